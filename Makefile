@@ -1,0 +1,54 @@
+# haploop: everything runs from a fresh clone with Python 3.11 or newer, pip and make; `make` alone lists the targets.
+PYTHON ?= python3
+UV ?= uv
+BIN := .venv/bin
+PIP := $(PYTHON) -m pip --python $(BIN)/python -qq --disable-pip-version-check --no-input
+READY := .venv/.installed
+
+.DEFAULT_GOAL := help
+.PHONY: help demo test slow check bench lock clean
+
+help: ## list the targets
+	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-6s %s\n", $$1, $$2 }' Makefile
+
+demo: $(READY) ## run the scene of figure 6c into runs/demo and draw it; the last line names the figure's file
+	@rm -rf runs/demo
+	@$(BIN)/haploop run launch/scenes/fig6c.toml --out runs/demo
+	@$(BIN)/haploop plot runs/demo
+
+test: $(READY) ## run the tests
+	@$(BIN)/pytest -q -m "not slow"
+
+slow: $(READY) ## run the slow tests (that there are none is no failure: pytest then exits with 5)
+	@$(BIN)/pytest -q -m slow || [ $$? -eq 5 ]
+
+check: $(READY) ## lint, format, types and the arrows between the packages
+	@$(BIN)/ruff check
+	@$(BIN)/ruff format --check
+	@$(BIN)/pyright
+	@$(BIN)/lint-imports
+
+bench: $(READY) ## measure the loop on this machine
+	@$(BIN)/python tests/bench/bench.py
+
+lock: ## pin every dependency anew with its hashes in requirements.lock (needs uv)
+	$(UV) pip compile pyproject.toml --extra plot --extra dev --output-file requirements.lock --upgrade --quiet \
+	  --universal --python-version 3.11 --fork-strategy fewest --generate-hashes \
+	  --no-emit-index-url --no-emit-find-links --no-annotate --no-header
+
+clean: ## remove the virtual environment, the runs and every cache
+	rm -rf .venv runs dist build .pytest_cache .ruff_cache .hypothesis .import_linter_cache
+	find nodes protocol launch tools tests -name __pycache__ -type d -prune -exec rm -rf {} +
+
+# A new lock means a new environment; a change of pyproject.toml only means installing haploop itself again.
+# The environment is made without pip and filled from outside, so a Python without ensurepip (Debian's) will do.
+.venv/.locked: requirements.lock
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "haploop needs Python 3.11 or newer, but $(PYTHON) is Python %d.%d; name another one: make PYTHON=python3.11" % sys.version_info[:2])'
+	@echo "setting up .venv (about a minute, once)"
+	@$(PYTHON) -m venv --clear --without-pip .venv
+	@$(PIP) install --require-hashes -r requirements.lock
+	@touch $@
+
+$(READY): .venv/.locked pyproject.toml
+	@$(PIP) install --no-deps --no-build-isolation -e .
+	@touch $@

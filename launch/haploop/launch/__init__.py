@@ -1,0 +1,1 @@
+"""From a scene file to a finished run: scene, plan, clock and launcher."""

@@ -1,0 +1,118 @@
+"""The ``[[event]]`` tables: what a single table cannot show, namely whether each change fits the run it comes into."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from pydantic_core import PydanticCustomError
+
+from haploop.launch.layers import KeyPath, Layers
+from haploop.launch.mistakes import nearest
+from haploop.launch.number import Number
+from haploop.launch.scene import EventTable, Wall, number_of
+from haploop.protocol.ticks import Timebase
+
+if TYPE_CHECKING:
+    from haploop.controller.dissipation import Element
+
+VERBS = ("swap", "set", "pause", "stop")
+SETTABLE_OF_WALL = ("stiffness", "position")
+NO_ELEMENT = "none"
+
+
+def check_events(
+    layers: Layers, time: Timebase | None, kinds: Mapping[str, type[Element]]
+) -> dict[int, dict[str, float]]:
+    """Walk the events in order of time, keeping book of which element is in which slot.
+
+    Removing an element, by kind "none", moves those after it up by one.
+
+    Returns:
+        Index of each event that sets something -> settable key -> SI value. Mistakes are added to ``layers``.
+    """
+    events = [(i, e) for i, e in enumerate(_tables(layers.data.get("event"))) if isinstance(e, dict)]
+    slots = [e.get("kind") if isinstance(e, dict) else None for e in _tables(layers.data.get("dissipation"))]
+    has_wall = isinstance(layers.data.get("wall"), dict)
+    settings: dict[int, dict[str, float]] = {}
+    for index, event in sorted(events, key=lambda item: _read(item[1], "at")):
+        key = ("event", index)
+        _check_shape(layers, key, event, time)
+        if isinstance(event.get("swap"), dict):
+            _swap(layers, key, event, slots)
+        if isinstance(event.get("set"), dict):
+            settable = _settable(slots, has_wall, kinds)
+            settings[index] = {
+                name: value
+                for name, given in event["set"].items()
+                if (value := _setting(layers, (*key, "set", name), given, settable)) is not None
+            }
+    return settings
+
+
+def _check_shape(layers: Layers, key: KeyPath, event: dict[str, Any], time: Timebase | None) -> None:
+    verbs = [verb for verb in VERBS if verb in event]
+    if len(verbs) != 1:
+        given = f"has {' and '.join(verbs)}" if verbs else "changes nothing"
+        layers.complain(key, "An event has exactly one of swap, set, pause and stop.", given)
+    if "element" in event and "swap" not in event:
+        layers.complain((*key, "element"), "It goes with swap alone.")
+    at = _read(event, "at")
+    if time and time.first_tick_at(at) >= time.ticks:
+        last = (time.ticks - 1) / time.control_rate
+        layers.complain((*key, "at"), f"It must be at most {last:g} s, when the last tick of the run is.")
+
+
+def _swap(layers: Layers, key: KeyPath, event: dict[str, Any], slots: list[Any]) -> None:
+    """Put the new kind into its slot."""
+    element = _read(event, "element")
+    kind = event["swap"].get("kind")
+    if element < len(slots) + (kind != NO_ELEMENT):
+        slots[element : element + 1] = [] if kind == NO_ELEMENT else [kind]
+    else:
+        count = f"{len(slots)} element" + "s" * (len(slots) != 1)
+        expected = f"The scene has {count} then, counted from 0; one past the end adds one."
+        layers.complain((*key, "element"), expected, f"is {element}")
+
+
+def _settable(slots: list[Any], has_wall: bool, kinds: Mapping[str, type[Element]]) -> dict[str, Number]:
+    """Every key that can be set at this moment of the run, and how its value is read."""
+    wall = {f"wall.{name}": number_of(Wall, name) for name in SETTABLE_OF_WALL if has_wall}
+    elements = {
+        f"dissipation.{slot}.{name}": Number(quantity)
+        for slot, kind in enumerate(slots)
+        if isinstance(kind, str) and kind in kinds
+        for name, (quantity, _) in kinds[kind].parameters().items()
+    }
+    return wall | elements
+
+
+def _setting(layers: Layers, key: KeyPath, given: Any, settable: dict[str, Number]) -> float | None:
+    name = str(key[-1])
+    if isinstance(given, dict):
+        layers.complain(
+            key,
+            f'Write the whole key in quotes, such as "{name}.{next(iter(given), "stiffness")}" = 1.0.',
+            "is a table",
+        )
+    elif name not in settable:
+        allowed = ", ".join(settable) or "nothing, since the scene has neither a wall nor elements then"
+        layers.complain(key, f"Allowed at that time: {allowed}.", "cannot be set", nearest(name, settable))
+    else:
+        try:
+            return settable[name].read(given)
+        except PydanticCustomError as error:
+            layers.complain(key, error.message())
+    return None
+
+
+def _read(event: dict[str, Any], key: str) -> Any:
+    """A number of an event; 0 where it is missing, or wrong, which is a mistake reported elsewhere."""
+    try:
+        return number_of(EventTable, key).read(event.get(key))
+    except PydanticCustomError:
+        return 0
+
+
+def _tables(value: Any) -> list[Any]:
+    return value if isinstance(value, list) else []

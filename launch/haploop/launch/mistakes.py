@@ -1,0 +1,58 @@
+"""What can be wrong with a scene, said in full sentences and all at once."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+COMMAND_LINE = "--set"
+
+
+@dataclass(frozen=True)
+class Mistake:
+    """One mistake.
+
+    Attributes:
+        file: the scene file that made it, or ``"--set"``.
+        key: dotted key, such as ``dissipation.0.mass``; empty when the file as a whole is wrong.
+        given: what was found there ("is -3.0", "is missing", "is not a key of [wall]").
+        expected: what is allowed, a full sentence.
+        nearest: the allowed name that comes nearest to the one given.
+    """
+
+    file: str
+    key: str
+    given: str
+    expected: str
+    nearest: str | None = None
+
+    def __str__(self) -> str:
+        if not self.key:
+            return f"{self.file}: {self.expected}"
+        hint = f"; did you mean {self.nearest}?" if self.nearest else "."
+        return f"{self.file}: {self.key} {self.given}{hint} {self.expected}"
+
+
+class SceneError(ValueError):
+    """A scene that cannot be run.
+
+    Attributes:
+        mistakes: everything that is wrong with it.
+    """
+
+    def __init__(self, mistakes: Iterable[Mistake]) -> None:
+        self.mistakes = list(dict.fromkeys(mistakes))
+        super().__init__("\n".join(map(str, self.mistakes)))
+
+
+def nearest(name: object, allowed: Iterable[str]) -> str | None:
+    """The allowed name closest to ``name``, if one is close."""
+    return next(iter(difflib.get_close_matches(str(name), list(allowed), n=1)), None)
+
+
+def shown(path: Path | str) -> str:
+    """A file as a reader wants to see it: relative when it lies below the working directory."""
+    path, here = Path(path), Path.cwd()
+    return str(path.relative_to(here)) if path.is_relative_to(here) else str(path)

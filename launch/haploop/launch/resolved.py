@@ -1,0 +1,57 @@
+"""A resolved scene as TOML that runs by itself and reads back to the same values, bit for bit."""
+
+from __future__ import annotations
+
+import math
+import re
+from typing import Any
+
+_BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
+_ESCAPES = {ord('"'): '\\"', ord("\\"): "\\\\", **{c: f"\\u{c:04x}" for c in [*range(0x20), 0x7F]}}
+
+
+def to_toml(scene: dict[str, Any]) -> str:
+    """TOML text of a dict of str, bool, int, finite float, lists and dicts.
+
+    Raises:
+        TypeError: another type of value, None and infinite numbers included.
+    """
+    return "\n".join(_table(scene, ())).lstrip("\n") + "\n"
+
+
+def inline(value: Any) -> str:
+    """One value on one line, as TOML writes it."""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, int) or (isinstance(value, float) and math.isfinite(value)):
+        return repr(value)
+    if isinstance(value, str):
+        return f'"{value.translate(_ESCAPES)}"'
+    if isinstance(value, list):
+        return f"[{', '.join(map(inline, value))}]"
+    if isinstance(value, dict):
+        return "{ " + ", ".join(f"{_key(k)} = {inline(v)}" for k, v in value.items()) + " }" if value else "{}"
+    raise TypeError(f"A scene holds text, numbers, true or false, lists and tables, but not {value!r}.")
+
+
+def _table(table: dict[str, Any], path: tuple[str, ...]) -> list[str]:
+    """Lines of a table: its plain keys first, since they belong to the header above them, then its sub-tables."""
+    lines = [f"{_key(key)} = {inline(value)}" for key, value in table.items() if not _has_header(value)]
+    for key, value in table.items():
+        inner = (*path, key)
+        name = ".".join(map(_key, inner))
+        if isinstance(value, dict):
+            lines += ["", f"[{name}]", *_table(value, inner)]
+        elif _has_header(value):
+            for item in value:
+                lines += ["", f"[[{name}]]", *_table(item, inner)]
+    return lines
+
+
+def _has_header(value: Any) -> bool:
+    is_array_of_tables = isinstance(value, list) and value and all(isinstance(item, dict) for item in value)
+    return isinstance(value, dict) or bool(is_array_of_tables)
+
+
+def _key(key: str) -> str:
+    return key if _BARE_KEY.fullmatch(key) else inline(key)

@@ -1,0 +1,1 @@
+"""The sampled controller: estimators, wall, dissipation elements and the controller process."""

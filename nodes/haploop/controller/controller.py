@@ -1,0 +1,81 @@
+"""The controller's core: from a sample to a force, with elements and gains that may change at a tick."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from haploop.controller.changes import Change, apply_change
+from haploop.controller.dissipation import Element, Motion
+from haploop.controller.estimators import Sample, acceleration_estimator, velocity_estimator
+from haploop.controller.recorder import Recorder
+from haploop.controller.slots import Slots
+from haploop.controller.wall import NoWall, Wall
+from haploop.protocol.ticks import Timebase
+
+
+class Controller:
+    """Estimates, wall and dissipation elements of one loop; knows nothing of sockets.
+
+    At tick k: f_d[k] = f_wall[k] + sum of the elements' forces[k], in the order of the scene's list.
+
+    Attributes:
+        tick: the next tick to be answered.
+        recorder: what happened at every tick, in blocks.
+    """
+
+    def __init__(self, scene: dict[str, Any], time: Timebase, kinds: dict[str, type[Element]]) -> None:
+        self._scene, self._time, self._kinds = scene, time, dict(kinds)
+        self._wall = Wall(scene["wall"]) if "wall" in scene else NoWall()
+        self._slots = Slots(scene.get("dissipation", []), self._kinds)
+        self._motion = Motion(time.period_s, self._wall.into_wall)
+        self._changes: list[tuple[int, Change]] = []
+        self._next_change = math.inf
+        self.recorder = Recorder(self._wall, self._slots, history_ticks=time.lookahead_ticks + 2)
+        self.tick = 0
+
+    def schedule(self, tick: int, change: Change) -> None:
+        """Have a checked swap or set take effect at ``tick``, before that tick's force."""
+        self._changes.append((tick, change))
+        self._next_change = self._changes[0][0]
+
+    def answer(self, samples: list[Sample]) -> list[float]:
+        """The commands in N that answer the next samples, in order."""
+        if self.tick == 0:
+            self._start(samples[0])
+        return [self._command(sample) for sample in samples]
+
+    def _start(self, first: Sample) -> None:
+        scene, period_s = self._scene, self._time.period_s
+        self._velocity = velocity_estimator(scene.get("velocity", {}), period_s, first)
+        self._acceleration = acceleration_estimator(scene.get("acceleration", {}), period_s, first)
+
+    def _command(self, sample: Sample) -> float:
+        if self.tick >= self._next_change:
+            self._change()
+        motion, wall = self._motion, self._wall
+        motion.a_before = motion.a
+        motion.x = x = sample[0]
+        motion.v = v = self._velocity(x)
+        motion.a = a = self._acceleration(v, sample)
+        motion.contact = contact = wall.contact(x)
+        total = f_wall = wall.force(x, contact)
+        row = [x, v, a, f_wall]
+        for slot in self._slots.slots:
+            force = slot.force(motion)
+            row.append(force)
+            total += force
+        row += (total, contact)
+        self.recorder.add(row)
+        self.tick += 1
+        return total
+
+    def _change(self) -> None:
+        """Carry out what is due; later ticks are written to a new block, since its columns may differ."""
+        self.recorder.cut()
+        while self._changes and self._changes[0][0] <= self.tick:
+            refusal = apply_change(self._changes.pop(0)[1], self.tick, self._slots, self._wall, self._kinds)
+            if refusal:
+                self.recorder.refused.append(refusal)
+        self._next_change = self._changes[0][0] if self._changes else math.inf
+        self.recorder.open()

@@ -1,0 +1,71 @@
+"""Finding the kinds of element: installed under the entry-point group, or in a file named at launch."""
+
+from __future__ import annotations
+
+import hashlib
+import inspect
+import sys
+from importlib.metadata import entry_points
+from pathlib import Path
+from types import ModuleType
+
+from haploop.controller.dissipation.element import Element
+
+ENTRY_POINT_GROUP = "haploop.dissipation"
+
+
+class PluginError(Exception):
+    """A plugin that cannot be used; the message says why."""
+
+
+def registry(plugin_files: list[Path] | None = None) -> dict[str, type[Element]]:
+    """Every kind by name: the installed ones, then those of ``plugin_files``, which win.
+
+    Raises:
+        PluginError: an entry point or a file does not load, or holds no element.
+    """
+    kinds: dict[str, type[Element]] = {}
+    for point in sorted(entry_points(group=ENTRY_POINT_GROUP), key=lambda p: p.name):
+        try:
+            kinds[point.name] = _checked(point.load(), f"entry point {point.name} = {point.value}")
+        except Exception as error:
+            raise PluginError(f"The installed element {point.name!r} ({point.value}) does not load: {error}") from error
+    for path in plugin_files or []:
+        kinds.update(load_plugin(path))
+    return kinds
+
+
+def load_plugin(path: Path) -> dict[str, type[Element]]:
+    """The elements a Python file defines, by kind. The file is executed: only files named by the user come here.
+
+    Raises:
+        PluginError: the file cannot be read or run, or defines no usable element.
+    """
+    try:
+        source = Path(path).read_text(encoding="utf-8")
+        module = ModuleType("haploop_plugin_" + hashlib.sha256(source.encode()).hexdigest()[:12])
+        module.__file__ = str(path)
+        sys.modules[module.__name__] = module  # dataclasses and type hints look the names up there
+        exec(compile(source, str(path), "exec"), module.__dict__)
+    except Exception as error:
+        line = f", line {error.lineno}" if isinstance(error, SyntaxError) else ""
+        raise PluginError(f"The plugin {path}{line} does not load: {type(error).__name__}: {error}") from error
+    found = [c for c in vars(module).values() if inspect.isclass(c) and c.__module__ == module.__name__]
+    elements = [_checked(c, str(path)) for c in found if issubclass(c, Element)]
+    if not elements:
+        raise PluginError(f"The plugin {path} defines no element; a class derived from Element was expected.")
+    return {element.kind: element for element in elements}
+
+
+def _checked(element: object, origin: str) -> type[Element]:
+    if not (inspect.isclass(element) and issubclass(element, Element)):
+        raise PluginError(f"{origin} must name a class derived from Element, but gives {element!r}.")
+    if not isinstance(getattr(element, "kind", None), str):
+        raise PluginError(f'{element.__name__} in {origin} names no kind; write kind = "my-element" in the class.')
+    if inspect.isabstract(element):
+        raise PluginError(f"{element.__name__} in {origin} has no method force(self, motion).")
+    try:
+        element.parameters()
+    except TypeError as error:
+        raise PluginError(f"{origin}: {error}") from error
+    return element

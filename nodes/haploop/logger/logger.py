@@ -1,0 +1,150 @@
+"""The logger's core: telemetry in, books, log and summary out; knows nothing of sockets."""
+
+from __future__ import annotations
+
+import hashlib
+import time as wall_clock
+from typing import Any
+
+import numpy as np
+
+from haploop.logger.books import Books
+from haploop.logger.channels import Channels
+from haploop.logger.summary import summary
+from haploop.logger.tapes import ControllerTape, PlantTape
+from haploop.logger.window import Window
+from haploop.protocol.ticks import Timebase
+
+Block = dict[str, Any]
+
+
+class Logger:
+    """Keeps the books of a run from the blocks of plant and controller, in whichever order they come.
+
+    Args:
+        scene, time: the resolved scene and its integers.
+        channels: where to write, or None to keep books only.
+
+    Attributes:
+        tick: every interval before it is booked.
+        latest: running books at the ticks booked last, name -> array; with ``latest_from`` the first of them.
+    """
+
+    def __init__(self, scene: dict[str, Any], time: Timebase, channels: Channels | None) -> None:
+        self._scene, self._time, self._channels = scene, time, channels
+        self.books = Books(scene, time)
+        resolution = scene.get("encoder", {}).get("resolution", 0.0)
+        self.window = Window(time.plant_rate, time.steps_per_tick, resolution)
+        self._into_wall = 0.0
+        self._accounts: dict[int, dict[str, Any]] = {}
+        self._digest = hashlib.sha256()
+        self.latest: dict[str, np.ndarray] = {}
+        self.latest_from = self.tick = self._first_tick = 0
+        self._began = wall_clock.perf_counter()
+
+    def start(self, plant: dict[str, float], history: list[Block]) -> None:
+        """Begin with the plant's state and, when joining a run, the controller's last blocks."""
+        known = history[-1]["from_tick"] + history[-1]["ticks"] if history else 0
+        self.tick = self._first_tick = max(int(plant["tick"]), known)
+        self._plant = PlantTape(self._time.steps_per_tick, int(plant["tick"]))
+        self._controller = ControllerTape(
+            history[0]["from_tick"] if history else self.tick, keep_ticks=self._time.lookahead_ticks + 2
+        )
+        for block in history:
+            self._controller.add(block)
+            self._note_accounts(block)
+        self._end_state = plant["x"], plant["v"], plant["force"]
+        self._started = False
+
+    def plant_block(self, block: Block) -> None:
+        """Take a block of the plant."""
+        self._plant.add(block)
+        self._book_common()
+
+    def controller_block(self, block: Block) -> None:
+        """Take a block of the controller."""
+        self._controller.add(block)
+        self._note_accounts(block)
+        if self._channels:
+            self._channels.controller(block)
+        self._book_common()
+
+    def event(self, tick: int, event: dict[str, Any]) -> None:
+        """Take note of something that changed the run."""
+        if self._channels:
+            self._channels.event(tick, event)
+
+    def _note_accounts(self, block: Block) -> None:
+        self._into_wall = block["wall"]["into_wall"]
+        end = block["from_tick"] + block["ticks"]
+        for element in block["elements"]:
+            self._accounts.setdefault(element["book"], dict(element))["to_tick"] = end
+
+    def _book_common(self) -> None:
+        """Book the intervals of which both sides are known."""
+        end = min(self._plant.end, self._controller.end)
+        if end <= self.tick:
+            return
+        if self._plant.tick < self.tick:
+            self._plant.take(self.tick)
+        plant = self._plant.take(end)
+        x, v, force = plant["x"], plant["v"], plant["force"]
+        if not self._started:
+            self.books.start(float(x[0]), float(v[0]))
+            self._digest.update(np.stack([x[:1], v[:1]], axis=1).tobytes())
+            self._started = True
+        rows = self.books.book(self.tick, plant, self._controller, self._into_wall)
+        at = self.tick - self._controller.first
+        columns = {name: column[at : at + end - self.tick] for name, column in self._controller.columns.items()}
+        self.window.add(x, force[:-1], columns)
+        self._digest.update(np.stack([x[1:], v[1:]], axis=1).tobytes())
+        self._end_state = float(x[-1]), float(v[-1]), float(force[-1])
+        self.latest_from, self.latest = self.tick, self._named(rows)
+        if self._channels:
+            self._channels.plant(self.tick, end - self.tick, {name: plant[name] for name in ("x", "v", "force")})
+            self._channels.energy(self.latest_from, self.latest)
+        self.tick = end
+        self._controller.forget_before(end)
+
+    def _named(self, rows: np.ndarray) -> dict[str, np.ndarray]:
+        """Running books by the names people read: an element's book by its kind, numbered where a kind recurs."""
+        names = [self._account_name(name) for name in self.books.names]
+        return dict(zip(names, rows, strict=True)) | {"residual": self.books.residuals(rows)}
+
+    def _account_name(self, name: str) -> str:
+        book, dot, side = name.partition(".")
+        if not book.isdigit():
+            return name
+        kind = self._accounts[int(book)]["kind"]
+        same = [b for b in sorted(self._accounts) if self._accounts[b]["kind"] == kind]
+        return f"{kind}{f'-{same.index(int(book)) + 1}' if same[0] != int(book) else ''}{dot}{side}"
+
+    def summary(self, ended: str, diverged: str | None, lost: dict[str, int]) -> dict[str, Any]:
+        """The summary of what was booked so far.
+
+        Args:
+            ended: why the run ended ("done", "stopped", ...).
+            diverged: why the plant ended by itself, or None.
+            lost: commands_dropped, commands_lost, telemetry_gaps.
+        """
+        ticks = self.tick - self._first_tick
+        x, v, force = self._end_state
+        ran = {
+            "duration_s": ticks / self._time.control_rate,
+            "ticks": ticks,
+            "steps": ticks * self._time.steps_per_tick,
+            "from_tick": self._first_tick,
+            "ended": ended,
+            "wall_s": wall_clock.perf_counter() - self._began,
+            "final": {"x_m": x, "v_m_s": v},
+            "lost": lost,
+            "trajectory_sha256": self._digest.hexdigest(),
+        }
+        accounts = [{**a, "to_tick": min(a["to_tick"], self.tick)} for a in self._accounts.values()]
+        return summary(self._scene, ran, self.window, self.books, accounts, diverged)
+
+    def end(self) -> None:
+        """Write the end state; call once, when no more blocks come."""
+        if self._channels:
+            x, v, force = self._end_state
+            self._channels.plant_end(self.tick, x, v, force)

@@ -1,0 +1,92 @@
+"""The summary of a run: what came of it, in the figures people and programs ask for."""
+
+from __future__ import annotations
+
+import json
+import math
+import platform
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from haploop.logger.books import Books
+from haploop.logger.window import Window
+
+# Entries that differ between two runs of the same scene.
+OF_THE_MACHINE = ("wall_s", "real_time_factor", "versions")
+
+
+def versions() -> dict[str, str]:
+    """What the run was made with."""
+    packages = {name: version(name) for name in ("haploop", "numpy", "pyzmq", "msgpack")}
+    return {**packages, "python": platform.python_version()}
+
+
+def energy(books: Books, accounts: list[dict[str, Any]], has_wall: bool) -> dict[str, Any]:
+    """The ``energy`` entry: every book as it stands at the end of the run."""
+    total = books.total
+    elements = []
+    for account in accounts:
+        pair = {"sampled_J": total(f"{account['book']}.sampled"), "true_J": total(f"{account['book']}.true")}
+        elements.append({key: value for key, value in account.items() if key != "book"} | pair)
+    wall: dict[str, Any] = {"sampled_J": total("wall.sampled"), "true_J": total("wall.true")}
+    if has_wall:
+        steps = [total("ideal"), total("sampled_and_held"), total("quantised"), wall["true_J"]]
+        causes = ("sampling_and_hold_J", "quantisation_J", "delay_J")
+        parts = {cause: after - before for cause, before, after in zip(causes, steps[:-1], steps[1:], strict=True)}
+        wall |= {"ideal_J": steps[0], "leak": {"total_J": steps[-1] - steps[0], **parts}}
+    heats = {f"{name}_J": total(name) for name in books.names if name.endswith("_heat")}
+    return {
+        "elements": elements,
+        "wall": wall,
+        "hand_work_J": total("hand_work"),
+        **heats,
+        "stored_J": books.stored_J,
+        "moved_J": books.moved_J,
+        "residual_J": books.residual_J,
+    }
+
+
+def summary(
+    scene: dict[str, Any], ran: dict[str, Any], window: Window, books: Books, accounts: list[dict[str, Any]], diverged: str | None
+) -> dict[str, Any]:
+    """All entries of ``summary.json``.
+
+    Args:
+        scene: the resolved scene.
+        ran: entries that say what ran: duration_s, ticks, steps, wall_s, ended, final, lost, trajectory_sha256.
+        window, books: as they stand at the end.
+        accounts: every element's book: kind, parameters, from_tick, to_tick.
+        diverged: why the plant ended by itself, or None.
+    """
+    verdict = window.verdict(diverged)
+    wall_s = ran.pop("wall_s")
+    return {
+        "title": scene["title"],
+        "seed": scene["seed"],
+        **ran,
+        "versions": versions(),
+        "wall_s": wall_s,
+        "real_time_factor": ran["duration_s"] / wall_s if wall_s else 0.0,
+        "verdict": verdict.word,
+        "verdict_rule": verdict.rule,
+        "extremes": {"x_min_m": window.x_min_m, "x_max_m": window.x_max_m, "force_max_N": window.force_max_N},
+        "window": window.figures(),
+        "energy": energy(books, accounts, "wall" in scene),
+    }
+
+
+def write(summary: dict[str, Any], path: Path) -> None:
+    """Write as JSON, in one piece: a reader never sees half a file. Numbers that are not finite become null."""
+    temporary = path.with_suffix(".part")
+    temporary.write_text(json.dumps(finite(summary), indent=2) + "\n", encoding="utf-8")
+    temporary.replace(path)
+
+
+def finite(value: Any) -> Any:
+    """The same structure with None for every number that JSON cannot hold."""
+    if isinstance(value, dict):
+        return {key: finite(entry) for key, entry in value.items()}
+    if isinstance(value, list | tuple):
+        return [finite(entry) for entry in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value

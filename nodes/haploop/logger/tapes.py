@@ -1,0 +1,98 @@
+"""Telemetry of plant and controller, laid side by side so that whole intervals can be booked."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+PLANT_COLUMNS = ("x", "v", "force", "command")
+
+
+def as_float64(data: bytes) -> np.ndarray:
+    """A telemetry column as an array."""
+    return np.frombuffer(data, "<f8")
+
+
+class TelemetryGap(RuntimeError):
+    """A block that does not follow the one before it."""
+
+
+class PlantTape:
+    """Plant states at every step from ``tick`` on; the last state is the start of what comes next."""
+
+    def __init__(self, steps_per_tick: int, tick: int) -> None:
+        self._steps = steps_per_tick
+        self.tick = self.end = tick
+        self._columns = {name: np.zeros(0) for name in PLANT_COLUMNS}
+
+    def add(self, block: dict[str, Any]) -> None:
+        """Append a block.
+
+        Raises:
+            TelemetryGap: it does not start where the last one ended.
+        """
+        if block["from_tick"] != self.end:
+            raise TelemetryGap(f"A plant block from tick {self.end} was expected, but one from {block['from_tick']} came.")
+        keep = max(0, (self.end - self.tick) * self._steps)
+        for name in PLANT_COLUMNS:
+            joined = self._columns[name][:keep], as_float64(block["columns"][name])
+            self._columns[name] = np.concatenate(joined)
+        self.end += block["ticks"]
+
+    def take(self, tick: int) -> dict[str, np.ndarray]:
+        """States of the intervals before ``tick``, end state included; what comes from there on stays."""
+        rows = (tick - self.tick) * self._steps
+        taken = {name: column[: rows + 1] for name, column in self._columns.items()}
+        self._columns = {name: column[rows:] for name, column in self._columns.items()}
+        self.tick = tick
+        return taken
+
+
+class ControllerTape:
+    """Controller rows by tick, with every book's force and the wall as it stood.
+
+    Rows older than ``keep_ticks`` before the last tick taken are forgotten.
+
+    Attributes:
+        first: tick of the first row kept.
+        end: tick after the last row.
+        columns: x, v, a, wall, total, in_contact, wall_position, wall_stiffness; shape (end - first,) each.
+        forces: force of every book that has acted within these ticks, 0 where it was not at work.
+    """
+
+    def __init__(self, tick: int, keep_ticks: int) -> None:
+        self.first = self.end = tick
+        self._keep_ticks = keep_ticks
+        self.columns: dict[str, np.ndarray] = {}
+        self.forces: dict[int, np.ndarray] = {}
+
+    def add(self, block: dict[str, Any]) -> None:
+        """Append a block.
+
+        Raises:
+            TelemetryGap: it does not start where the last one ended.
+        """
+        if block["from_tick"] != self.end:
+            raise TelemetryGap(
+                f"A controller block from tick {self.end} was expected, but one from {block['from_tick']} came."
+            )
+        new = {name: as_float64(data) for name, data in block["columns"].items()}
+        books = {e["book"]: new.pop(f"dissipation.{i}") for i, e in enumerate(block["elements"])}
+        ticks, kept = block["ticks"], self.end - self.first
+        for name in ("position", "stiffness"):
+            new[f"wall_{name}"] = np.full(ticks, block["wall"][name])
+        self.columns = {name: np.concatenate([self.columns.get(name, new[name][:0]), new[name]]) for name in new}
+        self.forces = {
+            book: np.concatenate([self.forces.get(book, np.zeros(kept)), books.get(book, np.zeros(ticks))])
+            for book in sorted(self.forces.keys() | books.keys())
+        }
+        self.end += ticks
+
+    def forget_before(self, tick: int) -> None:
+        """Drop rows no command in flight at ``tick`` needs, and books that have no force left."""
+        drop = max(0, tick - self._keep_ticks - self.first)
+        if drop:
+            self.columns = {name: column[drop:] for name, column in self.columns.items()}
+            self.forces = {book: force[drop:] for book, force in self.forces.items() if force[drop:].any()}
+            self.first += drop

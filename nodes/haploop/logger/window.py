@@ -1,0 +1,110 @@
+"""The last half second of a run: does the device rest, swing, or stay away from the wall?"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+WINDOW_S = 0.5
+# Below this, swinging is no limit cycle whatever the encoder: a thousandth of what a wall of 1 N/mm gives way to 1 N.
+SMALLEST_SWING_M = 1e-6
+CROSSINGS = 4
+CONTROLLER_COLUMNS = ("x", "total", "in_contact", "wall_position")
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """One word and the rule that gave it."""
+
+    word: str
+    rule: str
+
+
+class Window:
+    """Keeps what the last ``WINDOW_S`` seconds (or the second half of a shorter run) need to be judged.
+
+    Args:
+        resolution_m: encoder step, 0 without one; swings within one step either way do not count.
+    """
+
+    def __init__(self, plant_rate: int, steps_per_tick: int, resolution_m: float) -> None:
+        self._rate, self._steps_per_tick = plant_rate, steps_per_tick
+        self._keep_steps = math.ceil(WINDOW_S * plant_rate)
+        self.swing_m = max(resolution_m, SMALLEST_SWING_M)
+        self._x = np.zeros(0)
+        self._ticks = {name: np.zeros(0) for name in CONTROLLER_COLUMNS}
+        self._steps = 0
+        self.ever_in_contact = False
+        self.x_min_m, self.x_max_m, self.force_max_N = math.inf, -math.inf, 0.0
+
+    def add(self, x: np.ndarray, force: np.ndarray, rows: dict[str, np.ndarray]) -> None:
+        """Take the states of some intervals (end state included), the forces held and the controller's rows."""
+        kept = self._x if len(self._x) else x[:1]
+        self._x = np.concatenate([kept, x[1:]])[-self._keep_steps - 1 :]
+        keep_ticks = self._keep_steps // self._steps_per_tick + 1
+        self._ticks = {name: np.concatenate([self._ticks[name], rows[name]])[-keep_ticks:] for name in self._ticks}
+        self._steps += len(x) - 1
+        self.ever_in_contact |= bool(rows["in_contact"].any())
+        self.x_min_m = min(self.x_min_m, float(x.min()))
+        self.x_max_m = max(self.x_max_m, float(x.max()))
+        self.force_max_N = max(self.force_max_N, float(np.abs(force).max(initial=0.0)))
+
+    def _last(self) -> tuple[np.ndarray, dict[str, np.ndarray], int]:
+        """x at the plant steps of the window, controller columns at its ticks, and its first step."""
+        steps = min(self._keep_steps, self._steps if self._steps >= self._keep_steps else self._steps // 2)
+        first = self._steps - steps
+        ticks = self._steps // self._steps_per_tick + bool(self._steps % self._steps_per_tick)
+        ticks -= -(-first // self._steps_per_tick)
+        rows = {name: column[len(column) - ticks :] for name, column in self._ticks.items()}
+        return self._x[-steps - 1 :], rows, first
+
+    def figures(self) -> dict[str, Any]:
+        """The ``window`` entry of the summary."""
+        x, rows, first = self._last()
+        inside = rows["in_contact"] > 0
+        depth = rows["wall_position"][inside] - rows["x"][inside]
+        stiffness = rows["total"][inside] / depth
+        return {
+            "from_s": (first / self._rate),
+            "oscillation_m": float(np.ptp(x)) if len(x) else 0.0,
+            "outside_fraction": float(np.mean(~inside)) if len(inside) else 1.0,
+            "displayed_stiffness_N_m": float(np.mean(stiffness)) if len(stiffness) else None,
+            "penetration_mean_m": float(np.mean(np.abs(depth))) if len(depth) else None,
+        }
+
+    def verdict(self, diverged: str | None) -> Verdict:
+        """Judge the window; ``diverged`` is why the plant ended by itself, if it did."""
+        if diverged:
+            return Verdict("diverged", f"{diverged}.")
+        if not self.ever_in_contact:
+            return Verdict("no-contact", "No tick of the run was in contact with a wall.")
+        crossings, growth = swings(self._last()[0], self.swing_m)
+        seen = (
+            f"In the last {WINDOW_S:g} s (second half of a shorter run) x crossed its trend line {crossings} times by more "
+            f"than {self.swing_m * 1e6:.3g} um, its second half {growth:.2f} times as wide as its first; a limit cycle "
+            f"is at least {CROSSINGS} crossings and 0.5 times."
+        )
+        return Verdict("limit-cycle" if crossings >= CROSSINGS and growth >= 0.5 else "steady", seen)
+
+
+def swings(x: np.ndarray, swing_m: float) -> tuple[int, float]:
+    """How often x swings across its straight trend by more than ``swing_m`` on either side, and how the width grows.
+
+    Args:
+        x: positions at equal steps, m.
+        swing_m: a crossing counts only from beyond +swing_m to beyond -swing_m or back.
+
+    Returns:
+        (crossings, peak to peak of the second half over that of the first; 0 for no width at all).
+    """
+    if len(x) < 4:
+        return 0, 0.0
+    t = np.arange(len(x)) - (len(x) - 1) / 2.0
+    offset = x - x.mean()
+    offset = offset - t * (np.dot(t, offset) / np.dot(t, t))
+    side = np.sign(offset)[np.abs(offset) > swing_m]
+    first, second = np.ptp(offset[: len(x) // 2]), np.ptp(offset[len(x) // 2 :])
+    return int(np.count_nonzero(np.diff(side))), float(second / first) if first > 0 else 0.0

@@ -1,0 +1,1 @@
+"""The device in the hand: its dynamics, effects, integrators and the plant process."""

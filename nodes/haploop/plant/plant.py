@@ -1,0 +1,174 @@
+"""The plant's core: a device in a hand, stepped by its exact flow, sampled at ticks, driven by delayed commands."""
+
+from __future__ import annotations
+
+import math
+from array import array
+from typing import Any
+
+from haploop.plant.command_line import CommandLine
+from haploop.plant.flow import StepFlow
+from haploop.plant.hand_force import HandForce
+from haploop.plant.mechanics import Mechanics
+from haploop.plant.sensors import accelerometer_is_used, encoder
+from haploop.protocol.ticks import Timebase
+
+# The drive of the hand is prepared for this many intervals at a time.
+_DRIVE_TICKS = 256
+
+
+class Plant:
+    """State, sampling and stepping of one plant; knows nothing of sockets.
+
+    Call ``samples`` and ``receive`` in turn: samples of at most L + 1 ticks, then the commands that answer them.
+    The state is carried as a float and the rounding it left over (compensated addition), so that neither slow motion
+    nor a long run loses what a single step adds.
+
+    Attributes:
+        tick: the next tick to be sampled.
+        stop_reason: why the plant ended by itself (diverged), or None.
+    """
+
+    def __init__(self, scene: dict[str, Any], time: Timebase) -> None:
+        mechanics = Mechanics.of(scene)
+        self._flow = StepFlow.of(mechanics.mass_kg, mechanics.damping, mechanics.stiffness, time.step_s)
+        self._mechanics = mechanics
+        self._steps = time.steps_per_tick
+        self._tau = HandForce(scene.get("hand", {}).get("force"), time.plant_rate)
+        self._spring_at_origin_N = mechanics.stiffness * mechanics.rest_m
+        self._line = CommandLine(time)
+        self._limit_m = scene["diverged_beyond"]
+        measure = encoder(scene.get("encoder"))
+        if accelerometer_is_used(scene):
+            self._measure = lambda: (measure(self.x), self._acceleration())
+        else:
+            self._measure = lambda: (measure(self.x),)
+        self.x, self.v = mechanics.start
+        self._x_rest = self._v_rest = 0.0
+        self._force, self._command = 0.0, -1
+        self._interval_due = False
+        self._drive: list[tuple[float, float]] = []
+        self._drive_first = self._drive_end = 0
+        self.tick = 0
+        self.stop_reason: str | None = None
+        self._begin_block()
+
+    def samples(self, count: int) -> list[tuple[float, ...]]:
+        """The next ``count`` samples, (x_m,) or (x_m, acceleration) each; fewer when the plant diverged.
+
+        Commands up to ``tick + count - 2 - L`` must have been received.
+        """
+        samples = []
+        for _ in range(count):
+            if self._interval_due and not self._advance():
+                break
+            samples.append(self._measure())
+            self.tick += 1
+            self._interval_due = True
+        return samples
+
+    def receive(self, forces: list[float]) -> None:
+        """Take the next commands, in order of their ticks."""
+        self._line.receive(forces)
+
+    def finish(self) -> None:
+        """Step through the interval after the last sample, so that the run ends at the tick after it."""
+        if self._interval_due:
+            self._advance()
+
+    @property
+    def reached(self) -> int:
+        """The tick whose state is the present one: every interval before it has been stepped."""
+        return self.tick - self._interval_due
+
+    def _advance(self) -> bool:
+        """Step through interval ``tick - 1``; False when the run has to end where the plant now is."""
+        tick = self.tick - 1
+        if tick >= self._drive_end:
+            self._prepare_drive(tick)
+        holds = self._line.holds(tick)
+        for _, force, command in holds:
+            if not math.isfinite(force):
+                self._stop(tick, f"command {command} was {force}, which no device can apply")
+                return False
+        drive = (tick - self._drive_first) * self._steps
+        for count, force, command in holds:
+            self._hold(count, force, drive)
+            self._forces += [force] * count
+            self._commands += [float(command)] * count
+            drive += count
+        self._force, self._command = force, command
+        self._interval_due = False
+        if not -self._limit_m <= self.x <= self._limit_m:
+            self._stop(tick + 1, f"the device was at {self.x:g} m, beyond the limit of {self._limit_m:g} m")
+            return False
+        return True
+
+    def _hold(self, count: int, force: float, drive: int) -> None:
+        """``count`` plant steps under one held force: x+ = x + dx, v+ = v + dv by the exact flow."""
+        flow = self._flow
+        x_x, x_v, v_x, v_v = flow.x_x, flow.x_v, flow.v_x, flow.v_v
+        held_x, held_v = flow.x_force * force, flow.v_force * force
+        x, v, x_rest, v_rest = self.x, self.v, self._x_rest, self._v_rest
+        log_x, log_v = self._xs.append, self._vs.append
+        for drive_x, drive_v in self._drive[drive : drive + count]:
+            dx = x_x * x + x_v * v + (held_x + drive_x) + x_rest
+            dv = v_x * x + v_v * v + (held_v + drive_v) + v_rest
+            next_x, next_v = x + dx, v + dv
+            x_rest, v_rest = dx - (next_x - x), dv - (next_v - v)
+            x, v = next_x, next_v
+            log_x(x)
+            log_v(v)
+        self.x, self.v, self._x_rest, self._v_rest = x, v, x_rest, v_rest
+
+    def _prepare_drive(self, tick: int) -> None:
+        """What hand force and spring rest add to dx and dv at each step of the next intervals."""
+        first = tick * self._steps
+        tau = self._tau.at_steps(first, first + _DRIVE_TICKS * self._steps + 1)
+        start, rise = tau[:-1] + self._spring_at_origin_N, tau[1:] - tau[:-1]
+        flow = self._flow
+        drive_x, drive_v = flow.x_force * start + flow.x_slope * rise, flow.v_force * start + flow.v_slope * rise
+        self._drive = list(zip(drive_x.tolist(), drive_v.tolist(), strict=True))
+        self._drive_first, self._drive_end = tick, tick + _DRIVE_TICKS
+
+    def _acceleration(self) -> float:
+        """Acceleration now, under the force held over the step that ends here (0 at the start), m/s^2."""
+        step = self.tick * self._steps
+        tau = float(self._tau.at_steps(step, step + 1)[0])
+        m = self._mechanics
+        return (self._force + tau - m.damping * self.v - m.stiffness * (self.x - m.rest_m)) / m.mass_kg
+
+    def _stop(self, tick: int, what: str) -> None:
+        self.stop_reason = f"{what}, at tick {tick}"
+
+    def state(self) -> dict[str, float]:
+        """Where the plant is now: tick reached, x, v, force and command last in effect."""
+        return {
+            "tick": self.reached,
+            "x": self.x,
+            "v": self.v,
+            "force": self._force,
+            "command": float(self._command),
+        }
+
+    def take_block(self) -> tuple[int, int, dict[str, bytes]]:
+        """(first tick, ticks, columns) of what was stepped since the last block; empties it.
+
+        Columns x, v, force, command are little-endian float64 with ``ticks * n + 1`` rows: every step of the block
+        and its end state, whose force and command are the last held ones.
+        """
+        first, reached = self._block_first, self.reached
+        columns = {
+            "x": array("d", self._xs).tobytes(),
+            "v": array("d", self._vs).tobytes(),
+            "force": array("d", [*self._forces, self._force]).tobytes(),
+            "command": array("d", [*self._commands, self._command]).tobytes(),
+        }
+        self._begin_block()
+        return first, reached - first, columns
+
+    def _begin_block(self) -> None:
+        self._block_first = self.reached
+        self._xs, self._vs = [self.x], [self.v]
+        self._forces: list[float] = []
+        self._commands: list[float] = []

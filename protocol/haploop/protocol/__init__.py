@@ -1,0 +1,1 @@
+"""What every process agrees on: messages, wire format, sockets and the rules of the clock."""

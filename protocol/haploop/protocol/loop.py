@@ -1,0 +1,141 @@
+"""The direct line between plant and controller: every message stamped with its tick, every answer checked."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import msgpack
+import zmq
+
+from haploop.protocol.member import REPORT_MS
+from haploop.protocol.messages import MESSAGES, VERSION
+from haploop.protocol.sockets import open_socket
+from haploop.protocol.wire import Frame, WireError, decode, encode
+
+_COMMANDS = MESSAGES["COMMANDS"].code
+_SAMPLES = MESSAGES["SAMPLES"].code
+
+Idle = Callable[[], None]
+
+
+class LoopError(RuntimeError):
+    """A gap, a repeat or a wrong tick between plant and controller."""
+
+
+class PlantEnd:
+    """The plant's end: binds a ROUTER, so that a stranger who connects gets nothing and disturbs nothing.
+
+    Attributes:
+        socket: to be bound by the node.
+        strangers: frames that came from anyone but the controller.
+    """
+
+    def __init__(self, context: zmq.Context[zmq.Socket[bytes]]) -> None:
+        self.socket = open_socket(context, zmq.ROUTER)
+        self.socket.setsockopt(zmq.RCVTIMEO, REPORT_MS)
+        self._partner = b""
+        self.strangers = 0
+        self._pack = msgpack.Packer(autoreset=True).pack
+
+    def greet(self, secret: str, idle: Idle) -> None:
+        """Wait for the controller, known by the run's secret, and greet it back."""
+        while True:
+            sender, data = self._receive(idle)
+            if _is_hello(data, secret):
+                self._partner = sender
+                self._send(encode("HELLO", secret))
+                return
+            self.strangers += 1
+
+    def exchange(self, tick: int, samples: list[tuple[float, ...]], idle: Idle) -> list[float]:
+        """Send the samples of the ticks from ``tick`` on and return the commands that answer them.
+
+        Raises:
+            LoopError: the answer is for other ticks.
+        """
+        self._send(self._pack((VERSION, _SAMPLES, tick, samples)))
+        while True:
+            sender, data = self._receive(idle)
+            if sender == self._partner:
+                break
+            self.strangers += 1
+        answer = msgpack.unpackb(data)
+        if answer[:3] != [VERSION, _COMMANDS, tick] or len(answer[3]) != len(samples):
+            raise LoopError(_mismatch("commands", tick, len(samples), decode(data)))
+        return answer[3]
+
+    def close(self, tick: int) -> None:
+        """Tell the controller that the run ends at ``tick``."""
+        self._send(encode("LAST", tick))
+
+    def _send(self, data: bytes) -> None:
+        self.socket.send(self._partner, zmq.SNDMORE)
+        self.socket.send(data)
+
+    def _receive(self, idle: Idle) -> tuple[bytes, bytes]:
+        """Sender and last frame of the next message; calls ``idle`` now and then while nothing comes."""
+        while True:
+            try:
+                sender = self.socket.recv()
+                data = b""
+                while self.socket.rcvmore:
+                    data = self.socket.recv()
+                return sender, data
+            except zmq.Again:
+                idle()
+
+
+class ControllerEnd:
+    """The controller's end: a DEALER that knows only the plant."""
+
+    def __init__(self, context: zmq.Context[zmq.Socket[bytes]], address: str) -> None:
+        self.socket = open_socket(context, zmq.DEALER)
+        self.socket.setsockopt(zmq.RCVTIMEO, REPORT_MS)
+        self.socket.connect(address)
+        self._pack = msgpack.Packer(autoreset=True).pack
+
+    def greet(self, secret: str, idle: Idle) -> None:
+        """Present ourselves with the run's secret and wait for the plant's greeting."""
+        self.socket.send(encode("HELLO", secret))
+        if not _is_hello(self._receive(idle), secret):
+            raise LoopError("The plant's greeting did not carry the secret of this run.")
+
+    def samples(self, tick: int, idle: Idle) -> list[list[float]] | None:
+        """The next samples, which must start at ``tick``; None when the run ends there.
+
+        Raises:
+            LoopError: samples of other ticks came, or none will come although some are missing.
+        """
+        data = self._receive(idle)
+        items = msgpack.unpackb(data)
+        if items[:3] == [VERSION, _SAMPLES, tick]:
+            return items[3]
+        frame = decode(data)
+        if frame.name == "LAST" and frame.fields[0] <= tick:
+            return None
+        raise LoopError(_mismatch("samples", tick, None, frame))
+
+    def answer(self, tick: int, forces: list[float]) -> None:
+        """Send the commands of the ticks from ``tick`` on."""
+        self.socket.send(self._pack((VERSION, _COMMANDS, tick, forces)))
+
+    def _receive(self, idle: Idle) -> bytes:
+        while True:
+            try:
+                return self.socket.recv()
+            except zmq.Again:
+                idle()
+
+
+def _is_hello(data: bytes, secret: str) -> bool:
+    try:
+        return decode(data) == Frame("HELLO", [secret])
+    except WireError:
+        return False
+
+
+def _mismatch(what: str, tick: int, count: int | None, came: Frame) -> str:
+    expected = f"{what} from tick {tick}" + (f", {count} of them," if count else "")
+    fields: list[Any] = came.fields
+    return f"In the loop {expected} were expected, but {came.name} of tick {fields[0]} with {str(fields[1:])[:80]} came."

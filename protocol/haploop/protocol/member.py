@@ -1,0 +1,120 @@
+"""A node's tie to the clock: join, work no further than granted, report, leave."""
+
+from __future__ import annotations
+
+import os
+from typing import Any
+
+import zmq
+
+from haploop.protocol.sockets import open_socket
+from haploop.protocol.wire import Frame, WireError, decode, encode
+
+# A node that waits says so this often, so that the clock can tell who is being waited for.
+REPORT_MS = 200
+_JOIN_MS = 20_000
+
+
+class Aborted(Exception):
+    """The clock ended the run because something failed elsewhere; the message says what."""
+
+
+class Refused(Exception):
+    """The clock did not let this node join; the message says why."""
+
+
+class Member:
+    """One node's side of the conversation with the clock.
+
+    Attributes:
+        until: ticks before this one may be worked on.
+        last: whether no further ticks will be granted.
+        events: granted events not yet taken, (tick, event), in order.
+        garbled: frames from the clock's address that were no messages.
+    """
+
+    def __init__(self, context: zmq.Context[zmq.Socket[bytes]], role: str, address: str, secret: str) -> None:
+        self.role, self._secret = role, secret
+        self._socket = open_socket(context, zmq.DEALER)
+        self._socket.connect(address)
+        self.until = 0
+        self.last = False
+        self.events: list[tuple[int, dict[str, Any]]] = []
+        self.garbled = 0
+
+    @property
+    def socket(self) -> zmq.Socket[bytes]:
+        """For pollers."""
+        return self._socket
+
+    def join(self, endpoints: dict[str, str], lossless: bool = True) -> dict[str, Any]:
+        """Ask to take part and wait for the welcome; returns its fields by name.
+
+        Raises:
+            Refused: the clock said no, or said nothing for 20 s.
+            Aborted: the run failed before it began.
+        """
+        self._socket.send(encode("JOIN", self.role, self._secret, os.getpid(), endpoints, lossless))
+        while self._socket.poll(_JOIN_MS):
+            frame = self._receive()
+            if frame and frame.name == "WELCOME":
+                welcome = frame.as_dict()
+                self.until = welcome["granted"]
+                return welcome
+            if frame and frame.name == "REFUSED":
+                raise Refused(frame.fields[0])
+        raise Refused(f"The clock did not answer within {_JOIN_MS // 1000} s; is the run still there?")
+
+    def poll(self) -> None:
+        """Take what the clock has sent, without waiting."""
+        while self._socket.get(zmq.EVENTS) & zmq.POLLIN:
+            self._receive()
+
+    def wait(self, tick: int) -> bool:
+        """Wait for the clock to say something; after a while report being alive and return False."""
+        if self._socket.poll(REPORT_MS):
+            self._receive()
+            self.poll()
+            return True
+        self.waiting(tick, "clock")
+        return False
+
+    def _receive(self) -> Frame | None:
+        try:
+            frame = decode(self._socket.recv())
+        except WireError:
+            self.garbled += 1
+            return None
+        if frame.name == "GRANT":
+            until, self.last, events = frame.fields
+            self.until = max(self.until, until)
+            self.events += [(tick, event) for tick, event in events]
+        elif frame.name == "ABORT":
+            raise Aborted(frame.fields[0])
+        return frame
+
+    def take_events(self) -> list[tuple[int, dict[str, Any]]]:
+        """The granted events since the last call."""
+        events, self.events = self.events, []
+        return events
+
+    def ready(self, tick: int) -> None:
+        """All connections stand; work starts at ``tick``."""
+        self._socket.send(encode("READY", tick))
+
+    def progress(self, tick: int, status: dict[str, Any] | None = None) -> None:
+        """Every tick before ``tick`` is done."""
+        self._socket.send(encode("PROGRESS", tick, status or {}))
+
+    def waiting(self, tick: int, on: str) -> None:
+        """Alive, but waiting for another process."""
+        self._socket.send(encode("WAITING", tick, on))
+
+    def ended(self, tick: int, reason: str) -> None:
+        """The plant ended the run by itself."""
+        self._socket.send(encode("ENDED", tick, reason))
+
+    def leave(self, name: str, *fields: Any) -> None:
+        """Say DONE, FAILED or LEAVE, make sure it goes out, and close."""
+        self._socket.send(encode(name, *fields))
+        self._socket.close(linger=1000)

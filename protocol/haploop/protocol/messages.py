@@ -1,0 +1,111 @@
+"""The one table of messages: what travels between processes, under which code, with which fields.
+
+Every frame is a msgpack array ``[VERSION, code, field, field, ...]``; the table below is the whole grammar. Encoding,
+checking and the documentation in ``protocol/README.md`` derive from it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+VERSION = 1
+
+# Field types: what msgpack must have unpacked. "number" is an int or a float.
+_TYPES: dict[str, tuple[type, ...]] = {
+    "int": (int,),
+    "number": (int, float),
+    "text": (str,),
+    "bool": (bool,),
+    "bytes": (bytes,),
+    "map": (dict,),
+    "list": (list,),
+    "text?": (str, type(None)),
+}
+
+
+@dataclass(frozen=True)
+class Message:
+    """One row of the table.
+
+    Attributes:
+        code: the number on the wire.
+        channel: the socket it travels on (``CHANNELS``).
+        sender, receiver: roles.
+        fields: (name, type) in order.
+        meaning: one sentence.
+    """
+
+    code: int
+    channel: str
+    sender: str
+    receiver: str
+    fields: tuple[tuple[str, str], ...]
+    meaning: str
+
+
+CHANNELS = {
+    "clock": "ROUTER bound by the clock; every node and every command line connects a DEALER",
+    "loop": "ROUTER bound by the plant; the controller connects a DEALER",
+    "telemetry": "XPUB bound by plant, controller and logger, one each; whoever wants to listen connects a SUB",
+}
+
+
+def _message(code: int, channel: str, sender: str, receiver: str, fields: str, meaning: str) -> Message:
+    pairs = tuple((name, kind) for name, _, kind in (field.partition(":") for field in fields.split()))
+    return Message(code, channel, sender, receiver, pairs, meaning)
+
+
+MESSAGES: dict[str, Message] = {
+    # Joining
+    "JOIN": _message(1, "clock", "node", "clock", "role:text secret:text pid:int endpoints:map lossless:bool",
+                     "A node asks to take part. endpoints: channel -> address of each socket it has bound."),
+    "WELCOME": _message(2, "clock", "clock", "node", "run:text scene:map timebase:map endpoints:map granted:int context:map",
+                        "The node is part of the run: the resolved scene, its integers, every address, the tick granted."),
+    "REFUSED": _message(3, "clock", "clock", "any", "reason:text", "The frame before could not be used, and why."),
+    "READY": _message(4, "clock", "node", "clock", "tick:int", "All the node's connections stand; it starts from this tick."),
+    # Time
+    "GRANT": _message(5, "clock", "clock", "node", "until:int last:bool events:list",
+                      "Ticks before `until` may be worked on; `last`: none will follow. events: [tick, event] in order."),
+    "PROGRESS": _message(6, "clock", "node", "clock", "tick:int status:map", "Every tick before this one is done."),
+    "WAITING": _message(7, "clock", "node", "clock", "tick:int on:text", "The node is alive and waits for another."),
+    # Ending
+    "ENDED": _message(8, "clock", "plant", "clock", "tick:int reason:text", "The plant ended the run by itself at this tick."),
+    "DONE": _message(9, "clock", "node", "clock", "tick:int result:map", "The node has finished and leaves."),
+    "FAILED": _message(10, "clock", "node", "clock", "tick:int reason:text", "The node cannot go on, and why."),
+    "ABORT": _message(11, "clock", "clock", "node", "reason:text", "The run failed elsewhere: save what there is and leave."),
+    "LEAVE": _message(12, "clock", "node", "clock", "tick:int", "An attached node goes; the run goes on."),
+    # Commands from people
+    "COMMAND": _message(13, "clock", "client", "clock", "verb:text arguments:map", "status, pause, resume, step, stop, swap, set."),
+    "REPLY": _message(14, "clock", "clock", "client", "ok:bool text:text data:map", "What became of the command."),
+    # The loop itself
+    "HELLO": _message(20, "loop", "controller", "plant", "secret:text", "The controller presents itself; answered with HELLO."),
+    "SAMPLES": _message(21, "loop", "plant", "controller", "tick:int samples:list",
+                        "Measured samples of consecutive ticks from `tick` on, [x_m] or [x_m, acceleration] each."),
+    "COMMANDS": _message(22, "loop", "controller", "plant", "tick:int forces:list", "Forces in N that answer the same ticks."),
+    "LAST": _message(23, "loop", "plant", "controller", "tick:int", "No sample follows: the run ends at this tick."),
+    # Telemetry; every frame follows a topic frame with the publisher's role
+    "STATE": _message(30, "telemetry", "publisher", "subscriber", "tick:int state:map",
+                      "Answer to a new subscription: where the publisher is; its blocks from `tick` on follow without a gap."),
+    "PLANT_BLOCK": _message(31, "telemetry", "plant", "subscriber", "from_tick:int ticks:int columns:map",
+                            "x, v, force, command at each of ticks * n plant steps and at the end of the last one."),
+    "CONTROLLER_BLOCK": _message(32, "telemetry", "controller", "subscriber",
+                                 "from_tick:int ticks:int columns:map elements:list wall:map",
+                                 "What the controller saw and did at each tick; one dissipation column per element."),
+    "ENERGY_BLOCK": _message(33, "telemetry", "logger", "subscriber", "from_tick:int ticks:int columns:map status:map",
+                             "The energy books at each tick, and the verdict so far."),
+    "END": _message(34, "telemetry", "publisher", "subscriber", "tick:int reason:text trouble:text?", "Nothing follows: the stream ends at this tick."),
+}  # fmt: skip
+
+BY_CODE: dict[int, str] = {message.code: name for name, message in MESSAGES.items()}
+
+
+def complaint(name: str, fields: list[object]) -> str | None:
+    """What is wrong with the fields of a message, or None."""
+    expected = MESSAGES[name].fields
+    if len(fields) != len(expected):
+        return f"{name} has {len(expected)} fields ({', '.join(n for n, _ in expected)}), but {len(fields)} came"
+    for value, (field, kind) in zip(fields, expected, strict=True):
+        wrong_bool = isinstance(value, bool) and kind in ("int", "number")
+        if wrong_bool or not isinstance(value, _TYPES[kind]):
+            return f"{name}.{field} must be of type {kind}, but {type(value).__name__} came"
+    return None

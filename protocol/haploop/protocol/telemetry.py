@@ -1,0 +1,125 @@
+"""Telemetry: blocks from a publisher to any number of subscribers, none of which can hold the loop up."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import zmq
+
+from haploop.protocol.sockets import open_socket
+from haploop.protocol.wire import Frame, WireError, decode, encode
+
+
+class Publisher:
+    """A node's own stream of blocks.
+
+    Each message is two frames: the publisher's role as topic, then the message. A new subscription is answered, at
+    the next block boundary, with STATE; from its tick on the stream has no gap for whoever keeps up.
+
+    Attributes:
+        socket: to be bound by the node.
+        subscribers: subscriptions now standing.
+        strangers: frames that were no subscriptions.
+    """
+
+    def __init__(
+        self, context: zmq.Context[zmq.Socket[bytes]], role: str, state: Callable[[], tuple[int, dict[str, Any]]]
+    ) -> None:
+        self.socket = open_socket(context, zmq.XPUB)
+        self._topic = role.encode()
+        self._state = state
+        self.subscribers = 0
+        self.strangers = 0
+
+    def publish(self, name: str, *fields: Any) -> None:
+        """Send one message to all subscribers."""
+        self.socket.send_multipart([self._topic, encode(name, *fields)])
+
+    def serve(self) -> None:
+        """Take note of subscriptions; call at block boundaries only, where the state is that of a tick."""
+        while self.socket.get(zmq.EVENTS) & zmq.POLLIN:
+            request = self.socket.recv()
+            if request[:1] == b"\x01":
+                self.subscribers += 1
+                tick, state = self._state()
+                self.publish("STATE", tick, state)
+            elif request[:1] == b"\x00":
+                self.subscribers -= 1
+            else:
+                self.strangers += 1
+
+    def await_subscriber(self, idle: Callable[[], None]) -> None:
+        """Wait until someone listens, calling ``idle`` now and then."""
+        while not self.subscribers:
+            if not self.socket.poll(100):
+                idle()
+            self.serve()
+
+
+class Subscriber:
+    """Listens to several publishers over one socket each; tells gaps by the ticks of the blocks.
+
+    Attributes:
+        gaps: blocks' worth of ticks that never came, by role.
+        garbled: frames that were no messages.
+    """
+
+    def __init__(self, context: zmq.Context[zmq.Socket[bytes]], addresses: dict[str, str]) -> None:
+        self._sockets: dict[zmq.Socket[bytes], str] = {}
+        for role, address in addresses.items():
+            socket = open_socket(context, zmq.SUB)
+            socket.connect(address)
+            socket.subscribe(role.encode())
+            self._sockets[socket] = role
+        self._next_tick: dict[str, int] = {}
+        self.gaps = dict.fromkeys(addresses, 0)
+        self.garbled = 0
+
+    def register(self, poller: zmq.Poller) -> None:
+        """Have a poller watch all sockets."""
+        for socket in self._sockets:
+            poller.register(socket, zmq.POLLIN)
+
+    def receive(self, timeout_ms: int) -> list[tuple[str, Frame]]:
+        """What is there, (role, message), after waiting at most ``timeout_ms`` for the first."""
+        poller = zmq.Poller()
+        self.register(poller)
+        poller.poll(timeout_ms)
+        return self.drain()
+
+    def drain(self) -> list[tuple[str, Frame]]:
+        """What is there now, without waiting; blocks from before the publisher's STATE are left out."""
+        messages = []
+        for socket, role in self._sockets.items():
+            while socket.get(zmq.EVENTS) & zmq.POLLIN:
+                frame = self._read(socket)
+                if frame and self._follows(role, frame):
+                    messages.append((role, frame))
+        return messages
+
+    def _read(self, socket: zmq.Socket[bytes]) -> Frame | None:
+        try:
+            return decode(socket.recv_multipart()[-1])
+        except WireError:
+            self.garbled += 1
+            return None
+
+    def _follows(self, role: str, frame: Frame) -> bool:
+        tick = frame.fields[0]
+        if frame.name == "STATE":
+            if role in self._next_tick:  # the answer to another subscriber
+                return False
+            self._next_tick[role] = tick
+            return True
+        if role not in self._next_tick or tick < self._next_tick[role]:
+            return False
+        self.gaps[role] += tick - self._next_tick[role]
+        if frame.name != "END":
+            self._next_tick[role] = tick + frame.fields[1]
+        return True
+
+    def close(self) -> None:
+        """Stop listening."""
+        for socket in self._sockets:
+            socket.close(0)

@@ -1,0 +1,103 @@
+"""Simulated time, counted in whole plant steps and control ticks and never accumulated in floats."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict, dataclass
+from typing import Any
+
+# Decimal fractions such as 0.0003 s are not exact in binary; a whole number of steps is accepted within this.
+_WHOLE_WITHIN = 1e-6
+
+
+class TimebaseError(ValueError):
+    """Rates, delay or duration that do not fall on whole steps and ticks."""
+
+
+@dataclass(frozen=True)
+class Timebase:
+    """The integers all processes of a run share.
+
+    Step ``s`` is at ``s / plant_rate`` seconds, tick ``k`` is step ``k * steps_per_tick``, and command ``k`` takes
+    effect at step ``k * steps_per_tick + delay_steps``. *Interval* ``k`` is the steps from tick k to tick k + 1.
+
+    Attributes:
+        plant_rate: plant steps per second, Hz.
+        control_rate: control ticks per second, Hz; divides ``plant_rate``.
+        delay_steps: round-trip delay in plant steps.
+        ticks: number of ticks in the run; it covers ``ticks * steps_per_tick`` steps.
+    """
+
+    plant_rate: int
+    control_rate: int
+    delay_steps: int
+    ticks: int
+
+    @classmethod
+    def of(cls, clock: dict[str, Any], duration: float) -> Timebase:
+        """Build from a scene's ``[clock]`` table and its duration in seconds.
+
+        Raises:
+            TimebaseError: the plant rate is no whole multiple of the control rate, the delay is no whole number of
+                plant steps, or the duration is no whole number of control ticks; all that apply, one sentence each.
+        """
+        plant_rate, control_rate = clock["plant_rate"], clock["control_rate"]
+        delay = clock["round_trip_delay"]
+        complaints = []
+        if plant_rate % control_rate:
+            complaints.append(
+                f"plant_rate must be a whole multiple of control_rate, "
+                f"but {plant_rate} Hz is {plant_rate / control_rate:.6g} times {control_rate} Hz."
+            )
+        delay_steps = _whole(delay, plant_rate, "round_trip_delay", "plant steps", complaints)
+        ticks = _whole(duration, control_rate, "duration", "control ticks", complaints)
+        if not complaints and ticks < 1:
+            complaints.append(f"duration must cover at least one control tick, {1 / control_rate:g} s.")
+        if complaints:
+            raise TimebaseError("\n".join(complaints))
+        return cls(plant_rate, control_rate, delay_steps, ticks)
+
+    def as_dict(self) -> dict[str, int]:
+        """The four integers, as they travel on the wire."""
+        return asdict(self)
+
+    @property
+    def steps_per_tick(self) -> int:
+        """n: plant steps in one control period."""
+        return self.plant_rate // self.control_rate
+
+    @property
+    def step_s(self) -> float:
+        """h: one plant step in seconds."""
+        return 1.0 / self.plant_rate
+
+    @property
+    def period_s(self) -> float:
+        """T: one control period in seconds."""
+        return 1.0 / self.control_rate
+
+    @property
+    def lookahead_ticks(self) -> int:
+        """L: interval k needs no command later than k - L, so L + 1 samples may go out before a reply is awaited."""
+        return self.delay_steps // self.steps_per_tick
+
+    def tick_ns(self, tick: int) -> int:
+        """Time of a tick in whole nanoseconds (rounded down)."""
+        return tick * 1_000_000_000 // self.control_rate
+
+    def first_tick_at(self, seconds: float) -> int:
+        """The first tick that sees something which happens at ``seconds``: ceil(seconds * control_rate)."""
+        return math.ceil(seconds * self.control_rate - _WHOLE_WITHIN)
+
+
+def _whole(seconds: float, rate: int, name: str, units: str, complaints: list[str]) -> int:
+    """``seconds * rate`` as the whole number it must be; otherwise append a complaint naming the nearest two."""
+    count = seconds * rate
+    nearest = round(count)
+    if abs(count - nearest) > _WHOLE_WITHIN * max(1.0, abs(count) * 1e-6):
+        low, high = math.floor(count) / rate, math.ceil(count) / rate
+        complaints.append(
+            f"{name} must be a whole number of {units} at {rate} Hz, but {seconds:g} s is {count:.6g} of them; "
+            f"the nearest legal values are {low:.9g} s and {high:.9g} s."
+        )
+    return nearest

@@ -1,0 +1,59 @@
+"""Frames: the table's messages in msgpack, checked on the way in; nothing in them is ever executed."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import msgpack
+
+from haploop.protocol.messages import BY_CODE, MESSAGES, VERSION, complaint
+
+# A frame larger than this is refused by the socket itself.
+MAX_FRAME_BYTES = 64 * 1024 * 1024
+
+
+class WireError(ValueError):
+    """A frame that is no message of this version; the message says what is wrong with it."""
+
+
+class Frame(NamedTuple):
+    """A message that came: its name and its fields in the order of the table."""
+
+    name: str
+    fields: list[Any]
+
+    def as_dict(self) -> dict[str, Any]:
+        """The fields by name."""
+        return {name: value for (name, _), value in zip(MESSAGES[self.name].fields, self.fields, strict=True)}
+
+
+_packer = msgpack.Packer(autoreset=True)
+
+
+def encode(name: str, *fields: Any) -> bytes:
+    """A message as bytes; the fields in the order of the table."""
+    return _packer.pack((VERSION, MESSAGES[name].code, *fields))
+
+
+def decode(data: bytes) -> Frame:
+    """The message in a frame.
+
+    Raises:
+        WireError: not msgpack, another version, an unknown code, missing or wrong fields.
+    """
+    try:
+        items = msgpack.unpackb(data, strict_map_key=False)
+    except Exception as error:  # msgpack raises many kinds, RecursionError among them
+        raise WireError(f"A frame of {len(data)} bytes is no msgpack: {type(error).__name__}.") from error
+    if not isinstance(items, list) or len(items) < 2:
+        raise WireError(f"A frame must be an array [version, code, fields...], but is {type(items).__name__}.")
+    version, code, *fields = items
+    if version != VERSION:
+        raise WireError(f"This is protocol version {VERSION}, but a frame of version {str(version)[:40]} came.")
+    name = BY_CODE.get(code) if isinstance(code, int) else None
+    if name is None:
+        raise WireError(f"No message has the code {str(code)[:40]}.")
+    wrong = complaint(name, fields)
+    if wrong:
+        raise WireError(wrong + ".")
+    return Frame(name, fields)

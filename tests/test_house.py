@@ -1,0 +1,111 @@
+"""The house: one import name from four folders, arrows that only go down, and pinned dependencies."""
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tomllib
+import zipfile
+from importlib.metadata import entry_points
+from pathlib import Path
+
+import pytest
+
+HOUSE = Path(__file__).parents[1]
+SOURCE_ROOTS = ("protocol", "nodes", "launch", "tools")
+PROJECT = tomllib.loads((HOUSE / "pyproject.toml").read_text(encoding="utf-8"))
+LOCK = (HOUSE / "requirements.lock").read_text(encoding="utf-8")
+
+
+def lint_imports(house: Path) -> subprocess.CompletedProcess[str]:
+    """Check the arrows of the sources under `house`, which go before the installed ones."""
+    roots = os.pathsep.join(str(house / root) for root in SOURCE_ROOTS)
+    return subprocess.run(
+        [Path(sys.executable).with_name("lint-imports"), "--no-cache", "--config", HOUSE / "pyproject.toml"],
+        cwd=house,
+        env={**os.environ, "PYTHONPATH": roots},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
+def test_no_source_root_claims_the_import_name_for_itself() -> None:
+    claimed = [root for root in SOURCE_ROOTS if (HOUSE / root / "haploop" / "__init__.py").exists()]
+    assert claimed == []
+
+
+def test_every_package_has_its_place_in_the_layers() -> None:
+    packages = {f"haploop.{init.parent.name}" for init in HOUSE.glob("*/haploop/*/__init__.py")}
+    linter = PROJECT["tool"]["importlinter"]
+    layered = re.findall(r"[\w.]+", " ".join(linter["contracts"][0]["layers"]))
+    assert packages == set(linter["root_packages"]) == set(layered)
+
+
+def test_the_arrows_between_the_packages_only_go_down() -> None:
+    report = lint_imports(HOUSE)
+    assert report.returncode == 0, report.stdout + report.stderr
+
+
+@pytest.mark.parametrize(
+    ("importer", "imported"),
+    [
+        ("nodes/haploop/plant", "haploop.controller"),
+        ("nodes/haploop/controller", "haploop.plant"),
+        ("protocol/haploop/protocol", "haploop.logger"),
+        ("launch/haploop/launch", "haploop.tools"),
+    ],
+)
+def test_an_arrow_that_goes_up_or_sideways_is_caught(importer: str, imported: str, tmp_path: Path) -> None:
+    for root in SOURCE_ROOTS:
+        shutil.copytree(HOUSE / root / "haploop", tmp_path / root / "haploop")
+    (tmp_path / importer / "offender.py").write_text(f"import {imported}\n", encoding="utf-8")
+    report = lint_imports(tmp_path)
+    assert report.returncode == 1, report.stdout + report.stderr
+    assert f"{importer.split('/', 1)[1].replace('/', '.')}.offender -> {imported}" in report.stdout
+
+
+def test_a_wheel_holds_every_module_scene_and_device(tmp_path: Path) -> None:
+    build = [sys.executable, "-m", "hatchling", "build", "--target", "wheel", "--directory", str(tmp_path)]
+    subprocess.run(build, cwd=HOUSE, check=True, capture_output=True)
+    (wheel,) = tmp_path.glob("*.whl")
+    with zipfile.ZipFile(wheel) as archive:
+        held = {name for name in archive.namelist() if ".dist-info/" not in name}
+    modules = {
+        file.relative_to(HOUSE / root) for root in SOURCE_ROOTS for file in HOUSE.glob(f"{root}/haploop/**/*.py")
+    }
+    toml = {
+        "haploop" / file.relative_to(HOUSE)
+        for kind in ("scenes", "devices")
+        for file in HOUSE.glob(f"launch/{kind}/*.toml")
+    }
+    assert held >= {path.as_posix() for path in modules | toml}
+    assert {name.split("/")[0] for name in held} == {"haploop"}
+
+
+def test_the_lock_records_no_address() -> None:
+    assert "://" not in LOCK
+    assert not re.search(r"^\s*(-i|-f|--index-url|--extra-index-url|--find-links)\b", LOCK, re.MULTILINE)
+    assert " @ " not in LOCK
+
+
+def test_every_locked_requirement_has_a_version_and_a_hash() -> None:
+    requirements = LOCK.replace("\\\n", " ").splitlines()
+    pinned = re.compile(r"[\w.-]+==\S+( ; [^#]+?)?(\s+--hash=sha256:[0-9a-f]{64})+")
+    assert requirements
+    assert [line for line in requirements if not pinned.fullmatch(line.strip())] == []
+
+
+def test_the_lock_holds_every_declared_dependency() -> None:
+    extras = PROJECT["project"]["optional-dependencies"]
+    declared = [*PROJECT["project"]["dependencies"], *extras["plot"], *extras["dev"]]
+    declared += PROJECT["build-system"]["requires"]
+    names = {re.split(r"[\[><=~ ;]", requirement)[0] for requirement in declared}
+    assert names <= set(re.findall(r"^([\w.-]+)==", LOCK, re.MULTILINE))
+
+
+def test_every_dissipation_element_of_the_house_is_found_by_its_entry_point() -> None:
+    found = {entry.name: entry.load().__name__ for entry in entry_points(group="haploop.dissipation")}
+    ours = PROJECT["project"]["entry-points"]["haploop.dissipation"]
+    assert {name: found.get(name) for name in ours} == {name: path.split(":")[1] for name, path in ours.items()}

@@ -1,0 +1,227 @@
+"""haploop.logger.read: what the log holds comes back as arrays, from whole, cut, damaged and foreign files."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import msgpack
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from mcap.writer import CompressionType, Writer
+
+from haploop.logger import read
+from haploop.logger.log_error import LogError
+from haploop.logger.mcap_log import Compression, Log
+
+PLANT = {"timestamp": "s", "t": "s", "x": "m", "v": "m/s", "force": "N"}
+
+
+def same_bits(a: np.ndarray, b: np.ndarray) -> bool:
+    return a.dtype == b.dtype == np.float64 and a.tobytes() == np.ascontiguousarray(b).tobytes()
+
+
+def write_blocks(path: Path, blocks: list[np.ndarray], compression: Compression = "lz4") -> None:
+    """/plant blocks of shape (messages, 10, 5) and an event a block, a chunk each."""
+    first = 0
+    with Log(path, compression=compression) as log:
+        plant = log.channel("/plant", PLANT, samples_per_message=10, title="Plant")
+        events = log.channel("/events", {}, title="Events")
+        for block in blocks:
+            log.write(plant, np.arange(first, first + len(block)), block)
+            log.message(events, first, {"tick": first, "swap": {"kind": "damping", "damping": 0.8}})
+            first += len(block)
+            log.flush()
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    sizes=st.lists(st.integers(1, 30), min_size=1, max_size=5),
+    seed=st.integers(0, 2**32),
+    compression=st.sampled_from(["", "lz4"]),
+    share=st.floats(0, 1),
+)
+def test_a_log_cut_anywhere_gives_its_values_bit_for_bit_up_to_the_cut(
+    tmp_path_factory: pytest.TempPathFactory, sizes: list[int], seed: int, compression: Compression, share: float
+) -> None:
+    directory = tmp_path_factory.mktemp("run")
+    rng = np.random.default_rng(seed)
+    blocks = [rng.integers(0, 2**64, size=(size, 10, 5), dtype=np.uint64).view(np.float64) for size in sizes]
+    write_blocks(directory / "log.mcap", blocks, compression)
+    rows = np.concatenate(blocks).reshape(-1, 5)
+
+    whole = read(directory)
+    assert (whole.truncated, whole.cut) == (False, "")
+    assert list(whole) == ["/plant", "/events"]
+    assert whole["/plant"].units == PLANT
+    for number, name in enumerate(PLANT):
+        assert same_bits(whole["/plant"][name], rows[:, number])
+    assert [event["tick"] for event in whole["/events"]] == [sum(sizes[:i]) for i in range(len(sizes))]
+    assert whole["/events"][0] == {"tick": 0, "swap": {"kind": "damping", "damping": 0.8}}
+
+    content = (directory / "log.mcap").read_bytes()
+    content = content[: max(8, int(share * len(content)))]
+    (directory / "log.mcap").write_bytes(content)
+    part = read(directory)
+    assert part.truncated == (share < 1)
+    assert bool(part.cut) == part.truncated
+    found = len(part["/plant"]["x"]) if "/plant" in part else 0
+    assert found // 10 in np.cumsum([0, *sizes])
+    for number, name in enumerate(PLANT if found else {}):
+        assert same_bits(part["/plant"][name], rows[:found, number])
+
+
+def test_a_log_still_being_written_is_read_up_to_its_last_flush(tmp_path: Path) -> None:
+    with Log(tmp_path / "log.mcap") as log:
+        channel = log.channel("/energy", {"timestamp": "s", "wall.true": "J"}, title="Energy")
+        log.write(channel, np.arange(3), np.arange(6.0).reshape(3, 2))
+        assert read(tmp_path)["/energy"]["wall.true"].size == 0
+        log.flush()
+        recording = read(tmp_path)
+        assert recording["/energy"]["wall.true"].tolist() == [1.0, 3.0, 5.0]
+        assert recording.truncated
+        assert recording.cut.startswith(f"The log {tmp_path / 'log.mcap'} was cut off or is still being written")
+    assert not read(tmp_path).truncated
+
+
+def test_channels_of_one_topic_join_in_the_order_of_time_with_nan_for_absent_columns(tmp_path: Path) -> None:
+    """As after a swap there and back, all within one chunk, where each channel's messages stand together."""
+    with Log(tmp_path / "log.mcap") as log:
+        one = log.channel("/controller", {"x": "m", "dissipation.0": "N"}, title="Controller")
+        two = log.channel("/controller", {"x": "m", "dissipation.1": "N"}, title="Controller")
+        log.write(one, np.array([0, 1]), np.array([[0.0, 10.0], [1.0, 11.0]]))
+        log.write(two, np.array([2, 3]), np.array([[2.0, 22.0], [3.0, 23.0]]))
+        log.write(one, np.array([4]), np.array([[4.0, 14.0]]))
+    table = read(tmp_path)["/controller"]
+    nan = np.nan
+    assert table.units == {"x": "m", "dissipation.0": "N", "dissipation.1": "N"}
+    assert table["x"].tolist() == [0.0, 1.0, 2.0, 3.0, 4.0]
+    np.testing.assert_array_equal(table["dissipation.0"], [10.0, 11.0, nan, nan, 14.0])
+    np.testing.assert_array_equal(table["dissipation.1"], [nan, nan, 22.0, 23.0, nan])
+
+
+def test_messages_of_other_sample_counts_join_on_one_topic(tmp_path: Path) -> None:
+    with Log(tmp_path / "log.mcap") as log:
+        ticks = log.channel("/plant", {"x": "m"}, samples_per_message=3, title="Plant")
+        last = log.channel("/plant", {"x": "m"}, samples_per_message=1, title="Plant")
+        log.write(ticks, np.array([0, 1]), np.arange(6.0).reshape(2, 3, 1))
+        log.write(last, np.array([2]), np.full((1, 1, 1), 6.0))
+    assert read(tmp_path)["/plant"]["x"].tolist() == [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0]
+
+
+def test_an_attachment_comes_back(tmp_path: Path) -> None:
+    with Log(tmp_path / "log.mcap") as log:
+        log.attach("scene.toml", "application/toml", b"duration = 3.0\n")
+    assert read(tmp_path / "log.mcap").attachments == {"scene.toml": b"duration = 3.0\n"}
+
+
+def foreign(path: Path, topics: dict[str, list[Any]], **options: Any) -> None:
+    """A log by the mcap library's own writer: the topics' messages in turns, topic by topic at each time."""
+    with path.open("wb") as file:
+        writer = Writer(file, **options)
+        writer.start()
+        channels = {}
+        for topic, contents in topics.items():
+            numbers = {name: {"type": "number", "unit": "m"} for name in ("x", "v")}
+            schema: dict[str, Any] = {"type": "object", "properties": numbers}
+            if isinstance(contents[0], list):
+                schema = {"type": "array", "items": schema, "minItems": 1}
+            number = writer.register_schema("foreign", "jsonschema", msgpack_json(schema))
+            channels[topic] = writer.register_channel(topic, "msgpack", number)
+        for time, row in enumerate(zip(*topics.values(), strict=True)):
+            for topic, content in zip(topics, row, strict=True):
+                writer.add_message(channels[topic], time, msgpack.packb(content), time)
+        writer.finish()
+
+
+def msgpack_json(schema: dict[str, Any]) -> bytes:
+    import json
+
+    return json.dumps(schema).encode()
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"compression": CompressionType.ZSTD},
+        {"compression": CompressionType.LZ4, "chunk_size": 200},
+        {"use_chunking": False},
+    ],
+    ids=["zstd", "small chunks", "no chunks"],
+)
+def test_a_log_of_another_program_reads_the_same(tmp_path: Path, options: dict[str, Any]) -> None:
+    """Interleaved messages, numbers of other widths, another order of keys, absent keys, arrays of changing length."""
+    path = tmp_path / "log.mcap"
+    topics: dict[str, list[Any]] = {
+        "/ours": [{"x": 0.5 * i, "v": -1.0 * i} for i in range(20)],
+        "/ints": [{"x": i, "v": -i} for i in range(20)],
+        "/order": [{"v": -1.0 * i, "x": 0.5 * i} for i in range(20)],
+        "/absent": [{"x": 1.0} if i % 2 else {"v": 2.0} for i in range(20)],
+        "/batches": [[{"x": float(i), "v": 0.0}] * (i % 3) for i in range(20)],
+    }
+    foreign(path, topics, **options)
+    found = read(path)
+    assert not found.truncated
+    steps = np.arange(20.0)
+    assert found["/ours"]["x"].tolist() == found["/order"]["x"].tolist() == (0.5 * steps).tolist()
+    assert found["/ours"]["v"].tolist() == found["/order"]["v"].tolist() == found["/ints"]["v"].tolist()
+    assert found["/ints"]["x"].tolist() == steps.tolist()
+    np.testing.assert_array_equal(found["/absent"]["x"], np.where(steps % 2 == 1, 1.0, np.nan))
+    np.testing.assert_array_equal(found["/absent"]["v"], np.where(steps % 2 == 0, 2.0, np.nan))
+    assert found["/batches"]["x"].tolist() == [float(i) for i in range(20) for _ in range(i % 3)]
+
+
+def test_a_flipped_bit_ends_the_reading_before_its_chunk(tmp_path: Path) -> None:
+    blocks = [np.full((30, 10, 5), float(number)) for number in range(3)]
+    write_blocks(tmp_path / "log.mcap", blocks, "")
+    content = bytearray((tmp_path / "log.mcap").read_bytes())
+    at = content.index(np.float64(1.0).astype(">f8").tobytes())
+    content[at + 5] ^= 1
+    (tmp_path / "log.mcap").write_bytes(content)
+    recording = read(tmp_path)
+    assert recording["/plant"]["x"].tolist() == [0.0] * 300
+    assert recording.truncated
+    assert "damaged: crc validation failed" in recording.cut
+
+
+def test_what_is_no_log_is_refused_with_a_sentence(tmp_path: Path) -> None:
+    with pytest.raises(FileNotFoundError, match=r"There is no .*nowhere; give the directory of a run"):
+        read(tmp_path / "nowhere")
+    with pytest.raises(FileNotFoundError, match=r"holds no log\.mcap"):
+        read(tmp_path)
+    log = tmp_path / "log.mcap"
+    log.write_bytes(b"")
+    with pytest.raises(LogError, match="is empty"):
+        read(tmp_path)
+    log.write_bytes(b"t,x\n0.0,1.0\n")
+    with pytest.raises(LogError, match="is no MCAP file"):
+        read(tmp_path)
+    with log.open("wb") as file:
+        writer = Writer(file)
+        writer.start()
+        writer.register_channel("/image", "cdr", 0)
+        writer.add_message(1, 0, b"", 0)
+        writer.finish()
+    with pytest.raises(LogError, match="/image is cdr"):
+        read(tmp_path)
+    foreign(log, {"/words": [{"x": "one", "v": "two"}]})
+    with pytest.raises(LogError, match="/words is no msgpack map"):
+        read(tmp_path)
+
+
+def test_a_wrong_name_is_answered_with_the_right_ones(tmp_path: Path) -> None:
+    write_blocks(tmp_path / "log.mcap", [np.zeros((1, 10, 5))])
+    recording = read(tmp_path)
+    with pytest.raises(KeyError, match="its channels are /plant, /events"):
+        recording["/plnt"]
+    with pytest.raises(KeyError, match="the columns are timestamp, t, x, v, force"):
+        recording["/plant"]["y"]
+
+
+def test_importing_the_logger_imports_no_heavy_library() -> None:
+    code = "import sys, haploop.logger; print({'numpy', 'mcap', 'msgpack', 'lz4'} & set(sys.modules))"
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "set()\n"
