@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pydantic import ValidationError
-from pydantic_core import ErrorDetails, PydanticCustomError
+from pydantic_core import PydanticCustomError
 
 from haploop.launch.events import check_events
 from haploop.launch.layers import KeyPath, Layers
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from haploop.controller.dissipation import Element
 
 # Where the key ``kind`` says what else is in a table; a number stands for any.
-_TAGGED = (("hand", "force"), ("dissipation", 0), ("event", 0, "swap"))
+_TAGGED = {("hand", "force"), ("dissipation", 0), ("event", 0, "swap")}
 _FORMS = {
     "bool_type": "It must be true or false.",
     "string_type": "It must be text in quotes.",
@@ -43,8 +43,9 @@ def resolve(layers: Layers, kinds: Mapping[str, type[Element]]) -> dict[str, Any
         scene = scene_model(kinds).model_validate(layers.data)
     except ValidationError as error:
         schema = whole_schema(kinds)
+        tagged = _TAGGED if len(kinds) > 1 else _TAGGED - {("dissipation", 0)}  # one kind alone is no choice
         for detail in error.errors(include_url=False):
-            _complain(layers, detail, schema)
+            _complain(layers, detail["type"], detail["msg"], _plain(detail["loc"], tagged), schema)
     settings = check_events(layers, _timebase(layers), kinds)
     if layers.mistakes or scene is None:
         raise SceneError(layers.mistakes)
@@ -84,11 +85,10 @@ def _timebase(layers: Layers) -> Timebase | None:
         return None
 
 
-def _complain(layers: Layers, error: ErrorDetails, schema: Schema) -> None:
+def _complain(layers: Layers, what: str, message: str, key: KeyPath, schema: Schema) -> None:
     """One mistake that pydantic found, as a sentence."""
-    key = _plain(error["loc"])
     rule = schema_at(schema, key, layers.data)
-    match error["type"]:
+    match what:
         case "extra_forbidden":
             *table, name = key
             keys = list(schema_at(schema, tuple(table), layers.data).get("properties", {}))
@@ -99,16 +99,15 @@ def _complain(layers: Layers, error: ErrorDetails, schema: Schema) -> None:
         case "union_tag_not_found":
             allowed = alternatives(schema, rule)
             layers.complain((*key, "kind"), f"Allowed: {', '.join(allowed)}.", "is missing")
-        case "union_tag_invalid" | "literal_error" as kind:
-            if kind == "union_tag_invalid":
-                key = (*key, "kind")
+        case "union_tag_invalid" | "literal_error":
+            key = (*key, "kind") if what == "union_tag_invalid" else key
             allowed = alternatives(schema, rule)
             layers.complain(key, f"Allowed: {', '.join(allowed)}.", None, nearest(layers.value(key), allowed))
         case "sentence":
             given = "does not fit together" if isinstance(layers.value(key), dict) else None
-            layers.complain(key, error["msg"], given)
-        case kind:
-            layers.complain(key, _FORMS.get(kind, f"{error['msg']}."))
+            layers.complain(key, message, given)
+        case _:
+            layers.complain(key, _FORMS.get(what, f"{message}."))
 
 
 def _form(rule: Schema) -> str:
@@ -118,7 +117,7 @@ def _form(rule: Schema) -> str:
     return rule["description"].rpartition(": ")[2] if "description" in rule else rule.get("type", "given")
 
 
-def _plain(location: tuple[str | int, ...]) -> KeyPath:
+def _plain(location: tuple[str | int, ...], tagged: set[KeyPath]) -> KeyPath:
     """A location of pydantic's as a key of the scene: without the kind it puts after a table that has kinds."""
     key: KeyPath = ()
     skip = False
@@ -127,5 +126,5 @@ def _plain(location: tuple[str | int, ...]) -> KeyPath:
             skip = False
             continue
         key = (*key, part)
-        skip = tuple(0 if isinstance(p, int) else p for p in key) in _TAGGED
+        skip = tuple(0 if isinstance(p, int) else p for p in key) in tagged
     return key

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from pydantic_core import PydanticCustomError
 
 from haploop.launch.layers import KeyPath, Layers
-from haploop.launch.mistakes import nearest
+from haploop.launch.mistakes import counted, nearest
 from haploop.launch.number import Number
 from haploop.launch.scene import EventTable, Wall, number_of
 from haploop.protocol.ticks import Timebase
@@ -70,8 +70,7 @@ def _swap(layers: Layers, key: KeyPath, event: dict[str, Any], slots: list[Any])
     if element < len(slots) + (kind != NO_ELEMENT):
         slots[element : element + 1] = [] if kind == NO_ELEMENT else [kind]
     else:
-        count = f"{len(slots)} element" + "s" * (len(slots) != 1)
-        expected = f"The scene has {count} then, counted from 0; one past the end adds one."
+        expected = f"The scene has {counted(len(slots), 'element')} then, counted from 0; one past the end adds one."
         layers.complain((*key, "element"), expected, f"is {element}")
 
 
@@ -97,13 +96,20 @@ def _setting(layers: Layers, key: KeyPath, given: Any, settable: dict[str, Numbe
         )
     elif name not in settable:
         allowed = ", ".join(settable) or "nothing, since the scene has neither a wall nor elements then"
-        layers.complain(key, f"Allowed at that time: {allowed}.", "cannot be set", nearest(name, settable))
+        layers.complain(key, f"Allowed at that time: {allowed}.", "cannot be set", _nearest_key(name, settable))
     else:
         try:
             return settable[name].read(given)
         except PydanticCustomError as error:
             layers.complain(key, error.message())
     return None
+
+
+def _nearest_key(name: str, settable: dict[str, Number]) -> str | None:
+    """The key closest to ``name``, by its last part where the table is right: long names are alike in their front."""
+    table, _, last = name.rpartition(".")
+    names = {key.rpartition(".")[2]: key for key in settable if key.startswith(f"{table}.")}
+    return names.get(nearest(last, names) or "") if names else nearest(name, settable)
 
 
 def _read(event: dict[str, Any], key: str) -> Any:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import os
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -52,7 +53,13 @@ def nearest(name: object, allowed: Iterable[str]) -> str | None:
     return next(iter(difflib.get_close_matches(str(name), list(allowed), n=1)), None)
 
 
+def counted(count: int, name: str) -> str:
+    """``1 element``, ``2 elements``."""
+    return f"{count} {name}" + "s" * (count != 1)
+
+
 def shown(path: Path | str) -> str:
     """A file as a reader wants to see it: relative when it lies below the working directory."""
-    path, here = Path(path), Path.cwd()
+    here = Path.cwd()
+    path = Path(os.path.normpath(here / path))
     return str(path.relative_to(here)) if path.is_relative_to(here) else str(path)

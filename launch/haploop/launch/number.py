@@ -36,8 +36,8 @@ class Number:
         if isinstance(value, bool) or not isinstance(value, (int, float, str)):
             _refuse(f"It must be {self.form}.")
         try:
-            number = from_text(value, self.quantity.unit) if isinstance(value, str) else value
-            complaint = self.quantity.complaint(float(number))
+            number = float(from_text(value, self.quantity.unit)) if isinstance(value, str) else value
+            complaint = self.quantity.complaint(number)
         except OverflowError:
             _refuse("It must be a number that a float can hold.")
         except ValueError as error:

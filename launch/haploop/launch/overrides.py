@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from typing import Any
 
 from haploop.launch.layers import Layers
-from haploop.launch.mistakes import COMMAND_LINE, Mistake
+from haploop.launch.mistakes import COMMAND_LINE, Mistake, counted
 
 
 def lay_overrides(layers: Layers, overrides: Iterable[str]) -> None:
@@ -33,7 +33,8 @@ def _lay(layers: Layers, path: list[str], value: Any) -> str | None:
     for part, after in zip(path, [*path[1:], None], strict=True):
         if isinstance(node, list):
             if not part.isdecimal() or int(part) > len(node):
-                return f"{'.'.join(map(str, key))} has {len(node)} elements, counted from 0, so {part} is none of them."
+                count = counted(len(node), "element")
+                return f"{'.'.join(map(str, key))} has {count}, counted from 0, so {part} is none of them."
             step: Any = int(part)
             if step == len(node):
                 node.append({})

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import MISSING
-from functools import reduce
+from functools import cache, reduce
 from operator import or_
 from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar
 
@@ -119,8 +119,13 @@ def number_of(table: type[Table], key: str) -> Number:
 
 def scene_model(kinds: Mapping[str, type[Element]]) -> type[SceneTable]:
     """The whole scene, with the kinds of dissipation element that are at hand."""
+    return _scene_model(tuple(kinds.items()))
+
+
+@cache
+def _scene_model(kinds: tuple[tuple[str, type[Element]], ...]) -> type[SceneTable]:
     nothing = _table("none", Table, "Removes the element.", {"kind": (Literal["none"], ...)})
-    elements = [_element_table(kind, element) for kind, element in kinds.items()]
+    elements = [_element_table(kind, element) for kind, element in kinds]
     event = _table("Event", EventTable, EventTable.__doc__, {"swap": (_one_of([*elements, nothing]) | None, None)})
     keys = {
         "dissipation": (list[_one_of(elements or [nothing])] | None, None),

@@ -64,5 +64,4 @@ def _read_recording(layers: Layers) -> None:
         except TraceError as error:
             layers.complain(key, str(error))
     del force["file"]
-    force.setdefault("time", times)
-    force.setdefault("force", forces)
+    force |= {"time": times, "force": forces}

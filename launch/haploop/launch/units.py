@@ -7,7 +7,10 @@ from decimal import Decimal
 from functools import cache
 from typing import Any
 
-_TEXT = re.compile(r"\s*([+-]?(?:\d[\d_]*\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?)\s*([^\d\s.+-].{0,40})?", re.DOTALL)
+_NUMBER = r"[+-]?(?:\d[\d_]*\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?"
+# Products, quotients and one-digit powers of names: no more of arithmetic is let through to pint, which would do it.
+_FACTOR = r"(?:[^\W\d]\w*|%|°)(?:(?:\*\*|\^)-?\d|⁻?[¹²³⁴])?"
+_TEXT = re.compile(rf"\s*({_NUMBER})\s*({_FACTOR}(?:(?:\s*[*/·]\s*|\s+){_FACTOR})*)?\s*")
 
 
 def from_text(text: str, target: str) -> Decimal:
@@ -19,7 +22,7 @@ def from_text(text: str, target: str) -> Decimal:
     match = _TEXT.fullmatch(text)
     if not match:
         raise ValueError(f'It must be a number and its unit, such as "1 {target or "%"}".')
-    amount, unit = match[1], (match[2] or "").strip()
+    amount, unit = match[1], match[2] or ""
     if unit or not target:
         return _convert(Decimal(amount), unit, target)
     raise ValueError(f'Text must carry a unit, such as "{amount} {target}"; a number without one is written unquoted.')

@@ -49,6 +49,11 @@ class Recorder:
         names = [f"dissipation.{index}" for index in range(len(self._elements))]
         self._names = [*MOTION_COLUMNS, *names, "total", "in_contact"]
 
+    @property
+    def is_empty(self) -> bool:
+        """Whether every tick so far has been taken."""
+        return not self._rows and not self._cut
+
     def cut(self) -> None:
         """End the present block."""
         width = len(self._names)

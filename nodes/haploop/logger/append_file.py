@@ -37,7 +37,7 @@ class AppendFile:
     @property
     def writable(self) -> bool:
         """Whether another piece may be appended: neither closed nor refused by the operating system."""
-        return self._failure is None and not self._file.closed
+        return not self._file.closed
 
     def append(self, piece: bytes) -> None:
         """Hand a piece to the operating system.
@@ -62,6 +62,7 @@ class AppendFile:
         # A device or a pipe cannot be cut back; it was never a log that could be read again.
         with contextlib.suppress(OSError):
             self._file.truncate(self.size)
+        self._file.close()
         self._failure = LogError(
             f"Writing the log {self.path} failed after {self.size} bytes ({error.strerror}). "
             f"What was written before that stays and can be read with haploop.logger.read; "

@@ -6,6 +6,7 @@ channel and taken apart by NumPy all at once.
 
 from __future__ import annotations
 
+import os
 import struct
 from collections.abc import Iterator
 from io import BytesIO
@@ -14,6 +15,7 @@ from typing import IO
 
 import numpy as np
 from mcap.data_stream import ReadDataStream
+from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Chunk, Schema
 from mcap.stream_reader import get_chunk_data_stream
@@ -56,8 +58,8 @@ def read(path: str | Path) -> Recording:
                 whole = file.tell()
                 if opcode == Opcode.FOOTER and file.read(len(MAGIC)) == MAGIC:
                     reason = ""
-        except (ValueError, RuntimeError, struct.error) as damage:
-            reason = f"what follows is damaged: {damage}"
+        except (ValueError, OverflowError, RuntimeError, struct.error, McapError) as damage:
+            reason = f"what follows is damaged: {damage or type(damage).__name__}"
     cut = reason and f"The log {log} was cut off or is still being written; it was read up to byte {whole} ({reason})."
     return contents.recording(cut)
 
@@ -73,12 +75,12 @@ def _log_file(path: Path) -> Path:
 
 def _records(stream: IO[bytes]) -> Iterator[tuple[int, bytes]]:
     """Opcode and content of each whole record that is left in a file."""
+    end = os.fstat(stream.fileno()).st_size
     while len(prefix := stream.read(_PREFIX.size)) == _PREFIX.size:
         opcode, length = _PREFIX.unpack(prefix)
-        content = stream.read(length)
-        if len(content) < length:
+        if stream.tell() + length > end:
             return
-        yield opcode, content
+        yield opcode, stream.read(length)
 
 
 def _run(body: bytes, start: int, end: int) -> tuple[int, Run, int]:

@@ -26,12 +26,13 @@ class Logger:
         channels: where to write, or None to keep books only.
 
     Attributes:
+        time: the integers of the run.
         tick: every interval before it is booked.
         latest: running books at the ticks booked last, name -> array; with ``latest_from`` the first of them.
     """
 
     def __init__(self, scene: dict[str, Any], time: Timebase, channels: Channels | None) -> None:
-        self._scene, self._time, self._channels = scene, time, channels
+        self._scene, self.time, self._channels = scene, time, channels
         self.books = Books(scene, time)
         resolution = scene.get("encoder", {}).get("resolution", 0.0)
         self.window = Window(time.plant_rate, time.steps_per_tick, resolution)
@@ -46,9 +47,9 @@ class Logger:
         """Begin with the plant's state and, when joining a run, the controller's last blocks."""
         known = history[-1]["from_tick"] + history[-1]["ticks"] if history else 0
         self.tick = self._first_tick = max(int(plant["tick"]), known)
-        self._plant = PlantTape(self._time.steps_per_tick, int(plant["tick"]))
+        self._plant = PlantTape(self.time.steps_per_tick, int(plant["tick"]))
         self._controller = ControllerTape(
-            history[0]["from_tick"] if history else self.tick, keep_ticks=self._time.lookahead_ticks + 2
+            history[0]["from_tick"] if history else self.tick, keep_ticks=self.time.lookahead_ticks + 2
         )
         for block in history:
             self._controller.add(block)
@@ -130,9 +131,9 @@ class Logger:
         ticks = self.tick - self._first_tick
         x, v, force = self._end_state
         ran = {
-            "duration_s": ticks / self._time.control_rate,
+            "duration_s": ticks / self.time.control_rate,
             "ticks": ticks,
-            "steps": ticks * self._time.steps_per_tick,
+            "steps": ticks * self.time.steps_per_tick,
             "from_tick": self._first_tick,
             "ended": ended,
             "wall_s": wall_clock.perf_counter() - self._began,
@@ -142,6 +143,17 @@ class Logger:
         }
         accounts = [{**a, "to_tick": min(a["to_tick"], self.tick)} for a in self._accounts.values()]
         return summary(self._scene, ran, self.window, self.books, accounts, diverged)
+
+    def status(self) -> dict[str, Any]:
+        """Where the run is and how it looks, for progress lines and viewers."""
+        if not self.tick - self._first_tick:
+            return {}
+        return {
+            "t_s": self.tick / self.time.control_rate,
+            "verdict": self.window.verdict(None).word,
+            "oscillation_m": self.window.figures()["oscillation_m"],
+            "residual_J": self.books.residual_J,
+        }
 
     def end(self) -> None:
         """Write the end state; call once, when no more blocks come."""

@@ -1,0 +1,98 @@
+"""The processes of a run: started together, watched, and never left behind."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+from haploop.protocol.processes import PROCESSES
+
+
+class Child:
+    """One node's process.
+
+    Its stdin is a line of life: it ends at once when the launcher is gone. Its stdout carries nothing; that it closes
+    tells the launcher, without polling, that the process has ended.
+    """
+
+    def __init__(self, role: str, sockets: Path, address: str, secret: str, cores: set[int] | None) -> None:
+        self.role = role
+        command = [sys.executable, "-m", PROCESSES[role].module, str(sockets)]
+        self._process = subprocess.Popen(
+            command,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            start_new_session=True,  # Ctrl-C is for the launcher, which ends the run in order
+        )
+        assert self._process.stdin and self._process.stdout
+        if cores and hasattr(os, "sched_setaffinity"):
+            with contextlib.suppress(OSError):
+                os.sched_setaffinity(self._process.pid, cores)
+        with contextlib.suppress(BrokenPipeError):
+            self._process.stdin.write(f"{address} {secret}\n".encode())
+            self._process.stdin.flush()
+        self.died = self._process.stdout.fileno()
+
+    @property
+    def pid(self) -> int:
+        return self._process.pid
+
+    def fate(self) -> str:
+        """How the process ended, in words."""
+        try:
+            code = self._process.wait(timeout=1.0)
+        except subprocess.TimeoutExpired:
+            return "closed its output but still runs"
+        if code < 0:
+            return f"was killed by {signal.Signals(-code).name}"
+        return f"ended with exit status {code}"
+
+    def ended(self) -> bool:
+        """Whether the process is gone."""
+        return self._process.poll() is not None
+
+    def wait(self, timeout_s: float) -> bool:
+        """Give the process some time to end by itself; whether it did."""
+        try:
+            self._process.wait(timeout=timeout_s)
+        except subprocess.TimeoutExpired:
+            return False
+        return True
+
+    def kill(self) -> None:
+        """End the process now, stopped or not, and reap it."""
+        with contextlib.suppress(ProcessLookupError):
+            self._process.kill()
+        self._process.wait()
+        for pipe in (self._process.stdin, self._process.stdout):
+            if pipe:
+                with contextlib.suppress(OSError):
+                    pipe.close()
+
+
+def start_children(sockets: Path, address: str, secret: str, pin: bool, run_number: int) -> dict[str, Child]:
+    """Start every process of the table.
+
+    Plant and controller wait for each other at every tick and gain nothing from two cores, but lose the wake-up from
+    one to the other: they share a core, the others get the rest. Runs beside each other take different cores.
+    """
+    loop_cores, other_cores = share_cores(run_number) if pin else (None, None)
+    return {
+        role: Child(role, sockets, address, secret, loop_cores if process.on_loop_core else other_cores)
+        for role, process in PROCESSES.items()
+    }
+
+
+def share_cores(run_number: int) -> tuple[set[int] | None, set[int] | None]:
+    """(core of plant and controller, cores of the others), or (None, None) where nothing can be gained."""
+    if not hasattr(os, "sched_getaffinity"):
+        return None, None
+    cores = sorted(os.sched_getaffinity(0))
+    if len(cores) < 2:
+        return None, None
+    shared = cores[run_number % len(cores)]
+    return {shared}, set(cores) - {shared}

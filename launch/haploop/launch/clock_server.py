@@ -1,0 +1,204 @@
+"""The clock on its socket: nodes join and report, grants go out, commands from other terminals are answered."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import zmq
+
+from haploop.launch.clock import Clock
+from haploop.launch.roster import Node, Roster
+from haploop.protocol.processes import PROCESSES
+from haploop.protocol.sockets import bind, open_socket
+from haploop.protocol.wire import Frame, WireError, decode, encode
+
+Command = Callable[[str, dict[str, Any]], tuple[bool, str, dict[str, Any]]]
+
+
+class RunFailed(Exception):
+    """A run that cannot go on; the message names the node and the tick."""
+
+
+class ClockServer:
+    """Speaks the clock's part of the protocol.
+
+    Args:
+        clock: decides how far and when.
+        welcome: fields of WELCOME but for endpoints and granted: run, scene, timebase, context.
+        command: carries out a command from a client.
+
+    Attributes:
+        address: where the clock listens.
+        roster: who takes part.
+        results: role -> result of each own process that is done.
+        strangers: frames that were no messages, or from nobody who joined.
+    """
+
+    def __init__(
+        self,
+        context: zmq.Context[zmq.Socket[bytes]],
+        sockets: Path,
+        secret: str,
+        clock: Clock,
+        welcome: dict[str, Any],
+        command: Command,
+    ) -> None:
+        self._socket = open_socket(context, zmq.ROUTER)
+        self.address = bind(self._socket, sockets, "clock")
+        self._secret, self._clock, self._welcome, self._command = secret, clock, welcome, command
+        self.roster = Roster()
+        self.results: dict[str, dict[str, Any]] = {}
+        self.strangers = 0
+        self._greeted = False
+        self._granted = -1
+        self._last_sent = False
+
+    @property
+    def socket(self) -> zmq.Socket[bytes]:
+        """For pollers."""
+        return self._socket
+
+    def close(self) -> None:
+        """Stop listening; what was sent still goes out."""
+        self._socket.close(linger=200)
+
+    def serve(self) -> None:
+        """Take every message that is there, then grant what can be granted.
+
+        Raises:
+            RunFailed: one of the run's own processes said that it cannot go on.
+        """
+        while self._socket.get(zmq.EVENTS) & zmq.POLLIN:
+            sender, *frames = self._socket.recv_multipart()
+            try:
+                self._take(sender, decode(frames[-1] if frames else b""))
+            except WireError as error:
+                self.strangers += 1
+                self._send(sender, "REFUSED", str(error))
+        if not self._greeted and self.roster.joined():
+            self._greeted = True
+            for node in list(self.roster.nodes.values()):
+                self._greet(node)
+        if self.roster.all_own("ready"):
+            self.grant()
+
+    def grant(self) -> None:
+        """Tell everyone how far they may go, and what changes on the way, if that is news."""
+        clock = self._clock
+        until = clock.grant(self.roster.slowest(), time.monotonic())
+        if until == self._granted and clock.is_last == self._last_sent:
+            return
+        self._granted, self._last_sent = until, clock.is_last
+        self._broadcast("GRANT", until, clock.is_last, clock.take_events())
+
+    def _broadcast(self, name: str, *fields: Any) -> None:
+        for node in list(self.roster.nodes.values()):
+            if not node.done:
+                self._send(node.identity, name, *fields)
+
+    def _send(self, identity: bytes, name: str, *fields: Any) -> None:
+        try:
+            self._socket.send_multipart([identity, encode(name, *fields)], flags=zmq.DONTWAIT)
+        except zmq.ZMQError:  # gone, or so far behind that its queue is full
+            node = self.roster.nodes.get(identity)
+            if node and not node.is_own:
+                del self.roster.nodes[identity]
+
+    def _take(self, sender: bytes, frame: Frame) -> None:
+        if frame.name == "JOIN":
+            self._join(sender, frame.as_dict())
+            return
+        if frame.name == "COMMAND":
+            self._send(sender, "REPLY", *self._command(*frame.fields))
+            return
+        node = self.roster.nodes.get(sender)
+        if node is None:
+            self.strangers += 1
+            self._send(sender, "REFUSED", f"{frame.name} came from somebody who has not joined; send JOIN first.")
+            return
+        node.heard = time.monotonic()
+        node.waits_for = ""
+        handler = getattr(self, f"_on_{frame.name.lower()}", None)
+        if handler is None:
+            self.strangers += 1
+            self._send(sender, "REFUSED", f"{frame.name} is not for the clock.")
+            return
+        handler(node, *frame.fields)
+
+    def _join(self, sender: bytes, request: dict[str, Any]) -> None:
+        role = request["role"]
+        known = role in PROCESSES
+        reason = ""
+        if known and request["secret"] != self._secret:
+            reason = f"The role {role} belongs to the run's own process; join as an observer."
+        elif known and self.roster.own(role):
+            reason = f"The role {role} is taken."
+        elif not known and not self._greeted:
+            reason = "The run has not begun; try again in a moment."
+        elif sender in self.roster.nodes:
+            reason = "You have joined already."
+        elif not all(isinstance(v, str) for pair in request["endpoints"].items() for v in pair):
+            reason = "JOIN.endpoints must be a map from channel to address."
+        if reason:
+            self._send(sender, "REFUSED", reason)
+            return
+        lossless = request["lossless"] and role not in ("plant", "controller")
+        node = Node(sender, role, request["pid"], lossless, request["endpoints"], time.monotonic())
+        node.tick = 0 if known else self._clock.until
+        self.roster.add(node)
+        if not known:
+            self._greet(node)
+
+    def _greet(self, node: Node) -> None:
+        context = self._welcome["context"]
+        if not node.is_own:
+            context = {key: value for key, value in context.items() if key != "secret"}
+        fields = {**self._welcome, "endpoints": self.roster.endpoints(), "granted": self._clock.until, "context": context}
+        order = ("run", "scene", "timebase", "endpoints", "granted", "context")
+        self._send(node.identity, "WELCOME", *(fields[name] for name in order))
+
+    # What nodes say
+
+    def _on_ready(self, node: Node, tick: int) -> None:
+        node.ready, node.tick = True, tick
+
+    def _on_progress(self, node: Node, tick: int, status: dict[str, Any]) -> None:
+        node.tick = max(node.tick, tick)
+        node.status = status or node.status
+        for refusal in status.get("refused", []):
+            self._clock.note({"refused": str(refusal)})
+
+    def _on_waiting(self, node: Node, tick: int, on: str) -> None:
+        node.waits_for = on
+
+    def _on_ended(self, node: Node, tick: int, reason: str) -> None:
+        if node.role == "plant":
+            self._clock.end_at(tick)
+
+    def _on_done(self, node: Node, tick: int, result: dict[str, Any]) -> None:
+        node.done, node.tick = True, tick
+        if node.is_own:
+            self.results[node.role] = result
+        else:
+            del self.roster.nodes[node.identity]
+
+    def _on_leave(self, node: Node, tick: int) -> None:
+        if not node.is_own:
+            del self.roster.nodes[node.identity]
+
+    def _on_failed(self, node: Node, tick: int, reason: str) -> None:
+        if node.is_own:
+            raise RunFailed(f"The {node.role} failed: {reason}")
+        del self.roster.nodes[node.identity]
+
+    def drop(self, node: Node, reason: str) -> None:
+        """Go on without an attached node."""
+        self._send(node.identity, "ABORT", reason)
+        self.roster.nodes.pop(node.identity, None)
+
+    def abort(self, reason: str) -> None:
+        """Tell every node to save what it has and leave."""
+        self._broadcast("ABORT", reason)

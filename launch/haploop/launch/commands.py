@@ -1,0 +1,123 @@
+"""What other terminals may ask of a running loop, and the answers."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from haploop.controller.dissipation import PluginError, load_plugin
+from haploop.launch.clock import Clock, ClockError
+from haploop.launch.mistakes import SceneError
+from haploop.launch.output import OutputError, keep_plugin
+from haploop.launch.roster import Roster
+
+if TYPE_CHECKING:
+    from haploop.launch.supervisor import RunRequest
+
+Answer = tuple[bool, str, dict[str, Any]]
+
+
+class Commands:
+    """Carries out COMMAND messages: each a verb and its arguments, answered with a sentence and data.
+
+    Whatever is refused leaves the run as it was.
+    """
+
+    def __init__(self, clock: Clock, request: RunRequest, roster: Callable[[], Roster]) -> None:
+        self._clock, self._request, self._roster = clock, request, roster
+        self._rate = request.scene["clock"]["control_rate"]
+        self._verbs = {
+            "status": self._status,
+            "pause": self._pause,
+            "resume": self._resume,
+            "step": self._step,
+            "stop": self._stop,
+            "swap": self._swap,
+            "set": self._set,
+        }
+
+    def __call__(self, verb: str, arguments: dict[str, Any]) -> Answer:
+        """Carry out one command."""
+        act = self._verbs.get(verb)
+        if act is None:
+            return False, f"{verb[:40]!r} is no command; these are: {', '.join(self._verbs)}.", {}
+        try:
+            text, data = act(**arguments)
+            return True, text, data
+        except (ClockError, SceneError, PluginError, OutputError) as error:
+            return False, str(error), {}
+        except (TypeError, ValueError, KeyError, AttributeError) as error:
+            return False, f"The arguments of {verb} cannot be used: {error}.", {}
+
+    def _at(self, tick: int) -> str:
+        return f"tick {tick} ({tick / self._rate:g} s)"
+
+    def _status(self) -> tuple[str, dict[str, Any]]:
+        clock, roster = self._clock, self._roster()
+        logger = roster.own("logger")
+        data = {
+            "title": self._request.scene["title"],
+            "out": str(self._request.out),
+            "tick": logger.tick if logger else 0,
+            "granted": clock.until,
+            "end": clock.end,
+            "control_rate": self._rate,
+            "paused": clock.paused,
+            "nodes": roster.table(),
+            **({"status": logger.status} if logger else {}),
+        }
+        state = "paused" if clock.paused else "running"
+        return f"{state} at {self._at(data['tick'])} of {clock.end}", data
+
+    def _pause(self) -> tuple[str, dict[str, Any]]:
+        tick = self._clock.pause()
+        self._clock.note({"pause": True})
+        return f"paused at {self._at(tick)}", {"tick": tick}
+
+    def _resume(self) -> tuple[str, dict[str, Any]]:
+        tick = self._clock.resume(time.monotonic())
+        self._clock.note({"resume": True})
+        return f"resumed at {self._at(tick)}", {"tick": tick}
+
+    def _step(self, ticks: int = 1) -> tuple[str, dict[str, Any]]:
+        if not isinstance(ticks, int) or ticks < 1:
+            raise ClockError(f"A step goes on for at least one tick, but {ticks} was asked for.")
+        tick = self._clock.step(ticks, time.monotonic())
+        return f"stepping to {self._at(tick)}", {"tick": tick}
+
+    def _stop(self) -> tuple[str, dict[str, Any]]:
+        tick = self._clock.stop()
+        self._clock.note({"stop": True})
+        return f"stopping at {self._at(tick)}", {"tick": tick}
+
+    def _swap(
+        self, swap: dict[str, Any], element: int = 0, at: float | None = None, reload: bool = False
+    ) -> tuple[str, dict[str, Any]]:
+        kinds = dict(self._request.kinds)
+        extra = self._reload(str(swap.get("kind"))) if reload else {}
+        try:
+            tick = self._clock.change({"swap": swap, "element": element}, at, **extra)
+        except Exception:
+            self._request.kinds.update(kinds)
+            raise
+        return f"element {element} becomes {swap['kind']} at {self._at(tick)}", {"tick": tick}
+
+    def _set(self, set: dict[str, Any], at: float | None = None) -> tuple[str, dict[str, Any]]:
+        tick = self._clock.change({"set": set}, at)
+        what = ", ".join(f"{key} = {value}" for key, value in set.items())
+        return f"{what} from {self._at(tick)} on", {"tick": tick}
+
+    def _reload(self, kind: str) -> dict[str, Any]:
+        """Take up the edited file of a kind named at launch; a file that does not load changes nothing."""
+        source: Path | None = self._request.plugin_sources.get(kind)
+        if source is None:
+            known = ", ".join(sorted(self._request.plugin_sources)) or "none"
+            raise ClockError(f"Only kinds from --plugin files can be reloaded ({known}), but {kind} was asked for.")
+        loaded = load_plugin(source)
+        if kind not in loaded:
+            raise ClockError(f"{source} no longer defines {kind}, but {', '.join(loaded)}; the old element stays.")
+        kept = keep_plugin(source, self._request.out)
+        self._request.kinds.update(loaded)
+        return {"plugin": str(kept.resolve())}

@@ -1,0 +1,114 @@
+"""The whole loop in one process: the same plant, controller and logger, without sockets."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from haploop.controller.controller import Controller
+from haploop.logger.keeper import Keeper, open_keeper
+from haploop.plant.plant import Plant
+from haploop.protocol.ticks import Timebase
+
+if TYPE_CHECKING:
+    from haploop.controller.dissipation import Element
+
+Event = dict[str, Any]
+Progress = Callable[[dict[str, Any]], None]
+
+
+def run_in_process(
+    scene: dict[str, Any],
+    kinds: dict[str, type[Element]],
+    *,
+    out: Path | None = None,
+    attachments: dict[str, str] | None = None,
+    events: list[tuple[int, Event]] | None = None,
+    progress: Progress | None = None,
+    stop: Callable[[], bool] = lambda: False,
+) -> dict[str, Any]:
+    """Run a resolved scene to its end and return the summary.
+
+    Args:
+        scene: the resolved scene.
+        kinds: element kinds at hand.
+        out: directory for log and summary; nothing is written when None.
+        attachments: text files for the log, by name.
+        events: (tick, event) in order; the scene's own when None. Pauses are of the wall clock and change nothing.
+        progress: called now and then with the logger's status.
+        stop: asked after every block; True ends the run there.
+    """
+    time = Timebase.of(scene["clock"], scene["duration"])
+    keeper = open_keeper(scene, time, out, attachments or {})
+    loop = Loop(scene, time, kinds, keeper)
+    loop.schedule(scene_events(scene, time) if events is None else events)
+    while loop.block():
+        keeper.flush_when_due()
+        if progress:
+            progress(keeper.logger.status())
+        if stop():
+            loop.end_here()
+            loop.block()
+            break
+    return loop.finish()
+
+
+def scene_events(scene: dict[str, Any], time: Timebase) -> list[tuple[int, Event]]:
+    """The events of a scene with their ticks, in order."""
+    return [(time.first_tick_at(event["at"]), event) for event in scene.get("event", [])]
+
+
+class Loop:
+    """Plant, controller and keeper of one scene, advanced block by block."""
+
+    def __init__(self, scene: dict[str, Any], time: Timebase, kinds: dict[str, type[Element]], keeper: Keeper) -> None:
+        self._plant, self._controller = Plant(scene, time), Controller(scene, time, kinds)
+        self._keeper = keeper
+        self._end = time.ticks
+        self._block_ticks = scene["run"]["block_ticks"]
+        self._most = time.lookahead_ticks + 1
+        keeper.logger.start(self._plant.state(), [])
+
+    def schedule(self, events: list[tuple[int, Event]]) -> None:
+        """Have events take effect at their ticks."""
+        for tick, event in events:
+            self._keeper.logger.event(tick, event)
+            if "swap" in event or "set" in event:
+                self._controller.schedule(tick, event)
+            elif event.get("stop"):
+                self._end = min(self._end, tick)
+
+    def block(self) -> bool:
+        """Work through one block; False when the run has ended."""
+        plant, controller = self._plant, self._controller
+        until = min(plant.tick + self._block_ticks, self._end)
+        while plant.tick < until and plant.stop_reason is None:
+            samples = plant.samples(min(self._most, until - plant.tick))
+            if samples:
+                plant.receive(controller.answer(samples))
+        going_on = plant.tick < self._end and plant.stop_reason is None
+        if not going_on and plant.stop_reason is None:
+            plant.finish()
+        self._hand_over()
+        return going_on
+
+    def _hand_over(self) -> None:
+        first, ticks, columns = self._plant.take_block()
+        logger = self._keeper.logger
+        if ticks:
+            logger.plant_block({"from_tick": first, "ticks": ticks, "columns": columns})
+        for block in self._controller.recorder.take():
+            logger.controller_block(block)
+        for refusal in self._controller.recorder.refused:
+            logger.event(self._controller.tick, {"refused": refusal})
+        self._controller.recorder.refused = []
+
+    def end_here(self) -> None:
+        """End the run at the ticks worked on so far."""
+        self._end = self._plant.tick
+
+    def finish(self) -> dict[str, Any]:
+        """Close the books and return the summary."""
+        lost = {"commands_dropped": 0, "commands_lost": 0, "telemetry_gaps": 0}
+        return self._keeper.close("", self._plant.stop_reason, self._controller.recorder.trouble, lost)

@@ -1,0 +1,61 @@
+"""The directory a run writes to: new or empty, holding the scene it can be run from again."""
+
+from __future__ import annotations
+
+import hashlib
+import time
+from pathlib import Path
+from typing import Any
+
+from haploop.launch.resolved import to_toml
+
+SCENE, PLUGINS = "scene.toml", "plugins"
+
+
+class OutputError(Exception):
+    """The directory cannot be used; the message says why and what to do."""
+
+
+def make_output(out: Path | None, scene_path: Path) -> Path:
+    """Make the run's directory: ``out``, or a new one below ``runs/`` named by scene and time.
+
+    Raises:
+        OutputError: ``out`` holds something already, or cannot be made.
+    """
+    if out is None:
+        stem = f"{scene_path.stem}-{time.strftime('%Y%m%d-%H%M%S')}"
+        candidates = (Path("runs") / (stem + suffix) for suffix in ("", *(f"-{n}" for n in range(2, 1000))))
+        out = next(path for path in candidates if not path.exists())
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        if any(out.iterdir()):
+            raise OutputError(f"{out} must be new or empty, so that no earlier run is lost; name another with --out.")
+    except OSError as error:
+        raise OutputError(f"The run's directory {out} cannot be made: {error.strerror}.") from error
+    return out
+
+
+def write_scene(scene: dict[str, Any], out: Path) -> str:
+    """Write the resolved scene, which runs by itself, and return its text."""
+    text = to_toml(scene)
+    try:
+        (out / SCENE).write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise OutputError(f"{out / SCENE} cannot be written: {error.strerror}.") from error
+    return text
+
+
+def keep_plugin(path: Path, out: Path) -> Path:
+    """Copy a plugin file into the run's directory under a name that holds its digest, so that a replay finds it.
+
+    Raises:
+        OutputError: the file cannot be read or copied.
+    """
+    try:
+        source = path.read_bytes()
+        name = f"{path.stem}-{hashlib.sha256(source).hexdigest()[:12]}.py"
+        (out / PLUGINS).mkdir(exist_ok=True)
+        (out / PLUGINS / name).write_bytes(source)
+    except OSError as error:
+        raise OutputError(f"The plugin {path} cannot be copied into {out / PLUGINS}: {error.strerror}.") from error
+    return out / PLUGINS / name

@@ -1,0 +1,93 @@
+"""Who takes part in a run, how far each one is, and who keeps the others waiting."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+from haploop.protocol.processes import PROCESSES
+
+
+@dataclass
+class Node:
+    """A node as the clock knows it.
+
+    Attributes:
+        identity: where its messages come from.
+        role, pid, lossless: as it said when it joined; a lossless node holds the clock back.
+        tick: every tick before it is done.
+        heard: wall time of its last message, s.
+        waits_for: whom it said it waits for, or "".
+        status: the last status it reported.
+    """
+
+    identity: bytes
+    role: str
+    pid: int
+    lossless: bool
+    endpoints: dict[str, str]
+    heard: float
+    tick: int = 0
+    ready: bool = False
+    done: bool = False
+    waits_for: str = ""
+    status: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def is_own(self) -> bool:
+        """Whether it is one of the run's own processes, not an attached one."""
+        return self.role in PROCESSES
+
+
+class Roster:
+    """The nodes of a run, by identity."""
+
+    def __init__(self) -> None:
+        self.nodes: dict[bytes, Node] = {}
+
+    def add(self, node: Node) -> None:
+        """Take a node in."""
+        self.nodes[node.identity] = node
+
+    def own(self, role: str) -> Node | None:
+        """The run's own process of this role, if it has joined."""
+        return next((node for node in self.nodes.values() if node.role == role), None)
+
+    def all_own(self, what: str) -> bool:
+        """Whether all the run's own processes have joined and ``what`` ("ready", "done") holds for each."""
+        return all((node := self.own(role)) is not None and getattr(node, what) for role in PROCESSES)
+
+    def joined(self) -> bool:
+        """Whether all the run's own processes have joined."""
+        return all(self.own(role) for role in PROCESSES)
+
+    def endpoints(self) -> dict[str, dict[str, str]]:
+        """Addresses by role and channel."""
+        return {node.role: node.endpoints for node in self.nodes.values() if node.is_own}
+
+    def slowest(self) -> int:
+        """Tick of the slowest lossless node that is neither plant nor controller: it bounds what is in flight."""
+        return min((node.tick for node in self.nodes.values() if node.lossless and not node.done), default=0)
+
+    def common_tick(self) -> int:
+        """The last tick all own processes have done."""
+        return min((node.tick for node in self.nodes.values() if node.is_own), default=0)
+
+    def silent(self, now: float, deadline_s: float) -> list[Node]:
+        """Nodes not heard of for longer than the deadline."""
+        return [node for node in self.nodes.values() if not node.done and now - node.heard > deadline_s]
+
+    def table(self) -> list[dict[str, Any]]:
+        """For people: role, pid, tick, how far behind the first, whom it waits for."""
+        first = max((node.tick for node in self.nodes.values()), default=0)
+        return [
+            {
+                "role": node.role,
+                "pid": node.pid,
+                "tick": node.tick,
+                "behind_ticks": first - node.tick,
+                "waits_for": node.waits_for,
+                "lossless": node.lossless,
+            }
+            for node in self.nodes.values()
+        ]

@@ -1,0 +1,126 @@
+"""Where runs live while they run: a private directory of sockets each, in which other terminals find them."""
+
+from __future__ import annotations
+
+import json
+import os
+import secrets
+import shutil
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+# A socket's path must stay below the kernel's 107 bytes; this leaves room for the run and the socket's name.
+_LONGEST_BASE = 70
+
+
+class RunNotFound(Exception):
+    """No run, or not one run, to talk to; the message lists those there are."""
+
+
+def base_directory() -> Path:
+    """The user's directory of live runs, mode 0700, below XDG_RUNTIME_DIR or the temporary directory.
+
+    Raises:
+        PermissionError: a directory of that name belongs to somebody else.
+    """
+    candidate = Path(os.environ.get("XDG_RUNTIME_DIR") or "/nonexistent") / "haploop"
+    if not candidate.parent.is_dir() or len(os.fsencode(candidate)) > _LONGEST_BASE:
+        candidate = Path(tempfile.gettempdir()) / f"haploop-{os.getuid()}"
+    if len(os.fsencode(candidate)) > _LONGEST_BASE:
+        candidate = Path("/tmp") / f"haploop-{os.getuid()}"
+    candidate.mkdir(mode=0o700, exist_ok=True)
+    status = candidate.stat()
+    if status.st_uid != os.getuid() or status.st_mode & 0o077:
+        raise PermissionError(
+            f"{candidate} must belong to you alone (mode 0700), but it belongs to user {status.st_uid} with mode "
+            f"{status.st_mode & 0o777:o}; remove it or set XDG_RUNTIME_DIR."
+        )
+    return candidate
+
+
+@dataclass(frozen=True)
+class LiveRun:
+    """A run as other terminals see it: its directory of sockets, the launcher's process and the clock's address."""
+
+    id: str
+    sockets: Path
+    pid: int
+    clock: str
+    title: str
+    out: str
+
+
+def create() -> Path:
+    """A new directory of sockets, named by the run's id; clears away what dead runs left."""
+    live_runs()
+    while True:
+        path = base_directory() / secrets.token_hex(3)
+        try:
+            path.mkdir(mode=0o700)
+            return path
+        except FileExistsError:
+            continue
+
+
+def announce(sockets: Path, clock: str, title: str, out: str) -> None:
+    """Let other terminals find the run."""
+    entry = {"pid": os.getpid(), "clock": clock, "title": title, "out": out}
+    temporary = sockets / "run.part"
+    temporary.write_text(json.dumps(entry), encoding="utf-8")
+    temporary.replace(sockets / "run.json")
+
+
+def remove(sockets: Path) -> None:
+    """Forget a run: no socket file stays behind."""
+    shutil.rmtree(sockets, ignore_errors=True)
+
+
+def live_runs() -> list[LiveRun]:
+    """All runs of this user, oldest first; the directories of dead ones are cleared away."""
+    runs = []
+    for path in sorted(base_directory().iterdir(), key=lambda entry: entry.stat().st_mtime):
+        entry = _read(path)
+        if entry is None:
+            continue
+        if _is_alive(entry["pid"]):
+            runs.append(LiveRun(path.name, path, **entry))
+        else:
+            remove(path)
+    return runs
+
+
+def find(run_id: str | None) -> LiveRun:
+    """The run with this id (or its beginning), or the only one there is.
+
+    Raises:
+        RunNotFound: none, or several, fit.
+    """
+    runs = live_runs()
+    fitting = [run for run in runs if run_id is None or run.id.startswith(run_id)]
+    if len(fitting) == 1:
+        return fitting[0]
+    listing = "\n".join(f"  {run.id}  {run.title}" for run in runs)
+    if not runs:
+        raise RunNotFound("No run is live; start one with haploop run SCENE.")
+    if not fitting:
+        raise RunNotFound(f"No live run has the id {run_id}; these are live:\n{listing}")
+    raise RunNotFound(f"{len(fitting)} runs are live; name one with --run ID:\n{listing}")
+
+
+def _read(path: Path) -> dict[str, Any] | None:
+    try:
+        return json.loads((path / "run.json").read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
+
+
+def _is_alive(pid: int) -> bool:
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    except PermissionError:
+        return True
+    return True

@@ -1,0 +1,75 @@
+"""Running a scene file: read it, make its directory, run it one way or the other, say how it went."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from haploop.controller.dissipation import Element, load_plugin, registry
+from haploop.launch.output import keep_plugin, make_output, write_scene
+from haploop.launch.scene_file import load
+
+
+@dataclass
+class Prepared:
+    """A scene ready to run: resolved, with its kinds, its directory and what goes into the log."""
+
+    scene: dict[str, Any]
+    kinds: dict[str, type[Element]]
+    out: Path
+    attachments: dict[str, str]
+    plugins: list[Path]
+    plugin_sources: dict[str, Path]
+
+
+def prepare(
+    scene_path: Path, overrides: Sequence[str] = (), plugins: Sequence[Path] = (), out: Path | None = None
+) -> Prepared:
+    """Read and check everything; only when all is well is anything written.
+
+    Raises:
+        SceneError: the scene has mistakes.
+        PluginError: a plugin does not load.
+        OutputError: the directory cannot be used.
+    """
+    kinds = registry()
+    sources: dict[str, Path] = {}
+    for plugin in plugins:
+        for kind, element in load_plugin(plugin).items():
+            kinds[kind], sources[kind] = element, plugin
+    scene = load(scene_path, overrides, kinds)
+    directory = make_output(out, scene_path)
+    attachments = {"scene.toml": write_scene(scene, directory)}
+    kept = [keep_plugin(plugin, directory) for plugin in plugins]
+    attachments |= {f"plugins/{path.name}": path.read_text(encoding="utf-8") for path in kept}
+    return Prepared(scene, kinds, directory, attachments, kept, sources)
+
+
+def run(
+    prepared: Prepared,
+    *,
+    in_process: bool = False,
+    pace: float = math.inf,
+    progress: Callable[[dict[str, Any]], None] = lambda status: None,
+    announced: Callable[[str], None] = lambda run_id: None,
+) -> dict[str, Any]:
+    """Run a prepared scene and return its summary.
+
+    Raises:
+        RunFailed: a process was killed, hung or could not go on.
+        LogError: the log could not be written (in one process).
+    """
+    p = prepared
+    if in_process:
+        from haploop.launch.in_process import run_in_process
+
+        return run_in_process(p.scene, p.kinds, out=p.out, attachments=p.attachments, progress=progress)
+    from haploop.launch.supervisor import RunRequest, run_processes
+
+    request = RunRequest(
+        p.scene, p.kinds, p.out, p.attachments, p.plugins, p.plugin_sources, pace, progress, announced
+    )
+    return run_processes(request)

@@ -1,0 +1,144 @@
+"""The logger as a process: listens to plant and controller, keeps the books, writes log and summary."""
+
+from __future__ import annotations
+
+import time as wall_clock
+from pathlib import Path
+from typing import Any
+
+import zmq
+
+from haploop.logger.keeper import Keeper, open_keeper
+from haploop.logger.log_error import LogError
+from haploop.protocol.member import Aborted, Member
+from haploop.protocol.node import NodeError, run_node
+from haploop.protocol.processes import PROCESSES
+from haploop.protocol.sockets import bind
+from haploop.protocol.telemetry import Publisher, Subscriber
+from haploop.protocol.ticks import Timebase
+
+ROLE = "logger"
+# How often books go out to viewers and the verdict is judged anew, at most.
+_STATUS_S = 0.1
+
+
+class LoggerNode:
+    """Takes every block there is; its progress bounds how far the loop may run ahead.
+
+    The run's own logger is one; any number of others may join later, each with a directory of its own.
+    """
+
+    def __init__(self, member: Member, context: zmq.Context[zmq.Socket[bytes]], publisher: Publisher | None) -> None:
+        self._member, self._context, self._publisher = member, context, publisher
+        self._ended: dict[str, tuple[int, str, str | None]] = {}
+        self._status: dict[str, Any] = {}
+        self._status_due = 0.0
+
+    def start(self, welcome: dict[str, Any], out: Path) -> None:
+        """Subscribe to plant and controller, take their state, and be ready."""
+        self.out = out
+        endpoints = welcome["endpoints"]
+        self._streams = Subscriber(self._context, {role: endpoints[role]["telemetry"] for role in ("plant", "controller")})
+        time = Timebase(**welcome["timebase"])
+        self.keeper: Keeper = open_keeper(welcome["scene"], time, out, welcome["context"].get("attachments", {}))
+        states: dict[str, dict[str, Any]] = {}
+        early = []
+        while len(states) < 2:
+            for role, frame in self._streams.receive(200):
+                if frame.name == "STATE":
+                    states[role] = frame.fields[1]
+                else:
+                    early.append(frame)
+            self._member.poll()
+        self.keeper.logger.start(states["plant"], states["controller"]["history"])
+        for frame in early:
+            self._take(frame.name, frame)
+        self._member.ready(self.keeper.logger.tick)
+
+    def run(self) -> tuple[int, dict[str, Any]]:
+        """Take blocks until plant and controller have ended, then close the log and write the summary."""
+        poller = zmq.Poller()
+        poller.register(self._member.socket, zmq.POLLIN)
+        self._streams.register(poller)
+        reported = -1
+        while len(self._ended) < 2:
+            if not poller.poll(200):
+                self._member.waiting(self.keeper.logger.tick, "plant")
+            for role, frame in self._streams.drain():
+                self._take(role, frame)
+            self._member.poll()
+            self._note_events()
+            tick = self.keeper.logger.tick
+            if tick != reported:
+                self._report(tick)
+                reported = tick
+            self.keeper.flush_when_due()
+        return self.finish("")
+
+    def _take(self, role: str, frame: Any) -> None:
+        if frame.name == "PLANT_BLOCK":
+            self.keeper.logger.plant_block(frame.as_dict())
+        elif frame.name == "CONTROLLER_BLOCK":
+            self.keeper.logger.controller_block(frame.as_dict())
+        elif frame.name == "END":
+            tick, reason, trouble = frame.fields
+            self._ended[role] = tick, reason, trouble
+
+    def _note_events(self) -> None:
+        for tick, event in self._member.take_events():
+            self.keeper.logger.event(tick, event)
+
+    def _report(self, tick: int) -> None:
+        now = wall_clock.monotonic()
+        if now >= self._status_due:
+            self._status_due = now + _STATUS_S
+            self._status = self.keeper.logger.status()
+            self._member.progress(tick, self._status)
+        else:
+            self._member.progress(tick)
+        if self._publisher:
+            self._publisher.serve()
+            if self._publisher.subscribers:
+                self._publish_energy()
+
+    def _publish_energy(self) -> None:
+        assert self._publisher
+        first, latest = self.keeper.logger.latest_from, self.keeper.logger.latest
+        columns = {name: column.tobytes() for name, column in latest.items()}
+        self._publisher.publish("ENERGY_BLOCK", first, self.keeper.logger.tick - first, columns, self._status)
+
+    def finish(self, failed: str) -> tuple[int, dict[str, Any]]:
+        """Close the log and write the summary of what ran; ``failed`` says why it ended early, if it did."""
+        self._note_events()
+        reason = next((reason for _, reason, _ in self._ended.values() if reason), None)
+        trouble = next((trouble for _, _, trouble in self._ended.values() if trouble), None)
+        lost = {"commands_dropped": 0, "commands_lost": 0, "telemetry_gaps": sum(self._streams.gaps.values())}
+        result = self.keeper.close(failed, reason, trouble, lost)
+        if self._publisher:
+            self._publisher.publish("END", self.keeper.logger.tick, reason or "", trouble)
+        return self.keeper.logger.tick, result
+
+
+def work(member: Member, context: zmq.Context[zmq.Socket[bytes]], directory: Path) -> tuple[int, dict[str, Any]]:
+    """Run the run's own logger."""
+    node: LoggerNode
+
+    def state() -> tuple[int, dict[str, Any]]:
+        return node.keeper.logger.tick, node.keeper.logger.status()
+
+    publisher = Publisher(context, ROLE, state)
+    address = bind(publisher.socket, directory, PROCESSES[ROLE].binds["telemetry"])
+    welcome = member.join({"telemetry": address})
+    node = LoggerNode(member, context, publisher)
+    try:
+        node.start(welcome, Path(welcome["context"]["out"]))
+        return node.run()
+    except Aborted as error:
+        node.finish(str(error))
+        raise
+    except LogError as error:
+        raise NodeError(str(error)) from error
+
+
+if __name__ == "__main__":
+    run_node(ROLE, work)

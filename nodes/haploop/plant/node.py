@@ -1,0 +1,106 @@
+"""The plant as a process: samples out, commands in, telemetry beside."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import zmq
+
+from haploop.plant.plant import Plant
+from haploop.protocol.loop import PlantEnd
+from haploop.protocol.member import Member
+from haploop.protocol.node import run_node
+from haploop.protocol.processes import PROCESSES
+from haploop.protocol.sockets import bind
+from haploop.protocol.telemetry import Publisher
+from haploop.protocol.ticks import Timebase
+
+ROLE = "plant"
+
+
+class PlantNode:
+    """Leads the loop: steps as far as granted, L + 1 samples a message, and ends the run for plant and controller."""
+
+    def __init__(self, member: Member, context: zmq.Context[zmq.Socket[bytes]], directory: Path) -> None:
+        self._member = member
+        self._loop = PlantEnd(context)
+        self._publisher = Publisher(context, ROLE, self._state)
+        names = PROCESSES[ROLE].binds
+        sockets = {"loop": self._loop.socket, "telemetry": self._publisher.socket}
+        endpoints = {channel: bind(socket, directory, names[channel]) for channel, socket in sockets.items()}
+        welcome = member.join(endpoints)
+        time = self._time = Timebase(**welcome["timebase"])
+        self._plant = Plant(welcome["scene"], time)
+        self._block_ticks = welcome["scene"]["run"]["block_ticks"]
+        self._reported = 0
+        self._secret = welcome["context"]["secret"]
+
+    def _state(self) -> tuple[int, dict[str, Any]]:
+        state = self._plant.state()
+        return int(state["tick"]), state
+
+    def connect(self) -> None:
+        """Find the controller and the logger; no tick is worked on before both listen."""
+        self._loop.greet(self._secret, self._await_controller)
+        self._publisher.await_subscriber(lambda: self._wait("logger"))
+        self._member.ready(0)
+
+    def run(self) -> tuple[int, dict[str, Any]]:
+        """Work until the run ends; returns the tick it ended at."""
+        member, plant = self._member, self._plant
+        most = self._time.lookahead_ticks + 1
+        while plant.stop_reason is None:
+            if plant.tick >= member.until:
+                if member.last:
+                    plant.finish()
+                    break
+                self._flush()
+                while plant.tick >= member.until and not member.last:
+                    member.wait(plant.tick)
+                    self._publisher.serve()
+                continue
+            first = plant.tick
+            samples = plant.samples(min(most, member.until - first))
+            if samples:
+                plant.receive(self._loop.exchange(first, samples, self._await_controller))
+            if plant.reached - self._reported >= self._block_ticks:
+                self._flush()
+                member.poll()
+        return self._end()
+
+    def _end(self) -> tuple[int, dict[str, Any]]:
+        plant = self._plant
+        self._loop.close(plant.reached)
+        self._flush()
+        self._publisher.publish("END", plant.reached, plant.stop_reason or "", None)
+        if plant.stop_reason:
+            self._member.ended(plant.reached, plant.stop_reason)
+        return plant.reached, {"strangers": self._loop.strangers + self._publisher.strangers}
+
+    def _flush(self) -> None:
+        """Publish what was stepped, answer new subscribers, report."""
+        first, ticks, columns = self._plant.take_block()
+        if ticks:
+            self._publisher.publish("PLANT_BLOCK", first, ticks, columns)
+        self._publisher.serve()
+        self._reported = self._plant.reached
+        self._member.progress(self._reported)
+
+    def _await_controller(self) -> None:
+        self._wait("controller")
+
+    def _wait(self, on: str) -> None:
+        self._member.waiting(self._plant.tick, on)
+        self._member.poll()
+
+
+def work(member: Member, context: zmq.Context[zmq.Socket[bytes]], directory: Path) -> tuple[int, dict[str, Any]]:
+    """Run the plant as a member of a run."""
+    node = PlantNode(member, context, directory)
+    node.connect()
+    return node.run()
+
+
+if __name__ == "__main__":
+    run_node(ROLE, work)

@@ -1,0 +1,59 @@
+"""What every node's process does around its work: start, tie to its parent, tell the clock how it ended."""
+
+from __future__ import annotations
+
+import gc
+import os
+import sys
+import threading
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import zmq
+
+from haploop.protocol.loop import LoopError
+from haploop.protocol.member import Aborted, Member, Refused
+
+# work(member, context, directory of sockets) -> (tick reached, result for the clock)
+Work = Callable[[Member, "zmq.Context[zmq.Socket[bytes]]", Path], tuple[int, dict[str, Any]]]
+
+
+class NodeError(Exception):
+    """Something a user can mend, as a full sentence; reported without a traceback."""
+
+
+def run_node(role: str, work: Work) -> None:
+    """Run a node as a process: ``python -m module DIRECTORY`` with the clock's address and secret on stdin.
+
+    Stdin stays open as long as the launcher lives; at its end this process ends at once, whatever it is doing.
+    Exit status: 0 when the node said DONE, 1 otherwise.
+    """
+    directory = Path(sys.argv[1])
+    address, secret = sys.stdin.readline().split()
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+    gc.freeze()
+    context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
+    member = Member(context, role, address, secret)
+    try:
+        tick, result = work(member, context, directory)
+        member.leave("DONE", tick, result)
+        status = 0
+    except Aborted:
+        status = 1
+    except (Refused, NodeError, LoopError) as error:
+        member.leave("FAILED", -1, str(error))
+        status = 1
+    except Exception as error:
+        import traceback
+
+        traceback.print_exc()
+        member.leave("FAILED", -1, f"{type(error).__name__}: {error}")
+        status = 1
+    context.destroy(linger=1000)
+    sys.exit(status)
+
+
+def _end_with_parent() -> None:
+    sys.stdin.read()
+    os._exit(1)

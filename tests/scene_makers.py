@@ -1,0 +1,40 @@
+"""Scenes made in the tests: a least scene, and ways to read one from text or from tables."""
+
+from pathlib import Path
+from typing import Any
+
+from haploop.controller.dissipation import registry
+from haploop.launch.check import resolve
+from haploop.launch.layers import Layers
+from haploop.launch.mistakes import SceneError
+from haploop.launch.scene_file import load
+
+KINDS = registry()
+LEAST: dict[str, Any] = {"title": "least", "duration": 1.0, "device": {"mass": 0.01, "damping": 0.1}}
+WALL = {"position": -0.06, "stiffness": 150.0}
+
+
+def scene(**tables: Any) -> dict[str, Any]:
+    """The least scene with these tables, resolved."""
+    return resolve(Layers(Path("scene.toml"), {**LEAST, **tables}), KINDS)
+
+
+def mistakes(**tables: Any) -> list[str]:
+    """What is wrong with the least scene with these tables, without the name of the file."""
+    try:
+        scene(**tables)
+    except SceneError as error:
+        return [str(mistake).removeprefix("scene.toml: ") for mistake in error.mistakes]
+    return []
+
+
+def file_mistakes(path: Path, *overrides: str) -> list[str]:
+    """What is wrong with a scene file."""
+    try:
+        load(path, overrides)
+    except SceneError as error:
+        return str(error).splitlines()
+    return []
+
+
+LEAST_TOML = "duration = 1.0\n[device]\nmass = 0.01\ndamping = 0.1\n"

@@ -1,0 +1,93 @@
+"""Numbers in a scene: SI when bare, converted when they carry a unit."""
+
+import math
+import subprocess
+import sys
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from pydantic_core import PydanticCustomError
+from scene_makers import mistakes, scene
+
+from haploop.launch.number import si
+
+
+@pytest.mark.parametrize(
+    ("text", "unit", "value"),
+    [
+        ("0.15 N/mm", "N/m", 150.0),
+        ("-60 mm", "m", -0.060),
+        ("0.0008 N s/mm", "N s/m", 0.8),
+        ("2 ms", "s", 0.002),
+        ("28.7 µm", "m", 28.7e-6),
+        ("3g", "kg", 0.003),
+        ("1e1 kHz", "Hz", 10_000.0),
+        ("90 deg", "rad", math.pi / 2),
+    ],
+)
+def test_text_with_a_unit_is_the_same_float_as_the_si_number_to_the_last_bit(text, unit, value):
+    assert si(unit).read(text) == value
+
+
+@pytest.mark.parametrize(
+    ("given", "sentence"),
+    [
+        ("2 ms", "ms has the dimension [time], but N/m has [mass] / [time] ** 2."),
+        ("5 Ns/mm", '"Ns/mm" is not a unit'),
+        ("5", 'Text must carry a unit, such as "5 N/m"'),
+        ("five N/m", "It must be a number and its unit"),
+        ("1e9999 N/m", '"e9999 N/m" is not a unit'),
+        ("5 m**999999999", "It must be a number and its unit"),
+        ("5 m**9**9**9", "It must be a number and its unit"),
+        ("1e999 N/m", "It must be a finite number"),
+        ("9**9**9**9 N/m", "It must be a number and its unit"),
+        (True, "It must be a number in N/m, at least 0"),
+        ([1.0], "It must be a number in N/m, at least 0"),
+        (math.nan, "It must be a finite number of N/m."),
+        (-math.inf, "It must be a finite number of N/m."),
+        (10**400, "It must be a number that a float can hold."),
+        (-1, "It must be at least 0 N/m."),
+        ("-1 N/mm", "It must be at least 0 N/m."),
+    ],
+)
+def test_what_is_no_usable_number_is_refused_with_the_reason(given, sentence):
+    with pytest.raises(PydanticCustomError) as refusal:
+        si("N/m", at_least=0).read(given)
+    assert refusal.value.message().startswith(sentence)
+
+
+@pytest.mark.parametrize("text", ["10 rad/s", "600 rpm"])
+def test_an_angular_rate_is_not_taken_for_a_frequency(text):
+    """pint alone takes 10 rad/s for 10 Hz and 60 rpm for 6.28 Hz."""
+    [mistake] = mistakes(velocity={"cutoff": text})
+    assert "counts angle and cannot stand for Hz" in mistake
+
+
+def test_a_rate_is_a_whole_number():
+    assert scene(clock={"plant_rate": "20 kHz"})["clock"]["plant_rate"] == 20_000
+    assert isinstance(scene(clock={"plant_rate": 20_000.0})["clock"]["plant_rate"], int)
+    [mistake] = mistakes(clock={"control_rate": 999.5})
+    assert mistake.startswith("clock.control_rate is 999.5. It must be a whole number in Hz, at least 1")
+
+
+def test_a_seed_is_not_rounded_to_a_float():
+    assert scene(seed=2**63 - 1)["seed"] == 2**63 - 1
+    assert mistakes(seed=2**63) == ["seed is 9223372036854775808. It must be below 9.22337e+18."]
+
+
+@given(st.text(max_size=30) | st.from_regex(r"-?[0-9.e]{1,6} ?[a-zA-Z/*^ ().0-9µ%°²-]{0,12}", fullmatch=True))
+def test_any_text_is_a_number_or_a_sentence(text):
+    try:
+        said = si("m").read(text)
+    except PydanticCustomError as refusal:
+        said = refusal.message()
+    assert said.endswith(".") if isinstance(said, str) else math.isfinite(said)
+
+
+def test_units_are_loaded_only_when_text_carries_one():
+    code = (
+        "import sys; from haploop.launch.number import si; si('m').read(1.0); assert 'pint' not in sys.modules;"
+        "si('m').read('1 mm'); assert 'pint' in sys.modules"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)

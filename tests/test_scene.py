@@ -1,0 +1,156 @@
+"""The tables of a scene: defaults, and every mistake in one pass."""
+
+from typing import Annotated
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scene_makers import KINDS, LEAST, WALL, mistakes, scene
+
+from haploop.controller.dissipation import Element, Quantity
+from haploop.launch.check import resolve
+from haploop.launch.layers import Layers
+from haploop.launch.mistakes import SceneError
+from haploop.launch.scene import SceneTable
+
+
+def test_defaults_are_filled_in_and_absent_tables_stay_absent():
+    assert scene() == {
+        "title": "least",
+        "duration": 1.0,
+        "seed": 0,
+        "diverged_beyond": 1.0,
+        "clock": {"plant_rate": 10_000, "control_rate": 1_000, "round_trip_delay": 0.0},
+        "device": {"mass": 0.01, "damping": 0.1, "position": 0.0, "velocity": 0.0},
+        "run": {"log": "steps", "pin": True, "block_ticks": 100, "window_blocks": 4, "deadline": 5.0},
+    }
+    assert scene(wall=WALL)["wall"]["occupies"] == "below"
+    assert scene(encoder={"resolution": 1e-5})["encoder"]["rounding"] == "nearest"
+    assert scene(hand={})["hand"] == {"mass": 0.0, "damping": 0.0, "stiffness": 0.0, "rest": 0.0}
+    assert scene(dissipation=[{"kind": "damping", "damping": 1}])["dissipation"][0]["acts"] == "in-contact"
+
+
+def test_whole_numbers_become_floats_where_a_float_is_meant():
+    assert isinstance(scene(wall={"position": 0, "stiffness": 150})["wall"]["stiffness"], float)
+
+
+def test_an_empty_list_of_elements_is_no_list():
+    assert "dissipation" not in scene(dissipation=[])
+
+
+def test_a_resolved_scene_resolves_to_itself():
+    first = scene(wall=WALL, hand={"force": {"kind": "ramp", "value": -1, "rise_time": 1}}, velocity={"cutoff": 50})
+    assert scene(**first) == first
+
+
+def test_every_mistake_is_reported_at_once():
+    found = mistakes(
+        duration=1.00005,
+        clock={"round_trip_delay": 0.00205},
+        device={"mas": 0.01, "damping": "2 ms"},
+        wall={"position": True, "stifness": 150.0, "occupies": "belo"},
+        hand={"force": {"kind": "rampp"}},
+        encoder={"resolution": float("nan")},
+        dissipation=[{"kind": "dampin"}, {"kind": "damping", "damping": -1.0}],
+        event=[{"at": 0.5, "swap": {"kind": "nne"}, "pause": True}],
+        walls={},
+        run={"pin": 1},
+    )
+    starts = [
+        "device.mass is missing. It must be a number in kg, above 0",
+        'device.damping is "2 ms". ms has the dimension [time], but N s/m has [mass] / [time].',
+        "device.mas is not a key of [device]; did you mean mass? Allowed: mass, damping, position, velocity.",
+        'hand.force.kind is "rampp"; did you mean ramp? Allowed: constant, ramp, step, sine, minimum-jerk, trace.',
+        "encoder.resolution is nan. It must be a finite number of m.",
+        "wall.position is true. It must be a number in m",
+        "wall.stiffness is missing. It must be a number in N/m, at least 0",
+        'wall.occupies is "belo"; did you mean below? Allowed: below, above.',
+        "wall.stifness is not a key of [wall]; did you mean stiffness? Allowed: position, stiffness, occupies.",
+        'dissipation.0.kind is "dampin"; did you mean damping? Allowed: bidirectional-inertia, damping,',
+        "dissipation.1.damping is -1.0. It must be at least 0 N s/m.",
+        'event.0.swap.kind is "nne"; did you mean none? Allowed:',
+        "run.pin is 1. It must be true or false.",
+        "walls is not a key of a scene; did you mean wall? Allowed:",
+        "clock.round_trip_delay is 0.00205. The round_trip_delay must be a whole number of plant steps",
+        "duration is 1.00005. The duration must be a whole number of control ticks at 1000 Hz",
+        "event.0 has swap and pause. An event has exactly one of swap, set, pause and stop.",
+    ]
+    assert [start for start in starts if not any(line.startswith(start) for line in found)] == []
+    assert len(found) == len(starts)
+
+
+@pytest.mark.parametrize("key", ["device", "duration"])
+def test_what_must_be_there_is_asked_for(key):
+    with pytest.raises(SceneError, match=f"scene.toml: {key} is missing"):
+        resolve(Layers("scene.toml", {k: v for k, v in LEAST.items() if k != key}), KINDS)  # pyright: ignore[reportArgumentType]
+
+
+@pytest.mark.parametrize(
+    ("tables", "sentence"),
+    [
+        ({"device": 3}, "device is 3. It must be a table."),
+        ({"title": 3}, "title is 3. It must be text in quotes."),
+        ({"dissipation": {"kind": "damping"}}, 'dissipation is { kind = "damping" }. It must be a list.'),
+        ({"dissipation": [{"damping": 1}]}, "dissipation.0.kind is missing. Allowed: "),
+        ({"dissipation": [3]}, "dissipation.0 is 3. It must be a table."),
+        ({"dissipation": [{"kind": "none"}]}, 'dissipation.0.kind is "none". Allowed: '),
+        ({"hand": {"force": 1.0}}, "hand.force is 1.0. It must be a table."),
+        ({"clock": {"plant_rate": 1500}}, "clock.plant_rate is 1500. The plant_rate must be a whole multiple"),
+        ({"run": {"log": "ticcs"}}, 'run.log is "ticcs"; did you mean ticks? Allowed: steps, ticks, none.'),
+    ],
+)
+def test_a_wrong_shape_is_one_sentence(tables, sentence):
+    [mistake] = mistakes(**tables)
+    assert mistake.startswith(sentence)
+
+
+def test_the_mistake_carries_its_parts():
+    with pytest.raises(SceneError) as error:
+        scene(wall=WALL | {"stifness": 1})
+    [mistake] = error.value.mistakes
+    assert (mistake.file, mistake.key, mistake.nearest) == ("scene.toml", "wall.stifness", "stiffness")
+
+
+@pytest.mark.parametrize("samples", [([0.0, 0.0], [1.0, 2.0]), ([0.0, 1.0], [1.0]), ([], [])])
+def test_a_trace_whose_samples_are_no_function_of_time_is_refused(samples):
+    [mistake] = mistakes(hand={"force": {"kind": "trace", "time": samples[0], "force": samples[1]}})
+    assert mistake.startswith("hand.force does not fit together. Sample ")
+
+
+def test_a_plugin_brings_its_own_parameters_units_and_defaults():
+    class Brake(Element):
+        kind = "limit"  # the name of its parameter, to make sure that the two are told apart
+        limit: Annotated[float, Quantity("N", above=0)] = 1.0
+
+        def force(self, motion):
+            return -self.limit * motion.v
+
+    def read(kinds, **parameters):
+        data = {**LEAST, "dissipation": [{"kind": "limit", **parameters}]}
+        return resolve(Layers("scene.toml", data), kinds)["dissipation"][0]  # pyright: ignore[reportArgumentType]
+
+    for kinds in ({"limit": Brake}, KINDS | {"limit": Brake}):
+        assert read(kinds) == {"kind": "limit", "acts": "in-contact", "limit": 1.0}
+        assert read(kinds, limit="2 kN")["limit"] == 2000.0
+        with pytest.raises(SceneError, match=r"dissipation\.0\.limit is 0\. It must be above 0 N\."):
+            read(kinds, limit=0)
+
+
+# Any value at all, with the names of a scene made likely so that the inner checks are reached.
+_NAMES = st.sampled_from(
+    [*SceneTable.model_fields, "dissipation", "event", "kind", "at", "swap", "set", "force", "time", "element"]
+) | st.text(max_size=3)
+_VALUES = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats() | st.sampled_from([*KINDS, "none", "trace", "1 mm"]),
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(_NAMES, inner, max_size=4),
+    max_leaves=12,
+)
+
+
+@given(st.dictionaries(_NAMES, _VALUES, max_size=5))
+def test_anything_at_all_is_a_scene_or_a_list_of_mistakes(tables):
+    try:
+        read = scene(**tables)
+    except SceneError as error:
+        read = error.mistakes
+    assert read

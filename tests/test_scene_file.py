@@ -1,0 +1,160 @@
+"""Scene files: what extends what, who said what, and files that cannot be read."""
+
+import pytest
+from scene_makers import LEAST_TOML, file_mistakes
+
+from haploop.launch.mistakes import SceneError
+from haploop.launch.scene_file import load
+
+
+@pytest.fixture
+def files(tmp_path, monkeypatch):
+    """Write files by name and work in their directory."""
+    monkeypatch.chdir(tmp_path)
+
+    def write(**texts):
+        for name, text in texts.items():
+            (tmp_path / f"{name}.toml").write_text(text)
+        return tmp_path / f"{next(iter(texts))}.toml"
+
+    return write
+
+
+def test_the_title_is_the_name_of_the_file_unless_given(files):
+    assert load(files(tap=LEAST_TOML))["title"] == "tap"
+    assert load(files(tap=f'title = "A tap"\n{LEAST_TOML}'))["title"] == "A tap"
+
+
+def test_extends_merges_key_by_key_and_the_file_itself_wins(files):
+    path = files(
+        top='extends = ["one.toml", "two.toml"]\n[wall]\nstiffness = 3.0\n',
+        one='extends = "base.toml"\n[wall]\nposition = 1.0\nstiffness = 1.0\n',
+        two='[wall]\nstiffness = 2.0\noccupies = "above"\n[device]\nposition = 0.5\n',
+        base=LEAST_TOML,
+    )
+    scene = load(path)
+    assert scene["wall"] == {"position": 1.0, "stiffness": 3.0, "occupies": "above"}
+    assert scene["device"] == {"mass": 0.01, "damping": 0.1, "position": 0.5, "velocity": 0.0}
+    assert "extends" not in scene
+
+
+def test_lists_of_tables_are_replaced_whole(files):
+    element = '[[dissipation]]\nkind = "{}"\n{} = 1.0\n'
+    path = files(
+        top='extends = "base.toml"\n' + element.format("bidirectional-inertia", "mass"),
+        base=LEAST_TOML + 2 * element.format("damping", "damping"),
+    )
+    assert [e["kind"] for e in load(path)["dissipation"]] == ["bidirectional-inertia"]
+
+
+def test_a_table_of_another_kind_keeps_nothing_of_the_old_one(files):
+    path = files(
+        top='extends = "base.toml"\n[hand.force]\nkind = "constant"\nvalue = 2.0\n',
+        base=LEAST_TOML + '[hand.force]\nkind = "ramp"\nvalue = 1.0\nrise_time = 1.0\n',
+    )
+    assert load(path)["hand"]["force"] == {"kind": "constant", "value": 2.0}
+    sine = ["hand.force.amplitude=1", "hand.force.kind=sine", "hand.force.frequency=1"]
+    expected = {"kind": "sine", "amplitude": 1.0, "frequency": 1.0, "offset": 0.0, "phase": 0.0}
+    assert load(path, sine)["hand"]["force"] == expected
+
+
+def test_a_mistake_names_the_file_that_made_it(files, tmp_path):
+    (tmp_path / "devices").mkdir()
+    (tmp_path / "scenes").mkdir()
+    (tmp_path / "devices/base.toml").write_text(LEAST_TOML + "[encoder]\nresolution = -1.0\n[wall]\nposition = 0.0\n")
+    path = files(**{"scenes/top": 'extends = "../devices/base.toml"\n[wall]\nstiffness = "soft"\n'})
+    assert [line.split(" is ")[0] for line in file_mistakes(path, "wall.occupies=no")] == [
+        "devices/base.toml: encoder.resolution",
+        "scenes/top.toml: wall.stiffness",
+        "--set: wall.occupies",
+    ]
+
+
+def test_a_scene_that_extends_itself_is_told_the_circle(files, tmp_path):
+    files(a='extends = "b.toml"\n', b='extends = "c.toml"\n', c='extends = "./b.toml"\n')
+    [mistake] = file_mistakes(tmp_path / "a.toml")
+    assert mistake == "c.toml: A scene cannot extend itself: b.toml extends c.toml extends b.toml."
+
+
+def test_two_paths_to_one_base_are_no_circle(files):
+    path = files(a='extends = ["b.toml", "c.toml"]\n', b='extends = "d.toml"\n', c='extends = "d.toml"\n', d=LEAST_TOML)
+    assert load(path)["duration"] == 1.0
+
+
+@pytest.mark.parametrize("extends", ["3", '["x.toml", 3]', '""', "{}"])
+def test_extends_is_a_path_or_a_list_of_them(files, extends):
+    [mistake] = file_mistakes(files(a=f"extends = {extends}\n"))
+    assert mistake.endswith("It must be the path of a scene file, or a list of them.")
+
+
+@pytest.mark.parametrize(
+    ("content", "sentence"),
+    [
+        (None, "There is no such file."),
+        (b"", "The file is empty; a scene needs at least a duration and a [device]."),
+        (b"# nothing but this\n", "The file is empty; a scene needs at least a duration and a [device]."),
+        (b'title = "\xff"', "A scene must be UTF-8 text, but byte 9 is not."),
+        (b"a = 1\nb = = 2\n", "This is not TOML: Invalid value (at line 2, column 5)."),
+        (b"seed = " + 5000 * b"9", "This is not TOML: "),
+        (b"a = " + 5000 * b"[", "The tables are nested too deeply."),
+    ],
+)
+def test_a_file_that_cannot_be_read_says_why(tmp_path, monkeypatch, content, sentence):
+    monkeypatch.chdir(tmp_path)
+    if content is not None:
+        (tmp_path / "x.toml").write_bytes(content)
+    [mistake] = file_mistakes(tmp_path / "x.toml")
+    assert mistake.startswith(f"x.toml: {sentence}")
+
+
+def test_a_directory_is_no_scene(tmp_path):
+    assert file_mistakes(tmp_path) == [f"{tmp_path}: This is a directory; a scene is a TOML file."]
+
+
+def test_all_files_that_cannot_be_read_are_reported_at_once(files):
+    found = file_mistakes(files(a='extends = ["gone.toml", "bad.toml"]\n', bad="x"))
+    assert [line.split(":")[0] for line in found] == ["gone.toml", "bad.toml"]
+
+
+def test_a_byte_order_mark_is_no_mistake(tmp_path):
+    (tmp_path / "x.toml").write_text(LEAST_TOML, encoding="utf-8-sig")
+    assert load(tmp_path / "x.toml")["duration"] == 1.0
+
+
+def test_a_recorded_force_is_read_in_whole_relative_to_the_file_that_names_it(files, tmp_path):
+    (tmp_path / "devices").mkdir()
+    (tmp_path / "devices/push.csv").write_text("time,force\n0.0,0.0\n\n0.5,-1.0\n")
+    (tmp_path / "devices/base.toml").write_text(LEAST_TOML + '[hand.force]\nkind = "trace"\nfile = "push.csv"\n')
+    scene = load(files(top='extends = "devices/base.toml"\n'))
+    assert scene["hand"]["force"] == {"kind": "trace", "time": [0.0, 0.5], "force": [0.0, -1.0]}
+
+
+@pytest.mark.parametrize(
+    ("csv", "sentence"),
+    [
+        ("t,f\n0,1\n0,2\n", "Line 3: The times must increase, but 0 s follows 0 s."),
+        ("0,1\n1,x\n", "Line 2 must be a time in s and a force in N, but is '1,x'."),
+        ("0,1\n1\n", "Line 2 must be a time in s and a force in N, but is '1'."),
+        ("0,1,2\n", "Line 1 must be a time in s and a force in N, but is '0,1,2'."),
+        ("0,nan\n", "Line 1: Time and force must be finite numbers."),
+        ("t,f\n", "There must be at least one sample."),
+        (None, "The recording cannot be read: No such file or directory."),
+    ],
+)
+def test_a_recording_that_cannot_be_used_says_which_line(files, tmp_path, csv, sentence):
+    if csv is not None:
+        (tmp_path / "push.csv").write_text(csv)
+    path = files(top=LEAST_TOML + '[hand.force]\nkind = "trace"\nfile = "push.csv"\n')
+    assert file_mistakes(path) == [f'top.toml: hand.force.file is "push.csv". {sentence}']
+
+
+def test_a_trace_has_a_file_or_samples_but_not_both(files):
+    path = files(top=LEAST_TOML + '[hand.force]\nkind = "trace"\nfile = "push.csv"\ntime = [0.0, 1.0]\n')
+    [mistake] = file_mistakes(path)
+    assert mistake.endswith("A trace has either a file or the lists time and force.")
+
+
+def test_the_error_is_a_value_error_with_one_line_a_mistake(files):
+    with pytest.raises(SceneError) as error:
+        load(files(top="seed = -1\n"))
+    assert len(str(error.value).splitlines()) == len(error.value.mistakes) == 3
