@@ -10,16 +10,13 @@ from typing import Any
 import zmq
 
 from haploop.launch.clock import Clock
+from haploop.launch.failure import RunFailed
 from haploop.launch.roster import Node, Roster
 from haploop.protocol.processes import PROCESSES
 from haploop.protocol.sockets import bind, open_socket
 from haploop.protocol.wire import Frame, WireError, decode, encode
 
 Command = Callable[[str, dict[str, Any]], tuple[bool, str, dict[str, Any]]]
-
-
-class RunFailed(Exception):
-    """A run that cannot go on; the message names the node and the tick."""
 
 
 class ClockServer:

@@ -66,6 +66,7 @@ class Commands:
             "control_rate": self._rate,
             "paused": clock.paused,
             "nodes": roster.table(),
+            "telemetry": {role: addresses["telemetry"] for role, addresses in roster.endpoints().items()},
             **({"status": logger.status} if logger else {}),
         }
         state = "paused" if clock.paused else "running"

@@ -17,8 +17,10 @@ import zmq
 from haploop.launch import run_directory
 from haploop.launch.children import Child, start_children
 from haploop.launch.clock import Clock
-from haploop.launch.clock_server import ClockServer, RunFailed
+from haploop.launch.clock_server import ClockServer
+
 from haploop.launch.commands import Commands
+from haploop.launch.failure import RunFailed
 from haploop.protocol.ticks import Timebase
 
 if TYPE_CHECKING:

@@ -70,10 +70,11 @@ class Books:
         """
         n = self._time.steps_per_tick
         ticks = (len(plant["x"]) - 1) // n
-        for account in tape.forces:
-            if f"{account}.true" not in self._rows:
-                self._open_account(str(account))
-        forces = {"wall": tape.columns["wall"]} | {str(account): force for account, force in tape.forces.items()}
+        forces = {"wall": tape.columns["wall"]}
+        for book, force in tape.forces_opened_before(tick + ticks).items():
+            forces[str(book)] = force
+            if f"{book}.true" not in self._rows:
+                self._open_account(str(book))
 
         by_step = self._flows_by_step(tick, plant, tape, forces, into_wall)
         added = np.zeros((len(self._rows), ticks))

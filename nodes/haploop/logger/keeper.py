@@ -42,14 +42,14 @@ class Keeper:
             trouble: which element gave a force that is no finite number, or None.
             lost: the summary's ``lost`` entry.
         """
-        diverged = "; ".join(part for part in (trouble, reason) if part) or None
         logger = self.logger
+        diverged = "; ".join(part for part in (trouble, reason) if part) or None
         complete = logger.tick >= logger.time.ticks
-        ended = failed or ("diverged" if diverged else "done" if complete else "stopped")
+        ended = "failed" if failed or trouble else "diverged" if reason else "done" if complete else "stopped"
         logger.end()
         if self._log:
             self._log.close()
-        result = logger.summary(ended, diverged, lost)
+        result = logger.summary(ended, failed or diverged or "", diverged, lost)
         if self._out:
             try:
                 summaries.write(result, self._out / SUMMARY)

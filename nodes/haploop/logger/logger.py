@@ -82,10 +82,15 @@ class Logger:
             self._accounts.setdefault(element["book"], dict(element))["to_tick"] = end
 
     def _book_common(self) -> None:
-        """Book the intervals of which both sides are known."""
-        end = min(self._plant.end, self._controller.end)
-        if end <= self.tick:
-            return
+        """Book the intervals of which both sides are known, block by block of the controller.
+
+        Cutting only where elements change makes the log's columns independent of how telemetry was cut.
+        """
+        while (end := min(self._plant.end, self._controller.part_end(self.tick))) > self.tick:
+            self._book(end)
+
+    def _book(self, end: int) -> None:
+        """Book the intervals before ``end``."""
         if self._plant.tick < self.tick:
             self._plant.take(self.tick)
         plant = self._plant.take(end)
@@ -120,11 +125,12 @@ class Logger:
         same = [b for b in sorted(self._accounts) if self._accounts[b]["kind"] == kind]
         return f"{kind}{f'-{same.index(int(book)) + 1}' if same[0] != int(book) else ''}{dot}{side}"
 
-    def summary(self, ended: str, diverged: str | None, lost: dict[str, int]) -> dict[str, Any]:
+    def summary(self, ended: str, why: str, diverged: str | None, lost: dict[str, int]) -> dict[str, Any]:
         """The summary of what was booked so far.
 
         Args:
-            ended: why the run ended ("done", "stopped", ...).
+            ended: "done", "stopped", "diverged" or "failed".
+            why: what ended it, as a sentence, when it is not done.
             diverged: why the plant ended by itself, or None.
             lost: commands_dropped, commands_lost, telemetry_gaps.
         """
@@ -136,6 +142,7 @@ class Logger:
             "steps": ticks * self.time.steps_per_tick,
             "from_tick": self._first_tick,
             "ended": ended,
+            "why": why,
             "wall_s": wall_clock.perf_counter() - self._began,
             "final": {"x_m": x, "v_m_s": v},
             "lost": lost,

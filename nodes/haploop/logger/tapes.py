@@ -66,6 +66,8 @@ class ControllerTape:
         self._keep_ticks = keep_ticks
         self.columns: dict[str, np.ndarray] = {}
         self.forces: dict[int, np.ndarray] = {}
+        self._opened: dict[int, int] = {}
+        self._part_ends: list[int] = []
 
     def add(self, block: dict[str, Any]) -> None:
         """Append a block.
@@ -87,7 +89,18 @@ class ControllerTape:
             book: np.concatenate([self.forces.get(book, np.zeros(kept)), books.get(book, np.zeros(ticks))])
             for book in sorted(self.forces.keys() | books.keys())
         }
+        for element in block["elements"]:
+            self._opened[element["book"]] = element["from_tick"]
         self.end += ticks
+        self._part_ends.append(self.end)
+
+    def part_end(self, tick: int) -> int:
+        """Where the block that holds ``tick`` ends: up to there the elements are the same."""
+        return next((end for end in self._part_ends if end > tick), self.end)
+
+    def forces_opened_before(self, tick: int) -> dict[int, np.ndarray]:
+        """``forces`` without the books that open at ``tick`` or later."""
+        return {book: force for book, force in self.forces.items() if self._opened[book] < tick}
 
     def forget_before(self, tick: int) -> None:
         """Drop rows no command in flight at ``tick`` needs, and books that have no force left."""
@@ -96,3 +109,4 @@ class ControllerTape:
             self.columns = {name: column[drop:] for name, column in self.columns.items()}
             self.forces = {book: force[drop:] for book, force in self.forces.items() if force[drop:].any()}
             self.first += drop
+        self._part_ends = [end for end in self._part_ends if end > tick]

@@ -1,0 +1,172 @@
+"""The command line: every command, its arguments and its help; the work is done elsewhere and imported when needed."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+app = typer.Typer(
+    help="haploop simulates a haptic loop: a device in a hand, a sampled controller with a virtual wall, a line with delay.",
+    no_args_is_help=True,
+    add_completion=False,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+)
+
+Scene = Annotated[Path, typer.Argument(help="scene file (TOML)", show_default=False)]
+Directory = Annotated[Path, typer.Argument(help="directory of a run", show_default=False)]
+Set = Annotated[list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="change a key of the scene")]
+Plugin = Annotated[list[Path] | None, typer.Option("--plugin", metavar="FILE", help="Python file with elements")]
+Run = Annotated[str | None, typer.Option("--run", metavar="ID", help="which run, when several are live")]
+Json = Annotated[bool, typer.Option("--json", help="one JSON object on stdout")]
+At = Annotated[str | None, typer.Option("--at", metavar="TIME", help='simulated time, s or "1500 ms"; at once without')]
+
+
+@app.command()
+def run(
+    scene: Scene,
+    set: Set = None,
+    out: Annotated[Path | None, typer.Option(help="directory to write to, new or empty [runs/SCENE-TIME]")] = None,
+    in_process: Annotated[bool, typer.Option("--in-process", help="everything in one process, same bits")] = False,
+    pace: Annotated[str, typer.Option(help="free, or simulated seconds per second")] = "free",
+    plugin: Plugin = None,
+    json: Json = False,
+) -> None:
+    """Run a scene to its end; other terminals can steer and watch it meanwhile."""
+    from haploop.tools.run import run_scene
+
+    run_scene(scene, set or [], out, in_process, pace, plugin or [], json)
+
+
+@app.command()
+def check(
+    scene: Annotated[Path | None, typer.Argument(help="scene file (TOML)", show_default=False)] = None,
+    set: Set = None,
+    plugin: Plugin = None,
+    schema: Annotated[bool, typer.Option("--schema", help="print the JSON Schema of scenes instead")] = False,
+    json: Json = False,
+) -> None:
+    """Say everything that is wrong with a scene, or that nothing is; start nothing."""
+    from haploop.tools.scenes import check_scene, print_schema
+
+    if schema:
+        print_schema(plugin or [])
+    elif scene is None:
+        raise typer.BadParameter("A scene file was expected, or --schema.")
+    else:
+        check_scene(scene, set or [], plugin or [], json)
+
+
+@app.command()
+def plugins(plugin: Plugin = None, json: Json = False) -> None:
+    """List the dissipation elements with their parameters."""
+    from haploop.tools.scenes import list_plugins
+
+    list_plugins(plugin or [], json)
+
+
+@app.command()
+def status(run: Run = None, json: Json = False) -> None:
+    """Show the live runs: every node, its tick, whom it waits for."""
+    from haploop.tools.live import show_status
+
+    show_status(run, json)
+
+
+def _ask(run_id: str | None, json: bool, verb: str, **arguments: Any) -> None:
+    from haploop.tools.live import command
+
+    command(run_id, json, verb, arguments)
+
+
+@app.command()
+def pause(run: Run = None, json: Json = False) -> None:
+    """Stand still at the next tick that can."""
+    _ask(run, json, "pause")
+
+
+@app.command()
+def resume(run: Run = None, json: Json = False) -> None:
+    """Go on after a pause."""
+    _ask(run, json, "resume")
+
+
+@app.command()
+def step(ticks: Annotated[int, typer.Argument(help="control ticks")] = 1, run: Run = None, json: Json = False) -> None:
+    """Go on for some ticks, then stand still."""
+    _ask(run, json, "step", ticks=ticks)
+
+
+@app.command()
+def stop(run: Run = None, json: Json = False) -> None:
+    """End the run in order, with a summary of what ran."""
+    _ask(run, json, "stop")
+
+
+@app.command()
+def swap(
+    kind: Annotated[str, typer.Argument(help='kind of element, or "none" to remove', show_default=False)],
+    parameters: Annotated[list[str] | None, typer.Argument(metavar="[KEY=VALUE]...", show_default=False)] = None,
+    element: Annotated[int, typer.Option(help="which element; one past the end adds one")] = 0,
+    at: At = None,
+    reload: Annotated[bool, typer.Option("--reload", help="load the kind's --plugin file anew first")] = False,
+    run: Run = None,
+    json: Json = False,
+) -> None:
+    """Replace a dissipation element of a running loop."""
+    from haploop.tools.live import assignments, seconds
+
+    table = {"kind": kind, **assignments(parameters or [])}
+    _ask(run, json, "swap", swap=table, element=element, at=seconds(at), reload=reload)
+
+
+@app.command(name="set")
+def set_(
+    parameters: Annotated[list[str], typer.Argument(metavar="KEY=VALUE...", show_default=False)],
+    at: At = None,
+    run: Run = None,
+    json: Json = False,
+) -> None:
+    """Change numbers of a running loop: wall.stiffness, wall.position, dissipation.0.mass ..."""
+    from haploop.tools.live import assignments, seconds
+
+    _ask(run, json, "set", set=assignments(parameters), at=seconds(at))
+
+
+@app.command()
+def attach(
+    what: Annotated[str, typer.Argument(help="logger or print", show_default=False)],
+    out: Annotated[Path | None, typer.Option(help="directory of the attached logger [runs/RUN-TIME]")] = None,
+    run: Run = None,
+) -> None:
+    """Join a running loop: with a second logger, or to print what happens."""
+    from haploop.tools.attach import attach_to
+
+    attach_to(what, out, run)
+
+
+@app.command()
+def plot(directory: Directory) -> None:
+    """Draw a run; the last line names the figure's file."""
+    from haploop.tools.scenes import plot_run
+
+    plot_run(directory)
+
+
+@app.command()
+def replay(directory: Directory, json: Json = False) -> None:
+    """Repeat a run from its own log and say whether every bit agreed."""
+    from haploop.tools.replay import replay_run
+
+    replay_run(directory, json)
+
+
+def main() -> None:
+    """Entry point. Exit status: 0 done, 1 the run failed, 2 wrong usage or scene."""
+    app()
+
+
+if __name__ == "__main__":
+    main()

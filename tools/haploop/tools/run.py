@@ -1,0 +1,59 @@
+"""``haploop run``: a scene from file to summary, with progress on the way."""
+
+from __future__ import annotations
+
+import math
+import sys
+from pathlib import Path
+
+from haploop.tools.ending import FAILED, WRONG_USE, leave, plain_errors, print_json
+
+
+def run_scene(
+    scene_path: Path,
+    overrides: list[str],
+    out: Path | None,
+    in_process: bool,
+    pace: str,
+    plugins: list[Path],
+    as_json: bool,
+) -> None:
+    """Run a scene, show how it goes and what came of it."""
+    from haploop.launch.start import prepare, run
+    from haploop.tools.report import ProgressLine, print_summary
+
+    with plain_errors():
+        rate = _pace(pace, in_process)
+        prepared = prepare(scene_path, overrides, plugins, out)
+        title, duration_s = prepared.scene["title"], prepared.scene["duration"]
+        from haploop.launch.failure import RunFailed
+
+        try:
+            with ProgressLine(title, duration_s) as line:
+                summary = run(prepared, in_process=in_process, pace=rate, progress=line.update, announced=line.announce)
+        except RunFailed as error:
+            leave(f"{error}\nWhat was logged is in {prepared.out}.", FAILED)
+        except KeyboardInterrupt:
+            leave(f"Interrupted at once; what was logged is in {prepared.out}.", FAILED)
+    if as_json:
+        print_json({**summary, "directory": str(prepared.out)})
+    else:
+        print_summary(summary)
+        print(f"{prepared.out}", file=sys.stderr)
+    if summary["ended"] == "failed":
+        raise SystemExit(FAILED)
+
+
+def _pace(text: str, in_process: bool) -> float:
+    """``free`` or a positive number."""
+    if text == "free":
+        return math.inf
+    try:
+        rate = float(text.removesuffix("x"))
+    except ValueError:
+        rate = math.nan
+    if not (rate > 0 and math.isfinite(rate)):
+        leave(f"--pace must be free or a number above 0 (1 is real time), but {text!r} was given.", WRONG_USE)
+    if in_process:
+        leave("--pace needs the clock of a run as processes; leave out --in-process.", WRONG_USE)
+    return rate
