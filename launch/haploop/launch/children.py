@@ -51,9 +51,10 @@ class Child:
             return f"was killed by {signal.Signals(-code).name}"
         return f"ended with exit status {code}"
 
-    def ended(self) -> bool:
-        """Whether the process is gone."""
-        return self._process.poll() is not None
+    def exited(self) -> bool:
+        """Whether the process ended by itself, so that it may have left a last message."""
+        code = self._process.poll()
+        return code is not None and code >= 0
 
     def wait(self, timeout_s: float) -> bool:
         """Give the process some time to end by itself; whether it did."""

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from haploop.launch.check import resolve_event
+from haploop.launch.elements import swapped_in, try_out
 from haploop.protocol.ticks import Timebase
 
 if TYPE_CHECKING:
@@ -56,11 +57,13 @@ class Clock:
         for event in self._scene["event"]:
             self._insert(time.first_tick_at(event["at"]), event)
         self._pauses = [tick for tick, event in self.events if event.get("pause")]
-        self.set_pace(pace, 0.0)
+        self._pace = pace
+        self._pace_from: float | None = None  # the first grant starts the pace
+        self._pace_tick = 0
 
-    def set_pace(self, pace: float, now: float) -> None:
-        """From wall time ``now`` (s) on, run at ``pace`` times real time."""
-        self._pace, self._pace_from, self._pace_tick = pace, now, self.until
+    def _pace_anew(self, now: float) -> None:
+        """Count the pace from wall time ``now`` (s) and from here on: what was waited is not made up for."""
+        self._pace_from, self._pace_tick = now, self.until
 
     # Time
 
@@ -80,6 +83,8 @@ class Clock:
     def _paced(self, now: float) -> int:
         if math.isinf(self._pace):
             return self.end
+        if self._pace_from is None:
+            self._pace_from = now
         ahead = (now - self._pace_from) * self._pace + AHEAD_S * min(self._pace, 1.0)
         return self._pace_tick + max(1, math.floor(ahead * self._time.control_rate))
 
@@ -97,12 +102,16 @@ class Clock:
     # Changes
 
     def take_events(self) -> list[tuple[int, Event]]:
-        """Events that fall before ``until`` and have not been sent, in order."""
+        """Events up to ``until`` that have not been sent, in order; after a stop, what lies behind it never happens."""
         due = self._sent
-        while due < len(self.events) and (self.events[due][0] < self.until or self.is_last):
+        while due < len(self.events) and self.events[due][0] <= self.until:
             due += 1
         events, self._sent = self.events[self._sent : due], due
         return events
+
+    def events_from(self, tick: int) -> list[tuple[int, Event]]:
+        """Events from ``tick`` on that have been sent already, for a node that joins late."""
+        return [(at, event) for at, event in self.events[: self._sent] if at >= tick]
 
     def _insert(self, tick: int, event: Event) -> None:
         index = len(self.events)
@@ -122,11 +131,13 @@ class Clock:
 
         Raises:
             SceneError: the change does not fit the run; nothing happens.
+            ElementError: the new element's own code does not take its parameters; nothing happens.
             ClockError: the time is past or after the end.
         """
         tick = self.until if at_s is None else self._time.first_tick_at(at_s)
         self._check_ahead(tick)
         event = resolve_event({**change, "at": tick / self._time.control_rate}, self._scene, self._kinds)
+        try_out(swapped_in([event]), self._kinds)
         self._scene["event"].append(event)
         self._insert(tick, event | extra)
         return tick
@@ -144,7 +155,7 @@ class Clock:
 
     def note(self, event: Event) -> int:
         """Put something that changes no bit (pause, resume, a refusal) on record at the present tick."""
-        self.events.insert(self._sent, (self.until, event))
+        self._insert(self.until, event)
         return self.until
 
     def pause(self) -> int:
@@ -155,14 +166,15 @@ class Clock:
     def resume(self, now: float) -> int:
         """Go on."""
         self.paused, self._step_target = False, None
-        self.set_pace(self._pace, now)
+        self._pauses = [tick for tick in self._pauses if tick > self.until]  # stepped over while standing still
+        self._pace_anew(now)
         return self.until
 
     def step(self, ticks: int, now: float) -> int:
         """Go on for some ticks, then stand still; returns the tick it will stand at."""
         self.paused = True
         self._step_target = min(self.end, max(self.until, self._step_target or 0) + ticks)
-        self.set_pace(self._pace, now)
+        self._pace_anew(now)
         return self._step_target
 
     def stop(self) -> int:

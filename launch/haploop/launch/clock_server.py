@@ -18,6 +18,10 @@ from haploop.protocol.wire import Frame, WireError, decode, encode
 
 Command = Callable[[str, dict[str, Any]], tuple[bool, str, dict[str, Any]]]
 
+# Messages taken before grants go out, so that nobody who floods the clock can hold time up.
+_AT_ONCE = 200
+_LONGEST_ROLE = 40
+
 
 class ClockServer:
     """Speaks the clock's part of the protocol.
@@ -63,12 +67,14 @@ class ClockServer:
         self._socket.close(linger=200)
 
     def serve(self) -> None:
-        """Take every message that is there, then grant what can be granted.
+        """Take the messages that are there, though no more than a turn's worth, then grant what can be granted.
 
         Raises:
             RunFailed: one of the run's own processes said that it cannot go on.
         """
-        while self._socket.get(zmq.EVENTS) & zmq.POLLIN:
+        for _ in range(_AT_ONCE):
+            if not self._socket.get(zmq.EVENTS) & zmq.POLLIN:
+                break
             sender, *frames = self._socket.recv_multipart()
             try:
                 self._take(sender, decode(frames[-1] if frames else b""))
@@ -86,15 +92,19 @@ class ClockServer:
         """Tell everyone how far they may go, and what changes on the way, if that is news."""
         clock = self._clock
         until = clock.grant(self.roster.slowest(), time.monotonic())
-        if until == self._granted and clock.is_last == self._last_sent:
+        events = clock.take_events()
+        if until == self._granted and clock.is_last == self._last_sent and not events:
             return
         self._granted, self._last_sent = until, clock.is_last
-        self._broadcast("GRANT", until, clock.is_last, clock.take_events())
-
-    def _broadcast(self, name: str, *fields: Any) -> None:
         for node in list(self.roster.nodes.values()):
-            if not node.done:
-                self._send(node.identity, name, *fields)
+            if node.ready and not node.done:
+                self._send(node.identity, "GRANT", until, clock.is_last, events)
+
+    def probe(self, nodes: list[Node]) -> None:
+        """Repeat the grant to those attached: what cannot be sent shows that a node is gone, and takes it off."""
+        for node in nodes:
+            if not node.is_own:
+                self._send(node.identity, "GRANT", self._clock.until, self._clock.is_last, [])
 
     def _send(self, identity: bytes, name: str, *fields: Any) -> None:
         try:
@@ -115,6 +125,10 @@ class ClockServer:
         if node is None:
             self.strangers += 1
             self._send(sender, "REFUSED", f"{frame.name} came from somebody who has not joined; send JOIN first.")
+            return
+        if frame.name in ("READY", "PROGRESS") and not 0 <= frame.fields[0] <= self._clock.until:
+            self.strangers += 1
+            self._send(sender, "REFUSED", f"{frame.name} must name a tick from 0 to {self._clock.until}, which is granted.")
             return
         node.heard = time.monotonic()
         node.waits_for = ""
@@ -137,6 +151,8 @@ class ClockServer:
             reason = "The run has not begun; try again in a moment."
         elif sender in self.roster.nodes:
             reason = "You have joined already."
+        elif not (role.isprintable() and 0 < len(role) <= _LONGEST_ROLE):
+            reason = f"JOIN.role must be a printable name of at most {_LONGEST_ROLE} characters."
         elif not all(isinstance(v, str) for pair in request["endpoints"].items() for v in pair):
             reason = "JOIN.endpoints must be a map from channel to address."
         if reason:
@@ -161,12 +177,15 @@ class ClockServer:
 
     def _on_ready(self, node: Node, tick: int) -> None:
         node.ready, node.tick = True, tick
+        if not node.is_own:
+            self._send(node.identity, "GRANT", self._clock.until, self._clock.is_last, self._clock.events_from(tick))
 
     def _on_progress(self, node: Node, tick: int, status: dict[str, Any]) -> None:
         node.tick = max(node.tick, tick)
         node.status = status or node.status
-        for refusal in status.get("refused", []):
-            self._clock.note({"refused": str(refusal)})
+        if node.role == "controller":
+            for refusal in status.get("refused", []):
+                self._clock.note({"refused": refusal})
 
     def _on_waiting(self, node: Node, tick: int, on: str) -> None:
         node.waits_for = on
@@ -198,4 +217,6 @@ class ClockServer:
 
     def abort(self, reason: str) -> None:
         """Tell every node to save what it has and leave."""
-        self._broadcast("ABORT", reason)
+        for node in list(self.roster.nodes.values()):
+            if not node.done:
+                self._send(node.identity, "ABORT", reason)

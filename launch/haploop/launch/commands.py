@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from haploop.controller.dissipation import PluginError, load_plugin
+from haploop.controller.dissipation import ElementError, PluginError, load_plugin
 from haploop.launch.clock import Clock, ClockError
 from haploop.launch.mistakes import SceneError
 from haploop.launch.output import OutputError, keep_plugin
@@ -46,10 +46,10 @@ class Commands:
         try:
             text, data = act(**arguments)
             return True, text, data
-        except (ClockError, SceneError, PluginError, OutputError) as error:
+        except (ClockError, SceneError, PluginError, ElementError, OutputError) as error:
             return False, str(error), {}
-        except (TypeError, ValueError, KeyError, AttributeError) as error:
-            return False, f"The arguments of {verb} cannot be used: {error}.", {}
+        except Exception as error:  # whatever a terminal sends, the run goes on
+            return False, f"The arguments of {verb} cannot be used: {type(error).__name__}: {error}.", {}
 
     def _at(self, tick: int) -> str:
         return f"tick {tick} ({tick / self._rate:g} s)"
@@ -85,6 +85,7 @@ class Commands:
     def _step(self, ticks: int = 1) -> tuple[str, dict[str, Any]]:
         if not isinstance(ticks, int) or ticks < 1:
             raise ClockError(f"A step goes on for at least one tick, but {ticks} was asked for.")
+        self._clock.note({"step": ticks})
         tick = self._clock.step(ticks, time.monotonic())
         return f"stepping to {self._at(tick)}", {"tick": tick}
 

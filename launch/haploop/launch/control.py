@@ -6,11 +6,12 @@ from typing import Any
 
 import zmq
 
-from haploop.launch.run_directory import LiveRun, RunNotFound
+from haploop.launch.run_directory import LiveRun, RunNotFound, is_live
 from haploop.protocol.sockets import open_socket
 from haploop.protocol.wire import WireError, decode, encode
 
 _ANSWER_MS = 5000
+_LOOK_MS = 250
 
 
 class CommandRefused(Exception):
@@ -22,15 +23,14 @@ def ask(run: LiveRun, verb: str, **arguments: Any) -> tuple[str, dict[str, Any]]
 
     Raises:
         CommandRefused: it was refused; nothing has changed.
-        RunNotFound: the run does not answer.
+        RunNotFound: the run does not answer, or has ended.
     """
     context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
     socket = open_socket(context, zmq.DEALER)
     try:
         socket.connect(run.clock)
         socket.send(encode("COMMAND", verb, arguments))
-        if not socket.poll(_ANSWER_MS):
-            raise RunNotFound(f"Run {run.id} ({run.title}) has not answered for {_ANSWER_MS // 1000} s.")
+        _await_answer(socket, run)
         frame = decode(socket.recv())
     except WireError as error:
         raise RunNotFound(f"Run {run.id} answered with something else: {error}") from error
@@ -42,3 +42,12 @@ def ask(run: LiveRun, verb: str, **arguments: Any) -> tuple[str, dict[str, Any]]
     if not ok:
         raise CommandRefused(text)
     return text, data
+
+
+def _await_answer(socket: zmq.Socket[bytes], run: LiveRun) -> None:
+    for _ in range(_ANSWER_MS // _LOOK_MS):
+        if socket.poll(_LOOK_MS):
+            return
+        if not is_live(run):
+            raise RunNotFound(f"Run {run.id} ({run.title}) has ended.")
+    raise RunNotFound(f"Run {run.id} ({run.title}) has not answered for {_ANSWER_MS // 1000} s.")

@@ -51,7 +51,7 @@ def check_events(
 
 
 def _check_shape(layers: Layers, key: KeyPath, event: dict[str, Any], time: Timebase | None) -> None:
-    verbs = [verb for verb in VERBS if verb in event]
+    verbs = [verb for verb in VERBS if event.get(verb) is not None]
     if len(verbs) != 1:
         given = f"has {' and '.join(verbs)}" if verbs else "changes nothing"
         layers.complain(key, "An event has exactly one of swap, set, pause and stop.", given)

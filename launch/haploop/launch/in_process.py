@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NoReturn
 
 from haploop.controller.controller import Controller
+from haploop.controller.dissipation import ElementError
+from haploop.launch.failure import RunFailed
 from haploop.logger.keeper import Keeper, open_keeper
 from haploop.plant.plant import Plant
 from haploop.protocol.ticks import Timebase
@@ -38,19 +40,24 @@ def run_in_process(
         events: (tick, event) in order; the scene's own when None. Pauses are of the wall clock and change nothing.
         progress: called now and then with the logger's status.
         stop: asked after every block; True ends the run there.
+
+    Raises:
+        RunFailed: an element raised, or gave something that is no number.
+        LogError: the log could not be written.
     """
     time = Timebase.of(scene["clock"], scene["duration"])
     keeper = open_keeper(scene, time, out, attachments or {})
     loop = Loop(scene, time, kinds, keeper)
     loop.schedule(scene_events(scene, time) if events is None else events)
-    while loop.block():
-        keeper.flush_when_due()
-        if progress:
-            progress(keeper.logger.status())
-        if stop():
-            loop.end_here()
-            loop.block()
-            break
+    try:
+        while loop.block():
+            keeper.flush_when_due()
+            if progress:
+                progress(keeper.logger.status())
+            if stop():
+                loop.end_here()
+    except ElementError as error:
+        loop.fail(f"The controller failed: {error}")
     return loop.finish()
 
 
@@ -66,7 +73,7 @@ class Loop:
         self._plant, self._controller = Plant(scene, time), Controller(scene, time, kinds)
         self._keeper = keeper
         self._end = time.ticks
-        self._block_ticks = scene["run"]["block_ticks"]
+        self._block_ticks = scene["run"]["block_ticks"] * scene["run"]["window_blocks"]
         self._most = time.lookahead_ticks + 1
         keeper.logger.start(self._plant.state(), [])
 
@@ -106,9 +113,18 @@ class Loop:
 
     def end_here(self) -> None:
         """End the run at the ticks worked on so far."""
-        self._end = self._plant.tick
+        self.schedule([(self._plant.tick, {"stop": True})])
+
+    def fail(self, reason: str) -> NoReturn:
+        """Save what there is and raise RunFailed."""
+        self._hand_over()
+        self._close(reason)
+        raise RunFailed(reason)
 
     def finish(self) -> dict[str, Any]:
         """Close the books and return the summary."""
+        return self._close("")
+
+    def _close(self, failed: str) -> dict[str, Any]:
         lost = {"commands_dropped": 0, "commands_lost": 0, "telemetry_gaps": 0}
-        return self._keeper.close("", self._plant.stop_reason, self._controller.recorder.trouble, lost)
+        return self._keeper.close(failed, self._plant.stop_reason, self._controller.recorder.trouble, lost)

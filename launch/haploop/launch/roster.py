@@ -74,8 +74,14 @@ class Roster:
         return min((node.tick for node in self.nodes.values() if node.is_own), default=0)
 
     def silent(self, now: float, deadline_s: float) -> list[Node]:
-        """Nodes not heard of for longer than the deadline."""
-        return [node for node in self.nodes.values() if not node.done and now - node.heard > deadline_s]
+        """Nodes not heard of for longer than the deadline, the longest silent first."""
+        silent = [node for node in self.nodes.values() if not node.done and now - node.heard > deadline_s]
+        return sorted(silent, key=lambda node: node.heard)
+
+    def forgive(self, seconds: float) -> None:
+        """Not to count some time as silence."""
+        for node in self.nodes.values():
+            node.heard += seconds
 
     def table(self) -> list[dict[str, Any]]:
         """For people: role, pid, tick, how far behind the first, whom it waits for."""

@@ -7,12 +7,14 @@ import os
 import secrets
 import shutil
 import tempfile
+import time
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 # A socket's path must stay below the kernel's 107 bytes; this leaves room for the run and the socket's name.
 _LONGEST_BASE = 70
+# A directory that is older and tells of no run belonged to a launcher that was killed as it started.
+_ANNOUNCED_WITHIN_S = 60.0
 
 
 class RunNotFound(Exception):
@@ -80,15 +82,18 @@ def remove(sockets: Path) -> None:
 def live_runs() -> list[LiveRun]:
     """All runs of this user, oldest first; the directories of dead ones are cleared away."""
     runs = []
-    for path in sorted(base_directory().iterdir(), key=lambda entry: entry.stat().st_mtime):
-        entry = _read(path)
-        if entry is None:
-            continue
-        if _is_alive(entry["pid"]):
-            runs.append(LiveRun(path.name, path, **entry))
-        else:
+    for path in sorted(base_directory().iterdir(), key=_made):
+        run = _read(path)
+        if run and _is_alive(run.pid):
+            runs.append(run)
+        elif run or time.time() - _made(path) > _ANNOUNCED_WITHIN_S:
             remove(path)
     return runs
+
+
+def is_live(run: LiveRun) -> bool:
+    """Whether the run's launcher is still there."""
+    return _is_alive(run.pid)
 
 
 def find(run_id: str | None) -> LiveRun:
@@ -109,10 +114,18 @@ def find(run_id: str | None) -> LiveRun:
     raise RunNotFound(f"{len(fitting)} runs are live; name one with --run ID:\n{listing}")
 
 
-def _read(path: Path) -> dict[str, Any] | None:
+def _made(path: Path) -> float:
+    """When a run's directory was made; 0 for one that its run has just removed."""
     try:
-        return json.loads((path / "run.json").read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        return path.stat().st_mtime
+    except FileNotFoundError:
+        return 0.0
+
+
+def _read(path: Path) -> LiveRun | None:
+    try:
+        return LiveRun(path.name, path, **json.loads((path / "run.json").read_text(encoding="utf-8")))
+    except (OSError, ValueError, TypeError):  # not announced yet, removed, or no entry of ours
         return None
 
 

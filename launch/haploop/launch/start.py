@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from haploop.controller.dissipation import Element, load_plugin, registry
+from haploop.launch.elements import elements_of, try_out
 from haploop.launch.output import keep_plugin, make_output, write_scene
 from haploop.launch.scene_file import load
 
@@ -33,6 +34,7 @@ def prepare(
     Raises:
         SceneError: the scene has mistakes.
         PluginError: a plugin does not load.
+        ElementError: an element's own code does not take the parameters it is given.
         OutputError: the directory cannot be used.
     """
     kinds = registry()
@@ -41,6 +43,7 @@ def prepare(
         for kind, element in load_plugin(plugin).items():
             kinds[kind], sources[kind] = element, plugin
     scene = load(scene_path, overrides, kinds)
+    try_out(elements_of(scene), kinds)
     directory = make_output(out, scene_path)
     attachments = {"scene.toml": write_scene(scene, directory)}
     kept = [keep_plugin(plugin, directory) for plugin in plugins]
@@ -58,15 +61,27 @@ def run(
 ) -> dict[str, Any]:
     """Run a prepared scene and return its summary.
 
+    The first SIGINT or SIGTERM ends the run in order, with a summary of what ran; the second at once.
+
     Raises:
-        RunFailed: a process was killed, hung or could not go on.
+        RunFailed: a process was killed, hung or could not go on, or an element raised.
         LogError: the log could not be written (in one process).
+        KeyboardInterrupt: the second signal came.
     """
     p = prepared
     if in_process:
         from haploop.launch.in_process import run_in_process
+        from haploop.launch.interrupts import interrupts
 
-        return run_in_process(p.scene, p.kinds, out=p.out, attachments=p.attachments, progress=progress)
+        with interrupts(usual_from=2) as received:
+            return run_in_process(
+                p.scene,
+                p.kinds,
+                out=p.out,
+                attachments=p.attachments,
+                progress=progress,
+                stop=lambda: bool(received),
+            )
     from haploop.launch.supervisor import RunRequest, run_processes
 
     request = RunRequest(

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import contextlib
 import math
 import secrets
-import signal
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -21,6 +19,7 @@ from haploop.launch.clock_server import ClockServer
 
 from haploop.launch.commands import Commands
 from haploop.launch.failure import RunFailed
+from haploop.launch.interrupts import interrupts
 from haploop.protocol.ticks import Timebase
 
 if TYPE_CHECKING:
@@ -29,8 +28,14 @@ if TYPE_CHECKING:
 _START_DEADLINE_S = 20.0
 # What the logger is given to save its files after another node has failed.
 _SAVING_S = 0.7
+# How long the last message of a process that has exited may still be on its way.
+_LAST_WORDS_S = 1.0
 # Between looks at nodes that say nothing; commands, reports and deaths are noticed at once.
 _LOOK_MS = 100
+# Attached nodes that say nothing are asked this often whether they are still there.
+_PROBE_S = 0.2
+# When the launcher itself was held up for longer (stopped, swapped out, loading a plugin), nobody is blamed for it.
+_HELD_UP_S = 1.0
 
 
 @dataclass
@@ -71,8 +76,8 @@ def run_processes(request: RunRequest) -> dict[str, Any]:
     """
     sockets = run_directory.create()
     try:
-        with _signals() as interrupts:
-            return Supervisor(request, sockets, interrupts).run()
+        with interrupts(usual_from=3) as received:
+            return Supervisor(request, sockets, received).run()
     finally:
         run_directory.remove(sockets)
 
@@ -80,8 +85,8 @@ def run_processes(request: RunRequest) -> dict[str, Any]:
 class Supervisor:
     """One run's processes and its clock."""
 
-    def __init__(self, request: RunRequest, sockets: Path, interrupts: list[int]) -> None:
-        self._request, self._sockets, self._interrupts = request, sockets, interrupts
+    def __init__(self, request: RunRequest, sockets: Path, received: list[int]) -> None:
+        self._request, self._sockets, self._interrupts = request, sockets, received
         scene = request.scene
         timebase = Timebase.of(scene["clock"], scene["duration"])
         self._clock = Clock(scene, timebase, request.kinds, request.pace)
@@ -104,7 +109,8 @@ class Supervisor:
         run_directory.announce(sockets, self._server.address, scene["title"], str(request.out))
         run_number = len(run_directory.live_runs()) - 1
         self._children = start_children(sockets, self._server.address, secret, scene["run"]["pin"], run_number)
-        self._started = time.monotonic()
+        self._started = self._looked = time.monotonic()
+        self._probe_due = 0.0
         self._stopping = False
 
     def run(self) -> dict[str, Any]:
@@ -146,13 +152,29 @@ class Supervisor:
     def _look_at(self, child: Child) -> None:
         """A process has ended: in order after DONE, otherwise the run fails."""
         fate = child.fate()
+        given_up = time.monotonic() + (_LAST_WORDS_S if child.exited() else 0.0)
         self._server.serve()
-        node = self._server.roster.own(child.role)
-        if not (node and node.done):
-            raise RunFailed(f"The {child.role} {fate}; {self._where()}")
+        while not self._is_done(child.role):
+            if time.monotonic() > given_up:
+                raise RunFailed(f"The {child.role} {fate}; {self._where()}")
+            self._server.socket.poll(20)
+            self._server.serve()
+
+    def _is_done(self, role: str) -> bool:
+        node = self._server.roster.own(role)
+        return node is not None and node.done
+
+    def _forgive(self, now: float) -> None:
+        """Time in which the launcher itself did not listen is nobody's silence."""
+        held_up_s = now - self._looked
+        self._looked = now
+        if held_up_s > _HELD_UP_S:
+            self._started += held_up_s
+            self._server.roster.forgive(held_up_s)
 
     def _check_deadlines(self) -> None:
         now = time.monotonic()
+        self._forgive(now)
         if not self._server.roster.joined():
             if now - self._started > _START_DEADLINE_S:
                 missing = [role for role in self._children if not self._server.roster.own(role)]
@@ -166,6 +188,9 @@ class Supervisor:
                 )
             if node.lossless and node.tick <= self._server.roster.slowest():
                 self._server.drop(node, f"Nothing was heard of you for {self._deadline_s:g} s; the run goes on without you.")
+        if now >= self._probe_due:
+            self._probe_due = now + _PROBE_S
+            self._server.probe(self._server.roster.silent(now, _PROBE_S))
 
     def _where(self) -> str:
         tick = self._server.roster.common_tick()
@@ -177,38 +202,15 @@ class Supervisor:
             raise KeyboardInterrupt
         if self._interrupts and not self._stopping:
             self._stopping = True
-            if not self._server.roster.all_own("ready"):
-                raise RunFailed("The run was interrupted before it began.")
             self._clock.note({"stop": True, "by": "signal"})
             self._clock.stop()
-            self._server.grant()
+            self._server.serve()
 
     def _save(self, reason: str) -> None:
         """Let the logger write down what it has; the others have nothing to lose."""
         for role, child in self._children.items():
             if role != "logger":
                 child.kill()
-        self._server.abort(reason)
-        self._children["logger"].wait(_SAVING_S)
-
-
-@contextlib.contextmanager
-def _signals() -> Iterator[list[int]]:
-    """Collect SIGINT and SIGTERM in a list; a third one has its usual effect."""
-    received: list[int] = []
-
-    def note(number: int, _frame: Any) -> None:
-        received.append(number)
-        if len(received) > 2:
-            raise KeyboardInterrupt
-
-    try:
-        before = {number: signal.signal(number, note) for number in (signal.SIGINT, signal.SIGTERM)}
-    except ValueError:  # not in the main thread: signals are somebody else's business
-        yield received
-        return
-    try:
-        yield received
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
+        if self._server.roster.own("logger"):
+            self._server.abort(reason)
+            self._children["logger"].wait(_SAVING_S)

@@ -6,9 +6,9 @@ import math
 from typing import Any
 
 from haploop.controller.changes import Change, apply_change
-from haploop.controller.dissipation import Element, Motion
+from haploop.controller.dissipation import Element, ElementError, Motion
 from haploop.controller.estimators import Sample, acceleration_estimator, velocity_estimator
-from haploop.controller.recorder import Recorder
+from haploop.controller.recorder import MOTION_COLUMNS, Recorder
 from haploop.controller.slots import Slots
 from haploop.controller.wall import NoWall, Wall
 from haploop.protocol.ticks import Timebase
@@ -40,14 +40,18 @@ class Controller:
         self._next_change = self._changes[0][0]
 
     def answer(self, samples: list[Sample]) -> list[float]:
-        """The commands in N that answer the next samples, in order."""
+        """The commands in N that answer the next samples, in order.
+
+        Raises:
+            ElementError: an element raised, or gave something that is no number.
+        """
         if self.tick == 0:
             self._start(samples[0])
         return [self._command(sample) for sample in samples]
 
     def _start(self, first: Sample) -> None:
         scene, period_s = self._scene, self._time.period_s
-        self._velocity = velocity_estimator(scene.get("velocity", {}), period_s, first)
+        self._velocity = velocity_estimator(scene.get("velocity", {}), scene.get("encoder"), period_s, first)
         self._acceleration = acceleration_estimator(scene.get("acceleration", {}), period_s, first)
 
     def _command(self, sample: Sample) -> float:
@@ -61,14 +65,22 @@ class Controller:
         motion.contact = contact = wall.contact(x)
         total = f_wall = wall.force(x, contact)
         row = [x, v, a, f_wall]
-        for slot in self._slots.slots:
-            force = slot.force(motion)
-            row.append(force)
-            total += force
+        try:
+            for slot in self._slots.slots:
+                force = float(slot.force(motion))
+                row.append(force)
+                total += force
+        except Exception as error:
+            raise self._blame(len(row) - len(MOTION_COLUMNS), error) from error
         row += (total, contact)
         self.recorder.add(row)
         self.tick += 1
         return total
+
+    def _blame(self, index: int, error: Exception) -> ElementError:
+        kind = self._slots.slots[index].element.kind
+        what = f"{type(error).__name__}: {error}"
+        return ElementError(f"Element {index} ({kind}) gave no force at tick {self.tick}: {what}.")
 
     def _change(self) -> None:
         """Carry out what is due; later ticks are written to a new block, since its columns may differ."""

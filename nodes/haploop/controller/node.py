@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import traceback
 from pathlib import Path
 from typing import Any
 
 import zmq
 
 from haploop.controller.controller import Controller
-from haploop.controller.dissipation import PluginError, registry
+from haploop.controller.dissipation import ElementError, PluginError, registry
 from haploop.protocol.loop import ControllerEnd
 from haploop.protocol.member import Member
 from haploop.protocol.node import NodeError, run_node
@@ -29,10 +30,7 @@ class ControllerNode:
         address = bind(self._publisher.socket, directory, PROCESSES[ROLE].binds["telemetry"])
         welcome = member.join({"telemetry": address})
         scene = welcome["scene"]
-        try:
-            kinds = registry([Path(path) for path in welcome["context"]["plugins"]])
-        except PluginError as error:
-            raise NodeError(str(error)) from error
+        kinds = registry([Path(path) for path in welcome["context"]["plugins"]])
         self._controller = Controller(scene, Timebase(**welcome["timebase"]), kinds)
         self._block_ticks = scene["run"]["block_ticks"]
         self._reported = 0
@@ -58,11 +56,18 @@ class ControllerNode:
             if member.events:
                 self._schedule()
             first = controller.tick
-            loop.answer(first, controller.answer(samples))
+            loop.answer(first, self._answer(samples))
             if end - self._reported >= self._block_ticks or end >= member.until:
                 self._flush()
                 member.poll()
         return self._end()
+
+    def _answer(self, samples: list[list[float]]) -> list[float]:
+        try:
+            return self._controller.answer(samples)
+        except ElementError:
+            self._flush()
+            raise
 
     def _schedule(self) -> None:
         for tick, event in self._member.take_events():
@@ -99,9 +104,15 @@ class ControllerNode:
 
 def work(member: Member, context: zmq.Context[zmq.Socket[bytes]], directory: Path) -> tuple[int, dict[str, Any]]:
     """Run the controller as a member of a run."""
-    node = ControllerNode(member, context, directory)
-    node.connect()
-    return node.run()
+    try:
+        node = ControllerNode(member, context, directory)
+        node.connect()
+        return node.run()
+    except PluginError as error:
+        raise NodeError(str(error)) from error
+    except ElementError as error:
+        traceback.print_exc()  # where in the element's own code
+        raise NodeError(str(error)) from error
 
 
 if __name__ == "__main__":

@@ -86,8 +86,12 @@ class Recorder:
         return blocks
 
     def _find_trouble(self, columns: dict[str, array[float]]) -> None:
-        for index, element in enumerate(self._elements):
-            for tick, force in enumerate(columns[f"dissipation.{index}"]):
-                if not math.isfinite(force):
-                    self.trouble = f"element {index} ({element['kind']}) gave {force} at tick {self._next_tick + tick}"
-                    return
+        found = [
+            (tick, index, force)
+            for index in range(len(self._elements))
+            for tick, force in enumerate(columns[f"dissipation.{index}"], self._next_tick)
+            if not math.isfinite(force)
+        ]
+        if found:
+            tick, index, force = min(found)
+            self.trouble = f"element {index} ({self._elements[index]['kind']}) gave {force} at tick {tick}"

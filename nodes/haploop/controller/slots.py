@@ -6,7 +6,7 @@ import dataclasses
 from collections.abc import Callable
 from typing import Any
 
-from haploop.controller.dissipation import Element, Motion
+from haploop.controller.dissipation import Element, ElementError, Motion
 from haploop.protocol.arrays import where
 
 
@@ -40,9 +40,19 @@ class Slot:
 
 
 def make_element(table: dict[str, Any], kinds: dict[str, type[Element]]) -> tuple[Element, str]:
-    """The element a validated ``[[dissipation]]`` table names, and when it acts."""
+    """The element a validated ``[[dissipation]]`` table names, and when it acts.
+
+    Raises:
+        ElementError: the element's own code does not take these parameters.
+    """
     parameters = {key: value for key, value in table.items() if key not in ("kind", "acts")}
-    return kinds[table["kind"]](**parameters), table.get("acts", "in-contact")
+    try:
+        return kinds[table["kind"]](**parameters), table.get("acts", "in-contact")
+    except Exception as error:
+        given = ", ".join(f"{name} = {value}" for name, value in parameters.items()) or "no parameters"
+        raise ElementError(
+            f"The element {table['kind']} cannot be made with {given}: {type(error).__name__}: {error}"
+        ) from error
 
 
 class Slots:

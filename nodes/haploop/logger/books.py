@@ -114,7 +114,10 @@ class Books:
         by_step["moved"] = moved / 2.0
         if self._has_wall:
             at = tick - tape.first
-            rows = {name: tape.columns[name][at : at + len(x) // n] for name in ("wall", "wall_position", "wall_stiffness")}
+            rows = {
+                name: tape.columns[name][at : at + len(minus_dx) // n]
+                for name in ("wall", "wall_position", "wall_stiffness")
+            }
             by_step |= zip(CAUSES, ideal_and_undelayed(x, rows, into_wall, n), strict=True)
         return by_step
 

@@ -38,6 +38,7 @@ class Logger:
         self.window = Window(time.plant_rate, time.steps_per_tick, resolution)
         self._into_wall = 0.0
         self._accounts: dict[int, dict[str, Any]] = {}
+        self._events: list[tuple[int, dict[str, Any]]] = []
         self._digest = hashlib.sha256()
         self.latest: dict[str, np.ndarray] = {}
         self.latest_from = self.tick = self._first_tick = 0
@@ -71,9 +72,16 @@ class Logger:
         self._book_common()
 
     def event(self, tick: int, event: dict[str, Any]) -> None:
-        """Take note of something that changed the run."""
-        if self._channels:
-            self._channels.event(tick, event)
+        """Take note of something that changes the run at ``tick``; it is logged once the books get there."""
+        self._events.append((tick, event))
+        self._events.sort(key=lambda item: item[0])
+        self._log_events()
+
+    def _log_events(self) -> None:
+        while self._events and self._events[0][0] <= self.tick:
+            tick, event = self._events.pop(0)
+            if self._channels:
+                self._channels.event(tick, event)
 
     def _note_accounts(self, block: Block) -> None:
         self._into_wall = block["wall"]["into_wall"]
@@ -111,6 +119,7 @@ class Logger:
             self._channels.energy(self.latest_from, self.latest)
         self.tick = end
         self._controller.forget_before(end)
+        self._log_events()
 
     def _named(self, rows: np.ndarray) -> dict[str, np.ndarray]:
         """Running books by the names people read: an element's book by its kind, numbered where a kind recurs."""
@@ -148,8 +157,16 @@ class Logger:
             "lost": lost,
             "trajectory_sha256": self._digest.hexdigest(),
         }
-        accounts = [{**a, "to_tick": min(a["to_tick"], self.tick)} for a in self._accounts.values()]
-        return summary(self._scene, ran, self.window, self.books, accounts, diverged)
+        return summary(self._scene, ran, self.window, self.books, self._covered_accounts(), diverged)
+
+    def _covered_accounts(self) -> list[dict[str, Any]]:
+        """Every element of which anything was booked, with the ticks that were."""
+        booked = set(self.books.names)
+        return [
+            {**a, "from_tick": max(a["from_tick"], self._first_tick), "to_tick": min(a["to_tick"], self.tick)}
+            for a in self._accounts.values()
+            if f"{a['book']}.true" in booked
+        ]
 
     def status(self) -> dict[str, Any]:
         """Where the run is and how it looks, for progress lines and viewers."""

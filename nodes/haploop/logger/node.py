@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import time as wall_clock
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +12,8 @@ import zmq
 
 from haploop.logger.keeper import Keeper, open_keeper
 from haploop.logger.log_error import LogError
-from haploop.protocol.member import Aborted, Member
+from haploop.logger.tapes import TelemetryGap
+from haploop.protocol.member import REPORT_MS, Aborted, Member
 from haploop.protocol.node import NodeError, run_node
 from haploop.protocol.processes import PROCESSES
 from haploop.protocol.sockets import bind
@@ -28,11 +31,20 @@ class LoggerNode:
     The run's own logger is one; any number of others may join later, each with a directory of its own.
     """
 
-    def __init__(self, member: Member, context: zmq.Context[zmq.Socket[bytes]], publisher: Publisher | None) -> None:
-        self._member, self._context, self._publisher = member, context, publisher
+    def __init__(
+        self,
+        member: Member,
+        context: zmq.Context[zmq.Socket[bytes]],
+        publisher: Publisher | None,
+        leave: Callable[[], str | None] = lambda: None,
+    ) -> None:
+        """``leave`` is asked at every turn: None to stay, why it is no use to stay, or "" to go in order."""
+        self._member, self._context, self._publisher, self._leave = member, context, publisher, leave
         self._ended: dict[str, tuple[int, str, str | None]] = {}
         self._status: dict[str, Any] = {}
         self._status_due = 0.0
+        self._judged_at = 0
+        self._started = False
 
     def start(self, welcome: dict[str, Any], out: Path) -> None:
         """Subscribe to plant and controller, take their state, and be ready."""
@@ -44,15 +56,21 @@ class LoggerNode:
         states: dict[str, dict[str, Any]] = {}
         early = []
         while len(states) < 2:
-            for role, frame in self._streams.receive(200):
+            received = self._streams.receive(REPORT_MS)
+            for role, frame in received:
                 if frame.name == "STATE":
                     states[role] = frame.fields[1]
                 else:
-                    early.append(frame)
+                    early.append((role, frame))
+            if not received:
+                self._member.waiting(0, "controller" if "plant" in states else "plant")
             self._member.poll()
+            if (why := self._leave()) is not None:
+                raise Aborted(why or "The logger left before anything came.")
         self.keeper.logger.start(states["plant"], states["controller"]["history"])
-        for frame in early:
-            self._take(frame.name, frame)
+        self._started = True
+        for role, frame in early:
+            self._take(role, frame)
         self._member.ready(self.keeper.logger.tick)
 
     def run(self) -> tuple[int, dict[str, Any]]:
@@ -61,19 +79,25 @@ class LoggerNode:
         poller.register(self._member.socket, zmq.POLLIN)
         self._streams.register(poller)
         reported = -1
-        while len(self._ended) < 2:
-            if not poller.poll(200):
+        while len(self._ended) < 2 or not self._member.last:  # the last grant brings the last events
+            idle = not poller.poll(REPORT_MS)
+            if idle:
                 self._member.waiting(self.keeper.logger.tick, "plant")
-            for role, frame in self._streams.drain():
-                self._take(role, frame)
+            self._drain()
             self._member.poll()
             self._note_events()
+            if (why := self._leave()) is not None:
+                return self.finish(why)
             tick = self.keeper.logger.tick
-            if tick != reported:
+            if tick != reported or (idle and tick != self._judged_at):
                 self._report(tick)
                 reported = tick
             self.keeper.flush_when_due()
         return self.finish("")
+
+    def _drain(self) -> None:
+        for role, frame in self._streams.drain():
+            self._take(role, frame)
 
     def _take(self, role: str, frame: Any) -> None:
         if frame.name == "PLANT_BLOCK":
@@ -92,13 +116,13 @@ class LoggerNode:
         now = wall_clock.monotonic()
         if now >= self._status_due:
             self._status_due = now + _STATUS_S
-            self._status = self.keeper.logger.status()
+            self._status, self._judged_at = self.keeper.logger.status(), tick
             self._member.progress(tick, self._status)
         else:
             self._member.progress(tick)
         if self._publisher:
             self._publisher.serve()
-            if self._publisher.subscribers:
+            if self._publisher.heard:
                 self._publish_energy()
 
     def _publish_energy(self) -> None:
@@ -107,9 +131,18 @@ class LoggerNode:
         columns = {name: column.tobytes() for name, column in latest.items()}
         self._publisher.publish("ENERGY_BLOCK", first, self.keeper.logger.tick - first, columns, self._status)
 
+    def save(self, failed: str) -> dict[str, Any] | None:
+        """Finish because of what ``failed`` says, with the blocks that are here already; None if nothing has begun."""
+        if not self._started:
+            return None
+        with contextlib.suppress(TelemetryGap):
+            self._drain()
+        return self.finish(failed)[1]
+
     def finish(self, failed: str) -> tuple[int, dict[str, Any]]:
         """Close the log and write the summary of what ran; ``failed`` says why it ended early, if it did."""
         self._note_events()
+        self._streams.close()
         reason = next((reason for _, reason, _ in self._ended.values() if reason), None)
         trouble = next((trouble for _, _, trouble in self._ended.values() if trouble), None)
         lost = {"commands_dropped": 0, "commands_lost": 0, "telemetry_gaps": sum(self._streams.gaps.values())}
@@ -131,11 +164,12 @@ def work(member: Member, context: zmq.Context[zmq.Socket[bytes]], directory: Pat
     welcome = member.join({"telemetry": address})
     node = LoggerNode(member, context, publisher)
     try:
-        node.start(welcome, Path(welcome["context"]["out"]))
-        return node.run()
-    except Aborted as error:
-        node.finish(str(error))
-        raise
+        try:
+            node.start(welcome, Path(welcome["context"]["out"]))
+            return node.run()
+        except Aborted as error:
+            node.save(str(error))
+            raise
     except LogError as error:
         raise NodeError(str(error)) from error
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import math
 import platform
@@ -79,8 +80,13 @@ def summary(
 def write(summary: dict[str, Any], path: Path) -> None:
     """Write as JSON, in one piece: a reader never sees half a file. Numbers that are not finite become null."""
     temporary = path.with_suffix(".part")
-    temporary.write_text(json.dumps(finite(summary), indent=2) + "\n", encoding="utf-8")
-    temporary.replace(path)
+    try:
+        temporary.write_text(json.dumps(finite(summary), indent=2) + "\n", encoding="utf-8")
+        temporary.replace(path)
+    except OSError:
+        with contextlib.suppress(OSError):
+            temporary.unlink()
+        raise
 
 
 def finite(value: Any) -> Any:

@@ -12,6 +12,8 @@ WINDOW_S = 0.5
 # Below this, swinging is no limit cycle whatever the encoder: a thousandth of what a wall of 1 N/mm gives way to 1 N.
 SMALLEST_SWING_M = 1e-6
 CROSSINGS = 4
+# A quantised position on the wall's face may lie inside by this much, relative to the face's position.
+ROUNDING = 1e-12
 CONTROLLER_COLUMNS = ("x", "total", "in_contact", "wall_position")
 
 
@@ -37,7 +39,6 @@ class Window:
         self._x = np.zeros(0)
         self._ticks = {name: np.zeros(0) for name in CONTROLLER_COLUMNS}
         self._steps = 0
-        self.ever_in_contact = False
         self.x_min_m, self.x_max_m, self.force_max_N = math.inf, -math.inf, 0.0
 
     def add(self, x: np.ndarray, force: np.ndarray, rows: dict[str, np.ndarray]) -> None:
@@ -47,7 +48,6 @@ class Window:
         keep_ticks = self._keep_steps // self._steps_per_tick + 1
         self._ticks = {name: np.concatenate([self._ticks[name], rows[name]])[-keep_ticks:] for name in self._ticks}
         self._steps += len(x) - 1
-        self.ever_in_contact |= bool(rows["in_contact"].any())
         self.x_min_m = min(self.x_min_m, float(x.min()))
         self.x_max_m = max(self.x_max_m, float(x.max()))
         self.force_max_N = max(self.force_max_N, float(np.abs(force).max(initial=0.0)))
@@ -62,13 +62,18 @@ class Window:
         return self._x[-steps - 1 :], rows, first
 
     def figures(self) -> dict[str, Any]:
-        """The ``window`` entry of the summary."""
+        """The ``window`` entry of the summary.
+
+        The displayed stiffness is the mean of total force over penetration, ticks in contact (Choi et al. 2022, V.B.2);
+        ticks whose penetration is a rounding error of the wall's position are left out of it.
+        """
         x, rows, first = self._last()
         inside = rows["in_contact"] > 0
         depth = rows["wall_position"][inside] - rows["x"][inside]
-        stiffness = rows["total"][inside] / depth
+        real = np.abs(depth) > ROUNDING * np.abs(rows["wall_position"][inside])
+        stiffness = rows["total"][inside][real] / depth[real]
         return {
-            "from_s": (first / self._rate),
+            "from_s": first / self._rate,
             "oscillation_m": float(np.ptp(x)) if len(x) else 0.0,
             "outside_fraction": float(np.mean(~inside)) if len(inside) else 1.0,
             "displayed_stiffness_N_m": float(np.mean(stiffness)) if len(stiffness) else None,
@@ -79,9 +84,10 @@ class Window:
         """Judge the window; ``diverged`` is why the plant ended by itself, if it did."""
         if diverged:
             return Verdict("diverged", f"{diverged}.")
-        if not self.ever_in_contact:
-            return Verdict("no-contact", "No tick of the run was in contact with a wall.")
-        crossings, growth = swings(self._last()[0], self.swing_m)
+        x, rows, _ = self._last()
+        if not rows["in_contact"].any():
+            return Verdict("no-contact", f"No tick of the last {WINDOW_S:g} s (second half of a shorter run) was in contact.")
+        crossings, growth = swings(x, self.swing_m)
         seen = (
             f"In the last {WINDOW_S:g} s (second half of a shorter run) x crossed its trend line {crossings} times by more "
             f"than {self.swing_m * 1e6:.3g} um, its second half {growth:.2f} times as wide as its first; a limit cycle "

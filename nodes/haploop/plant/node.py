@@ -52,8 +52,8 @@ class PlantNode:
         most = self._time.lookahead_ticks + 1
         while plant.stop_reason is None:
             if plant.tick >= member.until:
-                if member.last:
-                    plant.finish()
+                plant.finish()
+                if member.last or plant.stop_reason:
                     break
                 self._flush()
                 while plant.tick >= member.until and not member.last:

@@ -6,7 +6,9 @@ import math
 from array import array
 from typing import Any
 
-from haploop.plant.command_line import CommandLine
+import numpy as np
+
+from haploop.plant.command_line import CommandLine, Hold
 from haploop.plant.flow import StepFlow
 from haploop.plant.hand_force import HandForce
 from haploop.plant.mechanics import Mechanics
@@ -31,7 +33,8 @@ class Plant:
 
     def __init__(self, scene: dict[str, Any], time: Timebase) -> None:
         mechanics = Mechanics.of(scene)
-        self._flow = StepFlow.of(mechanics.mass_kg, mechanics.damping, mechanics.stiffness, time.step_s)
+        flow = self._flow = StepFlow.of(mechanics.mass_kg, mechanics.damping, mechanics.stiffness, time.step_s)
+        self._coefficients = flow.x_x, flow.x_v, flow.x_force, flow.v_x, flow.v_v, flow.v_force
         self._mechanics = mechanics
         self._steps = time.steps_per_tick
         self._tau = HandForce(scene.get("hand", {}).get("force"), time.plant_rate)
@@ -45,12 +48,12 @@ class Plant:
             self._measure = lambda: (measure(self.x),)
         self.x, self.v = mechanics.start
         self._x_rest = self._v_rest = 0.0
-        self._force, self._command = 0.0, -1
-        self._interval_due = False
+        self._interval_due = self._unusable = False
         self._drive: list[tuple[float, float]] = []
         self._drive_first = self._drive_end = 0
         self.tick = 0
         self.stop_reason: str | None = None
+        self._holds: list[Hold] = [(0, 0.0, -1)]
         self._begin_block()
 
     def samples(self, count: int) -> list[tuple[float, ...]]:
@@ -70,6 +73,9 @@ class Plant:
     def receive(self, forces: list[float]) -> None:
         """Take the next commands, in order of their ticks."""
         self._line.receive(forces)
+        total = sum(forces)
+        if total - total != 0.0:  # infinite or not a number
+            self._unusable = True
 
     def finish(self) -> None:
         """Step through the interval after the last sample, so that the run ends at the tick after it."""
@@ -87,39 +93,45 @@ class Plant:
         if tick >= self._drive_end:
             self._prepare_drive(tick)
         holds = self._line.holds(tick)
-        for _, force, command in holds:
-            if not math.isfinite(force):
-                self._stop(tick, f"command {command} was {force}, which no device can apply")
-                return False
+        if self._unusable and self._refuse(tick, holds):
+            return False
         drive = (tick - self._drive_first) * self._steps
-        for count, force, command in holds:
-            self._hold(count, force, drive)
-            self._forces += [force] * count
-            self._commands += [float(command)] * count
-            drive += count
-        self._force, self._command = force, command
+        for hold in holds:
+            drive = self._hold(hold[0], hold[1], drive)
+        self._holds += holds
         self._interval_due = False
         if not -self._limit_m <= self.x <= self._limit_m:
             self._stop(tick + 1, f"the device was at {self.x:g} m, beyond the limit of {self._limit_m:g} m")
             return False
         return True
 
-    def _hold(self, count: int, force: float, drive: int) -> None:
+    def _hold(self, count: int, force: float, drive: int) -> int:
         """``count`` plant steps under one held force: x+ = x + dx, v+ = v + dv by the exact flow."""
-        flow = self._flow
-        x_x, x_v, v_x, v_v = flow.x_x, flow.x_v, flow.v_x, flow.v_v
-        held_x, held_v = flow.x_force * force, flow.v_force * force
+        x_x, x_v, x_force, v_x, v_v, v_force = self._coefficients
+        held_x, held_v = x_force * force, v_force * force
         x, v, x_rest, v_rest = self.x, self.v, self._x_rest, self._v_rest
         log_x, log_v = self._xs.append, self._vs.append
         for drive_x, drive_v in self._drive[drive : drive + count]:
             dx = x_x * x + x_v * v + (held_x + drive_x) + x_rest
             dv = v_x * x + v_v * v + (held_v + drive_v) + v_rest
-            next_x, next_v = x + dx, v + dv
-            x_rest, v_rest = dx - (next_x - x), dv - (next_v - v)
-            x, v = next_x, next_v
+            next_x = x + dx
+            next_v = v + dv
+            x_rest = dx - (next_x - x)
+            v_rest = dv - (next_v - v)
+            x = next_x
+            v = next_v
             log_x(x)
             log_v(v)
         self.x, self.v, self._x_rest, self._v_rest = x, v, x_rest, v_rest
+        return drive + count
+
+    def _refuse(self, tick: int, holds: list[Hold]) -> bool:
+        """End the run before interval ``tick`` if a force in it is no finite number."""
+        for _, force, command in holds:
+            if not math.isfinite(force):
+                self._stop(tick, f"command {command} was {force}, which no device can apply")
+                return True
+        return False
 
     def _prepare_drive(self, tick: int) -> None:
         """What hand force and spring rest add to dx and dv at each step of the next intervals."""
@@ -128,7 +140,10 @@ class Plant:
         start, rise = tau[:-1] + self._spring_at_origin_N, tau[1:] - tau[:-1]
         flow = self._flow
         drive_x, drive_v = flow.x_force * start + flow.x_slope * rise, flow.v_force * start + flow.v_slope * rise
-        self._drive = list(zip(drive_x.tolist(), drive_v.tolist(), strict=True))
+        if (start == start[0]).all() and not rise.any():  # one pair for all steps, kinder to the cache
+            self._drive = [(float(drive_x[0]), float(drive_v[0]))] * len(start)
+        else:
+            self._drive = list(zip(drive_x.tolist(), drive_v.tolist(), strict=True))
         self._drive_first, self._drive_end = tick, tick + _DRIVE_TICKS
 
     def _acceleration(self) -> float:
@@ -136,20 +151,15 @@ class Plant:
         step = self.tick * self._steps
         tau = float(self._tau.at_steps(step, step + 1)[0])
         m = self._mechanics
-        return (self._force + tau - m.damping * self.v - m.stiffness * (self.x - m.rest_m)) / m.mass_kg
+        return (self._holds[-1][1] + tau - m.damping * self.v - m.stiffness * (self.x - m.rest_m)) / m.mass_kg
 
     def _stop(self, tick: int, what: str) -> None:
         self.stop_reason = f"{what}, at tick {tick}"
 
     def state(self) -> dict[str, float]:
         """Where the plant is now: tick reached, x, v, force and command last in effect."""
-        return {
-            "tick": self.reached,
-            "x": self.x,
-            "v": self.v,
-            "force": self._force,
-            "command": float(self._command),
-        }
+        _, force, command = self._holds[-1]
+        return {"tick": self.reached, "x": self.x, "v": self.v, "force": force, "command": command}
 
     def take_block(self) -> tuple[int, int, dict[str, bytes]]:
         """(first tick, ticks, columns) of what was stepped since the last block; empties it.
@@ -158,17 +168,18 @@ class Plant:
         and its end state, whose force and command are the last held ones.
         """
         first, reached = self._block_first, self.reached
+        counts, forces, commands = zip(*self._holds[1:], (1, *self._holds[-1][1:]), strict=True)
         columns = {
             "x": array("d", self._xs).tobytes(),
             "v": array("d", self._vs).tobytes(),
-            "force": array("d", [*self._forces, self._force]).tobytes(),
-            "command": array("d", [*self._commands, self._command]).tobytes(),
+            "force": np.repeat(np.array(forces, float), counts).tobytes(),
+            "command": np.repeat(np.array(commands, float), counts).tobytes(),
         }
         self._begin_block()
         return first, reached - first, columns
 
     def _begin_block(self) -> None:
+        """Start a block with the present state; the last hold stays, for whoever asks for the force."""
         self._block_first = self.reached
         self._xs, self._vs = [self.x], [self.v]
-        self._forces: list[float] = []
-        self._commands: list[float] = []
+        self._holds = self._holds[-1:]

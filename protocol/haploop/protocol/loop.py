@@ -54,12 +54,12 @@ class PlantEnd:
         Raises:
             LoopError: the answer is for other ticks.
         """
-        self._send(self._pack((VERSION, _SAMPLES, tick, samples)))
-        while True:
-            sender, data = self._receive(idle)
-            if sender == self._partner:
-                break
+        self.socket.send(self._partner, zmq.SNDMORE)
+        self.socket.send(self._pack((VERSION, _SAMPLES, tick, samples)))
+        sender, data = self._receive(idle)
+        while sender != self._partner:
             self.strangers += 1
+            sender, data = self._receive(idle)
         answer = msgpack.unpackb(data)
         if answer[:3] != [VERSION, _COMMANDS, tick] or len(answer[3]) != len(samples):
             raise LoopError(_mismatch("commands", tick, len(samples), decode(data)))
@@ -78,12 +78,14 @@ class PlantEnd:
         while True:
             try:
                 sender = self.socket.recv()
-                data = b""
-                while self.socket.rcvmore:
-                    data = self.socket.recv()
-                return sender, data
             except zmq.Again:
                 idle()
+                continue
+            data = b"" if sender != self._partner else self.socket.recv()
+            if not data:  # a stranger may have sent any number of frames; the controller sends one
+                while self.socket.rcvmore:
+                    data = self.socket.recv()
+            return sender, data
 
 
 class ControllerEnd:

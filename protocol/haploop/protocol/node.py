@@ -30,7 +30,10 @@ def run_node(role: str, work: Work) -> None:
     Exit status: 0 when the node said DONE, 1 otherwise.
     """
     directory = Path(sys.argv[1])
-    address, secret = sys.stdin.readline().split()
+    line = sys.stdin.readline().split()
+    if not line:
+        sys.exit(1)  # the launcher is gone already
+    address, secret = line
     threading.Thread(target=_end_with_parent, daemon=True).start()
     gc.freeze()
     context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import zmq
 
-from haploop.protocol.wire import MAX_FRAME_BYTES
+from haploop.protocol.wire import MAX_FRAME_BYTES, MAX_REQUEST_BYTES
 
 # A subscriber this many blocks behind starts to lose blocks; the grant window keeps lossless ones far below.
 TELEMETRY_BACKLOG_BLOCKS = 256
@@ -19,7 +19,7 @@ def open_socket(context: zmq.Context[zmq.Socket[bytes]], kind: int) -> zmq.Socke
     """A socket of a type such as ``zmq.DEALER`` with the options every socket of a run has."""
     socket = context.socket(kind)
     socket.linger = 0
-    socket.setsockopt(zmq.MAXMSGSIZE, MAX_FRAME_BYTES)
+    socket.setsockopt(zmq.MAXMSGSIZE, MAX_REQUEST_BYTES if kind in (zmq.ROUTER, zmq.XPUB) else MAX_FRAME_BYTES)
     socket.setsockopt(zmq.RECONNECT_IVL, 20)
     if kind == zmq.ROUTER:
         socket.setsockopt(zmq.ROUTER_MANDATORY, 1)

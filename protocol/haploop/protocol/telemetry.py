@@ -11,6 +11,10 @@ from haploop.protocol.sockets import open_socket
 from haploop.protocol.wire import Frame, WireError, decode, encode
 
 
+# Requests taken at one block boundary, so that nobody who floods a publisher can hold its node up.
+_AT_ONCE = 200
+
+
 class Publisher:
     """A node's own stream of blocks.
 
@@ -19,8 +23,8 @@ class Publisher:
 
     Attributes:
         socket: to be bound by the node.
-        subscribers: subscriptions now standing.
-        strangers: frames that were no subscriptions.
+        heard: whether anyone has subscribed so far.
+        strangers: frames that were no subscriptions to this stream.
     """
 
     def __init__(
@@ -29,7 +33,7 @@ class Publisher:
         self.socket = open_socket(context, zmq.XPUB)
         self._topic = role.encode()
         self._state = state
-        self.subscribers = 0
+        self.heard = False
         self.strangers = 0
 
     def publish(self, name: str, *fields: Any) -> None:
@@ -37,21 +41,23 @@ class Publisher:
         self.socket.send_multipart([self._topic, encode(name, *fields)])
 
     def serve(self) -> None:
-        """Take note of subscriptions; call at block boundaries only, where the state is that of a tick."""
-        while self.socket.get(zmq.EVENTS) & zmq.POLLIN:
+        """Answer new subscriptions; call at block boundaries only, where the state is that of a tick."""
+        new = False
+        for _ in range(_AT_ONCE):
+            if not self.socket.get(zmq.EVENTS) & zmq.POLLIN:
+                break
             request = self.socket.recv()
-            if request[:1] == b"\x01":
-                self.subscribers += 1
-                tick, state = self._state()
-                self.publish("STATE", tick, state)
-            elif request[:1] == b"\x00":
-                self.subscribers -= 1
-            else:
+            if request[:1] == b"\x01" and self._topic.startswith(request[1:]):
+                new = True
+            elif request[:1] != b"\x00":
                 self.strangers += 1
+        if new:
+            self.heard = True
+            self.publish("STATE", *self._state())
 
     def await_subscriber(self, idle: Callable[[], None]) -> None:
         """Wait until someone listens, calling ``idle`` now and then."""
-        while not self.subscribers:
+        while not self.heard:
             if not self.socket.poll(100):
                 idle()
             self.serve()

@@ -8,7 +8,9 @@ import msgpack
 
 from haploop.protocol.messages import BY_CODE, MESSAGES, VERSION, complaint
 
-# A frame larger than this is refused by the socket itself.
+# A frame larger than this is refused by the socket itself: one that binds takes requests and reports, from anyone;
+# one that connects takes what the run's own processes send, a scene with a long recording among it.
+MAX_REQUEST_BYTES = 4 * 1024 * 1024
 MAX_FRAME_BYTES = 64 * 1024 * 1024
 
 
@@ -48,12 +50,17 @@ def decode(data: bytes) -> Frame:
     if not isinstance(items, list) or len(items) < 2:
         raise WireError(f"A frame must be an array [version, code, fields...], but is {type(items).__name__}.")
     version, code, *fields = items
-    if version != VERSION:
-        raise WireError(f"This is protocol version {VERSION}, but a frame of version {str(version)[:40]} came.")
-    name = BY_CODE.get(code) if isinstance(code, int) else None
+    if type(version) is not int or version != VERSION:
+        raise WireError(f"This is protocol version {VERSION}, but a frame of version {_shown(version)} came.")
+    name = BY_CODE.get(code) if type(code) is int else None
     if name is None:
-        raise WireError(f"No message has the code {str(code)[:40]}.")
+        raise WireError(f"No message has the code {_shown(code)}.")
     wrong = complaint(name, fields)
     if wrong:
         raise WireError(wrong + ".")
     return Frame(name, fields)
+
+
+def _shown(value: Any) -> str:
+    """A number as it is, anything else by its type: it may be huge, or nested deeper than Python can print."""
+    return str(value) if isinstance(value, int | float) else f"({type(value).__name__})"

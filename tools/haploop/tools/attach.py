@@ -5,9 +5,13 @@ from __future__ import annotations
 import signal
 import sys
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from haploop.tools.ending import WRONG_USE, leave, plain_errors
+from haploop.tools.ending import FAILED, WRONG_USE, leave, plain_errors
+
+if TYPE_CHECKING:
+    from haploop.launch.run_directory import LiveRun
+    from haploop.protocol.member import Member
 
 TARGETS = ("logger", "print")
 
@@ -27,41 +31,59 @@ def attach_to(what: str, out: Path | None, run_id: str | None) -> None:
             _attach_print(run)
 
 
-def _attach_logger(run: Any, out: Path | None) -> None:
+def _attach_logger(run: LiveRun, out: Path | None) -> None:
     import zmq
 
-    from haploop.launch.output import make_output, write_scene
-    from haploop.logger.node import LoggerNode
-    from haploop.protocol.member import Aborted, Member, Refused
+    from haploop.launch.interrupts import interrupts
+    from haploop.launch.output import make_output
+    from haploop.protocol.member import Member, Refused
     from haploop.protocol.processes import OBSERVER
     from haploop.tools.report import print_summary
 
     directory = make_output(out, Path(f"attached-{run.id}"))
     context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
-    member = Member(context, OBSERVER, run.clock, "")
     try:
-        welcome = member.join({})
-        write_scene(welcome["scene"], directory)
-        node = LoggerNode(member, context, None)
-        node.start(welcome, directory)
-        print(f"logging run {run.id} from tick {node.keeper.logger.tick} on; Ctrl-C leaves", file=sys.stderr)
-        try:
-            tick, summary = node.run()
-            member.leave("DONE", tick, {})
-        except KeyboardInterrupt:
-            tick, summary = node.finish("")
-            member.leave("LEAVE", tick)
-        except Aborted as error:
-            tick, summary = node.finish(str(error))
+        with interrupts(usual_from=2) as received:
+            summary = _log(run, Member(context, OBSERVER, run.clock, ""), context, directory, received)
     except Refused as error:
         leave(str(error), WRONG_USE)
     finally:
         context.destroy(linger=500)
+    if summary is None:
+        leave(f"Run {run.id} ended before anything could be logged.", FAILED)
     print_summary(summary)
     print(directory, file=sys.stderr)
+    if summary["ended"] == "failed":
+        leave(summary["why"], FAILED)
 
 
-def _attach_print(run: Any) -> None:
+def _log(run: LiveRun, member: Member, context: Any, directory: Path, received: list[int]) -> dict[str, Any] | None:
+    """Log until the run ends or a signal comes; the summary, or None if nothing came."""
+    from haploop.launch.output import write_scene
+    from haploop.launch.run_directory import is_live
+    from haploop.logger.node import LoggerNode
+    from haploop.logger.tapes import TelemetryGap
+    from haploop.protocol.member import Aborted
+
+    def reason_to_leave() -> str | None:
+        if received:
+            return ""
+        return None if is_live(run) else f"The launcher of run {run.id} has ended without a word."
+
+    node = LoggerNode(member, context, None, reason_to_leave)
+    try:
+        welcome = member.join({})
+        write_scene(welcome["scene"], directory)
+        node.start(welcome, directory)
+        print(f"logging run {run.id} from tick {node.keeper.logger.tick} on; Ctrl-C leaves", file=sys.stderr)
+        tick, summary = node.run()
+        member.leave("LEAVE", tick)
+        return summary
+    except (Aborted, TelemetryGap) as error:
+        return node.save(str(error))
+
+
+def _attach_print(run: LiveRun) -> None:
     """A lossy listener: prints where the run is; whatever it is too slow for, it skips, and says how much."""
     import zmq
 

@@ -27,7 +27,7 @@ def print_json(data: Any) -> None:
 @contextlib.contextmanager
 def plain_errors() -> Iterator[None]:
     """Turn the errors of the packages below into messages: 2 for wrong use, 1 for a run that failed."""
-    from haploop.controller.dissipation import PluginError
+    from haploop.controller.dissipation import ElementError, PluginError
     from haploop.launch.control import CommandRefused
     from haploop.launch.mistakes import SceneError
     from haploop.launch.output import OutputError
@@ -39,7 +39,7 @@ def plain_errors() -> Iterator[None]:
     except SceneError as error:
         count = len(error.mistakes)
         leave(f"{error}\n{count} mistake{'s' * (count != 1)}; nothing was started.", WRONG_USE)
-    except (PluginError, OutputError, CommandRefused, RunNotFound) as error:
+    except (PluginError, ElementError, OutputError, CommandRefused, RunNotFound) as error:
         leave(str(error), WRONG_USE)
     except LogError as error:
         leave(str(error), FAILED)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import tomllib
 from typing import Any
 
@@ -26,9 +27,13 @@ def show_status(run_id: str | None, as_json: bool) -> None:
     from haploop.launch import run_directory
     from haploop.launch.control import ask
 
+    answers = {}
     with plain_errors():
-        runs = [run_directory.find(run_id)] if run_id else run_directory.live_runs()
-        answers = {run.id: ask(run, "status")[1] for run in runs}
+        for run in [run_directory.find(run_id)] if run_id else run_directory.live_runs():
+            try:
+                answers[run.id] = ask(run, "status")[1]
+            except run_directory.RunNotFound as error:  # it ended just now, or its launcher hangs
+                print(error, file=sys.stderr)
     if as_json:
         print_json(answers)
     elif not answers:

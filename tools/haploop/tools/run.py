@@ -41,7 +41,7 @@ def run_scene(
         print_summary(summary)
         print(f"{prepared.out}", file=sys.stderr)
     if summary["ended"] == "failed":
-        raise SystemExit(FAILED)
+        leave(f"The run failed: {summary['why']}.", FAILED)
 
 
 def _pace(text: str, in_process: bool) -> float:

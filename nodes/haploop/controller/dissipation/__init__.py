@@ -1,8 +1,8 @@
 """Dissipation elements: one a file, all of one shape."""
 
-from haploop.controller.dissipation.element import Element, Motion
+from haploop.controller.dissipation.element import Element, ElementError, Motion
 from haploop.controller.dissipation.registry import PluginError, load_plugin, registry
 from haploop.protocol.arrays import where
 from haploop.protocol.quantity import Quantity
 
-__all__ = ["Element", "Motion", "PluginError", "Quantity", "load_plugin", "registry", "where"]
+__all__ = ["Element", "ElementError", "Motion", "PluginError", "Quantity", "load_plugin", "registry", "where"]

@@ -9,6 +9,10 @@ from typing import Annotated, Any, ClassVar, dataclass_transform, get_args, get_
 from haploop.protocol.quantity import Quantity
 
 
+class ElementError(Exception):
+    """An element that cannot be made of its parameters, or gave no force; the message names it and what it raised."""
+
+
 class Motion:
     """What the controller knows of the device at tick k; one object, renewed each tick, read only for elements.
 

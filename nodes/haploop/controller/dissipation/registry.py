@@ -47,7 +47,7 @@ def load_plugin(path: Path) -> dict[str, type[Element]]:
         module.__file__ = str(path)
         sys.modules[module.__name__] = module  # dataclasses and type hints look the names up there
         exec(compile(source, str(path), "exec"), module.__dict__)
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         line = f", line {error.lineno}" if isinstance(error, SyntaxError) else ""
         raise PluginError(f"The plugin {path}{line} does not load: {type(error).__name__}: {error}") from error
     found = [c for c in vars(module).values() if inspect.isclass(c) and c.__module__ == module.__name__]

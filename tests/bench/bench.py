@@ -1,0 +1,127 @@
+"""Speed as ratios to stated yardsticks, medians of interleaved repeats in one run: ``make bench``."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import platform
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+from rich.console import Console
+from rich.table import Table
+from yardsticks import ping_pong_us, plain_loop_us
+
+from haploop.controller.dissipation import registry
+from haploop.launch.in_process import run_in_process
+from haploop.launch.scene_file import load
+from haploop.launch.start import prepare, run
+from haploop.logger.summary import versions
+
+SCENE = Path(__file__).parents[2] / "launch" / "scenes" / "fig6c.toml"
+
+
+def _loop_us(delay_s: float, log: str, seconds: float) -> Callable[[], float]:
+    """Wall time per tick of figure 6c as processes, logged to disk."""
+
+    def measure() -> float:
+        with tempfile.TemporaryDirectory() as folder:
+            settings = [f"clock.round_trip_delay={delay_s}", f"duration={seconds}", f"run.log={log}", "diverged_beyond=1e9"]
+            summary = run(prepare(SCENE, settings, out=Path(folder, "out")))
+            return summary["wall_s"] / summary["ticks"] * 1e6
+
+    return measure
+
+
+def _in_process_us(seconds: float) -> float:
+    """Wall time per tick of figure 6c in one process with the books, nothing logged."""
+    scene = load(SCENE, [f"duration={seconds}", "run.log=none", "diverged_beyond=1e9"])
+    kinds = registry()
+    began = time.perf_counter()
+    summary = run_in_process(scene, kinds)
+    return (time.perf_counter() - began) / summary["ticks"] * 1e6
+
+
+def _first_tick_s() -> float:
+    """From the command line to the first tick: a run of one tick, less nothing."""
+    with tempfile.TemporaryDirectory() as folder:
+        command = [sys.executable, "-m", "haploop.tools.cli", "run", str(SCENE), "--set", "duration=0.001"]
+        began = time.perf_counter()
+        subprocess.run([*command, "--out", f"{folder}/out"], check=True, capture_output=True)
+        return time.perf_counter() - began
+
+
+ROWS: dict[str, tuple[Callable[[], float], str, str, float]] = {
+    # what: (measure, unit, yardstick, target as a ratio; 0 for an absolute one)
+    "ping-pong": (ping_pong_us, "us/tick", "", 0.0),
+    "plain loop": (plain_loop_us, "us/tick", "", 0.0),
+    "processes, d = 0, every step logged": (_loop_us(0.0, "steps", 10.0), "us/tick", "ping-pong", 1.3),
+    "processes, d = 2 ms, every step logged": (_loop_us(0.002, "steps", 10.0), "us/tick", "ping-pong", 0.8),
+    "processes, d = 10 ms, every step logged": (_loop_us(0.010, "steps", 20.0), "us/tick", "ping-pong", 0.6),
+    "processes, d = 10 ms, ticks logged": (_loop_us(0.010, "ticks", 20.0), "us/tick", "ping-pong", 0.4),
+    "one process, books, no log": (lambda: _in_process_us(20.0), "us/tick", "plain loop", 8.0 / 2.7),
+    # "haploop run of one tick, start to end": (_first_tick_s, "s", "", 0.0),
+}
+
+
+def main() -> None:
+    """Measure, print a table, and write JSON where asked."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--repeats", type=int, default=5)
+    parser.add_argument("--only", default="", help="rows whose name holds this text, and the yardsticks")
+    parser.add_argument("--json", type=Path)
+    options = parser.parse_args()
+    rows = {name: row for name, row in ROWS.items() if options.only in name or not row[2]}
+    seen: dict[str, list[float]] = {name: [] for name in rows}
+    for _ in range(options.repeats):
+        for name, (measure, *_rest) in rows.items():
+            seen[name].append(measure())
+    medians = {name: statistics.median(values) for name, values in seen.items()}
+    _show(rows, seen, medians, options.repeats)
+    if options.json:
+        record = {"machine": machine(), "versions": versions(), "repeats": options.repeats, "values": seen}
+        options.json.write_text(json.dumps(record, indent=2) + "\n", encoding="utf-8")
+
+
+def _show(rows: dict, seen: dict[str, list[float]], medians: dict[str, float], repeats: int) -> None:
+    table = Table(title=f"medians of {repeats} interleaved repeats; {machine()}", title_justify="left")
+    for heading in ("what", "median", "least - most", "ratio", "yardstick", "at most"):
+        table.add_column(heading, justify="left" if heading in ("what", "yardstick") else "right")
+    for name, (_, unit, yardstick, target) in rows.items():
+        ratio = medians[name] / medians[yardstick] if yardstick else None
+        table.add_row(
+            name,
+            f"{medians[name]:.3g} {unit}",
+            f"{min(seen[name]):.3g} - {max(seen[name]):.3g}",
+            f"{ratio:.2f}" if ratio else "",
+            yardstick,
+            f"{target:.2f}" if target else "",
+        )
+    console = Console(width=130)
+    console.print(table)
+    console.print(", ".join(f"{name} {version}" for name, version in versions().items()))
+
+
+def machine() -> str:
+    """Processor and cores, for the record."""
+    import os
+
+    cpu = next(
+        (line.partition(":")[2].strip() for line in _cpuinfo() if line.startswith("model name")), platform.processor()
+    )
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+    return f"{cpu or platform.machine()}, {cores} cores, {platform.system()}"
+
+
+def _cpuinfo() -> list[str]:
+    path = Path("/proc/cpuinfo")
+    return path.read_text(encoding="utf-8").splitlines() if path.exists() else []
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,222 @@
+"""Runs as a user starts them, in a process of their own, and what a test sees of them from outside."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+from haploop.launch import control, run_directory
+from haploop.logger import read
+from haploop.logger.recording import Recording
+from haploop.protocol.processes import PROCESSES
+
+SCENES = Path(__file__).parents[2] / "launch/scenes"
+SCENE = SCENES / "fig6c.toml"
+HAPLOOP = [sys.executable, "-m", "haploop.tools.cli"]
+# So long that it surely goes on while a test does something to it.
+LONG = ("duration=600", "run.deadline=30")
+PACE = ("--pace", "5")
+# A test gives up after so long. It says nothing about how long anything may take.
+PATIENCE_S = 40.0
+ROLES = tuple(PROCESSES)
+
+Row = tuple[int, int, str, str]
+
+
+def wait_for(what: str, look: Callable[[], Any]) -> Any:
+    """The first true answer of ``look``."""
+    give_up = time.monotonic() + PATIENCE_S
+    while not (answer := look()):
+        assert time.monotonic() < give_up, f"{what} has not come within {PATIENCE_S:g} s"
+        time.sleep(0.01)
+    return answer
+
+
+def processes() -> list[Row]:
+    """(pid, parent, state, command line) of every process there is."""
+    listing = subprocess.run(["ps", "-A", "-o", "pid=,ppid=,stat=,args="], capture_output=True, text=True, check=True)
+    rows = (line.split(maxsplit=3) for line in listing.stdout.splitlines())
+    return [(int(row[0]), int(row[1]), row[2], row[3]) for row in rows if len(row) == 4]
+
+
+def alive(pids: Sequence[int]) -> list[int]:
+    """Which of these processes are still there; one that only waits to be reaped is gone."""
+    return [pid for pid, _, state, _ in processes() if pid in pids and not state.startswith("Z")]
+
+
+def command(*arguments: str) -> subprocess.CompletedProcess[str]:
+    """A haploop command from another terminal, to its end."""
+    return subprocess.run([*HAPLOOP, *arguments], capture_output=True, text=True, timeout=PATIENCE_S)
+
+
+def same_bits(log: Recording, truth: Recording) -> int:
+    """How many ticks of the controller a log holds, every number in it being the undisturbed run's, bit for bit."""
+    for topic, names in (("/plant", ("timestamp", "x", "v")), ("/controller", ("timestamp", "x", "v", "a", "total"))):
+        for name in names if topic in log else ():
+            shared = min(len(log[topic][name]), len(truth[topic][name]))
+            assert log[topic][name][:shared].tobytes() == truth[topic][name][:shared].tobytes(), (topic, name)
+    return len(log["/controller"]["x"]) if "/controller" in log else 0
+
+
+class Launched:
+    """``haploop`` with some arguments as a process.
+
+    Attributes:
+        out: the directory named by ``--out``, or None.
+        took_s: wall time from the last :meth:`signal` or :meth:`kill` to the end, for people who read the output.
+    """
+
+    def __init__(self, *arguments: str, out: Path | None = None, before: Callable[[], None] | None = None) -> None:
+        self.out = out
+        command = [*HAPLOOP, *arguments, *(("--out", str(out)) if out else ())]
+        self._said = tempfile.TemporaryFile()  # noqa: SIM115: it goes with this object
+        self._process = subprocess.Popen(
+            command, stdout=subprocess.PIPE, stderr=self._said, text=True, preexec_fn=before
+        )
+        self.pid = self._process.pid
+        self.nodes: dict[str, int] = {}
+        self._since = time.monotonic()
+
+    @property
+    def stderr(self) -> str:
+        """What it and its nodes have said to people so far."""
+        return os.pread(self._said.fileno(), 1_000_000, 0).decode()
+
+    def says(self, words: str) -> None:
+        """Wait until it has said something."""
+        wait_for(words, lambda: words in self.stderr)
+
+    def signal(self, number: signal.Signals) -> None:
+        """Send the process itself a signal."""
+        self._since = time.monotonic()
+        self._process.send_signal(number)
+
+    def stood_for(self, seconds: float) -> bool:
+        """Whether so much time has gone since the last signal."""
+        return time.monotonic() - self._since >= seconds
+
+    def is_there(self) -> bool:
+        """Whether the process has not ended yet."""
+        return self._process.poll() is None
+
+    def end(self, status: int) -> str:
+        """Wait for the end, which must come with this exit status; returns stdout."""
+        try:
+            stdout, _ = self._process.communicate(timeout=PATIENCE_S)
+        except subprocess.TimeoutExpired:
+            self.clear_away()
+            raise AssertionError(f"haploop has not ended; it said: {self.stderr}") from None
+        self.took_s = time.monotonic() - self._since
+        print(f"ended {self.took_s:.2f} s later: {self.stderr[-400:]}")
+        assert self._process.returncode == status, self.stderr
+        return stdout
+
+    def summary(self) -> dict[str, Any]:
+        """Wait for the end, which must be exit status 0; returns the summary that ``--json`` prints."""
+        return json.loads(self.end(0))
+
+    def clear_away(self) -> None:
+        """Leave no process behind, however the test went."""
+        for pid in (*self.nodes.values(), self.pid):
+            if pid != self.pid or self._process.poll() is None:
+                try:
+                    os.kill(pid, signal.SIGKILL)
+                except ProcessLookupError:
+                    continue
+        self._process.communicate()
+        self._said.close()
+
+
+class Run(Launched):
+    """``haploop run`` as a process, and its nodes.
+
+    Attributes:
+        nodes: pid by role, once :meth:`nodes_started` or :meth:`reaches` has returned.
+    """
+
+    def __init__(self, out: Path, *arguments: str, scene: Path = SCENE, sets: Sequence[str] = LONG, pace: Sequence[str] = PACE, **more: Any) -> None:
+        options = [word for assignment in sets for word in ("--set", assignment)]
+        super().__init__("run", str(scene), *options, *pace, *arguments, "--json", out=out, **more)
+
+    @property
+    def out_directory(self) -> Path:
+        assert self.out
+        return self.out
+
+    @property
+    def live(self) -> run_directory.LiveRun:
+        """The run as other terminals find it."""
+        return wait_for("the run", lambda: next((r for r in run_directory.live_runs() if r.pid == self.pid), None))
+
+    def nodes_started(self, *roles: str) -> None:
+        """Wait until there is a process for each role, by its command line, whatever it is doing."""
+        modules = {role: PROCESSES[role].module for role in roles or ROLES}
+
+        def look() -> bool:
+            for pid, parent, _, command in processes():
+                for role, module in modules.items():
+                    if parent == self.pid and module in command:
+                        self.nodes[role] = pid
+            return modules.keys() <= self.nodes.keys()
+
+        wait_for(f"a process for {', '.join(modules)}", look)
+
+    def ask(self, verb: str, **arguments: Any) -> dict[str, Any]:
+        """A command as from another terminal; returns the data of its answer."""
+        return control.ask(self.live, verb, **arguments)[1]
+
+    def reaches(self, tick: int) -> int:
+        """Wait until all nodes have done the ticks before ``tick``; returns how far they are."""
+
+        def look() -> int:
+            if self._process.poll() is not None:
+                raise AssertionError(f"the run has ended: {self.stderr}")
+            nodes = [node for node in self.ask("status")["nodes"] if node["role"] in PROCESSES]
+            self.nodes = {node["role"]: node["pid"] for node in nodes}
+            done = min((node["tick"] for node in nodes), default=0)
+            return done if len(nodes) == len(PROCESSES) and done >= tick else 0
+
+        return wait_for(f"tick {tick}", look)
+
+    def has_logged(self, ticks: int) -> int:
+        """Wait until so many ticks can be read from the log while the run goes on; returns how many."""
+        self.reaches(ticks)
+
+        def look() -> int:
+            log = self.log()
+            return len(log["/controller"]["x"]) if "/controller" in log else 0
+
+        return wait_for("a flushed log", lambda: found if (found := look()) >= ticks else 0)
+
+    def log(self) -> Recording:
+        """What its log holds now."""
+        return read(self.out_directory)
+
+    def stands(self) -> int:
+        """Wait until a paused run stands still, all nodes at the same tick; returns it."""
+
+        def look() -> int:
+            data = self.ask("status")
+            ticks = {node["tick"] for node in data["nodes"]}
+            return data["granted"] + 1 if data["paused"] and ticks == {data["granted"]} else 0
+
+        return wait_for("standstill", look) - 1
+
+    def send(self, role: str, number: signal.Signals) -> None:
+        """Send a node a signal."""
+        self._since = time.monotonic()
+        os.kill(self.nodes[role], number)
+
+    def leaves_nothing(self) -> None:
+        """No process of the run is left, and none of its sockets."""
+        pids = [self.pid, *self.nodes.values()]
+        wait_for("the end of all processes", lambda: not alive(pids))
+        assert list(run_directory.base_directory().iterdir()) == []

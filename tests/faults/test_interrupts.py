@@ -1,0 +1,93 @@
+"""Ctrl-C and SIGTERM: the first ends a run in order, with a summary of what ran; the second at once."""
+
+import json
+import signal
+
+import pytest
+from faults.launched import SCENE, same_bits, wait_for
+
+import haploop.logger
+from haploop.launch.replay import replay
+
+SIGNALS = (signal.SIGINT, signal.SIGTERM)
+
+
+def assert_stopped_in_order(run, summary, undisturbed):
+    """Exit status 0 is behind us; the summary covers what the log holds, to the last bit, and says why it ended."""
+    log = haploop.logger.read(run.out)
+    assert summary["ended"] == "stopped"
+    assert json.loads((run.out / "summary.json").read_text())["ticks"] == summary["ticks"]
+    assert not log.truncated
+    assert same_bits(log, undisturbed) == summary["ticks"] if summary["ticks"] else True
+    assert log["/events"][-1]["stop"] is True
+    assert log["/events"][-1]["tick"] == summary["ticks"]
+
+
+@pytest.mark.parametrize("number", SIGNALS)
+def test_the_first_signal_ends_a_run_in_order_with_a_summary_of_what_ran(number, running, undisturbed):
+    run = running()
+    done = run.reaches(200)
+    run.signal(number)
+    summary = run.summary()
+    run.leaves_nothing()
+    assert summary["ticks"] >= done
+    assert_stopped_in_order(run, summary, undisturbed)
+
+
+def test_a_run_that_a_signal_ended_can_be_replayed_bit_for_bit(running):
+    run = running()
+    run.reaches(200)
+    run.signal(signal.SIGINT)
+    run.end(0)
+    assert replay(run.out).differences == []
+
+
+def test_the_first_signal_ends_a_paused_run_where_it_stands(running, undisturbed):
+    run = running()
+    run.reaches(200)
+    run.ask("pause")
+    tick = run.stands()
+    run.signal(signal.SIGINT)
+    summary = run.summary()
+    assert summary["ticks"] == tick
+    assert_stopped_in_order(run, summary, undisturbed)
+
+
+def test_a_signal_before_the_first_tick_ends_the_run_in_order_at_tick_0(running, undisturbed):
+    run = running()
+    wait_for("the run", lambda: run.live)
+    run.nodes_started("plant")
+    run.signal(signal.SIGINT)
+    summary = run.summary()
+    run.leaves_nothing()
+    assert summary["ticks"] == 0
+    assert summary["verdict"] == "no-contact"
+    assert_stopped_in_order(run, summary, undisturbed)
+
+
+def test_the_second_signal_ends_a_run_at_once_that_the_first_cannot_end(running, undisturbed):
+    """The logger hangs and the deadline is far away, so that the order the first signal asks for never comes."""
+    run = running()
+    flushed = run.has_logged(200)
+    run.send("logger", signal.SIGSTOP)
+    run.signal(signal.SIGINT)
+    wait_for("half a second", lambda: run.stood_for(0.5))
+    assert run.ask("status")
+    run.signal(signal.SIGINT)
+    run.end(1)
+    run.leaves_nothing()
+    assert "Interrupted at once" in run.stderr
+    assert "Traceback" not in run.stderr
+    assert same_bits(haploop.logger.read(run.out), undisturbed) >= flushed
+
+
+@pytest.mark.parametrize("number", SIGNALS)
+def test_the_first_signal_ends_a_run_in_one_process_in_order_too(number, launched, tmp_path, undisturbed):
+    out = tmp_path / "out"
+    run = launched("run", str(SCENE), "--set", "duration=600", "--in-process", "--json", out=out)
+    wait_for("the log", lambda: (out / "log.mcap").exists() and haploop.logger.read(out).get("/controller"))
+    run.signal(number)
+    summary = run.summary()
+    assert 0 < summary["ticks"] < 600_000
+    assert_stopped_in_order(run, summary, undisturbed)
+    assert replay(out).differences == []

@@ -1,0 +1,200 @@
+"""A user's element that goes wrong: never silent, named with its tick, and a reload that fails leaves the old at work."""
+
+import os
+import signal
+
+import numpy as np
+import pytest
+from faults.launched import SCENES, command, wait_for
+
+import haploop.logger
+from haploop.launch import control
+from haploop.launch.replay import replay
+
+HEAD = """
+import math, os, sys
+from typing import Annotated
+from haploop.controller.dissipation import Element, Motion, Quantity
+"""
+ELEMENT = """
+class Brake(Element):
+    kind = "brake"
+    damping: Annotated[float, Quantity("N s/m", at_least=0)]
+
+    def __post_init__(self):
+        self.tick = -1
+
+    def force(self, motion):
+        self.tick += 1
+        if self.tick == 150:
+            {at_150}
+        return -self.damping * motion.v
+"""
+SOUND = ELEMENT.format(at_150="pass")
+IN_THE_CONTROLLER = "sys.argv[0].endswith(os.path.join('controller', 'node.py'))"
+
+
+@pytest.fixture
+def brake(tmp_path):
+    """Write the plugin's file; returns the arguments that run figure 6(a) with it, acting always."""
+    plugin = tmp_path / "brake.py"
+    scene = tmp_path / "scene.toml"
+    scene.write_text(
+        f'extends = "{SCENES / "fig6a.toml"}"\n[[dissipation]]\nkind = "brake"\ndamping = 0.05\nacts = "always"\n'
+    )
+
+    def write(source):
+        plugin.write_text(HEAD + source)
+        return {"scene": scene, "plugin": plugin}
+
+    return write
+
+
+def started(running, brake, source, **options):
+    made = brake(source)
+    return running("--plugin", str(made["plugin"]), scene=made["scene"], **options)
+
+
+@pytest.mark.parametrize("value", ["nan", "inf", "-inf"])
+def test_a_force_that_is_no_finite_number_fails_the_run_and_names_element_and_tick(value, running, brake):
+    run = started(running, brake, ELEMENT.format(at_150=f"return float('{value}')"))
+    run.end(1)
+    run.leaves_nothing()
+    assert f"element 0 (brake) gave {value} at tick 150" in run.stderr
+    assert "Traceback" not in run.stderr
+    log = run.log()
+    force = log["/controller"]["dissipation.0"]
+    assert np.isfinite(force[:150]).all()
+    assert str(force[150]) == value
+    assert np.isfinite(log["/plant"]["x"]).all(), "no device was ever given such a force"
+
+
+def test_a_force_that_is_no_finite_number_fails_a_run_in_one_process_too(launched, brake, tmp_path):
+    made = brake(ELEMENT.format(at_150="return math.nan"))
+    options = ("--plugin", str(made["plugin"]), "--in-process")
+    run = launched("run", str(made["scene"]), *options, out=tmp_path / "out")
+    run.end(1)
+    assert "element 0 (brake) gave nan at tick 150" in run.stderr
+    assert "Traceback" not in run.stderr
+
+
+@pytest.mark.parametrize(
+    ("statement", "reason"),
+    [("1 / 0", "ZeroDivisionError: division by zero"), ("return 'much'", "ValueError: could not convert string")],
+)
+@pytest.mark.parametrize("options", [(), ("--in-process",)])
+def test_a_force_that_raises_or_is_no_number_fails_the_run_and_names_element_and_tick(
+    statement, reason, options, launched, brake, tmp_path
+):
+    """The log holds every tick before."""
+    made = brake(ELEMENT.format(at_150=statement))
+    out = tmp_path / "out"
+    run = launched("run", str(made["scene"]), "--plugin", str(made["plugin"]), *options, out=out)
+    run.end(1)
+    assert f"Element 0 (brake) gave no force at tick 150: {reason}" in run.stderr
+    assert len(haploop.logger.read(out)["/controller"]["x"]) == 150
+
+
+def test_a_force_that_never_returns_is_named_after_the_deadline(running, brake):
+    run = started(
+        running, brake, ELEMENT.format(at_150="\n            while True: pass"), sets=("run.deadline=0.7",), pace=()
+    )
+    run.end(1)
+    run.leaves_nothing()
+    assert "The controller has not answered for 0.7 s" in run.stderr
+
+
+def test_a_force_that_never_returns_in_one_process_is_ended_by_the_second_interrupt(launched, brake, tmp_path):
+    made = brake(ELEMENT.format(at_150=f"open({str(tmp_path / 'here')!r}, 'w')\n            while True: pass"))
+    options = ("--plugin", str(made["plugin"]), "--in-process")
+    run = launched("run", str(made["scene"]), *options, out=tmp_path / "out")
+    wait_for("tick 150", (tmp_path / "here").exists)
+    run.signal(signal.SIGINT)
+    wait_for("a moment", lambda: run.stood_for(0.3))
+    run.signal(signal.SIGINT)
+    run.end(1)
+    assert "Interrupted at once" in run.stderr
+
+
+@pytest.mark.parametrize(
+    ("statement", "words"),
+    [
+        ("raise RuntimeError('not here')", "The controller failed: The plugin "),
+        ("os._exit(3)", "The controller ended with exit status 3; the last tick all nodes had done is 0 "),
+    ],
+)
+def test_a_plugin_that_fails_in_the_controllers_process_alone_ends_the_run(statement, words, running, brake):
+    run = started(running, brake, f"if {IN_THE_CONTROLLER}:\n    {statement}\n{SOUND}")
+    run.end(1)
+    run.leaves_nothing()
+    assert words in run.stderr
+    assert "Traceback" not in run.stderr
+
+
+def test_an_element_that_refuses_its_parameters_in_the_controllers_process_alone_ends_the_run(running, brake):
+    source = SOUND.replace("self.tick = -1", f"self.tick = 1 / (not {IN_THE_CONTROLLER}) - 2")
+    run = started(running, brake, source)
+    run.end(1)
+    run.leaves_nothing()
+    assert "The controller failed: The element brake cannot be made with damping = 0.05: ZeroDivisionError" in run.stderr
+
+
+def test_an_element_that_refuses_its_parameters_is_an_error_of_the_scene_and_nothing_is_started(running, brake):
+    run = started(running, brake, SOUND.replace("self.tick = -1", "raise ValueError('too little')"))
+    run.end(2)
+    assert "The element brake cannot be made with damping = 0.05: ValueError: too little" in run.stderr
+    assert not run.out.exists()
+
+
+@pytest.mark.parametrize("role", ["plant", "controller", "logger"])
+def test_a_node_whose_python_does_not_even_start_ends_the_run_and_is_named(role, running, tmp_path, monkeypatch):
+    (tmp_path / "sitecustomize.py").write_text(
+        f"import os, sys\nif 'haploop.{role}.node' in sys.orig_argv:\n    os._exit(3)\n"
+    )
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    run = running()
+    run.end(1)
+    run.leaves_nothing()
+    assert f"The {role} ended with exit status 3; the last tick all nodes had done is 0 (0 s)." in run.stderr
+
+
+BROKEN = {
+    "line 5 does not load: SyntaxError": "class Brake(Element:\n",
+    "does not load: ZeroDivisionError": "1 / 0\n",
+    "does not load: SystemExit": "sys.exit(3)\n",
+    "has no method force": SOUND.replace("def force", "def strength"),
+    "no longer defines brake": SOUND.replace('"brake"', '"break"'),
+    "cannot be made with damping = 0.05: ValueError: too little": SOUND.replace(
+        "self.tick = -1", "raise ValueError('too little')"
+    ),
+    "gain is missing": SOUND.replace("    damping:", '    gain: Annotated[float, Quantity("")]\n    damping:'),
+}
+
+
+def test_a_reload_that_fails_says_why_and_leaves_the_old_element_at_work_until_one_succeeds(running, brake):
+    run = started(running, brake, SOUND)
+    run.reaches(300)
+    run.ask("pause")
+    paused = run.stands()
+    swap = {"swap": {"kind": "brake", "damping": 0.05, "acts": "always"}, "reload": True}
+    for reason, source in BROKEN.items():
+        brake(source)
+        with pytest.raises(control.CommandRefused, match=reason):
+            run.ask("swap", **swap)
+    run.ask("step", ticks=100)
+    swapped = run.stands()
+    assert swapped == paused + 100
+    brake(SOUND.replace("-self.damping", "-3.0 * self.damping"))
+    assert command("swap", "brake", "damping=0.05", "acts=always", "--reload").returncode == 0
+    run.ask("resume")
+    run.reaches(swapped + 100)
+    end = run.ask("stop")["tick"]
+    summary = run.summary()
+    rows = run.log()["/controller"]
+    v, force = rows["v"], rows["dissipation.0"]
+    assert np.array_equal(force[:swapped], -0.05 * v[:swapped])
+    assert np.array_equal(force[swapped:], -3.0 * 0.05 * v[swapped:])
+    books = [(e["kind"], e["from_tick"], e["to_tick"]) for e in summary["energy"]["elements"]]
+    assert books == [("brake", 0, swapped), ("brake", swapped, end)]
+    os.remove(run.out.parent / "brake.py")
+    assert replay(run.out).differences == []

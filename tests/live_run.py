@@ -1,0 +1,112 @@
+"""A run as processes that goes on while a test does something to it."""
+
+from __future__ import annotations
+
+import tempfile
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from haploop.launch import control, run_directory
+from haploop.launch.in_process import run_in_process
+from haploop.launch.run_directory import LiveRun
+from haploop.launch.start import Prepared, prepare, run
+
+SCENE = Path(__file__).parents[1] / "launch" / "scenes" / "fig6c.toml"
+
+
+class Going:
+    """A run that a thread of this process leads.
+
+    Attributes:
+        prepared: what is run.
+        live: as other terminals find it.
+    """
+
+    def __init__(self, prepared: Prepared, announced: Callable[[Path], None], options: dict[str, Any]) -> None:
+        self.prepared = prepared
+        self._result: dict[str, Any] = {}
+        self._error: BaseException | None = None
+        self._announced = threading.Event()
+        self._tell = announced
+        self._thread = threading.Thread(target=self._lead, args=(options,))
+        self._thread.start()
+        assert self._announced.wait(30), "the run was never announced"
+        if self._error:
+            raise self._error
+
+    def _lead(self, options: dict[str, Any]) -> None:
+        try:
+            self._result = run(self.prepared, announced=self._note, **options)
+        except BaseException as error:
+            self._error = error
+        finally:
+            self._announced.set()
+
+    def _note(self, run_id: str) -> None:
+        self.live: LiveRun = run_directory.find(run_id)
+        self._tell(self.live.sockets)
+        self._announced.set()
+
+    @property
+    def run_json(self) -> Path:
+        return self.live.sockets / "run.json"
+
+    def ask(self, verb: str, **arguments: Any) -> tuple[str, dict[str, Any]]:
+        """A command as from another terminal."""
+        return control.ask(self.live, verb, **arguments)
+
+    def stands_at(self, tick: int) -> None:
+        """Wait until the run stands still at ``tick``, every tick before it logged."""
+        for _ in range(1500):
+            data = self.ask("status")[1]
+            if data["paused"] and data["granted"] == tick and data["tick"] == tick:
+                return
+            threading.Event().wait(0.02)
+        raise AssertionError(f"The run does not come to stand at tick {tick}: {data}")
+
+    def result(self) -> dict[str, Any]:
+        """The summary, when the run has ended."""
+        self._thread.join(60)
+        assert not self._thread.is_alive(), "the run does not end"
+        if self._error:
+            raise self._error
+        return self._result
+
+    def end(self) -> None:
+        """Leave nothing behind, however the test went."""
+        if self._thread.is_alive():
+            try:
+                self.ask("stop")
+            except (control.CommandRefused, control.RunNotFound):
+                pass
+            self._thread.join(30)
+
+
+@contextmanager
+def going(
+    tmp_path: Path,
+    *overrides: str,
+    pauses: tuple[int, ...] = (),
+    announced: Callable[[Path], None] = lambda sockets: None,
+    **options: Any,
+) -> Iterator[Going]:
+    """A run of figure 6(c) with overrides, standing still at the ticks ``pauses``."""
+    with tempfile.TemporaryDirectory(prefix="hl", dir="/tmp") as base, pytest.MonkeyPatch.context() as patch:
+        patch.setenv("XDG_RUNTIME_DIR", base)
+        prepared = prepare(SCENE, overrides, out=tmp_path / "out")
+        prepared.scene["event"] = [{"at": tick / 1000, "pause": True} for tick in pauses]
+        subject = Going(prepared, announced, options)
+        try:
+            yield subject
+        finally:
+            subject.end()
+
+
+def undisturbed(prepared: Prepared) -> dict[str, Any]:
+    """The summary of the same scene run in one process, with nobody watching."""
+    return run_in_process(prepared.scene, prepared.kinds)

@@ -1,0 +1,96 @@
+"""Runs kept whole: every state, force and controller row of a scene, beside its summary."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scene_makers import KINDS
+
+from haploop.launch.in_process import Loop, scene_events
+from haploop.logger.keeper import Keeper
+from haploop.logger.logger import Block, Logger
+from haploop.protocol.ticks import Timebase
+
+
+@dataclass
+class Captured:
+    """What a run did.
+
+    Attributes:
+        plant: x, v, force, command at every step and at the end, shape (steps + 1,).
+        controller: x, v, a, wall, total, in_contact at every tick, shape (ticks,).
+        forces: force of every element's book at every tick, 0 where it was not at work, shape (ticks,).
+        summary: the run's summary.
+    """
+
+    plant: dict[str, np.ndarray]
+    controller: dict[str, np.ndarray]
+    forces: dict[int, np.ndarray]
+    summary: dict[str, Any]
+
+    @property
+    def energy(self) -> dict[str, Any]:
+        return self.summary["energy"]
+
+    @property
+    def relative_residual(self) -> float:
+        return self.energy["residual_J"] / self.energy["moved_J"]
+
+
+class _CapturingLogger(Logger):
+    """A logger that also remembers the blocks it was given."""
+
+    def __init__(self, scene: dict[str, Any], time: Timebase) -> None:
+        super().__init__(scene, time, None)
+        self.plant_blocks: list[Block] = []
+        self.controller_blocks: list[Block] = []
+
+    def plant_block(self, block: Block) -> None:
+        self.plant_blocks.append(block)
+        super().plant_block(block)
+
+    def controller_block(self, block: Block) -> None:
+        self.controller_blocks.append(block)
+        super().controller_block(block)
+
+
+def run(scene: dict[str, Any]) -> Captured:
+    """Run a resolved scene in this process and keep everything."""
+    time = Timebase.of(scene["clock"], scene["duration"])
+    logger = _CapturingLogger(scene, time)
+    loop = Loop(scene, time, KINDS, Keeper(logger, None, None))
+    loop.schedule(sorted(scene_events(scene, time), key=lambda event: event[0]))
+    while loop.block():
+        pass
+    summary = loop.finish()
+    controller, forces = _joined_rows(logger.controller_blocks)
+    return Captured(_joined_states(logger.plant_blocks), controller, forces, summary)
+
+
+def summarise(scene: dict[str, Any]) -> dict[str, Any]:
+    """The summary of a run of a resolved scene."""
+    return run(scene).summary
+
+
+def _joined_states(blocks: list[Block]) -> dict[str, np.ndarray]:
+    """Consecutive blocks share one state; the later block knows the force that acts from it on."""
+    columns: dict[str, np.ndarray] = {}
+    for name in ("x", "v", "force", "command"):
+        pieces = [np.frombuffer(block["columns"][name]) for block in blocks]
+        columns[name] = np.concatenate([*(piece[:-1] for piece in pieces), pieces[-1][-1:]])
+    return columns
+
+
+def _joined_rows(blocks: list[Block]) -> tuple[dict[str, np.ndarray], dict[int, np.ndarray]]:
+    ticks = sum(block["ticks"] for block in blocks)
+    names = ("x", "v", "a", "wall", "total", "in_contact")
+    rows = {name: np.concatenate([np.frombuffer(b["columns"][name]) for b in blocks]) for name in names}
+    forces: dict[int, np.ndarray] = {}
+    for block in blocks:
+        covered = slice(block["from_tick"], block["from_tick"] + block["ticks"])
+        for index, element in enumerate(block["elements"]):
+            force = forces.setdefault(element["book"], np.zeros(ticks))
+            force[covered] = np.frombuffer(block["columns"][f"dissipation.{index}"])
+    return rows, forces

@@ -1,0 +1,44 @@
+"""The controller and the books along a motion that is given, as no plant is needed to ask what a spring leaks."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from scene_makers import KINDS
+
+from haploop.controller.controller import Controller
+from haploop.logger.logger import Logger
+from haploop.logger.summary import energy
+from haploop.plant.sensors import encoder
+from haploop.protocol.ticks import Timebase
+
+
+def books_along(scene: dict[str, Any], x: np.ndarray) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
+    """Have the controller of a scene see a motion, its delayed commands act on it, and the books written.
+
+    Args:
+        scene: a resolved scene; its duration is that of the motion.
+        x: position at every plant step and at the end, m.
+
+    Returns:
+        The running books at every tick by name, J, and the summary's ``energy``. What the plant's own books say has
+        no meaning here, since no plant moved so.
+    """
+    time = Timebase.of(scene["clock"], scene["duration"])
+    n, steps = time.steps_per_tick, time.ticks * time.steps_per_tick
+    assert len(x) == steps + 1
+    measure = encoder(scene.get("encoder"))
+    controller = Controller(scene, time, KINDS)
+    commands = controller.answer([(measure(float(at)),) for at in x[:-1:n]])
+    in_effect = np.maximum((np.arange(steps + 1) - time.delay_steps) // n, -1)
+    in_effect[-1] = in_effect[-2]
+    force = np.array([0.0, *commands])[in_effect + 1]
+    columns = {"x": x, "v": np.zeros_like(x), "force": force, "command": in_effect.astype(float)}
+    logger = Logger(scene, time, None)
+    logger.start({"tick": 0, "x": x[0], "v": 0.0, "force": 0.0}, [])
+    blocks = {name: np.ascontiguousarray(column).tobytes() for name, column in columns.items()}
+    logger.plant_block({"from_tick": 0, "ticks": time.ticks, "columns": blocks})
+    for block in controller.recorder.take():
+        logger.controller_block(block)
+    return logger.latest, energy(logger.books, [], "wall" in scene)

@@ -1,0 +1,55 @@
+"""How a run is cut into blocks, and whether one process or four work on it, changes no bit of it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+from physics.captured import summarise
+from physics.random_scenes import drawn
+
+from haploop.launch.scene_file import load
+from haploop.launch.start import prepare
+from haploop.launch.start import run as run_prepared
+
+SCENES = sorted((Path(__file__).parents[2] / "launch/scenes").glob("*.toml"))
+OF_THE_MACHINE = ("wall_s", "real_time_factor", "versions")
+
+
+def of_the_scene(summary: dict[str, Any]) -> dict[str, Any]:
+    """The summary but for what differs between two runs of the same scene."""
+    return {name: value for name, value in summary.items() if name not in OF_THE_MACHINE}
+
+
+def in_blocks(scene: dict[str, Any], block_ticks: int, window_blocks: int = 1) -> dict[str, Any]:
+    cut = {"block_ticks": block_ticks, "window_blocks": window_blocks}
+    return of_the_scene(summarise(scene | {"run": scene["run"] | cut}))
+
+
+@pytest.mark.parametrize("seed", [6, 11, 24, 25, 29])
+def test_blocks_and_windows_of_any_size_give_the_same_summary_of_drawn_scenes(seed):
+    scene, _ = drawn(seed)
+    usual = in_blocks(scene, 100, 4)
+    for block_ticks, window_blocks in ((1, 1), (3, 1), (7, 3), (1000, 1)):
+        assert in_blocks(scene, block_ticks, window_blocks) == usual
+
+
+@pytest.mark.parametrize("path", SCENES, ids=lambda path: path.stem)
+@pytest.mark.parametrize("delay", [13, *(pytest.param(d, marks=pytest.mark.slow) for d in (0, 3, 10, 20, 50))])
+def test_blocks_of_any_size_give_the_same_summary_of_every_shipped_scene(path, delay):
+    scene = load(path, [f"clock.round_trip_delay={delay / 10_000}"])
+    usual = in_blocks(scene, 100)
+    for block_ticks in (1, 7, 1000):
+        assert in_blocks(scene, block_ticks) == usual
+
+
+@pytest.mark.parametrize("delay", [13, *(pytest.param(d, marks=pytest.mark.slow) for d in (0, 3, 10, 20, 50))])
+def test_processes_with_small_blocks_and_the_least_window_give_the_bits_of_one_process(delay, tmp_path):
+    """A swap in mid-contact, half a second after it, with commands in flight."""
+    summaries = []
+    for name, cut in (("one", []), ("many", ["run.block_ticks=7", "run.window_blocks=1", "run.log=none"])):
+        overrides = [f"clock.round_trip_delay={delay / 10_000}", "duration=1.8", *cut]
+        prepared = prepare(SCENES[0].with_name("swap.toml"), overrides, out=tmp_path / name)
+        summaries.append(of_the_scene(run_prepared(prepared, in_process=name == "one")))
+    assert summaries[0] == summaries[1]

@@ -1,0 +1,317 @@
+"""The pure clock: how far it grants, and at which tick a change takes effect. Time is a number the tests give."""
+
+import math
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scene_makers import KINDS, WALL, scene
+
+from haploop.launch.clock import AHEAD_S, Clock, ClockError
+from haploop.launch.mistakes import SceneError
+from haploop.protocol.ticks import Timebase
+
+DAMPING = {"kind": "damping", "damping": 0.5}
+SWAP = {"swap": DAMPING, "element": 0}
+TICKS, WINDOW = 1000, 400
+WINDOW_OF_400 = {"block_ticks": 100, "window_blocks": 4}
+
+
+def clock(pace: float = math.inf, run: dict[str, Any] | None = None, **tables: Any) -> Clock:
+    """The clock of a run of 1000 ticks that grants 400 beyond the slowest node."""
+    resolved = scene(wall=WALL, dissipation=[DAMPING], run=run or WINDOW_OF_400, **tables)
+    return Clock(resolved, Timebase.of(resolved["clock"], resolved["duration"]), KINDS, pace)
+
+
+def granted(subject: Clock, slowest: int = TICKS, now: float = 0.0) -> int:
+    return subject.grant(slowest, now)
+
+
+def sent(subject: Clock) -> list[tuple[int, str]]:
+    """The events that go out now, by what they do."""
+    verbs = ("swap", "set", "pause", "resume", "stop", "refused")
+    return [(tick, next(verb for verb in verbs if verb in event)) for tick, event in subject.take_events()]
+
+
+# How far
+
+
+def test_the_grant_stays_within_the_window_beyond_the_slowest_node_and_ends_with_the_run() -> None:
+    subject = clock()
+    assert [granted(subject, slowest) for slowest in (0, 0, 1, 250, 599, 600, 700)] == [400, 400, 401, 650, 999, 1000, 1000]
+    assert subject.is_last
+
+
+def test_the_window_is_that_of_the_scene() -> None:
+    assert granted(clock(run={"block_ticks": 7, "window_blocks": 3}), 0) == 21
+
+
+COMMANDS = st.one_of(
+    st.tuples(st.just("done"), st.integers(0, TICKS)),
+    st.tuples(st.just("pause"), st.none()),
+    st.tuples(st.just("resume"), st.none()),
+    st.tuples(st.just("step"), st.integers(1, 50)),
+    st.tuples(st.just("swap"), st.one_of(st.none(), st.floats(0, 1.1))),
+    st.tuples(st.just("stop"), st.none()),
+    st.tuples(st.just("ended"), st.integers(0, TICKS)),
+)
+
+
+@given(
+    doings=st.lists(st.tuples(COMMANDS, st.floats(0, 0.3)), max_size=40),
+    pace=st.sampled_from([0.3, 2.0, math.inf]),
+    pauses=st.sets(st.integers(0, TICKS - 1), max_size=3),
+)
+def test_whatever_is_asked_the_grant_is_monotone_bounded_and_no_event_comes_late_or_twice(
+    doings: list[tuple[tuple[str, Any], float]], pace: float, pauses: set[int]
+) -> None:
+    subject = clock(pace, event=[{"at": tick / 1000, "pause": True} for tick in sorted(pauses)])
+    slowest, now, before = 0, 10.0, 0
+    changes: list[int] = []
+    taken: list[tuple[int, dict[str, Any]]] = []
+    for (verb, argument), passed in doings:
+        now += passed
+        stood, stood_at = subject.paused, subject.until
+        match verb:
+            case "done":
+                slowest = max(slowest, min(argument, subject.until))
+            case "pause":
+                assert subject.pause() == stood_at
+            case "resume":
+                subject.resume(now)
+            case "step":
+                assert subject.step(argument, now) <= subject.end
+            case "stop":
+                assert subject.stop() == subject.end <= subject.until
+            case "ended":
+                subject.end_at(min(argument, subject.until))
+            case "swap":
+                try:
+                    changes.append(subject.change(SWAP, argument))
+                    assert stood_at <= changes[-1] < subject.end
+                except (ClockError, SceneError):
+                    pass
+        until = subject.grant(slowest, now)
+        assert before <= until <= min(slowest + WINDOW, TICKS)
+        if stood and verb not in ("resume", "step", "stop") and subject.paused and subject._step_target is None:
+            assert until == before
+        due = subject.take_events()
+        assert all(before <= tick <= until for tick, _ in due), "an event came after its tick, or too early"
+        taken += due
+        before = until
+    assert [tick for tick, _ in taken] == sorted(tick for tick, _ in taken)
+    swaps = [tick for tick, event in taken if "swap" in event]
+    assert swaps == sorted(tick for tick in changes if tick <= before)
+
+
+# At which tick
+
+
+def test_a_change_without_a_time_takes_effect_at_the_first_tick_not_granted() -> None:
+    subject = clock()
+    granted(subject, 0)
+    assert subject.change(SWAP) == 400
+    assert sent(subject) == [(400, "swap")]
+
+
+def test_a_change_with_a_time_takes_effect_at_the_first_tick_at_or_after_it() -> None:
+    subject = clock()
+    assert [subject.change(SWAP, at) for at in (0.5, 0.5001, 0.5009999, 0.501)] == [500, 501, 501, 501]
+
+
+def test_events_go_out_in_order_of_their_ticks_with_the_grant_that_covers_them() -> None:
+    subject = clock(event=[{"at": 0.45, "swap": DAMPING}, {"at": 0.1, "set": {"wall.stiffness": 200.0}}])
+    subject.change(SWAP, 0.3)
+    granted(subject, 0)
+    assert sent(subject) == [(100, "set"), (300, "swap")]
+    granted(subject, 49)
+    assert sent(subject) == []
+    granted(subject, 50)  # before tick 450 may be worked on, its event is there
+    assert sent(subject) == [(450, "swap")]
+
+
+def test_a_node_that_joins_late_gets_the_events_from_its_first_tick_on_that_others_have_had() -> None:
+    subject = clock(event=[{"at": at, "swap": DAMPING} for at in (0.1, 0.3, 0.39, 0.7)])
+    granted(subject, 0)
+    assert [tick for tick, _ in subject.take_events()] == [100, 300, 390]
+    assert [tick for tick, _ in subject.events_from(300)] == [300, 390]
+
+
+@pytest.mark.parametrize(
+    ("at", "says"), [(0.399, r"past.*0\.4 s"), (0.0, "past"), (1.0, "ends at tick 1000"), (5.0, "ends at tick 1000")]
+)
+def test_a_change_in_the_past_or_after_the_end_is_refused_and_leaves_no_trace(at: float, says: str) -> None:
+    subject = clock()
+    granted(subject, 0)
+    with pytest.raises(ClockError, match=says):
+        subject.change(SWAP, at)
+    assert subject.events == []
+
+
+@pytest.mark.parametrize("at", [math.inf, -math.inf, math.nan])
+def test_a_time_that_is_no_number_is_refused(at: float) -> None:
+    subject = clock()
+    with pytest.raises((ValueError, OverflowError)):
+        subject.change(SWAP, at)
+    assert subject.events == []
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"swap": {"kind": "dampling"}},
+        {"swap": {"kind": "damping", "damping": -1.0}},
+        {"swap": DAMPING, "element": 2},
+        {"swap": None},
+        {"set": {"wall.hardness": 1.0}},
+        {"set": None},
+        {"swap": DAMPING, "set": {"wall.stiffness": 1.0}},
+        {},
+    ],
+)
+def test_a_change_that_does_not_fit_is_refused_and_does_not_stand_in_the_way_of_the_next(change: dict[str, Any]) -> None:
+    subject = clock()
+    with pytest.raises(SceneError):
+        subject.change(change)
+    assert subject.events == []
+    assert subject.change(SWAP) == 0
+
+
+def test_a_change_must_fit_the_changes_before_it() -> None:
+    subject = clock()
+    subject.change({"swap": {"kind": "none"}, "element": 0})
+    with pytest.raises(SceneError):
+        subject.change({"set": {"dissipation.0.damping": 0.1}})
+
+
+def test_what_is_put_on_record_keeps_its_place_among_the_events() -> None:
+    subject = clock(event=[{"at": 0.4, "swap": DAMPING}, {"at": 0.2, "swap": DAMPING}])
+    granted(subject, 0)
+    assert sent(subject) == [(200, "swap"), (400, "swap")]
+    subject.change(SWAP, 0.6)
+    assert subject.note({"refused": "why"}) == 400
+    assert sent(subject) == [(400, "refused")]
+    granted(subject, 600)
+    assert sent(subject) == [(600, "swap")]
+
+
+# Standing still and ending
+
+
+def test_a_pause_stands_at_what_is_granted_until_resumed() -> None:
+    subject = clock()
+    granted(subject, 0)
+    assert subject.pause() == 400
+    assert granted(subject, 400) == 400
+    assert subject.resume(0.0) == 400
+    assert granted(subject, 400) == 800
+
+
+def test_a_pause_of_the_scene_stands_at_its_tick_once() -> None:
+    subject = clock(event=[{"at": 0.25, "pause": True}])
+    assert [granted(subject), granted(subject)] == [250, 250]
+    assert subject.paused
+    subject.resume(0.0)
+    assert granted(subject) == 1000
+
+
+def test_a_pause_at_the_first_tick_holds_the_run_before_it_begins() -> None:
+    subject = clock(event=[{"at": 0.0, "pause": True}])
+    assert granted(subject, 0) == 0
+    assert subject.paused
+
+
+def test_a_step_goes_on_from_where_the_last_step_leads_and_stands_there() -> None:
+    subject = clock()
+    granted(subject, 0)
+    subject.pause()
+    assert subject.step(3, 0.0) == 403
+    assert subject.step(2, 0.0) == 405
+    assert [granted(subject), granted(subject)] == [405, 405]
+    assert subject.paused
+
+
+def test_a_step_also_keeps_within_the_window_and_the_end() -> None:
+    subject = clock()
+    subject.pause()
+    assert subject.step(5000, 0.0) == 1000
+    assert granted(subject, 0) == 400
+
+
+def test_a_pause_that_was_stepped_over_does_not_stop_the_run_a_second_time() -> None:
+    subject = clock(event=[{"at": 0.1, "pause": True}, {"at": 0.6, "pause": True}])
+    assert granted(subject) == 100
+    granted(subject)
+    subject.step(50, 0.0)
+    assert granted(subject) == 150
+    subject.pause()
+    subject.step(500, 0.0)
+    assert granted(subject) == 650
+    subject.resume(0.0)
+    assert granted(subject) == 1000
+
+
+def test_a_stop_ends_the_run_at_what_is_granted_even_while_it_stands() -> None:
+    subject = clock()
+    granted(subject, 0)
+    subject.pause()
+    assert subject.stop() == 400
+    assert granted(subject, 400) == 400
+    assert subject.is_last
+
+
+def test_a_stop_of_the_scene_ends_the_run_at_its_tick() -> None:
+    subject = clock(event=[{"at": 0.3, "stop": True}])
+    assert granted(subject) == 300
+    assert subject.is_last
+    assert sent(subject) == [(300, "stop")]
+
+
+def test_after_a_stop_what_lies_behind_it_never_happens() -> None:
+    subject = clock(event=[{"at": 0.9, "swap": DAMPING}])
+    granted(subject, 0)
+    subject.stop()
+    subject.note({"stop": True})
+    assert granted(subject, 1000) == 400
+    assert sent(subject) == [(400, "stop")]
+
+
+def test_the_plant_may_end_the_run_early() -> None:
+    subject = clock()
+    granted(subject, 0)
+    subject.end_at(123)
+    assert granted(subject, 123) == 400
+    assert subject.is_last
+
+
+# Pace
+
+
+@given(start=st.floats(0, 1e7), pace=st.sampled_from([0.1, 1.0, 3.0]))
+def test_at_a_pace_time_is_granted_no_faster_than_that_from_the_first_grant_on(start: float, pace: float) -> None:
+    subject = clock(pace)
+    ahead = AHEAD_S * min(pace, 1.0)
+    for passed in (0.0, 0.01, 0.1, 0.2):
+        allowed = (passed * pace + ahead) * 1000
+        until = granted(subject, now=start + passed)
+        assert max(1, allowed - 1) <= until + 1e-3 * pace
+        assert until <= allowed + 1
+
+
+def test_what_was_waited_is_not_made_up_for() -> None:
+    subject = clock(1.0)
+    assert granted(subject, now=100.0) == 20
+    subject.pause()
+    assert granted(subject, now=200.0) == 20
+    subject.resume(200.0)
+    assert granted(subject, now=200.0) == 40
+    assert granted(subject, now=200.1001) == 140
+
+
+def test_only_a_pace_makes_the_clock_look_at_the_time() -> None:
+    assert clock().wait_s(0.0) is None
+    paced = clock(1.0)
+    assert (paced.wait_s(0.0) or 0.0) > 0.0
+    paced.pause()
+    assert paced.wait_s(0.0) is None

@@ -1,0 +1,176 @@
+"""What the terminal shows of a run holds its numbers, in units, at any width."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+from typing import Annotated, Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from rich.console import Console
+
+from haploop.controller.dissipation import Element, Motion, registry
+from haploop.launch.start import prepare, run
+from haploop.protocol.quantity import Quantity
+from haploop.tools.amounts import amount, fixed
+from haploop.tools.report import PrintedLine, ProgressLine, plugins_table, status_table, summary_table
+
+SCENES = Path(__file__).parents[1] / "launch/scenes"
+STATUS = {"t_s": 1.25, "verdict": "limit-cycle", "oscillation_m": 1.23e-3, "residual_J": 3e-18}
+
+
+@pytest.fixture(scope="module")
+def swap(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+    return run(prepare(SCENES / "swap.toml", out=tmp_path_factory.mktemp("run") / "swap"), in_process=True)
+
+
+def shown(renderable: Any, width: int = 100) -> str:
+    terminal = Console(width=width, file=io.StringIO(), highlight=False)
+    terminal.print(renderable)
+    return terminal.file.getvalue()  # pyright: ignore[reportAttributeAccessIssue]
+
+
+def row(text: str, begins: str) -> list[str]:
+    """The cells of the line that begins with some words."""
+    (line,) = [line for line in text.splitlines() if line.strip().startswith(begins)]
+    return [cell.strip() for cell in line.strip().removeprefix(begins).split("  ") if cell.strip()]
+
+
+@pytest.mark.parametrize("width", [80, 100, 140])
+def test_the_summary_table_holds_every_book_and_the_residual(swap: dict[str, Any], width: int) -> None:
+    text, energy = shown(summary_table(swap), width), swap["energy"]
+    damping, inertia = energy["elements"]
+    assert row(text, "wall") == [amount(energy["wall"][side], "J") for side in ("true_J", "sampled_J")]
+    books = [amount(damping["true_J"], "J"), amount(damping["sampled_J"], "J")]
+    assert row(text, "damping (damping 0.8)") == ["0–1.5 s", *books]
+    books = [amount(inertia["true_J"], "J"), amount(inertia["sampled_J"], "J")]
+    assert row(text, "unidirectional-inertia (mass 0.01)") == ["1.5–3 s", *books]
+    assert row(text, "leak by delay") == [amount(energy["wall"]["leak"]["delay_J"], "J")]
+    assert row(text, "work of the hand") == [amount(energy["hand_work_J"], "J")]
+    assert row(text, "heat in the device") == [amount(energy["device_heat_J"], "J")]
+    share = f"residual, {energy['residual_J'] / energy['moved_J']:.1e} of what moved"
+    assert row(text, share) == [amount(energy["residual_J"], "J")]
+    assert max(map(len, text.splitlines())) <= width
+
+
+def test_the_summary_table_begins_with_the_verdict_and_what_was_seen(swap: dict[str, Any]) -> None:
+    first, second = shown(summary_table(swap), 200).splitlines()[:2]
+    assert first.split() == [swap["verdict"], *swap["title"].split()]
+    assert swap["verdict_rule"].startswith(second.strip().rstrip("."))
+
+
+def test_a_scene_without_wall_or_hand_shows_no_wall_and_an_early_end_is_said(tmp_path: Path) -> None:
+    scene = tmp_path / "scene.toml"
+    scene.write_text("duration = 0.1\n[device]\nmass = 0.1\ndamping = 0.5\n", encoding="utf-8")
+    summary = run(prepare(scene, out=tmp_path / "run"), in_process=True)
+    text = shown(summary_table(summary))
+    assert text.startswith("no-contact")
+    assert "leak" not in text
+    assert "heat in the hand" not in text or "0 J" in text
+    assert "ended early" not in text
+    assert "ended early: stopped" in shown(summary_table({**summary, "ended": "stopped"}))
+
+
+def test_a_number_that_the_summary_does_not_have_is_a_dash(swap: dict[str, Any]) -> None:
+    energy = {**swap["energy"], "residual_J": None, "hand_work_J": None}
+    assert row(shown(summary_table({**swap, "energy": energy})), "work of the hand") == ["–"]
+
+
+def test_lost_commands_are_told_and_only_then(swap: dict[str, Any]) -> None:
+    lost = {"commands_dropped": 0, "commands_lost": 7, "telemetry_gaps": 0}
+    assert "7 commands lost" in shown(summary_table({**swap, "lost": lost}))
+    assert "lost" not in shown(summary_table(swap))
+
+
+def test_the_progress_line_is_silent_without_a_terminal(capsys: pytest.CaptureFixture[str]) -> None:
+    with ProgressLine("title", 3.0) as line:
+        line.update(STATUS)
+        line.update({})
+    assert capsys.readouterr() == ("", "")
+
+
+def test_the_progress_line_shows_time_verdict_oscillation_and_residual_on_a_terminal() -> None:
+    screen = io.StringIO()
+    with ProgressLine("title", 3.0, Console(file=screen, force_terminal=True, width=100)) as line:
+        line.announce("a1b2c3")
+        line.update({})
+        line.update(STATUS)
+    for words in ("a1b2c3", "1.25/3 s", "limit-cycle", "1.23 mm", "residual 3e-18 J"):
+        assert words in screen.getvalue()
+
+
+@pytest.mark.parametrize("width", [40, 80, 100])
+def test_the_progress_line_keeps_to_one_line(width: int) -> None:
+    line = ProgressLine("title", 1e4)
+    line.announce("a1b2c3")
+    text = line.line({**STATUS, "t_s": 9999.0}, 123.4, 100, width)
+    assert text.cell_len <= width
+    assert "\n" not in text.plain
+
+
+def test_the_bar_fills_with_the_share_of_the_run_that_is_done() -> None:
+    line = ProgressLine("title", 2.0)
+    bars = [line.line({**STATUS, "t_s": t}, 0.0, 0, 100).plain for t in (0.0, 1.0, 2.0)]
+    assert [bar.count("━") for bar in bars] == [0, 12, 24]
+
+
+def test_the_printed_line_prints_into_a_pipe_and_tells_what_it_skipped(capsys: pytest.CaptureFixture[str]) -> None:
+    with PrintedLine("title", 3.0) as line:
+        line.show(STATUS, skipped_ticks=400)
+    out, err = capsys.readouterr()
+    assert "1.25/3 s" in out
+    assert "skipped 400 ticks" in out
+    assert (out.count("\n"), err) == (1, "")
+
+
+def test_the_status_table_tells_who_is_behind_and_waits() -> None:
+    node = {"pid": 11, "tick": 1210, "behind_ticks": 0, "waits_for": "", "lossless": True}
+    logger = {**node, "role": "logger", "tick": 1200, "behind_ticks": 10, "waits_for": "plant"}
+    data = {
+        "run": "a1b2c3", "title": "a tap", "tick": 1200, "end": 3000, "control_rate": 1000, "paused": True,
+        "nodes": [{**node, "role": "plant"}, logger],
+        "status": STATUS,
+    }  # fmt: skip
+    text = shown(status_table(data), 80)
+    assert "paused  1.2 s of 3 s, tick 1200 of 3000, limit-cycle so far" in text
+    assert row(text, "plant") == ["11", "1210", "0", "–"]
+    assert row(text, "logger") == ["11", "1200", "10", "plant"]
+    assert "paused" not in shown(status_table({**data, "paused": False, "status": {}}))
+
+
+def test_the_plugins_table_tells_kind_meaning_unit_bounds_and_default() -> None:
+    class Glue(Element):
+        """Sticks to what it touches.
+
+        A second paragraph.
+        """
+
+        kind = "glue"
+        grip: Annotated[float, Quantity("N", above=0, at_most=5)] = 2.5
+
+        def force(self, motion: Motion) -> float:
+            return -self.grip * motion.v
+
+    text = shown(plugins_table({"glue": Glue}), 120)
+    assert row(text, "glue") == ["Sticks to what it touches.", "grip (N), above 0, at most 5, default 2.5"]
+    assert "second" not in text
+    listed = shown(plugins_table(registry()), 100)
+    assert all(kind in listed for kind in registry())
+
+
+@given(st.floats(min_value=1e-9, max_value=9e5) | st.floats(min_value=-9e5, max_value=-1e-9))
+def test_an_amount_means_the_number_it_was_made_of(value: float) -> None:
+    """Read back, it differs by half of its last digit at most."""
+    number, unit = amount(value, "J").replace("−", "-").split()
+    factor = {"kJ": 1e3, "J": 1.0, "mJ": 1e-3, "µJ": 1e-6, "nJ": 1e-9}[unit]
+    assert float(number) * factor == pytest.approx(value, rel=0.00501)
+
+
+def test_amounts_that_no_prefix_suits_or_that_are_none() -> None:
+    assert amount(2.75e-18, "J") == "2.75e−18 J"
+    assert amount(0.0, "J") == "0 J"
+    assert amount(None, "J") == "–"
+    assert amount(float("inf"), "J") == "inf J"
+    assert [fixed(value) for value in (12345.6, 1.0, -0.5, 0.0)] == ["12346", "1.00", "−0.500", "0"]

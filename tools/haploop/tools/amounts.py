@@ -1,0 +1,54 @@
+"""Numbers as people read them: with a prefix that suits their size, and their unit."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+
+PREFIXES = {1e3: "k", 1.0: "", 1e-3: "m", 1e-6: "µ", 1e-9: "n"}
+
+
+def prefix_for(values: Iterable[float]) -> tuple[float, str]:
+    """The factor and letter that suit the largest of some values: 1 <= |largest| / factor < 1000 where possible."""
+    largest = max((abs(value) for value in values if math.isfinite(value)), default=0.0)
+    if largest == 0.0:
+        return 1.0, ""
+    # 999.6 m would be rounded up to 1000 m.
+    factor = next((factor for factor in PREFIXES if largest >= factor * 0.9995), 1e-9)
+    return factor, PREFIXES[factor]
+
+
+def amount(value: float | None, unit: str, digits: int = 3) -> str:
+    """A number with its unit: ``"5.14 mm"``; a dash for no number, powers of ten where no prefix helps."""
+    if value is None or math.isnan(value):
+        return "–"
+    if not math.isfinite(value):
+        return f"{value} {unit}"
+    factor, letter = prefix_for([value])
+    if value and not 1e-3 <= abs(value) / factor < 1e5:
+        return f"{value:.{digits - 1}e} {unit}".replace("-", "−")
+    return f"{fixed(value / factor, digits)} {letter}{unit}"
+
+
+def fixed(value: float, digits: int = 3) -> str:
+    """``digits`` significant digits without powers of ten; digits before the point are never rounded away."""
+    if value == 0.0 or not math.isfinite(value):
+        return f"{value:g}".replace("-0", "0")
+    before_point = math.floor(math.log10(abs(value))) + 1
+    text = f"{value:.{max(0, digits - before_point)}f}"
+    return text.replace("-", "−")
+
+
+def spring(stiffness_N_m: float | None) -> str:
+    """A stiffness; kept in N/m, as scene files have it."""
+    if stiffness_N_m is None:
+        return "–"
+    if abs(stiffness_N_m) >= 1e7:
+        return f"{stiffness_N_m:.2e} N/m"
+    return f"{fixed(stiffness_N_m)} N/m"
+
+
+def parameters(table: dict[str, object]) -> str:
+    """An element's parameters in short: ``"mass 0.01, always"``; acting in contact goes without saying."""
+    words = [f"{name} {value:g}" for name, value in table.items() if isinstance(value, int | float)]
+    return ", ".join(words + (["always"] if table.get("acts") == "always" else []))

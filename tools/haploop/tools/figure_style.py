@@ -1,0 +1,64 @@
+"""Colours that the colour-blind tell apart (Okabe and Ito 2008), and axes without clutter."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+INK, GREY, FAINT = "#222222", "#666666", "#BBBBBB"
+WALL, WALL_FILL, CLOSE = "#0072B2", "#D6E6F2", "#EBD9A8"
+ELEMENTS = ("#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#8C564B")
+PRESSING, RELEASING, EARLY = "#332288", "#DDAA33", "#C8C8C8"
+VERDICTS = {"steady": "#007A5A", "limit-cycle": "#B35900", "diverged": "#8B1A1A", "no-contact": "#555555"}
+TEXT, SMALL, LARGE = 9.0, 8.0, 15.0
+# What fits into a legend beside the title, and what the handle of an entry takes of it.
+_ROOM_LETTERS, _HANDLE_LETTERS = 76, 9
+
+
+def element_colour(number: int) -> str:
+    """The colour of the element with this number, by the order of their books."""
+    return ELEMENTS[number % len(ELEMENTS)]
+
+
+def dress(ax: Axes, title: str, x_label: str, y_label: str) -> None:
+    """Title to the left, labels with units, a light grid, no box."""
+    ax.set_title(title, loc="left", fontsize=TEXT + 1, fontweight="bold", color=INK)
+    ax.set_xlabel(x_label, fontsize=TEXT, color=INK)
+    ax.set_ylabel(y_label, fontsize=TEXT, color=INK)
+    ax.tick_params(labelsize=SMALL, colors=GREY, labelcolor=INK)
+    ax.grid(color="#E6E6E6", linewidth=0.6)
+    ax.set_axisbelow(True)
+    ax.ticklabel_format(useOffset=False)
+    for side in ("top", "right"):
+        ax.spines[side].set_visible(False)
+    for side in ("left", "bottom"):
+        ax.spines[side].set_color(FAINT)
+
+
+def few_ticks(ax: Axes) -> None:
+    """So few numbers below the axes that long ones have room in a narrow panel."""
+    ax.locator_params(axis="x", nbins=5)
+
+
+def legend(ax: Axes, only: tuple[str, ...] = (), **where: Any) -> None:
+    """A small legend above the axes' right end, where no line can run through it, or where told to.
+
+    Entries that do not fit beside the title are left out; the colours are explained beside the books, too.
+    """
+    named = [(handle, label) for handle, label in zip(*ax.get_legend_handles_labels(), strict=True)]
+    named = [(handle, label) for handle, label in named if label in only or not only]
+    while not where and sum(len(label) + _HANDLE_LETTERS for _, label in named) > _ROOM_LETTERS:
+        named = named[:-1]
+    if named:
+        handles, labels = zip(*named, strict=True)
+        place = {"loc": "lower right", "bbox_to_anchor": (1.0, 1.0), "ncols": len(named), "frameon": False} | where
+        look = {"fontsize": SMALL, "borderaxespad": 0.2, "handlelength": 1.6, "columnspacing": 1.0}
+        ax.legend(handles, labels, **look, **place)
+
+
+def corner_legend(ax: Axes) -> None:
+    """A legend in the upper left corner, which loops of springs and inertias leave free."""
+    few_ticks(ax)
+    legend(ax, loc="upper left", bbox_to_anchor=(0.0, 1.0), ncols=1, framealpha=0.8, edgecolor="none")

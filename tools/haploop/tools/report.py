@@ -1,0 +1,203 @@
+"""What the terminal shows: the books at the end of a run, the state of live runs, the kinds of element."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import TYPE_CHECKING, Any
+
+from haploop.tools.amounts import amount, fixed, parameters, spring
+from haploop.tools.progress import PrintedLine, ProgressLine
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from rich.console import Console, RenderableType
+    from rich.table import Table
+
+    from haploop.controller.dissipation import Element
+    from haploop.protocol.quantity import Quantity
+
+__all__ = [
+    "PrintedLine",
+    "ProgressLine",
+    "console",
+    "plugins_table",
+    "print_summary",
+    "status_table",
+    "summary_table",
+]
+
+VERDICT_STYLES = {"steady": "bold green", "limit-cycle": "bold yellow", "diverged": "bold red", "no-contact": "bold"}
+# The causes of a wall's leak, as the summary names them and as people do.
+LEAKS = {"sampling_and_hold_J": "sampling and hold", "quantisation_J": "quantisation", "delay_J": "delay"}
+
+
+def console(stderr: bool = False) -> Console:
+    """A terminal, or a pipe: then without colours, and as wide as the lines are."""
+    from rich.console import Console
+
+    made = Console(stderr=stderr, highlight=False)
+    if not made.is_terminal:
+        made.width = 100
+    return made
+
+
+def print_summary(summary: dict[str, Any]) -> None:
+    """Show what came of a run, on stderr."""
+    console(stderr=True).print(summary_table(summary))
+
+
+def summary_table(summary: dict[str, Any]) -> RenderableType:
+    """Verdict, key numbers and every book of a run, from its summary."""
+    from rich.console import Group
+    from rich.text import Text
+
+    word = summary["verdict"]
+    head = Text.assemble((word, VERDICT_STYLES.get(word, "bold")), "  ", (summary["title"], "bold"))
+    parts: list[RenderableType] = [head, Text(_rule_in_short(summary["verdict_rule"]), style="dim")]
+    if summary["ended"] not in ("done", "diverged"):
+        parts.append(Text(f"ended early: {summary['ended']}", style="bold red"))
+    return Group(*parts, _grid(_key_figures(summary)), _books(summary["energy"], _control_rate(summary)))
+
+
+def _rule_in_short(rule: str) -> str:
+    """What was seen, without the limits it was held against."""
+    seen = rule.partition("; ")[0].rstrip(".")
+    return f"{seen[:1].upper()}{seen[1:]}."
+
+
+def _control_rate(summary: dict[str, Any]) -> float:
+    return summary["ticks"] / summary["duration_s"] if summary["duration_s"] else 1.0
+
+
+def _key_figures(summary: dict[str, Any]) -> list[tuple[str, str]]:
+    window, lost = summary["window"], summary["lost"]
+    ran = f"{summary['duration_s']:g} s, {summary['ticks']} ticks"
+    if summary["wall_s"]:
+        ran += f", in {amount(summary['wall_s'], 's')} ({fixed(summary['real_time_factor'])} times real time)"
+    figures = [("ran", ran), ("oscillation", f"{amount(window['oscillation_m'], 'm')} peak to peak")]
+    if window["penetration_mean_m"] is not None:
+        depth = f"{amount(window['penetration_mean_m'], 'm')} on average"
+        outside = 100 * window["outside_fraction"]
+        figures.append(("penetration", depth + (f", outside the wall {outside:.0f} % of the time" if outside else "")))
+    if window["displayed_stiffness_N_m"] is not None:
+        figures.append(("displayed stiffness", spring(window["displayed_stiffness_N_m"])))
+    if any(lost.values()):
+        figures.append(("lost", ", ".join(f"{n} {what.replace('_', ' ')}" for what, n in lost.items() if n)))
+    return figures
+
+
+def _grid(rows: list[tuple[str, str]]) -> Table:
+    from rich.table import Table
+
+    grid = Table.grid(padding=(0, 2))
+    grid.add_column(style="dim", no_wrap=True)
+    grid.add_column()
+    for row in rows:
+        grid.add_row(*row)
+    return grid
+
+
+def _books(energy: dict[str, Any], control_rate: float) -> Table:
+    """The energy books: wall with its leak, elements, then what the plant moved."""
+    from rich import box
+    from rich.table import Table
+
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 1))
+    table.add_column("energy taken out of the device by")
+    for name in ("at work", "true", "sampled"):
+        table.add_column(name, justify="right", no_wrap=True)
+    for row in _virtual_rows(energy, control_rate):
+        table.add_row(*row)
+    table.add_section()
+    table.add_row("energy in the plant", "", "", "", style="bold")
+    for name, value in _plant_rows(energy):
+        table.add_row(name, "", value, "")
+    return table
+
+
+def _virtual_rows(energy: dict[str, Any], control_rate: float) -> list[tuple[str, str, str, str]]:
+    wall, rows = energy["wall"], []
+    if "leak" in wall:
+        rows.append(("wall", "", amount(wall["true_J"], "J"), amount(wall["sampled_J"], "J")))
+        rows += [(f"  leak by {words}", "", amount(wall["leak"][key], "J"), "") for key, words in LEAKS.items()]
+        rows.append(("  held by an ideal spring", "", amount(_rounded(wall["ideal_J"], wall["true_J"]), "J"), ""))
+    for element in energy["elements"]:
+        values = parameters(element["parameters"])
+        ticks = f"{element['from_tick'] / control_rate:g}–{element['to_tick'] / control_rate:g} s"
+        name = element["kind"] + (f" ({values})" if values else "")
+        rows.append((name, ticks, amount(element["true_J"], "J"), amount(element["sampled_J"], "J")))
+    return rows
+
+
+def _plant_rows(energy: dict[str, Any]) -> list[tuple[str, str]]:
+    rows = [("work of the hand", amount(energy["hand_work_J"], "J"))]
+    for key in energy:
+        if key.endswith("_heat_J"):
+            rows.append((f"heat in the {key.removesuffix('_heat_J')}", amount(energy[key], "J")))
+    rows.append(("stored at the end", amount(energy["stored_J"], "J")))
+    residual, moved = energy["residual_J"], energy["moved_J"]
+    share = f", {residual / moved:.1e} of what moved" if residual is not None and moved else ""
+    return [*rows, ("moved in total", amount(moved, "J")), (f"residual{share}", amount(residual, "J"))]
+
+
+def _rounded(value: float | None, beside: float | None) -> float | None:
+    """Zero for what is only the rounding of a much larger number."""
+    return 0.0 if value is not None and beside is not None and abs(value) < 1e-9 * abs(beside) else value
+
+
+def status_table(data: dict[str, Any]) -> RenderableType:
+    """One live run: how far it is, how it looks, and who waits for whom."""
+    from rich.console import Group
+    from rich.text import Text
+
+    rate = data["control_rate"]
+    state = ("paused", "bold yellow") if data["paused"] else ("running", "bold green")
+    where = f"  {data['tick'] / rate:g} s of {data['end'] / rate:g} s, tick {data['tick']} of {data['end']}"
+    head = Text.assemble((data.get("run", ""), "bold"), "  " if data.get("run") else "", data["title"])
+    status = data.get("status") or {}
+    looks = f", {status['verdict']} so far, oscillation {amount(status['oscillation_m'], 'm')}" if status else ""
+    return Group(head, Text.assemble(state, where, looks), _nodes(data["nodes"]))
+
+
+def _nodes(nodes: list[dict[str, Any]]) -> Table:
+    from rich import box
+    from rich.table import Table
+
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+    table.add_column("node")
+    for name in ("pid", "tick", "ticks behind"):
+        table.add_column(name, justify="right")
+    table.add_column("waits for")
+    for node in nodes:
+        role = node["role"] + ("" if node.get("lossless", True) else " (may skip)")
+        counts = (str(node[key]) for key in ("pid", "tick", "behind_ticks"))
+        table.add_row(role, *counts, node["waits_for"] or "–")
+    return table
+
+
+def plugins_table(kinds: Mapping[str, type[Element]]) -> Table:
+    """Every kind of element: what it does, its parameters with unit, bounds and default."""
+    from rich import box
+    from rich.table import Table
+
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, show_lines=False)
+    table.add_column("kind", no_wrap=True)
+    table.add_column("what it does")
+    table.add_column("parameters")
+    for kind, element in kinds.items():
+        about = (element.__doc__ or "").strip().partition("\n")[0]
+        lines = [_parameter(name, *declared) for name, declared in element.parameters().items()]
+        table.add_row(kind, about, "\n".join(lines) or "–")
+        table.add_section()
+    return table
+
+
+def _parameter(name: str, quantity: Quantity, default: Any) -> str:
+    words = [f"{name} ({quantity.unit})" if quantity.unit else name]
+    for bound in ("at_least", "above", "at_most", "below"):
+        value = getattr(quantity, bound)
+        words += [f"{bound.replace('_', ' ')} {value:g}"] if value is not None else []
+    if default is not dataclasses.MISSING:
+        words.append(f"default {default:g}")
+    return ", ".join(words)
