@@ -10,18 +10,20 @@ from faults.launched import SCENE, alive, wait_for
 import haploop.logger
 from haploop.controller.dissipation import registry
 from haploop.launch.in_process import run_in_process
+from haploop.launch.replay import ReplayError, replay
 from haploop.launch.scene_file import load
 
 KINDS = registry()
-SHORT = "duration=6"
+# It stands still at tick 500, so that it is surely still there when something joins it.
+SHORT = ("duration=3", "event=[{at=0.5, pause=true}]")
 # Nobody waits so long: what does not depend on the deadline must not need it.
 NEVER = "run.deadline=600"
 
 
 @pytest.fixture(scope="module")
 def alone():
-    """The digest of 6 s of figure 6(c) run alone."""
-    return run_in_process(load(SCENE, [SHORT], KINDS), KINDS)["trajectory_sha256"]
+    """The digest of the short run when nothing joins it."""
+    return run_in_process(load(SCENE, SHORT, KINDS), KINDS)["trajectory_sha256"]
 
 
 @pytest.fixture
@@ -77,11 +79,13 @@ def test_a_logger_that_joins_in_mid_run_logs_the_same_numbers_from_its_first_tic
     assert its["ticks"] == summary["ticks"] - first
     assert its["final"] == summary["final"]
     assert its["lost"] == summary["lost"] == {"commands_dropped": 0, "commands_lost": 0, "telemetry_gaps": 0}
+    with pytest.raises(ReplayError, match=f"was logged from {first / 1000:g} s on"):
+        replay(second.out)
     assert its["energy"]["residual_J"] <= 1e-12 * its["energy"]["moved_J"]
 
 
 def test_a_logger_can_join_a_run_that_stands_still(running, attached, alone):
-    run = running(sets=(SHORT, NEVER, "event=[{at=0.5, pause=true}]"), pace=())
+    run = running(sets=(*SHORT, NEVER))
     run.reaches(500)
     second = attached(run)
     run.ask("resume")
@@ -91,35 +95,41 @@ def test_a_logger_can_join_a_run_that_stands_still(running, attached, alone):
 
 
 def test_a_logger_that_leaves_by_an_interrupt_has_a_whole_log_and_the_run_goes_on(running, attached, alone):
-    run = running(sets=(SHORT, NEVER))
-    run.reaches(200)
+    run = running(sets=(*SHORT, NEVER))
+    run.reaches(500)
     second = attached(run)
+    run.ask("step", ticks=200)
+    run.stands()
     second.signal(signal.SIGINT)
     second.end(0)
-    run.reaches(run.ask("status")["granted"] + 200)
     assert {node["role"] for node in run.ask("status")["nodes"]} == {"plant", "controller", "logger"}
+    run.ask("resume")
     assert run.summary()["trajectory_sha256"] == alone
     log, its = haploop.logger.read(second.out), json.loads((second.out / "summary.json").read_text())
     assert not log.truncated
-    assert (its["ended"], its["ticks"]) == ("stopped", len(log["/controller"]["x"]))
+    assert (its["ended"], its["ticks"], len(log["/controller"]["x"])) == ("stopped", 200, 200)
 
 
 def test_a_logger_that_is_killed_does_not_hold_the_run_up_until_the_deadline(running, attached, alone):
-    run = running(sets=(SHORT, NEVER))
-    run.reaches(200)
+    run = running(sets=(*SHORT, NEVER))
+    run.reaches(500)
     second = attached(run)
     second.signal(signal.SIGKILL)
     second.end(-signal.SIGKILL)
+    run.ask("resume")
     assert run.summary()["trajectory_sha256"] == alone
     assert haploop.logger.read(second.out).truncated
 
 
 def test_a_logger_that_hangs_holds_the_run_up_until_the_deadline_and_is_then_dropped(running, attached, alone):
     """The run waits for it first: a lossless logger may be slow. Woken up, it says that the run went on without it."""
-    run = running(sets=(SHORT, "run.deadline=0.8"))
-    run.reaches(200)
+    run = running(sets=(*SHORT, "run.deadline=0.8"))
+    run.reaches(500)
     second = attached(run)
+    run.ask("step", ticks=200)
+    run.stands()
     second.signal(signal.SIGSTOP)
+    run.ask("resume")
     assert run.summary()["trajectory_sha256"] == alone
     assert second.stood_for(0.8)
     assert second.is_there()
@@ -142,6 +152,7 @@ def test_a_logger_whose_run_vanishes_ends_by_itself_and_its_log_reads(running, a
     run = running()
     run.reaches(200)
     second = attached(run)
+    run.reaches(run.ask("status")["granted"] + 1)
     run.signal(signal.SIGKILL)
     run.end(-signal.SIGKILL)
     second.end(1)

@@ -8,6 +8,7 @@ from faults.launched import ROLES, alive, same_bits, wait_for
 
 import haploop.logger
 from haploop.launch import run_directory
+from haploop.launch.replay import replay
 
 NAMED = r"The {} was killed by SIGKILL; the last tick all nodes had done is (\d+) "
 
@@ -33,6 +34,7 @@ def test_a_node_killed_in_mid_run_ends_the_run_is_named_with_the_last_common_tic
     assert common_tick(role, run.stderr) >= done
     log = haploop.logger.read(run.out)
     logged = same_bits(log, undisturbed)
+    assert replay(run.out).differences == []
     if role == "logger":
         assert log.truncated
         assert logged >= flushed

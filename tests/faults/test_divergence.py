@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import haploop.logger
+from haploop.launch.replay import replay
 
 # A force -b v held over T on a free mass m turns v over and more than back when b T / m > 2.
 UNSTABLE = ('dissipation=[{kind="damping", damping=60.0, acts="always"}]',)
@@ -28,6 +29,7 @@ def test_a_device_beyond_the_limit_ends_the_run_with_verdict_tick_and_a_whole_lo
     assert len(x) == summary["steps"] + 1 == 10 * end + 1
     assert np.abs(x[:-10]).max() <= limit_m < abs(x[-1])
     assert len(log["/controller"]["x"]) == end
+    assert replay(run.out).differences == []
     assert summary["energy"]["residual_J"] <= 1e-12 * summary["energy"]["moved_J"]
     assert json.loads((run.out / "summary.json").read_text())["verdict"] == "diverged"
 

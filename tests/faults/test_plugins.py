@@ -67,6 +67,7 @@ def test_a_force_that_is_no_finite_number_fails_the_run_and_names_element_and_ti
     assert np.isfinite(force[:150]).all()
     assert str(force[150]) == value
     assert np.isfinite(log["/plant"]["x"]).all(), "no device was ever given such a force"
+    assert replay(run.out).differences == []
 
 
 def test_a_force_that_is_no_finite_number_fails_a_run_in_one_process_too(launched, brake, tmp_path):
@@ -93,6 +94,7 @@ def test_a_force_that_raises_or_is_no_number_fails_the_run_and_names_element_and
     run.end(1)
     assert f"Element 0 (brake) gave no force at tick 150: {reason}" in run.stderr
     assert len(haploop.logger.read(out)["/controller"]["x"]) == 150
+    assert replay(out).differences == []
 
 
 def test_a_force_that_never_returns_is_named_after_the_deadline(running, brake):

@@ -1,8 +1,9 @@
 """The loop a second time, written another way: what haploop computes must come out of this too.
 
 Step: scipy's matrix exponential of the state with its inputs appended. Heat and work of the hand: Gauss-Legendre
-quadrature along the exact motion. Controller: one function with the formulas as they stand in the contract; with an
-encoder and nothing but differences, in exact fractions. Books: exact sums (``math.fsum``) over the whole run.
+quadrature along the exact motion. Controller: one function with the formulas of the definitions, in floats and in the
+order they are written, since the last bits of a quantised position decide the sign of v[k] a[k-1] where the counts of
+two ticks change alike. Books: exact sums (``math.fsum``) over the whole run.
 """
 
 from __future__ import annotations
@@ -85,12 +86,11 @@ class Controller:
         self.wall = dict(scene["wall"]) if "wall" in scene else None
         self.slots = [Element(dict(table), 0) for table in scene.get("dissipation", [])]
         self.all_elements = list(self.slots)
-        # Ticks are counted from the decimal number in the scene, as is everything a Fraction is made of here.
+        # Ticks are counted from the decimal number in the scene.
         events = [(math.ceil(Fraction(repr(e["at"])) * self.rate), e) for e in scene.get("event", [])]
         self.events = sorted(events, key=lambda event: event[0])
         self.filters = {name: scene.get(name, {}).get("cutoff") for name in ("velocity", "acceleration")}
         self.accelerometer = scene.get("acceleration", {}).get("source") == "accelerometer"
-        self.exact = "encoder" in scene and not any(self.filters.values())
         self.rows: list[tuple[Any, Any, Any, float, float, bool]] = []
 
     def measure(self, x: float) -> Any:
@@ -99,12 +99,12 @@ class Controller:
             return x
         q = encoder["resolution"]
         count = round(x / q) if encoder["rounding"] == "nearest" else math.floor(x / q)
-        return Fraction(repr(q)) * count if self.exact else q * count
+        return q * count
 
     def command(self, tick: int, x_true: float, acceleration: float) -> float:
         for _, event in [e for e in self.events if e[0] == tick]:
             self._change(tick, event)
-        T = Fraction(1, self.rate) if self.exact else 1.0 / self.rate
+        T = 1.0 / self.rate
         x = self.measure(x_true)
         before = self.rows[-1] if self.rows else None
         v = self._low_passed("velocity", (x - before[0]) / T if before else x - x, before and before[1])
@@ -115,7 +115,7 @@ class Controller:
         if self.wall:
             surface = self.wall["position"]
             inwards = -1 if self.wall["occupies"] == "below" else 1
-            contact = inwards * (x - (Fraction(repr(surface)) if self.exact else surface)) > 0
+            contact = inwards * (x - surface) > 0
             f_wall = float(self.wall["stiffness"] * (surface - x)) if contact else 0.0
         total = f_wall
         for slot in self.slots:

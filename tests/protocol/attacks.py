@@ -20,6 +20,8 @@ import zmq
 
 PUBLISHERS = ("plant", "controller", "logger")
 SOCKETS = ("clock", "loop", *PUBLISHERS)
+# An XSUB keeps a long subscription as a tree so deep that libzmq cannot take it down again; theirs is short.
+TOO_LARGE = {zmq.DEALER: 5 * 1024 * 1024, zmq.PUB: 5 * 1024 * 1024, zmq.XSUB: 5 * 1024}
 MAX_WHOLE, MIN_WHOLE = 2**64 - 1, -(2**63)
 
 
@@ -83,7 +85,7 @@ def impossible_commands() -> Iterator[tuple[Any, Any]]:
     yield from (("stop", {key: 1}) for key in ("self", "ticks", "", 5, None, b"x", True))
     yield from (("swap", {"swap": swap}) for swap in (None, 1, "damping", [], {}, deep, {"kind": deep}, {"kind": None}))
     yield from (("swap", {"swap": {"kind": "damping", "damping": b}}) for b in (None, -1.0, math.inf, math.nan, "x", deep, []))
-    yield from (("swap", {"swap": damping, "element": i}) for i in (-1, 2, 1.5, "0", None and 0, MAX_WHOLE, math.nan, [], deep) if i is not None)
+    yield from (("swap", {"swap": damping, "element": i}) for i in (-1, 2, 1.5, "one", MAX_WHOLE, math.nan, [], deep))
     yield from (("swap", {"swap": damping, "at": at}) for at in (math.inf, -math.inf, math.nan, -1, 1e308, MAX_WHOLE, "soon", [], deep))
     yield ("swap", {"swap": damping, "reload": True})
     yield ("swap", {"swap": {**damping, 5: 6}})
@@ -134,7 +136,7 @@ def send_unasked(context: zmq.Context[zmq.Socket[bytes]], directory: Path) -> li
                     _send(sender, [frame])
                 _send(sender, [b""] * 20)
                 _send(sender, frames[:50])
-                _send(sender, [b"\x01" + bytes(5 * 1024 * 1024)])
+                _send(sender, [b"\x01" + bytes(TOO_LARGE[kind])])
         no_zeromq(path)
     return opened
 

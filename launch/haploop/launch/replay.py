@@ -12,6 +12,7 @@ import numpy as np
 
 import haploop.logger
 from haploop.controller.dissipation import load_plugin, registry
+from haploop.launch.failure import RunFailed
 from haploop.launch.in_process import run_in_process
 from haploop.launch.output import PLUGINS, SCENE
 from haploop.launch.scene_file import load
@@ -47,19 +48,41 @@ def replay(directory: Path) -> Replay:
     """
     if not (directory / SCENE).is_file():
         raise ReplayError(f"{directory} holds no {SCENE}; a directory that haploop run has written was expected.")
-    recorded = haploop.logger.read(directory)
+    recorded = _recorded(directory)
     kinds = registry([Path(directory) / PLUGINS / name for name in _launch_plugins(directory, recorded)])
     scene = load(directory / SCENE, (), kinds)
     events = [_event(dict(event), directory) for event in recorded["/events"]] if "/events" in recorded else []
+    logged = len(recorded["/controller"]["x"]) if "/controller" in recorded else 0
+    events.append((logged, {"stop": True}))  # a run that was cut off is repeated as far as its log goes
     with tempfile.TemporaryDirectory(prefix="haploop-replay-") as scratch:
-        summary = run_in_process(scene, kinds, out=Path(scratch), events=events)
+        try:
+            summary = run_in_process(scene, kinds, out=Path(scratch), events=events)
+        except RunFailed:  # then ticks are missing, and the comparison says so
+            summary = _summary(Path(scratch)) or {}
         repeated = haploop.logger.read(scratch)
-    differences = _compare(recorded, repeated)
-    summary_file = directory / SUMMARY
-    if summary_file.is_file():
-        before = json.loads(summary_file.read_text(encoding="utf-8"))
+    before = _summary(directory)
+    failed = before is not None and before["ended"] == "failed"
+    differences = _compare(recorded, repeated, failed)
+    if before and not failed:
         differences += _compare_summaries(before, finite(summary))
     return Replay(summary, differences)
+
+
+def _recorded(directory: Path) -> Recording:
+    """The log of a run from its first tick on."""
+    try:
+        recorded = haploop.logger.read(directory)
+    except FileNotFoundError as error:
+        raise ReplayError(str(error)) from error
+    seen = recorded["/controller"]["timestamp"][:1] if "/controller" in recorded else []
+    if any(t > 0.0 for t in seen):
+        raise ReplayError(f"{directory} was logged from {seen[0]:g} s on; replay the directory of the run itself.")
+    return recorded
+
+
+def _summary(directory: Path) -> dict[str, Any] | None:
+    file = directory / SUMMARY
+    return json.loads(file.read_text(encoding="utf-8")) if file.is_file() else None
 
 
 def _launch_plugins(directory: Path, recorded: Recording) -> list[str]:
@@ -81,13 +104,17 @@ def _event(event: dict[str, Any], directory: Path) -> tuple[int, dict[str, Any]]
     return tick, event
 
 
-def _compare(recorded: Recording, repeated: Recording) -> list[str]:
-    """Differences between two logs as far as the recorded one goes, one sentence a column."""
+def _compare(recorded: Recording, repeated: Recording, failed: bool) -> list[str]:
+    """Differences between two logs as far as the recorded one goes, one sentence a column.
+
+    Where a failed run broke off, the force of its end state is the one held before, not the one that would follow.
+    """
     differences = []
     for topic in ("/plant", "/controller", "/energy"):
         if topic not in recorded:
             continue
-        for name, before in recorded[topic].items():
+        for name, whole in recorded[topic].items():
+            before = whole[:-1] if failed and (topic, name) == ("/plant", "force") else whole
             after = repeated[topic].get(name, np.zeros(0))[: len(before)]
             differs = np.ones(len(before), bool)
             differs[: len(after)] = before[: len(after)].view(np.uint64) != after.view(np.uint64)
@@ -99,8 +126,6 @@ def _compare(recorded: Recording, repeated: Recording) -> list[str]:
 
 
 def _compare_summaries(before: dict[str, Any], after: dict[str, Any]) -> list[str]:
-    """Differences between the summary of a run that ended by itself and the repeated one's."""
-    if before["ended"] == "failed" or before["from_tick"] != after["from_tick"]:
-        return []
+    """Differences between the summary of a run that ended in order and the repeated one's."""
     keys = ("ticks", "verdict", "trajectory_sha256", "final", "extremes", "window", "energy")
     return [f"{key} of the summary differs." for key in keys if before[key] != after[key]]

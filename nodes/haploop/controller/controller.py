@@ -51,7 +51,7 @@ class Controller:
 
     def _start(self, first: Sample) -> None:
         scene, period_s = self._scene, self._time.period_s
-        self._velocity = velocity_estimator(scene.get("velocity", {}), scene.get("encoder"), period_s, first)
+        self._velocity = velocity_estimator(scene.get("velocity", {}), period_s, first)
         self._acceleration = acceleration_estimator(scene.get("acceleration", {}), period_s, first)
 
     def _command(self, sample: Sample) -> float:
@@ -67,7 +67,7 @@ class Controller:
         row = [x, v, a, f_wall]
         try:
             for slot in self._slots.slots:
-                force = float(slot.force(motion))
+                force = slot.force(motion)
                 row.append(force)
                 total += force
         except Exception as error:

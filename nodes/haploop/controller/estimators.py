@@ -6,8 +6,6 @@ import math
 from collections.abc import Callable
 from typing import Any
 
-from haploop.protocol.arrays import rint
-
 Sample = tuple[Any, ...]
 
 
@@ -39,30 +37,9 @@ class Difference:
         return rate
 
 
-class CountDifference:
-    """Backward difference (x_m[k] - x_m[k-1]) / T of an encoder's positions, taken in whole counts.
-
-    Positions are rounded counts times resolution, so their differences vary in the last bits where the counts do not,
-    and the next difference would be noise where it must be 0; the sign of v a would hang on it.
-    """
-
-    def __init__(self, resolution_m: float, period_s: float, first: Any) -> None:
-        self._resolution_m, self._count_rate = resolution_m, resolution_m / period_s
-        self._previous = rint(first / resolution_m)
-
-    def __call__(self, x: Any) -> Any:
-        count = rint(x / self._resolution_m)
-        rate = (count - self._previous) * self._count_rate
-        self._previous = count
-        return rate
-
-
-def velocity_estimator(
-    table: dict[str, Any], encoder: dict[str, Any] | None, period_s: float, first: Sample
-) -> Callable[[Any], Any]:
-    """From measured position to v[k] by the ``[velocity]`` and ``[encoder]`` tables; ``first`` is the first sample."""
-    x = first[0]
-    difference = CountDifference(encoder["resolution"], period_s, x) if encoder else Difference(period_s, x)
+def velocity_estimator(table: dict[str, Any], period_s: float, first: Sample) -> Callable[[Any], Any]:
+    """From measured position to v[k] by the ``[velocity]`` table; ``first`` is the sample of the first tick."""
+    difference = Difference(period_s, first[0])
     if "cutoff" not in table:
         return difference
     low_pass = LowPass(table["cutoff"], period_s, 0.0 * first[0])

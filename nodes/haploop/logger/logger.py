@@ -97,6 +97,7 @@ class Logger:
         while (end := min(self._plant.end, self._controller.part_end(self.tick))) > self.tick:
             self._book(end)
 
+    @np.errstate(over="ignore", invalid="ignore")  # where a force is no finite number, its books are none either
     def _book(self, end: int) -> None:
         """Book the intervals before ``end``."""
         if self._plant.tick < self.tick:

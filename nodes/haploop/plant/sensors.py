@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from decimal import Decimal
 from typing import Any
 
 from haploop.protocol.arrays import floor, rint
@@ -16,9 +15,7 @@ def encoder(table: dict[str, Any] | None) -> Callable[[Any], Any]:
     if table is None:
         return lambda x: x
     resolution, whole = table["resolution"], ROUNDINGS[table["rounding"]]
-    # A count times a decimal resolution, rounded once: count 6000 of 1e-5 m is the very float a scene means by 0.06.
-    numerator, denominator = map(float, Decimal(repr(resolution)).as_integer_ratio())
-    return lambda x: whole(x / resolution) * numerator / denominator
+    return lambda x: resolution * whole(x / resolution)
 
 
 def accelerometer_is_used(scene: dict[str, Any]) -> bool:

@@ -54,8 +54,7 @@ class PlantEnd:
         Raises:
             LoopError: the answer is for other ticks.
         """
-        self.socket.send(self._partner, zmq.SNDMORE)
-        self.socket.send(self._pack((VERSION, _SAMPLES, tick, samples)))
+        self._send(self._pack((VERSION, _SAMPLES, tick, samples)))
         sender, data = self._receive(idle)
         while sender != self._partner:
             self.strangers += 1
@@ -70,8 +69,13 @@ class PlantEnd:
         self._send(encode("LAST", tick))
 
     def _send(self, data: bytes) -> None:
-        self.socket.send(self._partner, zmq.SNDMORE)
-        self.socket.send(data)
+        """Send to the controller; nowhere when it has gone, which the clock sees too, and says what comes of it."""
+        try:
+            self.socket.send(self._partner, zmq.SNDMORE)
+            self.socket.send(data)
+        except zmq.ZMQError as error:
+            if error.errno != zmq.EHOSTUNREACH:
+                raise
 
     def _receive(self, idle: Idle) -> tuple[bytes, bytes]:
         """Sender and last frame of the next message; calls ``idle`` now and then while nothing comes."""

@@ -7,10 +7,13 @@ from pathlib import Path
 
 import zmq
 
-from haploop.protocol.wire import MAX_FRAME_BYTES, MAX_REQUEST_BYTES
+from haploop.protocol.wire import MAX_FRAME_BYTES
 
 # A subscriber this many blocks behind starts to lose blocks; the grant window keeps lossless ones far below.
 TELEMETRY_BACKLOG_BLOCKS = 256
+# What comes in where anyone may connect is small: reports and commands, subscriptions to a role. (A large scene goes
+# out, from there to sockets that connect.)
+_LARGEST = {zmq.ROUTER: 4 * 1024 * 1024, zmq.XPUB: 1024}
 # The kernel's limit on the path of an ipc socket.
 _LONGEST_PATH = 107
 
@@ -19,7 +22,7 @@ def open_socket(context: zmq.Context[zmq.Socket[bytes]], kind: int) -> zmq.Socke
     """A socket of a type such as ``zmq.DEALER`` with the options every socket of a run has."""
     socket = context.socket(kind)
     socket.linger = 0
-    socket.setsockopt(zmq.MAXMSGSIZE, MAX_REQUEST_BYTES if kind in (zmq.ROUTER, zmq.XPUB) else MAX_FRAME_BYTES)
+    socket.setsockopt(zmq.MAXMSGSIZE, _LARGEST.get(kind, MAX_FRAME_BYTES))
     socket.setsockopt(zmq.RECONNECT_IVL, 20)
     if kind == zmq.ROUTER:
         socket.setsockopt(zmq.ROUTER_MANDATORY, 1)

@@ -8,9 +8,7 @@ import msgpack
 
 from haploop.protocol.messages import BY_CODE, MESSAGES, VERSION, complaint
 
-# A frame larger than this is refused by the socket itself: one that binds takes requests and reports, from anyone;
-# one that connects takes what the run's own processes send, a scene with a long recording among it.
-MAX_REQUEST_BYTES = 4 * 1024 * 1024
+# A frame larger than this is refused by the socket itself.
 MAX_FRAME_BYTES = 64 * 1024 * 1024
 
 
