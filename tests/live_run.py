@@ -5,7 +5,7 @@ from __future__ import annotations
 import tempfile
 import threading
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -60,11 +60,11 @@ class Going:
         """A command as from another terminal."""
         return control.ask(self.live, verb, **arguments)
 
-    def stands_at(self, tick: int) -> None:
-        """Wait until the run stands still at ``tick``, every tick before it logged."""
+    def stands_at(self, tick: int, paused: bool = True) -> None:
+        """Wait until the run stands still at ``tick``, every tick before it logged, on request or because it must."""
         for _ in range(1500):
             data = self.ask("status")[1]
-            if data["paused"] and data["granted"] == tick and data["tick"] == tick:
+            if data["paused"] == paused and data["granted"] == tick and data["tick"] == tick:
                 return
             threading.Event().wait(0.02)
         raise AssertionError(f"The run does not come to stand at tick {tick}: {data}")
@@ -80,10 +80,8 @@ class Going:
     def end(self) -> None:
         """Leave nothing behind, however the test went."""
         if self._thread.is_alive():
-            try:
+            with suppress(control.CommandRefused, control.RunNotFound):
                 self.ask("stop")
-            except (control.CommandRefused, control.RunNotFound):
-                pass
             self._thread.join(30)
 
 

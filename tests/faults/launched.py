@@ -13,6 +13,8 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 from haploop.launch import control, run_directory
 from haploop.logger import read
 from haploop.logger.recording import Recording
@@ -27,6 +29,12 @@ PACE = ("--pace", "5")
 # A test gives up after so long. It says nothing about how long anything may take.
 PATIENCE_S = 40.0
 ROLES = tuple(PROCESSES)
+
+
+def first_and_slowly(*values: str) -> list[Any]:
+    """Parameters of a test, of which all but the first are left to the slow tests."""
+    return [values[0], *(pytest.param(value, marks=pytest.mark.slow) for value in values[1:])]
+
 
 Row = tuple[int, int, str, str]
 
@@ -77,7 +85,7 @@ class Launched:
     def __init__(self, *arguments: str, out: Path | None = None, before: Callable[[], None] | None = None) -> None:
         self.out = out
         command = [*HAPLOOP, *arguments, *(("--out", str(out)) if out else ())]
-        self._said = tempfile.TemporaryFile()  # noqa: SIM115: it goes with this object
+        self._said = tempfile.TemporaryFile()  # noqa: SIM115 (it goes with this object)
         self._process = subprocess.Popen(
             command, stdout=subprocess.PIPE, stderr=self._said, text=True, preexec_fn=before
         )
@@ -142,7 +150,15 @@ class Run(Launched):
         nodes: pid by role, once :meth:`nodes_started` or :meth:`reaches` has returned.
     """
 
-    def __init__(self, out: Path, *arguments: str, scene: Path = SCENE, sets: Sequence[str] = LONG, pace: Sequence[str] = PACE, **more: Any) -> None:
+    def __init__(
+        self,
+        out: Path,
+        *arguments: str,
+        scene: Path = SCENE,
+        sets: Sequence[str] = LONG,
+        pace: Sequence[str] = PACE,
+        **more: Any,
+    ) -> None:
         options = [word for assignment in sets for word in ("--set", assignment)]
         super().__init__("run", str(scene), *options, *pace, *arguments, "--json", out=out, **more)
 

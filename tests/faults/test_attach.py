@@ -5,7 +5,7 @@ import signal
 
 import numpy as np
 import pytest
-from faults.launched import SCENE, alive, wait_for
+from faults.launched import SCENE, alive, first_and_slowly
 
 import haploop.logger
 from haploop.controller.dissipation import registry
@@ -60,7 +60,7 @@ def assert_same_from_its_first_tick_on(own, second):
     return first
 
 
-@pytest.mark.parametrize("delay", ["2 ms", "0.3 ms", "0 ms"])
+@pytest.mark.parametrize("delay", first_and_slowly("2 ms", "0.3 ms", "0 ms"))
 def test_a_logger_that_joins_in_mid_run_logs_the_same_numbers_from_its_first_tick_on(delay, running, attached):
     """The swap after it has joined stands in its log too, the books it opens as well."""
     run = running(sets=("duration=600", NEVER, f"clock.round_trip_delay={delay}", "wall.position=-0.001"))

@@ -4,7 +4,7 @@ import re
 import signal
 
 import pytest
-from faults.launched import ROLES, alive, same_bits, wait_for
+from faults.launched import ROLES, alive, first_and_slowly, same_bits, wait_for
 
 import haploop.logger
 from haploop.launch import run_directory
@@ -79,7 +79,7 @@ def test_a_node_that_hangs_is_named_after_the_deadline_the_user_has_set(role, ru
     assert same_bits(haploop.logger.read(run.out), undisturbed) >= 200
 
 
-@pytest.mark.parametrize("role", ["plant", "controller"])
+@pytest.mark.parametrize("role", first_and_slowly("controller", "plant"))
 def test_a_node_that_hangs_before_the_run_begins_is_named_and_not_those_that_wait_for_it(role, running):
     """The logger waits for the others' first word and is not to blame."""
     run = running(sets=("duration=600", "run.deadline=1"))

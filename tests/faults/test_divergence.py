@@ -14,9 +14,7 @@ UNSTABLE = ('dissipation=[{kind="damping", damping=60.0, acts="always"}]',)
 
 @pytest.mark.parametrize("options", [(), ("--in-process",)])
 @pytest.mark.parametrize(("sets", "limit_m"), [((), 1.0), (("diverged_beyond=0.03",), 0.03)])
-def test_a_device_beyond_the_limit_ends_the_run_with_verdict_tick_and_a_whole_log(
-    options, sets, limit_m, running, tmp_path
-):
+def test_a_device_beyond_the_limit_ends_the_run_with_verdict_tick_and_a_whole_log(options, sets, limit_m, running):
     """1 m when the scene sets no limit."""
     run = running(*options, sets=(*UNSTABLE, "duration=30", *sets), pace=())
     summary = run.summary()

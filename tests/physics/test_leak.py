@@ -114,3 +114,17 @@ def test_every_part_of_the_leak_comes_from_its_cause_and_the_parts_add_up():
         parts = [value for name, value in leak.items() if name != "total_J"]
         assert sum(parts) == pytest.approx(leak["total_J"], rel=1e-13)
         assert leak["sampling_and_hold_J"] < 0
+
+
+def test_a_wall_made_stiffer_in_contact_is_no_leak_and_nothing_is_held_once_the_device_has_left():
+    """leak = true - (ideal - changes); outside the wall an ideal spring holds nothing, however it came there."""
+    push = {"kind": "trace", "time": [0.0, 0.5, 0.6, 0.8], "force": [-1.0, -1.0, -1.0, 1.0]}
+    hand = {"mass": 0.01, "damping": 10.0, "stiffness": 1.0, "force": push}
+    change = {"at": 0.4, "set": {"wall.stiffness": 200.0}}
+    ran = run(scene(duration=1.2, hand=hand, wall={"position": 0.0, "stiffness": 100.0}, event=[change]))
+    wall = ran.energy["wall"]
+    assert ran.controller["in_contact"][400] and not ran.controller["in_contact"][-1]
+    assert wall["changes_J"] == pytest.approx(50.0 * ran.plant["x"][4000] ** 2, rel=1e-12)
+    assert wall["ideal_J"] == pytest.approx(0.0, abs=1e-12 * ran.energy["moved_J"])
+    assert wall["leak"]["total_J"] == pytest.approx(wall["true_J"] - wall["ideal_J"] + wall["changes_J"], rel=1e-9)
+    assert abs(wall["leak"]["total_J"]) < 0.1 * wall["changes_J"]

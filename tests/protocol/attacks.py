@@ -12,6 +12,7 @@ import socket
 import sys
 import time
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -114,38 +115,29 @@ class Stranger:
         return msgpack.unpackb(self.socket.recv(), strict_map_key=False)[1:]
 
 
-def send_unasked(context: zmq.Context[zmq.Socket[bytes]], directory: Path) -> list[zmq.Socket[bytes]]:
-    """Junk, messages out of place, oversized ones and no ZeroMQ at all to every socket that is there.
+def send_unasked(context: zmq.Context[zmq.Socket[bytes]], path: Path) -> list[zmq.Socket[bytes]]:
+    """Junk, messages out of place, oversized ones and no ZeroMQ at all to one socket of a run.
 
     Returns the sockets, still open, so that the sending goes on while the run does.
     """
+    topics = (path.stem.encode(), b"", b"junk", b"\xff")
+    frames = [pack(1, 20, "0" * 32), *false_joins(), *out_of_place(), *junk(), pack(1, 22, 0, [MAX_WHOLE] * 10_000)]
+    frames += [mark + topic for mark in (b"\0", b"\1") for topic in topics]
     opened = []
-    frames = [*junk(), *out_of_place(), *false_joins(), pack(1, 20, "0" * 32), pack(1, 22, 0, [MAX_WHOLE] * 10_000)]
-    for name in SOCKETS:
-        path = directory / f"{name}.sock"
-        if not path.exists():
-            continue
-        for kind in (zmq.XSUB,) if name in PUBLISHERS else (zmq.DEALER, zmq.ROUTER, zmq.PUB):
-            sender = context.socket(kind)
-            sender.linger = 0
-            sender.connect(f"ipc://{path}")
-            opened.append(sender)
-            if kind != zmq.ROUTER:
-                said = [*frames, *(mark + topic for mark in (b"\0", b"\1") for topic in (name.encode(), b"", b"junk", b"\xff"))]
-                for frame in said:
-                    _send(sender, [frame])
-                _send(sender, [b""] * 20)
-                _send(sender, frames[:50])
-                _send(sender, [b"\x01" + bytes(TOO_LARGE[kind])])
-        no_zeromq(path)
+    for kind in (zmq.XSUB,) if path.stem in PUBLISHERS else (zmq.DEALER, zmq.PUB):
+        sender = context.socket(kind)
+        sender.linger = 0
+        sender.connect(f"ipc://{path}")
+        opened.append(sender)
+        for message in (*([frame] for frame in frames), [b""] * 20, frames[:50], [b"\x01" + bytes(TOO_LARGE[kind])]):
+            _send(sender, message)
+    no_zeromq(path)
     return opened
 
 
 def _send(sender: zmq.Socket[bytes], frames: list[bytes]) -> None:
-    try:
+    with suppress(zmq.Again):  # its queue is full: enough has been said
         sender.send_multipart(frames, zmq.DONTWAIT)
-    except zmq.Again:  # its queue is full: enough has been said
-        pass
 
 
 def no_zeromq(path: Path) -> None:
@@ -154,10 +146,8 @@ def no_zeromq(path: Path) -> None:
     for data in (os.urandom(2000), b"GET / HTTP/1.1\r\n\r\n", greeting[:20], greeting, greeting + os.urandom(500), b""):
         with socket.socket(socket.AF_UNIX) as raw:
             raw.connect(str(path))
-            try:
+            with suppress(OSError):  # thrown out already
                 raw.sendall(data)
-            except OSError:  # thrown out already
-                pass
 
 
 def flood(directory: Path) -> None:

@@ -69,6 +69,8 @@ def test_commands_that_cannot_be_carried_out_are_refused_and_change_nothing(
                 assert text
         run.ask("resume")
         assert_unharmed(run, run.result())
+    noted = [event for _, event in haploop.logger.read(run.prepared.out)["/events"]]
+    assert all("pause" in event or "resume" in event for event in noted), noted
 
 
 def test_an_observer_that_talks_nonsense_harms_only_itself(
@@ -105,26 +107,29 @@ def test_junk_on_every_socket_before_a_run_begins_and_while_it_runs_changes_noth
 ) -> None:
     opened: list[zmq.Socket[bytes]] = []
 
-    def attack(sockets: Path) -> None:
-        """As soon as the sockets are there, before the nodes have found each other."""
-        for name in attacks.SOCKETS:
-            while not (sockets / f"{name}.sock").exists():
-                threading.Event().wait(0.001)
-        opened.extend(attacks.send_unasked(context, sockets))
+    def attack(path: Path) -> None:
+        """As soon as the socket is there: before its node has heard of its partners."""
+        while not path.exists():
+            threading.Event().wait(0.0005)
+        opened.extend(attacks.send_unasked(context, path))
 
     threads: list[threading.Thread] = []
 
     def announced(sockets: Path) -> None:
-        threads.append(threading.Thread(target=attack, args=(sockets,)))
-        threads[0].start()
+        for name in attacks.SOCKETS:
+            threads.append(threading.Thread(target=attack, args=(sockets / f"{name}.sock",)))
+            threads[-1].start()
+        threads[0].join()  # the clock has heard the strangers before any node
 
     with going(tmp_path, "duration=0.6", pauses=(200,), announced=announced) as run:
-        threads[0].join()
+        for thread in threads:
+            thread.join()
         run.stands_at(200)
-        opened.extend(attacks.send_unasked(context, run.live.sockets))
+        for name in attacks.SOCKETS:
+            attack(run.live.sockets / f"{name}.sock")
         run.ask("resume")
         assert_unharmed(run, run.result())
-    assert len(opened) == 18
+    assert len(opened) == 14
 
 
 def test_a_flood_of_junk_on_every_socket_cannot_hold_a_run_up(tmp_path: Path) -> None:

@@ -79,15 +79,18 @@ def test_an_observer_that_joins_a_run_in_motion_sees_what_is_logged_and_changes_
     assert_saw_the_log(run, seen)
 
 
-def test_observers_may_join_a_paused_run_leave_it_and_be_killed_while_it_goes_on(tmp_path: Path) -> None:
-    with going(tmp_path, "duration=1.5", pauses=(200, 1400)) as run:
+def test_observers_may_join_a_paused_run_leave_it_hold_it_up_and_be_killed_while_it_goes_on(tmp_path: Path) -> None:
+    window_of_400 = ("run.block_ticks=100", "run.window_blocks=4")
+    with going(tmp_path, "duration=1.5", *window_of_400, pauses=(200, 1400)) as run:
         run.stands_at(200)
         leaving, staying, doomed = Observer(run, "--ticks", "300"), Observer(run), Observer(run, "--dwell")
         attached = [observer.line() for observer in (leaving, staying, doomed)]
         assert [state["first"] for state in attached] == [{"plant": 200, "controller": 200}] * 3
         assert len(run.ask("status")[1]["nodes"]) == 6
-        doomed.kill()
         run.ask("resume")
+        run.stands_at(600, paused=False)  # the run goes no further beyond an observer than the window
+        assert doomed.process.poll() is None
+        doomed.kill()
         left = leaving.leave()
         run.stands_at(1400)
         assert {node["role"] for node in run.ask("status")[1]["nodes"]} == {

@@ -93,7 +93,7 @@ class Loop:
         while plant.tick < until and plant.stop_reason is None:
             samples = plant.samples(min(self._most, until - plant.tick))
             if samples:
-                plant.receive(controller.answer(samples))
+                plant.receive([float(force) for force in controller.answer(samples)])
         going_on = plant.tick < self._end and plant.stop_reason is None
         if not going_on and plant.stop_reason is None:
             plant.finish()

@@ -68,8 +68,8 @@ class Controller:
         try:
             for slot in self._slots.slots:
                 force = slot.force(motion)
-                row.append(force)
                 total += force
+                row.append(force)
         except Exception as error:
             raise self._blame(len(row) - len(MOTION_COLUMNS), error) from error
         row += (total, contact)

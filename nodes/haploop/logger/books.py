@@ -10,7 +10,7 @@ import numpy as np
 from haploop.logger.plant_books import PlantBooks
 from haploop.logger.sums import RunningSums, sum_in_order
 from haploop.logger.tapes import ControllerTape
-from haploop.logger.wall_books import CAUSES, ideal_and_undelayed
+from haploop.logger.wall_books import CAUSES, held_J, ideal_and_undelayed
 from haploop.protocol.ticks import Timebase
 
 
@@ -26,6 +26,7 @@ class Books:
     Attributes:
         names: all books, in the order of the rows of ``book``: the plant's, the causes of the wall's leak where there
             is a wall, ``moved``, then ``<b>.sampled`` and ``<b>.true`` for the wall and for every element's book b.
+        wall_changes_J: what changes of the wall in contact would have put into an ideal spring.
     """
 
     def __init__(self, scene: dict[str, Any], time: Timebase) -> None:
@@ -38,6 +39,8 @@ class Books:
         self._accounts = 0
         self._open_account("wall")
         self._stored_at_start_J = 0.0
+        self._wall: tuple[float, float] | None = None
+        self.wall_changes_J = 0.0
 
     @property
     def names(self) -> list[str]:
@@ -60,7 +63,7 @@ class Books:
 
         Args:
             tick: first interval.
-            plant: columns x, v, force, command with ticks * n + 1 rows.
+            plant: columns x, v, x_low, force, command with ticks * n + 1 rows.
             tape: controller rows of these ticks and of all commands in effect in them.
             into_wall: direction into the wall, +1 or -1.
 
@@ -99,27 +102,33 @@ class Books:
         """What every plant step adds to each book, by name; arrays of shape (steps,)."""
         n = self._time.steps_per_tick
         x = plant["x"]
-        plant_flows = self._plant.increments(tick * n, x, plant["v"], plant["force"][:-1])
+        dx = np.diff(x) + np.diff(plant["x_low"])
+        plant_flows = self._plant.increments(tick * n, x, dx, plant["v"], plant["force"][:-1])
         by_step = dict(zip(self._plant.names, plant_flows, strict=True))
         moved = np.abs(plant_flows).sum(axis=0)
-        minus_dx = x[:-1] - x[1:]
         in_effect = plant["command"][:-1].astype(np.intp)
         index = np.maximum(in_effect - tape.first, 0)
         before_first = in_effect < 0
         for account, force in forces.items():
             applied = force[index]
             applied[before_first] = 0.0
-            by_step[f"{account}.true"] = absorbed = applied * minus_dx
+            by_step[f"{account}.true"] = absorbed = -applied * dx
             moved = moved + np.abs(absorbed)
         by_step["moved"] = moved / 2.0
         if self._has_wall:
             at = tick - tape.first
             rows = {
-                name: tape.columns[name][at : at + len(minus_dx) // n]
+                name: tape.columns[name][at : at + len(dx) // n]
                 for name in ("wall", "wall_position", "wall_stiffness")
             }
-            by_step |= zip(CAUSES, ideal_and_undelayed(x, rows, into_wall, n), strict=True)
+            self._note_wall(float(x[0]), (float(rows["wall_position"][0]), float(rows["wall_stiffness"][0])), into_wall)
+            by_step |= zip(CAUSES, ideal_and_undelayed(x, dx, rows, into_wall, n), strict=True)
         return by_step
+
+    def _note_wall(self, x: float, wall: tuple[float, float], into_wall: float) -> None:
+        if self._wall and wall != self._wall:
+            self.wall_changes_J += held_J(x, wall, into_wall) - held_J(x, self._wall, into_wall)
+        self._wall = wall
 
     @staticmethod
     def _sampled(tick: int, ticks: int, tape: ControllerTape, forces: np.ndarray) -> np.ndarray:
@@ -151,7 +160,7 @@ class Books:
         parts = []
         for name, row in self._rows.items():
             sign = self._sign(name)
-            parts += sign * self._sums.sums[row], sign * self._sums.errors[row]
+            parts += sign * float(self._sums.sums[row]), sign * float(self._sums.errors[row])
         return abs(math.fsum(parts)) if all(map(math.isfinite, parts)) else math.inf
 
     def residuals(self, at_ticks: np.ndarray) -> np.ndarray:

@@ -35,12 +35,15 @@ class PlantBooks:
         self.names = ["hand_work", *(f"{name}_heat" for name in m.dampers), "kinetic", "spring"]
         self.signs = np.array([1.0, *(-1.0 for _ in m.dampers), -1.0, -1.0])
 
-    def increments(self, first_step: int, x: np.ndarray, v: np.ndarray, force: np.ndarray) -> np.ndarray:
+    def increments(
+        self, first_step: int, x: np.ndarray, dx: np.ndarray, v: np.ndarray, force: np.ndarray
+    ) -> np.ndarray:
         """What each step adds to each book, J.
 
         Args:
             first_step: step of the first state.
             x, v: states at the steps and at the end, shape (steps + 1,).
+            dx: displacement over each step, shape (steps,), with the digits that the difference of two x has lost.
             force: force held over each step, shape (steps,).
 
         Returns:
@@ -48,7 +51,7 @@ class PlantBooks:
         """
         m = self.mechanics
         tau = self._tau.at_steps(first_step, first_step + len(x))
-        start_x, start_v, dx, dv = x[:-1], v[:-1], np.diff(x), np.diff(v)
+        start_x, start_v, dv = x[:-1], v[:-1], np.diff(v)
         rise = np.diff(tau)
         net = force + tau[:-1] - m.damping * start_v - m.stiffness * (start_x - m.rest_m)
         scale = 1.0 / (m.mass_kg * self._rate)

@@ -24,7 +24,11 @@ def versions() -> dict[str, str]:
 
 
 def energy(books: Books, accounts: list[dict[str, Any]], has_wall: bool) -> dict[str, Any]:
-    """The ``energy`` entry: every book as it stands at the end of the run."""
+    """The ``energy`` entry: every book as it stands at the end of the run.
+
+    The wall's leak is its true book less what an ideal spring would hold now (``ideal_J``, against the start), but for
+    what changes of the wall in contact put into that spring (``changes_J``).
+    """
     total = books.total
     elements = []
     for account in accounts:
@@ -35,7 +39,8 @@ def energy(books: Books, accounts: list[dict[str, Any]], has_wall: bool) -> dict
         steps = [total("ideal"), total("sampled_and_held"), total("quantised"), wall["true_J"]]
         causes = ("sampling_and_hold_J", "quantisation_J", "delay_J")
         parts = {cause: after - before for cause, before, after in zip(causes, steps[:-1], steps[1:], strict=True)}
-        wall |= {"ideal_J": steps[0], "leak": {"total_J": steps[-1] - steps[0], **parts}}
+        wall |= {"ideal_J": steps[0] + books.wall_changes_J, "changes_J": books.wall_changes_J}
+        wall |= {"leak": {"total_J": steps[-1] - steps[0], **parts}}
     heats = {f"{name}_J": total(name) for name in books.names if name.endswith("_heat")}
     return {
         "elements": elements,

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-PLANT_COLUMNS = ("x", "v", "force", "command")
+PLANT_COLUMNS = ("x", "v", "x_low", "force", "command")
 
 
 def as_float64(data: bytes) -> np.ndarray:

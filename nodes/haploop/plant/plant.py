@@ -47,7 +47,7 @@ class Plant:
         else:
             self._measure = lambda: (measure(self.x),)
         self.x, self.v = mechanics.start
-        self._x_rest = self._v_rest = 0.0
+        self._x_low = self._v_low = 0.0
         self._interval_due = self._unusable = False
         self._drive: list[tuple[float, float]] = []
         self._drive_first = self._drive_end = 0
@@ -109,20 +109,21 @@ class Plant:
         """``count`` plant steps under one held force: x+ = x + dx, v+ = v + dv by the exact flow."""
         x_x, x_v, x_force, v_x, v_v, v_force = self._coefficients
         held_x, held_v = x_force * force, v_force * force
-        x, v, x_rest, v_rest = self.x, self.v, self._x_rest, self._v_rest
-        log_x, log_v = self._xs.append, self._vs.append
+        x, v, x_low, v_low = self.x, self.v, self._x_low, self._v_low
+        log_x, log_v, log_low = self._xs.append, self._vs.append, self._lows.append
         for drive_x, drive_v in self._drive[drive : drive + count]:
-            dx = x_x * x + x_v * v + (held_x + drive_x) + x_rest
-            dv = v_x * x + v_v * v + (held_v + drive_v) + v_rest
+            dx = x_x * x + x_v * v + (held_x + drive_x) + x_low
+            dv = v_x * x + v_v * v + (held_v + drive_v) + v_low
             next_x = x + dx
             next_v = v + dv
-            x_rest = dx - (next_x - x)
-            v_rest = dv - (next_v - v)
+            x_low = dx - (next_x - x)
+            v_low = dv - (next_v - v)
             x = next_x
             v = next_v
             log_x(x)
             log_v(v)
-        self.x, self.v, self._x_rest, self._v_rest = x, v, x_rest, v_rest
+            log_low(x_low)
+        self.x, self.v, self._x_low, self._v_low = x, v, x_low, v_low
         return drive + count
 
     def _refuse(self, tick: int, holds: list[Hold]) -> bool:
@@ -164,14 +165,15 @@ class Plant:
     def take_block(self) -> tuple[int, int, dict[str, bytes]]:
         """(first tick, ticks, columns) of what was stepped since the last block; empties it.
 
-        Columns x, v, force, command are little-endian float64 with ``ticks * n + 1`` rows: every step of the block
-        and its end state, whose force and command are the last held ones.
+        Columns x, v, x_low (what rounding to a float left of x), force and command are little-endian float64 with
+        ``ticks * n + 1`` rows: every step of the block and its end state, whose force and command are the last held ones.
         """
         first, reached = self._block_first, self.reached
         counts, forces, commands = zip(*self._holds[1:], (1, *self._holds[-1][1:]), strict=True)
         columns = {
             "x": array("d", self._xs).tobytes(),
             "v": array("d", self._vs).tobytes(),
+            "x_low": array("d", self._lows).tobytes(),
             "force": np.repeat(np.array(forces, float), counts).tobytes(),
             "command": np.repeat(np.array(commands, float), counts).tobytes(),
         }
@@ -181,5 +183,5 @@ class Plant:
     def _begin_block(self) -> None:
         """Start a block with the present state; the last hold stays, for whoever asks for the force."""
         self._block_first = self.reached
-        self._xs, self._vs = [self.x], [self.v]
+        self._xs, self._vs, self._lows = [self.x], [self.v], [self._x_low]
         self._holds = self._holds[-1:]

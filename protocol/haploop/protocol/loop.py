@@ -99,7 +99,7 @@ class ControllerEnd:
         self.socket = open_socket(context, zmq.DEALER)
         self.socket.setsockopt(zmq.RCVTIMEO, REPORT_MS)
         self.socket.connect(address)
-        self._pack = msgpack.Packer(autoreset=True).pack
+        self._pack = msgpack.Packer(autoreset=True, default=float).pack  # an element may give a number of another type
 
     def greet(self, secret: str, idle: Idle) -> None:
         """Present ourselves with the run's secret and wait for the plant's greeting."""
