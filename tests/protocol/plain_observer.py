@@ -4,7 +4,8 @@ usage: plain_observer.py RUN_JSON [--viewer] [--ticks N] [--dwell]
 
 Attaches to the run that RUN_JSON announces, prints one JSON line when it has the state of plant and controller, reads
 on for N ticks or to the end of the run, leaves, and prints a second JSON line with all it saw.
---viewer: join no clock and report nothing, so that the run does not wait; what is missed is counted.
+--viewer: join no clock and report nothing, so that the run does not wait; what is missed is counted. Whenever all that
+  has come is taken in, a JSON line says how far.
 --dwell: after attaching, report and stay, but take no more blocks (for tests that end this process).
 """
 
@@ -131,7 +132,7 @@ def main():
     if clock:
         poller.register(clock.socket, zmq.POLLIN)
 
-    ready, reported, last = False, -1, None
+    ready, reported, last, quiet = False, -1, None, -1
     while not all(stream.ended for stream in streams):
         heard = dict(poller.poll(200))
         for stream in streams:
@@ -151,6 +152,9 @@ def main():
             clock.say(PROGRESS, done, {})
         elif clock:
             clock.say(WAITING, done, "plant")
+        elif not heard and done > quiet:
+            quiet = done
+            print(json.dumps({"quiet": quiet}), flush=True)
         reported = done
         if last is not None and done >= last:
             break

@@ -120,8 +120,12 @@ def test_a_viewer_that_stands_still_costs_nothing_and_afterwards_counts_what_it_
         run.ask("resume")
         run.stands_at(2900)
         os.kill(viewer.process.pid, signal.SIGCONT)
+        while viewer.line()["quiet"] <= 100:
+            pass
         run.ask("resume")
-        seen = viewer.leave()
+        while "plant" not in (seen := viewer.line()):
+            pass
+        viewer.kill()
         summary = run.result()
     assert summary["ended"] == "done"
     assert summary["lost"]["telemetry_gaps"] == 0

@@ -1,0 +1,102 @@
+"""The verdict of a run, from signals whose verdict is plain."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from haploop.logger.window import Window, swings
+
+RATE, N = 10_000, 10
+WALL = -0.06
+
+
+def judged(x_of_t, seconds: float = 1.0, resolution: float = 0.0, pieces: int = 7, diverged: str | None = None):
+    """Verdict and figures of a device that moved as ``x_of_t`` says; the wall below ``WALL``, force 100 N/m deep."""
+    window = Window(RATE, N, resolution)
+    ticks = round(seconds * RATE / N)
+    bounds = [ticks * i // pieces for i in range(pieces + 1)]
+    for first, last in zip(bounds[:-1], bounds[1:], strict=True):
+        x = x_of_t(np.arange(first * N, last * N + 1) / RATE)
+        at_ticks = x[:-1:N]
+        depth = np.maximum(0.0, WALL - at_ticks)
+        rows = {"x": at_ticks, "total": 100.0 * depth, "in_contact": (depth > 0).astype(float)}
+        window.add(x, np.repeat(100.0 * depth, N), rows | {"wall_position": np.full(len(at_ticks), WALL)})
+    return window.verdict(diverged).word, window.figures(), window
+
+
+def test_a_device_at_rest_in_the_wall_is_steady_and_shows_the_stiffness_of_the_wall():
+    word, figures, window = judged(lambda t: np.full_like(t, -0.061))
+    assert word == "steady"
+    assert figures["oscillation_m"] == 0.0
+    assert figures["outside_fraction"] == 0.0
+    assert figures["displayed_stiffness_N_m"] == pytest.approx(100.0)
+    assert (window.x_min_m, window.x_max_m) == (-0.061, -0.061)
+    assert window.force_max_N == pytest.approx(0.1)
+
+
+@pytest.mark.parametrize("hz", [5.0, 60.0, 300.0])
+def test_a_swing_that_goes_on_is_a_limit_cycle_and_its_width_is_the_oscillation(hz):
+    word, figures, _ = judged(lambda t: -0.061 + 1e-3 * np.sin(2 * math.pi * hz * t))
+    assert word == "limit-cycle"
+    assert figures["oscillation_m"] == pytest.approx(2e-3, rel=1e-3)
+
+
+def test_a_swing_that_dies_away_is_steady():
+    assert judged(lambda t: -0.061 + 1e-3 * np.exp(-8 * t) * np.sin(2 * math.pi * 60 * t))[0] == "steady"
+
+
+def test_a_slow_way_into_the_wall_is_no_limit_cycle_however_long_it_is():
+    assert judged(lambda t: -0.0601 - 5e-3 * t)[0] == "steady"
+    assert judged(lambda t: -0.0601 - 5e-3 * t + 1e-4 * np.sin(400 * t))[0] == "limit-cycle"
+
+
+def test_swings_within_one_encoder_step_either_way_do_not_count():
+    def chatter(t):
+        return -0.061 + 0.9e-5 * np.sign(np.sin(500 * t))
+
+    assert judged(chatter, resolution=1e-5)[0] == "steady"
+    assert judged(chatter, resolution=0.5e-5)[0] == "limit-cycle"
+
+
+def test_a_device_that_has_left_for_good_is_not_called_steady():
+    word, figures, _ = judged(lambda t: -0.061 + 0.1 * np.maximum(0, t - 0.3))
+    assert word == "no-contact"
+    assert figures["outside_fraction"] == 1.0
+    assert figures["displayed_stiffness_N_m"] is None
+
+
+def test_a_plant_that_ended_by_itself_has_diverged_whatever_the_window_shows():
+    assert judged(lambda t: np.full_like(t, -0.061), diverged="it was at 2 m, at tick 7")[0] == "diverged"
+
+
+@pytest.mark.parametrize(("seconds", "start"), [(2.0, 1.5), (0.5, 0.0), (0.6, 0.1), (0.4, 0.2), (0.001, 0.0005)])
+def test_the_window_is_the_last_half_second_or_the_second_half_of_a_shorter_run(seconds, start):
+    _, figures, _ = judged(lambda t: -0.061 + 1e-3 * t, seconds, pieces=1 if seconds < 0.01 else 7)
+    assert figures["from_s"] == pytest.approx(start)
+    assert figures["oscillation_m"] == pytest.approx(1e-3 * (seconds - start), rel=1e-6)
+
+
+@pytest.mark.parametrize("pieces", [1, 3, 100])
+def test_how_the_run_is_cut_changes_nothing(pieces):
+    def moving(t):
+        return -0.0605 + 1e-3 * np.sin(300 * t + t * t)
+
+    assert judged(moving, 1.3, pieces=pieces)[1] == judged(moving, 1.3, pieces=13)[1]
+
+
+def test_a_position_on_the_face_but_for_rounding_counts_for_no_stiffness():
+    """1e-5 * -6000 is -0.060000000000000005: force over that penetration would be anything."""
+    window = Window(RATE, N, 1e-5)
+    x = np.full(6001, 1e-5 * -6000)
+    rows = {"x": x[:-1:N], "total": np.full(600, 0.3), "in_contact": np.ones(600), "wall_position": np.full(600, WALL)}
+    window.add(x, np.zeros(6000), rows)
+    assert window.figures()["displayed_stiffness_N_m"] is None
+
+
+def test_crossings_are_counted_from_beyond_one_side_to_beyond_the_other():
+    x = np.array([0.0, 2.0, 0.5, 2.0, -2.0, 0.5, -2.0, 2.0, -2.0, 0.0])
+    assert swings(x, 1.0)[0] == 3
+    assert swings(np.zeros(3), 1.0) == (0, 0.0)
