@@ -27,7 +27,7 @@ class Going:
         live: as other terminals find it.
     """
 
-    def __init__(self, prepared: Prepared, announced: Callable[[Path], None], options: dict[str, Any]) -> None:
+    def __init__(self, prepared: Prepared, announced: Callable[[Path], object], options: dict[str, Any]) -> None:
         self.prepared = prepared
         self._result: dict[str, Any] = {}
         self._error: BaseException | None = None
@@ -62,6 +62,7 @@ class Going:
 
     def stands_at(self, tick: int, paused: bool = True) -> None:
         """Wait until the run stands still at ``tick``, every tick before it logged, on request or because it must."""
+        data: dict[str, Any] = {}
         for _ in range(1500):
             data = self.ask("status")[1]
             if data["paused"] == paused and data["granted"] == tick and data["tick"] == tick:
@@ -90,7 +91,7 @@ def going(
     tmp_path: Path,
     *overrides: str,
     pauses: tuple[int, ...] = (),
-    announced: Callable[[Path], None] = lambda sockets: None,
+    announced: Callable[[Path], object] = id,
     **options: Any,
 ) -> Iterator[Going]:
     """A run of figure 6(c) with overrides, standing still at the ticks ``pauses``."""

@@ -65,7 +65,7 @@ ROWS: dict[str, tuple[Callable[[], float], str, str, float]] = {
     "processes, d = 10 ms, every step logged": (_loop_us(0.010, "steps", 20.0), "us/tick", "ping-pong", 0.6),
     "processes, d = 10 ms, ticks logged": (_loop_us(0.010, "ticks", 20.0), "us/tick", "ping-pong", 0.4),
     "one process, books, no log": (lambda: _in_process_us(20.0), "us/tick", "plain loop", 8.0 / 2.7),
-    # "haploop run of one tick, start to end": (_first_tick_s, "s", "", 0.0),
+    "haploop run of one tick, start to end": (_first_tick_s, "s", "", 0.0),
 }
 
 

@@ -31,7 +31,7 @@ PATIENCE_S = 40.0
 ROLES = tuple(PROCESSES)
 
 
-def first_and_slowly(*values: str) -> list[Any]:
+def first_and_slowly(*values: Any) -> list[Any]:
     """Parameters of a test, of which all but the first are left to the slow tests."""
     return [values[0], *(pytest.param(value, marks=pytest.mark.slow) for value in values[1:])]
 
@@ -44,7 +44,7 @@ def wait_for(what: str, look: Callable[[], Any]) -> Any:
     give_up = time.monotonic() + PATIENCE_S
     while not (answer := look()):
         assert time.monotonic() < give_up, f"{what} has not come within {PATIENCE_S:g} s"
-        time.sleep(0.01)
+        time.sleep(0.03)
     return answer
 
 
@@ -120,7 +120,6 @@ class Launched:
         try:
             stdout, _ = self._process.communicate(timeout=PATIENCE_S)
         except subprocess.TimeoutExpired:
-            self.clear_away()
             raise AssertionError(f"haploop has not ended; it said: {self.stderr}") from None
         self.took_s = time.monotonic() - self._since
         print(f"ended {self.took_s:.2f} s later: {self.stderr[-400:]}")

@@ -111,12 +111,15 @@ def test_a_logger_that_leaves_by_an_interrupt_has_a_whole_log_and_the_run_goes_o
 
 
 def test_a_logger_that_is_killed_does_not_hold_the_run_up_until_the_deadline(running, attached, alone):
-    run = running(sets=(*SHORT, NEVER))
+    """Not even when the run is waiting for it already, a window of 4 blocks of 50 ticks ahead."""
+    run = running(sets=(*SHORT, NEVER, "run.block_ticks=50"))
     run.reaches(500)
     second = attached(run)
+    second.signal(signal.SIGSTOP)
+    run.ask("resume")
+    assert run.reaches(700) == run.ask("status")["granted"] == 700
     second.signal(signal.SIGKILL)
     second.end(-signal.SIGKILL)
-    run.ask("resume")
     assert run.summary()["trajectory_sha256"] == alone
     assert haploop.logger.read(second.out).truncated
 
@@ -172,6 +175,7 @@ def test_a_logger_whose_run_fails_says_why(running, attached):
     assert json.loads((second.out / "summary.json").read_text())["ended"] == "failed"
 
 
+@pytest.mark.slow
 def test_a_directory_that_holds_something_is_refused_by_attach_too(running, launched, tmp_path):
     (tmp_path / "kept.txt").touch()
     run = running()

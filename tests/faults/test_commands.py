@@ -116,6 +116,7 @@ def test_what_cannot_be_done_is_refused_with_the_reason_and_leaves_the_run_as_it
     assert [element["kind"] for element in summary["energy"]["elements"]] == ["unidirectional-inertia"]
 
 
+@pytest.mark.slow
 def test_a_refused_command_line_says_why_and_exits_with_2(running):
     run = running()
     run.reaches(1)
@@ -152,6 +153,7 @@ def test_two_runs_side_by_side_each_give_the_bits_they_give_alone(running):
         run.leaves_nothing()
 
 
+@pytest.mark.slow
 def test_killing_a_node_of_one_run_does_not_disturb_the_one_beside_it(running, undisturbed):
     doomed, other = running(), running(sets=("duration=3",), pace=("--pace", "2"))
     doomed.reaches(1)

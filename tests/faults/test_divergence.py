@@ -32,6 +32,7 @@ def test_a_device_beyond_the_limit_ends_the_run_with_verdict_tick_and_a_whole_lo
     assert json.loads((run.out / "summary.json").read_text())["verdict"] == "diverged"
 
 
+@pytest.mark.slow
 def test_both_ways_to_run_it_diverge_at_the_same_bits(running):
     sets = (*UNSTABLE, "duration=30")
     digests = {running(*way, sets=sets, pace=()).summary()["trajectory_sha256"] for way in ((), ("--in-process",))}

@@ -4,12 +4,12 @@ import json
 import signal
 
 import pytest
-from faults.launched import SCENE, same_bits, wait_for
+from faults.launched import SCENE, first_and_slowly, same_bits, wait_for
 
 import haploop.logger
 from haploop.launch.replay import replay
 
-SIGNALS = (signal.SIGINT, signal.SIGTERM)
+SIGNALS = first_and_slowly(signal.SIGINT, signal.SIGTERM)
 
 
 def assert_stopped_in_order(run, summary, undisturbed):
@@ -25,21 +25,15 @@ def assert_stopped_in_order(run, summary, undisturbed):
 
 @pytest.mark.parametrize("number", SIGNALS)
 def test_the_first_signal_ends_a_run_in_order_with_a_summary_of_what_ran(number, running, undisturbed):
+    """And it can be replayed, bit for bit."""
     run = running()
     done = run.reaches(200)
     run.signal(number)
     summary = run.summary()
     run.leaves_nothing()
     assert summary["ticks"] >= done
-    assert_stopped_in_order(run, summary, undisturbed)
-
-
-def test_a_run_that_a_signal_ended_can_be_replayed_bit_for_bit(running):
-    run = running()
-    run.reaches(200)
-    run.signal(signal.SIGINT)
-    run.end(0)
     assert replay(run.out).differences == []
+    assert_stopped_in_order(run, summary, undisturbed)
 
 
 def test_the_first_signal_ends_a_paused_run_where_it_stands(running, undisturbed):

@@ -82,7 +82,7 @@ def test_a_force_that_is_no_finite_number_fails_a_run_in_one_process_too(launche
     ("statement", "reason"),
     [("1 / 0", "ZeroDivisionError: division by zero"), ("return 'much'", "TypeError: unsupported operand")],
 )
-@pytest.mark.parametrize("options", [(), ("--in-process",)])
+@pytest.mark.parametrize("options", first_and_slowly((), ("--in-process",)))
 def test_a_force_that_raises_or_is_no_number_fails_the_run_and_names_element_and_tick(
     statement, reason, options, launched, brake, tmp_path
 ):
@@ -96,6 +96,7 @@ def test_a_force_that_raises_or_is_no_number_fails_the_run_and_names_element_and
     assert replay(out).differences == []
 
 
+@pytest.mark.slow
 def test_a_force_of_another_number_type_gives_the_same_bits_both_ways(launched, brake, tmp_path):
     """As a force in single precision does, whose sum with the wall's is one too."""
     source = SOUND.replace("return -self.damping * motion.v", "return np.float32(-self.damping * motion.v)")

@@ -37,7 +37,7 @@ class Stream:
         self.socket.setsockopt(zmq.RCVHWM, 256)
         self.socket.connect(address)
         self.socket.subscribe(role.encode())
-        self.tick = None
+        self.tick = -1
         self.state = None
         self.gap_ticks = 0
         self.columns = {}
@@ -47,9 +47,9 @@ class Stream:
         version, code, tick, *fields = msgpack.unpackb(data, strict_map_key=False)
         assert version == VERSION, version
         if code == STATE:
-            if self.tick is None:
+            if self.state is None:
                 self.state, self.tick, self.first = fields[0], tick, tick
-        elif self.tick is None or tick < self.tick:
+        elif self.state is None or tick < self.tick:
             pass  # from before our state
         else:
             self.gap_ticks += tick - self.tick
@@ -65,7 +65,7 @@ class Stream:
             kept = self.columns.setdefault(name, [])
             if code == PLANT_BLOCK:  # blocks overlap by one state
                 if follows and kept and name in ("x", "v"):
-                    assert kept[-1] == column[0], f"{name} at tick {tick}: {kept[-1]} ended a block, {column[0]} begins one"
+                    assert kept[-1] == column[0], f"{name} at tick {tick}: {kept[-1]}, then {column[0]}"
                 if follows and kept:
                     del kept[-1]
             else:

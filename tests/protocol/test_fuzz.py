@@ -3,20 +3,23 @@
 import hashlib
 import subprocess
 import sys
+import tempfile
 import threading
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import attacks
 import numpy as np
 import pytest
 import zmq
 from live_run import Going, going, undisturbed
+from scene_makers import KINDS, scene
 
 import haploop.logger
-
-sys.path.insert(0, str(Path(__file__).parent))
-import attacks  # noqa: E402
+from haploop.launch.clock import Clock
+from haploop.launch.clock_server import ClockServer
+from haploop.protocol.ticks import Timebase
 
 REFUSED, WELCOME, REPLY = 3, 2, 14
 
@@ -69,8 +72,8 @@ def test_commands_that_cannot_be_carried_out_are_refused_and_change_nothing(
                 assert text
         run.ask("resume")
         assert_unharmed(run, run.result())
-    noted = [event for _, event in haploop.logger.read(run.prepared.out)["/events"]]
-    assert all("pause" in event or "resume" in event for event in noted), noted
+    noted = haploop.logger.read(run.prepared.out)["/events"]
+    assert [set(event) & {"pause", "resume", "swap", "set", "stop"} for event in noted] == [{"pause"}, {"resume"}]
 
 
 def test_an_observer_that_talks_nonsense_harms_only_itself(
@@ -93,7 +96,7 @@ def test_an_observer_that_talks_nonsense_harms_only_itself(
             for status in ({"refused": 5}, {"refused": ["I refuse"]}, {1: {2: [None]}}, {"t_s": "x", "verdict": []}):
                 observer.socket.send(attacks.pack(1, 6, 200, status))
             observer.socket.send(attacks.pack(1, 8, 0, "the plant has ended"))
-            text, data = run.ask("status")
+            data = run.ask("status")[1]
             assert data["nodes"][-1]["role"] == "observer"
             observer.socket.send(attacks.pack(1, 10, 0, "I cannot go on"))
         run.ask("resume")
@@ -129,6 +132,8 @@ def test_junk_on_every_socket_before_a_run_begins_and_while_it_runs_changes_noth
             attack(run.live.sockets / f"{name}.sock")
         run.ask("resume")
         assert_unharmed(run, run.result())
+    for sender in opened:
+        sender.close(0)
     assert len(opened) == 14
 
 
@@ -145,3 +150,25 @@ def test_a_flood_of_junk_on_every_socket_cannot_hold_a_run_up(tmp_path: Path) ->
             finally:
                 flood.kill()
         assert_unharmed(run, summary)
+
+
+def test_the_clock_grants_after_a_turns_worth_of_messages_however_many_wait(
+    context: "zmq.Context[zmq.Socket[bytes]]",
+) -> None:
+    resolved = scene()
+    time = Timebase.of(resolved["clock"], resolved["duration"])
+    with tempfile.TemporaryDirectory(prefix="hl", dir="/tmp") as sockets:
+        server = ClockServer(context, Path(sockets), "", Clock(resolved, time, KINDS), {}, lambda *_: (True, "", {}))
+        with attacks.Stranger(context, Path(sockets) / "clock.sock") as stranger:
+            for _ in range(900):
+                stranger.socket.send(b"junk")
+            stranger.socket.send(attacks.pack(1, 13, "status", {}))
+            turns = []
+            while sum(turns) < 900:
+                server.socket.poll()
+                threading.Event().wait(0.02)  # let more of them come in
+                before = server.strangers
+                server.serve()
+                turns.append(server.strangers - before)
+        server.close()
+    assert max(turns) <= 200

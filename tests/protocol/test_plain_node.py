@@ -1,8 +1,9 @@
-"""Any process that speaks the protocol can watch a run: a node written from the README alone, in place of all others."""
+"""Any process that speaks the protocol can watch a run: here a node written from the README alone."""
 
 import base64
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -15,6 +16,7 @@ from live_run import Going, going, undisturbed
 import haploop.logger
 
 OBSERVER = Path(__file__).with_name("plain_observer.py")
+README = Path(__file__).parents[2] / "protocol" / "README.md"
 STEPS_PER_TICK = 10
 
 
@@ -32,7 +34,8 @@ class Observer:
 
     def leave(self) -> dict[str, Any]:
         """What it saw, once it has left."""
-        seen = self.line()
+        while "plant" not in (seen := self.line()):
+            pass
         assert self.process.stdout
         with self.process.stdout:
             assert self.process.wait(30) == 0
@@ -49,12 +52,21 @@ def column(seen: dict[str, Any], role: str, name: str) -> np.ndarray:
     return np.frombuffer(base64.b64decode(seen[role]["columns"][name]), "<f8")
 
 
+def documented(message: str) -> set[str]:
+    """The columns of a message's blocks in the README: the names in the table after its paragraph."""
+    _, _, after = README.read_text(encoding="utf-8").partition(f"**{message}**: `ticks")
+    rows = [line for line in after.split("\n\n")[1].splitlines() if line.startswith("| `")]
+    return {name for row in rows for name in re.findall(r"`([\w.]+)`", row.split("|")[1])}
+
+
 def assert_saw_the_log(run: Going, seen: dict[str, Any]) -> None:
     """Every sample seen is the log's, bit for bit, without a gap from the first to the last."""
     log = haploop.logger.read(run.prepared.out)
     plant, controller = seen["plant"], seen["controller"]
     assert plant["gap_ticks"] == controller["gap_ticks"] == 0
     steps = slice(plant["first"] * STEPS_PER_TICK, plant["tick"] * STEPS_PER_TICK + 1)
+    assert set(plant["columns"]) == documented("PLANT_BLOCK")
+    assert set(controller["columns"]) == documented("CONTROLLER_BLOCK") - {"dissipation.1"}
     for name in ("x", "v"):
         assert column(seen, "plant", name).tobytes() == log["/plant"][name][steps].tobytes()
     # A step's force is the one held from it on; what follows the last step seen was not yet known then.
@@ -123,9 +135,7 @@ def test_a_viewer_that_stands_still_costs_nothing_and_afterwards_counts_what_it_
         while viewer.line()["quiet"] <= 100:
             pass
         run.ask("resume")
-        while "plant" not in (seen := viewer.line()):
-            pass
-        viewer.kill()
+        seen = viewer.leave()
         summary = run.result()
     assert summary["ended"] == "done"
     assert summary["lost"]["telemetry_gaps"] == 0

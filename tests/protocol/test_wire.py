@@ -19,6 +19,7 @@ PLAIN = st.one_of(st.none(), st.booleans(), WHOLE, st.floats(allow_nan=False), T
 NESTED = st.recursive(
     PLAIN, lambda inner: st.lists(inner, max_size=4) | st.dictionaries(TEXT, inner, max_size=4), max_leaves=12
 )
+pack = msgpack.Packer(autoreset=True).pack
 FIELD = {
     "int": WHOLE,
     "number": WHOLE | st.floats(allow_nan=False),
@@ -45,7 +46,8 @@ def test_every_message_comes_back_as_it_was(name: str, data: st.DataObject) -> N
     fields = [data.draw(FIELD[kind]) for _, kind in MESSAGES[name].fields]
     frame = decode(encode(name, *fields))
     assert frame == Frame(name, fields)
-    assert list(frame.as_dict().items()) == [(field, v) for (field, _), v in zip(MESSAGES[name].fields, fields, strict=True)]
+    names = [field for field, _ in MESSAGES[name].fields]
+    assert list(frame.as_dict().items()) == list(zip(names, fields, strict=True))
 
 
 @given(bits=st.integers(0, 2**64 - 1))
@@ -63,12 +65,8 @@ def test_a_float_comes_back_bit_for_bit(bits: int) -> None:
 @example(b"\xc6\xff\xff\xff\xff")
 @example(b"\xc7\x0c\xff" + b"\xff" * 12)  # a time stamp that is none
 def test_bytes_that_are_no_message_are_refused(data: bytes) -> None:
-    try:
-        frame = decode(data)
-    except WireError as error:
-        assert 0 < len(str(error)) < 200
-    else:
-        assert frame.name in MESSAGES
+    with pytest.raises(WireError, match=r"^.{1,200}$"):
+        decode(data)
 
 
 @given(message=messages(), cut=st.floats(0, 1, exclude_max=True))
@@ -92,7 +90,7 @@ def test_another_version_is_refused(message: tuple[str, list[Any]], version: Any
     if type(version) is int and version == VERSION:
         return
     with pytest.raises(WireError, match=f"This is protocol version {VERSION}"):
-        decode(msgpack.packb([version, MESSAGES[message[0]].code, *message[1]]))
+        decode(pack([version, MESSAGES[message[0]].code, *message[1]]))
 
 
 @given(code=NESTED)
@@ -104,7 +102,7 @@ def test_an_unknown_code_is_refused(code: Any) -> None:
     if type(code) is int and code in {message.code for message in MESSAGES.values()}:
         return
     with pytest.raises(WireError, match="No message has the code"):
-        decode(msgpack.packb([VERSION, code, 0]))
+        decode(pack([VERSION, code, 0]))
 
 
 @given(message=messages(), where=st.integers(0, 5), wrong=NESTED)
@@ -134,7 +132,7 @@ def test_missing_and_surplus_fields_are_refused(message: tuple[str, list[Any]], 
 @pytest.mark.parametrize("wrapped", [{}, {1: 2}, "READY", 4, None, b"\x01\x04", [], [VERSION]])
 def test_a_frame_must_be_an_array_of_version_and_code(wrapped: Any) -> None:
     with pytest.raises(WireError, match="array"):
-        decode(msgpack.packb(wrapped))
+        decode(pack(wrapped))
 
 
 @pytest.mark.parametrize("depth", [100, 900, 1000, 1020, 1024, 5000, 100_000])
@@ -161,7 +159,7 @@ def test_the_largest_whole_numbers_of_the_wire_come_through_and_larger_ones_cann
 
 def test_keys_that_cannot_be_keys_are_refused() -> None:
     for key in ([], {}, [1, [2]]):
-        items = b"\x94\x01\x06\x00\x81" + msgpack.packb(key) + b"\x00"
+        items = b"\x94\x01\x06\x00\x81" + pack(key) + b"\x00"
         with pytest.raises(WireError):
             decode(items)
 

@@ -13,7 +13,7 @@ from haploop.launch.clock import Clock
 from haploop.launch.failure import RunFailed
 from haploop.launch.roster import Node, Roster
 from haploop.protocol.processes import PROCESSES
-from haploop.protocol.sockets import bind, open_socket
+from haploop.protocol.sockets import bind, has_message, open_socket
 from haploop.protocol.wire import Frame, WireError, decode, encode
 
 Command = Callable[[str, dict[str, Any]], tuple[bool, str, dict[str, Any]]]
@@ -73,7 +73,7 @@ class ClockServer:
             RunFailed: one of the run's own processes said that it cannot go on.
         """
         for _ in range(_AT_ONCE):
-            if not self._socket.get(zmq.EVENTS) & zmq.POLLIN:
+            if not has_message(self._socket):
                 break
             sender, *frames = self._socket.recv_multipart()
             try:

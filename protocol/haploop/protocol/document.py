@@ -1,4 +1,4 @@
-"""The tables in ``protocol/README.md``, written from the tables in the code: ``python -m haploop.protocol.document``."""
+"""The tables in ``protocol/README.md``, written from those in the code by ``python -m haploop.protocol.document``."""
 
 from __future__ import annotations
 
@@ -36,7 +36,11 @@ def table() -> str:
 
 def _processes() -> str:
     rows = (
-        (process.role, f"`python -m {process.module}`", ", ".join(f"`{file}.sock` ({ch})" for ch, file in process.binds.items()))
+        (
+            process.role,
+            f"`python -m {process.module}`",
+            ", ".join(f"`{f}.sock` ({ch})" for ch, f in process.binds.items()),
+        )
         for process in PROCESSES.values()
     )
     return "#### Processes of every run\n\n" + _markdown(("role", "started as", "binds"), rows)

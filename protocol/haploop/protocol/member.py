@@ -7,7 +7,7 @@ from typing import Any
 
 import zmq
 
-from haploop.protocol.sockets import open_socket
+from haploop.protocol.sockets import has_message, open_socket
 from haploop.protocol.wire import Frame, WireError, decode, encode
 
 # A node that waits says so this often, so that the clock can tell who is being waited for.
@@ -67,7 +67,7 @@ class Member:
 
     def poll(self) -> None:
         """Take what the clock has sent, without waiting."""
-        while self._socket.get(zmq.EVENTS) & zmq.POLLIN:
+        while has_message(self._socket):
             self._receive()
 
     def wait(self, tick: int) -> bool:

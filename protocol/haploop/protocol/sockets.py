@@ -13,7 +13,7 @@ from haploop.protocol.wire import MAX_FRAME_BYTES
 TELEMETRY_BACKLOG_BLOCKS = 256
 # What comes in where anyone may connect is small: reports and commands, subscriptions to a role. (A large scene goes
 # out, from there to sockets that connect.)
-_LARGEST = {zmq.ROUTER: 4 * 1024 * 1024, zmq.XPUB: 1024}
+_LARGEST: dict[int, int] = {zmq.ROUTER: 4 * 1024 * 1024, zmq.XPUB: 1024}
 # The kernel's limit on the path of an ipc socket.
 _LONGEST_PATH = 107
 
@@ -32,6 +32,11 @@ def open_socket(context: zmq.Context[zmq.Socket[bytes]], kind: int) -> zmq.Socke
     if kind == zmq.SUB:
         socket.setsockopt(zmq.RCVHWM, TELEMETRY_BACKLOG_BLOCKS)
     return socket
+
+
+def has_message(socket: zmq.Socket[bytes]) -> bool:
+    """Whether a message is there to be taken."""
+    return bool(int(socket.get(zmq.EVENTS)) & zmq.POLLIN)
 
 
 def bind(socket: zmq.Socket[bytes], directory: Path, name: str) -> str:

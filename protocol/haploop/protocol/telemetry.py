@@ -7,9 +7,8 @@ from typing import Any
 
 import zmq
 
-from haploop.protocol.sockets import open_socket
+from haploop.protocol.sockets import has_message, open_socket
 from haploop.protocol.wire import Frame, WireError, decode, encode
-
 
 # Requests taken at one block boundary, so that nobody who floods a publisher can hold its node up.
 _AT_ONCE = 200
@@ -44,7 +43,7 @@ class Publisher:
         """Answer new subscriptions; call at block boundaries only, where the state is that of a tick."""
         new = False
         for _ in range(_AT_ONCE):
-            if not self.socket.get(zmq.EVENTS) & zmq.POLLIN:
+            if not has_message(self.socket):
                 break
             request = self.socket.recv()
             if request[:1] == b"\x01" and self._topic.startswith(request[1:]):
@@ -98,7 +97,7 @@ class Subscriber:
         """What is there now, without waiting; blocks from before the publisher's STATE are left out."""
         messages = []
         for socket, role in self._sockets.items():
-            while socket.get(zmq.EVENTS) & zmq.POLLIN:
+            while has_message(socket):
                 frame = self._read(socket)
                 if frame and self._follows(role, frame):
                     messages.append((role, frame))

@@ -26,8 +26,12 @@ TOO_LARGE = {zmq.DEALER: 5 * 1024 * 1024, zmq.PUB: 5 * 1024 * 1024, zmq.XSUB: 5 
 MAX_WHOLE, MIN_WHOLE = 2**64 - 1, -(2**63)
 
 
+_packer = msgpack.Packer(autoreset=True)
+
+
 def pack(*items: Any) -> bytes:
-    return msgpack.packb(items)
+    """A frame."""
+    return _packer.pack(items)
 
 
 def junk(seed: int = 1) -> list[bytes]:
@@ -37,9 +41,12 @@ def junk(seed: int = 1) -> list[bytes]:
     frames = [b"", b"\0", b"\xc1", b"HELLO", b"GET / HTTP/1.1\r\n\r\n", b"\x80\x04N.", b"\xff" * 1000]
     frames += [dice.randbytes(dice.randint(1, 300)) for _ in range(50)]
     frames += [data[:cut] for data in good for cut in range(1, len(data))]
-    frames += [pack(version, 13, "stop", {}) for version in (0, 2, -1, 1.0, True, "1", None, [1], {}, math.nan, MAX_WHOLE)]
-    frames += [pack(1, code, 0) for code in (0, 99, -1, MAX_WHOLE, 6.0, True, "6", None, [], b"6")]
-    frames += [pack(1, 6, *fields) for fields in ((), (1,), ("1", {}), (1.0, {}), (True, {}), (None, {}), (1, []), (1, {}, 2))]
+    versions = (0, 2, -1, 1.0, True, "1", None, [1], {}, math.nan, MAX_WHOLE)
+    codes = (0, 99, -1, MAX_WHOLE, 6.0, True, "6", None, [], b"6")
+    progress = ((), (1,), ("1", {}), (1.0, {}), (True, {}), (None, {}), (1, []), (1, {}, 2))
+    frames += [pack(version, 13, "stop", {}) for version in versions]
+    frames += [pack(1, code, 0) for code in codes]
+    frames += [pack(1, 6, *fields) for fields in progress]
     frames += [head * depth + b"\x01" for head in (b"\x91", b"\x81\x01") for depth in (1000, 1020, 5000)]
     frames += [b"\x92" + b"\x91" * 1010 + b"\x01\x04", b"\x92\x01" + b"\x91" * 1010 + b"\x01"]
     frames += [b"\xdd\xff\xff\xff\xff", b"\xdf\xff\xff\xff\xff", b"\xc6\xff\xff\xff\xff", b"\x93\x01\x06\xc7\xff\x05"]
@@ -72,7 +79,7 @@ def false_joins() -> list[bytes]:
     """Requests to take part that must not be granted."""
     own = [pack(1, 1, role, "0" * 32, 1, {}, True) for role in PUBLISHERS]
     odd = [pack(1, 1, role, "", 1, {}, True) for role in ("", "x" * 41, "\x1b[2J", "a\nb")]
-    return own + odd + [pack(1, 1, "observer", "", 1, endpoints, True) for endpoints in ({1: "x"}, {"x": 1}, {"x": [{}]})]
+    return own + odd + [pack(1, 1, "observer", "", 1, binds, True) for binds in ({1: "x"}, {"x": 1}, {"x": [{}]})]
 
 
 def impossible_commands() -> Iterator[tuple[Any, Any]]:
@@ -81,17 +88,26 @@ def impossible_commands() -> Iterator[tuple[Any, Any]]:
     for _ in range(400):
         deep = {"kind": [deep]}
     damping = {"kind": "damping", "damping": 0.5}
-    yield from ((verb, {}) for verb in ("", "Stop", "x" * 100_000, "__class__", "swap", "set"))
-    yield from (("step", {"ticks": ticks}) for ticks in (0, -1, 1.5, "1", None, [], MIN_WHOLE, math.nan))
-    yield from (("stop", {key: 1}) for key in ("self", "ticks", "", 5, None, b"x", True))
-    yield from (("swap", {"swap": swap}) for swap in (None, 1, "damping", [], {}, deep, {"kind": deep}, {"kind": None}))
-    yield from (("swap", {"swap": {"kind": "damping", "damping": b}}) for b in (None, -1.0, math.inf, math.nan, "x", deep, []))
-    yield from (("swap", {"swap": damping, "element": i}) for i in (-1, 2, 1.5, "one", MAX_WHOLE, math.nan, [], deep))
-    yield from (("swap", {"swap": damping, "at": at}) for at in (math.inf, -math.inf, math.nan, -1, 1e308, MAX_WHOLE, "soon", [], deep))
-    yield ("swap", {"swap": damping, "reload": True})
-    yield ("swap", {"swap": {**damping, 5: 6}})
-    values = ({}, deep, {1: 2}, {None: 1}, {"": 1}, {"wall.stiffness": None}, {"wall.stiffness": deep}, {"device.mass": 1.0})
-    yield from (("set", {"set": value}) for value in (None, 1, "wall.stiffness", [], *values[1:]))
+    odd = (None, "x", math.nan, math.inf, [], deep)
+    changes = (*odd, 1, {}, {1: 2}, {None: 1}, {"": 1}, {"kind": deep}, {"kind": None}, {**damping, 5: 6})
+    settings = ({"wall.stiffness": None}, {"wall.stiffness": deep}, {"device.mass": 1.0}, {"wall": {"stiffness": 1.0}})
+    for verb in ("", "Stop", "x" * 100_000, "__class__", "swap", "set"):
+        yield verb, {}
+    for key in ("self", "ticks", "", 5, None, b"x", True):
+        yield "stop", {key: 1}
+    for ticks in (*odd, 0, -1, 1.5, MIN_WHOLE):
+        yield "step", {"ticks": ticks}
+    for change in changes:
+        yield "swap", {"swap": change}
+    for value in (*odd, -1.0):
+        yield "swap", {"swap": {"kind": "damping", "damping": value}}
+    for element in (*odd[1:], -1, 2, 1.5, MAX_WHOLE):
+        yield "swap", {"swap": damping, "element": element}
+    for at in (*odd[1:], -math.inf, -1, 1e308, MAX_WHOLE):
+        yield "swap", {"swap": damping, "at": at}
+    yield "swap", {"swap": damping, "reload": True}
+    for change in (*odd, 1, *changes[8:], *settings):
+        yield "set", {"set": change}
 
 
 class Stranger:
@@ -144,10 +160,9 @@ def no_zeromq(path: Path) -> None:
     """Raw bytes instead of a ZeroMQ greeting, all of a greeting but its end, and nothing at all."""
     greeting = b"\xff" + bytes(8) + b"\x7f\x03\x00NULL" + bytes(48)
     for data in (os.urandom(2000), b"GET / HTTP/1.1\r\n\r\n", greeting[:20], greeting, greeting + os.urandom(500), b""):
-        with socket.socket(socket.AF_UNIX) as raw:
+        with socket.socket(socket.AF_UNIX) as raw, suppress(OSError):  # not listening yet, or thrown out already
             raw.connect(str(path))
-            with suppress(OSError):  # thrown out already
-                raw.sendall(data)
+            raw.sendall(data)
 
 
 def flood(directory: Path) -> None:
