@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -18,7 +19,7 @@ def judged(x_of_t, seconds: float = 1.0, resolution: float = 0.0, pieces: int = 
     window = Window(RATE, N, resolution)
     ticks = round(seconds * RATE / N)
     bounds = [ticks * i // pieces for i in range(pieces + 1)]
-    for first, last in zip(bounds[:-1], bounds[1:], strict=True):
+    for first, last in pairwise(bounds):
         x = x_of_t(np.arange(first * N, last * N + 1) / RATE)
         at_ticks = x[:-1:N]
         depth = np.maximum(0.0, WALL - at_ticks)

@@ -15,6 +15,9 @@ from haploop.launch.children import share_cores
 from haploop.plant.flow import StepFlow
 
 
+_pack = msgpack.Packer(autoreset=True).pack
+
+
 def _echo(address: str, ticks: int) -> None:
     """The other side of the ping-pong: one force for one sample."""
     socket = zmq.Context().socket(zmq.DEALER)
@@ -22,7 +25,7 @@ def _echo(address: str, ticks: int) -> None:
     socket.send(b"")
     for _ in range(ticks):
         message = msgpack.unpackb(socket.recv())
-        socket.send(msgpack.packb([1, 2, message[2], [0.25]]))
+        socket.send(_pack([1, 2, message[2], [0.25]]))
     socket.close(linger=1000)
 
 
@@ -40,7 +43,7 @@ def _ping_pong(address: str, ticks: int, result: str, cores: set[int] | None) ->
     socket.recv()
     began = time.perf_counter()
     for tick in range(ticks):
-        socket.send(msgpack.packb([1, 1, tick, [[0.5]]]))
+        socket.send(_pack([1, 1, tick, [[0.5]]]))
         msgpack.unpackb(socket.recv())
     Path(result).write_text(str((time.perf_counter() - began) / ticks * 1e6), encoding="utf-8")
     echo.join()

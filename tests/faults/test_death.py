@@ -4,7 +4,7 @@ import re
 import signal
 
 import pytest
-from faults.launched import ROLES, alive, first_and_slowly, same_bits, wait_for
+from faults.launched import LONG, ROLES, alive, first_and_slowly, same_bits, wait_for
 
 import haploop.logger
 from haploop.launch import run_directory
@@ -77,6 +77,21 @@ def test_a_node_that_hangs_is_named_after_the_deadline_the_user_has_set(role, ru
     assert re.search(r"the last tick all nodes had done is \d+ ", run.stderr)
     assert "run.deadline" in run.stderr
     assert same_bits(haploop.logger.read(run.out), undisturbed) >= 200
+
+
+@pytest.mark.parametrize("role", first_and_slowly(*reversed(ROLES)))
+def test_a_node_that_hangs_for_less_than_the_deadline_costs_time_but_not_one_tick(role, running, undisturbed):
+    """At a slow pace time is granted, and telemetry sent, in small pieces, and many can come together meanwhile."""
+    run = running(sets=(*LONG, "run.window_blocks=8"), pace=("--pace", "1"))
+    run.reaches(50)
+    run.send(role, signal.SIGSTOP)
+    wait_for("a while", lambda: run.stood_for(1.5))
+    run.send(role, signal.SIGCONT)
+    done = run.reaches(run.ask("status")["granted"] + 50)
+    run.ask("stop")
+    summary = run.summary()
+    assert summary["lost"]["telemetry_gaps"] == 0
+    assert same_bits(run.log(), undisturbed) == summary["ticks"] >= done
 
 
 @pytest.mark.parametrize("role", first_and_slowly("controller", "plant"))

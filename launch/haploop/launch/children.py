@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import contextlib
+import json
 import os
 import signal
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 from haploop.protocol.processes import PROCESSES
 
@@ -19,7 +21,7 @@ class Child:
     tells the launcher, without polling, that the process has ended.
     """
 
-    def __init__(self, role: str, sockets: Path, address: str, secret: str, cores: set[int] | None) -> None:
+    def __init__(self, role: str, sockets: Path, start: dict[str, Any], cores: set[int] | None) -> None:
         self.role = role
         command = [sys.executable, "-m", PROCESSES[role].module, str(sockets)]
         self._process = subprocess.Popen(
@@ -33,7 +35,7 @@ class Child:
             with contextlib.suppress(OSError):
                 os.sched_setaffinity(self._process.pid, cores)
         with contextlib.suppress(BrokenPipeError):
-            self._process.stdin.write(f"{address} {secret}\n".encode())
+            self._process.stdin.write(json.dumps(start).encode() + b"\n")
             self._process.stdin.flush()
         self.died = self._process.stdout.fileno()
 
@@ -75,7 +77,7 @@ class Child:
                     pipe.close()
 
 
-def start_children(sockets: Path, address: str, secret: str, pin: bool, run_number: int) -> dict[str, Child]:
+def start_children(sockets: Path, start: dict[str, Any], pin: bool, run_number: int) -> dict[str, Child]:
     """Start every process of the table.
 
     Plant and controller wait for each other at every tick and gain nothing from two cores, but lose the wake-up from
@@ -83,7 +85,7 @@ def start_children(sockets: Path, address: str, secret: str, pin: bool, run_numb
     """
     loop_cores, other_cores = share_cores(run_number) if pin else (None, None)
     return {
-        role: Child(role, sockets, address, secret, loop_cores if process.on_loop_core else other_cores)
+        role: Child(role, sockets, start, loop_cores if process.on_loop_core else other_cores)
         for role, process in PROCESSES.items()
     }
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +18,9 @@ Event = dict[str, Any]
 
 # At a given pace, time is granted this far ahead of the wall clock.
 AHEAD_S = 0.02
+# Grants that the slowest lossless node has not worked through. Each may end in a block of its own, however short; with
+# those of the window they must stay below what telemetry keeps for a subscriber.
+MOST_GRANTS = 100
 
 
 class ClockError(Exception):
@@ -28,7 +32,7 @@ class Clock:
 
     A tick may be worked on once it is granted; a change takes effect at a tick not yet granted, so every node knows
     of it in time. The grant is the least of: the end, the next pause, the target of a step, the pace, and the
-    progress of the slowest lossless node plus the window.
+    progress of the slowest lossless node plus the window; and no more than ``MOST_GRANTS`` lie ahead of that node.
 
     Args:
         scene, time: the resolved scene and its integers.
@@ -60,6 +64,9 @@ class Clock:
         self._pace = pace
         self._pace_from: float | None = None  # the first grant starts the pace
         self._pace_tick = 0
+        # Less than this is not worth a message.
+        self._least_ticks = 0 if math.isinf(pace) else math.floor(pace * AHEAD_S / 4 * time.control_rate)
+        self._ahead: deque[int] = deque()
 
     def _pace_anew(self, now: float) -> None:
         """Count the pace from wall time ``now`` (s) and from here on: what was waited is not made up for."""
@@ -77,7 +84,11 @@ class Clock:
             limit = min(limit, self.until if self._step_target is None else self._step_target)
         elif self._pauses:
             limit = min(limit, self._pauses[0])
-        self.until = max(self.until, limit)
+        while self._ahead and self._ahead[0] <= slowest:
+            self._ahead.popleft()
+        if limit > self.until and len(self._ahead) < MOST_GRANTS:
+            self.until = limit
+            self._ahead.append(limit)
         return self.until
 
     def _paced(self, now: float) -> int:
@@ -86,7 +97,8 @@ class Clock:
         if self._pace_from is None:
             self._pace_from = now
         ahead = (now - self._pace_from) * self._pace + AHEAD_S * min(self._pace, 1.0)
-        return self._pace_tick + max(1, math.floor(ahead * self._time.control_rate))
+        allowed = self._pace_tick + max(1, math.floor(ahead * self._time.control_rate))
+        return allowed if allowed >= self.until + self._least_ticks else self.until
 
     def wait_s(self, now: float) -> float | None:
         """How long until the pace lets time go on; None when it waits for something else."""

@@ -11,6 +11,8 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
+from haploop.protocol.transport import Transport, Wires
+
 # A socket's path must stay below the kernel's 107 bytes; this leaves room for the run and the socket's name.
 _LONGEST_BASE = 70
 # A directory that is older and tells of no run belonged to a launcher that was killed as it started.
@@ -44,7 +46,7 @@ def base_directory() -> Path:
 
 @dataclass(frozen=True)
 class LiveRun:
-    """A run as other terminals see it: its directory of sockets, the launcher's process and the clock's address."""
+    """A run as other terminals see it: its directory of sockets, the launcher's process, the clock's address, its keys."""
 
     id: str
     sockets: Path
@@ -52,6 +54,11 @@ class LiveRun:
     clock: str
     title: str
     out: str
+    keys: str | None = None
+
+    def wires(self) -> Wires:
+        """A context whose sockets may connect to the run."""
+        return Wires.over(Transport(keys=Path(self.keys) if self.keys else None))
 
 
 def create() -> Path:
@@ -66,9 +73,9 @@ def create() -> Path:
             continue
 
 
-def announce(sockets: Path, clock: str, title: str, out: str) -> None:
+def announce(sockets: Path, clock: str, title: str, out: str, keys: str | None = None) -> None:
     """Let other terminals find the run."""
-    entry = {"pid": os.getpid(), "clock": clock, "title": title, "out": out}
+    entry = {"pid": os.getpid(), "clock": clock, "title": title, "out": out, "keys": keys}
     temporary = sockets / "run.part"
     temporary.write_text(json.dumps(entry), encoding="utf-8")
     temporary.replace(sockets / "run.json")

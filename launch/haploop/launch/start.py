@@ -12,6 +12,7 @@ from haploop.controller.dissipation import Element, load_plugin, registry
 from haploop.launch.elements import elements_of, try_out
 from haploop.launch.output import keep_plugin, make_output, write_scene
 from haploop.launch.scene_file import load
+from haploop.protocol.transport import Transport
 
 
 @dataclass
@@ -56,6 +57,7 @@ def run(
     *,
     in_process: bool = False,
     pace: float = math.inf,
+    transport: Transport | None = None,
     progress: Callable[[dict[str, Any]], None] = lambda status: None,
     announced: Callable[[str], None] = lambda run_id: None,
 ) -> dict[str, Any]:
@@ -85,6 +87,15 @@ def run(
     from haploop.launch.supervisor import RunRequest, run_processes
 
     request = RunRequest(
-        p.scene, p.kinds, p.out, p.attachments, p.plugins, p.plugin_sources, pace, progress, announced
+        p.scene,
+        p.kinds,
+        p.out,
+        p.attachments,
+        p.plugins,
+        p.plugin_sources,
+        pace,
+        transport or Transport(),
+        progress,
+        announced,
     )
     return run_processes(request)

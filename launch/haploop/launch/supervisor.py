@@ -21,6 +21,7 @@ from haploop.launch.commands import Commands
 from haploop.launch.failure import RunFailed
 from haploop.launch.interrupts import interrupts
 from haploop.protocol.ticks import Timebase
+from haploop.protocol.transport import Transport, Wires
 
 if TYPE_CHECKING:
     from haploop.controller.dissipation import Element
@@ -50,8 +51,9 @@ class RunRequest:
         plugins: plugin files within ``out`` that the controller loads.
         plugin_sources: kind -> the user's file it came from, for reloading.
         pace: simulated seconds per wall second; infinite for as fast as it goes.
+        transport: how the sockets are reached.
         progress: called now and then with the logger's status.
-        announced: called once with the run's id.
+        announced: called once with the run's id, and the clock's address where that is one of TCP.
     """
 
     scene: dict[str, Any]
@@ -61,6 +63,7 @@ class RunRequest:
     plugins: list[Path] = field(default_factory=list)
     plugin_sources: dict[str, Path] = field(default_factory=dict)
     pace: float = math.inf
+    transport: Transport = field(default_factory=Transport)
     progress: Callable[[dict[str, Any]], None] = lambda status: None
     announced: Callable[[str], None] = lambda run_id: None
 
@@ -91,7 +94,7 @@ class Supervisor:
         timebase = Timebase.of(scene["clock"], scene["duration"])
         self._clock = Clock(scene, timebase, request.kinds, request.pace)
         self._deadline_s = scene["run"]["deadline"]
-        self._context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
+        self._context = Wires.over(request.transport)
         secret = secrets.token_hex(16)
         welcome = {
             "run": sockets.name,
@@ -106,9 +109,11 @@ class Supervisor:
         }
         commands = Commands(self._clock, request, lambda: self._server.roster)
         self._server = ClockServer(self._context, sockets, secret, self._clock, welcome, commands)
-        run_directory.announce(sockets, self._server.address, scene["title"], str(request.out))
+        keys = request.transport.as_dict()["keys"]
+        run_directory.announce(sockets, self._server.address, scene["title"], str(request.out), keys)
         run_number = len(run_directory.live_runs()) - 1
-        self._children = start_children(sockets, self._server.address, secret, scene["run"]["pin"], run_number)
+        start = {"address": self._server.address, "secret": secret, "transport": request.transport.as_dict()}
+        self._children = start_children(sockets, start, scene["run"]["pin"], run_number)
         self._started = self._looked = time.monotonic()
         self._probe_due = 0.0
         self._stopping = False
@@ -116,7 +121,8 @@ class Supervisor:
     def run(self) -> dict[str, Any]:
         """Lead the run to its end."""
         try:
-            self._request.announced(self._sockets.name)
+            address = f" at {self._server.address}" if self._request.transport.host else ""
+            self._request.announced(self._sockets.name + address)
             self._lead()
             return self._server.results["logger"]
         except RunFailed as error:

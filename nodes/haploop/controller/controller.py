@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 from haploop.controller.changes import Change, apply_change
@@ -39,7 +40,7 @@ class Controller:
         self._changes.append((tick, change))
         self._next_change = self._changes[0][0]
 
-    def answer(self, samples: list[Sample]) -> list[float]:
+    def answer(self, samples: Sequence[Sample]) -> list[float]:
         """The commands in N that answer the next samples, in order.
 
         Raises:

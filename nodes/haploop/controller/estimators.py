@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
-Sample = tuple[Any, ...]
+Sample = Sequence[Any]
 
 
 class LowPass:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Callable
 from typing import Any
 
@@ -34,7 +33,7 @@ class Slot:
         return {
             "book": self.book,
             "kind": self.element.kind,
-            "parameters": {**dataclasses.asdict(self.element), "acts": self.acts},
+            "parameters": {**self.element.values(), "acts": self.acts},
             "from_tick": self.from_tick,
         }
 

@@ -8,12 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 
 Matrix = np.ndarray
+Real = float | np.floating
 
 # Coefficients are made once and used for every step, so their error adds up: they are computed in the widest float.
 _wide = np.longdouble
 
 
-def flow_minus_identity(rates: Matrix, duration: float) -> Matrix:
+def flow_minus_identity(rates: Matrix, duration: Real) -> Matrix:
     """e^{A t} - I, accurate in every entry however small A t is.
 
     With E = e^{A h} - I on a step so short that |A h| <= 1/2, the Taylor series converges in a few terms and loses
@@ -37,7 +38,7 @@ def flow_minus_identity(rates: Matrix, duration: float) -> Matrix:
     return increment
 
 
-def gramian(rates: Matrix, weight: Matrix, duration: float) -> Matrix:
+def gramian(rates: Matrix, weight: Matrix, duration: Real) -> Matrix:
     """W = integral over [0, t] of e^{A' s} Q e^{A s} ds, by halving the step until |A h| <= 1/2 and doubling back.
 
     On the short step W is a Taylor series in h: the k-th derivative of e^{A's} Q e^{As} at 0 is D_k with
@@ -66,7 +67,7 @@ def gramian(rates: Matrix, weight: Matrix, duration: float) -> Matrix:
     return (total + total.T) / 2.0
 
 
-def _short_step(rates: Matrix, duration: float) -> tuple[Matrix, int]:
+def _short_step(rates: Matrix, duration: Real) -> tuple[Matrix, int]:
     size = np.abs(rates * duration).sum(axis=1).max()
     doublings = max(0, int(np.ceil(np.log2(size))) + 1) if size > 0.5 else 0
     return rates * (duration / _wide(2) ** doublings), doublings

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import json
 import os
 import sys
 import threading
@@ -14,6 +15,7 @@ import zmq
 
 from haploop.protocol.loop import LoopError
 from haploop.protocol.member import Aborted, Member, Refused
+from haploop.protocol.transport import Transport, Wires
 
 # work(member, context, directory of sockets) -> (tick reached, result for the clock)
 Work = Callable[[Member, "zmq.Context[zmq.Socket[bytes]]", Path], tuple[int, dict[str, Any]]]
@@ -24,20 +26,21 @@ class NodeError(Exception):
 
 
 def run_node(role: str, work: Work) -> None:
-    """Run a node as a process: ``python -m module DIRECTORY`` with the clock's address and secret on stdin.
+    """Run a node as a process: ``python -m module DIRECTORY`` with a line of JSON on stdin:
+    the clock's address, the run's secret, the transport.
 
     Stdin stays open as long as the launcher lives; at its end this process ends at once, whatever it is doing.
     Exit status: 0 when the node said DONE, 1 otherwise.
     """
     directory = Path(sys.argv[1])
-    line = sys.stdin.readline().split()
+    line = sys.stdin.readline()
     if not line:
         sys.exit(1)  # the launcher is gone already
-    address, secret = line
+    start = json.loads(line)
     threading.Thread(target=_end_with_parent, daemon=True).start()
     gc.freeze()
-    context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
-    member = Member(context, role, address, secret)
+    context = Wires.over(Transport.from_dict(start["transport"]))
+    member = Member(context, role, start["address"], start["secret"])
     try:
         tick, result = work(member, context, directory)
         member.leave("DONE", tick, result)

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import zmq
 
+from haploop.protocol.transport import Transport, Wires
 from haploop.protocol.wire import MAX_FRAME_BYTES
 
 # A subscriber this many blocks behind starts to lose blocks; the grant window keeps lossless ones far below.
@@ -14,6 +15,7 @@ TELEMETRY_BACKLOG_BLOCKS = 256
 # What comes in where anyone may connect is small: reports and commands, subscriptions to a role. (A large scene goes
 # out, from there to sockets that connect.)
 _LARGEST: dict[int, int] = {zmq.ROUTER: 4 * 1024 * 1024, zmq.XPUB: 1024}
+_BINDING = (zmq.ROUTER, zmq.XPUB)
 # The kernel's limit on the path of an ipc socket.
 _LONGEST_PATH = 107
 
@@ -22,6 +24,7 @@ def open_socket(context: zmq.Context[zmq.Socket[bytes]], kind: int) -> zmq.Socke
     """A socket of a type such as ``zmq.DEALER`` with the options every socket of a run has."""
     socket = context.socket(kind)
     socket.linger = 0
+    _transport(context).guard(socket, binds=kind in _BINDING)
     socket.setsockopt(zmq.MAXMSGSIZE, _LARGEST.get(kind, MAX_FRAME_BYTES))
     socket.setsockopt(zmq.RECONNECT_IVL, 20)
     if kind == zmq.ROUTER:
@@ -34,17 +37,25 @@ def open_socket(context: zmq.Context[zmq.Socket[bytes]], kind: int) -> zmq.Socke
     return socket
 
 
+def _transport(context: zmq.Context[zmq.Socket[bytes]]) -> Transport:
+    return context.transport if isinstance(context, Wires) else Transport()
+
+
 def has_message(socket: zmq.Socket[bytes]) -> bool:
     """Whether a message is there to be taken."""
     return bool(int(socket.get(zmq.EVENTS)) & zmq.POLLIN)
 
 
 def bind(socket: zmq.Socket[bytes], directory: Path, name: str) -> str:
-    """Bind in the run's directory of sockets and return the address.
+    """Bind in the run's directory of sockets, or to a free TCP port where that was asked for; return the address.
 
     Raises:
         OSError: the path is longer than the kernel allows, or is taken.
     """
+    host = _transport(socket.context).host
+    if host:
+        socket.bind(f"tcp://{host}:*")
+        return socket.last_endpoint.decode()
     path = directory / f"{name}.sock"
     if len(os.fsencode(path)) > _LONGEST_PATH:
         raise OSError(

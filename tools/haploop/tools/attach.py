@@ -32,8 +32,6 @@ def attach_to(what: str, out: Path | None, run_id: str | None) -> None:
 
 
 def _attach_logger(run: LiveRun, out: Path | None) -> None:
-    import zmq
-
     from haploop.launch.interrupts import interrupts
     from haploop.launch.output import make_output
     from haploop.protocol.member import Member, Refused
@@ -41,7 +39,7 @@ def _attach_logger(run: LiveRun, out: Path | None) -> None:
     from haploop.tools.report import print_summary
 
     directory = make_output(out, Path(f"attached-{run.id}"))
-    context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
+    context = run.wires()
     try:
         with interrupts(usual_from=2) as received:
             summary = _log(run, Member(context, OBSERVER, run.clock, ""), context, directory, received)
@@ -85,14 +83,12 @@ def _log(run: LiveRun, member: Member, context: Any, directory: Path, received: 
 
 def _attach_print(run: LiveRun) -> None:
     """A lossy listener: prints where the run is; whatever it is too slow for, it skips, and says how much."""
-    import zmq
-
     from haploop.launch.control import ask
     from haploop.protocol.telemetry import Subscriber
     from haploop.tools.report import PrintedLine
 
     _, data = ask(run, "status")
-    context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
+    context = run.wires()
     stream = Subscriber(context, {"logger": data["telemetry"]["logger"]})
     try:
         with PrintedLine(data["title"], data["end"] / data["control_rate"]) as line:

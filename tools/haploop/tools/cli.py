@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 
 app = typer.Typer(
-    help="haploop simulates a haptic loop: a device in a hand, a sampled controller with a virtual wall, a line with delay.",
+    help="Simulate a haptic loop: a device in a hand, a sampled controller with a virtual wall, a line with delay.",
     no_args_is_help=True,
     add_completion=False,
     rich_markup_mode=None,
@@ -32,12 +32,14 @@ def run(
     in_process: Annotated[bool, typer.Option("--in-process", help="everything in one process, same bits")] = False,
     pace: Annotated[str, typer.Option(help="free, or simulated seconds per second")] = "free",
     plugin: Plugin = None,
+    tcp: Annotated[str | None, typer.Option(metavar="ADDRESS", help="TCP sockets, such as 127.0.0.1")] = None,
+    keys: Annotated[Path | None, typer.Option(metavar="DIR", help="CURVE keys for TCP; made where missing")] = None,
     json: Json = False,
 ) -> None:
     """Run a scene to its end; other terminals can steer and watch it meanwhile."""
     from haploop.tools.run import run_scene
 
-    run_scene(scene, set or [], out, in_process, pace, plugin or [], json)
+    run_scene(scene, set or [], out, in_process, pace, plugin or [], tcp, keys, json)
 
 
 @app.command()

@@ -5,8 +5,12 @@ from __future__ import annotations
 import math
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from haploop.tools.ending import FAILED, WRONG_USE, leave, plain_errors, print_json
+
+if TYPE_CHECKING:
+    from haploop.protocol.transport import Transport
 
 
 def run_scene(
@@ -16,6 +20,8 @@ def run_scene(
     in_process: bool,
     pace: str,
     plugins: list[Path],
+    tcp: str | None,
+    keys: Path | None,
     as_json: bool,
 ) -> None:
     """Run a scene, show how it goes and what came of it."""
@@ -24,13 +30,21 @@ def run_scene(
 
     with plain_errors():
         rate = _pace(pace, in_process)
+        transport = _transport(tcp, keys, in_process)
         prepared = prepare(scene_path, overrides, plugins, out)
         title, duration_s = prepared.scene["title"], prepared.scene["duration"]
         from haploop.launch.failure import RunFailed
 
         try:
             with ProgressLine(title, duration_s) as line:
-                summary = run(prepared, in_process=in_process, pace=rate, progress=line.update, announced=line.announce)
+                summary = run(
+                    prepared,
+                    in_process=in_process,
+                    pace=rate,
+                    transport=transport,
+                    progress=line.update,
+                    announced=line.announce,
+                )
         except RunFailed as error:
             leave(f"{error}\nWhat was logged is in {prepared.out}.", FAILED)
         except KeyboardInterrupt:
@@ -42,6 +56,18 @@ def run_scene(
         print(f"{prepared.out}", file=sys.stderr)
     if summary["ended"] == "failed":
         leave(f"The run failed: {summary['why']}.", FAILED)
+
+
+def _transport(host: str | None, keys: Path | None, in_process: bool) -> Transport:
+    """Local sockets, or TCP where an address was given."""
+    from haploop.protocol.transport import Transport, TransportError
+
+    if host and in_process:
+        leave("--tcp needs the sockets of a run as processes; leave out --in-process.", WRONG_USE)
+    try:
+        return Transport.of(host, keys)
+    except TransportError as error:
+        leave(str(error), WRONG_USE)
 
 
 def _pace(text: str, in_process: bool) -> float:

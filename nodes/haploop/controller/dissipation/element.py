@@ -55,6 +55,10 @@ class Element(ABC):
     def force(self, motion: Motion) -> Any:
         """Force of the element on the device at this tick, N, positive along +x."""
 
+    def values(self) -> dict[str, float]:
+        """The parameters as they are now."""
+        return {name: getattr(self, name) for name in self.__dataclass_fields__}  # pyright: ignore[reportAttributeAccessIssue]
+
     @classmethod
     def parameters(cls) -> dict[str, tuple[Quantity, Any]]:
         """Name -> (quantity, default or ``dataclasses.MISSING``) of every declared parameter.

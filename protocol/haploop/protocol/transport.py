@@ -1,0 +1,119 @@
+"""How the sockets of a run are reached: local files, or TCP where that was asked for, in the open only with keys."""
+
+from __future__ import annotations
+
+import ipaddress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import zmq
+
+SERVER, CLIENT, CLIENTS = "server", "client", "clients"
+
+
+class TransportError(ValueError):
+    """An address that must not be used, or keys that cannot be; the message says what to do."""
+
+
+@dataclass(frozen=True)
+class Transport:
+    """Where sockets are bound, and the keys that guard them.
+
+    Attributes:
+        host: address that TCP sockets are bound to, each at a port of its own; None for local (ipc) sockets.
+        keys: directory of CURVE keys (``server.key_secret``, ``client.key_secret``, public keys of those who may
+            connect in ``clients/``), or None for none.
+    """
+
+    host: str | None = None
+    keys: Path | None = None
+
+    @classmethod
+    def of(cls, host: str | None, keys: Path | None) -> Transport:
+        """Check what was asked for; keys are made where the directory has none.
+
+        Raises:
+            TransportError: a host that others can reach without keys, no address at all, or keys without TCP.
+        """
+        if host is None:
+            if keys:
+                raise TransportError("Keys guard TCP; name the address to bind as well, or leave out the keys.")
+            return cls()
+        try:
+            is_local = host == "localhost" or ipaddress.ip_address(host).is_loopback
+        except ValueError as error:
+            raise TransportError(f"A numeric address such as 127.0.0.1 was expected for TCP, but {host!r} came.") from error
+        if not is_local and keys is None:
+            raise TransportError(
+                f"Anyone who reaches {host} could steer the loop: give a directory of keys as well, or use 127.0.0.1."
+            )
+        if keys:
+            _make_missing_keys(keys)
+        return cls("127.0.0.1" if host == "localhost" else host, keys and keys.resolve())
+
+    def as_dict(self) -> dict[str, str | None]:
+        """Plain values, for JSON."""
+        return {"host": self.host, "keys": str(self.keys) if self.keys else None}
+
+    @classmethod
+    def from_dict(cls, values: dict[str, str | None]) -> Transport:
+        """The inverse of ``as_dict``."""
+        keys = values.get("keys")
+        return cls(values.get("host"), Path(keys) if keys else None)
+
+    def guard(self, socket: zmq.Socket[bytes], binds: bool) -> None:
+        """Set the keys of a socket that will be bound, or connected."""
+        if self.keys is None:
+            return
+        from zmq.auth import load_certificate
+
+        own, secret = load_certificate(self.keys / f"{SERVER if binds else CLIENT}.key_secret")
+        socket.curve_publickey, socket.curve_secretkey = own, secret
+        if binds:
+            socket.curve_server = True
+        else:
+            socket.curve_serverkey = load_certificate(self.keys / f"{SERVER}.key")[0]
+
+
+class Wires(zmq.Context[zmq.Socket[bytes]]):
+    """A ZeroMQ context whose sockets all use one transport; closes its doorkeeper with itself."""
+
+    transport: Transport = Transport()
+    _doorkeeper: Any = None
+
+    @classmethod
+    def over(cls, transport: Transport) -> Wires:
+        """A new context; with keys, only the holders of those in ``clients/`` get in."""
+        wires = cls()
+        wires.transport = transport
+        if transport.keys and transport.host:
+            from zmq.auth.thread import ThreadAuthenticator
+
+            wires._doorkeeper = ThreadAuthenticator(wires)
+            wires._doorkeeper.start()
+            wires._doorkeeper.configure_curve(domain="*", location=str(transport.keys / CLIENTS))
+        return wires
+
+    def destroy(self, linger: int | None = None) -> None:
+        """Close everything."""
+        if self._doorkeeper:
+            self._doorkeeper.stop()
+            self._doorkeeper = None
+        super().destroy(linger)
+
+
+def _make_missing_keys(keys: Path) -> None:
+    from zmq.auth import create_certificates
+
+    try:
+        keys.mkdir(mode=0o700, parents=True, exist_ok=True)
+        (keys / CLIENTS).mkdir(mode=0o700, exist_ok=True)
+        for name in (SERVER, CLIENT):
+            if not (keys / f"{name}.key_secret").exists():
+                public, secret = create_certificates(keys, name)
+                Path(secret).chmod(0o600)
+                if name == CLIENT:
+                    (keys / CLIENTS / f"{CLIENT}.key").write_bytes(Path(public).read_bytes())
+    except OSError as error:
+        raise TransportError(f"Keys could not be made in {keys}: {error.strerror}.") from error
