@@ -31,7 +31,12 @@ def _loop_us(delay_s: float, log: str, seconds: float) -> Callable[[], float]:
 
     def measure() -> float:
         with tempfile.TemporaryDirectory() as folder:
-            settings = [f"clock.round_trip_delay={delay_s}", f"duration={seconds}", f"run.log={log}", "diverged_beyond=1e9"]
+            settings = [
+                f"clock.round_trip_delay={delay_s}",
+                f"duration={seconds}",
+                f"run.log={log}",
+                "diverged_beyond=1e9",
+            ]
             summary = run(prepare(SCENE, settings, out=Path(folder, "out")))
             return summary["wall_s"] / summary["ticks"] * 1e6
 

@@ -14,7 +14,6 @@ import zmq
 from haploop.launch.children import share_cores
 from haploop.plant.flow import StepFlow
 
-
 _pack = msgpack.Packer(autoreset=True).pack
 
 

@@ -215,13 +215,14 @@ class Run(Launched):
         """What its log holds now."""
         return read(self.out_directory)
 
-    def stands(self) -> int:
-        """Wait until a paused run stands still, all nodes at the same tick; returns it."""
+    def stands(self, at: int | None = None) -> int:
+        """Wait until a paused run stands still, all nodes at the same tick (at ``at``, if given); returns it."""
 
         def look() -> int:
             data = self.ask("status")
-            ticks = {node["tick"] for node in data["nodes"]}
-            return data["granted"] + 1 if data["paused"] and ticks == {data["granted"]} else 0
+            tick = data["granted"]
+            still = data["paused"] and {node["tick"] for node in data["nodes"]} == {tick}
+            return tick + 1 if still and at in (None, tick) else 0
 
         return wait_for("standstill", look) - 1
 

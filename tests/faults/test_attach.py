@@ -98,8 +98,7 @@ def test_a_logger_that_leaves_by_an_interrupt_has_a_whole_log_and_the_run_goes_o
     run = running(sets=(*SHORT, NEVER))
     run.reaches(500)
     second = attached(run)
-    run.ask("step", ticks=200)
-    run.stands()
+    run.stands(at=run.ask("step", ticks=200)["tick"])
     second.signal(signal.SIGINT)
     second.end(0)
     assert {node["role"] for node in run.ask("status")["nodes"]} == {"plant", "controller", "logger"}
@@ -129,8 +128,7 @@ def test_a_logger_that_hangs_holds_the_run_up_until_the_deadline_and_is_then_dro
     run = running(sets=(*SHORT, "run.deadline=0.8"))
     run.reaches(500)
     second = attached(run)
-    run.ask("step", ticks=200)
-    run.stands()
+    run.stands(at=run.ask("step", ticks=200)["tick"])
     second.signal(signal.SIGSTOP)
     run.ask("resume")
     assert run.summary()["trajectory_sha256"] == alone

@@ -196,8 +196,7 @@ def test_a_reload_that_fails_says_why_and_leaves_the_old_element_at_work_until_o
         brake(source)
         with pytest.raises(control.CommandRefused, match=reason):
             run.ask("swap", **swap)
-    run.ask("step", ticks=100)
-    swapped = run.stands()
+    swapped = run.stands(at=run.ask("step", ticks=100)["tick"])
     assert swapped == paused + 100
     brake(SOUND.replace("-self.damping", "-3.0 * self.damping"))
     assert command("swap", "brake", "damping=0.05", "acts=always", "--reload").returncode == 0

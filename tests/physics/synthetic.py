@@ -34,7 +34,13 @@ def books_along(scene: dict[str, Any], x: np.ndarray) -> tuple[dict[str, np.ndar
     in_effect = np.maximum((np.arange(steps + 1) - time.delay_steps) // n, -1)
     in_effect[-1] = in_effect[-2]
     force = np.array([0.0, *commands])[in_effect + 1]
-    columns = {"x": x, "v": np.zeros_like(x), "x_low": np.zeros_like(x), "force": force, "command": in_effect.astype(float)}
+    columns = {
+        "x": x,
+        "v": np.zeros_like(x),
+        "x_low": np.zeros_like(x),
+        "force": force,
+        "command": in_effect.astype(float),
+    }
     logger = Logger(scene, time, None)
     logger.start({"tick": 0, "x": x[0], "v": 0.0, "force": 0.0}, [])
     blocks = {name: np.ascontiguousarray(column).tobytes() for name, column in columns.items()}

@@ -123,7 +123,8 @@ def test_a_wall_made_stiffer_in_contact_is_no_leak_and_nothing_is_held_once_the_
     change = {"at": 0.4, "set": {"wall.stiffness": 200.0}}
     ran = run(scene(duration=1.2, hand=hand, wall={"position": 0.0, "stiffness": 100.0}, event=[change]))
     wall = ran.energy["wall"]
-    assert ran.controller["in_contact"][400] and not ran.controller["in_contact"][-1]
+    assert ran.controller["in_contact"][400]
+    assert not ran.controller["in_contact"][-1]
     assert wall["changes_J"] == pytest.approx(50.0 * ran.plant["x"][4000] ** 2, rel=1e-12)
     assert wall["ideal_J"] == pytest.approx(0.0, abs=1e-12 * ran.energy["moved_J"])
     assert wall["leak"]["total_J"] == pytest.approx(wall["true_J"] - wall["ideal_J"] + wall["changes_J"], rel=1e-9)

@@ -30,7 +30,8 @@ class Child:
             stdout=subprocess.PIPE,
             start_new_session=True,  # Ctrl-C is for the launcher, which ends the run in order
         )
-        assert self._process.stdin and self._process.stdout
+        assert self._process.stdin
+        assert self._process.stdout
         if cores and hasattr(os, "sched_setaffinity"):
             with contextlib.suppress(OSError):
                 os.sched_setaffinity(self._process.pid, cores)

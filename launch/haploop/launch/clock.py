@@ -158,7 +158,8 @@ class Clock:
         rate = self._time.control_rate
         if tick < self.until:
             raise ClockError(
-                f"Time {tick / rate:g} s is past; the earliest tick that can still change is {self.until}, {self.until / rate:g} s."
+                f"Time {tick / rate:g} s is past; "
+                f"the earliest tick that can still change is {self.until}, {self.until / rate:g} s."
             )
         if tick >= self.end:
             raise ClockError(

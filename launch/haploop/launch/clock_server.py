@@ -128,7 +128,9 @@ class ClockServer:
             return
         if frame.name in ("READY", "PROGRESS") and not 0 <= frame.fields[0] <= self._clock.until:
             self.strangers += 1
-            self._send(sender, "REFUSED", f"{frame.name} must name a tick from 0 to {self._clock.until}, which is granted.")
+            self._send(
+                sender, "REFUSED", f"{frame.name} must name a tick from 0 to {self._clock.until}, which is granted."
+            )
             return
         node.heard = time.monotonic()
         node.waits_for = ""
@@ -169,7 +171,12 @@ class ClockServer:
         context = self._welcome["context"]
         if not node.is_own:
             context = {key: value for key, value in context.items() if key != "secret"}
-        fields = {**self._welcome, "endpoints": self.roster.endpoints(), "granted": self._clock.until, "context": context}
+        fields = {
+            **self._welcome,
+            "endpoints": self.roster.endpoints(),
+            "granted": self._clock.until,
+            "context": context,
+        }
         order = ("run", "scene", "timebase", "endpoints", "granted", "context")
         self._send(node.identity, "WELCOME", *(fields[name] for name in order))
 

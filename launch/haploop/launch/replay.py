@@ -90,7 +90,9 @@ def _launch_plugins(directory: Path, recorded: Recording) -> list[str]:
     names = [name.removeprefix(f"{PLUGINS}/") for name in recorded.attachments if name.startswith(f"{PLUGINS}/")]
     for name in names:
         if not (directory / PLUGINS / name).is_file():
-            raise ReplayError(f"{directory / PLUGINS / name} is missing; the run cannot be repeated without its plugin.")
+            raise ReplayError(
+                f"{directory / PLUGINS / name} is missing; the run cannot be repeated without its plugin."
+            )
     return names
 
 
@@ -121,7 +123,9 @@ def _compare(recorded: Recording, repeated: Recording, failed: bool) -> list[str
             if differs.any():
                 first = int(np.argmax(differs))
                 t = float(recorded[topic]["timestamp"][first])
-                differences.append(f"{topic} {name} differs in {int(differs.sum())} of {len(before)} rows, first at {t:g} s.")
+                differences.append(
+                    f"{topic} {name} differs in {int(differs.sum())} of {len(before)} rows, first at {t:g} s."
+                )
     return differences
 
 

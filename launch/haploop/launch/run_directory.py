@@ -46,7 +46,7 @@ def base_directory() -> Path:
 
 @dataclass(frozen=True)
 class LiveRun:
-    """A run as other terminals see it: its directory of sockets, the launcher's process, the clock's address, its keys."""
+    """A run as other terminals see it: its sockets, the launcher's process, the clock's address and keys."""
 
     id: str
     sockets: Path

@@ -16,7 +16,6 @@ from haploop.launch import run_directory
 from haploop.launch.children import Child, start_children
 from haploop.launch.clock import Clock
 from haploop.launch.clock_server import ClockServer
-
 from haploop.launch.commands import Commands
 from haploop.launch.failure import RunFailed
 from haploop.launch.interrupts import interrupts
@@ -193,7 +192,9 @@ class Supervisor:
                     "A longer wait can be set with run.deadline."
                 )
             if node.lossless and node.tick <= self._server.roster.slowest():
-                self._server.drop(node, f"Nothing was heard of you for {self._deadline_s:g} s; the run goes on without you.")
+                self._server.drop(
+                    node, f"Nothing was heard of you for {self._deadline_s:g} s; the run goes on without you."
+                )
         if now >= self._probe_due:
             self._probe_due = now + _PROBE_S
             self._server.probe(self._server.roster.silent(now, _PROBE_S))

@@ -12,9 +12,7 @@ from haploop.controller.wall import Wall
 Change = dict[str, Any]
 
 
-def apply_change(
-    change: Change, tick: int, slots: Slots, wall: Wall, kinds: dict[str, type[Element]]
-) -> str | None:
+def apply_change(change: Change, tick: int, slots: Slots, wall: Wall, kinds: dict[str, type[Element]]) -> str | None:
     """Carry out a change that was checked before; returns why it could not be done, or None.
 
     Whatever fails leaves slots and wall as they were. ``plugin`` names a file that is loaded first; it lies in the

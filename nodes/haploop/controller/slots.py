@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from haploop.controller.dissipation import Element, ElementError, Motion
@@ -38,7 +38,7 @@ class Slot:
         }
 
 
-def make_element(table: dict[str, Any], kinds: dict[str, type[Element]]) -> tuple[Element, str]:
+def make_element(table: dict[str, Any], kinds: Mapping[str, type[Element]]) -> tuple[Element, str]:
     """The element a validated ``[[dissipation]]`` table names, and when it acts.
 
     Raises:

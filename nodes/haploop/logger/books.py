@@ -118,8 +118,7 @@ class Books:
         if self._has_wall:
             at = tick - tape.first
             rows = {
-                name: tape.columns[name][at : at + len(dx) // n]
-                for name in ("wall", "wall_position", "wall_stiffness")
+                name: tape.columns[name][at : at + len(dx) // n] for name in ("wall", "wall_position", "wall_stiffness")
             }
             self._note_wall(float(x[0]), (float(rows["wall_position"][0]), float(rows["wall_stiffness"][0])), into_wall)
             by_step |= zip(CAUSES, ideal_and_undelayed(x, dx, rows, into_wall, n), strict=True)

@@ -145,7 +145,7 @@ class Logger:
             lost: commands_dropped, commands_lost, telemetry_gaps.
         """
         ticks = self.tick - self._first_tick
-        x, v, force = self._end_state
+        x, v, _ = self._end_state
         ran = {
             "duration_s": ticks / self.time.control_rate,
             "ticks": ticks,

@@ -50,7 +50,9 @@ class LoggerNode:
         """Subscribe to plant and controller, take their state, and be ready."""
         self.out = out
         endpoints = welcome["endpoints"]
-        self._streams = Subscriber(self._context, {role: endpoints[role]["telemetry"] for role in ("plant", "controller")})
+        self._streams = Subscriber(
+            self._context, {role: endpoints[role]["telemetry"] for role in ("plant", "controller")}
+        )
         time = Timebase(**welcome["timebase"])
         self.keeper: Keeper = open_keeper(welcome["scene"], time, out, welcome["context"].get("attachments", {}))
         states: dict[str, dict[str, Any]] = {}

@@ -54,7 +54,12 @@ def energy(books: Books, accounts: list[dict[str, Any]], has_wall: bool) -> dict
 
 
 def summary(
-    scene: dict[str, Any], ran: dict[str, Any], window: Window, books: Books, accounts: list[dict[str, Any]], diverged: str | None
+    scene: dict[str, Any],
+    ran: dict[str, Any],
+    window: Window,
+    books: Books,
+    accounts: list[dict[str, Any]],
+    diverged: str | None,
 ) -> dict[str, Any]:
     """All entries of ``summary.json``.
 

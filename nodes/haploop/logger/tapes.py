@@ -33,7 +33,9 @@ class PlantTape:
             TelemetryGap: it does not start where the last one ended.
         """
         if block["from_tick"] != self.end:
-            raise TelemetryGap(f"A plant block from tick {self.end} was expected, but one from {block['from_tick']} came.")
+            raise TelemetryGap(
+                f"A plant block from tick {self.end} was expected, but one from {block['from_tick']} came."
+            )
         keep = max(0, (self.end - self.tick) * self._steps)
         for name in PLANT_COLUMNS:
             joined = self._columns[name][:keep], as_float64(block["columns"][name])

@@ -86,12 +86,14 @@ class Window:
             return Verdict("diverged", f"{diverged}.")
         x, rows, _ = self._last()
         if not rows["in_contact"].any():
-            return Verdict("no-contact", f"No tick of the last {WINDOW_S:g} s (second half of a shorter run) was in contact.")
+            return Verdict(
+                "no-contact", f"No tick of the last {WINDOW_S:g} s (second half of a shorter run) was in contact."
+            )
         crossings, growth = swings(x, self.swing_m)
         seen = (
-            f"In the last {WINDOW_S:g} s (second half of a shorter run) x crossed its trend line {crossings} times by more "
-            f"than {self.swing_m * 1e6:.3g} um, its second half {growth:.2f} times as wide as its first; a limit cycle "
-            f"is at least {CROSSINGS} crossings and 0.5 times."
+            f"In the last {WINDOW_S:g} s (second half of a shorter run) x crossed its trend line {crossings} times "
+            f"by more than {self.swing_m * 1e6:.3g} um, its second half {growth:.2f} times as wide as its first; "
+            f"a limit cycle is at least {CROSSINGS} crossings and 0.5 times."
         )
         return Verdict("limit-cycle" if crossings >= CROSSINGS and growth >= 0.5 else "steady", seen)
 

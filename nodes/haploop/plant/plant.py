@@ -166,7 +166,8 @@ class Plant:
         """(first tick, ticks, columns) of what was stepped since the last block; empties it.
 
         Columns x, v, x_low (what rounding to a float left of x), force and command are little-endian float64 with
-        ``ticks * n + 1`` rows: every step of the block and its end state, whose force and command are the last held ones.
+        ``ticks * n + 1`` rows: every step of the block and its end state, whose force and command are the last
+        held ones.
         """
         first, reached = self._block_first, self.reached
         counts, forces, commands = zip(*self._holds[1:], (1, *self._holds[-1][1:]), strict=True)

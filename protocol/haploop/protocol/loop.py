@@ -144,4 +144,6 @@ def _is_hello(data: bytes, secret: str) -> bool:
 def _mismatch(what: str, tick: int, count: int | None, came: Frame) -> str:
     expected = f"{what} from tick {tick}" + (f", {count} of them," if count else "")
     fields: list[Any] = came.fields
-    return f"In the loop {expected} were expected, but {came.name} of tick {fields[0]} with {str(fields[1:])[:80]} came."
+    return (
+        f"In the loop {expected} were expected, but {came.name} of tick {fields[0]} with {str(fields[1:])[:80]} came."
+    )

@@ -55,7 +55,7 @@ def bind(socket: zmq.Socket[bytes], directory: Path, name: str) -> str:
     host = _transport(socket.context).host
     if host:
         socket.bind(f"tcp://{host}:*")
-        return socket.last_endpoint.decode()
+        return bytes(socket.getsockopt(zmq.LAST_ENDPOINT)).rstrip(b"\0").decode()
     path = directory / f"{name}.sock"
     if len(os.fsencode(path)) > _LONGEST_PATH:
         raise OSError(

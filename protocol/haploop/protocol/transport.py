@@ -43,7 +43,9 @@ class Transport:
         try:
             is_local = host == "localhost" or ipaddress.ip_address(host).is_loopback
         except ValueError as error:
-            raise TransportError(f"A numeric address such as 127.0.0.1 was expected for TCP, but {host!r} came.") from error
+            raise TransportError(
+                f"A numeric address such as 127.0.0.1 was expected for TCP, but {host!r} came."
+            ) from error
         if not is_local and keys is None:
             raise TransportError(
                 f"Anyone who reaches {host} could steer the loop: give a directory of keys as well, or use 127.0.0.1."

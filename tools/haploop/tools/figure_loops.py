@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
 GRAMS = 1e3
 
+
 def force_position_loop(run: RunData, span_s: tuple[float, float]) -> tuple[Floats, Floats]:
     """Penetration (m, positive inside) and force out of the wall (N) at every plant step of a stretch of time.
 
