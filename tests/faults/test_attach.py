@@ -84,6 +84,7 @@ def test_a_logger_that_joins_in_mid_run_logs_the_same_numbers_from_its_first_tic
     assert its["energy"]["residual_J"] <= 1e-12 * its["energy"]["moved_J"]
 
 
+@pytest.mark.slow
 def test_a_logger_can_join_a_run_that_stands_still(running, attached, alone):
     run = running(sets=(*SHORT, NEVER))
     run.reaches(500)
@@ -162,6 +163,7 @@ def test_a_logger_whose_run_vanishes_ends_by_itself_and_its_log_reads(running, a
     assert not haploop.logger.read(second.out).truncated
 
 
+@pytest.mark.slow
 def test_a_logger_whose_run_fails_says_why(running, attached):
     run = running()
     run.reaches(200)

@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+from faults.launched import first_and_slowly
 
 import haploop.logger
 from haploop.launch.replay import replay
@@ -13,7 +14,7 @@ UNSTABLE = ('dissipation=[{kind="damping", damping=60.0, acts="always"}]',)
 
 
 @pytest.mark.parametrize("options", [(), ("--in-process",)])
-@pytest.mark.parametrize(("sets", "limit_m"), [((), 1.0), (("diverged_beyond=0.03",), 0.03)])
+@pytest.mark.parametrize(("sets", "limit_m"), first_and_slowly(((), 1.0), (("diverged_beyond=0.03",), 0.03)))
 def test_a_device_beyond_the_limit_ends_the_run_with_verdict_tick_and_a_whole_log(options, sets, limit_m, running):
     """1 m when the scene sets no limit."""
     run = running(*options, sets=(*UNSTABLE, "duration=30", *sets), pace=())

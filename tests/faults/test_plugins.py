@@ -82,7 +82,7 @@ def test_a_force_that_is_no_finite_number_fails_a_run_in_one_process_too(launche
     ("statement", "reason"),
     [("1 / 0", "ZeroDivisionError: division by zero"), ("return 'much'", "TypeError: unsupported operand")],
 )
-@pytest.mark.parametrize("options", first_and_slowly((), ("--in-process",)))
+@pytest.mark.parametrize("options", first_and_slowly([], ["--in-process"]))
 def test_a_force_that_raises_or_is_no_number_fails_the_run_and_names_element_and_tick(
     statement, reason, options, launched, brake, tmp_path
 ):
@@ -133,10 +133,10 @@ def test_a_force_that_never_returns_in_one_process_is_ended_by_the_second_interr
 
 @pytest.mark.parametrize(
     ("statement", "words"),
-    [
+    first_and_slowly(
         ("raise RuntimeError('not here')", "The controller failed: The plugin "),
         ("os._exit(3)", "The controller ended with exit status 3; the last tick all nodes had done is 0 "),
-    ],
+    ),
 )
 def test_a_plugin_that_fails_in_the_controllers_process_alone_ends_the_run(statement, words, running, brake):
     run = started(running, brake, f"if {IN_THE_CONTROLLER}:\n    {statement}\n{SOUND}")

@@ -61,10 +61,11 @@ class Controller:
         motion, wall = self._motion, self._wall
         motion.a_before = motion.a
         motion.x = x = sample[0]
-        motion.v = v = self._velocity(x)
+        motion.v = v = self._velocity(x, sample)
         motion.a = a = self._acceleration(v, sample)
-        motion.contact = contact = wall.contact(x)
-        total = f_wall = wall.force(x, contact)
+        contact, f_wall = wall.meet(x)
+        motion.contact = contact
+        total = f_wall
         row = [x, v, a, f_wall]
         try:
             for slot in self._slots.slots:

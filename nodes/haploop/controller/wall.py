@@ -19,22 +19,16 @@ class Wall:
         self.stiffness = table["stiffness"]
         self.into_wall = -1.0 if table["occupies"] == "below" else 1.0
 
-    def contact(self, x: Any) -> Any:
-        """Whether measured position x (m) is strictly inside."""
-        return x < self.position if self.into_wall < 0 else x > self.position
-
-    def force(self, x: Any, contact: Any) -> Any:
-        """Force on the device in N, positive along +x."""
-        return where(contact, self.stiffness * (self.position - x), 0.0)
+    def meet(self, x: Any) -> tuple[Any, Any]:
+        """Whether measured position x (m) is strictly inside, and the force on the device in N along +x."""
+        out = self.position - x
+        contact = out * self.into_wall < 0.0
+        return contact, where(contact, self.stiffness * out, 0.0)
 
 
 class NoWall(Wall):
-    """A scene without ``[wall]``: never in contact, no force, no way in."""
+    """A scene without ``[wall]``: no way in, so never in contact, and no force."""
 
     def __init__(self) -> None:
         super().__init__({"position": 0.0, "stiffness": 0.0, "occupies": "below"})
         self.into_wall = 0.0
-
-    def contact(self, x: Any) -> Any:
-        """Never."""
-        return (x != x) & False

@@ -1,0 +1,146 @@
+"""The command line as its users meet it: what it prints where, and its exit status."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from haploop.tools.cli import app
+
+SCENES = Path(__file__).parents[1] / "launch" / "scenes"
+FIG6C = str(SCENES / "fig6c.toml")
+BRAKE = '''
+from typing import Annotated
+from haploop.controller.dissipation import Element, Motion, Quantity, where
+
+class Brake(Element):
+    """A force of constant size against the motion, on the way in only."""
+    kind = "brake"
+    force_N: Annotated[float, Quantity("N", at_least=0)] = 0.05
+
+    def force(self, motion: Motion):
+        return where(motion.v * motion.into_wall > 0, self.force_N * -motion.into_wall, 0.0)
+'''
+
+
+def haploop(*arguments: str):
+    """Run a command in this process."""
+    return CliRunner().invoke(app, list(arguments))
+
+
+@pytest.fixture(scope="module")
+def done(tmp_path_factory) -> Path:
+    """A finished run of figure 6(c), shortened."""
+    out = tmp_path_factory.mktemp("run") / "out"
+    result = haploop("run", FIG6C, "--set", "duration=1.2", "--in-process", "--out", str(out))
+    assert result.exit_code == 0, result.output
+    return out
+
+
+def test_json_is_one_object_on_stdout_and_nothing_else_is(tmp_path):
+    result = haploop("run", FIG6C, "--set", "duration=0.1", "--json", "--out", str(tmp_path / "o"))
+    summary = json.loads(result.stdout)
+    assert (result.exit_code, summary["ticks"], summary["ended"]) == (0, 100, "done")
+    assert summary["directory"] == str(tmp_path / "o")
+
+
+def test_a_run_leaves_scene_log_and_summary_and_its_scene_runs_by_itself(done, tmp_path):
+    assert {path.name for path in done.iterdir()} == {"scene.toml", "log.mcap", "summary.json"}
+    again = haploop("run", str(done / "scene.toml"), "--in-process", "--json", "--out", str(tmp_path / "again"))
+    before = json.loads((done / "summary.json").read_text(encoding="utf-8"))
+    assert json.loads(again.stdout)["trajectory_sha256"] == before["trajectory_sha256"]
+
+
+def test_every_mistake_is_told_at_once_with_exit_status_2_and_nothing_is_written(tmp_path):
+    settings = ("wall.stifness=3", "device.mass=-1", "clock.round_trip_delay='2 N'", "dissipation.0.kind=dampin")
+    arguments = [word for setting in settings for word in ("--set", setting)]
+    result = haploop("run", FIG6C, *arguments, "--out", str(tmp_path / "out"))
+    assert result.exit_code == 2
+    for words in ("did you mean stiffness", "device.mass", "round_trip_delay", "did you mean damping", "4 mistakes"):
+        assert words in result.stderr, words
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_directory_that_holds_a_run_is_refused_and_left_as_it_is(done):
+    before = {path: path.read_bytes() for path in done.iterdir()}
+    result = haploop("run", FIG6C, "--in-process", "--out", str(done))
+    assert result.exit_code == 2
+    assert "must be new or empty" in result.stderr
+    assert {path: path.read_bytes() for path in done.iterdir()} == before
+
+
+def test_check_prints_the_resolved_scene_or_the_schema_and_starts_nothing():
+    result = haploop("check", FIG6C)
+    assert result.exit_code == 0
+    assert "stiffness = 150.0" in result.stdout
+    schema = json.loads(haploop("check", "--schema").stdout)
+    assert schema["$schema"].endswith("2020-12/schema")
+    assert haploop("check").exit_code == 2
+
+
+def test_a_plugin_of_ten_lines_is_listed_checked_run_and_replayed(tmp_path):
+    plugin = tmp_path / "brake.py"
+    plugin.write_text(BRAKE, encoding="utf-8")
+    listing = json.loads(haploop("plugins", "--plugin", str(plugin), "--json").stdout)
+    assert listing["brake"]["force_N"]["unit"] == "N"
+    assert listing["brake"]["force_N"]["default"] == 0.05
+    assert {"damping", "unidirectional-damping", "bidirectional-inertia", "unidirectional-inertia"} < set(listing)
+    run = ("run", FIG6C, "--set", "dissipation.0.kind=brake", "--set", "duration=1.2", "--json")
+    assert haploop(*run, "--out", str(tmp_path / "without")).exit_code == 2
+    result = haploop(*run, "--plugin", str(plugin), "--out", str(tmp_path / "with"))
+    elements = json.loads(result.stdout)["energy"]["elements"]
+    assert [element["kind"] for element in elements] == ["brake"]
+    assert elements[0]["true_J"] > 0
+    plugin.unlink()
+    assert haploop("replay", str(tmp_path / "with")).exit_code == 0
+
+
+def test_replay_says_whether_every_bit_agreed(done, tmp_path):
+    good = haploop("replay", str(done))
+    assert good.exit_code == 0
+    assert "Every bit of 12000 steps agreed" in good.stdout
+    other = tmp_path / "other"
+    other.mkdir()
+    for path in done.iterdir():
+        (other / path.name).write_bytes(path.read_bytes())
+    scene = (other / "scene.toml").read_text(encoding="utf-8")
+    (other / "scene.toml").write_text(
+        scene.replace("stiffness = 150.0", "stiffness = 150.00000000001"), encoding="utf-8"
+    )
+    bad = haploop("replay", str(other))
+    assert bad.exit_code == 1
+    assert "/controller wall differs" in bad.stdout
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("run", "nowhere.toml"), "nowhere.toml"),
+        (("run", FIG6C, "--pace", "quick"), "--pace must be free or a number above 0"),
+        (("run", FIG6C, "--pace", "0"), "--pace must be"),
+        (("run", FIG6C, "--tcp", "0.0.0.0"), "directory of keys"),
+        (("replay", "nowhere"), "nowhere"),
+        (("plot", "nowhere"), "nowhere"),
+        (("attach", "scope"), "logger or print"),
+        (("swap", "damping", "0.8"), "KEY=VALUE was expected"),
+        (("swap", "damping", "damping=0.8", "--at", "soon"), "--at must be a time"),
+        (("pause", "--run", "zzzzzz"), "live"),
+    ],
+)
+def test_wrong_use_is_answered_with_a_sentence_and_exit_status_2(arguments, words):
+    result = haploop(*arguments)
+    assert result.exit_code == 2
+    assert words in result.stderr
+    assert "Traceback" not in result.output
+
+
+def test_help_imports_none_of_the_heavy_packages():
+    """It has to answer at once: no NumPy, pydantic, ZeroMQ or matplotlib for a list of commands."""
+    code = "import sys, haploop.tools.cli; print(*sys.modules)"
+    loaded = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True).stdout.split()
+    assert not {"numpy", "scipy", "pydantic", "pint", "zmq", "msgpack", "matplotlib", "mcap"} & set(loaded)
