@@ -69,7 +69,7 @@ class Controller:
         row = [x, v, a, f_wall]
         try:
             for slot in self._slots.slots:
-                force = slot.force(motion)
+                force = float(slot.force(motion))
                 total += force
                 row.append(force)
         except Exception as error:
