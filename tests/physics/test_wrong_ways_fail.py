@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,8 +14,7 @@ from scene_makers import scene
 
 from haploop.logger import plant_books
 from haploop.logger.books import Books
-from haploop.plant import plant
-from haploop.plant.flow import StepFlow
+from haploop.plant.flow import HeldFlow, StepFlow
 
 
 def busy() -> dict:
@@ -96,6 +96,19 @@ def semi_implicit_euler(mass: float, damping: float, stiffness: float, step_s: f
     return StepFlow(h * e.v_x, h * (1 + e.v_v), h * e.v_force, 0.0, e.v_x, e.v_v, e.v_force, 0.0)
 
 
+def step_by(method: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Have the plant step by another method, over any number of steps."""
+
+    def held(mass: float, damping: float, stiffness: float, step_s: float, steps: int) -> HeldFlow:
+        s = method(mass, damping, stiffness, step_s)
+        one = np.array([[s.x_x, s.x_v, s.x_force], [s.v_x, s.v_v, s.v_force], [0.0, 0.0, 0.0]])
+        powers = [np.linalg.matrix_power(np.eye(3) + one, count) - np.eye(3) for count in range(steps + 1)]
+        return HeldFlow(np.array([power[:2].ravel() for power in powers]))
+
+    monkeypatch.setattr(StepFlow, "of", method)
+    monkeypatch.setattr(HeldFlow, "of", held)
+
+
 def swinging() -> dict:
     device = {"mass": 0.02, "damping": 0.0, "position": 0.01}
     return scene(duration=2.0, device=device, hand={"stiffness": 10.0})
@@ -103,7 +116,7 @@ def swinging() -> dict:
 
 def test_explicit_euler_gains_energy_and_the_books_say_so(monkeypatch):
     """A factor 1 + (w h)^2 every step: e^{N (w h)^2} - 1 over the run."""
-    monkeypatch.setattr(plant.StepFlow, "of", euler)
+    step_by(euler, monkeypatch)
     ran = run(swinging())
     start = 10.0 * 0.01**2 / 2
     assert ran.energy["stored_J"] / start == pytest.approx(math.exp(20_000 * 500.0 * 1e-8), rel=1e-4)
@@ -113,7 +126,7 @@ def test_explicit_euler_gains_energy_and_the_books_say_so(monkeypatch):
 
 @pytest.mark.parametrize("method", [euler, semi_implicit_euler])
 def test_an_approximate_step_does_not_close_the_books_of_the_busy_scene(method, monkeypatch):
-    monkeypatch.setattr(plant.StepFlow, "of", method)
+    step_by(method, monkeypatch)
     assert run(busy()).relative_residual > 1e-7
 
 

@@ -94,19 +94,55 @@ class StepFlow:
 
     @classmethod
     def of(cls, mass: float, damping: float, stiffness: float, step_s: float) -> StepFlow:
-        """The exact flow over ``step_s`` seconds for mass in kg (> 0), damping in N s/m, stiffness in N/m.
+        """The exact flow over ``step_s`` seconds for mass in kg (> 0), damping in N s/m, stiffness in N/m."""
+        increment = flow_minus_identity(_rates(mass, damping, stiffness, step_s), _wide(step_s))
+        return cls(*(float(entry) for entry in _to_state(increment, mass, stiffness, step_s).ravel()))
 
-        Taken in the coordinates (c x, v, F h / m, rise of F over a step * h / m) with c = ``natural_rate``, in which
-        every rate is at most about |A| and an undamped oscillation is a pure rotation.
-        """
-        h, c = _wide(step_s), _wide(natural_rate(mass, stiffness, step_s))
-        rates = np.zeros((4, 4), _wide)
-        rates[0, 1] = c
-        rates[1] = -stiffness / mass / c, -damping / mass, 1.0 / h, 0.0
-        rates[2, 3] = 1.0 / h
-        x_row, v_row = flow_minus_identity(rates, h)[:2]
-        to_state = np.array([c, _wide(1), h / mass, h / mass])
-        return cls(*(float(entry) for entry in (*(x_row * to_state / c), *(v_row * to_state))))
+
+@dataclass(frozen=True)
+class HeldFlow:
+    """The same over 0, 1, 2 ... steps under a force that is held: columns x_x, x_v, x_force, v_x, v_v, v_force.
+
+    E(i + 1) = E(i) + E(1) + E(1) E(i) for E = e^{A i h} - I, which never subtracts the identity.
+
+    Attributes:
+        coefficients: shape (steps + 1, 6), row i for i steps.
+    """
+
+    coefficients: np.ndarray
+
+    @classmethod
+    def of(cls, mass: float, damping: float, stiffness: float, step_s: float, steps: int) -> HeldFlow:
+        """For up to ``steps`` steps of ``step_s`` seconds; mass in kg (> 0), damping in N s/m, stiffness in N/m."""
+        one = flow_minus_identity(_rates(mass, damping, stiffness, step_s), _wide(step_s))
+        flow, rows = np.zeros_like(one), []
+        for _ in range(steps + 1):
+            rows.append(_to_state(flow, mass, stiffness, step_s)[:, :3].ravel().astype(float))
+            flow = flow + one + one @ flow
+        return cls(np.array(rows))
+
+    def by_count(self) -> list[tuple[float, ...]]:
+        """The coefficients as plain floats, one tuple for each number of steps."""
+        return [tuple(row) for row in self.coefficients.tolist()]
+
+
+def _rates(mass: float, damping: float, stiffness: float, step_s: float) -> Matrix:
+    """A for the state (c x, v, F h / m, rise of F over a step * h / m) with c = ``natural_rate``.
+
+    In these coordinates every rate is at most about |A| and an undamped oscillation is a pure rotation.
+    """
+    h, c = _wide(step_s), _wide(natural_rate(mass, stiffness, step_s))
+    rates = np.zeros((4, 4), _wide)
+    rates[0, 1] = c
+    rates[1] = -stiffness / mass / c, -damping / mass, 1.0 / h, 0.0
+    rates[2, 3] = 1.0 / h
+    return rates
+
+
+def _to_state(flow: Matrix, mass: float, stiffness: float, step_s: float) -> Matrix:
+    """The rows of x and v in the coordinates (x, v, F, rise of F); shape (2, 4)."""
+    h, c = _wide(step_s), _wide(natural_rate(mass, stiffness, step_s))
+    return flow[:2] * np.array([c, _wide(1), h / mass, h / mass]) / np.array([[c], [_wide(1)]])
 
 
 def natural_rate(mass: float, stiffness: float, step_s: float) -> float:

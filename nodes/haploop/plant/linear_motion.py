@@ -1,0 +1,152 @@
+"""The state of device and hand, moved by the exact flow from one change of force to the next."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from haploop.plant.command_line import Hold
+from haploop.plant.flow import HeldFlow, StepFlow
+from haploop.plant.hand_force import HandForce
+from haploop.plant.mechanics import Mechanics
+from haploop.protocol.ticks import Timebase
+
+# Responses to the hand are made for this many intervals at a time, on a fixed grid.
+_PIECE_TICKS = 256
+
+
+class LinearMotion:
+    """m a + b v + k x = f + tau + k x_rest, f held, tau piecewise linear between plant steps.
+
+    The motion is a sum: z = y + D. D is the response to tau and the spring's rest from zero at the start of an
+    interval; it does not depend on the controller and is made beforehand for every plant step. y starts as z and
+    follows the held forces: over a hold of i steps y+ = y + (e^{A i h} - I) y + (integral of e^{A s} ds) f / m.
+    So a hold costs one step whatever its length, and the plant steps within it are filled in when they are recorded.
+
+    The state is a float and the rounding it left over (compensated addition), so that neither slow motion nor a long
+    run loses what a single interval adds.
+
+    Attributes:
+        x, v: position in m and velocity in m/s at the end of the last interval.
+    """
+
+    def __init__(self, mechanics: Mechanics, hand_force: dict[str, Any] | None, time: Timebase) -> None:
+        m, self._steps = mechanics, time.steps_per_tick
+        self._held = HeldFlow.of(m.mass_kg, m.damping, m.stiffness, time.step_s, self._steps)
+        self._over = self._held.by_count()
+        self._step = StepFlow.of(m.mass_kg, m.damping, m.stiffness, time.step_s)
+        self._tau = HandForce(hand_force, time.plant_rate)
+        self._spring_at_origin_N = m.stiffness * m.rest_m
+        self._pieces: dict[int, np.ndarray] = {}
+        self._response: list[list[float]] = []
+        self._response_first = self._response_end = 0
+        self.x, self.v = m.start
+        self._x_low = self._v_low = 0.0
+        self.begin_record()
+
+    def advance(self, tick: int, holds: list[Hold]) -> None:
+        """Move through interval ``tick`` under the forces held in it."""
+        if tick >= self._response_end:
+            self._respond_from(tick)
+        x, v, x_low, v_low = self.x, self.v, self._x_low, self._v_low
+        drive_x, drive_v = self._response[tick - self._response_first]
+        last = holds[-1]
+        for hold in holds:
+            count, force, _ = hold
+            self._starts += (x, x_low, v, v_low)
+            x_x, x_v, x_force, v_x, v_v, v_force = self._over[count]
+            dx = x_x * x + x_v * v + x_force * force + x_low
+            dv = v_x * x + v_v * v + v_force * force + v_low
+            if hold is last:
+                dx += drive_x
+                dv += drive_v
+            next_x, next_v = x + dx, v + dv
+            x_low, v_low = dx - (next_x - x), dv - (next_v - v)
+            x, v = next_x, next_v
+        self.x, self.v, self._x_low, self._v_low = x, v, x_low, v_low
+        self._holds += holds
+
+    def _respond_from(self, tick: int) -> None:
+        """What tau adds to x and v over each of the next intervals."""
+        piece = tick // _PIECE_TICKS
+        self._response_first, self._response_end = piece * _PIECE_TICKS, (piece + 1) * _PIECE_TICKS
+        self._response = self._responses(piece)[:, -1].tolist()
+
+    def _responses(self, piece: int) -> np.ndarray:
+        """D at the steps of the intervals of a piece, from each interval's start; shape (intervals, n + 1, 2)."""
+        if piece not in self._pieces:
+            if len(self._pieces) > 8:
+                self._pieces.clear()
+            self._pieces[piece] = self._make_responses(piece)
+        return self._pieces[piece]
+
+    def _make_responses(self, piece: int) -> np.ndarray:
+        n, s = self._steps, self._step
+        first = piece * _PIECE_TICKS * n
+        force = self._tau.at_steps(first, first + _PIECE_TICKS * n + 1) + self._spring_at_origin_N
+        start, rise = force[:-1].reshape(-1, n), np.diff(force).reshape(-1, n)
+        push_x, push_v = s.x_force * start + s.x_slope * rise, s.v_force * start + s.v_slope * rise
+        response = np.zeros((_PIECE_TICKS, n + 1, 2))
+        x, v = response[:, 0, 0], response[:, 0, 1]
+        for i in range(n):
+            x, v = x + (s.x_x * x + s.x_v * v + push_x[:, i]), v + (s.v_x * x + s.v_v * v + push_v[:, i])
+            response[:, i + 1, 0], response[:, i + 1, 1] = x, v
+        return response
+
+    # The record of every plant step
+
+    @property
+    def force(self) -> float:
+        """The force held last, N; 0 before the first command."""
+        return self._holds[-1][1]
+
+    @property
+    def command(self) -> int:
+        """Tick of the command in effect last; -1 before the first."""
+        return self._holds[-1][2]
+
+    def begin_record(self) -> None:
+        """Record from the present state on; the last hold stays, for whoever asks for the force."""
+        self._holds: list[Hold] = self._holds[-1:] if hasattr(self, "_holds") else [(0, 0.0, -1)]
+        self._starts: list[float] = []
+
+    def take_record(self, tick: int) -> dict[str, np.ndarray]:
+        """x, v, x_low, force, command at every plant step from interval ``tick`` on and at the end; starts anew.
+
+        Step i of a hold that began at y is y plus the flow of i steps, plus D; the end is the present state itself.
+        """
+        holds, n = self._holds[1:], self._steps
+        counts = np.array([hold[0] for hold in holds], np.intp)
+        forces = np.array([hold[1] for hold in holds], float)
+        commands = np.array([hold[2] for hold in holds], float)
+        ends = np.cumsum(counts)
+        steps = int(ends[-1]) if len(ends) else 0
+        of_hold = np.repeat(np.arange(len(holds)), counts)
+        since = np.arange(steps) - np.repeat(ends - counts, counts)
+        x, x_low, v, v_low = np.array(self._starts, float).reshape(-1, 4).T[:, of_hold]
+        force = forces[of_hold]
+        x_x, x_v, x_force, v_x, v_v, v_force = self._held.coefficients[since].T
+        response = self._between(tick, steps // n)
+        dx = x_x * x + x_v * v + x_force * force + x_low + response[:, 0]
+        dv = v_x * x + v_v * v + v_force * force + v_low + response[:, 1]
+        begun = np.arange(steps) % n == 0  # the state itself, as it stood at the end of the interval before
+        at_x, at_v = np.where(begun, x, x + dx), np.where(begun, v, v + dv)
+        record = {
+            "x": np.append(at_x, self.x),
+            "v": np.append(at_v, self.v),
+            "x_low": np.append(dx - (at_x - x), self._x_low),
+            "force": np.append(force, self.force),
+            "command": np.append(commands[of_hold], self.command),
+        }
+        self.begin_record()
+        return record
+
+    def _between(self, tick: int, ticks: int) -> np.ndarray:
+        """D at the steps of some intervals, their ends left out; shape (ticks * n, 2)."""
+        if not ticks:
+            return np.zeros((0, 2))
+        first, last = tick // _PIECE_TICKS, (tick + ticks - 1) // _PIECE_TICKS
+        joined = np.concatenate([self._responses(piece)[:, :-1] for piece in range(first, last + 1)])
+        start = tick - first * _PIECE_TICKS
+        return joined[start : start + ticks].reshape(-1, 2)
