@@ -28,7 +28,9 @@ class Child:
             command,
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
-            start_new_session=True,  # Ctrl-C is for the launcher, which ends the run in order
+            # A group of its own, since Ctrl-C is for the launcher, which ends the run in order; but the same session:
+            # the kernel schedules sessions as groups, and two of them preempt each other at every message.
+            process_group=0,
         )
         assert self._process.stdin
         assert self._process.stdout

@@ -93,7 +93,7 @@ class Roster:
                 "tick": node.tick,
                 "behind_ticks": first - node.tick,
                 "waits_for": node.waits_for,
-                "lossless": node.lossless,
+                "lossless": node.lossless or node.is_own,
             }
             for node in self.nodes.values()
         ]
