@@ -1,4 +1,4 @@
-"""Whether the memory of every process stays flat from one to ten simulated minutes; the second part of ``make bench``."""
+"""Whether the memory of every process stays flat from one to ten simulated minutes; part two of ``make bench``."""
 
 from __future__ import annotations
 
