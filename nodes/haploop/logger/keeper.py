@@ -13,7 +13,7 @@ from haploop.logger.logger import Logger
 from haploop.logger.mcap_log import Log
 from haploop.protocol.ticks import Timebase
 
-LOG, SUMMARY, SCENE = "log.mcap", "summary.json", "scene.toml"
+LOG, SUMMARY = "log.mcap", "summary.json"
 # The log is at most this far behind on disk, in wall time.
 _FLUSH_S = 0.4
 
