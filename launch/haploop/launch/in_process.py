@@ -74,7 +74,6 @@ class Loop:
         self._keeper = keeper
         self._end = time.ticks
         self._block_ticks = scene["run"]["block_ticks"] * scene["run"]["window_blocks"]
-        self._most = time.lookahead_ticks + 1
         keeper.logger.start(self._plant.state(), [])
 
     def schedule(self, events: list[tuple[int, Event]]) -> None:
@@ -90,15 +89,9 @@ class Loop:
         """Work through one block; False when the run has ended."""
         plant, controller = self._plant, self._controller
         until = min(plant.tick + self._block_ticks, self._end)
-        while plant.tick < until and plant.stop_reason is None:
-            samples = plant.samples(min(self._most, until - plant.tick))
-            if samples:
-                plant.receive([float(force) for force in controller.answer(samples)])
-        going_on = plant.tick < self._end and plant.stop_reason is None
-        if not going_on and plant.stop_reason is None:
-            plant.finish()
+        plant.run_until(until, lambda _, samples: [float(force) for force in controller.answer(samples)])
         self._hand_over()
-        return going_on
+        return plant.tick < self._end and plant.stop_reason is None
 
     def _hand_over(self) -> None:
         first, ticks, columns = self._plant.take_block()

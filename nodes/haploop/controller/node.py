@@ -35,39 +35,35 @@ class ControllerNode:
         self._block_ticks = scene["run"]["block_ticks"]
         self._reported = 0
         self._secret = welcome["context"]["secret"]
-        self._loop = ControllerEnd(context, welcome["endpoints"]["plant"]["loop"])
+        self._loop = ControllerEnd(context, welcome["endpoints"]["plant"]["loop"], self._await_plant)
 
     def _state(self) -> tuple[int, dict[str, Any]]:
         return self._controller.tick, {"history": self._controller.recorder.history}
 
     def connect(self) -> None:
         """Greet the plant and wait for the logger."""
-        self._loop.greet(self._secret, self._await_plant)
+        self._loop.greet(self._secret)
         self._publisher.await_subscriber(lambda: self._wait("logger"))
         self._member.ready(0)
 
     def run(self) -> tuple[int, dict[str, Any]]:
         """Answer until the plant ends the run; returns the number of ticks answered."""
         controller, member, loop = self._controller, self._member, self._loop
-        while (samples := loop.samples(controller.tick, self._await_plant)) is not None:
+        while (samples := loop.samples(controller.tick)) is not None:
             end = controller.tick + len(samples)
             while member.until < end:
                 member.wait(controller.tick)
             if member.events:
                 self._schedule()
-            first = controller.tick
-            loop.answer(first, self._answer(samples))
+            try:
+                loop.answer(controller.tick, controller.answer(samples))
+            except ElementError:
+                self._flush()
+                raise
             if end - self._reported >= self._block_ticks or end >= member.until:
                 self._flush()
                 member.poll()
         return self._end()
-
-    def _answer(self, samples: list[list[float]]) -> list[float]:
-        try:
-            return self._controller.answer(samples)
-        except ElementError:
-            self._flush()
-            raise
 
     def _schedule(self) -> None:
         for tick, event in self._member.take_events():

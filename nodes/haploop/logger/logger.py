@@ -42,10 +42,10 @@ class Logger:
         self._digest = hashlib.sha256()
         self.latest: dict[str, np.ndarray] = {}
         self.latest_from = self.tick = self._first_tick = 0
-        self._began = wall_clock.perf_counter()
 
     def start(self, plant: dict[str, float], history: list[Block]) -> None:
         """Begin with the plant's state and, when joining a run, the controller's last blocks."""
+        self._began = wall_clock.perf_counter()
         known = history[-1]["from_tick"] + history[-1]["ticks"] if history else 0
         self.tick = self._first_tick = max(int(plant["tick"]), known)
         self._plant = PlantTape(self.time.steps_per_tick, int(plant["tick"]))

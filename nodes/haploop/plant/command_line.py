@@ -15,6 +15,9 @@ class CommandLine:
 
     In interval k command k - L - 1 still holds for the first r steps and command k - L for the rest; before the first
     command the force is 0. Commands are kept no longer than they are in flight.
+
+    Attributes:
+        receive: takes the next commands, a list in order of their ticks.
     """
 
     def __init__(self, time: Timebase) -> None:
@@ -22,10 +25,7 @@ class CommandLine:
         self._prompt_steps = time.steps_per_tick - self._late_steps
         self._forces: list[Any] = [0.0] * (self._lookahead + 1)
         self._first = -self._lookahead - 1
-
-    def receive(self, forces: list[Any]) -> None:
-        """Take the next commands, in order."""
-        self._forces.extend(forces)
+        self.receive = self._forces.extend
 
     def holds(self, tick: int) -> list[Hold]:
         """The forces held in interval ``tick``, in order; forgets all older commands.

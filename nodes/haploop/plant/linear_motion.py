@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from array import array
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,7 @@ from haploop.protocol.ticks import Timebase
 
 # Responses to the hand are made for this many intervals at a time, on a fixed grid.
 _PIECE_TICKS = 256
+RECORD = ("x", "v", "x_low", "force", "command")
 
 
 class LinearMotion:
@@ -43,7 +45,10 @@ class LinearMotion:
         self._response_first = self._response_end = 0
         self.x, self.v = m.start
         self._x_low = self._v_low = 0.0
-        self.begin_record()
+        late = time.delay_steps % self._steps
+        self._cuts = [(0, late), (late, self._steps - late)] if late else [(0, self._steps)]
+        self._starts: list[float] = []
+        self._last: Hold = (0, 0.0, -1)
 
     def advance(self, tick: int, holds: list[Hold]) -> None:
         """Move through interval ``tick`` under the forces held in it."""
@@ -53,8 +58,8 @@ class LinearMotion:
         drive_x, drive_v = self._response[tick - self._response_first]
         last = holds[-1]
         for hold in holds:
-            count, force, _ = hold
-            self._starts += (x, x_low, v, v_low)
+            count, force, command = hold
+            self._starts += (x, x_low, v, v_low, force, command)
             x_x, x_v, x_force, v_x, v_v, v_force = self._over[count]
             dx = x_x * x + x_v * v + x_force * force + x_low
             dv = v_x * x + v_v * v + v_force * force + v_low
@@ -65,7 +70,7 @@ class LinearMotion:
             x_low, v_low = dx - (next_x - x), dv - (next_v - v)
             x, v = next_x, next_v
         self.x, self.v, self._x_low, self._v_low = x, v, x_low, v_low
-        self._holds += holds
+        self._last = last
 
     def _respond_from(self, tick: int) -> None:
         """What tau adds to x and v over each of the next intervals."""
@@ -99,54 +104,46 @@ class LinearMotion:
     @property
     def force(self) -> float:
         """The force held last, N; 0 before the first command."""
-        return self._holds[-1][1]
+        return self._last[1]
 
     @property
     def command(self) -> int:
         """Tick of the command in effect last; -1 before the first."""
-        return self._holds[-1][2]
-
-    def begin_record(self) -> None:
-        """Record from the present state on; the last hold stays, for whoever asks for the force."""
-        self._holds: list[Hold] = self._holds[-1:] if hasattr(self, "_holds") else [(0, 0.0, -1)]
-        self._starts: list[float] = []
+        return self._last[2]
 
     def take_record(self, tick: int) -> dict[str, np.ndarray]:
         """x, v, x_low, force, command at every plant step from interval ``tick`` on and at the end; starts anew.
 
         Step i of a hold that began at y is y plus the flow of i steps, plus D; the end is the present state itself.
+        Every interval is cut alike, so the i-th holds of all intervals are filled in at once.
         """
-        holds, n = self._holds[1:], self._steps
-        counts = np.array([hold[0] for hold in holds], np.intp)
-        forces = np.array([hold[1] for hold in holds], float)
-        commands = np.array([hold[2] for hold in holds], float)
-        ends = np.cumsum(counts)
-        steps = int(ends[-1]) if len(ends) else 0
-        of_hold = np.repeat(np.arange(len(holds)), counts)
-        since = np.arange(steps) - np.repeat(ends - counts, counts)
-        x, x_low, v, v_low = np.array(self._starts, float).reshape(-1, 4).T[:, of_hold]
-        force = forces[of_hold]
-        x_x, x_v, x_force, v_x, v_v, v_force = self._held.coefficients[since].T
-        response = self._between(tick, steps // n)
-        dx = x_x * x + x_v * v + x_force * force + x_low + response[:, 0]
-        dv = v_x * x + v_v * v + v_force * force + v_low + response[:, 1]
-        begun = np.arange(steps) % n == 0  # the state itself, as it stood at the end of the interval before
-        at_x, at_v = np.where(begun, x, x + dx), np.where(begun, v, v + dv)
-        record = {
-            "x": np.append(at_x, self.x),
-            "v": np.append(at_v, self.v),
-            "x_low": np.append(dx - (at_x - x), self._x_low),
-            "force": np.append(force, self.force),
-            "command": np.append(commands[of_hold], self.command),
-        }
-        self.begin_record()
-        return record
+        cuts, n = self._cuts, self._steps
+        starts = np.frombuffer(array("d", self._starts)).reshape(-1, len(cuts), 6)
+        self._starts = []
+        ticks = len(starts)
+        columns = {name: np.empty(ticks * n + 1) for name in RECORD}
+        columns_of_ticks = [column[:-1].reshape(ticks, n) for column in columns.values()]
+        response = self._between(tick, ticks)
+        for index, (first, count) in enumerate(cuts):
+            x, x_low, v, v_low, force, command = (entry[:, None] for entry in starts[:, index].T)
+            x_x, x_v, x_force, v_x, v_v, v_force = self._held.coefficients[:count].T
+            during = slice(first, first + count)
+            dx = x_x * x + x_v * v + x_force * force + x_low + response[:, during, 0]
+            dv = v_x * x + v_v * v + v_force * force + v_low + response[:, during, 1]
+            at_x, at_v = x + dx, v + dv
+            if not first:  # the state itself, as it stood at the end of the interval before
+                at_x[:, :1], at_v[:, :1] = x, v
+            rows = at_x, at_v, dx - (at_x - x), force, command
+            for column, row in zip(columns_of_ticks, rows, strict=True):
+                column[:, during] = row
+        for column, end in zip(columns.values(), (self.x, self.v, self._x_low, self.force, self.command), strict=True):
+            column[-1] = end
+        return columns
 
     def _between(self, tick: int, ticks: int) -> np.ndarray:
-        """D at the steps of some intervals, their ends left out; shape (ticks * n, 2)."""
-        if not ticks:
-            return np.zeros((0, 2))
-        first, last = tick // _PIECE_TICKS, (tick + ticks - 1) // _PIECE_TICKS
-        joined = np.concatenate([self._responses(piece)[:, :-1] for piece in range(first, last + 1)])
+        """D at the steps of some intervals, their ends left out; shape (ticks, n, 2)."""
+        first, last = tick // _PIECE_TICKS, max(tick, tick + ticks - 1) // _PIECE_TICKS
+        pieces = [self._responses(piece) for piece in range(first, last + 1)]
+        joined = pieces[0] if len(pieces) == 1 else np.concatenate(pieces)
         start = tick - first * _PIECE_TICKS
-        return joined[start : start + ticks].reshape(-1, 2)
+        return joined[start : start + ticks, :-1]

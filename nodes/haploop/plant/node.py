@@ -24,14 +24,13 @@ class PlantNode:
 
     def __init__(self, member: Member, context: zmq.Context[zmq.Socket[bytes]], directory: Path) -> None:
         self._member = member
-        self._loop = PlantEnd(context)
+        self._loop = PlantEnd(context, self._await_controller)
         self._publisher = Publisher(context, ROLE, self._state)
         names = PROCESSES[ROLE].binds
         sockets = {"loop": self._loop.socket, "telemetry": self._publisher.socket}
         endpoints = {channel: bind(socket, directory, names[channel]) for channel, socket in sockets.items()}
         welcome = member.join(endpoints)
-        time = self._time = Timebase(**welcome["timebase"])
-        self._plant = Plant(welcome["scene"], time)
+        self._plant = Plant(welcome["scene"], Timebase(**welcome["timebase"]))
         self._block_ticks = welcome["scene"]["run"]["block_ticks"]
         self._reported = 0
         self._secret = welcome["context"]["secret"]
@@ -42,31 +41,20 @@ class PlantNode:
 
     def connect(self) -> None:
         """Find the controller and the logger; no tick is worked on before both listen."""
-        self._loop.greet(self._secret, self._await_controller)
+        self._loop.greet(self._secret)
         self._publisher.await_subscriber(lambda: self._wait("logger"))
         self._member.ready(0)
 
     def run(self) -> tuple[int, dict[str, Any]]:
         """Work until the run ends; returns the tick it ended at."""
         member, plant = self._member, self._plant
-        most = self._time.lookahead_ticks + 1
-        while plant.stop_reason is None:
-            if plant.tick >= member.until:
-                plant.finish()
-                if member.last or plant.stop_reason:
-                    break
-                self._flush()
-                while plant.tick >= member.until and not member.last:
-                    member.wait(plant.tick)
-                    self._publisher.serve()
-                continue
-            first = plant.tick
-            samples = plant.samples(min(most, member.until - first))
-            if samples:
-                plant.receive(self._loop.exchange(first, samples, self._await_controller))
-            if plant.reached - self._reported >= self._block_ticks:
-                self._flush()
-                member.poll()
+        while plant.stop_reason is None and not (member.last and plant.tick >= member.until):
+            plant.run_until(min(plant.tick + self._block_ticks, member.until), self._loop.exchange)
+            self._flush()
+            member.poll()
+            while plant.tick >= member.until and not member.last and plant.stop_reason is None:
+                member.wait(plant.tick)
+                self._publisher.serve()
         return self._end()
 
     def _end(self) -> tuple[int, dict[str, Any]]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 from haploop.plant.command_line import CommandLine, Hold
@@ -12,11 +13,12 @@ from haploop.plant.mechanics import Mechanics
 from haploop.plant.sensors import accelerometer_is_used, encoder
 from haploop.protocol.ticks import Timebase
 
+# From the first tick and its samples to the commands that answer them.
+Exchange = Callable[[int, list[tuple[float, ...]]], list[float]]
+
 
 class Plant:
     """Sampling, commands and record of one plant; knows nothing of sockets.
-
-    Call ``samples`` and ``receive`` in turn: samples of at most L + 1 ticks, then the commands that answer them.
 
     Attributes:
         tick: the next tick to be sampled.
@@ -28,7 +30,7 @@ class Plant:
         hand_force = scene.get("hand", {}).get("force")
         self._motion = LinearMotion(self._mechanics, hand_force, time)
         self._tau = HandForce(hand_force, time.plant_rate)
-        self._steps = time.steps_per_tick
+        self._steps, self._most = time.steps_per_tick, time.lookahead_ticks + 1
         self._line = CommandLine(time)
         self._limit_m = scene["diverged_beyond"]
         self._quantise = encoder(scene.get("encoder"))
@@ -43,6 +45,19 @@ class Plant:
 
     def _measure_both(self) -> tuple[float, ...]:
         return self._quantise(self._motion.x), self._acceleration()
+
+    def run_until(self, end: int, exchange: Exchange) -> None:
+        """Work up to tick ``end``, or to where the plant stops by itself; ``exchange`` turns samples into commands.
+
+        It is given the first tick of at most L + 1 samples and returns the forces in N that answer them.
+        """
+        most = self._most
+        while (tick := self.tick) < end and self.stop_reason is None:
+            samples = self.samples(min(most, end - tick))
+            if samples:
+                self.receive(exchange(tick, samples))
+        if self._interval_due:
+            self._advance()
 
     def samples(self, count: int) -> list[tuple[float, ...]]:
         """The next ``count`` samples, (x_m,) or (x_m, acceleration) each; fewer when the plant diverged.
@@ -64,11 +79,6 @@ class Plant:
         total = sum(forces)
         if total - total != 0.0:  # infinite or not a number
             self._unusable = True
-
-    def finish(self) -> None:
-        """Step through the interval after the last sample, so that the run ends at the tick after it."""
-        if self._interval_due:
-            self._advance()
 
     @property
     def reached(self) -> int:

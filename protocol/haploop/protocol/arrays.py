@@ -17,7 +17,7 @@ def where(condition: Any, yes: Any, no: Any) -> Any:
 
 def rint(value: Any) -> Any:
     """Nearest whole number, halves to even, as ``numpy.rint``; values are finite."""
-    if isinstance(value, float):
+    if value.__class__ is float:
         return float(round(value))
     return value.__array_namespace__().rint(value)
 

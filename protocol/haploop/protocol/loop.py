@@ -10,7 +10,7 @@ import zmq
 
 from haploop.protocol.member import REPORT_MS
 from haploop.protocol.messages import MESSAGES, VERSION
-from haploop.protocol.sockets import open_socket
+from haploop.protocol.sockets import bare_send, open_socket
 from haploop.protocol.wire import Frame, WireError, decode, encode
 
 _COMMANDS = MESSAGES["COMMANDS"].code
@@ -26,39 +26,49 @@ class LoopError(RuntimeError):
 class PlantEnd:
     """The plant's end: binds a ROUTER, so that a stranger who connects gets nothing and disturbs nothing.
 
+    Args:
+        idle: called now and then while an answer is awaited.
+
     Attributes:
         socket: to be bound by the node.
         strangers: frames that came from anyone but the controller.
     """
 
-    def __init__(self, context: zmq.Context[zmq.Socket[bytes]]) -> None:
+    def __init__(self, context: zmq.Context[zmq.Socket[bytes]], idle: Idle) -> None:
         self.socket = open_socket(context, zmq.ROUTER)
         self.socket.setsockopt(zmq.RCVTIMEO, REPORT_MS)
+        self._idle = idle
         self._partner = b""
         self.strangers = 0
         self._pack = msgpack.Packer(autoreset=True).pack
+        self._emit = bare_send(self.socket)
 
-    def greet(self, secret: str, idle: Idle) -> None:
+    def greet(self, secret: str) -> None:
         """Wait for the controller, known by the run's secret, and greet it back."""
         while True:
-            sender, data = self._receive(idle)
+            sender, data = self._receive()
             if _is_hello(data, secret):
                 self._partner = sender
                 self._send(encode("HELLO", secret))
                 return
             self.strangers += 1
 
-    def exchange(self, tick: int, samples: list[tuple[float, ...]], idle: Idle) -> list[float]:
+    def exchange(self, tick: int, samples: list[tuple[float, ...]]) -> list[float]:
         """Send the samples of the ticks from ``tick`` on and return the commands that answer them.
 
         Raises:
             LoopError: the answer is for other ticks.
         """
-        self._send(self._pack((VERSION, _SAMPLES, tick, samples)))
-        sender, data = self._receive(idle)
-        while sender != self._partner:
+        emit, partner = self._emit, self._partner
+        try:
+            emit(partner, zmq.SNDMORE)
+            emit(self._pack((VERSION, _SAMPLES, tick, samples)))
+        except zmq.ZMQError as error:
+            _let_go(error)
+        sender, data = self._receive()
+        while sender != partner:
             self.strangers += 1
-            sender, data = self._receive(idle)
+            sender, data = self._receive()
         answer = msgpack.unpackb(data)
         if answer[:3] != [VERSION, _COMMANDS, tick] or len(answer[3]) != len(samples):
             raise LoopError(_mismatch("commands", tick, len(samples), decode(data)))
@@ -69,21 +79,20 @@ class PlantEnd:
         self._send(encode("LAST", tick))
 
     def _send(self, data: bytes) -> None:
-        """Send to the controller; nowhere when it has gone, which the clock sees too, and says what comes of it."""
+        """Send to the controller."""
         try:
-            self.socket.send(self._partner, zmq.SNDMORE)
-            self.socket.send(data)
+            self._emit(self._partner, zmq.SNDMORE)
+            self._emit(data)
         except zmq.ZMQError as error:
-            if error.errno != zmq.EHOSTUNREACH:
-                raise
+            _let_go(error)
 
-    def _receive(self, idle: Idle) -> tuple[bytes, bytes]:
-        """Sender and last frame of the next message; calls ``idle`` now and then while nothing comes."""
+    def _receive(self) -> tuple[bytes, bytes]:
+        """Sender and last frame of the next message."""
         while True:
             try:
                 sender = self.socket.recv()
             except zmq.Again:
-                idle()
+                self._idle()
                 continue
             data = b"" if sender != self._partner else self.socket.recv()
             if not data:  # a stranger may have sent any number of frames; the controller sends one
@@ -93,27 +102,29 @@ class PlantEnd:
 
 
 class ControllerEnd:
-    """The controller's end: a DEALER that knows only the plant."""
+    """The controller's end: a DEALER that knows only the plant; ``idle`` as for the plant's end."""
 
-    def __init__(self, context: zmq.Context[zmq.Socket[bytes]], address: str) -> None:
+    def __init__(self, context: zmq.Context[zmq.Socket[bytes]], address: str, idle: Idle) -> None:
+        self._idle = idle
         self.socket = open_socket(context, zmq.DEALER)
         self.socket.setsockopt(zmq.RCVTIMEO, REPORT_MS)
         self.socket.connect(address)
         self._pack = msgpack.Packer(autoreset=True, default=float).pack  # an element may give a number of another type
+        self._emit = bare_send(self.socket)
 
-    def greet(self, secret: str, idle: Idle) -> None:
+    def greet(self, secret: str) -> None:
         """Present ourselves with the run's secret and wait for the plant's greeting."""
         self.socket.send(encode("HELLO", secret))
-        if not _is_hello(self._receive(idle), secret):
+        if not _is_hello(self._receive(), secret):
             raise LoopError("The plant's greeting did not carry the secret of this run.")
 
-    def samples(self, tick: int, idle: Idle) -> list[list[float]] | None:
+    def samples(self, tick: int) -> list[list[float]] | None:
         """The next samples, which must start at ``tick``; None when the run ends there.
 
         Raises:
             LoopError: samples of other ticks came, or none will come although some are missing.
         """
-        data = self._receive(idle)
+        data = self._receive()
         items = msgpack.unpackb(data)
         if items[:3] == [VERSION, _SAMPLES, tick]:
             return items[3]
@@ -124,14 +135,20 @@ class ControllerEnd:
 
     def answer(self, tick: int, forces: list[float]) -> None:
         """Send the commands of the ticks from ``tick`` on."""
-        self.socket.send(self._pack((VERSION, _COMMANDS, tick, forces)))
+        self._emit(self._pack((VERSION, _COMMANDS, tick, forces)))
 
-    def _receive(self, idle: Idle) -> bytes:
+    def _receive(self) -> bytes:
         while True:
             try:
                 return self.socket.recv()
             except zmq.Again:
-                idle()
+                self._idle()
+
+
+def _let_go(error: zmq.ZMQError) -> None:
+    """A controller that has gone is no error here: the clock sees it too, and says what comes of it."""
+    if error.errno != zmq.EHOSTUNREACH:
+        raise error
 
 
 def _is_hello(data: bytes, secret: str) -> bool:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import zmq
 
@@ -35,6 +37,11 @@ def open_socket(context: zmq.Context[zmq.Socket[bytes]], kind: int) -> zmq.Socke
     if kind == zmq.SUB:
         socket.setsockopt(zmq.RCVHWM, TELEMETRY_BACKLOG_BLOCKS)
     return socket
+
+
+def bare_send(socket: zmq.Socket[bytes]) -> Callable[..., Any]:
+    """``socket.send`` without the checks of options that the loop does not use: a third of its time."""
+    return super(zmq.Socket, socket).send
 
 
 def _transport(context: zmq.Context[zmq.Socket[bytes]]) -> Transport:
