@@ -112,7 +112,7 @@ def test_a_logger_that_leaves_by_an_interrupt_has_a_whole_log_and_the_run_goes_o
 
 def test_a_logger_that_is_killed_does_not_hold_the_run_up_until_the_deadline(running, attached, alone):
     """Not even when the run is waiting for it already, a window of 4 blocks of 50 ticks ahead."""
-    run = running(sets=(*SHORT, NEVER, "run.block_ticks=50"))
+    run = running(sets=(*SHORT, NEVER, "run.block_ticks=50", "run.window_blocks=4"))
     run.reaches(500)
     second = attached(run)
     second.signal(signal.SIGSTOP)

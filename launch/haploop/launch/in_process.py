@@ -11,6 +11,7 @@ from haploop.controller.dissipation import ElementError
 from haploop.launch.failure import RunFailed
 from haploop.logger.keeper import Keeper, open_keeper
 from haploop.plant.plant import Plant
+from haploop.protocol.block_length import BlockLength
 from haploop.protocol.ticks import Timebase
 
 if TYPE_CHECKING:
@@ -73,7 +74,7 @@ class Loop:
         self._plant, self._controller = Plant(scene, time), Controller(scene, time, kinds)
         self._keeper = keeper
         self._end = time.ticks
-        self._block_ticks = scene["run"]["block_ticks"] * scene["run"]["window_blocks"]
+        self._block = BlockLength(scene["run"]["block_ticks"])
         keeper.logger.start(self._plant.state(), [])
 
     def schedule(self, events: list[tuple[int, Event]]) -> None:
@@ -88,9 +89,10 @@ class Loop:
     def block(self) -> bool:
         """Work through one block; False when the run has ended."""
         plant, controller = self._plant, self._controller
-        until = min(plant.tick + self._block_ticks, self._end)
+        until = min(plant.tick + self._block.ticks, self._end)
         plant.run_until(until, lambda _, samples: [float(force) for force in controller.answer(samples)])
         self._hand_over()
+        self._block.next()
         return plant.tick < self._end and plant.stop_reason is None
 
     def _hand_over(self) -> None:

@@ -81,8 +81,8 @@ class Run(Table):
 
     log: Literal["steps", "ticks", "none"] = "steps"
     pin: bool = True
-    block_ticks: Annotated[int, si("", "ticks a telemetry block", whole=True, at_least=1)] = 250
-    window_blocks: Annotated[int, si("", "blocks the clock grants ahead", whole=True, at_least=1, at_most=100)] = 4
+    block_ticks: Annotated[int, si("", "most ticks in a block of telemetry", whole=True, at_least=1)] = 1000
+    window_blocks: Annotated[int, si("", "blocks the clock grants ahead", whole=True, at_least=1, at_most=100)] = 2
     deadline: Annotated[float, si("s", "wall time a node may stay silent", above=0)] = 5.0
 
 

@@ -10,6 +10,7 @@ import zmq
 
 from haploop.controller.controller import Controller
 from haploop.controller.dissipation import ElementError, PluginError, registry
+from haploop.protocol.block_length import BlockLength
 from haploop.protocol.loop import ControllerEnd
 from haploop.protocol.member import Member
 from haploop.protocol.node import NodeError, run_node
@@ -32,7 +33,7 @@ class ControllerNode:
         scene = welcome["scene"]
         kinds = registry([Path(path) for path in welcome["context"]["plugins"]])
         self._controller = Controller(scene, Timebase(**welcome["timebase"]), kinds)
-        self._block_ticks = scene["run"]["block_ticks"]
+        self._block = BlockLength(scene["run"]["block_ticks"])
         self._reported = 0
         self._secret = welcome["context"]["secret"]
         self._loop = ControllerEnd(context, welcome["endpoints"]["plant"]["loop"], self._await_plant)
@@ -60,7 +61,7 @@ class ControllerNode:
             except ElementError:
                 self._flush()
                 raise
-            if end - self._reported >= self._block_ticks or end >= member.until:
+            if end - self._reported >= self._block.ticks or end >= member.until:
                 self._flush()
                 member.poll()
         return self._end()
@@ -86,6 +87,7 @@ class ControllerNode:
         self._reported = self._controller.tick
         refused, recorder.refused = recorder.refused, []
         self._member.progress(self._reported, {"refused": refused} if refused else None)
+        self._block.next()
 
     def _await_plant(self) -> None:
         self._wait("plant")

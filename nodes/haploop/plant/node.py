@@ -8,6 +8,7 @@ from typing import Any
 import zmq
 
 from haploop.plant.plant import Plant
+from haploop.protocol.block_length import BlockLength
 from haploop.protocol.loop import PlantEnd
 from haploop.protocol.member import Member
 from haploop.protocol.node import run_node
@@ -31,8 +32,7 @@ class PlantNode:
         endpoints = {channel: bind(socket, directory, names[channel]) for channel, socket in sockets.items()}
         welcome = member.join(endpoints)
         self._plant = Plant(welcome["scene"], Timebase(**welcome["timebase"]))
-        self._block_ticks = welcome["scene"]["run"]["block_ticks"]
-        self._reported = 0
+        self._block = BlockLength(welcome["scene"]["run"]["block_ticks"])
         self._secret = welcome["context"]["secret"]
 
     def _state(self) -> tuple[int, dict[str, Any]]:
@@ -49,7 +49,7 @@ class PlantNode:
         """Work until the run ends; returns the tick it ended at."""
         member, plant = self._member, self._plant
         while plant.stop_reason is None and not (member.last and plant.tick >= member.until):
-            plant.run_until(min(plant.tick + self._block_ticks, member.until), self._loop.exchange)
+            plant.run_until(min(plant.tick + self._block.ticks, member.until), self._loop.exchange)
             self._flush()
             member.poll()
             while plant.tick >= member.until and not member.last and plant.stop_reason is None:
@@ -72,8 +72,8 @@ class PlantNode:
         if ticks:
             self._publisher.publish("PLANT_BLOCK", first, ticks, columns)
         self._publisher.serve()
-        self._reported = self._plant.reached
-        self._member.progress(self._reported)
+        self._member.progress(self._plant.reached)
+        self._block.next()
 
     def _await_controller(self) -> None:
         self._wait("controller")

@@ -165,6 +165,9 @@ class RunData:
         ends = [*ended.get("elements", []), *[None] * len(self.history.elements)]
         accounts += [(span.name, span.from_tick, end) for span, end in zip(self.history.elements, ends, strict=False)]
         books = [self._book(*account) for account in accounts if f"{account[0]}.true" in self.energy]
+        books = [
+            book for book in books if len(book.t_s)
+        ]  # a log may end between an element's start and its first books
         if len(books) < 2:
             return books
         longest = max(books, key=lambda book: len(book.t_s))

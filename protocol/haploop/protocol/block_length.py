@@ -1,0 +1,31 @@
+"""How many ticks go into one block of telemetry."""
+
+from __future__ import annotations
+
+import time
+
+# A block that takes no longer than this is never far behind what a viewer shows or a killed run leaves in its log.
+AT_MOST_S = 0.1
+_FIRST_TICKS = 100
+
+
+class BlockLength:
+    """As many ticks as the scene's ``block_ticks`` allows, fewer where ticks are slow; no bit of a run depends on it.
+
+    Attributes:
+        ticks: length of the block being worked on.
+    """
+
+    def __init__(self, most_ticks: int) -> None:
+        self._most = most_ticks
+        self.ticks = min(most_ticks, _FIRST_TICKS)
+        self._began = time.perf_counter()
+
+    def next(self) -> None:
+        """A block is done: the next is twice as long if that one was quick, half as long if it was slow."""
+        now = time.perf_counter()
+        took_s, self._began = now - self._began, now
+        if took_s < AT_MOST_S / 2:
+            self.ticks = min(2 * self.ticks, self._most)
+        elif took_s > AT_MOST_S:
+            self.ticks = max(self.ticks // 2, 1)
