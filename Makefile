@@ -28,9 +28,10 @@ check: $(READY) ## lint, format, types and the arrows between the packages
 	@$(BIN)/pyright
 	@$(BIN)/lint-imports
 
-bench: $(READY) ## measure speed and memory on this machine (about two minutes)
+bench: $(READY) ## measure speed, memory and what each effect costs on this machine (about five minutes)
 	@$(BIN)/python tests/bench/bench.py
 	@$(BIN)/python tests/bench/memory.py
+	@$(BIN)/python tests/bench/ablation.py
 
 lock: ## pin every dependency anew with its hashes in requirements.lock (needs uv)
 	$(UV) pip compile pyproject.toml --extra plot --extra dev --output-file requirements.lock --upgrade --quiet \

@@ -80,6 +80,14 @@ def test_the_window_is_the_last_half_second_or_the_second_half_of_a_shorter_run(
     assert figures["oscillation_m"] == pytest.approx(1e-3 * (seconds - start), rel=1e-6)
 
 
+@pytest.mark.parametrize("rate", [-3.0, 0.0, 2.0])
+def test_the_rate_at_which_swings_grow_is_that_of_their_envelope(rate):
+    """Within 0.1 / s: the halves of the window hold no whole number of swings."""
+    figures = judged(lambda t: -0.061 + 1e-3 * np.exp(rate * (t - 1.0)) * np.sin(2000 * t), 1.0)[1]
+    assert figures["growth_1_s"] == pytest.approx(rate, abs=0.1)
+    assert judged(lambda t: -0.061 + 1e-3 * t, 1.0)[1]["growth_1_s"] is None
+
+
 @pytest.mark.parametrize("pieces", [1, 3, 100])
 def test_how_the_run_is_cut_changes_nothing(pieces):
     def moving(t):

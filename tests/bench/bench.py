@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import platform
 import statistics
 import subprocess
 import sys
@@ -13,6 +12,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
+from machine import machine
 from rich.console import Console
 from rich.table import Table
 from yardsticks import ping_pong_us, plain_loop_us
@@ -110,22 +110,6 @@ def _show(rows: dict, seen: dict[str, list[float]], medians: dict[str, float], r
     console = Console(width=130)
     console.print(table)
     console.print(", ".join(f"{name} {version}" for name, version in versions().items()))
-
-
-def machine() -> str:
-    """Processor and cores, for the record."""
-    import os
-
-    cpu = next(
-        (line.partition(":")[2].strip() for line in _cpuinfo() if line.startswith("model name")), platform.processor()
-    )
-    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
-    return f"{cpu or platform.machine()}, {cores} cores, {platform.system()}"
-
-
-def _cpuinfo() -> list[str]:
-    path = Path("/proc/cpuinfo")
-    return path.read_text(encoding="utf-8").splitlines() if path.exists() else []
 
 
 if __name__ == "__main__":

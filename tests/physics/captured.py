@@ -19,7 +19,7 @@ class Captured:
     """What a run did.
 
     Attributes:
-        plant: x, v, force, command at every step and at the end, shape (steps + 1,).
+        plant: x, v, force, command and what effects add at every step and at the end, shape (steps + 1,).
         controller: x, v, a, wall, total, in_contact at every tick, shape (ticks,).
         forces: force of every element's book at every tick, 0 where it was not at work, shape (ticks,).
         summary: the run's summary.
@@ -75,11 +75,13 @@ def summarise(scene: dict[str, Any]) -> dict[str, Any]:
 
 
 def _joined_states(blocks: list[Block]) -> dict[str, np.ndarray]:
-    """Consecutive blocks share one state; the later block knows the force that acts from it on."""
+    """Consecutive blocks share one state; the later block knows the force that acts from it on. Pieces share none."""
     columns: dict[str, np.ndarray] = {}
-    for name in ("x", "v", "force", "command"):
-        pieces = [np.frombuffer(block["columns"][name]) for block in blocks]
-        columns[name] = np.concatenate([*(piece[:-1] for piece in pieces), pieces[-1][-1:]])
+    for name in blocks[0]["columns"]:
+        rows = [np.frombuffer(block["columns"][name]) for block in blocks]
+        if not name.startswith("pieces."):
+            rows = [*(row[:-1] for row in rows), rows[-1][-1:]]
+        columns[name] = np.concatenate(rows)
     return columns
 
 

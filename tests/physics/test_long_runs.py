@@ -38,9 +38,11 @@ def plainly_added(resolved) -> tuple[np.ndarray, np.ndarray]:
 def relative_residual(resolved, x: np.ndarray, v: np.ndarray) -> float:
     """What the plant's books leave unexplained of a motion without commands, over the energy moved."""
     books = PlantBooks(resolved, Timebase.of(resolved["clock"], resolved["duration"]))
-    changes = books.increments(0, x, np.diff(x), v, np.zeros(len(x) - 1))
-    moved = books.stored_J(float(x[0]), float(v[0])) + np.abs(changes).sum() / 2
-    return abs(math.fsum((changes * books.signs[:, None]).ravel())) / moved
+    columns = {"x": x, "v": v, "force": np.zeros(len(x))}
+    changes = books.increments(0, columns, np.diff(x), [])
+    moved = books.stored_J(columns) + np.abs(changes).sum() / 2
+    signs = np.array([1.0 if name == "hand_work" else -1.0 for name in books.names])
+    return abs(math.fsum((changes * signs[:, None]).ravel())) / moved
 
 
 def energies(resolved, x: np.ndarray, v: np.ndarray) -> np.ndarray:

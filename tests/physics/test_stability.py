@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from physics.captured import run
-from physics.one_tick_map import LinearLoop
+from physics.one_tick_map import LinearLoop, growth_of
 from scene_makers import scene
 
 SURFACE_M = 0.1
@@ -33,16 +33,8 @@ def pressed_deep(loop: LinearLoop, stiffness: float, duration: float = 0.8):
     )
 
 
-def growth_of(ran, from_tick: int = 300, over_ticks: int = 400) -> float:
-    """Growth per tick of x = Re(c z^k): x[k]^2 - x[k+1] x[k-1] = |c|^2 sin^2(arg z) |z|^{2k}."""
-    assert ran.controller["in_contact"].all()
-    x = ran.controller["x"]
-    measure = [x[k] ** 2 - x[k + 1] * x[k - 1] for k in (from_tick, from_tick + over_ticks)]
-    return (measure[1] / measure[0]) ** (0.5 / over_ticks)
-
-
-LOOPS = [LinearLoop(0.02, 0.11, 10.0, delay) for delay in (0, 3, 10, 13, 20, 50)]
-LOOPS += [LinearLoop(0.02, 0.11, 10.0, delay, virtual_damping=0.1) for delay in (0, 13)]
+LOOPS = [LinearLoop(0.02, 0.11, 10.0, delay_steps=delay) for delay in (0, 3, 10, 13, 20, 50)]
+LOOPS += [LinearLoop(0.02, 0.11, 10.0, delay_steps=delay, virtual_damping=0.1) for delay in (0, 13)]
 
 
 @pytest.mark.parametrize("loop", LOOPS, ids=lambda p: f"delay {p.delay_steps} steps, B {p.virtual_damping}")
@@ -67,7 +59,7 @@ def exact_critical_stiffness(mass_kg: float, damping: float) -> float:
 @pytest.mark.parametrize(("mass", "damping"), [(0.01, 0.1), (0.0525, 0.0114), (0.02, 5.0)])
 def test_without_delay_the_critical_stiffness_has_its_closed_form(mass, damping):
     expected = exact_critical_stiffness(mass, damping)
-    loop = LinearLoop(mass, damping, 0.0, 0)
+    loop = LinearLoop(mass, damping, 0.0, delay_steps=0)
     assert loop.critical_stiffness() == pytest.approx(expected, rel=1e-9)
     for of_critical in (0.99, 1.0, 1.01):
         growth = growth_of(pressed_deep(loop, of_critical * expected))
@@ -80,7 +72,7 @@ def test_a_soft_wall_is_stable_up_to_damping_over_half_a_period_plus_delay(delay
     """K < (b + B) / (T/2 + td) for small K (Gil et al.): the smaller the damping, the closer."""
     errors = []
     for b in (4e-3, 2e-3, 1e-3):
-        loop = LinearLoop(0.02, b, 0.0, delay, virtual_damping=b / 2)
+        loop = LinearLoop(0.02, b, 0.0, delay_steps=delay, virtual_damping=b / 2)
         errors.append(loop.critical_stiffness() / (1.5 * b / (0.5e-3 + delay * 1e-4)) - 1.0)
     assert abs(errors[2]) < abs(errors[1]) < abs(errors[0]) < 0.1
     assert errors[1] / errors[2] == pytest.approx(2.0, rel=0.1)

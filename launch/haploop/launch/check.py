@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any
 from pydantic import ValidationError
 from pydantic_core import PydanticCustomError
 
+from haploop.launch.combinations import check_combinations, check_rate
+from haploop.launch.estimator_keys import check_estimators, check_filter
 from haploop.launch.events import check_events
 from haploop.launch.layers import KeyPath, Layers
 from haploop.launch.mistakes import SceneError, nearest
@@ -21,7 +23,7 @@ if TYPE_CHECKING:
     from haploop.controller.dissipation import Element
 
 # Where the key ``kind`` says what else is in a table; a number stands for any.
-_TAGGED = {("hand", "force"), ("dissipation", 0), ("event", 0, "swap")}
+_TAGGED = {("hand", "force"), ("jitter",), ("dissipation", 0), ("event", 0, "swap")}
 _FORMS = {
     "bool_type": "It must be true or false.",
     "string_type": "It must be text in quotes.",
@@ -46,6 +48,11 @@ def resolve(layers: Layers, kinds: Mapping[str, type[Element]]) -> dict[str, Any
         tagged = _TAGGED if len(kinds) > 1 else _TAGGED - {("dissipation", 0)}  # one kind alone is no choice
         for detail in error.errors(include_url=False):
             _complain(layers, detail["type"], detail["msg"], _plain(detail["loc"], tagged), schema)
+    check_combinations(layers)
+    check_estimators(layers)
+    if scene:
+        check_filter(layers, scene)
+        check_rate(layers, scene)
     settings = check_events(layers, _timebase(layers), kinds)
     if layers.mistakes or scene is None:
         raise SceneError(layers.mistakes)

@@ -59,6 +59,8 @@ def run_in_process(
                 loop.end_here()
     except ElementError as error:
         loop.fail(f"The controller failed: {error}")
+    except ArithmeticError as error:
+        loop.fail(f"The plant failed: {error}")
     return loop.finish()
 
 
@@ -121,5 +123,4 @@ class Loop:
         return self._close("")
 
     def _close(self, failed: str) -> dict[str, Any]:
-        lost = {"commands_dropped": 0, "commands_lost": 0, "telemetry_gaps": 0}
-        return self._keeper.close(failed, self._plant.stop_reason, self._controller.recorder.trouble, lost)
+        return self._keeper.close(failed, self._plant.stop_reason, self._controller.recorder.trouble, 0)

@@ -11,6 +11,8 @@ from haploop.launch.mistakes import COMMAND_LINE, Mistake, SceneError, shown
 from haploop.launch.resolved import inline
 
 KeyPath = tuple[str | int, ...]
+# Keys that say what else is in their table, each with the keys that are there whatever it says.
+_SORTS = {"kind": (), "estimator": ("source", "cutoff")}
 
 
 @dataclass
@@ -56,10 +58,11 @@ class Layers:
         The keys of a ramp mean nothing to a sine: a table that names another kind drops what lay below it.
         """
         under = self.value(key)
-        if "kind" in over and under.get("kind", over["kind"]) != over["kind"]:
-            for name in [name for name in under if self.origins.get((*key, name)) != origin]:
-                self._forget((*key, name))
-                del under[name]
+        for sort, common in _SORTS.items():
+            if sort in over and under.get(sort, over[sort]) != over[sort]:
+                for name in [n for n in under if n not in common and self.origins.get((*key, n)) != origin]:
+                    self._forget((*key, name))
+                    del under[name]
         if origin != COMMAND_LINE or key not in self.origins:
             self.origins[key] = origin
         for name, value in over.items():

@@ -131,5 +131,6 @@ def _compare(recorded: Recording, repeated: Recording, failed: bool) -> list[str
 
 def _compare_summaries(before: dict[str, Any], after: dict[str, Any]) -> list[str]:
     """Differences between the summary of a run that ended in order and the repeated one's."""
-    keys = ("ticks", "verdict", "trajectory_sha256", "final", "extremes", "window", "energy")
-    return [f"{key} of the summary differs." for key in keys if before[key] != after[key]]
+    keys = ("ticks", "verdict", "trajectory_sha256", "final", "extremes", "window", "energy", "lost")
+    of_effects = ("actuator", "accelerometer")
+    return [f"{key} of the summary differs." for key in (*keys, *of_effects) if before.get(key) != after.get(key)]

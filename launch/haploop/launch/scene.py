@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar
 
 from pydantic import Field, create_model
 
+from haploop.launch.effects import Accelerometer, Actuator, Friction, Grip, Jitter, Loss, Noise, Transmission
+from haploop.launch.estimators import Acceleration, Velocity
 from haploop.launch.hand_force import HandForce
 from haploop.launch.number import Number, si
 from haploop.launch.table import Table
@@ -18,7 +20,6 @@ if TYPE_CHECKING:
     from haploop.controller.dissipation import Element
 
 TableType = TypeVar("TableType", bound=Table)
-Cutoff = Annotated[float, si("Hz", "cutoff of a first-order low-pass", above=0)]
 
 
 class Clock(Table):
@@ -39,13 +40,14 @@ class Device(Table):
 
 
 class Hand(Table):
-    """The hand, attached rigidly (Choi et al. 2022, eq. 11), and the force of its muscles."""
+    """The hand, attached rigidly (Choi et al. 2022, eq. 11) or by a grip, and the force of its muscles."""
 
     mass: Annotated[float, si("kg", "mass that moves with the device", at_least=0)] = 0.0
     damping: Annotated[float, si("N s/m", "viscous damping", at_least=0)] = 0.0
     stiffness: Annotated[float, si("N/m", "stiffness", at_least=0)] = 0.0
     rest: Annotated[float, si("m", "position at which the hand's spring is slack")] = 0.0
     force: HandForce | None = None
+    grip: Grip | None = None
 
 
 class Encoder(Table):
@@ -61,19 +63,6 @@ class Wall(Table):
     position: Annotated[float, si("m", "where the surface is")]
     stiffness: Annotated[float, si("N/m", "stiffness", at_least=0)]
     occupies: Literal["below", "above"] = "below"
-
-
-class Velocity(Table):
-    """The velocity estimate: a backward difference, low-passed when a cutoff is given."""
-
-    cutoff: Cutoff | None = None
-
-
-class Acceleration(Table):
-    """The acceleration estimate: a backward difference of the velocity, or an accelerometer's reading."""
-
-    source: Literal["encoder", "accelerometer"] = "encoder"
-    cutoff: Cutoff | None = None
 
 
 class Run(Table):
@@ -105,11 +94,18 @@ class SceneTable(Table):
     diverged_beyond: Annotated[float, si("m", "the run ends when the device is farther from 0", above=0)] = 1.0
     clock: Clock = Field(default_factory=Clock)
     device: Device
+    transmission: Transmission | None = None
+    friction: Friction | None = None
     hand: Hand | None = None
     encoder: Encoder | None = None
+    noise: Noise | None = None
+    accelerometer: Accelerometer | None = None
     wall: Wall | None = None
     velocity: Velocity | None = None
     acceleration: Acceleration | None = None
+    actuator: Actuator | None = None
+    jitter: Jitter | None = None
+    loss: Loss | None = None
 
 
 def number_of(table: type[Table], key: str) -> Number:

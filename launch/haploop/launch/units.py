@@ -8,8 +8,9 @@ from functools import cache
 from typing import Any
 
 _NUMBER = r"[+-]?(?:\d[\d_]*\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?"
-# Products, quotients and one-digit powers of names: no more of arithmetic is let through to pint, which would do it.
-_FACTOR = r"(?:[^\W\d]\w*|%|°)(?:(?:\*\*|\^)-?\d|⁻?[¹²³⁴])?"
+# Products, quotients, one-digit powers and roots of names: no more of arithmetic is let through to pint, which would
+# do it.
+_FACTOR = r"(?:[^\W\d]\w*|%|°)(?:(?:\*\*|\^)-?(?:0\.5|\d)|⁻?[¹²³⁴])?"
 _TEXT = re.compile(rf"\s*({_NUMBER})\s*({_FACTOR}(?:(?:\s*[*/·]\s*|\s+){_FACTOR})*)?\s*")
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from haploop.controller.changes import Change, apply_change
 from haploop.controller.dissipation import Element, ElementError, Motion
-from haploop.controller.estimators import Sample, acceleration_estimator, velocity_estimator
+from haploop.controller.estimators import Sample, estimators
 from haploop.controller.recorder import MOTION_COLUMNS, Recorder
 from haploop.controller.slots import Slots
 from haploop.controller.wall import NoWall, Wall
@@ -26,7 +26,8 @@ class Controller:
     """
 
     def __init__(self, scene: dict[str, Any], time: Timebase, kinds: dict[str, type[Element]]) -> None:
-        self._scene, self._time, self._kinds = scene, time, dict(kinds)
+        self._kinds = dict(kinds)
+        self._start_estimates = estimators(scene, time.period_s)
         self._wall = Wall(scene["wall"]) if "wall" in scene else NoWall()
         self._slots = Slots(scene.get("dissipation", []), self._kinds)
         self._motion = Motion(time.period_s, self._wall.into_wall)
@@ -47,13 +48,8 @@ class Controller:
             ElementError: an element raised, or gave something that is no number.
         """
         if self.tick == 0:
-            self._start(samples[0])
+            self._velocity, self._acceleration = self._start_estimates(samples[0])
         return [self._command(sample) for sample in samples]
-
-    def _start(self, first: Sample) -> None:
-        scene, period_s = self._scene, self._time.period_s
-        self._velocity = velocity_estimator(scene.get("velocity", {}), period_s, first)
-        self._acceleration = acceleration_estimator(scene.get("acceleration", {}), period_s, first)
 
     def _command(self, sample: Sample) -> float:
         if self.tick >= self._next_change:

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from haploop.logger.plant_books import PlantBooks
-from haploop.logger.sums import RunningSums, sum_in_order
+from haploop.logger.plant_books import plant_books
+from haploop.logger.sums import RunningSums, sum_in_order, sum_rows
 from haploop.logger.tapes import ControllerTape
 from haploop.logger.wall_books import CAUSES, held_J, ideal_and_undelayed
 from haploop.protocol.ticks import Timebase
@@ -31,7 +31,7 @@ class Books:
 
     def __init__(self, scene: dict[str, Any], time: Timebase) -> None:
         self._time = time
-        self._plant = PlantBooks(scene, time)
+        self._plant = plant_books(scene, time)
         self._has_wall = "wall" in scene
         self._sums = RunningSums()
         self._rows: dict[str, int] = {}
@@ -54,16 +54,16 @@ class Books:
     def _open_account(self, name: str) -> None:
         self._open([f"{name}.sampled", f"{name}.true"])
 
-    def start(self, x: float, v: float) -> None:
-        """Begin with the plant at x (m), v (m/s)."""
-        self._stored_at_start_J = self._plant.stored_J(x, v)
+    def start(self, plant: dict[str, np.ndarray]) -> None:
+        """Begin with the plant in the first state of its first columns."""
+        self._stored_at_start_J = self._plant.stored_J(plant)
 
     def book(self, tick: int, plant: dict[str, np.ndarray], tape: ControllerTape, into_wall: float) -> np.ndarray:
         """Book the intervals from ``tick`` on that ``plant`` covers.
 
         Args:
             tick: first interval.
-            plant: columns x, v, x_low, force, command with ticks * n + 1 rows.
+            plant: telemetry columns of the plant with ticks * n + 1 rows.
             tape: controller rows of these ticks and of all commands in effect in them.
             into_wall: direction into the wall, +1 or -1.
 
@@ -103,18 +103,11 @@ class Books:
         n = self._time.steps_per_tick
         x = plant["x"]
         dx = np.diff(x) + np.diff(plant["x_low"])
-        plant_flows = self._plant.increments(tick * n, x, dx, plant["v"], plant["force"][:-1])
+        commanded = self._in_effect(plant["command"][:-1].astype(np.intp), tape, forces)
+        plant_flows = self._plant.increments(tick * n, plant, dx, commanded.values())
         by_step = dict(zip(self._plant.names, plant_flows, strict=True))
-        moved = np.abs(plant_flows).sum(axis=0)
-        in_effect = plant["command"][:-1].astype(np.intp)
-        index = np.maximum(in_effect - tape.first, 0)
-        before_first = in_effect < 0
-        for account, force in forces.items():
-            applied = force[index]
-            applied[before_first] = 0.0
-            by_step[f"{account}.true"] = absorbed = -applied * dx
-            moved = moved + np.abs(absorbed)
-        by_step["moved"] = moved / 2.0
+        by_step |= {f"{account}.true": -force * dx for account, force in commanded.items()}
+        by_step["moved"] = sum_rows(np.abs(flow) for flow in by_step.values()) / 2.0
         if self._has_wall:
             at = tick - tape.first
             rows = {
@@ -123,6 +116,16 @@ class Books:
             self._note_wall(float(x[0]), (float(rows["wall_position"][0]), float(rows["wall_stiffness"][0])), into_wall)
             by_step |= zip(CAUSES, ideal_and_undelayed(x, dx, rows, into_wall, n), strict=True)
         return by_step
+
+    @staticmethod
+    def _in_effect(command: np.ndarray, tape: ControllerTape, forces: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+        """The force of every account that was commanded over each step, N; 0 before the first command."""
+        index = np.maximum(command - tape.first, 0)
+        before_first = command < 0
+        found = {account: force[index] for account, force in forces.items()}
+        for force in found.values():
+            force[before_first] = 0.0
+        return found
 
     def _note_wall(self, x: float, wall: tuple[float, float], into_wall: float) -> None:
         if self._wall and wall != self._wall:

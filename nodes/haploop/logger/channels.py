@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 
 from haploop.logger.mcap_log import Log
+from haploop.logger.motion_columns import UNITS
 from haploop.logger.tapes import as_float64
 from haploop.protocol.ticks import Timebase
 
-PLANT_UNITS = {"timestamp": "s", "t": "s", "x": "m", "v": "m/s", "force": "N"}
 CONTROLLER_UNITS = {"x": "m", "v": "m/s", "a": "m/s^2", "wall": "N", "total": "N", "in_contact": ""}
 
 
@@ -27,25 +27,26 @@ class Channels:
         return numbers * 1_000_000_000 // self._time.control_rate, numbers / self._time.control_rate
 
     def plant(self, first: int, ticks: int, columns: dict[str, np.ndarray]) -> None:
-        """One message a tick, an array of its steps; ``columns`` x, v, force have ``ticks * n + 1`` rows."""
+        """One message a tick, an array of its steps; ``columns`` of ``motion_columns`` have ``ticks * n + 1`` rows."""
         if self._every_step and ticks:
             steps = self._time.steps_per_tick
             self._plant_messages(first, ticks, steps, {name: column[:-1] for name, column in columns.items()})
 
-    def plant_end(self, tick: int, x: float, v: float, force: float) -> None:
+    def plant_end(self, tick: int, state: dict[str, np.ndarray]) -> None:
         """The end state of the run, a message of one sample; its force is the last one held."""
         if self._every_step:
-            self._plant_messages(tick, 1, 1, {"x": np.array([x]), "v": np.array([v]), "force": np.array([force])})
+            self._plant_messages(tick, 1, 1, state)
 
     def _plant_messages(self, first: int, ticks: int, samples: int, columns: dict[str, np.ndarray]) -> None:
+        units = {"timestamp": "s", "t": "s"} | {name: UNITS[name] for name in columns}
         channel = self._log.channel(
-            "/plant", PLANT_UNITS, samples_per_message=samples, title="the plant at every step; force acts from it on"
+            "/plant", units, samples_per_message=samples, title="the plant at every step; force acts from it on"
         )
         start = first * self._time.steps_per_tick
         t = np.arange(start, start + ticks * samples) / self._time.plant_rate
-        values = np.stack([t, t, columns["x"], columns["v"], columns["force"]], axis=1)
+        values = np.stack([t, t, *columns.values()], axis=1)
         times, _ = self._tick_times(first, ticks)
-        self._log.write(channel, times, values.reshape(ticks, samples, len(PLANT_UNITS)))
+        self._log.write(channel, times, values.reshape(ticks, samples, len(units)))
 
     def controller(self, block: dict[str, Any]) -> None:
         """One message a tick: estimates, the force of wall and elements, their total."""

@@ -33,14 +33,14 @@ class Keeper:
             self._log.flush()
             self._flush_due = now + _FLUSH_S
 
-    def close(self, failed: str, reason: str | None, trouble: str | None, lost: dict[str, int]) -> dict[str, Any]:
+    def close(self, failed: str, reason: str | None, trouble: str | None, telemetry_gaps: int) -> dict[str, Any]:
         """Write the end state, close the log and write the summary; returns the summary.
 
         Args:
             failed: why the run failed, "" if it did not.
             reason: why the plant ended the run by itself, or None.
             trouble: which element gave a force that is no finite number, or None.
-            lost: the summary's ``lost`` entry.
+            telemetry_gaps: ticks whose telemetry did not come.
         """
         logger = self.logger
         diverged = "; ".join(part for part in (trouble, reason) if part) or None
@@ -49,7 +49,7 @@ class Keeper:
         logger.end()
         if self._log:
             self._log.close()
-        result = logger.summary(ended, failed or diverged or "", diverged, lost)
+        result = logger.summary(ended, failed or diverged or "", diverged, telemetry_gaps)
         if self._out:
             try:
                 summaries.write(result, self._out / SUMMARY)

@@ -10,9 +10,11 @@ import numpy as np
 
 from haploop.logger.books import Books
 from haploop.logger.channels import Channels
+from haploop.logger.motion_columns import motion_columns
 from haploop.logger.summary import summary
 from haploop.logger.tapes import ControllerTape, PlantTape
 from haploop.logger.window import Window
+from haploop.plant.tally import TALLIES
 from haploop.protocol.ticks import Timebase
 
 Block = dict[str, Any]
@@ -39,6 +41,7 @@ class Logger:
         self._into_wall = 0.0
         self._accounts: dict[int, dict[str, Any]] = {}
         self._events: list[tuple[int, dict[str, Any]]] = []
+        self._counted: dict[str, int] = {}
         self._digest = hashlib.sha256()
         self.latest: dict[str, np.ndarray] = {}
         self.latest_from = self.tick = self._first_tick = 0
@@ -49,13 +52,11 @@ class Logger:
         known = history[-1]["from_tick"] + history[-1]["ticks"] if history else 0
         self.tick = self._first_tick = max(int(plant["tick"]), known)
         self._plant = PlantTape(self.time.steps_per_tick, int(plant["tick"]))
-        self._controller = ControllerTape(
-            history[0]["from_tick"] if history else self.tick, keep_ticks=self.time.lookahead_ticks + 2
-        )
+        self._controller = ControllerTape(history[0]["from_tick"] if history else self.tick)
         for block in history:
             self._controller.add(block)
             self._note_accounts(block)
-        self._end_state = plant["x"], plant["v"], plant["force"]
+        self._end_state = {name: np.array([plant[name]]) for name in ("x", "v", "force")}
         self._started = False
 
     def plant_block(self, block: Block) -> None:
@@ -92,8 +93,11 @@ class Logger:
     def _book_common(self) -> None:
         """Book the intervals of which both sides are known, block by block of the controller.
 
-        Cutting only where elements change makes the log's columns independent of how telemetry was cut.
+        Cutting only where elements change makes the log's columns independent of how telemetry was cut. One that joins
+        begins where no command is in effect any more that is older than what it knows of the controller.
         """
+        if not self._started and self._plant.end > self._plant.tick:
+            self.tick = self._first_tick = max(self.tick, self._plant.first_tick_from(self._controller.first))
         while (end := min(self._plant.end, self._controller.part_end(self.tick))) > self.tick:
             self._book(end)
 
@@ -105,7 +109,7 @@ class Logger:
         plant = self._plant.take(end)
         x, v, force = plant["x"], plant["v"], plant["force"]
         if not self._started:
-            self.books.start(float(x[0]), float(v[0]))
+            self.books.start(plant)
             self._digest.update(np.stack([x[:1], v[:1]], axis=1).tobytes())
             self._started = True
         rows = self.books.book(self.tick, plant, self._controller, self._into_wall)
@@ -113,13 +117,16 @@ class Logger:
         columns = {name: column[at : at + end - self.tick] for name, column in self._controller.columns.items()}
         self.window.add(x, force[:-1], columns)
         self._digest.update(np.stack([x[1:], v[1:]], axis=1).tobytes())
-        self._end_state = float(x[-1]), float(v[-1]), float(force[-1])
+        for name in plant.keys() & TALLIES:
+            self._counted[name] = self._counted.get(name, 0) + int(plant[name][-1] - plant[name][0])
+        motion = motion_columns(plant)
+        self._end_state = {name: column[-1:] for name, column in motion.items()}
         self.latest_from, self.latest = self.tick, self._named(rows)
         if self._channels:
-            self._channels.plant(self.tick, end - self.tick, {name: plant[name] for name in ("x", "v", "force")})
+            self._channels.plant(self.tick, end - self.tick, motion)
             self._channels.energy(self.latest_from, self.latest)
         self.tick = end
-        self._controller.forget_before(end)
+        self._controller.forget_before(end, int(plant["command"][-1]))
         self._log_events()
 
     def _named(self, rows: np.ndarray) -> dict[str, np.ndarray]:
@@ -135,17 +142,16 @@ class Logger:
         same = [b for b in sorted(self._accounts) if self._accounts[b]["kind"] == kind]
         return f"{kind}{f'-{same.index(int(book)) + 1}' if same[0] != int(book) else ''}{dot}{side}"
 
-    def summary(self, ended: str, why: str, diverged: str | None, lost: dict[str, int]) -> dict[str, Any]:
+    def summary(self, ended: str, why: str, diverged: str | None, telemetry_gaps: int) -> dict[str, Any]:
         """The summary of what was booked so far.
 
         Args:
             ended: "done", "stopped", "diverged" or "failed".
             why: what ended it, as a sentence, when it is not done.
             diverged: why the plant ended by itself, or None.
-            lost: commands_dropped, commands_lost, telemetry_gaps.
+            telemetry_gaps: ticks whose telemetry did not come.
         """
         ticks = self.tick - self._first_tick
-        x, v, _ = self._end_state
         ran = {
             "duration_s": ticks / self.time.control_rate,
             "ticks": ticks,
@@ -154,11 +160,20 @@ class Logger:
             "ended": ended,
             "why": why,
             "wall_s": wall_clock.perf_counter() - self._began,
-            "final": {"x_m": x, "v_m_s": v},
-            "lost": lost,
+            "final": {"x_m": float(self._end_state["x"][0]), "v_m_s": float(self._end_state["v"][0])},
+            **self._counts(telemetry_gaps),
             "trajectory_sha256": self._digest.hexdigest(),
         }
         return summary(self._scene, ran, self.window, self.books, self._covered_accounts(), diverged)
+
+    def _counts(self, telemetry_gaps: int) -> dict[str, dict[str, int]]:
+        """What was lost, and what the scene's effects counted, by entry of the summary."""
+        entries = {"lost": {"commands_dropped": 0, "commands_lost": 0, "telemetry_gaps": telemetry_gaps}}
+        for name in TALLIES:
+            if name in self._counted:
+                entry, _, what = name.partition(".")
+                entries.setdefault(entry, {})[what] = self._counted[name]
+        return entries
 
     def _covered_accounts(self) -> list[dict[str, Any]]:
         """Every element of which anything was booked, with the ticks that were."""
@@ -183,5 +198,4 @@ class Logger:
     def end(self) -> None:
         """Write the end state; call once, when no more blocks come."""
         if self._channels:
-            x, v, force = self._end_state
-            self._channels.plant_end(self.tick, x, v, force)
+            self._channels.plant_end(self.tick, self._end_state)

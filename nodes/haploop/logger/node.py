@@ -147,8 +147,7 @@ class LoggerNode:
         self._streams.close()
         reason = next((reason for _, reason, _ in self._ended.values() if reason), None)
         trouble = next((trouble for _, _, trouble in self._ended.values() if trouble), None)
-        lost = {"commands_dropped": 0, "commands_lost": 0, "telemetry_gaps": sum(self._streams.gaps.values())}
-        result = self.keeper.close(failed, reason, trouble, lost)
+        result = self.keeper.close(failed, reason, trouble, sum(self._streams.gaps.values()))
         if self._publisher:
             self._publisher.publish("END", self.keeper.logger.tick, reason or "", trouble)
         return self.keeper.logger.tick, result

@@ -2,14 +2,29 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from haploop.logger.sums import sum_rows
 from haploop.plant.flow import motion_integrals, natural_rate
 from haploop.plant.hand_force import HandForce
 from haploop.plant.mechanics import Mechanics
 from haploop.protocol.ticks import Timebase
+
+if TYPE_CHECKING:
+    from haploop.logger.chain_books import ChainBooks
+
+
+def plant_books(scene: dict[str, Any], time: Timebase) -> PlantBooks | ChainBooks:
+    """The books of a scene's plant: one mass under held forces, or a chain of bodies."""
+    bandwidth = "bandwidth" in scene.get("actuator", {})
+    if bandwidth or "grip" in scene.get("hand", {}) or scene.keys() & {"friction", "transmission"}:
+        from haploop.logger.chain_books import ChainBooks
+
+        return ChainBooks(scene, time)
+    return PlantBooks(scene, time)
 
 
 class PlantBooks:
@@ -20,6 +35,7 @@ class PlantBooks:
         heat of damper i   b_i integral v^2 dt = b_i w' S w,  w = (v, a/c, tau' h/(m c))
         kinetic change     m (v+ - v) (v+ + v) / 2
         spring change      k dx ((x+ + x)/2 - x_rest)
+        actuator           (f_commanded - f) dx, what saturation and steps of force keep from the device
     Nothing is taken from the balance, so that its residual is a proof. Forces times dx (and not times v) keep the
     books of a device at rest under load at rest too.
 
@@ -32,24 +48,25 @@ class PlantBooks:
         self._tau = HandForce(scene.get("hand", {}).get("force"), time.plant_rate)
         self._square, self._lag = motion_integrals(m.mass_kg, m.damping, m.stiffness, time.step_s)
         self._rate = natural_rate(m.mass_kg, m.stiffness, time.step_s)
+        self._is_limited = "actuator" in scene
         self.names = ["hand_work", *(f"{name}_heat" for name in m.dampers), "kinetic", "spring"]
-        self.signs = np.array([1.0, *(-1.0 for _ in m.dampers), -1.0, -1.0])
+        self.names += ["actuator"] * self._is_limited
 
     def increments(
-        self, first_step: int, x: np.ndarray, dx: np.ndarray, v: np.ndarray, force: np.ndarray
+        self, first_step: int, columns: dict[str, np.ndarray], dx: np.ndarray, commanded: Iterable[np.ndarray]
     ) -> np.ndarray:
         """What each step adds to each book, J.
 
         Args:
             first_step: step of the first state.
-            x, v: states at the steps and at the end, shape (steps + 1,).
+            columns: plant telemetry of these steps, the end state included; shape (steps + 1,) each.
             dx: displacement over each step, shape (steps,), with the digits that the difference of two x has lost.
-            force: force held over each step, shape (steps,).
+            commanded: the force of the wall and of every element over each step, shape (steps,) each.
 
         Returns:
             Shape (books, steps), ordered as ``names``.
         """
-        m = self.mechanics
+        m, x, v, force = self.mechanics, columns["x"], columns["v"], columns["force"][:-1]
         tau = self._tau.at_steps(first_step, first_step + len(x))
         start_x, start_v, dv = x[:-1], v[:-1], np.diff(v)
         rise = np.diff(tau)
@@ -58,18 +75,24 @@ class PlantBooks:
         rates = np.stack([start_v, net * scale, rise * scale])
         square = sum_products(self._square, rates)
         lagged = self._lag[0] * rates[0] + self._lag[1] * rates[1] + self._lag[2] * rates[2]
-        return np.stack(
-            [
-                (tau[:-1] + rise / 2.0) * dx + rise * lagged,
-                *(damping * square for damping in m.dampers.values()),
-                m.mass_kg * dv * (start_v + dv / 2.0),
-                m.stiffness * dx * (start_x - m.rest_m + dx / 2.0),
-            ]
-        )
+        books = [
+            (tau[:-1] + rise / 2.0) * dx + rise * lagged,
+            *(damping * square for damping in m.dampers.values()),
+            m.mass_kg * dv * (start_v + dv / 2.0),
+            m.stiffness * dx * (start_x - m.rest_m + dx / 2.0),
+        ]
+        if self._is_limited:
+            books.append(beyond_limits(commanded, force) * dx)
+        return np.stack(books)
 
-    def stored_J(self, x: float, v: float) -> float:
-        """Kinetic and spring energy in the state x (m), v (m/s)."""
-        return self.mechanics.kinetic_J(v) + self.mechanics.spring_J(x)
+    def stored_J(self, columns: dict[str, np.ndarray]) -> float:
+        """Kinetic and spring energy in the first state of some telemetry."""
+        return self.mechanics.kinetic_J(float(columns["v"][0])) + self.mechanics.spring_J(float(columns["x"][0]))
+
+
+def beyond_limits(commanded: Iterable[np.ndarray], force: np.ndarray) -> np.ndarray:
+    """What was commanded in all beyond the force that the actuator holds, N."""
+    return sum_rows(commanded) - force
 
 
 def sum_products(form: np.ndarray, w: np.ndarray) -> np.ndarray:

@@ -41,12 +41,12 @@ def energy(books: Books, accounts: list[dict[str, Any]], has_wall: bool) -> dict
         parts = {cause: after - before for cause, before, after in zip(causes, steps[:-1], steps[1:], strict=True)}
         wall |= {"ideal_J": steps[0] + books.wall_changes_J, "changes_J": books.wall_changes_J}
         wall |= {"leak": {"total_J": steps[-1] - steps[0], **parts}}
-    heats = {f"{name}_J": total(name) for name in books.names if name.endswith("_heat")}
+    plants = {f"{name}_J": total(name) for name in books.names if name.endswith("_heat") or name == "actuator"}
     return {
         "elements": elements,
         "wall": wall,
         "hand_work_J": total("hand_work"),
-        **heats,
+        **plants,
         "stored_J": books.stored_J,
         "moved_J": books.moved_J,
         "residual_J": books.residual_J,
@@ -65,7 +65,8 @@ def summary(
 
     Args:
         scene: the resolved scene.
-        ran: entries that say what ran: duration_s, ticks, steps, wall_s, ended, final, lost, trajectory_sha256.
+        ran: entries that say what ran: duration_s, ticks, steps, wall_s, ended, final, lost and what else was counted,
+            trajectory_sha256.
         window, books: as they stand at the end.
         accounts: every element's book: kind, parameters, from_tick, to_tick.
         diverged: why the plant ended by itself, or None.

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 
 
@@ -17,6 +19,22 @@ def sum_in_order(values: np.ndarray) -> np.ndarray:
     total = values[..., 0].copy()
     for index in range(1, values.shape[-1]):
         total += values[..., index]
+    return total
+
+
+def sum_rows(rows: Iterable[np.ndarray]) -> np.ndarray:
+    """Sum of at least one row, first to last, in every column by itself.
+
+    Args:
+        rows: shape (n,) each.
+
+    Returns:
+        Shape (n,).
+    """
+    first, *others = rows
+    total = first.copy()
+    for row in others:
+        total += row
     return total
 
 

@@ -6,7 +6,8 @@ from typing import Any
 
 import numpy as np
 
-PLANT_COLUMNS = ("x", "v", "x_low", "force", "command")
+# Columns of pieces of steps have a row for each piece, in order; ``pieces.step`` says of which step it is.
+PIECES = "pieces."
 
 
 def as_float64(data: bytes) -> np.ndarray:
@@ -24,7 +25,7 @@ class PlantTape:
     def __init__(self, steps_per_tick: int, tick: int) -> None:
         self._steps = steps_per_tick
         self.tick = self.end = tick
-        self._columns = {name: np.zeros(0) for name in PLANT_COLUMNS}
+        self._columns: dict[str, np.ndarray] = {}
 
     def add(self, block: dict[str, Any]) -> None:
         """Append a block.
@@ -37,24 +38,31 @@ class PlantTape:
                 f"A plant block from tick {self.end} was expected, but one from {block['from_tick']} came."
             )
         keep = max(0, (self.end - self.tick) * self._steps)
-        for name in PLANT_COLUMNS:
-            joined = self._columns[name][:keep], as_float64(block["columns"][name])
-            self._columns[name] = np.concatenate(joined)
+        for name, data in block["columns"].items():
+            new = as_float64(data)
+            kept = self._columns.get(name, new[:0])
+            self._columns[name] = np.concatenate([kept if name.startswith(PIECES) else kept[:keep], new])
         self.end += block["ticks"]
+
+    def first_tick_from(self, command: int) -> int:
+        """The first tick from which on every command in effect is ``command`` or later; or none has come yet."""
+        in_effect = self._columns["command"][:-1]
+        older = np.flatnonzero((in_effect >= 0) & (in_effect < command))
+        return self.tick + (int(older[-1]) // self._steps + 1 if len(older) else 0)
 
     def take(self, tick: int) -> dict[str, np.ndarray]:
         """States of the intervals before ``tick``, end state included; what comes from there on stays."""
         rows = (tick - self.tick) * self._steps
-        taken = {name: column[: rows + 1] for name, column in self._columns.items()}
-        self._columns = {name: column[rows:] for name, column in self._columns.items()}
+        pieces = int(np.searchsorted(self._columns.get(PIECES + "step", ()), tick * self._steps))
+        cuts = {name: (pieces, pieces) if name.startswith(PIECES) else (rows + 1, rows) for name in self._columns}
+        taken = {name: column[: cuts[name][0]] for name, column in self._columns.items()}
+        self._columns = {name: column[cuts[name][1] :] for name, column in self._columns.items()}
         self.tick = tick
         return taken
 
 
 class ControllerTape:
     """Controller rows by tick, with every book's force and the wall as it stood.
-
-    Rows older than ``keep_ticks`` before the last tick taken are forgotten.
 
     Attributes:
         first: tick of the first row kept.
@@ -63,9 +71,8 @@ class ControllerTape:
         forces: force of every book that has acted within these ticks, 0 where it was not at work.
     """
 
-    def __init__(self, tick: int, keep_ticks: int) -> None:
+    def __init__(self, tick: int) -> None:
         self.first = self.end = tick
-        self._keep_ticks = keep_ticks
         self.columns: dict[str, np.ndarray] = {}
         self.forces: dict[int, np.ndarray] = {}
         self._opened: dict[int, int] = {}
@@ -104,9 +111,9 @@ class ControllerTape:
         """``forces`` without the books that open at ``tick`` or later."""
         return {book: force for book, force in self.forces.items() if self._opened[book] < tick}
 
-    def forget_before(self, tick: int) -> None:
-        """Drop rows no command in flight at ``tick`` needs, and books that have no force left."""
-        drop = max(0, tick - self._keep_ticks - self.first)
+    def forget_before(self, tick: int, command: int) -> None:
+        """Drop the rows before the last tick and before ``command``, in effect then, and books with no force left."""
+        drop = max(0, min(tick - 1, command) - self.first)
         if drop:
             self.columns = {name: column[drop:] for name, column in self.columns.items()}
             self.forces = {book: force[drop:] for book, force in self.forces.items() if force[drop:].any()}

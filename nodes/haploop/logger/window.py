@@ -65,9 +65,11 @@ class Window:
         """The ``window`` entry of the summary.
 
         The displayed stiffness is the mean of total force over penetration, ticks in contact (Choi et al. 2022, V.B.2);
-        ticks whose penetration is a rounding error of the wall's position are left out of it.
+        ticks whose penetration is a rounding error of the wall's position are left out of it. ``growth_1_s`` is the
+        r of e^(r t) by which the swings grow (decay where negative); null where nothing swings.
         """
         x, rows, first = self._last()
+        crossings, growth = swings(x, self.swing_m)
         inside = rows["in_contact"] > 0
         depth = rows["wall_position"][inside] - rows["x"][inside]
         real = np.abs(depth) > ROUNDING * np.abs(rows["wall_position"][inside])
@@ -75,6 +77,7 @@ class Window:
         return {
             "from_s": first / self._rate,
             "oscillation_m": float(np.ptp(x)) if len(x) else 0.0,
+            "growth_1_s": _rate(growth, len(x) / self._rate) if crossings >= CROSSINGS else None,
             "outside_fraction": float(np.mean(~inside)) if len(inside) else 1.0,
             "displayed_stiffness_N_m": float(np.mean(stiffness)) if len(stiffness) else None,
             "penetration_mean_m": float(np.mean(np.abs(depth))) if len(depth) else None,
@@ -96,6 +99,11 @@ class Window:
             f"a limit cycle is at least {CROSSINGS} crossings and 0.5 times."
         )
         return Verdict("limit-cycle" if crossings >= CROSSINGS and growth >= 0.5 else "steady", seen)
+
+
+def _rate(growth: float, seconds: float) -> float | None:
+    """r in 1/s if what is ``growth`` times as wide in the second half of ``seconds`` follows e^(r t)."""
+    return 2.0 * math.log(growth) / seconds if growth > 0.0 else None
 
 
 def swings(x: np.ndarray, swing_m: float) -> tuple[int, float]:

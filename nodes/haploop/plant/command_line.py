@@ -2,12 +2,46 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 from haploop.protocol.ticks import Timebase
 
+if TYPE_CHECKING:
+    from haploop.plant.tally import Tally
+
 # (number of steps, force in N, tick of the command); a force holds over its steps.
 Hold = tuple[int, Any, int]
+
+
+class Line(Protocol):
+    """What brings the commands to the device."""
+
+    @property
+    def tallies(self) -> dict[str, Tally]:
+        """What may befall a command, counted, by the name of its column."""
+        ...
+
+    def receive(self, forces: list[Any], /) -> None:
+        """Take the next commands, in order of their ticks."""
+
+    def holds(self, tick: int) -> list[Hold]:
+        """The forces held in interval ``tick``, in order: all its steps, no hold of none."""
+        ...
+
+
+def line_of(scene: dict[str, Any], time: Timebase) -> Line:
+    """The line of a scene, and the actuator at its end."""
+    line: Line = CommandLine(time)
+    if "jitter" in scene or "loss" in scene:
+        from haploop.plant.uncertain_line import uncertain_line
+
+        line = uncertain_line(scene, time)
+    actuator = scene.get("actuator", {})
+    if "saturation" in actuator or "resolution" in actuator:
+        from haploop.plant.actuator import Actuator
+
+        line = Actuator(line, actuator, time)
+    return line
 
 
 class CommandLine:
@@ -18,6 +52,7 @@ class CommandLine:
 
     Attributes:
         receive: takes the next commands, a list in order of their ticks.
+        tallies: none; nothing befalls a command.
     """
 
     def __init__(self, time: Timebase) -> None:
@@ -26,6 +61,7 @@ class CommandLine:
         self._forces: list[Any] = [0.0] * (self._lookahead + 1)
         self._first = -self._lookahead - 1
         self.receive = self._forces.extend
+        self.tallies: dict[str, Tally] = {}
 
     def holds(self, tick: int) -> list[Hold]:
         """The forces held in interval ``tick``, in order; forgets all older commands.

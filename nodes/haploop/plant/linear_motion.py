@@ -33,12 +33,13 @@ class LinearMotion:
         x, v: position in m and velocity in m/s at the end of the last interval.
     """
 
-    def __init__(self, mechanics: Mechanics, hand_force: dict[str, Any] | None, time: Timebase) -> None:
-        m, self._steps = mechanics, time.steps_per_tick
+    def __init__(self, scene: dict[str, Any], time: Timebase) -> None:
+        self._mechanics = m = Mechanics.of(scene)
+        self._steps = time.steps_per_tick
         self._held = HeldFlow.of(m.mass_kg, m.damping, m.stiffness, time.step_s, self._steps)
         self._over = self._held.by_count()
         self._step = StepFlow.of(m.mass_kg, m.damping, m.stiffness, time.step_s)
-        self._tau = HandForce(hand_force, time.plant_rate)
+        self._tau = HandForce(scene.get("hand", {}).get("force"), time.plant_rate)
         self._spring_at_origin_N = m.stiffness * m.rest_m
         self._pieces: dict[int, np.ndarray] = {}
         self._response: list[list[float]] = []
@@ -98,6 +99,12 @@ class LinearMotion:
             x, v = x + (s.x_x * x + s.x_v * v + push_x[:, i]), v + (s.v_x * x + s.v_v * v + push_v[:, i])
             response[:, i + 1, 0], response[:, i + 1, 1] = x, v
         return response
+
+    def acceleration(self, tick: int) -> float:
+        """Acceleration at ``tick``, the present one, under the force held over the step that ends there, m/s^2."""
+        m, step = self._mechanics, tick * self._steps
+        load = float(self._tau.at_steps(step, step + 1)[0])
+        return (self.force + load - m.damping * self.v - m.stiffness * (self.x - m.rest_m)) / m.mass_kg
 
     # The record of every plant step
 

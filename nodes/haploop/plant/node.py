@@ -11,7 +11,7 @@ from haploop.plant.plant import Plant
 from haploop.protocol.block_length import BlockLength
 from haploop.protocol.loop import PlantEnd
 from haploop.protocol.member import Member
-from haploop.protocol.node import run_node
+from haploop.protocol.node import NodeError, run_node
 from haploop.protocol.processes import PROCESSES
 from haploop.protocol.sockets import bind
 from haploop.protocol.telemetry import Publisher
@@ -87,7 +87,10 @@ def work(member: Member, context: zmq.Context[zmq.Socket[bytes]], directory: Pat
     """Run the plant as a member of a run."""
     node = PlantNode(member, context, directory)
     node.connect()
-    return node.run()
+    try:
+        return node.run()
+    except ArithmeticError as error:
+        raise NodeError(str(error)) from error
 
 
 if __name__ == "__main__":

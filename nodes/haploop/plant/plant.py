@@ -6,11 +6,9 @@ import math
 from collections.abc import Callable
 from typing import Any
 
-from haploop.plant.command_line import CommandLine, Hold
-from haploop.plant.hand_force import HandForce
-from haploop.plant.linear_motion import LinearMotion
-from haploop.plant.mechanics import Mechanics
-from haploop.plant.sensors import accelerometer_is_used, encoder
+from haploop.plant.command_line import Hold, line_of
+from haploop.plant.motion import motion_of
+from haploop.plant.sensors import accelerometer, accelerometer_is_used, position_sensor
 from haploop.protocol.ticks import Timebase
 
 # From the first tick and its samples to the commands that answer them.
@@ -26,14 +24,16 @@ class Plant:
     """
 
     def __init__(self, scene: dict[str, Any], time: Timebase) -> None:
-        self._mechanics = Mechanics.of(scene)
-        hand_force = scene.get("hand", {}).get("force")
-        self._motion = LinearMotion(self._mechanics, hand_force, time)
-        self._tau = HandForce(hand_force, time.plant_rate)
+        self._motion = motion_of(scene, time)
         self._steps, self._most = time.steps_per_tick, time.lookahead_ticks + 1
-        self._line = CommandLine(time)
+        self._line = line_of(scene, time)
+        self._tallies = dict(self._line.tallies)
         self._limit_m = scene["diverged_beyond"]
-        self._quantise = encoder(scene.get("encoder"))
+        self._quantise = position_sensor(scene, time)
+        feel = self._acceleration = self._motion.acceleration
+        if sensor := accelerometer(scene, time):
+            self._acceleration = lambda tick: sensor.reading(feel(tick))
+            self._tallies |= sensor.tallies
         self._measure = self._measure_both if accelerometer_is_used(scene) else self._measure_position
         self._interval_due = self._unusable = False
         self._block_first = 0
@@ -44,7 +44,7 @@ class Plant:
         return (self._quantise(self._motion.x),)
 
     def _measure_both(self) -> tuple[float, ...]:
-        return self._quantise(self._motion.x), self._acceleration()
+        return self._quantise(self._motion.x), self._acceleration(self.tick)
 
     def run_until(self, end: int, exchange: Exchange) -> None:
         """Work up to tick ``end``, or to where the plant stops by itself; ``exchange`` turns samples into commands.
@@ -56,7 +56,7 @@ class Plant:
             samples = self.samples(min(most, end - tick))
             if samples:
                 self.receive(exchange(tick, samples))
-        if self._interval_due:
+        if self._interval_due and self.stop_reason is None:
             self._advance()
 
     def samples(self, count: int) -> list[tuple[float, ...]]:
@@ -94,7 +94,10 @@ class Plant:
         motion.advance(tick, holds)
         self._interval_due = False
         if not -self._limit_m <= motion.x <= self._limit_m:
-            self._stop(tick + 1, f"the device was at {motion.x:g} m, beyond the limit of {self._limit_m:g} m")
+            if math.isfinite(motion.x):
+                self._stop(tick + 1, f"the device was at {motion.x:g} m, beyond the limit of {self._limit_m:g} m")
+            else:
+                self._stop(tick + 1, f"the arithmetic failed, not the device: its position came out as {motion.x}")
             return False
         return True
 
@@ -105,13 +108,6 @@ class Plant:
                 self._stop(tick, f"command {command} was {force}, which no device can apply")
                 return True
         return False
-
-    def _acceleration(self) -> float:
-        """Acceleration now, under the force held over the step that ends here (0 at the start), m/s^2."""
-        step = self.tick * self._steps
-        tau = float(self._tau.at_steps(step, step + 1)[0])
-        m, motion = self._mechanics, self._motion
-        return (motion.force + tau - m.damping * motion.v - m.stiffness * (motion.x - m.rest_m)) / m.mass_kg
 
     def _stop(self, tick: int, what: str) -> None:
         self.stop_reason = f"{what}, at tick {tick}"
@@ -126,9 +122,11 @@ class Plant:
 
         Columns x, v, x_low (what rounding to a float left of x), force and command are little-endian float64 with
         ``ticks * n + 1`` rows: every step of the block and its end state, whose force and command are the last
-        held ones.
+        held ones. What a scene's effects count follows, each the number of times before a step.
         """
         first, reached = self._block_first, self.reached
         record = self._motion.take_record(first)
+        steps = first * self._steps, reached * self._steps
+        record |= {name: tally.column(*steps) for name, tally in self._tallies.items()}
         self._block_first = reached
         return first, reached - first, {name: column.tobytes() for name, column in record.items()}

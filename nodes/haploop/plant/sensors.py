@@ -3,11 +3,35 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from haploop.protocol.arrays import floor, rint
+from haploop.protocol.ticks import Timebase
+
+if TYPE_CHECKING:
+    from haploop.plant.accelerometer import Accelerometer
 
 ROUNDINGS = {"nearest": rint, "floor": floor}
+
+
+def position_sensor(scene: dict[str, Any], time: Timebase) -> Callable[[Any], Any]:
+    """From true to measured position, to be called once a tick: what the encoder makes of x, noise added before."""
+    quantise = encoder(scene.get("encoder"))
+    if "noise" not in scene:
+        return quantise
+    from haploop.plant.noise import position_noise
+
+    noise = position_noise(scene["noise"], scene["seed"], time.period_s)
+    return lambda x: quantise(x + noise())
+
+
+def accelerometer(scene: dict[str, Any], time: Timebase) -> Accelerometer | None:
+    """What reads the true acceleration; None where it is read as it is, or not at all."""
+    if "accelerometer" not in scene or not accelerometer_is_used(scene):
+        return None
+    from haploop.plant.accelerometer import Accelerometer
+
+    return Accelerometer(scene["accelerometer"], scene["seed"], time)
 
 
 def encoder(table: dict[str, Any] | None) -> Callable[[Any], Any]:
@@ -20,4 +44,5 @@ def encoder(table: dict[str, Any] | None) -> Callable[[Any], Any]:
 
 def accelerometer_is_used(scene: dict[str, Any]) -> bool:
     """Whether samples carry the plant's acceleration beside the position."""
-    return scene.get("acceleration", {}).get("source") == "accelerometer"
+    by_itself = scene.get("acceleration", {}).get("source") == "accelerometer"
+    return by_itself or scene.get("velocity", {}).get("accelerometer", False)

@@ -27,3 +27,12 @@ def floor(value: Any) -> Any:
     if isinstance(value, float):
         return float(math.floor(value))
     return value.__array_namespace__().floor(value)
+
+
+def nearest_multiple(value: Any, unit: Any) -> Any:
+    """``unit * rint(value / unit)``; a value without a finite count of units (infinite, not a number) stays."""
+    counts = value / unit
+    if counts.__class__ is float:
+        return unit * float(round(counts)) if counts - counts == 0.0 else value
+    xp = counts.__array_namespace__()
+    return xp.where(xp.isfinite(counts), unit * xp.rint(counts), value)

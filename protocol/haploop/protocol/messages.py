@@ -87,7 +87,8 @@ MESSAGES: dict[str, Message] = {
     "STATE": _message(30, "telemetry", "publisher", "subscriber", "tick:int state:map",
                       "Answer to a new subscription: where the publisher is; its blocks from `tick` on follow without a gap."),
     "PLANT_BLOCK": _message(31, "telemetry", "plant", "subscriber", "from_tick:int ticks:int columns:map",
-                            "x, v, x_low, force, command at each of ticks * n plant steps and at the end of the last one."),
+                            "x, v, x_low, force, command at each of ticks * n plant steps and at the end of the last one; "
+                            "effects add columns."),
     "CONTROLLER_BLOCK": _message(32, "telemetry", "controller", "subscriber",
                                  "from_tick:int ticks:int columns:map elements:list wall:map",
                                  "What the controller saw and did at each tick; one dissipation column per element."),

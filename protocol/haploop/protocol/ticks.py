@@ -49,8 +49,8 @@ class Timebase:
                 f"plant_rate must be a whole multiple of control_rate, "
                 f"but {plant_rate} Hz is {plant_rate / control_rate:.6g} times {control_rate} Hz."
             )
-        delay_steps = _whole(delay, plant_rate, "round_trip_delay", "plant steps", complaints)
-        ticks = _whole(duration, control_rate, "duration", "control ticks", complaints)
+        delay_steps = whole_count(delay, plant_rate, "round_trip_delay", "plant steps", complaints)
+        ticks = whole_count(duration, control_rate, "duration", "control ticks", complaints)
         if not complaints and ticks < 1:
             complaints.append(f"duration must cover at least one control tick, {1 / control_rate:g} s.")
         if complaints:
@@ -90,8 +90,13 @@ class Timebase:
         return math.ceil(seconds * self.control_rate - _WHOLE_WITHIN)
 
 
-def _whole(seconds: float, rate: int, name: str, units: str, complaints: list[str]) -> int:
-    """``seconds * rate`` as the whole number it must be; otherwise append a complaint naming the nearest two."""
+def whole_count(seconds: float, rate: int, name: str, units: str, complaints: list[str]) -> int:
+    """``seconds * rate`` as the whole number it must be; otherwise append a complaint naming the nearest two.
+
+    Args:
+        name: what the sentence begins with.
+        units: what is counted, such as "plant steps".
+    """
     count = seconds * rate
     nearest = round(count)
     if abs(count - nearest) > _WHOLE_WITHIN * max(1.0, abs(count) * 1e-6):

@@ -62,6 +62,14 @@ def check(
 
 
 @app.command()
+def explain(scene: Scene, set: Set = None, plugin: Plugin = None, json: Json = False) -> None:
+    """Show what a scene comes to: bodies, states, what happens in which order, and what each effect costs."""
+    from haploop.tools.explain import explain_scene
+
+    explain_scene(scene, set or [], plugin or [], json)
+
+
+@app.command()
 def plugins(plugin: Plugin = None, json: Json = False) -> None:
     """List the dissipation elements with their parameters."""
     from haploop.tools.scenes import list_plugins

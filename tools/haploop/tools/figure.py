@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from haploop.tools.figure_data import TOGETHER, FigureError, RunData
 from haploop.tools.figure_loops import draw_force_position, draw_momentum
-from haploop.tools.figure_style import CLOSE, INK, WALL, element_colour, few_ticks, legend
+from haploop.tools.figure_style import CLOSE, INK, OF_THE_PLANT, WALL, element_colour, few_ticks, legend
 from haploop.tools.figure_time import energy_panel, force_panel, mark_events, position_panel
 from haploop.tools.figure_words import draw_books, draw_events, draw_header, event_lines
 
@@ -65,7 +65,7 @@ def figure_of(run: RunData) -> Figure:
         legend(ax)
         ax.axvspan(*close_s, color=CLOSE, alpha=0.5, zorder=0.5, linewidth=0)
     books = run.books()
-    colours = {"wall": WALL, TOGETHER: INK}
+    colours = OF_THE_PLANT | {"wall": WALL, TOGETHER: INK}
     colours |= {span.name: element_colour(number) for number, span in enumerate(run.history.elements)}
     energy_panel(energy, run, books, colours)
     mark_events([position, force, energy], run)

@@ -50,6 +50,8 @@ class RunData:
         controller, energy: columns at every tick, with ``timestamp``.
         t_s, x_m, v_m_s, force_N: the motion at every plant step and the force applied from there on; at every tick
             what the controller measured and asked for, where the plant was not logged (``every_step`` is False).
+        bodies_m, plant_forces_N: positions of the bodies beyond x, and forces of the plant's own effects, by name, at
+            the same times.
         cut: where the log ends if it was cut off, else "".
     """
 
@@ -63,6 +65,8 @@ class RunData:
     x_m: Floats
     v_m_s: Floats
     force_N: Floats
+    bodies_m: dict[str, Floats]
+    plant_forces_N: dict[str, Floats]
     every_step: bool
     cut: str
 
@@ -86,6 +90,9 @@ class RunData:
             raise FigureError(f"The log in {directory} holds no tick yet, so there is nothing to draw.")
         plant = log.get("/plant")
         motion = plant or {**controller, "t": controller["timestamp"], "force": controller["total"]}
+        forces = {name: motion[name] for name in ("actuator", "friction") if name in motion}
+        if plant and "actuator" in scene:
+            forces.setdefault("actuator", plant["force"])
         events = log.get("/events", [])
         return cls(
             scene=scene,
@@ -97,7 +104,9 @@ class RunData:
             t_s=motion["t"],
             x_m=motion["x"],
             v_m_s=motion["v"],
-            force_N=motion["force"],
+            force_N=motion.get("actuator", motion["force"]),
+            bodies_m={name: motion[f"{name}_x"] for name in ("tip", "hand") if f"{name}_x" in motion},
+            plant_forces_N=forces,
             every_step=plant is not None,
             cut=log.cut,
         )

@@ -9,7 +9,18 @@ import numpy as np
 from haploop.tools.amounts import prefix_for
 from haploop.tools.figure_data import Book, Floats, RunData
 from haploop.tools.figure_envelope import extremes
-from haploop.tools.figure_style import FAINT, GREY, INK, SMALL, WALL, WALL_FILL, dress, element_colour, legend
+from haploop.tools.figure_style import (
+    FAINT,
+    GREY,
+    INK,
+    OF_THE_PLANT,
+    SMALL,
+    WALL,
+    WALL_FILL,
+    dress,
+    element_colour,
+    legend,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -33,10 +44,12 @@ def position_panel(ax: Axes, run: RunData, span_s: tuple[float, float], title: s
     """Position over time with the wall shaded; fitted to the motion in contact if the approach dwarfs it."""
     inside = (run.t_s >= span_s[0]) & (run.t_s <= span_s[1])
     t, x = run.t_s[inside], run.x_m[inside] * MM
-    name = "device" if run.every_step else "device as measured"
+    name = ("motor" if "tip" in run.bodies_m else "device") + ("" if run.every_step else " as measured")
     line(ax, t, x, name, INK, gid="position")
+    for body, position in run.bodies_m.items():
+        line(ax, t, position[inside] * MM, body, OF_THE_PLANT[body], linewidth=1.0, gid=body)
     ax.set_xlim(*span_s)
-    low, high, left_out = view_mm(run, t, x)
+    low, high, left_out = view_mm(run, t, np.stack([x, *(all_of[inside] * MM for all_of in run.bodies_m.values())]))
     if run.history.walls:
         _shade_wall(ax, run, span_s, low, high)
     ax.set_ylim(low, high)
@@ -44,16 +57,21 @@ def position_panel(ax: Axes, run: RunData, span_s: tuple[float, float], title: s
 
 
 def view_mm(run: RunData, t: Floats, x_mm: Floats) -> tuple[float, float, str]:
-    """Lower and upper limit of the position axis, and a note in brackets on what lies outside of it."""
+    """Lower and upper limit of the position axis, and a note in brackets on what lies outside of it.
+
+    Args:
+        t, x_mm: times in s, and positions of all bodies in mm, shape (bodies, times).
+    """
     x_mm = np.where(np.isfinite(x_mm), x_mm, np.nan)
     low, high, note = np.nanmin(x_mm), np.nanmax(x_mm), ""
     contact = run.contact_s()
     since = t >= contact[0] if len(contact) else np.zeros(0, bool)
     if since.any():
         walls = run.wall_at(t[since])[0] * MM
-        near = min(np.nanmin(x_mm[since]), walls.min()), max(np.nanmax(x_mm[since]), walls.max())
+        x_since = x_mm[:, since]
+        near = min(np.nanmin(x_since), walls.min()), max(np.nanmax(x_since), walls.max())
         if high - low > _DWARFED * (near[1] - near[0]):
-            note = f" (approach from {x_mm[0]:.3g} mm not shown)"
+            note = f" (approach from {x_mm[0, 0]:.3g} mm not shown)"
             low, high = near
     margin = 0.08 * (high - low) or 0.01
     return float(low - margin), float(high + margin), note
@@ -83,6 +101,13 @@ def force_panel(ax: Axes, run: RunData, span_s: tuple[float, float], title: str)
         if here.any():
             colour = element_colour(number)
             line(ax, times[here], force[here], span.name, colour, held=True, linewidth=1.0, gid=span.name)
+    at_steps = (run.t_s >= span_s[0]) & (run.t_s <= span_s[1])
+    for name, force in run.plant_forces_N.items():
+        line(ax, run.t_s[at_steps], force[at_steps], name, OF_THE_PLANT[name], linewidth=1.0, gid=name)
+    most = run.scene.get("actuator", {}).get("saturation")
+    if most is not None and np.abs(run.controller["total"][inside]).max(initial=0.0) > most:
+        for limit in (-most, most):
+            ax.axhline(limit, color=OF_THE_PLANT["actuator"], linewidth=0.8, dashes=(1, 2), zorder=0, gid="saturation")
     ax.set_xlim(*span_s)
     ax.axhline(0.0, color=FAINT, linewidth=0.8, zorder=0)
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from haploop.tools.amounts import amount, parameters, spring
 from haploop.tools.figure_data import Book, RunData
 from haploop.tools.figure_style import GREY, INK, LARGE, SMALL, TEXT, VERDICTS
+from haploop.tools.plant_words import counts, plant_books
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -15,6 +16,9 @@ if TYPE_CHECKING:
 
 # What has room in the table and below the figure.
 _MOST_BOOKS, _MOST_LINES, _LINE_LETTERS = 7, 2, 225
+
+# Books of the plant that belong to a force which is drawn.
+_LINES = {"friction_heat_J": "friction", "actuator_J": "actuator"}
 
 
 def draw_header(figure: Figure | SubFigure, run: RunData) -> None:
@@ -73,7 +77,7 @@ def _write(ax: Axes, y: float, cells: tuple[str, ...], size: float, **look: Any)
 
 @dataclass(frozen=True)
 class Row:
-    """A line of the table; ``book`` names the book whose colour it has, "" for none."""
+    """A line of the table; ``book`` names the book or force whose colour it has, "" for none."""
 
     name: str
     true: str
@@ -83,7 +87,7 @@ class Row:
 
 
 def book_rows(run: RunData, books: list[Book]) -> list[Row]:
-    """Wall, its leak by cause, elements, then what the plant moved."""
+    """Wall, its leak by cause, elements, then what the plant moved and what was lost or limited."""
     spans = {span.name: span for span in run.history.elements}
     energy = run.summary.get("energy", {})
     rows = []
@@ -101,9 +105,9 @@ def book_rows(run: RunData, books: list[Book]) -> list[Row]:
             rows += _leak_rows(energy.get("wall", {}))
     if len(shown) > _MOST_BOOKS:
         rows.append(Row(f"and {len(shown) - _MOST_BOOKS} more elements in summary.json", ""))
-    names = {"hand_work_J": "work of the hand"}
-    names |= {key: f"heat in the {key.removesuffix('_heat_J')}" for key in energy if key.endswith("_heat_J")}
-    return rows + [Row(words, amount(energy[key], "J")) for key, words in names.items() if key in energy]
+    for key, words in plant_books(energy).items():
+        rows.append(Row(words, amount(energy[key], "J"), book=_LINES.get(key, "")))
+    return rows + [Row(words, f"{count}") for words, count in counts(run.summary).items()]
 
 
 def _leak_rows(wall: dict[str, Any]) -> list[Row]:

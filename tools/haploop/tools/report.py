@@ -6,6 +6,7 @@ import dataclasses
 from typing import TYPE_CHECKING, Any
 
 from haploop.tools.amounts import amount, fixed, parameters, spring
+from haploop.tools.plant_words import counts, plant_books
 from haploop.tools.progress import PrintedLine, ProgressLine
 
 if TYPE_CHECKING:
@@ -71,7 +72,7 @@ def _control_rate(summary: dict[str, Any]) -> float:
 
 
 def _key_figures(summary: dict[str, Any]) -> list[tuple[str, str]]:
-    window, lost = summary["window"], summary["lost"]
+    window = summary["window"]
     ran = f"{summary['duration_s']:g} s, {summary['ticks']} ticks"
     if summary["wall_s"]:
         ran += f", in {amount(summary['wall_s'], 's')} ({fixed(summary['real_time_factor'])} times real time)"
@@ -82,8 +83,8 @@ def _key_figures(summary: dict[str, Any]) -> list[tuple[str, str]]:
         figures.append(("penetration", depth + (f", outside the wall {outside:.0f} % of the time" if outside else "")))
     if window["displayed_stiffness_N_m"] is not None:
         figures.append(("displayed stiffness", spring(window["displayed_stiffness_N_m"])))
-    if any(lost.values()):
-        figures.append(("lost", ", ".join(f"{n} {what.replace('_', ' ')}" for what, n in lost.items() if n)))
+    if happened := counts(summary):
+        figures.append(("in all", ", ".join(f"{count} {words}" for words, count in happened.items())))
     return figures
 
 
@@ -131,10 +132,7 @@ def _virtual_rows(energy: dict[str, Any], control_rate: float) -> list[tuple[str
 
 
 def _plant_rows(energy: dict[str, Any]) -> list[tuple[str, str]]:
-    rows = [("work of the hand", amount(energy["hand_work_J"], "J"))]
-    for key in energy:
-        if key.endswith("_heat_J"):
-            rows.append((f"heat in the {key.removesuffix('_heat_J')}", amount(energy[key], "J")))
+    rows = [(words, amount(energy[key], "J")) for key, words in plant_books(energy).items()]
     rows.append(("stored at the end", amount(energy["stored_J"], "J")))
     residual, moved = energy["residual_J"], energy["moved_J"]
     share = f", {residual / moved:.1e} of what moved" if residual is not None and moved else ""

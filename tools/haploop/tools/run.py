@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from haploop.tools.ending import FAILED, WRONG_USE, leave, plain_errors, print_json
+from haploop.tools.scenes import print_notes
 
 if TYPE_CHECKING:
     from haploop.protocol.transport import Transport
@@ -32,6 +33,7 @@ def run_scene(
         rate = _pace(pace, in_process)
         transport = _transport(tcp, keys, in_process)
         prepared = prepare(scene_path, overrides, plugins, out)
+        print_notes(prepared.scene)
         title, duration_s = prepared.scene["title"], prepared.scene["duration"]
         from haploop.launch.failure import RunFailed
 

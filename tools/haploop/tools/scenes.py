@@ -27,11 +27,20 @@ def check_scene(scene_path: Path, overrides: list[str], plugins: list[Path], as_
 
     with plain_errors():
         scene = load(scene_path, overrides, kinds_with(plugins))
+    print_notes(scene)
     if as_json:
         print_json(scene)
     else:
         print(to_toml(scene), end="")
         print(f"{scene_path} can be run.", file=sys.stderr)
+
+
+def print_notes(scene: dict[str, Any]) -> None:
+    """Say on stderr what in a resolved scene may not be what was meant."""
+    from haploop.launch.combinations import notes
+
+    for note in notes(scene):
+        print(f"Note: {note}", file=sys.stderr)
 
 
 def print_schema(plugins: list[Path]) -> None:

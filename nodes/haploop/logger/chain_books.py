@@ -1,0 +1,104 @@
+"""The energy books of a chain of bodies, by exact integrals over each step and each piece of a step."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from haploop.logger.chain_forms import ChainForms
+from haploop.logger.chain_moves import Columns, Moves
+from haploop.logger.plant_books import beyond_limits
+from haploop.logger.sums import sum_rows
+from haploop.plant.chain import Chain
+from haploop.plant.hand_force import HandForce
+from haploop.protocol.ticks import Timebase
+
+
+class ChainBooks:
+    """What every plant step moves between the hand's muscles, dampers, friction, actuator, masses and springs.
+
+    Over a step, or a piece of it where friction cut it, with x_j, v_j of body j and the stretch s_i of link i:
+        work of tau        (tau + tau+)/2 dx + (tau+ - tau) integral (t - t_mid)/t_end v dt, of the last body
+        heats              b integral v_j^2 dt of the dampers to ground, b_i integral s_i'^2 dt of the links
+        heat of friction   -F dx_0, and m_0 v_0^2 / 2 where it stopped body 0
+        kinetic change     sum of m_j dv_j (v_j + dv_j / 2)
+        spring change      k_h dx (x - x_rest + dx / 2) of the last body + sum of k_i ds_i (s_i + ds_i / 2)
+        actuator           (f_commanded - force) dx_0 + integral p' v_0 dt / (2 pi bandwidth)
+    The last is what the actuator's limits keep from the device: it feels p = force - p' / (2 pi bandwidth), while the
+    true books of wall and elements are those of the forces they commanded. Integrals are forms of the rates at the
+    start (``ChainIntegrals``). Nothing is taken from the balance, so that its residual is a proof.
+
+    Attributes:
+        names: the books, in the order of the rows of ``increments``; heats end in ``_heat``.
+        least_friction_J: the least heat of friction in any step so far, 0 or above but for rounding.
+    """
+
+    def __init__(self, scene: dict[str, Any], time: Timebase) -> None:
+        # A sensor takes no energy.
+        self._chain = replace(Chain.of(scene), sensor=None)
+        self._tau = HandForce(scene.get("hand", {}).get("force"), time.plant_rate)
+        self._forms = ChainForms(self._chain, time.step_s)
+        self._rubs, self._is_limited = "friction" in scene, "actuator" in scene
+        self._heats = [name for name in self._forms.names if name.endswith("_heat")]
+        friction, actuator = ["friction_heat"] * self._rubs, ["actuator"] * self._is_limited
+        self.names = ["hand_work", *self._heats, *friction, "kinetic", "spring", *actuator]
+        self.least_friction_J = 0.0
+
+    def increments(
+        self, first_step: int, columns: Columns, dx: np.ndarray, commanded: Iterable[np.ndarray]
+    ) -> np.ndarray:
+        """What each step adds to each book, J; see ``PlantBooks.increments``."""
+        moves, steps = Moves.of(self._chain, first_step, columns), len(dx)
+        tau, force = self._tau.at_steps(first_step, first_step + steps + 1), columns["force"][:-1]
+        rise = np.diff(tau)[moves.step]
+        start = tau[:-1][moves.step] + rise * moves.elapsed
+        found = self._forms.integrals(moves, force[moves.step], start, rise)
+        integrals = dict(zip(self._forms.names, found, strict=True))
+        risen = np.ldexp(rise, -moves.level)
+        way = sum_rows(moves.ways)
+        books = {"hand_work": (start + risen / 2.0) * way + risen * integrals["swing"]}
+        books |= {name: integrals[name] for name in self._heats}
+        if self._rubs:
+            books["friction_heat"] = -moves.friction * moves.ways[0] + moves.snap
+        books |= {"kinetic": self._kinetic(moves), "spring": self._spring(moves, way)}
+        if self._is_limited:
+            books["actuator"] = integrals.get("lag", np.zeros(len(moves.step)))
+        by_step = np.stack([_by_step(books[name], moves.step, steps) for name in self.names])
+        if self._rubs:
+            least = by_step[self.names.index("friction_heat")].min(initial=0.0)
+            self.least_friction_J = min(self.least_friction_J, float(least))
+        if self._is_limited:
+            by_step[-1] += beyond_limits(commanded, force) * dx
+        return by_step
+
+    def _kinetic(self, moves: Moves) -> np.ndarray:
+        n, masses = self._chain.count, self._chain.masses_kg
+        v, dv = np.cumsum(moves.states[n : 2 * n], axis=0), np.cumsum(moves.changes, axis=0)
+        return sum_rows([masses[body] * dv[body] * (v[body] + dv[body] / 2.0) for body in range(n)])
+
+    def _spring(self, moves: Moves, way: np.ndarray) -> np.ndarray:
+        """Change of energy in the hand's spring, whose end moves by ``way``, and in the links."""
+        (stiffness, rest), lengths = self._chain.spring, moves.states[: self._chain.count]
+        beyond = sum_rows([lengths[0] - rest, *lengths[1:], *moves.lows])
+        parts = [stiffness * way * (beyond + way / 2.0)]
+        for link, stretch, change in zip(self._chain.links, lengths[1:], moves.ways[1:], strict=True):
+            parts.append(link.stiffness * change * (stretch + change / 2.0))
+        return sum_rows(parts)
+
+    def stored_J(self, columns: Columns) -> float:
+        """Kinetic and spring energy in the first state of some telemetry."""
+        chain, n = self._chain, self._chain.count
+        state = [float(columns[name][0]) for name in chain.states]
+        velocities = np.cumsum(state[n : 2 * n]).tolist()
+        stiffness, rest = chain.spring
+        energies = [mass * v * v for mass, v in zip(chain.masses_kg, velocities, strict=True)]
+        energies += [link.stiffness * s * s for link, s in zip(chain.links, state[1:n], strict=True)]
+        return sum([*energies, stiffness * (sum(state[:n]) - rest) ** 2]) / 2.0
+
+
+def _by_step(values: np.ndarray, step: np.ndarray, steps: int) -> np.ndarray:
+    """The sum over the moves of each step, in their order."""
+    return values if len(values) == steps else np.bincount(step, values, steps)

@@ -1,0 +1,95 @@
+"""Integrals over many stretches of a chain's motion at once, as exact forms of the rates at their beginnings."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from haploop.logger.chain_moves import Moves
+from haploop.plant.chain import Chain
+from haploop.plant.chain_flow import ChainIntegrals
+
+
+class ChainForms:
+    """The integrals that the books need, of any moves; the forms of a level are made when it first occurs.
+
+    Attributes:
+        names: the integrals, in the order of the rows of ``integrals``: heat of every damper to ground and of every
+            link, as ``<damper>_heat``; ``lag`` of the actuator's force behind the force held, where it has a bandwidth,
+            J; and ``swing``, integral of (t - t_mid) / t_end v dt of the last body, m.
+    """
+
+    def __init__(self, chain: Chain, step_s: float) -> None:
+        self._chain = chain
+        self._flows = {stuck: ChainIntegrals(chain, step_s, stuck) for stuck in (False, True)}
+        self._rates = {stuck: chain.rates(stuck).astype(float) for stuck in (False, True)}
+        self._made: dict[tuple[int, bool], tuple[np.ndarray, np.ndarray]] = {}
+        bodies, rates = _velocities(chain)
+        self._products = [(damping, bodies[body], bodies[body]) for body, damping in chain.grounded.values()]
+        self._products += [(link.damping, *[rates[i + 1]] * 2) for i, link in enumerate(chain.links)]
+        self.names = [f"{name}_heat" for name in (*chain.grounded, *(link.name for link in chain.links))]
+        if chain.actuator_rate is not None:
+            force = np.eye(len(chain.states))[chain.states.index("actuator")]
+            self._products.append((1.0 / chain.actuator_rate, force, bodies[0]))
+            self.names.append("lag")
+        self.names.append("swing")
+        self._last = bodies[-1]
+
+    def integrals(self, moves: Moves, force: np.ndarray, tau: np.ndarray, rise: np.ndarray) -> np.ndarray:
+        """All integrals of all moves.
+
+        Args:
+            moves: the stretches of motion.
+            force: held in each, N, shape (moves,).
+            tau: of the hand, at the beginning of each, N.
+            rise: by which tau rises in a whole plant step, N.
+
+        Returns:
+            Shape (integrals, moves), ordered as ``names``.
+        """
+        # The hand's spring pulls as far as it is from its rest; so written no digits go to where the rest lies.
+        states = moves.states.copy()
+        states[0] = states[0] - self._chain.spring[1] + moves.lows[0]
+        acting = np.concatenate([states, [force, moves.friction, tau]])
+        result = np.empty((len(self.names), len(force)))
+        for level, stuck, which in moves.groups():
+            rates = _matrix_times(self._rates[stuck], acting[:, which])
+            w = np.concatenate([rates, [rise[which]]])
+            products, swing = self._forms(level, stuck)
+            result[:-1, which] = _forms_of(products, w)
+            result[-1, which] = _matrix_times(swing[None], w)[0]
+        return result
+
+    def _forms(self, level: int, stuck: bool) -> tuple[np.ndarray, np.ndarray]:
+        """(forms of all products, shape (products, rates, rates); form of the swing, shape (rates,))."""
+        if (level, stuck) not in self._made:
+            flow = self._flows[stuck]
+            forms = [factor * flow.product(left, right, level) for factor, left, right in self._products]
+            self._made[level, stuck] = np.stack(forms), flow.lag(self._last, level)
+        return self._made[level, stuck]
+
+
+def _velocities(chain: Chain) -> tuple[np.ndarray, np.ndarray]:
+    """What picks the velocity of each body, and each relative rate, from the states' rates; (bodies, states) each."""
+    rates = np.eye(len(chain.states))[: chain.count]
+    return chain.absolute() @ rates, rates
+
+
+def _matrix_times(matrix: np.ndarray, columns: np.ndarray) -> np.ndarray:
+    """Their product, term by term in a fixed order (a matrix product may reorder with its size)."""
+    total = np.zeros((len(matrix), columns.shape[1]))
+    for row, entries in enumerate(matrix):
+        for entry, column in zip(entries.tolist(), columns, strict=True):
+            if entry:
+                total[row] += entry * column
+    return total
+
+
+def _forms_of(forms: np.ndarray, w: np.ndarray) -> np.ndarray:
+    """w' Q w of every form Q and every column of w, in a fixed order; shape (forms, columns)."""
+    total = np.zeros((len(forms), w.shape[1]))
+    for i in range(len(w)):
+        for j in range(i, len(w)):
+            entries = forms[:, i, j] if i == j else 2.0 * forms[:, i, j]
+            if entries.any():
+                total += entries[:, None] * (w[i] * w[j])
+    return total

@@ -1,0 +1,74 @@
+"""The motion of a chain whose first body sticks and slips."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from haploop.plant.chain_motion import HELD, ChainMotion, Interval
+from haploop.plant.command_line import Hold
+from haploop.plant.friction import Friction
+from haploop.plant.friction_walk import Walk
+from haploop.protocol.ticks import Timebase
+
+
+class FrictionMotion(ChainMotion):
+    """Exact flow between the instants at which friction switches, and these instants by halving the step.
+
+    Body 0 slips in a direction +-1 under friction -direction F, or is stuck: then it is clamped, v is exactly 0.0 and
+    x stays, while the rest of the chain follows the flow of the clamped system. It slips until v changes its sign;
+    there it sticks if the other forces on it are within the breakaway force, else it slips where they pull. It is stuck
+    until they exceed the breakaway force. An interval in which nothing switches is one linear motion, as without
+    friction; any other, and every one of a scene too stiff or with too curved a law for that, is walked step by step.
+    """
+
+    held_names = (*HELD, "friction", "stuck")
+
+    def __init__(self, scene: dict[str, Any], time: Timebase) -> None:
+        self._friction = Friction(scene["friction"])
+        super().__init__(scene, time)
+        self._clamped = self._responses(time, stuck=True)
+        self._walk.halve(self._free.flow, self._clamped.flow)
+
+    def _held_before(self) -> np.ndarray:
+        self._walk = Walk(self._chain, self._friction, self._step_s)
+        self._walk.start(self.z, float(self.loads(0, 1)[0]))
+        return np.array([0.0, -1.0, self._walk.friction_at(self.z[self._v]), float(self._walk.is_stuck)])
+
+    def advance(self, tick: int, holds: list[Hold]) -> None:
+        """Move through interval ``tick`` under the forces held in it."""
+        interval = self._begin(holds)
+        loads = self.loads(tick * self._n, (tick + 1) * self._n + 1)
+        step = 0
+        while step < self._n:
+            if self._walk.whole_steps:
+                step = self._as_it_goes(interval, step, holds, tick, loads)
+            if step < self._n:
+                self._through(interval, step, tick, loads)
+                step += 1
+        self._accept(tick, interval)
+
+    def _as_it_goes(self, interval: Interval, begin: int, holds: list[Hold], tick: int, loads: np.ndarray) -> int:
+        """Follow the present mode from step ``begin`` on; returns the first step in which it does not hold."""
+        walk, states, command = self._walk, interval.states, interval.held[begin:, 0]
+        walk.decide_at_rest(states[begin], command[0], loads[begin])
+        friction = 0.0 if walk.is_stuck else -walk.direction * self._friction.kinetic_N
+        self._follow(interval, begin, holds, self._clamped if walk.is_stuck else self._free, tick, friction)
+        interval.held[begin:, 2:] = interval.at_ends[begin:] = friction, walk.is_stuck
+        goes_on = walk.goes_on(states[begin + 1 :].T, command, loads[begin + 1 :])
+        if walk.is_stuck:
+            goes_on &= walk.goes_on(states[begin:-1].T, command, loads[begin:-1])
+        return self._n if goes_on.all() else begin + int(goes_on.argmin())
+
+    def _through(self, interval: Interval, step: int, tick: int, loads: np.ndarray) -> None:
+        """Through one step, whatever happens in it."""
+        states, lows, held, at_ends = interval
+        load, rise = float(loads[step]), float(loads[step + 1] - loads[step])
+        through = self._walk.through(tick * self._n + step, states[step], lows[step], float(held[step, 0]), load, rise)
+        states[step + 1], lows[step + 1], held[step, 2], held[step, 3] = through
+        at_ends[step] = self._walk.friction_at(states[step + 1, self._v]), self._walk.is_stuck
+
+    def take_record(self, tick: int) -> dict[str, np.ndarray]:
+        """As without friction; the pieces of the steps within which friction switched come beside, ``pieces.*``."""
+        return super().take_record(tick) | self._walk.take_pieces()

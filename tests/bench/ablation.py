@@ -1,0 +1,74 @@
+"""What every effect costs: the loop in one process with all effects, with all but one, with none, in random order.
+
+All effects stand in the table twice (A/A): how far these two rows differ is how much a difference of others means.
+"""
+
+from __future__ import annotations
+
+import argparse
+import random
+import statistics
+import time
+from pathlib import Path
+from typing import Any
+
+from machine import machine
+from rich.console import Console
+from rich.table import Table
+
+from haploop.controller.dissipation import registry
+from haploop.launch.in_process import run_in_process
+from haploop.launch.plan import effects_of
+from haploop.launch.scene_file import load
+from haploop.tools.operations import without
+
+SCENE = Path(__file__).parents[2] / "launch" / "scenes" / "all_effects.toml"
+
+
+def without_all(scene: dict[str, Any]) -> dict[str, Any]:
+    """The scene with no effect left."""
+    while named := effects_of(scene):
+        scene = without(named[0], scene)
+    return scene
+
+
+def measured_us(scene: dict[str, Any], kinds: dict[str, Any]) -> float:
+    """Wall time of a tick, µs."""
+    began = time.perf_counter()
+    summary = run_in_process(scene, kinds)
+    return (time.perf_counter() - began) / summary["ticks"] * 1e6
+
+
+def main() -> None:
+    """Measure and print a table."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--repeats", type=int, default=7)
+    parser.add_argument("--seconds", type=float, default=2.0)
+    options = parser.parse_args()
+    kinds = registry()
+    everything = load(SCENE, [f"duration={options.seconds}", "diverged_beyond=1e9"], kinds)
+    named = effects_of(everything)
+    scenes = {"all effects (A)": everything, "all effects again (A)": everything}
+    scenes |= {f"all but {effect.name}": without(effect, everything) for effect in named}
+    scenes["none"] = without_all(everything)
+    seen: dict[str, list[float]] = {name: [] for name in scenes}
+    for _ in range(options.repeats):
+        for name in random.Random(len(seen["none"])).sample(list(scenes), len(scenes)):
+            seen[name].append(measured_us(scenes[name], kinds))
+    show(seen, options.repeats)
+
+
+def show(seen: dict[str, list[float]], repeats: int) -> None:
+    """A row a scene: median, quartiles, and what leaving the effect out saves."""
+    table = Table(title=f"one process, medians of {repeats} repeats in random order; {machine()}", title_justify="left")
+    for heading in ("scene", "us/tick", "quartiles", "saves"):
+        table.add_column(heading, justify="left" if heading == "scene" else "right")
+    whole = statistics.median(next(iter(seen.values())))
+    for name, values in seen.items():
+        low, middle, high = statistics.quantiles(values, n=4)
+        table.add_row(name, f"{middle:.1f}", f"{low:.1f} - {high:.1f}", f"{whole - middle:+.1f}")
+    Console(width=110).print(table)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,40 @@
+"""Estimates along sampled positions, by the tables of a scene."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from haploop.controller.estimators import estimators
+from haploop.plant.sensors import encoder
+
+T = 1e-3
+COUNT = 1e-5
+ENCODER = {"resolution": COUNT, "rounding": "nearest"}
+EVERYTHING = 1e9  # a bound that lets every window pass
+SIGMA = 3e-6
+CORNER = 2 * np.pi * 40.0
+JERK = CORNER**3 * SIGMA * np.sqrt(T)
+KALMAN = {"estimator": "kalman", "jerk_density": JERK, "measurement_noise": SIGMA}
+FUSED = {**KALMAN, "accelerometer": True, "accelerometer_noise": 0.5}
+
+
+def estimates(x: Sequence[Any], readings: Sequence[Any] = (), **tables: Any) -> tuple[np.ndarray, np.ndarray]:
+    """v and a along sampled positions, by the tables of a scene; shape (ticks, ...) as the samples are."""
+    samples = list(zip(x, readings, strict=True)) if len(readings) else [(at,) for at in x]
+    velocity, acceleration = estimators(tables, T)(samples[0])
+    rows = []
+    for sample in samples:
+        v = velocity(sample[0], sample)
+        rows.append((v, acceleration(v, sample)))
+    v, a = zip(*rows, strict=True)
+    return np.array(v), np.array(a)
+
+
+def floats(values: np.ndarray) -> list[float]:
+    return values.tolist()
+
+
+def measured(x: np.ndarray, rounding: str = "nearest") -> list[float]:
+    measure = encoder({"resolution": COUNT, "rounding": rounding})
+    return [measure(at) for at in floats(x)]

@@ -1,0 +1,103 @@
+"""What a scene costs, counted in instructions, and what ``haploop explain`` shows of it."""
+
+import json
+import sys
+from pathlib import Path
+
+import pytest
+from scene_makers import KINDS, scene
+from test_plan import BESIDE, EVERYTHING, NAMING
+from typer.testing import CliRunner
+
+from haploop.controller.dissipation.damping import Damping
+from haploop.launch.plan import effects_of
+from haploop.launch.scene_file import load
+from haploop.protocol.effects import EFFECTS, Effect
+from haploop.tools.cli import app
+from haploop.tools.operations import bill, operations, without
+
+SCENES = Path(__file__).parents[1] / "launch/scenes"
+MINOR = f"{sys.version_info.major}.{sys.version_info.minor}"
+RECORDED = json.loads((Path(__file__).parent / "bytecode.json").read_text())
+
+
+@pytest.mark.skipif(MINOR not in RECORDED, reason=f"no numbers are recorded for Python {MINOR}")
+@pytest.mark.parametrize("name", ["fig6a", "fig6b", "fig6c", "tap"])
+def test_scenes_without_effects_execute_what_they_did_before_there_were_any(name):
+    """Recorded before the effects were built: not one instruction more in plant or controller."""
+    counted = operations(load(SCENES / f"{name}.toml"), KINDS)
+    assert [counted.plant, counted.controller, counted.ticks] == RECORDED[MINOR][name]
+
+
+def test_a_single_dead_branch_would_be_seen():
+    class Heavier(Damping):
+        kind = "damping"
+
+        def force(self, motion):
+            if motion.contact is None:
+                return 0.0
+            return super().force(motion)
+
+    resolved = scene(dissipation=[{"kind": "damping", "damping": 1.0}])
+    light, heavy = operations(resolved, KINDS), operations(resolved, KINDS | {"damping": Heavier})
+    assert heavy.plant == light.plant
+    assert heavy.controller > light.controller
+
+
+def test_counts_are_the_same_each_time_and_leave_tracing_as_it_was():
+    resolved = scene(**EVERYTHING)
+    before = sys.gettrace()
+    assert operations(resolved, KINDS) == operations(resolved, KINDS)
+    assert sys.gettrace() is before
+
+
+@pytest.mark.parametrize("ticks", [1, 2, 30])
+def test_a_short_run_is_counted_too(ticks):
+    assert operations(scene(duration=ticks / 1000), KINDS).per_tick > 0
+
+
+@pytest.mark.parametrize("effect", EFFECTS, ids=lambda effect: effect.name)
+def test_a_scene_without_one_of_its_effects_is_the_scene_that_never_named_it(effect: Effect):
+    """What goes with it is what cannot be there without it; the rest is left alone, and it can be run."""
+    resolved = scene(**NAMING[effect.name], wall={"position": 0, "stiffness": 1})
+    rest = without(effect, resolved)
+    assert effect in effects_of(resolved)
+    gone = {e.name for e in effects_of(resolved)} - {e.name for e in effects_of(rest)}
+    dependent = {name for name, needs in BESIDE.items() if effect.name in needs}
+    assert {effect.name} <= gone <= {effect.name} | dependent
+    assert operations(rest, KINDS).per_tick > 0
+    assert resolved == scene(**NAMING[effect.name], wall={"position": 0, "stiffness": 1})
+
+
+def test_every_effect_of_a_tick_costs_instructions_and_is_billed():
+    elements = [{"kind": "damping", "damping": 1}, {"kind": "unidirectional-inertia", "mass": 0.01}]
+    resolved = scene(**NAMING["noise"], **NAMING["encoder"], **NAMING["friction"], velocity={"cutoff": 9},
+                     dissipation=elements)  # fmt: skip
+    billed = bill(resolved, effects_of(resolved), KINDS)
+    assert list(billed.effects) == ["friction", "noise", "encoder", "velocity.cutoff"]
+    assert all(cost > 0 for cost in [*billed.effects.values(), *billed.elements])
+    assert len(billed.elements) == 2
+
+
+def test_explain_shows_bodies_states_order_and_costs():
+    result = CliRunner().invoke(app, ["explain", str(SCENES / "premium_tap.toml"), "--set", "accelerometer.bias=1"])
+    assert result.exit_code == 0
+    for words in ("device 52.5 g, hand 269 g", "4: x, grip.stretch, v, grip.rate", "friction_motion", "in every tick"):
+        assert words in result.stdout, words
+    assert "Note: [accelerometer] is not simulated" in result.stderr
+
+
+def test_explain_gives_one_json_object():
+    result = CliRunner().invoke(app, ["explain", str(SCENES / "fig6c.toml"), "--json"])
+    data = json.loads(result.stdout)
+    assert data["states"] == ["x", "v"]
+    assert [effect["name"] for effect in data["effects"]] == ["encoder"]
+    assert data["elements"][0]["instructions_per_tick"] > 0
+    assert len(data["absent"]) == len(EFFECTS) - 1
+    assert data["modules"] == {"plant": [], "controller": []}
+
+
+def test_explain_tells_every_mistake_with_exit_status_2():
+    result = CliRunner().invoke(app, ["explain", str(SCENES / "fig6c.toml"), "--set", "frction.kinetic=1"])
+    assert result.exit_code == 2
+    assert "did you mean friction?" in result.stderr

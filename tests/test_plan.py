@@ -1,0 +1,258 @@
+"""What a scene comes to: the plan says what runs, and only what is named is imported and executed."""
+
+import importlib.util
+import json
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+from scene_makers import KINDS, scene
+
+import haploop.logger
+from haploop.launch.in_process import run_in_process
+from haploop.launch.plan import effects_of, plan
+from haploop.launch.scene_file import load
+from haploop.protocol.effects import EFFECTS, Effect
+
+SCENES = Path(__file__).parents[1] / "launch/scenes"
+ENCODER = {"resolution": 1e-5}
+READ = {"acceleration": {"source": "accelerometer"}}
+FILTER = {"estimator": "kalman", "jerk_density": 10.0}
+# The least that names each effect. What an effect cannot be without stands in the lists of ``BESIDE``.
+NAMING: dict[str, dict[str, Any]] = {
+    "transmission": {"transmission": {"motor_mass": 0.003, "stiffness": 4000}},
+    "hand.grip": {"hand": {"mass": 0.2, "grip": {"stiffness": 500}}},
+    "actuator.bandwidth": {"actuator": {"bandwidth": 300}},
+    "friction": {"friction": {"kinetic": 0.05}},
+    "accelerometer.bandwidth": {"accelerometer": {"bandwidth": 400}, **READ},
+    "accelerometer.delay": {"accelerometer": {"delay": 0.001}, **READ},
+    "noise": {"noise": {"deviation": 1e-5, "cutoff": 300}},
+    "encoder": {"encoder": ENCODER},
+    "accelerometer": {"accelerometer": {"noise_density": 3e-3}, **READ},
+    "accelerometer.range": {"accelerometer": {"range": 20}, **READ},
+    "velocity.estimator = window": {"velocity": {"estimator": "window", "ticks": 5}},
+    "velocity.estimator = foaw": {"velocity": {"estimator": "foaw", "ticks": 8, "bound": 1e-5}},
+    "velocity.estimator = kalman": {"velocity": {**FILTER, "measurement_noise": 1e-5}},
+    "velocity.cutoff": {"velocity": {"cutoff": 100}},
+    "acceleration.source = accelerometer": READ,
+    "acceleration.source = kalman": {
+        "velocity": {**FILTER, "measurement_noise": 1e-5},
+        "acceleration": {"source": "kalman"},
+    },
+    "acceleration.estimator = window": {"acceleration": {"estimator": "window", "ticks": 5}},
+    "acceleration.estimator = foaw": {"acceleration": {"estimator": "foaw", "ticks": 5, "bound": 0.01}},
+    "acceleration.cutoff": {"acceleration": {"cutoff": 100}},
+    "jitter": {"jitter": {"kind": "uniform", "most": 0.001}},
+    "loss": {"loss": {"probability": 0.1}},
+    "actuator.resolution": {"actuator": {"resolution": 0.01}},
+    "actuator.saturation": {"actuator": {"saturation": 5}},
+}
+BESIDE = {
+    "accelerometer.bandwidth": ["accelerometer", "acceleration.source = accelerometer"],
+    "accelerometer.delay": ["accelerometer", "acceleration.source = accelerometer"],
+    "accelerometer": ["acceleration.source = accelerometer"],
+    "accelerometer.range": ["accelerometer", "acceleration.source = accelerometer"],
+    "acceleration.source = kalman": ["velocity.estimator = kalman"],
+}
+EVERYTHING: dict[str, Any] = {
+    "wall": {"position": -0.001, "stiffness": 500},
+    "dissipation": [{"kind": "damping", "damping": 0.5}, {"kind": "unidirectional-inertia", "mass": 0.005}],
+    "hand": {
+        "mass": 0.2,
+        "stiffness": 80,
+        "damping": 4,
+        "grip": {"stiffness": 500},
+        "force": {"kind": "sine", "offset": -1, "amplitude": 1, "frequency": 5},
+    },
+    "accelerometer": {"bandwidth": 400, "delay": 0.001, "range": 20, "noise_density": 3e-3},
+    "actuator": {"bandwidth": 300, "resolution": 0.01, "saturation": 5},
+    "velocity": {"estimator": "window", "ticks": 5, "cutoff": 100},
+    "acceleration": {"source": "accelerometer", "cutoff": 100},
+    **{key: NAMING[key][key] for key in ("transmission", "friction", "noise", "encoder", "jitter", "loss")},
+}
+# The nodes' cores, built from scenes on stdin as their processes build them. Each scene is built in a fork of a fresh
+# interpreter that has built none, and a line tells what of haploop is loaded then.
+CORES = {
+    "plant": "from haploop.plant.plant import Plant as Core; rest = ()",
+    "controller": "from haploop.controller.controller import Controller as Core\n"
+    "from haploop.controller.dissipation import registry; rest = (registry(),)",
+}
+BUILD = """
+import json, os, sys
+from haploop.protocol.ticks import Timebase
+{core}
+for scene in json.load(sys.stdin):
+    if child := os.fork():
+        assert os.waitpid(child, 0)[1] == 0
+        continue
+    Core(scene, Timebase.of(scene["clock"], scene["duration"]), *rest)
+    print(*(name for name in sys.modules if name.startswith("haploop.")), flush=True)
+    os._exit(0)
+"""
+READ_BY_NOTHING = {"accelerometer": {"bandwidth": 400, "range": 20}}
+BUILT: dict[str, dict[str, Any]] = {
+    "plain": {},
+    "everything": EVERYTHING,
+    "read by nothing": READ_BY_NOTHING,
+    **NAMING,
+}
+Loaded = dict[str, dict[str, set[str]]]
+
+
+@pytest.fixture(scope="module")
+def loaded() -> Loaded:
+    """Node -> name of the scene -> the modules of haploop that are loaded once its core is built."""
+    scenes = json.dumps([scene(**tables) for tables in BUILT.values()])
+    told: Loaded = {}
+    for node, core in CORES.items():
+        command = [sys.executable, "-c", BUILD.format(core=core)]
+        child = subprocess.run(command, input=scenes, capture_output=True, text=True, check=False)
+        assert child.returncode == 0, child.stderr
+        lines = child.stdout.splitlines()
+        told[node] = {name: set(line.split()) for name, line in zip(BUILT, lines, strict=True)}
+    return told
+
+
+def test_a_plain_scene_loads_no_module_of_any_effect(loaded):
+    modules = {module for effect in EFFECTS for module in effect.modules}
+    assert plan(scene()).named == ()
+    for node in CORES:
+        assert {f"haploop.{node}.{node}", "haploop.protocol.ticks"} < loaded[node]["plain"]
+        assert not loaded[node]["plain"] & modules
+
+
+@pytest.mark.parametrize("effect", EFFECTS, ids=lambda effect: effect.name)
+def test_an_effect_brings_only_itself_and_what_it_cannot_be_without(effect: Effect):
+    assert {e.name for e in effects_of(scene(**NAMING[effect.name]))} == {effect.name, *BESIDE.get(effect.name, [])}
+
+
+@pytest.mark.parametrize("name", [name for name in BUILT if name != "plain"])
+def test_a_scene_loads_the_modules_its_plan_says_and_nothing_else(name, loaded):
+    """In both nodes; an effect of one loads nothing in the other."""
+    modules = plan(scene(**BUILT[name])).modules
+    assert {node: loaded[node][name] - loaded[node]["plain"] for node in CORES} == {
+        node: set(modules[node]) for node in CORES
+    }
+
+
+def test_an_accelerometer_that_nothing_reads_is_not_in_the_plan():
+    assert effects_of(scene(**READ_BY_NOTHING)) == ()
+
+
+def test_the_table_of_effects_is_whole():
+    names = [effect.name for effect in EFFECTS]
+    assert len(set(names)) == len(names)
+    assert set(names) == set(NAMING)
+    for effect in EFFECTS:
+        assert all(module.startswith(f"haploop.{effect.node}.") for module in effect.modules)
+        assert all(importlib.util.find_spec(module) for module in effect.modules)
+
+
+def test_the_log_and_the_summary_hold_what_the_plan_says(tmp_path):
+    resolved = scene(**EVERYTHING, duration=0.1)
+    planned = plan(resolved)
+    summary = run_in_process(resolved, KINDS, out=tmp_path)
+    log = haploop.logger.read(tmp_path)
+    for channel, columns in planned.columns.items():
+        assert [name for name in log[channel] if name not in ("timestamp", "t")] == list(columns)
+    assert planned.counts
+    for count in planned.counts:
+        entry, _, key = count.partition(".")
+        assert isinstance(summary[entry][key], int)
+
+
+# What each scene that comes with haploop is: bodies, states, effects.
+GOLDEN = {
+    "fig6a": (["device"], 2, ["encoder"]),
+    "fig6b": (["device"], 2, ["encoder"]),
+    "fig6c": (["device"], 2, ["encoder"]),
+    "swap": (["device"], 2, ["encoder"]),
+    "tap": (["device"], 2, ["encoder"]),
+    "premium_tap": (["device", "hand"], 4, ["hand.grip", "friction", "encoder", "actuator.saturation"]),
+    "all_effects": (
+        ["motor", "tip", "hand"],
+        20,  # three positions, three velocities, actuator, accelerometer, two kinds of noise, ten steps of delay
+        [
+            "transmission",
+            "hand.grip",
+            "actuator.bandwidth",
+            "friction",
+            "accelerometer.bandwidth",
+            "accelerometer.delay",
+            "noise",
+            "encoder",
+            "accelerometer",
+            "accelerometer.range",
+            "acceleration.source = accelerometer",
+            "jitter",
+            "loss",
+            "actuator.resolution",
+            "actuator.saturation",
+        ],
+    ),
+}
+
+
+@pytest.mark.parametrize("name", sorted(path.stem for path in SCENES.glob("*.toml")))
+def test_the_scenes_that_come_with_haploop_are_what_they_were(name):
+    planned = plan(load(SCENES / f"{name}.toml"))
+    bodies, states, effects = GOLDEN[name]
+    assert list(planned.bodies) == bodies
+    assert len(planned.states) + sum(planned.memory.values()) == states
+    assert [effect.name for effect in planned.named] == effects
+
+
+def test_a_tick_of_figure_6c_in_order():
+    planned = plan(load(SCENES / "fig6c.toml"))
+    assert [(step.node, step.what) for step in planned.tick] == [
+        ("plant", "the position of the device is sampled"),
+        ("plant", "the position is rounded to whole counts (resolution = 1e-05)"),
+        ("controller", "v is the backward difference of the position"),
+        ("controller", "a is the backward difference of v"),
+        ("controller", "wall: 150 N/m where x < -0.06 m"),
+        ("controller", "unidirectional-inertia (mass = 0.01), in-contact"),
+        ("controller", "their sum is the command"),
+        ("plant", "the command takes effect 20 plant steps after its sample and is held until the next does"),
+    ]
+
+
+def test_what_effects_do_stands_where_they_do_it():
+    """Motion in the plant step; in a tick measurement, estimates, forces and command, in the order of the loop."""
+    planned = plan(scene(**EVERYTHING))
+    assert [step.effect for step in planned.plant_step] == [
+        "",
+        "transmission",
+        "hand.grip",
+        "actuator.bandwidth",
+        "friction",
+        "accelerometer.bandwidth",
+    ]
+    assert [step.effect for step in planned.tick if step.effect] == [
+        "accelerometer.delay",
+        "noise",
+        "encoder",
+        "accelerometer",
+        "accelerometer.range",
+        "velocity.estimator = window",
+        "velocity.cutoff",
+        "acceleration.source = accelerometer",
+        "acceleration.cutoff",
+        "jitter",
+        "loss",
+        "actuator.resolution",
+        "actuator.saturation",
+    ]
+    assert not any("backward difference" in step.what for step in planned.tick)
+    assert list(planned.bodies) == ["motor", "tip", "hand"]
+    states = ("x", "cable.stretch", "grip.stretch", "v", "cable.rate", "grip.rate", "actuator", "accelerometer")
+    assert planned.states == states
+    assert planned.memory == {
+        "accelerometer.delay": 10,
+        "noise": 1,
+        "accelerometer": 1,
+        "velocity.estimator = window": 5,
+        "velocity.cutoff": 1,
+        "acceleration.cutoff": 1,
+    }

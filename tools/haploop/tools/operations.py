@@ -1,0 +1,146 @@
+"""What a scene costs, counted and not timed: bytecode instructions of the loop, effect by effect.
+
+A count is the same on every machine and in every hour. It sees what Python executes; a call into NumPy counts as one
+instruction, whatever the size of its arrays.
+"""
+
+from __future__ import annotations
+
+import copy
+import statistics
+import sys
+from collections.abc import Iterable
+from dataclasses import dataclass
+from types import FrameType
+from typing import TYPE_CHECKING, Any
+
+from haploop.controller.controller import Controller
+from haploop.launch.plan import multiplications
+from haploop.plant.plant import Plant
+from haploop.protocol.effects import Effect
+from haploop.protocol.ticks import Timebase
+
+if TYPE_CHECKING:
+    from haploop.controller.dissipation import Element
+
+Kinds = dict[str, type["Element"]]
+# Exchanges that are left out, since they make what is used from then on, and exchanges that are counted.
+_FIRST, _COUNTED = 20, 101
+
+
+@dataclass(frozen=True)
+class Operations:
+    """Bytecode instructions per exchange of samples and commands, which covers L + 1 ticks: the median.
+
+    Attributes:
+        plant, controller: instructions.
+        ticks: ticks an exchange covers.
+    """
+
+    plant: int
+    controller: int
+    ticks: int
+
+    @property
+    def per_tick(self) -> float:
+        """Of both together, per tick."""
+        return (self.plant + self.controller) / self.ticks
+
+
+class _Counter:
+    """A trace function that counts every instruction outside this file."""
+
+    def __init__(self) -> None:
+        self.count = 0
+
+    def __call__(self, frame: FrameType, event: str, _argument: Any) -> Any:
+        if frame.f_code.co_filename == __file__:
+            return None
+        frame.f_trace_opcodes, frame.f_trace_lines = True, False
+        self.count += event == "opcode"
+        return self
+
+    def take(self) -> int:
+        """The count since the last call."""
+        count, self.count = self.count, 0
+        return count
+
+
+def operations(scene: dict[str, Any], kinds: Kinds) -> Operations:
+    """Run the loop of a resolved scene in this process for some ticks and count; events are left out.
+
+    A run that ends earlier is counted over the second half of what it has.
+    """
+    time = Timebase.of(scene["clock"], scene["duration"])
+    plant, controller = Plant(scene, time), Controller(scene, time, kinds)
+    counter = _Counter()
+    counts: list[tuple[int, int]] = []
+
+    def exchange(_tick: int, samples: list[tuple[float, ...]]) -> list[float]:
+        by_plant = counter.take()
+        answer = controller.answer(samples)
+        counts.append((by_plant, counter.take()))
+        return answer
+
+    ticks = time.lookahead_ticks + 1
+    end = min((_FIRST + _COUNTED) * ticks, time.ticks)
+    before = sys.gettrace()
+    sys.settrace(counter)
+    try:
+        plant.run_until(end, exchange)
+    finally:
+        sys.settrace(before)
+    counted = counts[min(_FIRST, len(counts) // 2) :]
+    by_plant, by_controller = (statistics.median_low(column) for column in zip(*counted, strict=True))
+    return Operations(by_plant, by_controller, ticks)
+
+
+@dataclass(frozen=True)
+class Bill:
+    """What a scene costs, in bytecode instructions per tick.
+
+    Attributes:
+        whole: of the whole loop.
+        effects: of each named effect: what the loop would save without it, by the effect's name.
+        elements: of each dissipation element, likewise.
+        multiplications: of the motion, in all; and saved by leaving out each effect, by name.
+    """
+
+    whole: Operations
+    effects: dict[str, float]
+    elements: list[float]
+    multiplications: tuple[int, dict[str, int]]
+
+
+def bill(scene: dict[str, Any], named: Iterable[Effect], kinds: Kinds) -> Bill:
+    """Count the loop as it is, then without each effect and each element in turn."""
+    whole = operations(scene, kinds)
+
+    def saved(other: dict[str, Any]) -> float:
+        return whole.per_tick - operations(other, kinds).per_tick
+
+    elements = scene.get("dissipation", [])
+    others = {effect.name: without(effect, scene) for effect in named}
+    moving = multiplications(scene)
+    return Bill(
+        whole,
+        {name: saved(other) for name, other in others.items()},
+        [saved({**scene, "dissipation": elements[:i] + elements[i + 1 :]}) for i in range(len(elements))],
+        (moving, {name: moving - multiplications(other) for name, other in others.items()}),
+    )
+
+
+def without(effect: Effect, scene: dict[str, Any]) -> dict[str, Any]:
+    """A resolved scene without an effect, and without what cannot be there without it."""
+    scene = copy.deepcopy(scene)
+    *tables, last = effect.key.split(".")
+    table = scene
+    for name in tables:
+        table = table[name]
+    if last == "estimator":  # its other keys are its own
+        scene[tables[0]] = {key: table[key] for key in ("source", "cutoff") if key in table}
+        if scene.get("acceleration", {}).get("source") == "kalman":
+            del scene["acceleration"]["source"]
+    else:
+        del table[last]
+    return scene
