@@ -163,7 +163,7 @@ CHAINS: dict[str, dict[str, Any]] = {
 
 
 @pytest.mark.parametrize("chain", CHAINS)
-@pytest.mark.parametrize("delay", [0, 13, *slowly([3, 10, 20, 50])])
+@pytest.mark.parametrize("delay", [13, *slowly([0, 3, 10, 20, 50])])
 @pytest.mark.parametrize(("of_critical", "virtual"), [(0.97, 0.0), (1.02, 0.05)])
 def test_a_chain_deep_in_contact_grows_every_tick_by_the_spectral_radius_of_its_one_tick_map(
     chain, delay, of_critical, virtual
@@ -192,7 +192,7 @@ def assert_same_motion(ran: Captured, truth: EffectsTruth) -> None:
 
 
 PRESSED: dict[str, Any] = {
-    "duration": 0.12,
+    "duration": 0.1,
     "clock": {"round_trip_delay": 0.0013},
     "device": {"mass": 0.05, "damping": 0.1, "velocity": -0.1},
     "wall": {"position": -1e-3, "stiffness": 400.0},
@@ -218,10 +218,12 @@ def test_every_body_moves_as_in_an_independent_program_of_the_whole_loop(loop):
 
 
 @pytest.mark.parametrize("mount", ["tip", "motor"])
-@pytest.mark.parametrize("table", [{}, {"bandwidth": 260.0}, {"delay": 0.0007}, {"bandwidth": 400.0, "delay": 0.001}])
+@pytest.mark.parametrize(
+    "table", [{}, {"bandwidth": 400.0, "delay": 0.001}, *slowly([{"bandwidth": 260.0}, {"delay": 0.0007}])]
+)
 def test_an_accelerometer_feels_what_the_independent_program_says(mount, table):
     sensed = PRESSED | LOOPS["friction, transmission"] | {"acceleration": {"source": "accelerometer"}}
-    pressed = scene(**sensed | {"accelerometer": {"mount": mount, **table}, "duration": 0.05})
+    pressed = scene(**sensed | {"accelerometer": {"mount": mount, **table}, "duration": 0.03})
     ran, truth = run(pressed), simulate(pressed)
     assert truth.controller is not None
     felt = np.array([row[2] for row in truth.controller.rows])

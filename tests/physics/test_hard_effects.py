@@ -154,7 +154,7 @@ def test_a_hard_loop_gives_numbers_and_books_that_close(case, effects):
     assert_sound(run(tap(effects, **LOOPS[case])))
 
 
-@pytest.mark.parametrize("depth", [-1e-3, 0.0, 1e-15, 1e-3])
+@pytest.mark.parametrize("depth", [0.0, 1e-3, *slowly([-1e-3, 1e-15])])
 @pytest.mark.parametrize("speed", [0.0, 1e-15, 1e-9, 1e-3])
 @pytest.mark.parametrize("effects", [ALL, *slowly([("friction", "transmission")])], ids="+".join)
 def test_a_start_outside_on_or_inside_the_wall_however_slow_is_sound(depth, speed, effects):
@@ -167,7 +167,7 @@ def undisturbed(effects: tuple[str, ...]) -> Captured:
     return run(tap(effects))
 
 
-@pytest.mark.parametrize("phase", [0, 3, 6, 9, *slowly([1, 2, 4, 5, 7, 8, 10, 11])])
+@pytest.mark.parametrize("phase", [0, 4, 8, *slowly([1, 2, 3, 5, 6, 7, 9, 10, 11])])
 @pytest.mark.parametrize("effects", [("friction", "transmission", "grip"), ALL], ids="+".join)
 def test_a_swap_in_any_phase_of_a_contact_changes_nothing_before_and_its_books_close(phase, effects):
     """From before the tap through entering, deepest and leaving to the hold."""
@@ -255,7 +255,7 @@ BEHIND: dict[str, dict[str, Any]] = {
 }
 
 
-@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
+@pytest.mark.parametrize("value", [math.nan, -math.inf, *slowly([math.inf])])
 @pytest.mark.parametrize("effect", BEHIND)
 def test_no_effect_hides_a_force_that_is_no_finite_number(effect, value, monkeypatch):
     monkeypatch.setattr(Broken, "value", value)

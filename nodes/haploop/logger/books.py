@@ -160,15 +160,19 @@ class Books:
     def residual_J(self) -> float:
         """What the books leave unexplained, in magnitude."""
         parts = []
-        for name, row in self._rows.items():
-            sign = self._sign(name)
+        for sign, row in self._balance():
             parts += sign * float(self._sums.sums[row]), sign * float(self._sums.errors[row])
         return abs(math.fsum(parts)) if all(map(math.isfinite, parts)) else math.inf
 
     def residuals(self, at_ticks: np.ndarray) -> np.ndarray:
         """The signed residual at each tick from the rows that ``book`` returned, shape (ticks,)."""
-        signs = np.array([self._sign(name) for name in self._rows])
-        return sum_in_order((at_ticks[: len(signs)] * signs[:, None]).T)
+        signs, rows = zip(*self._balance(), strict=True)
+        return sum_in_order((at_ticks[list(rows)] * np.array(signs)[:, None]).T)
+
+    def _balance(self) -> list[tuple[float, int]]:
+        """Sign and row of every book that is part of the balance; what a plugin only asked for is not."""
+        signs = [(self._sign(name), row) for name, row in self._rows.items()]
+        return [(sign, row) for sign, row in signs if sign]
 
     def _sign(self, name: str) -> float:
         if name == "hand_work":

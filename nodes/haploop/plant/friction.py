@@ -20,6 +20,7 @@ class Friction:
     Attributes:
         kinetic_N: F at high speed.
         is_constant: whether F is the same at every speed.
+        holds_N: the largest force it holds at rest.
     """
 
     def __init__(self, table: dict[str, float]) -> None:
@@ -27,7 +28,7 @@ class Friction:
         self._breakaway_N = table.get("breakaway", self.kinetic_N)
         self._stribeck_m_s = table.get("stribeck_velocity", 0.0)
         self.is_constant = not self._stribeck_m_s
-        self._holds_N = self._breakaway_N * (1.0 + _MARGIN)
+        self.holds_N = self._breakaway_N * (1.0 + _MARGIN)
 
     def at(self, v: float) -> float:
         """F in N at velocity v in m/s."""
@@ -37,4 +38,4 @@ class Friction:
 
     def holds(self, force):
         """Whether a body at rest stays there under this force (N; a float or an array)."""
-        return abs(force) <= self._holds_N
+        return abs(force) <= self.holds_N

@@ -33,8 +33,9 @@ class FrictionMotion(ChainMotion):
 
     def _held_before(self) -> np.ndarray:
         self._walk = Walk(self._chain, self._friction, self._step_s)
-        self._walk.start(self.z, float(self.loads(0, 1)[0]))
-        return np.array([0.0, -1.0, self._walk.friction_at(self.z[self._v]), float(self._walk.is_stuck)])
+        mode = self._mode = self._walk.mode
+        mode.start(self.z, float(self.loads(0, 1)[0]))
+        return np.array([0.0, -1.0, mode.friction_at(self.z[self._v]), float(mode.is_stuck)])
 
     def advance(self, tick: int, holds: list[Hold]) -> None:
         """Move through interval ``tick`` under the forces held in it."""
@@ -51,14 +52,16 @@ class FrictionMotion(ChainMotion):
 
     def _as_it_goes(self, interval: Interval, begin: int, holds: list[Hold], tick: int, loads: np.ndarray) -> int:
         """Follow the present mode from step ``begin`` on; returns the first step in which it does not hold."""
-        walk, states, command = self._walk, interval.states, interval.held[begin:, 0]
-        walk.decide_at_rest(states[begin], command[0], loads[begin])
-        friction = 0.0 if walk.is_stuck else -walk.direction * self._friction.kinetic_N
-        self._follow(interval, begin, holds, self._clamped if walk.is_stuck else self._free, tick, friction)
-        interval.held[begin:, 2:] = interval.at_ends[begin:] = friction, walk.is_stuck
-        goes_on = walk.goes_on(states[begin + 1 :].T, command, loads[begin + 1 :])
-        if walk.is_stuck:
-            goes_on &= walk.goes_on(states[begin:-1].T, command, loads[begin:-1])
+        mode, states, command = self._mode, interval.states, interval.held[begin:, 0]
+        mode.decide_at_rest(states[begin], command[0], loads[begin])
+        friction = 0.0 if mode.is_stuck else -mode.direction * self._friction.kinetic_N
+        self._follow(interval, begin, holds, self._clamped if mode.is_stuck else self._free, tick, friction)
+        interval.held[begin:, 2:] = interval.at_ends[begin:] = friction, mode.is_stuck
+        starts, ends, load, end_load = states[begin:-1].T, states[begin + 1 :].T, loads[begin:-1], loads[begin + 1 :]
+        goes_on = mode.goes_on(ends, command, end_load)
+        if mode.is_stuck:
+            goes_on &= mode.goes_on(starts, command, load)
+        goes_on &= ~mode.may_pause(starts, ends, command, load, end_load, friction, 1.0)
         return self._n if goes_on.all() else begin + int(goes_on.argmin())
 
     def _through(self, interval: Interval, step: int, tick: int, loads: np.ndarray) -> None:
@@ -67,7 +70,7 @@ class FrictionMotion(ChainMotion):
         load, rise = float(loads[step]), float(loads[step + 1] - loads[step])
         through = self._walk.through(tick * self._n + step, states[step], lows[step], float(held[step, 0]), load, rise)
         states[step + 1], lows[step + 1], held[step, 2], held[step, 3] = through
-        at_ends[step] = self._walk.friction_at(states[step + 1, self._v]), self._walk.is_stuck
+        at_ends[step] = self._mode.friction_at(states[step + 1, self._v]), self._mode.is_stuck
 
     def take_record(self, tick: int) -> dict[str, np.ndarray]:
         """As without friction; the pieces of the steps within which friction switched come beside, ``pieces.*``."""

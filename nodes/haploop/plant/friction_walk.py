@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 
 from haploop.plant.chain import Chain
 from haploop.plant.chain_flow import ChainFlow
 from haploop.plant.friction import Friction
+from haploop.plant.friction_mode import Mode
 
 # A piece is halved this often to find when friction switches: to 2e-14 s at 10 kHz.
 _HALVINGS = 32
@@ -21,63 +21,30 @@ MOST_PARTS = 4096
 
 
 class Walk:
-    """The mode of body 0, stuck or slipping, and the way through a step in which it may change.
+    """The way through a plant step in which body 0 may stick and slip.
 
-    A piece of the step is moved by the exact flow. If the mode no longer holds at its end the piece is halved, until
-    the switch lies within h / 2^32; there the mode changes, and v is set to exactly 0.0. The kinetic energy which that
-    throws away, of the order of 1e-20 of what moves, is heat of friction. With a Stribeck velocity every piece has the
-    friction of the speed foreseen for its middle: second order in h.
+    A piece of the step is moved by the exact flow. If the mode no longer holds at its end, or may have ceased within
+    it, the piece is halved, until the switch lies within h / 2^32; there the mode changes, and v is set to exactly 0.0.
+    The kinetic energy which that throws away, of the order of 1e-20 of what moves, is heat of friction. With a Stribeck
+    velocity every piece has the friction of the speed foreseen for its middle: second order in h.
 
     Attributes:
-        is_stuck, direction: the mode; the way body 0 slips, or last slipped, +1.0 or -1.0.
+        mode: whether body 0 sticks or slips.
         whole_steps: whether a step in which nothing switches is one piece, with the same friction at every speed.
     """
 
     def __init__(self, chain: Chain, friction: Friction, step_s: float) -> None:
         self._chain, self._friction = chain, friction
-        self._size, self._v = len(chain.states), chain.count
-        self._mass_kg = chain.masses_kg[0]
-        pull = (chain.accelerations()[0] * self._mass_kg).astype(float).tolist()
-        self._of_states = [(i, factor) for i, factor in enumerate(pull[: self._size]) if factor]
-        self._of_command, self._of_load = pull[self._size], pull[self._size + 2]
+        self._v, self._mass_kg = chain.count, chain.masses_kg[0]
+        self.mode = Mode(chain, friction, step_s)
         self._coarsest = parts_of_a_step(chain, step_s).bit_length() - 1
         self._finest = self._coarsest + _HALVINGS
         self.whole_steps = not self._coarsest and friction.is_constant
-        self.is_stuck, self.direction = False, 1.0
         self._pieces: list[list[float]] = []
 
     def halve(self, free: ChainFlow, clamped: ChainFlow) -> None:
         """Prepare the flows of all pieces."""
         self._flows = {stuck: flow.halves(self._finest + 1) for stuck, flow in ((False, free), (True, clamped))}
-
-    def start(self, z: np.ndarray, load: float) -> None:
-        """Find the mode in which the run begins."""
-        self.direction = math.copysign(1.0, z[self._v])
-        self.decide_at_rest(z, 0.0, load)
-
-    def force_on(self, z: Any, command: Any, load: Any) -> Any:
-        """All forces on body 0 but friction, N; in one state, or in many, z of shape (states, many)."""
-        force = self._of_command * command + self._of_load * load
-        for i, factor in self._of_states:
-            force = force + factor * z[i]
-        return force
-
-    def decide_at_rest(self, z: np.ndarray, command: float, load: float) -> None:
-        """Where v is exactly 0: stick, or slip where the forces pull."""
-        if z[self._v] == 0.0:
-            force = self.force_on(z, command, load)
-            self.is_stuck = bool(self._friction.holds(force))
-            self.direction = math.copysign(1.0, force)
-
-    def friction_at(self, v: float) -> float:
-        """The friction force at velocity v, N; none at rest."""
-        return -self.direction * self._friction.at(v) if v else 0.0
-
-    def goes_on(self, z: Any, command: Any, load: Any) -> Any:
-        """Whether the present mode still holds in state z (or in many)."""
-        if self.is_stuck:
-            return self._friction.holds(self.force_on(z, command, load))
-        return self.direction * z[self._v] > 0.0
 
     def through(
         self, step: int, z: np.ndarray, low: np.ndarray, command: float, load: float, rise: float
@@ -88,9 +55,10 @@ class Walk:
             States and what rounding left of them at the end; friction in N and whether stuck at the start.
 
         Raises:
-            ArithmeticError: friction switched more than ten thousand times.
+            ArithmeticError: friction switched so often that it took a million pieces.
         """
-        self.decide_at_rest(z, command, load)
+        mode = self.mode
+        mode.decide_at_rest(z, command, load)
         whole = left = 1 << self._finest
         level, hunted_to, pieces = self._coarsest, -1, []
         while left:
@@ -99,16 +67,20 @@ class Walk:
             load_now, load_then = load + rise * (1.0 - left / whole), load + rise * (1.0 - rest / whole)
             friction = self._friction_over(level, z, low, command, load_now, rise)
             next_z, next_low = self._moved(level, z, low, command, friction, load_now, rise)
-            goes_on = self.goes_on(next_z, command, load_then) or not math.isfinite(next_z[self._v])
-            if not goes_on and level < self._finest:
-                level, hunted_to = level + 1, rest if hunted_to < 0 else hunted_to
-                continue
-            piece = [step, level, self.is_stuck, friction, load_now, 0.0, *z, *low[: self._v]]
+            goes_on = mode.goes_on(next_z, command, load_then) or not math.isfinite(next_z[self._v])
+            if level < self._finest:
+                if not goes_on:
+                    level, hunted_to = level + 1, rest if hunted_to < 0 else hunted_to
+                    continue
+                if mode.may_pause(z, next_z, command, load_now, load_then, friction, 0.5**level):
+                    level += 1
+                    continue
+            piece = [step, level, mode.is_stuck, friction, load_now, 0.0, *z, *low[: self._v]]
             pieces.append(piece)
             left, z, low = rest, next_z, next_low
             if not goes_on:
                 z, low, piece[5] = self._at_rest(z, low)
-                self.decide_at_rest(z, command, load_then)
+                mode.decide_at_rest(z, command, load_then)
             if not goes_on or left <= hunted_to:
                 level, hunted_to = self._coarsest, -1
             elif hunted_to >= 0:
@@ -126,20 +98,20 @@ class Walk:
         self, level: int, z: np.ndarray, low: np.ndarray, command: float, load: float, rise: float
     ) -> float:
         """The friction force held over a piece, N."""
-        if self.is_stuck:
+        if self.mode.is_stuck:
             return 0.0
-        v = float(z[self._v])
+        v, direction = float(z[self._v]), self.mode.direction
         if not self._friction.is_constant:
-            begun = -self.direction * self._friction.at(v)
+            begun = -direction * self._friction.at(v)
             v = float(self._moved(level + 1, z, low, command, begun, load, rise)[0][self._v])
-        return -self.direction * self._friction.at(v)
+        return -direction * self._friction.at(v)
 
     def _moved(
         self, level: int, z: np.ndarray, low: np.ndarray, command: float, friction: float, load: float, rise: float
     ) -> tuple[np.ndarray, np.ndarray]:
         """States and what rounding left of them after h / 2^level."""
         acting = np.append(z, (command, friction, load, rise))
-        change = np.add.reduce(self._flows[self.is_stuck][level] * acting[:, None]) + low
+        change = np.add.reduce(self._flows[self.mode.is_stuck][level] * acting[:, None]) + low
         moved = z + change
         return moved, change - (moved - z)
 

@@ -120,7 +120,7 @@ EFFECTS: tuple[Effect, ...] = (
     Effect(
         "friction",
         "plant",
-        _plant("friction", "haploop.plant.friction_motion", "haploop.plant.friction_walk", *_CHAIN),
+        _plant("friction", "haploop.plant.friction_motion", "haploop.plant.friction_walk", "haploop.plant.friction_mode", *_CHAIN),
         "motion",
         "dry friction holds or brakes, each stop and start at its own time",
         columns=("friction",),
