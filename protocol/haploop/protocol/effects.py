@@ -11,6 +11,7 @@ from typing import Any, Literal
 
 # What bodies in a row, or forces that change between ticks, are moved by in place of ``haploop.plant.linear_motion``.
 _CHAIN = tuple(f"haploop.plant.{name}" for name in ("chain_motion", "chain", "chain_flow", "felt_acceleration"))
+_RUBBING = tuple(f"haploop.plant.friction_{name}" for name in ("motion", "walk", "mode"))
 _DRAWN = ("haploop.plant.random_stream",)
 _NOISY = ("haploop.plant.band_limited_noise", *_DRAWN)
 _COUNTED = ("haploop.plant.tally",)
@@ -120,7 +121,7 @@ EFFECTS: tuple[Effect, ...] = (
     Effect(
         "friction",
         "plant",
-        _plant("friction", "haploop.plant.friction_motion", "haploop.plant.friction_walk", "haploop.plant.friction_mode", *_CHAIN),
+        ("haploop.plant.friction", *_RUBBING, *_CHAIN),
         "motion",
         "dry friction holds or brakes, each stop and start at its own time",
         columns=("friction",),
