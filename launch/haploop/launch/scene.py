@@ -20,14 +20,16 @@ if TYPE_CHECKING:
     from haploop.controller.dissipation import Element
 
 TableType = TypeVar("TableType", bound=Table)
+Integrator = Literal["exact", "semi-implicit-euler", "euler", "rk4", "implicit-midpoint", "dop853"]
 
 
 class Clock(Table):
-    """Rates and delay; the plant rate is a whole multiple of the control rate."""
+    """Rates, delay and what moves the plant; the plant rate is a whole multiple of the control rate."""
 
     plant_rate: Annotated[int, si("Hz", "steps of the plant per second", whole=True, at_least=1)] = 10_000
     control_rate: Annotated[int, si("Hz", "ticks of the controller per second", whole=True, at_least=1)] = 1_000
     round_trip_delay: Annotated[float, si("s", "from a sample to the force that answers it", at_least=0)] = 0.0
+    integrator: Integrator = "exact"
 
 
 class Device(Table):

@@ -40,6 +40,7 @@ class Walk:
         self._coarsest = parts_of_a_step(chain, step_s).bit_length() - 1
         self._finest = self._coarsest + _HALVINGS
         self.whole_steps = not self._coarsest and friction.is_constant
+        self._acting = np.zeros(len(chain.states) + 4)
         self._pieces: list[list[float]] = []
 
     def halve(self, free: ChainFlow, clamped: ChainFlow) -> None:
@@ -67,15 +68,16 @@ class Walk:
             load_now, load_then = load + rise * (1.0 - left / whole), load + rise * (1.0 - rest / whole)
             friction = self._friction_over(level, z, low, command, load_now, rise)
             next_z, next_low = self._moved(level, z, low, command, friction, load_now, rise)
-            goes_on = mode.goes_on(next_z, command, load_then) or not math.isfinite(next_z[self._v])
+            begin, end = z.tolist(), next_z.tolist()
+            goes_on = mode.goes_on(end, command, load_then) or not math.isfinite(end[self._v])
             if level < self._finest:
                 if not goes_on:
                     level, hunted_to = level + 1, rest if hunted_to < 0 else hunted_to
                     continue
-                if mode.may_pause(z, next_z, command, load_now, load_then, friction, 0.5**level):
+                if mode.may_pause(begin, end, command, load_now, load_then, friction, 0.5**level):
                     level += 1
                     continue
-            piece = [step, level, mode.is_stuck, friction, load_now, 0.0, *z, *low[: self._v]]
+            piece = [step, level, mode.is_stuck, friction, load_now, 0.0, *begin, *low[: self._v].tolist()]
             pieces.append(piece)
             left, z, low = rest, next_z, next_low
             if not goes_on:
@@ -110,7 +112,8 @@ class Walk:
         self, level: int, z: np.ndarray, low: np.ndarray, command: float, friction: float, load: float, rise: float
     ) -> tuple[np.ndarray, np.ndarray]:
         """States and what rounding left of them after h / 2^level."""
-        acting = np.append(z, (command, friction, load, rise))
+        acting = self._acting
+        acting[:-4], acting[-4], acting[-3], acting[-2], acting[-1] = z, command, friction, load, rise
         change = np.add.reduce(self._flows[self.mode.is_stuck][level] * acting[:, None]) + low
         moved = z + change
         return moved, change - (moved - z)
