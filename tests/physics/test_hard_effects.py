@@ -267,6 +267,15 @@ def test_no_effect_hides_a_force_that_is_no_finite_number(effect, value, monkeyp
     assert all(np.isfinite(column).all() for column in ran.plant.values()), "no device was ever given such a force"
 
 
+def test_a_force_that_is_no_number_and_never_arrives_leaves_the_balance_as_it_is(monkeypatch):
+    """The element is to blame all the same; what it asked for is in no true book."""
+    monkeypatch.setitem(KINDS, "broken", Broken)
+    ran = run(tap((), loss={"probability": 1.0}, dissipation=[{"kind": "broken", "acts": "always"}]))
+    assert ran.summary["ended"] == "failed"
+    assert ran.energy["residual_J"] <= 1e-12 * ran.energy["moved_J"]
+    assert not np.isfinite(ran.energy["elements"][0]["sampled_J"])
+
+
 # Physical instability is named, and is no numerical failure
 
 
