@@ -118,7 +118,7 @@ def test_heat_of_a_stiff_step_is_what_adaptive_quadrature_gives(case):
 def test_the_heat_form_never_cools(system):
     """Its eigenvalues are not below 0, but for rounding."""
     square, _ = motion_integrals(*system)
-    eigenvalues = np.linalg.eigvalsh(square)
+    eigenvalues = np.linalg.eigvalsh(square.astype(float))
     assert eigenvalues.min() >= -1e-15 * eigenvalues.max()
 
 

@@ -7,6 +7,7 @@ import numpy as np
 from haploop.logger.chain_moves import Moves
 from haploop.plant.chain import Chain
 from haploop.plant.chain_flow import ChainIntegrals
+from haploop.plant.flow import real_for
 
 
 class ChainForms:
@@ -21,7 +22,10 @@ class ChainForms:
     def __init__(self, chain: Chain, step_s: float) -> None:
         self._chain = chain
         self._flows = {stuck: ChainIntegrals(chain, step_s, stuck) for stuck in (False, True)}
-        self._rates = {stuck: chain.rates(stuck).astype(float) for stuck in (False, True)}
+        n = chain.count
+        damping_rate = np.abs(chain.rates()[n : 2 * n, n : 2 * n]).max()
+        self._real = real_for(float(damping_rate), step_s)
+        self._rates = {stuck: chain.rates(stuck).astype(self._real) for stuck in (False, True)}
         self._made: dict[tuple[int, bool], tuple[np.ndarray, np.ndarray]] = {}
         bodies, rates = _velocities(chain)
         self._products = [(damping, bodies[body], bodies[body]) for body, damping in chain.grounded.values()]
@@ -49,7 +53,7 @@ class ChainForms:
         # The hand's spring pulls as far as it is from its rest; so written no digits go to where the rest lies.
         states = moves.states.copy()
         states[0] = states[0] - self._chain.spring[1] + moves.lows[0]
-        acting = np.concatenate([states, [force, moves.friction, tau]])
+        acting = np.concatenate([states, [force, moves.friction, tau]]).astype(self._real)
         result = np.empty((len(self.names), len(force)))
         for level, stuck, which in moves.groups():
             rates = _matrix_times(self._rates[stuck], acting[:, which])
@@ -64,7 +68,8 @@ class ChainForms:
         if (level, stuck) not in self._made:
             flow = self._flows[stuck]
             forms = [factor * flow.product(left, right, level) for factor, left, right in self._products]
-            self._made[level, stuck] = np.stack(forms), flow.lag(self._last, level)
+            made = np.stack(forms), flow.lag(self._last, level)
+            self._made[level, stuck] = made[0].astype(self._real), made[1].astype(self._real)
         return self._made[level, stuck]
 
 
@@ -76,7 +81,7 @@ def _velocities(chain: Chain) -> tuple[np.ndarray, np.ndarray]:
 
 def _matrix_times(matrix: np.ndarray, columns: np.ndarray) -> np.ndarray:
     """Their product, term by term in a fixed order (a matrix product may reorder with its size)."""
-    total = np.zeros((len(matrix), columns.shape[1]))
+    total = np.zeros((len(matrix), columns.shape[1]), columns.dtype)
     for row, entries in enumerate(matrix):
         for entry, column in zip(entries.tolist(), columns, strict=True):
             if entry:
@@ -86,7 +91,7 @@ def _matrix_times(matrix: np.ndarray, columns: np.ndarray) -> np.ndarray:
 
 def _forms_of(forms: np.ndarray, w: np.ndarray) -> np.ndarray:
     """w' Q w of every form Q and every column of w, in a fixed order; shape (forms, columns)."""
-    total = np.zeros((len(forms), w.shape[1]))
+    total = np.zeros((len(forms), w.shape[1]), w.dtype)
     for i in range(len(w)):
         for j in range(i, len(w)):
             entries = forms[:, i, j] if i == j else 2.0 * forms[:, i, j]

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from haploop.logger.sums import sum_rows
-from haploop.plant.flow import motion_integrals, natural_rate
+from haploop.plant.flow import motion_integrals, natural_rate, real_for
 from haploop.plant.hand_force import HandForce
 from haploop.plant.mechanics import Mechanics
 from haploop.protocol.ticks import Timebase
@@ -46,7 +46,9 @@ class PlantBooks:
     def __init__(self, scene: dict[str, Any], time: Timebase) -> None:
         m = self.mechanics = Mechanics.of(scene)
         self._tau = HandForce(scene.get("hand", {}).get("force"), time.plant_rate)
-        self._square, self._lag = motion_integrals(m.mass_kg, m.damping, m.stiffness, time.step_s)
+        self._real = real_for(m.damping / m.mass_kg, time.step_s)
+        integrals = motion_integrals(m.mass_kg, m.damping, m.stiffness, time.step_s)
+        self._square, self._lag = (integral.astype(self._real) for integral in integrals)
         self._rate = natural_rate(m.mass_kg, m.stiffness, time.step_s)
         self._is_limited = "actuator" in scene
         self.names = ["hand_work", *(f"{name}_heat" for name in m.dampers), "kinetic", "spring"]
@@ -70,9 +72,10 @@ class PlantBooks:
         tau = self._tau.at_steps(first_step, first_step + len(x))
         start_x, start_v, dv = x[:-1], v[:-1], np.diff(v)
         rise = np.diff(tau)
-        net = force + tau[:-1] - m.damping * start_v - m.stiffness * (start_x - m.rest_m)
+        wide_v = np.asarray(start_v, self._real)
+        net = force + tau[:-1] - m.damping * wide_v - m.stiffness * (start_x - m.rest_m)
         scale = 1.0 / (m.mass_kg * self._rate)
-        rates = np.stack([start_v, net * scale, rise * scale])
+        rates = np.stack([wide_v, net * scale, rise * scale])
         square = sum_products(self._square, rates)
         lagged = self._lag[0] * rates[0] + self._lag[1] * rates[1] + self._lag[2] * rates[2]
         books = [
@@ -83,7 +86,7 @@ class PlantBooks:
         ]
         if self._is_limited:
             books.append(beyond_limits(commanded, force) * dx)
-        return np.stack(books)
+        return np.stack(books).astype(float)
 
     def stored_J(self, columns: dict[str, np.ndarray]) -> float:
         """Kinetic and spring energy in the first state of some telemetry."""
@@ -97,7 +100,7 @@ def beyond_limits(commanded: Iterable[np.ndarray], force: np.ndarray) -> np.ndar
 
 def sum_products(form: np.ndarray, w: np.ndarray) -> np.ndarray:
     """w' Q w for every column of w, term by term in a fixed order (a matrix product may reorder with its size)."""
-    total = np.zeros(w.shape[1])
+    total = np.zeros(w.shape[1], w.dtype)
     for i in range(len(form)):
         for j in range(i, len(form)):
             total += (form[i, j] if i == j else 2.0 * form[i, j]) * w[i] * w[j]

@@ -122,7 +122,7 @@ class ChainIntegrals:
         a, b = (np.append(row, 0.0) / self._scales for row in (left, right))
         weight = (np.outer(a, b) + np.outer(b, a)) / 2.0
         form = gramian(self._rates, weight, self._step_s / _wide(2) ** level)
-        return (form * np.outer(self._scales, self._scales)).astype(float)
+        return form * np.outer(self._scales, self._scales)
 
     def lag(self, velocity: np.ndarray, level: int = 0) -> np.ndarray:
         """l with integral (t - t_end/2)/t_end velocity.w dt = l . w over h/2^level."""
@@ -132,4 +132,4 @@ class ChainIntegrals:
         extended[n, :n] = np.append(velocity, 0.0) / self._scales
         extended[n + 1, n] = 1.0 / end
         increment = flow_minus_identity(extended, end)
-        return ((increment[n, :n] / 2.0 - increment[n + 1, :n]) * self._scales).astype(float)
+        return (increment[n, :n] / 2.0 - increment[n + 1, :n]) * self._scales

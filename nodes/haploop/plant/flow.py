@@ -157,7 +157,7 @@ def motion_integrals(mass: float, damping: float, stiffness: float, step_s: floa
     within a step and c is ``natural_rate``. In rates nothing cancels when a large force holds the device at rest.
 
     Returns:
-        (square, lag): integral of v(t)^2 dt = w' square w, shape (3, 3), s; and
+        In the widest float, (square, lag): integral of v(t)^2 dt = w' square w, shape (3, 3), s; and
         integral of (t - h/2) / h * v(t) dt = lag . w, shape (3,), s.
     """
     h, c = _wide(step_s), _wide(natural_rate(mass, stiffness, step_s))
@@ -171,4 +171,9 @@ def motion_integrals(mass: float, damping: float, stiffness: float, step_s: floa
     extended[3, 0] = 1.0
     extended[4, 3] = 1.0 / h
     increment = flow_minus_identity(extended, h)
-    return square.astype(float), (increment[3, :3] / 2.0 - increment[4, :3]).astype(float)
+    return square, increment[3, :3] / 2.0 - increment[4, :3]
+
+
+def real_for(damping_rate: float, step_s: float) -> type[np.floating]:
+    """The float in which forms of rates are to be summed: their terms cancel in the ratio of step to time constant."""
+    return np.longdouble if damping_rate * step_s > 100.0 else np.float64
