@@ -174,3 +174,12 @@ def test_amounts_that_no_prefix_suits_or_that_are_none() -> None:
     assert amount(None, "J") == "–"
     assert amount(float("inf"), "J") == "inf J"
     assert [fixed(value) for value in (12345.6, 1.0, -0.5, 0.0)] == ["12346", "1.00", "−0.500", "0"]
+
+
+@pytest.mark.parametrize(
+    ("rate", "words"), [(2.34, "growing as e^(+2.3 t/s)"), (-1.5, "dying away as e^(-1.5 t/s)"), (0.1, ""), (None, "")]
+)
+def test_swings_that_grow_or_die_away_say_how_fast(swap: dict[str, Any], rate: float | None, words: str) -> None:
+    window = {**swap["window"], "growth_1_s": rate}
+    [line] = [line for line in shown(summary_table({**swap, "window": window}), 200).splitlines() if "peak to" in line]
+    assert line.partition("peak to peak")[2].strip(" ,") == words

@@ -76,7 +76,7 @@ def _key_figures(summary: dict[str, Any]) -> list[tuple[str, str]]:
     ran = f"{summary['duration_s']:g} s, {summary['ticks']} ticks"
     if summary["wall_s"]:
         ran += f", in {amount(summary['wall_s'], 's')} ({fixed(summary['real_time_factor'])} times real time)"
-    figures = [("ran", ran), ("oscillation", f"{amount(window['oscillation_m'], 'm')} peak to peak")]
+    figures = [("ran", ran), ("oscillation", f"{amount(window['oscillation_m'], 'm')} peak to peak{_growth(window)}")]
     if window["penetration_mean_m"] is not None:
         depth = f"{amount(window['penetration_mean_m'], 'm')} on average"
         outside = 100 * window["outside_fraction"]
@@ -86,6 +86,14 @@ def _key_figures(summary: dict[str, Any]) -> list[tuple[str, str]]:
     if happened := counts(summary):
         figures.append(("in all", ", ".join(f"{count} {words}" for words, count in happened.items())))
     return figures
+
+
+def _growth(window: dict[str, Any]) -> str:
+    """How the swings grow; nothing where nothing swings, or as little as a limit cycle's."""
+    rate = window.get("growth_1_s") or 0.0
+    if abs(rate) < 0.5:
+        return ""
+    return f", {'growing' if rate > 0 else 'dying away'} as e^({rate:+.2g} t/s)"
 
 
 def _grid(rows: list[tuple[str, str]]) -> Table:
