@@ -6,10 +6,10 @@ PIP := $(PYTHON) -m pip --python $(BIN)/python -qq --disable-pip-version-check -
 READY := .venv/.installed
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test slow check bench lock clean
+.PHONY: help demo test slow check bench accuracy lock clean
 
 help: ## list the targets
-	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-6s %s\n", $$1, $$2 }' Makefile
+	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-8s %s\n", $$1, $$2 }' Makefile
 
 demo: $(READY) ## run the scene of figure 6c into runs/demo and draw it; the last line names the figure's file
 	@rm -rf runs/demo
@@ -32,6 +32,10 @@ bench: $(READY) ## measure speed, memory and what each effect costs on this mach
 	@$(BIN)/python tests/bench/bench.py
 	@$(BIN)/python tests/bench/memory.py
 	@$(BIN)/python tests/bench/ablation.py
+
+accuracy: $(READY) ## measure what accuracy costs and write docs/accuracy.md (an hour; stopped, it goes on where it was)
+	@$(BIN)/haploop cost --out runs/accuracy
+	@$(BIN)/python -m haploop.tools.accuracy_page runs/accuracy docs
 
 lock: ## pin every dependency anew with its hashes in requirements.lock (needs uv)
 	$(UV) pip compile pyproject.toml --extra plot --extra dev --output-file requirements.lock --upgrade --quiet \

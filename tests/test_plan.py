@@ -21,7 +21,9 @@ ENCODER = {"resolution": 1e-5}
 READ = {"acceleration": {"source": "accelerometer"}}
 FILTER = {"estimator": "kalman", "jerk_density": 10.0}
 # The least that names each effect. What an effect cannot be without stands in the lists of ``BESIDE``.
+METHODS = ("euler", "semi-implicit-euler", "rk4", "implicit-midpoint", "dop853")
 NAMING: dict[str, dict[str, Any]] = {
+    **{f"clock.integrator = {method}": {"clock": {"integrator": method}} for method in METHODS},
     "transmission": {"transmission": {"motor_mass": 0.003, "stiffness": 4000}},
     "hand.grip": {"hand": {"mass": 0.2, "grip": {"stiffness": 500}}},
     "actuator.bandwidth": {"actuator": {"bandwidth": 300}},
@@ -96,6 +98,7 @@ BUILT: dict[str, dict[str, Any]] = {
     "plain": {},
     "everything": EVERYTHING,
     "read by nothing": READ_BY_NOTHING,
+    **{f"everything by {method}": EVERYTHING | {"clock": {"integrator": method}} for method in METHODS},
     **NAMING,
 }
 Loaded = dict[str, dict[str, set[str]]]
@@ -216,6 +219,14 @@ def test_a_tick_of_figure_6c_in_order():
         ("controller", "their sum is the command"),
         ("plant", "the command takes effect 20 plant steps after its sample and is held until the next does"),
     ]
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_the_integrator_is_what_moves_the_bodies_in_a_plant_step(method):
+    named = plan(scene(clock={"integrator": method}))
+    assert named.plant_step[0].what.startswith(f"{method} of 2 states (device)")
+    assert named.plant_step[1].effect == f"clock.integrator = {method}"
+    assert plan(scene()).plant_step[0].what.startswith("exact flow of 2 states (device)")
 
 
 def test_what_effects_do_stands_where_they_do_it():

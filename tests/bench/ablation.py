@@ -1,6 +1,6 @@
 """What every effect costs: the loop in one process with all effects, with all but one, with none, in random order.
 
-All effects stand in the table twice (A/A): how far these two rows differ is how much a difference of others means.
+All effects stand in the table twice: how far these two rows differ is how much a difference of others means.
 """
 
 from __future__ import annotations
@@ -12,24 +12,16 @@ import time
 from pathlib import Path
 from typing import Any
 
-from machine import machine
 from rich.console import Console
 from rich.table import Table
 
 from haploop.controller.dissipation import registry
 from haploop.launch.in_process import run_in_process
-from haploop.launch.plan import effects_of
 from haploop.launch.scene_file import load
-from haploop.tools.operations import without
+from haploop.tools.ablation import AGAIN, NONE, WHOLE, ablations
+from haploop.tools.machine import machine
 
 SCENE = Path(__file__).parents[2] / "launch" / "scenes" / "all_effects.toml"
-
-
-def without_all(scene: dict[str, Any]) -> dict[str, Any]:
-    """The scene with no effect left."""
-    while named := effects_of(scene):
-        scene = without(named[0], scene)
-    return scene
 
 
 def measured_us(scene: dict[str, Any], kinds: dict[str, Any]) -> float:
@@ -47,13 +39,10 @@ def main() -> None:
     options = parser.parse_args()
     kinds = registry()
     everything = load(SCENE, [f"duration={options.seconds}", "diverged_beyond=1e9"], kinds)
-    named = effects_of(everything)
-    scenes = {"all effects (A)": everything, "all effects again (A)": everything}
-    scenes |= {f"all but {effect.name}": without(effect, everything) for effect in named}
-    scenes["none"] = without_all(everything)
+    scenes = ablations(everything)
     seen: dict[str, list[float]] = {name: [] for name in scenes}
     for _ in range(options.repeats):
-        for name in random.Random(len(seen["none"])).sample(list(scenes), len(scenes)):
+        for name in random.Random(len(seen[WHOLE])).sample(list(scenes), len(scenes)):
             seen[name].append(measured_us(scenes[name], kinds))
     show(seen, options.repeats)
 
@@ -66,7 +55,8 @@ def show(seen: dict[str, list[float]], repeats: int) -> None:
     whole = statistics.median(next(iter(seen.values())))
     for name, values in seen.items():
         low, middle, high = statistics.quantiles(values, n=4)
-        table.add_row(name, f"{middle:.1f}", f"{low:.1f} - {high:.1f}", f"{whole - middle:+.1f}")
+        scene = name if name in (WHOLE, AGAIN, NONE) else f"without {name}"
+        table.add_row(scene, f"{middle:.1f}", f"{low:.1f} - {high:.1f}", f"{whole - middle:+.1f}")
     Console(width=110).print(table)
 
 

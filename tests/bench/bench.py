@@ -12,7 +12,6 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from machine import machine
 from rich.console import Console
 from rich.table import Table
 from yardsticks import ping_pong_us, plain_loop_us
@@ -22,6 +21,7 @@ from haploop.launch.in_process import run_in_process
 from haploop.launch.scene_file import load
 from haploop.launch.start import prepare, run
 from haploop.logger.summary import versions
+from haploop.tools.machine import machine
 
 SCENE = Path(__file__).parents[2] / "launch" / "scenes" / "fig6c.toml"
 

@@ -13,6 +13,8 @@ from haploop.launch.table import Table
 from haploop.protocol.ticks import whole_count
 
 TableType = TypeVar("TableType", bound=Table)
+# What rounding adds to the factor 1 of a body that drifts.
+_ROUNDING = 1e-7
 
 
 def check_combinations(layers: Layers) -> None:
@@ -33,20 +35,25 @@ def check_combinations(layers: Layers) -> None:
 
 
 def check_rate(layers: Layers, scene: SceneTable) -> None:
-    """Refuse a plant rate so low that friction would have to be followed through thousands of swings a step."""
-    if scene.friction is None:
+    """Refuse a plant rate too low for friction: thousands of swings a step to be followed, or steps it cannot brake."""
+    if scene.friction is None or scene.clock.integrator == "dop853":
         return
-    from haploop.plant.chain import Chain
-    from haploop.plant.friction_walk import MOST_PARTS, parts_of_a_step
+    rate, resolved = scene.clock.plant_rate, scene.model_dump(exclude_none=True)
+    if scene.clock.integrator == "exact":
+        from haploop.plant.chain import Chain
+        from haploop.plant.friction_walk import MOST_PARTS, parts_of_a_step
 
-    rate = scene.clock.plant_rate
-    parts = parts_of_a_step(Chain.of(scene.model_dump(exclude_none=True)), 1.0 / rate)
-    if parts > MOST_PARTS:
-        layers.complain(
-            ("clock", "plant_rate"),
-            f"With friction on bodies that swing this fast it must be at least {rate * parts // MOST_PARTS} Hz.",
-            f"is {rate} Hz",
-        )
+        parts = parts_of_a_step(Chain.of(resolved), 1.0 / rate)
+        if parts > MOST_PARTS:
+            least = rate * parts // MOST_PARTS
+            expected = f"With friction on bodies that swing this fast it must be at least {least} Hz."
+            layers.complain(("clock", "plant_rate"), expected, f"is {rate} Hz")
+        return
+    from haploop.plant.integrators.one_step import friction_brakes
+
+    if not friction_brakes(resolved):
+        expected = f"Friction on bodies that swing this fast does not brake them by {scene.clock.integrator}; raise it."
+        layers.complain(("clock", "plant_rate"), expected, f"is {rate} Hz")
 
 
 def notes(scene: dict[str, Any]) -> list[str]:
@@ -62,7 +69,22 @@ def notes(scene: dict[str, Any]) -> list[str]:
             )
         elif accelerometer["mount"] == "motor" and "transmission" not in scene:
             found.append('accelerometer.mount = "motor" means the one mass there is without a [transmission].')
-    return found
+    return [*found, *_unstable(scene["clock"]["integrator"], scene)]
+
+
+def _unstable(integrator: str, scene: dict[str, Any]) -> list[str]:
+    """Says where a method of a fixed step makes the bodies swing ever wider by itself."""
+    if integrator in ("exact", "dop853"):
+        return []
+    from haploop.plant.integrators.one_step import growth
+
+    factor = growth(scene)
+    if factor <= 1.0 + _ROUNDING:
+        return []
+    return [
+        f'clock.integrator = "{integrator}" is unstable by itself at {scene["clock"]["plant_rate"]} Hz: it multiplies '
+        f"the fastest growing swing of the bodies by {factor:.7g} in every plant step, whatever the controller does."
+    ]
 
 
 def _friction(layers: Layers, friction: Friction) -> None:

@@ -8,7 +8,7 @@ from typing import Any
 
 from haploop.controller.recorder import MOTION_COLUMNS
 from haploop.plant.chain import Chain
-from haploop.plant.motion import needs_chain
+from haploop.plant.motion import integrator_of, needs_chain
 from haploop.plant.sensors import accelerometer_is_used
 from haploop.protocol.effects import EFFECTS, Effect, Stage, at
 from haploop.protocol.ticks import Timebase
@@ -68,7 +68,7 @@ def plan(scene: dict[str, Any]) -> Plan:
         plant_step=_plant_step(chain, named, scene),
         tick=_tick(scene, chain, named),
         modules={
-            node: _once(module for effect in named if effect.node == node for module in effect.modules)
+            node: _once(module for effect in named if effect.node == node for module in effect.modules_in(scene))
             for node in ("plant", "controller")
         },
         columns={
@@ -84,11 +84,13 @@ def plan(scene: dict[str, Any]) -> Plan:
 def multiplications(scene: dict[str, Any]) -> int:
     """Multiplications that move the bodies through one tick: every state by every state, command and friction.
 
-    One mass is moved once a hold and filled in at the plant steps; bodies in a row are moved to every plant step.
+    One mass is moved once a hold and filled in at the plant steps; bodies in a row are moved to every plant step. The
+    classical Runge-Kutta method moves them four times; of DOP853 twelve times a tick are counted, the least there is.
     """
     time, size = Timebase.of(scene["clock"], scene["duration"]), len(Chain.of(scene).states)
     if needs_chain(scene):
-        return time.steps_per_tick * size * (size + 2)
+        moves = {"rk4": 4 * time.steps_per_tick, "dop853": 12}.get(integrator_of(scene), time.steps_per_tick)
+        return moves * size * (size + 2)
     return (time.steps_per_tick + (2 if time.delay_steps % time.steps_per_tick else 1)) * size * (size + 1)
 
 
@@ -110,7 +112,8 @@ def _memory(scene: dict[str, Any], named: tuple[Effect, ...]) -> dict[str, int]:
 
 def _plant_step(chain: Chain, named: tuple[Effect, ...], scene: dict[str, Any]) -> tuple[Step, ...]:
     bodies = " - ".join(chain.bodies)
-    what = f"exact flow of {len(chain.states)} states ({bodies}), the command held, the force of the hand linear"
+    method = "exact flow" if integrator_of(scene) == "exact" else integrator_of(scene)
+    what = f"{method} of {len(chain.states)} states ({bodies}), the command held, the force of the hand linear"
     return Step("plant", what), *_stage("motion", named, scene)
 
 

@@ -18,7 +18,11 @@ if TYPE_CHECKING:
 
 
 def plant_books(scene: dict[str, Any], time: Timebase) -> PlantBooks | ChainBooks:
-    """The books of a scene's plant: one mass under held forces, or a chain of bodies."""
+    """The books of a scene's plant: one mass under held forces, or a chain of bodies.
+
+    Their integrals are those of the exact motion from each recorded state on. Where ``clock.integrator`` is another,
+    what its next state has more or less is in no book: the residual is then the energy error of the method.
+    """
     bandwidth = "bandwidth" in scene.get("actuator", {})
     if bandwidth or "grip" in scene.get("hand", {}) or scene.keys() & {"friction", "transmission"}:
         from haploop.logger.chain_books import ChainBooks

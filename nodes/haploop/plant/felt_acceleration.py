@@ -13,7 +13,7 @@ from haploop.plant.sensors import accelerometer_is_used
 from haploop.protocol.ticks import Timebase
 
 if TYPE_CHECKING:
-    from haploop.plant.chain_motion import Interval
+    from haploop.plant.chain_history import Interval
 
 Feel = Callable[["Interval", int], None]
 

@@ -6,7 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from haploop.plant.chain_motion import HELD, ChainMotion, Interval
+from haploop.plant.chain_history import HELD, Interval
+from haploop.plant.chain_motion import ChainMotion
 from haploop.plant.command_line import Hold
 from haploop.plant.friction import Friction
 from haploop.plant.friction_walk import Walk

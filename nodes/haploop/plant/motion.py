@@ -9,14 +9,23 @@ from haploop.plant.sensors import accelerometer_is_used
 from haploop.protocol.ticks import Timebase
 
 if TYPE_CHECKING:
-    from haploop.plant.chain_motion import ChainMotion
+    from haploop.plant.chain_history import ChainHistory
+
+
+def integrator_of(scene: dict[str, Any]) -> str:
+    """What moves the bodies from one plant step to the next."""
+    return scene["clock"].get("integrator", "exact")
 
 
 def needs_chain(scene: dict[str, Any]) -> bool:
-    """Whether there is more than one mass under held forces that change at the same steps of every interval."""
+    """Whether there is more than one mass under held forces that change at the same steps of every interval.
+
+    All integrators but the exact flow move a chain of bodies, be it of one.
+    """
     sensor = scene.get("accelerometer", {}) if accelerometer_is_used(scene) else {}
     return (
-        any(table in scene for table in ("friction", "transmission", "jitter", "loss"))
+        integrator_of(scene) != "exact"
+        or any(table in scene for table in ("friction", "transmission", "jitter", "loss"))
         or "grip" in scene.get("hand", {})
         or "bandwidth" in scene.get("actuator", {})
         or "bandwidth" in sensor
@@ -24,8 +33,11 @@ def needs_chain(scene: dict[str, Any]) -> bool:
     )
 
 
-def motion_of(scene: dict[str, Any], time: Timebase) -> LinearMotion | ChainMotion:
+def motion_of(scene: dict[str, Any], time: Timebase) -> LinearMotion | ChainHistory:
     """The least that moves this scene; nothing else is even imported."""
+    integrator = integrator_of(scene)
+    if integrator != "exact":
+        return _integrated(integrator, scene, time)
     if "friction" in scene:
         from haploop.plant.friction_motion import FrictionMotion
 
@@ -35,3 +47,22 @@ def motion_of(scene: dict[str, Any], time: Timebase) -> LinearMotion | ChainMoti
 
         return ChainMotion(scene, time)
     return LinearMotion(scene, time)
+
+
+def _integrated(integrator: str, scene: dict[str, Any], time: Timebase) -> ChainHistory:
+    """The motion by another method than the exact flow."""
+    if integrator == "dop853":
+        if "friction" in scene:
+            from haploop.plant.integrators.dop853_friction import Dop853FrictionMotion
+
+            return Dop853FrictionMotion(scene, time)
+        from haploop.plant.integrators.dop853 import Dop853Motion
+
+        return Dop853Motion(scene, time)
+    if "friction" in scene:
+        from haploop.plant.stepwise_friction_motion import StepwiseFrictionMotion
+
+        return StepwiseFrictionMotion(scene, time)
+    from haploop.plant.stepwise_motion import StepwiseMotion
+
+    return StepwiseMotion(scene, time)

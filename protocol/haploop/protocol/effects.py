@@ -10,8 +10,16 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 # What bodies in a row, or forces that change between ticks, are moved by in place of ``haploop.plant.linear_motion``.
-_CHAIN = tuple(f"haploop.plant.{name}" for name in ("chain_motion", "chain", "chain_flow", "felt_acceleration"))
-_RUBBING = tuple(f"haploop.plant.friction_{name}" for name in ("motion", "walk", "mode"))
+_HISTORY = tuple(f"haploop.plant.{name}" for name in ("chain_history", "chain", "felt_acceleration"))
+_EXACT = tuple(f"haploop.plant.{name}" for name in ("chain_motion", "chain_flow"))
+_CHAIN = (*_EXACT, *_HISTORY)
+_EXACT_RUBBING = tuple(f"haploop.plant.friction_{name}" for name in ("motion", "walk"))
+_RUBBING = (*_EXACT_RUBBING, "haploop.plant.friction_mode")
+# And where another integrator than the exact flow moves them, with friction or without.
+_METHODS = "haploop.plant.integrators"
+_STEPWISE = ("haploop.plant.stepwise_motion", _METHODS, f"{_METHODS}.one_step", f"{_METHODS}.linear_rates", *_HISTORY)
+_STEPWISE_RUBBING = tuple(f"haploop.plant.{name}" for name in ("stepwise_friction_motion", "friction_projection"))
+_DOP853_RUBBING = (f"{_METHODS}.dop853_friction",)
 _DRAWN = ("haploop.plant.random_stream",)
 _NOISY = ("haploop.plant.band_limited_noise", *_DRAWN)
 _COUNTED = ("haploop.plant.tally",)
@@ -57,6 +65,15 @@ class Effect:
         """How often: "every plant step" or "every tick"."""
         return "every plant step" if self.stage == "motion" else "every tick"
 
+    def modules_in(self, scene: dict[str, Any]) -> tuple[str, ...]:
+        """What it imports in a scene: an integrator has its own in place of what moves bodies exactly."""
+        integrator = at(scene, "clock.integrator") or "exact"
+        if integrator == "exact":
+            return self.modules
+        rubbing = _DOP853_RUBBING if integrator == "dop853" else _STEPWISE_RUBBING
+        kept = tuple(module for module in self.modules if module not in (*_EXACT, *_EXACT_RUBBING))
+        return kept + (rubbing if self.key == "friction" else ())
+
     def is_named(self, scene: dict[str, Any]) -> bool:
         """Whether a resolved scene names it; a number that is 0 names nothing."""
         found = at(scene, self.key)
@@ -83,6 +100,12 @@ def _plant(module: str, *others: str) -> tuple[str, ...]:
     return f"haploop.plant.{module}", *others
 
 
+def _integrator(name: str, does: str, *modules: str) -> Effect:
+    """A method of ``clock.integrator``, written in a module of its own."""
+    own = f"{_METHODS}.{name.replace('-', '_')}"
+    return Effect("clock.integrator", "plant", (own, *modules), "motion", f"every step is {does}", value=name)
+
+
 def _noise_memory(scene: dict[str, Any]) -> int:
     """An accelerometer's noise is correlated where its bandwidth is limited."""
     table = scene["accelerometer"]
@@ -91,6 +114,11 @@ def _noise_memory(scene: dict[str, Any]) -> int:
 
 # In the order in which they act within their stage.
 EFFECTS: tuple[Effect, ...] = (
+    _integrator("euler", "one of the explicit Euler method, order 1", *_STEPWISE),
+    _integrator("semi-implicit-euler", "one of the semi-implicit Euler method, order 1", *_STEPWISE),
+    _integrator("rk4", "one of the classical Runge-Kutta method, order 4", *_STEPWISE),
+    _integrator("implicit-midpoint", "one of the implicit midpoint rule, order 2", *_STEPWISE),
+    _integrator("dop853", "made of DOP853's own steps, order 8, from event to event", _METHODS, *_HISTORY),
     Effect(
         "transmission",
         "plant",
@@ -123,7 +151,7 @@ EFFECTS: tuple[Effect, ...] = (
         "plant",
         ("haploop.plant.friction", *_RUBBING, *_CHAIN),
         "motion",
-        "dry friction holds or brakes, each stop and start at its own time",
+        "dry friction brakes what slips and holds what has stopped",
         columns=("friction",),
     ),
     Effect(

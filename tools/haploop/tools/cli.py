@@ -173,6 +173,29 @@ def replay(directory: Directory, json: Json = False) -> None:
     replay_run(directory, json)
 
 
+@app.command()
+def cost(
+    scenes: Annotated[
+        list[Path] | None, typer.Argument(metavar="[SCENE]...", help="scene files [the accuracy scenes]")
+    ] = None,
+    rates: Annotated[str, typer.Option(help="plant rates, Hz")] = "1k,2k,5k,10k,20k,50k,100k",
+    methods: Annotated[str | None, typer.Option(help="integrators, comma-separated [all]")] = None,
+    out: Annotated[Path, typer.Option(help="directory; what it holds is not measured again")] = Path("runs/cost"),
+    tolerance: Annotated[float, typer.Option(help="RMS error the advice is for, m")] = 1e-6,
+    repeats: Annotated[int, typer.Option(help="of each time in one process; as processes at most 3")] = 20,
+    processes: Annotated[bool, typer.Option("--processes/--no-processes", help="time runs as processes too")] = True,
+    json: Json = False,
+) -> None:
+    """Measure what accuracy costs in time: error and time of every method at every plant rate, and advice.
+
+    Can be stopped; the same command goes on.
+    """
+    from haploop.tools.cost import Request
+    from haploop.tools.cost import cost as measure
+
+    measure(Request(scenes or [], methods, rates, out, tolerance, repeats, processes), json)
+
+
 def main() -> None:
     """Entry point. Exit status: 0 done, 1 the run failed, 2 wrong usage or scene."""
     app()

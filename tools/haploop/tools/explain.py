@@ -61,7 +61,7 @@ def as_data(scene: dict[str, Any], planned: Plan, costs: Bill) -> dict[str, Any]
             {
                 "name": effect.name,
                 "node": effect.node,
-                "modules": effect.modules,
+                "modules": effect.modules_in(scene),
                 "acts": effect.acts,
                 "does": effect.does,
                 "columns": effect.columns,
@@ -145,7 +145,8 @@ def _costs(scene: dict[str, Any], planned: Plan, costs: Bill) -> Table:
     for name in ("states", "multiplications", "instructions"):
         table.add_column(name, justify="right", no_wrap=True)
     for effect in planned.named:
-        module = _short(effect.modules[0]) if effect.modules else effect.node
+        modules = effect.modules_in(scene)
+        module = _short(modules[0]) if modules else effect.node
         numbers = f"{costs.multiplications[1][effect.name]:+d}", f"{costs.effects[effect.name]:+.0f}"
         table.add_row(effect.name, module, effect.acts.removeprefix("every "), str(effect.states_in(scene)), *numbers)
     for element, cost in zip(scene.get("dissipation", []), costs.elements, strict=True):

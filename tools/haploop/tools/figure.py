@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from haploop.tools.figure_data import TOGETHER, FigureError, RunData
+from haploop.tools.figure_file import empty_figure, write_figure
 from haploop.tools.figure_loops import draw_force_position, draw_momentum
 from haploop.tools.figure_style import CLOSE, INK, OF_THE_PLANT, WALL, element_colour, few_ticks, legend
 from haploop.tools.figure_time import energy_panel, force_panel, mark_events, position_panel
@@ -15,8 +16,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 __all__ = ["FigureError", "draw", "figure_of"]
-
-_DPI = 110
 
 
 def draw(run_directory: Path, target: Path | None = None) -> Path:
@@ -34,12 +33,7 @@ def draw(run_directory: Path, target: Path | None = None) -> Path:
         LogError: the log is no log.
     """
     target = target or run_directory / "figure.png"
-    figure = figure_of(RunData.of(run_directory))
-    try:
-        figure.savefig(target, dpi=_DPI)
-    except (ValueError, OSError) as error:
-        raise FigureError(f"The figure {target} cannot be written: {error}.") from error
-    return target
+    return write_figure(figure_of(RunData.of(run_directory)), target)
 
 
 def figure_of(run: RunData) -> Figure:
@@ -48,11 +42,7 @@ def figure_of(run: RunData) -> Figure:
     Raises:
         FigureError: matplotlib is missing.
     """
-    try:
-        from matplotlib.figure import Figure
-    except ImportError as error:
-        raise FigureError("Figures need matplotlib; install it with: pip install 'haploop[plot]'") from error
-    figure = Figure(figsize=(15.0, 9.2), facecolor="white", layout="constrained")
+    figure = empty_figure(15.0, 9.2)
     events = event_lines(run)
     heights = 0.085, 1.0, 0.001 + 0.025 * len(events)
     header, body, footer = figure.subfigures(3, 1, squeeze=False, height_ratios=heights)[:, 0]

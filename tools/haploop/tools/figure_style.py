@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.axis import Axis
 
 INK, GREY, FAINT = "#222222", "#666666", "#BBBBBB"
 WALL, WALL_FILL, CLOSE = "#0072B2", "#D6E6F2", "#EBD9A8"
@@ -42,6 +43,16 @@ def dress(ax: Axes, title: str, x_label: str, y_label: str) -> None:
 def few_ticks(ax: Axes) -> None:
     """So few numbers below the axes that long ones have room in a narrow panel."""
     ax.locator_params(axis="x", nbins=5)
+
+
+def plain_numbers(axis: Axis) -> None:
+    """Numbers at 1, 2, 5 and without powers of ten on a logarithmic axis."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.set_minor_formatter(NullFormatter())
+    axis.set_tick_params(which="minor", length=0)
 
 
 def legend(ax: Axes, only: tuple[str, ...] = (), **where: Any) -> None:

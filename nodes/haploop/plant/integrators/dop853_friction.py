@@ -1,0 +1,132 @@
+"""The motion by DOP853 of a chain whose first body sticks and slips, event by event."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from haploop.plant.chain_history import HELD, Interval
+from haploop.plant.friction import Friction
+from haploop.plant.friction_mode import Mode
+from haploop.plant.integrators.dop853 import Dop853Motion, Rates, System
+from haploop.protocol.ticks import Timebase
+
+_MOST_SWITCHES = 1000
+
+
+class _Forces(NamedTuple):
+    """A command in N, and a load of ``load`` N at time ``start`` that rises by ``slope`` N/s."""
+
+    command: float
+    load: float
+    slope: float
+    start: float
+
+    def load_at(self, t: float) -> float:
+        return self.load + self.slope * (t - self.start)
+
+
+class Dop853FrictionMotion(Dop853Motion):
+    """As without friction, and started anew where friction switches: events, found on the dense output.
+
+    Slipping ends where v changes its sign; there body 0 sticks, clamped with v = 0.0, if the other forces on it are
+    within the breakaway force. Sticking ends where they exceed it. The books are told one friction force a step, that
+    of the part in which the body slips, so that the residual shows the steps within which friction switched.
+    """
+
+    held_names = (*HELD, "friction", "stuck")
+
+    def __init__(self, scene: dict[str, Any], time: Timebase) -> None:
+        self._friction = Friction(scene["friction"])
+        super().__init__(scene, time)
+        self._clamped = System(self._chain, stuck=True)
+        self._pull = (self._chain.accelerations()[0] * self._chain.masses_kg[0]).astype(float)
+
+    def _held_before(self) -> np.ndarray:
+        mode = self._mode = Mode(self._chain, self._friction, self._step_s)
+        mode.start(self.z, float(self.loads(0, 1)[0]))
+        return np.array([0.0, -1.0, mode.friction_at(self.z[self._v]), float(mode.is_stuck)])
+
+    def _through(self, interval: Interval, first: int, last: int, load: float, slope: float) -> None:
+        """Through steps ``first`` ... ``last``, from one switch of friction to the next.
+
+        Raises:
+            ArithmeticError: friction switches again and again, with no time between.
+        """
+        mode, v, end = self._mode, self._v, last * self._step_s
+        forces = _Forces(float(interval.held[first, 0]), load, slope, first * self._step_s)
+        z, t = interval.states[first].copy(), forces.start
+        interval.held[first:last, 2:] = 0.0, 1.0
+        mode.decide_at_rest(z, forces.command, load)
+        for _ in range(_MOST_SWITCHES):
+            begun = t
+            z, t, has_ceased = self._piece(interval, z, t, last, forces)
+            if has_ceased:
+                z[v] = 0.0
+                self._switch(z, t, forces, moved=t > begun)
+            if t >= end:
+                break
+        else:
+            raise ArithmeticError(f"Friction switched {_MOST_SWITCHES} times in a plant step; raise clock.plant_rate.")
+        interval.states[last], interval.at_ends[last - 1] = z, (mode.friction_at(z[v]), mode.is_stuck)
+
+    def _switch(self, z: np.ndarray, t: float, forces: _Forces, moved: bool) -> None:
+        """The mode after the present one has ceased; a slip that led nowhere is none."""
+        mode = self._mode
+        if mode.is_stuck:
+            mode.is_stuck, mode.direction = False, math.copysign(1.0, self._other_forces(t, z, forces))
+        elif moved:
+            mode.decide_at_rest(z, forces.command, forces.load_at(t))
+        else:
+            mode.is_stuck = True
+
+    def _piece(
+        self, interval: Interval, z: np.ndarray, t: float, last: int, forces: _Forces
+    ) -> tuple[np.ndarray, float, bool]:
+        """From time t in s to step ``last``, or to where the mode ceases: the state there, the time, whether it did."""
+        mode, h = self._mode, self._step_s
+        steps = np.arange(int(t / h), last + 1)
+        steps = steps[steps * h > t]
+        rates, watched = self._sticking(forces) if mode.is_stuck else self._slipping(forces)
+        found = self._solved(rates, (t, last * h), z, steps * h, [watched])
+        states = np.reshape(found.y, (len(z), -1))  # solve_ivp gives an empty list where no step ends in the piece
+        reached = steps[: states.shape[1]]
+        interval.states[reached] = states.T
+        for step, v in zip(reached.tolist(), states[self._v].tolist(), strict=True):
+            interval.at_ends[step - 1] = mode.friction_at(v), mode.is_stuck
+        has_ceased = found.status == 1
+        end = float(found.t_events[0][0]) if has_ceased else last * h
+        if not mode.is_stuck:
+            self._tell_friction(interval, int(steps[0]) - 1, min(math.ceil(end / h), last), float(z[self._v]))
+        return (found.y_events[0][0] if has_ceased else states[:, -1]).copy(), end, has_ceased
+
+    def _tell_friction(self, interval: Interval, first: int, last: int, v: float) -> None:
+        """Friction in the steps in which the body slips, as at their beginning; ``v`` at that of the first."""
+        speeds = [v, *interval.states[first + 1 : last, self._v].tolist()]
+        for step, speed in zip(range(first, last), speeds, strict=False):
+            interval.held[step, 2:] = -self._mode.direction * self._friction.at(speed), 0.0
+
+    def _slipping(self, forces: _Forces) -> tuple[Rates, Callable[[float, np.ndarray], float]]:
+        """z' while body 0 slips, and what falls below 0 when it no longer does: the speed in its direction."""
+        law, v, direction = self._friction, self._v, self._mode.direction
+        smooth, unit = self._free.under(*forces), -direction * self._free.of_friction
+        return (lambda t, z: smooth(t, z) + law.at(z[v]) * unit), _event(lambda _t, z: direction * z[v])
+
+    def _sticking(self, forces: _Forces) -> tuple[Rates, Callable[[float, np.ndarray], float]]:
+        """z' while body 0 is held, and what falls below 0 when it no longer is: what more could be held."""
+        most = self._friction.holds_N
+        return self._clamped.under(*forces), _event(lambda t, z: most - abs(self._other_forces(t, z, forces)))
+
+    def _other_forces(self, t: float, z: np.ndarray, forces: _Forces) -> float:
+        """All forces on body 0 but friction, N."""
+        pull, size = self._pull, len(z)
+        return float(pull[:size] @ z + pull[size] * forces.command + pull[size + 2] * forces.load_at(t))
+
+
+def _event(function: Callable[[float, np.ndarray], float]) -> Callable[[float, np.ndarray], float]:
+    """An event of ``solve_ivp`` that ends the motion where the function falls below 0."""
+    function.terminal, function.direction = True, -1.0  # pyright: ignore[reportFunctionMemberAccess]
+    return function

@@ -1,0 +1,65 @@
+"""The rates of a chain's states, and what all of its one-step methods share."""
+
+from __future__ import annotations
+
+from typing import Any, Protocol
+
+import numpy as np
+
+from haploop.plant.chain import Chain
+
+# One row for every state: a number, or an array of numbers.
+Rows = list[Any]
+
+
+class LinearRates:
+    """z' = A z + p of a chain of bodies, the zeros of A left out.
+
+    Args:
+        stuck: body 0 is held where it is.
+
+    Attributes:
+        matrix: A, shape (states, states), 1/s.
+        of_inputs: rates that a unit of command, friction and load bring, shape (3, states).
+        count: number of bodies: rows 0 ... count - 1 of z are lengths, the next as many their rates.
+    """
+
+    def __init__(self, chain: Chain, stuck: bool = False) -> None:
+        rates, size = chain.rates(stuck), len(chain.states)
+        self.matrix, self.count = rates[:, :size], chain.count
+        self.of_inputs = np.ascontiguousarray(rates[:, size:].T).astype(float)
+        rows = self.matrix.astype(float).tolist()
+        self._rows = [[(i, factor) for i, factor in enumerate(row) if factor] for row in rows]
+
+    def at(self, z: Rows, push: Rows) -> Rows:
+        """A z + p, term by term."""
+        rates = []
+        for row, rate in zip(self._rows, push, strict=True):
+            for i, factor in row:
+                rate = rate + factor * z[i]
+            rates.append(rate)
+        return rates
+
+
+class OneStep(Protocol):
+    """A method that goes from one plant step to the next by a formula."""
+
+    def step(self, z: Rows, begin: Rows, middle: Rows, end: Rows, /) -> Rows:
+        """z at the end of a plant step; the pushes are those at its beginning, middle and end."""
+        ...
+
+
+def moved(z: Rows, h: float, rates: Rows) -> Rows:
+    """z + h z'."""
+    return [a + h * rate for a, rate in zip(z, rates, strict=True)]
+
+
+def one_step_matrix(method: OneStep, size: int) -> np.ndarray:
+    """M of z+ = M z without inputs, shape (states, states): a method of linear rates is linear."""
+    still = [0.0] * size
+    return np.stack(method.step(list(np.eye(size)), still, still, still))
+
+
+def response_to(push: Rows, method: OneStep) -> Rows:
+    """z at the end of a plant step that began with none, under a push held over it."""
+    return method.step([0.0] * len(push), push, push, push)

@@ -1,0 +1,56 @@
+"""A small scene to be measured by ``haploop cost``, and ways to measure it."""
+
+from pathlib import Path
+from typing import Any
+
+from haploop.launch.scene_file import load as load_scene
+from haploop.tools.cost_grid import grid
+from haploop.tools.cost_points import outcome
+from haploop.tools.reference import Reference, statistics
+from haploop.tools.trajectory import trajectory
+
+SMOOTH = """
+title = "a spring drawn out"
+duration = 0.04
+diverged_beyond = 0.5
+[clock]
+integrator = "euler"
+plant_rate = 5000
+[device]
+mass = 0.02
+damping = 0.4
+[hand]
+stiffness = 400.0
+[hand.force]
+kind = "ramp"
+value = 1.0
+rise_time = 0.02
+"""
+
+
+def exact_reference(path: Path, _scene: dict[str, Any] | None = None) -> Reference:
+    """The exact method at 100 kHz, in the shape of a stored reference."""
+    scene = load_scene(path, ["clock.integrator=exact", "clock.plant_rate=100000"])
+    ran = trajectory(scene)
+    swings, verdict = statistics(scene, ran.x_m, ran.v_m_s), ran.summary["verdict"]
+    return Reference(path.stem, ran.x_m, ran.v_m_s, 1e-15, swings, True, "Exact at 100 kHz.", verdict)
+
+
+def outcomes(path: Path, methods: list[str], rates: list[int], reference: Reference | None = None) -> dict[Any, Any]:
+    """(method, rate) -> outcome, without a store."""
+    reference = reference or exact_reference(path)
+    return {(c.method, c.plant_rate): outcome(c, reference) for c in grid(path, methods, rates).candidates}
+
+
+def count_stages(counts):
+    """A stage that notes its name and how many measurements were announced and made."""
+
+    def stage(name, announced):
+        entry = counts.setdefault(name, {"announced": announced, "made": 0})
+
+        def advance():
+            entry["made"] += 1
+
+        return advance
+
+    return stage

@@ -1,0 +1,177 @@
+"""A measurement of ``haploop cost`` that is stopped and taken up again, and what is timed; never how long it took."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+from cost_makers import fake_cost
+from cost_scene import SMOOTH, count_stages, exact_reference
+
+from haploop.launch.scene_file import load as load_scene
+from haploop.tools import cost_measure, cost_times
+from haploop.tools.cost_data import CostFileError, Spread, load, save
+from haploop.tools.cost_grid import grid
+from haploop.tools.cost_measure import Measurement
+from haploop.tools.cost_store import Store
+
+
+@pytest.fixture
+def smooth(tmp_path: Path) -> Path:
+    """A scene file without anything that switches."""
+    path = tmp_path / "smooth.toml"
+    path.write_text(SMOOTH)
+    return path
+
+
+def test_a_finished_measurement_is_not_made_again(smooth, tmp_path, monkeypatch):
+    grids = [grid(smooth, ["exact", "rk4"], [5_000, 10_000])]
+    first, again = {}, {}
+    for counts in (first, again):
+        with Measurement(grids, tmp_path, 2, 0, exact_reference) as measurement:
+            measurement.errors(count_stages(counts))
+            measurement.times(count_stages(counts))
+            costs = measurement.cost(1e-6)
+        monkeypatch.setattr(cost_measure, "outcome", None)
+        monkeypatch.setattr(cost_times, "in_process_us", None)
+    assert [stage["made"] for stage in first.values()] == [5, 10]
+    assert again == {}
+    assert len(costs.scenes[0].points) == 5
+    assert all(point.us_per_tick for point in costs.scenes[0].points)
+    assert costs.scenes[0].advice.startswith("Cheapest within 1.00 µm of the reference: ")
+
+
+def test_what_was_stopped_goes_on_where_it_was_and_gives_a_cost_meanwhile(smooth, tmp_path, monkeypatch):
+    grids = [grid(smooth, ["exact", "rk4"], [5_000])]
+    timed = []
+
+    def interrupted(job):
+        if len(timed) == 4:
+            raise KeyboardInterrupt
+        timed.append(job.key)
+        return 1.0
+
+    # Nothing is timed here, so that each call stands for one measurement.
+    monkeypatch.setattr(cost_times, "in_process_us", interrupted)
+    monkeypatch.setattr(cost_times, "_warm", lambda *_: None)
+    with Measurement(grids, tmp_path, 3, 0, exact_reference) as measurement:
+        measurement.errors(count_stages({}))
+        with pytest.raises(KeyboardInterrupt):
+            measurement.times(count_stages({}))
+        partial = measurement.cost(1e-6)
+    assert len(partial.scenes[0].points) == 3
+    assert partial.scenes[0].advice == ""
+    monkeypatch.setattr(cost_times, "in_process_us", lambda job: timed.append(job.key) or 1.0)
+    with Measurement(grids, tmp_path, 3, 0, exact_reference) as measurement:
+        measurement.times(count_stages({}))
+        assert measurement.cost(1e-6).scenes[0].advice
+    assert sorted(timed) == sorted(3 * list(dict.fromkeys(timed)))
+    assert len(timed) == 9
+
+
+def test_every_round_times_every_candidate_once_in_an_order_of_its_own(smooth, tmp_path, monkeypatch):
+    order = []
+    monkeypatch.setattr(cost_times, "in_process_us", lambda job: order.append(job.key) or 1.0)
+    monkeypatch.setattr(cost_times, "_warm", lambda *_: None)
+    with Measurement([grid(smooth, ["euler"], [1_000, 2_000, 5_000, 10_000])], tmp_path, 5, 0, exact_reference) as made:
+        made.errors(count_stages({}))
+        made.times(count_stages({}))
+    rounds = [tuple(order[i : i + 4]) for i in range(0, 20, 4)]
+    assert all(len(set(keys)) == 4 for keys in rounds)
+    assert len(set(rounds)) > 1
+
+
+def test_another_scene_or_another_source_is_measured_anew(smooth, tmp_path, monkeypatch):
+    def made():
+        counts = {}
+        with Measurement([grid(smooth, ["euler"], [5_000])], tmp_path, 1, 0, exact_reference) as measurement:
+            measurement.errors(count_stages(counts))
+        return sum(stage["made"] for stage in counts.values())
+
+    assert [made(), made()] == [1, 0]
+    smooth.write_text(SMOOTH.replace("damping = 0.4", "damping = 0.5"))
+    assert [made(), made()] == [1, 0]
+    monkeypatch.setattr(cost_measure, "_sources", lambda: "edited")
+    assert [made(), made()] == [1, 0]
+
+
+def test_a_line_cut_off_by_a_kill_is_measured_again(smooth, tmp_path):
+    grids = [grid(smooth, ["euler"], [5_000, 10_000])]
+
+    def made():
+        counts = {}
+        with Measurement(grids, tmp_path, 1, 0, exact_reference) as measurement:
+            measurement.errors(count_stages(counts))
+        return sum(stage["made"] for stage in counts.values())
+
+    assert made() == 2
+    file = tmp_path / "points.jsonl"
+    file.write_text(file.read_text()[:-20])
+    assert [made(), made()] == [1, 0]
+    assert json.loads(file.read_text().splitlines()[-1])["what"] == "outcome"
+
+
+def test_a_store_passes_over_what_was_cut_off_and_what_is_no_record(tmp_path):
+    file = tmp_path / "points.jsonl"
+    with Store(tmp_path) as store:
+        store.add("us", "a", 1.0)
+        store.add("us", "a", 2.0, repeat=2)
+    file.write_text(file.read_text() + '{"what": "us"}\n[1]\n{"what": "us", "key": "b", "rep')
+    with Store(tmp_path) as store:
+        assert not store.has("us", "b")
+        store.add("us", "b", None)
+    with Store(tmp_path) as store:
+        assert store.has("us", "b")
+        assert store.all("us", "a", 5) == [1.0, 2.0]
+        assert store.all("us", "a", 2) == [1.0]
+
+
+def test_runs_as_processes_are_timed_too(smooth, tmp_path):
+    with Measurement([grid(smooth, ["euler"], [5_000])], tmp_path, 1, 1, exact_reference) as measurement:
+        measurement.errors(count_stages({}))
+        measurement.times(count_stages({}))
+        point: Any = measurement.cost(1e-6).scenes[0].points[0]
+    assert point.us_per_tick.median > 0
+    assert point.processes_us_per_tick.median > 0
+    assert point.instructions_per_tick > 100
+
+
+def test_a_failure_is_timed_in_one_process_but_not_as_processes(smooth, tmp_path):
+    """It is let go on far beyond where it failed; one that the check refuses has no time."""
+    smooth.write_text(SMOOTH.replace("stiffness = 400.0", "stiffness = 400000.0"))
+    with Measurement([grid(smooth, ["euler"], [1_000, 1_500])], tmp_path, 1, 1, exact_reference) as measurement:
+        measurement.errors(count_stages({}))
+        measurement.times(count_stages({}))
+        points: dict[int, Any] = {p.plant_rate: p for p in measurement.cost(1e-6).scenes[0].points}
+    assert points[1_000].failure
+    assert points[1_000].us_per_tick.median > 0
+    assert points[1_000].processes_us_per_tick is None
+    assert points[1_500].us_per_tick is None
+    assert points[1_500].instructions_per_tick is None
+
+
+@pytest.mark.parametrize(("ticks", "beyond_m", "timed"), [(300, 1.0, 200), (80, 1.0, 80), (300, 1e-6, 2)])
+def test_the_first_block_of_a_longer_run_is_not_timed(smooth, ticks, beyond_m, timed, monkeypatch):
+    """With a clock that says one second each time, the time of a tick tells how many ticks were counted.
+
+    At rest under 50 N/s, 20 g are 0.4 um away after 1 ms and 3.3 um after 2 ms: a limit of 1 um leaves two ticks.
+    """
+    monkeypatch.setattr(cost_times, "timed_s", lambda work: work() or 1.0)
+    scene = load_scene(smooth, [f"duration={ticks / 1000}", f"diverged_beyond={beyond_m}", "clock.integrator=exact"])
+    us: Any = cost_times.loop_us(scene)
+    assert 1e6 / us == pytest.approx(timed)
+
+
+def test_cost_json_is_read_back_as_it_was_and_another_file_is_refused(tmp_path):
+    save(fake_cost(), tmp_path)
+    assert load(tmp_path) == fake_cost()
+    (tmp_path / "cost.json").write_text('{"machine": 1}')
+    with pytest.raises(CostFileError, match=r"no cost\.json of this version"):
+        load(tmp_path)
+    with pytest.raises(CostFileError, match="haploop cost --out"):
+        load(tmp_path / "nowhere")
+
+
+def test_median_and_quartiles_of_few_and_many():
+    assert Spread.of([3.0]) == Spread(3.0, 3.0, 3.0)
+    assert Spread.of([1.0, 2.0, 3.0, 4.0, 100.0]) == Spread(3.0, 2.0, 4.0)

@@ -1,0 +1,250 @@
+"""The other prices: what is measured, counted, kept, put into words and drawn.
+
+No test looks at how long anything took.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import pytest
+from cost_makers import fake_cost
+from scene_makers import KINDS, scene
+from test_figure import artists
+
+from haploop.controller.controller import Controller
+from haploop.launch.in_process import run_in_process
+from haploop.launch.plan import effects_of
+from haploop.launch.scene_file import load
+from haploop.tools import price_jobs, prices, prices_figure
+from haploop.tools.ablation import AGAIN, NONE, WHOLE, ablations
+from haploop.tools.cost_store import Store
+from haploop.tools.cost_times import IN_PROCESS, PROCESSES
+from haploop.tools.figure_data import FigureError
+from haploop.tools.one_tick import OneTickMap
+from haploop.tools.operations import Operations
+from haploop.tools.price_data import PriceGroup, as_data, chance_in, price, price_groups
+from haploop.tools.stiffness_limit import StiffnessLimit
+
+SCENES = Path(__file__).parents[1] / "launch/scenes"
+
+
+def test_an_ablation_leaves_out_each_effect_once_and_in_the_end_all() -> None:
+    everything = load(SCENES / "all_effects.toml")
+    named = [effect.name for effect in effects_of(everything)]
+    parts = ablations(everything)
+    assert list(parts) == [WHOLE, AGAIN, *named, NONE]
+    assert parts[WHOLE] == parts[AGAIN] == everything
+    for name in named:
+        assert name not in {effect.name for effect in effects_of(parts[name])}
+    assert not effects_of(parts[NONE])
+
+
+def test_ratio_and_cost_are_against_the_baseline_and_of_an_effect_what_it_saves() -> None:
+    base = price("none", [9.0, 10.0, 11.0], None, "")
+    assert (base.ratio, base.costs, base.time.median) == (1.0, 0.0, 10.0)
+    assert (base.time.q1, base.time.q3) == (9.5, 10.5)
+    dear, left_out = (price("x", [4.0], base.time, "", is_left_out=out) for out in (False, True))
+    assert (dear.ratio, dear.costs) == (0.4, -6.0)
+    assert (left_out.ratio, left_out.costs) == (0.4, 6.0)
+
+
+def test_chance_is_the_distance_of_two_equal_runs_or_of_the_quartiles() -> None:
+    base = price(WHOLE, [9.0, 10.0, 11.0], None, "")
+    for again, expected in ((10.1, 1.0), (13.0, 3.0)):
+        both = [base, price(AGAIN, [again], base.time, "", is_left_out=True)]
+        assert chance_in(PriceGroup("effects", "", "", 3, "", both)) == expected
+
+
+def test_groups_survive_cost_json() -> None:
+    limit = StiffnessLimit(220.0, "steady", "limit-cycle")
+    group = PriceGroup("delay", "Delay", "µs per tick", 3, "how", [price("0 ms", [1.0], None, "", stiffness=limit)])
+    made = fake_cost()
+    made.prices.extend(as_data([group]))
+    assert price_groups(made) == [group]
+
+
+@pytest.fixture(scope="module")
+def jobs() -> price_jobs.Jobs:
+    return price_jobs.price_jobs(SCENES, [])
+
+
+def test_each_group_has_its_jobs_baseline_first(jobs: price_jobs.Jobs) -> None:
+    effects = [effect.name for effect in effects_of(load(SCENES / "all_effects.toml"))]
+    assert {group: list(members) for group, members in jobs.items()} == {
+        "books": ["without", "with"],
+        "log": ["none", "ticks", "steps"],
+        "effects": [WHOLE, AGAIN, *effects, NONE],
+        "processes": ["one process", "three processes"],
+        "delay": ["0 ms", "1 ms", "2 ms", "5 ms", "10 ms"],
+        "control rate": ["1 kHz", "0.5 kHz", "2 kHz", "5 kHz", "10 kHz"],
+    }
+
+
+def test_what_is_the_same_run_is_timed_once_and_nothing_else_is(jobs: price_jobs.Jobs) -> None:
+    assert jobs["books"]["with"].key == jobs["processes"]["one process"].key == jobs["control rate"]["1 kHz"].key
+    assert jobs["log"]["none"].key == jobs["processes"]["three processes"].key
+    assert jobs["log"]["steps"].key == jobs["delay"]["0 ms"].key
+    every = [job.key for members in jobs.values() for job in members.values()]
+    assert len(every) - len(set(every)) == 4
+
+
+def test_stiffness_falls_with_delay_and_grows_with_control_rate(jobs: price_jobs.Jobs) -> None:
+    def limits(group: str) -> list[float]:
+        return [OneTickMap.of(job.scene).stiffness_limit() for job in jobs[group].values()]
+
+    delays = limits("delay")
+    assert delays == sorted(delays, reverse=True)
+    one, half, two, five, ten = limits("control rate")
+    assert half < one < two < five < ten
+    assert ten / one == pytest.approx(10.0, rel=0.01)
+
+
+def test_without_books_plant_and_controller_do_just_what_they_do_in_a_run(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The same samples are answered by the same commands, every one of them."""
+    made = scene(
+        duration=0.3,
+        device={"mass": 0.02, "damping": 0.1, "velocity": -0.3},
+        wall={"position": -0.01, "stiffness": 300.0},
+    )
+    answered: dict[str, list[Any]] = {}
+
+    def spy(where: str) -> type:
+        class Spy(Controller):
+            def answer(self, samples: Any) -> list[float]:
+                forces = super().answer(samples)
+                answered.setdefault(where, []).extend(zip(samples, forces, strict=True))
+                return forces
+
+        return Spy
+
+    monkeypatch.setattr(price_jobs, "Controller", spy("bare"))
+    monkeypatch.setattr("haploop.launch.in_process.Controller", spy("run"))
+    price_jobs.bare_us(made)
+    run_in_process(made, KINDS)
+    assert answered["bare"] == answered["run"]
+    assert len(answered["run"]) == 300
+
+
+class Measuring:
+    """Prices in a directory, with clocks that are counted and not read."""
+
+    def __init__(self, directory: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.directory, self.runs, self.stop_after = directory, 0, math.inf
+        limit = StiffnessLimit(100.0, "steady", "limit-cycle")
+        monkeypatch.setattr(prices, "stiffness_limit", lambda scene, kinds: limit)
+        monkeypatch.setattr(prices, "operations", lambda scene, kinds: Operations(400, 100, 1))
+        monkeypatch.setattr(price_jobs, "loop_us", lambda scene: self.clock(5.0))
+        monkeypatch.setattr(price_jobs, "bare_us", lambda scene: self.clock(4.0))
+        monkeypatch.setattr(price_jobs, "run_us", lambda path, overrides, ticks: self.clock(40.0))
+
+    def clock(self, us: float) -> float | None:
+        if self.runs >= self.stop_after:
+            raise KeyboardInterrupt
+        self.runs += 1
+        return us
+
+    def measure(self, processes_repeats: int = 2) -> list[PriceGroup]:
+        with Store(self.directory) as store:
+            measured = prices.Prices(SCENES, store, {IN_PROCESS: 3, PROCESSES: processes_repeats})
+            measured.measure(lambda name, count: lambda: None)
+            return measured.groups()
+
+
+@pytest.fixture
+def measuring(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Measuring:
+    return Measuring(tmp_path, monkeypatch)
+
+
+def test_all_groups_are_measured_and_a_second_time_nothing_is(measuring: Measuring) -> None:
+    groups = measuring.measure()
+    assert [group.name for group in groups] == ["books", "log", "effects", "processes", "delay", "control rate"]
+    books = groups[0]
+    assert [p.ratio for p in books.prices] == [1.0, 1.25]
+    assert [group.repeats for group in groups] == [3, 2, 3, 2, 2, 3]
+    assert all(p.buys for group in groups for p in group.prices)
+    counted = {g.name for g in groups if all(p.instructions_per_tick for p in g.prices)}
+    assert counted == {"effects", "delay", "control rate"}
+    limited = {group.name for group in groups if all(p.stiffness for p in group.prices)}
+    assert limited == {"delay", "control rate"}
+    five_kHz = next(p for p in groups[5].prices if p.what == "5 kHz")
+    assert five_kHz.time.median == 25.0  # ms for a second of 5000 ticks at 5 us
+    runs = measuring.runs
+    assert measuring.measure() == groups
+    assert measuring.runs == runs
+
+
+def test_a_measurement_that_was_stopped_goes_on_where_it_was(measuring: Measuring, tmp_path: Path) -> None:
+    """In the end every record is there once, as if it had not been stopped."""
+    measuring.stop_after = 30
+    with pytest.raises(KeyboardInterrupt):
+        measuring.measure()
+    assert 0 < len(records(tmp_path)) < 80
+    measuring.stop_after = math.inf
+    groups = measuring.measure()
+    measuring.directory = tmp_path / "at once"
+    measuring.directory.mkdir()
+    assert measuring.measure() == groups
+    stopped, at_once = records(tmp_path), records(tmp_path / "at once")
+    assert len(stopped) == len(set(stopped))
+    assert set(stopped) == set(at_once)
+
+
+def records(directory: Path) -> list[tuple[str, str, int]]:
+    """What is kept, without what says how quiet the machine was."""
+    lines = map(json.loads, (directory / "points.jsonl").read_text().splitlines())
+    return [(line["what"], line["key"], line["repeat"]) for line in lines if line["what"] != "quiet"]
+
+
+def test_without_processes_their_prices_are_left_out(measuring: Measuring) -> None:
+    assert [group.name for group in measuring.measure(0)] == ["books", "effects", "control rate"]
+
+
+def drawn() -> tuple[Any, list[PriceGroup]]:
+    steady, odd = StiffnessLimit(200.0, "steady", "limit-cycle"), StiffnessLimit(90.0, "limit-cycle", "limit-cycle")
+    base = price("1 kHz", [5.0, 6.0, 7.0], None, "", stiffness=steady)
+    slow = price("0.5 kHz", [3.0], base.time, "", stiffness=odd)
+    whole = price(WHOLE, [99.0, 100.0, 101.0], None, "", instructions_per_tick=500.0)
+    times = {AGAIN: 97.0, "loss": 98.0, "friction": 20.0, NONE: 10.0}
+    effects = [
+        price(what, [us], whole.time, "", is_left_out=True, instructions_per_tick=us) for what, us in times.items()
+    ]
+    logs = [price("none", [40.0], None, "")]
+    logs.append(price("steps", [80.0], logs[0].time, ""))
+    groups = [
+        PriceGroup("log", "What is logged", "µs per tick", 3, "how", logs),
+        PriceGroup("effects", "Each effect", "µs per tick", 3, "how", [whole, *effects]),
+        PriceGroup("control rate", "Control rate", "ms", 3, "how", [base, slow]),
+    ]
+    return prices_figure.figure_of(groups), groups
+
+
+def test_the_figure_has_a_bar_for_each_price_the_dearest_effect_first_and_chance_shaded() -> None:
+    figure, _ = drawn()
+    log, effects, _ = figure.axes
+    assert [bar.get_width() for bar in log.patches] == [40.0, 80.0]
+    assert [text.get_text() for text in artists(log, "value")] == ["40.0, 1.00 ×", "80.0, 2.00 ×"]
+    assert [label.get_text() for label in effects.get_yticklabels()] == ["friction", "loss"]
+    (band,) = artists(effects, "chance")
+    assert band.get_extents().transformed(effects.transData.inverted()).intervalx.tolist() == pytest.approx([-3.0, 3.0])
+    bars = [bar for bar in effects.patches if bar is not band]
+    assert [bar.get_width() for bar in bars] == [80.0, 2.0]
+    assert bars[0].get_facecolor() != bars[1].get_facecolor()
+
+
+def test_the_figure_draws_stiffness_against_time_and_what_runs_did_not_confirm_hollow() -> None:
+    figure, _ = drawn()
+    curve = figure.axes[2]
+    (confirmed,), (hollow,) = artists(curve, "confirmed"), artists(curve, "not confirmed")
+    assert (confirmed.get_xdata()[0], confirmed.get_ydata()[0]) == (6.0, 200.0)
+    assert (hollow.get_xdata()[0], hollow.get_ydata()[0]) == (3.0, 90.0)
+    assert hollow.get_markerfacecolor() == "white"
+    assert {label.get_text() for label in artists(curve, "rate")} == {"1 kHz", "0.5 kHz"}
+
+
+def test_without_prices_there_is_nothing_to_draw(tmp_path: Path) -> None:
+    with pytest.raises(FigureError, match="nothing to draw"):
+        prices_figure.draw(fake_cost(), tmp_path / "prices.png")

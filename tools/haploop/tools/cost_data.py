@@ -1,0 +1,193 @@
+"""What accuracy costs, as ``haploop cost`` measured it: the contents of cost.json."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+import statistics
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+COST_FILE = "cost.json"
+# A machine on which nothing else runs: the calibration loop varies less, and no second process waits for a core.
+QUIET_SPREAD, QUIET_LOAD = 0.05, 1.5
+
+
+class CostFileError(ValueError):
+    """A cost.json that cannot be read."""
+
+
+@dataclass(frozen=True)
+class Spread:
+    """Repeated measurements of one time: median and quartiles, in the unit that the name of the entry gives."""
+
+    median: float
+    q1: float
+    q3: float
+
+    @classmethod
+    def of(cls, values: Sequence[float]) -> Spread:
+        """Of at least one value."""
+        if len(values) == 1:
+            return cls(values[0], values[0], values[0])
+        q1, median, q3 = statistics.quantiles(values, n=4, method="inclusive")
+        return cls(median, q1, q3)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Errors:
+    """How far a run is from its reference.
+
+    Where the reference is pointwise the positions at the ticks and at the end are compared, and the relative entries
+    are None; where it is not, it is the other way round.
+
+    Attributes:
+        final_m, rms_m, max_m: of x - x_ref: at the end, root mean square over the ticks, largest.
+        amplitude, frequency, energy_per_cycle: relative errors of the swings, >= 0.
+        amplitude_m: absolute error of the amplitude.
+        residual: energy residual over the energy moved in total.
+        verdict: the run's own.
+        verdict_right: whether it is the reference's.
+    """
+
+    final_m: float | None = None
+    rms_m: float | None = None
+    max_m: float | None = None
+    amplitude: float | None = None
+    frequency: float | None = None
+    energy_per_cycle: float | None = None
+    amplitude_m: float | None = None
+    residual: float | None = None
+    verdict: str
+    verdict_right: bool
+
+    @property
+    def size_m(self) -> float:
+        """The one number in metres that is drawn and held against a tolerance: rms_m, else amplitude_m; inf if none."""
+        size = self.rms_m if self.rms_m is not None else self.amplitude_m
+        return math.inf if size is None else size
+
+
+@dataclass(frozen=True)
+class Point:
+    """One method at one plant rate.
+
+    Attributes:
+        method: ``clock.integrator``.
+        plant_rate: Hz.
+        error: None where the run failed.
+        failure: why there is no error, as a sentence; None where there is one.
+        us_per_tick: time of a simulated tick in one process, books on, no log; of a run that diverged, of the ticks it
+            has until its numbers are too large. None for a scene refused by the check.
+        processes_us_per_tick: end to end as processes, every plant step logged; None where it was not measured, as for
+            failures.
+        instructions_per_tick: bytecode instructions of plant and controller.
+    """
+
+    method: str
+    plant_rate: int
+    error: Errors | None
+    failure: str | None
+    us_per_tick: Spread | None = None
+    processes_us_per_tick: Spread | None = None
+    instructions_per_tick: float | None = None
+
+
+@dataclass(frozen=True)
+class ReferenceNote:
+    """What the errors are against: how it was made, its own uncertainty, and whether positions can be compared."""
+
+    how: str
+    error_m: float
+    pointwise: bool
+    verdict: str
+
+
+@dataclass(frozen=True)
+class SceneCost:
+    """Every point of one scene.
+
+    Attributes:
+        own_method, own_rate: what the scene itself names.
+        ticks: in a run.
+        advice: one sentence.
+    """
+
+    name: str
+    title: str
+    own_method: str
+    own_rate: int
+    ticks: int
+    reference: ReferenceNote
+    points: list[Point]
+    advice: str = ""
+
+
+@dataclass(frozen=True)
+class Load:
+    """How quiet the machine was while times were taken.
+
+    Attributes:
+        average: median of the one-minute load averages seen, this program's own share included; None if unknown.
+        calibration_spread: (q3 - q1) / median of a fixed loop timed once a round.
+    """
+
+    average: float | None
+    calibration_spread: float
+
+    @property
+    def busy(self) -> bool:
+        """Whether something else seems to have run."""
+        return self.calibration_spread > QUIET_SPREAD or (self.average or 0.0) > QUIET_LOAD
+
+
+@dataclass(frozen=True)
+class Cost:
+    """All of cost.json.
+
+    Attributes:
+        load: None where no time was measured.
+        repeats, processes_repeats: of each time.
+        prices: the other prices of accuracy.
+    """
+
+    machine: str
+    versions: dict[str, str]
+    commit: str
+    repeats: int
+    processes_repeats: int
+    tolerance_m: float
+    load: Load | None
+    scenes: list[SceneCost]
+    prices: list[dict[str, Any]] = field(default_factory=list)
+
+
+def save(cost: Cost, directory: Path) -> Path:
+    """Write DIR/cost.json in one piece and return its path; numbers that are not finite become null."""
+    from haploop.logger.summary import write
+
+    path = directory / COST_FILE
+    write(dataclasses.asdict(cost), path)
+    return path
+
+
+def load(directory: Path) -> Cost:
+    """Read DIR/cost.json.
+
+    Raises:
+        CostFileError: there is none, or it is not one that ``haploop cost`` of this version wrote.
+    """
+    from pydantic import TypeAdapter, ValidationError
+
+    path = directory / COST_FILE
+    try:
+        return TypeAdapter(Cost).validate_python(json.loads(path.read_text(encoding="utf-8")))
+    except OSError as error:
+        raise CostFileError(
+            f"{path} could not be read: {error.strerror}. Run haploop cost --out {directory}."
+        ) from error
+    except (ValidationError, ValueError) as error:
+        raise CostFileError(f"{path} is no cost.json of this version: {error}") from error

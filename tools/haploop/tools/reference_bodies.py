@@ -1,0 +1,131 @@
+"""Device and hand as one linear system in as many digits as asked for, and its flow.
+
+Only for making references: it needs mpmath, and it is slow.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from mpmath import mp, mpf
+
+Row = list[Any]
+Matrix = list[Row]
+COMMAND, FRICTION, LOAD, SLOPE = -4, -3, -2, -1
+
+
+class Bodies:
+    """w' = A w, w = (positions, velocities, actuator's force, accelerometer's output; command, friction, load, slope).
+
+    [motor -cable-] tip [-grip- hand] - hand's spring - ground, in absolute coordinates (50 digits can afford that).
+    Load is tau + k_h rest and rises by its slope, N/s; command and friction are held. p' = 2 pi bandwidth (command - p)
+    and y' = 2 pi bandwidth (a - y); both are absent where the scene has no bandwidth.
+
+    Args:
+        scene: resolved, with any of its tables.
+
+    Attributes:
+        count: bodies.
+        free, stuck: A, with body 0 free, and held where it is.
+        force: the row of w that gives the force on body 0 without friction, N.
+        felt: by whether body 0 is stuck, the row of w that an accelerometer feels.
+        begin: w at t = 0, with nothing acting.
+    """
+
+    def __init__(self, scene: dict[str, Any]) -> None:
+        device, hand, cable = scene["device"], scene.get("hand", {}), scene.get("transmission")
+        grip, meter = hand.get("grip"), scene.get("accelerometer", {})
+        masses, ground, links = [mpf(device["mass"])], [mpf(device["damping"])], []
+        if cable:
+            masses.insert(0, mpf(cable["motor_mass"]))
+            ground.insert(0, mpf(cable["motor_damping"]))
+            links.append((cable["stiffness"], cable["damping"]))
+        tip = len(masses) - 1
+        if grip:
+            masses.append(mpf(0))
+            ground.append(mpf(0))
+            links.append((grip["stiffness"], grip["damping"]))
+        masses[-1] += mpf(hand.get("mass", 0.0))
+        ground[-1] += mpf(hand.get("damping", 0.0))
+        n = self.count = len(masses)
+        actuator, output = scene.get("actuator", {}).get("bandwidth"), meter.get("bandwidth")
+        size = 2 * n + bool(actuator) + bool(output) + 4
+        sensor = 0 if meter.get("mount") == "motor" else tip
+
+        forces = [[mpf(0)] * size for _ in masses]
+        for i, (stiffness, damping) in enumerate(links):
+            for body, sign in ((i, 1), (i + 1, -1)):
+                for state, value in ((i, stiffness), (n + i, damping)):
+                    forces[body][state] -= sign * mpf(value)
+                    forces[body][state + 1] += sign * mpf(value)
+        for body in range(n):
+            forces[body][n + body] -= ground[body]
+        forces[-1][n - 1] -= mpf(hand.get("stiffness", 0.0))
+        forces[-1][LOAD] += 1
+        forces[0][2 * n if actuator else COMMAND] += 1
+        self.force = forces[0].copy()
+        forces[0][FRICTION] += 1
+        free = [[entry / mass for entry in row] for row, mass in zip(forces, masses, strict=True)]
+        held = [[mpf(0)] * size, *free[1:]]
+        self.felt = {False: free[sensor], True: held[sensor]}
+
+        def rates(accelerations: Matrix, stuck: bool) -> Matrix:
+            moving = [[mpf(j == n + i and not (stuck and i == 0)) for j in range(size)] for i in range(n)]
+            rows = [*moving, *accelerations]
+            if actuator:
+                rate = 2 * mp.pi * mpf(actuator)
+                rows.append([rate * ((j == size + COMMAND) - (j == 2 * n)) for j in range(size)])
+            if output:
+                rate, y = 2 * mp.pi * mpf(output), len(rows)
+                rows.append([rate * (a - (j == y)) for j, a in enumerate(accelerations[sensor])])
+                self.felt = {mode: [mpf(j == y) for j in range(size)] for mode in (False, True)}
+            zero = [mpf(0)] * size
+            return [*rows, zero, zero, [mpf(j == size + SLOPE) for j in range(size)], zero]
+
+        self.free, self.stuck = rates(free, False), rates(held, True)
+        self.begin = [mpf(device["position"])] * n + [mpf(device["velocity"])] * n + [mpf(0)] * (size - 2 * n)
+
+
+class Flow:
+    """e^{A t} of one mode: over a fixed length by the matrix exponential, over any shorter one by its series.
+
+    Args:
+        rates: A.
+        length_s: the fixed length.
+    """
+
+    def __init__(self, rates: Matrix, length_s: Any) -> None:
+        self._rates = rates
+        self._over = mp.expm(mp.matrix(rates) * length_s).tolist()
+
+    def whole(self, w: Row) -> Row:
+        """w after the fixed length."""
+        return _times(self._over, w)
+
+    def part(self, w: Row, t: Any) -> Row:
+        """w after t, by its series sum (A t)^k w / k!, until the terms are below the last digit."""
+        total, term, order = list(w), list(w), 0
+        while any(abs(part) > mp.eps * mpf(1e-10) * abs(whole) for part, whole in zip(term, total, strict=True)):
+            order += 1
+            term = [entry * t / order for entry in _times(self._rates, term)]
+            total = [whole + part for whole, part in zip(total, term, strict=True)]
+        return total
+
+    def taylor(self, row: Row, terms: int) -> Matrix:
+        """Rows r_k = row A^k / k!: row . w(t) = sum r_k . w(0) t^k."""
+        columns, rows = [list(column) for column in zip(*self._rates, strict=True)], [row]
+        for order in range(1, terms):
+            rows.append([entry / order for entry in _times(columns, rows[-1])])
+        return rows
+
+
+def fastest_rate(bodies: Bodies) -> float:
+    """The largest magnitude of an eigenvalue of both modes, 1/s."""
+    both = (np.array([[float(entry) for entry in row] for row in rates]) for rates in (bodies.free, bodies.stuck))
+    return max(float(np.abs(np.linalg.eigvals(rates)).max()) for rates in both)
+
+
+def _times(rows: Matrix, w: Sequence[Any]) -> Row:
+    return [mp.fdot((a, b) for a, b in zip(row, w, strict=True) if a and b) for row in rows]

@@ -1,0 +1,60 @@
+"""A run in one process, of which the motion at ticks is kept beside the summary."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from haploop.controller.dissipation import registry
+from haploop.launch.in_process import Loop, scene_events
+from haploop.logger.keeper import Keeper
+from haploop.logger.logger import Logger
+from haploop.protocol.ticks import Timebase
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """Where body 0 was.
+
+    Attributes:
+        x_m, v_m_s: at every tick and at the end, shape (ticks + 1,); fewer where the run diverged.
+        summary: what a run's ``summary.json`` holds.
+    """
+
+    x_m: np.ndarray
+    v_m_s: np.ndarray
+    summary: dict[str, Any]
+
+
+class _Remembering(Logger):
+    """A logger that keeps what the plant reports at ticks."""
+
+    def __init__(self, scene: dict[str, Any], time: Timebase) -> None:
+        super().__init__(scene, time, None)
+        self.motion: list[np.ndarray] = []
+
+    def plant_block(self, block: dict[str, Any]) -> None:
+        columns = (np.frombuffer(block["columns"][name], "<f8") for name in ("x", "v"))
+        at_ticks = np.stack([column[:: self.time.steps_per_tick] for column in columns])
+        self.motion.append(at_ticks[:, 1 if self.motion else 0 :])
+        super().plant_block(block)
+
+
+def trajectory(scene: dict[str, Any]) -> Trajectory:
+    """Run a resolved scene of installed elements to its end; nothing is written.
+
+    Raises:
+        ElementError: an element raised, or gave something that is no number.
+        ArithmeticError: friction switched too often for the plant rate.
+    """
+    time = Timebase.of(scene["clock"], scene["duration"])
+    logger = _Remembering(scene, time)
+    loop = Loop(scene, time, registry(), Keeper(logger, None, None))
+    loop.schedule(scene_events(scene, time))
+    while loop.block():
+        pass
+    summary = loop.finish()
+    x, v = np.concatenate(logger.motion, axis=1)
+    return Trajectory(x, v, summary)
