@@ -35,7 +35,9 @@ def test_blocks_and_windows_of_any_size_give_the_same_summary_of_drawn_scenes(se
         assert in_blocks(scene, block_ticks, window_blocks) == usual
 
 
-@pytest.mark.parametrize("path", SCENES, ids=lambda path: path.stem)
+@pytest.mark.parametrize(
+    "path", [pytest.param(p, marks=[pytest.mark.slow] * (p.stem == "all_effects"), id=p.stem) for p in SCENES]
+)
 @pytest.mark.parametrize("delay", [13, *(pytest.param(d, marks=pytest.mark.slow) for d in (0, 3, 10, 20, 50))])
 def test_blocks_of_any_size_give_the_same_summary_of_every_shipped_scene(path, delay):
     scene = load(path, [f"clock.round_trip_delay={delay / 10_000}"])
