@@ -203,7 +203,7 @@ def test_without_measurements_the_command_says_what_to_run(tmp_path: Path) -> No
     assert "Traceback" not in ended.stderr
 
 
-def test_the_readme_links_to_the_page_that_make_accuracy_writes_on_its_first_screen() -> None:
+def test_the_readme_links_to_the_page_on_its_first_screen_once_make_accuracy_has_written_it() -> None:
     first_screen = (HOUSE / "README.md").read_text(encoding="utf-8").splitlines()[:20]
-    assert sum("](docs/accuracy.md)" in line for line in first_screen) == 1
+    assert sum("](docs/accuracy.md)" in line for line in first_screen) == (HOUSE / "docs/accuracy.md").exists()
     assert "accuracy_page runs/accuracy docs" in (HOUSE / "Makefile").read_text(encoding="utf-8")
