@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -12,7 +13,7 @@ from scipy.optimize import root_scalar
 
 
 @dataclass(frozen=True, kw_only=True)
-class OneTickMap:
+class OneTickMap(ABC):
     """A wall that is never left, with virtual damping, on a linear plant z' = A z + b u whose z[0] is sampled.
 
     z counts from the equilibrium. The command is u[k] = -K x[k] - B (x[k] - x[k-1]) / T. In interval k the command of
@@ -26,9 +27,9 @@ class OneTickMap:
     steps_per_tick: int = 10
     step_s: float = 1e-4
 
+    @abstractmethod
     def rates(self) -> tuple[np.ndarray, np.ndarray]:
         """A, shape (m, m), and b, shape (m,)."""
-        raise NotImplementedError
 
     @cached_property
     def _flows(self) -> tuple[np.ndarray, np.ndarray]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -30,7 +31,7 @@ class Interval(NamedTuple):
     at_ends: np.ndarray
 
 
-class ChainHistory:
+class ChainHistory(ABC):
     """Where a chain has come to, and its record; what moves it is written in what builds on this.
 
     Attributes:
@@ -78,9 +79,9 @@ class ChainHistory:
             first += count
         return Interval(states, lows, held, np.zeros((self._n, 2)))
 
+    @abstractmethod
     def advance(self, tick: int, holds: list[Hold]) -> None:
         """Move through interval ``tick`` under the forces held in it."""
-        raise NotImplementedError
 
     def _accept(self, tick: int, interval: Interval) -> None:
         """The interval went this way."""
