@@ -182,7 +182,7 @@ def cost(
     methods: Annotated[str | None, typer.Option(help="integrators, comma-separated [all]")] = None,
     out: Annotated[Path, typer.Option(help="directory; what it holds is not measured again")] = Path("runs/cost"),
     tolerance: Annotated[float, typer.Option(help="RMS error the advice is for, m")] = 1e-6,
-    repeats: Annotated[int, typer.Option(help="of each time in one process; as processes at most 3")] = 20,
+    repeats: Annotated[int, typer.Option(help="of each time")] = 20,
     processes: Annotated[bool, typer.Option("--processes/--no-processes", help="time runs as processes too")] = True,
     json: Json = False,
 ) -> None:

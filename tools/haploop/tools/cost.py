@@ -19,8 +19,6 @@ if TYPE_CHECKING:
     from haploop.tools.cost_grid import Grid
     from haploop.tools.cost_measure import Measurement, Stage
 
-_PROCESSES_REPEATS = 3
-
 
 @dataclass(frozen=True)
 class Request:
@@ -31,7 +29,7 @@ class Request:
         methods, rates: as comma-separated text, rates in Hz or with a k; every method when None.
         out: directory, made where missing; what it holds already is not measured again.
         tolerance_m: for the advice.
-        repeats: of each time in one process; as processes at most three.
+        repeats: of each time.
         processes: whether to time runs as processes at all.
     """
 
@@ -57,7 +55,7 @@ def cost(request: Request, as_json: bool) -> None:
             request.out.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             leave(f"The directory {request.out} cannot be used: {error.strerror}.", WRONG_USE)
-        times = min(_PROCESSES_REPEATS, request.repeats) if request.processes else 0
+        times = request.repeats if request.processes else 0
         with Measurement(grids, request.out, request.repeats, times) as measurement:
             interrupted = _measured(measurement, with_prices=not request.scenes)
             result = measurement.cost(request.tolerance_m)
