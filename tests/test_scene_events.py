@@ -36,7 +36,7 @@ def test_set_sees_the_element_that_is_there_at_its_time_whatever_the_order_in_th
     early = mass | {"at": 0.3}
     assert mistakes(**with_events(early, swap)) == [
         "event.0.set.dissipation.0.mass cannot be set. "
-        "Allowed at that time: wall.stiffness, wall.position, dissipation.0.damping."
+        "Allowed at that time: wall.stiffness, wall.position, clock.round_trip_delay, dissipation.0.damping."
     ]
 
 
@@ -79,7 +79,7 @@ def test_the_last_tick_still_sees_an_event():
 
 def test_a_wall_that_is_not_there_cannot_be_set():
     [mistake] = mistakes(event=[{"at": 0.5, "set": {"wall.stiffness": 1}}])
-    assert mistake.endswith("Allowed at that time: nothing, since the scene has neither a wall nor elements then.")
+    assert mistake.endswith("Allowed at that time: clock.round_trip_delay.")
 
 
 def test_a_live_event_is_checked_after_what_has_happened_and_before_what_is_to_come():

@@ -42,9 +42,11 @@ def books_along(scene: dict[str, Any], x: np.ndarray) -> tuple[dict[str, np.ndar
         "command": in_effect.astype(float),
     }
     logger = Logger(scene, time, None)
+    latest: dict[str, np.ndarray] = {}
+    logger.booked = lambda first, books: latest.update(books)
     logger.start({"tick": 0, "x": x[0], "v": 0.0, "force": 0.0}, [])
     blocks = {name: np.ascontiguousarray(column).tobytes() for name, column in columns.items()}
     logger.plant_block({"from_tick": 0, "ticks": time.ticks, "columns": blocks})
     for block in controller.recorder.take():
         logger.controller_block(block)
-    return logger.latest, energy(logger.books, [], "wall" in scene)
+    return latest, energy(logger.books, [], "wall" in scene)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from haploop.launch.check import resolve_event
 from haploop.launch.elements import swapped_in, try_out
+from haploop.launch.events import changed
 from haploop.protocol.ticks import Timebase
 
 if TYPE_CHECKING:
@@ -43,6 +44,7 @@ class Clock:
         until: ticks before this one are granted.
         end: tick at which the run ends.
         paused: whether time stands still on request.
+        pace: simulated seconds per wall second.
         events: every event of the run, scene's and live, (tick, event) in order.
     """
 
@@ -61,12 +63,15 @@ class Clock:
         for event in self._scene["event"]:
             self._insert(time.first_tick_at(event["at"]), event)
         self._pauses = [tick for tick, event in self.events if event.get("pause")]
-        self._pace = pace
         self._pace_from: float | None = None  # the first grant starts the pace
         self._pace_tick = 0
-        # Less than this is not worth a message.
-        self._least_ticks = 0 if math.isinf(pace) else math.floor(pace * AHEAD_S / 4 * time.control_rate)
+        self._set_pace(pace)
         self._ahead: deque[int] = deque()
+
+    def _set_pace(self, pace: float) -> None:
+        self.pace = pace
+        # Less than this is not worth a message.
+        self._least_ticks = 0 if math.isinf(pace) else math.floor(pace * AHEAD_S / 4 * self._time.control_rate)
 
     def _pace_anew(self, now: float) -> None:
         """Count the pace from wall time ``now`` (s) and from here on: what was waited is not made up for."""
@@ -92,17 +97,17 @@ class Clock:
         return self.until
 
     def _paced(self, now: float) -> int:
-        if math.isinf(self._pace):
+        if math.isinf(self.pace):
             return self.end
         if self._pace_from is None:
             self._pace_from = now
-        ahead = (now - self._pace_from) * self._pace + AHEAD_S * min(self._pace, 1.0)
+        ahead = (now - self._pace_from) * self.pace + AHEAD_S * min(self.pace, 1.0)
         allowed = self._pace_tick + max(1, math.floor(ahead * self._time.control_rate))
         return allowed if allowed >= self.until + self._least_ticks else self.until
 
     def wait_s(self, now: float) -> float | None:
         """How long until the pace lets time go on; None when it waits for something else."""
-        if math.isinf(self._pace) or self.paused or self.until >= self.end:
+        if math.isinf(self.pace) or self.paused or self.until >= self.end:
             return None
         return AHEAD_S / 4
 
@@ -189,6 +194,22 @@ class Clock:
         self._step_target = min(self.end, max(self.until, self._step_target or 0) + ticks)
         self._pace_anew(now)
         return self._step_target
+
+    def run_at(self, pace: float, now: float) -> int:
+        """Go on at another pace, in simulated seconds per wall second from ``now`` on; returns the tick.
+
+        Raises:
+            ClockError: the pace is no positive number.
+        """
+        if not pace > 0.0:
+            raise ClockError(f"A pace is a number above 0, or free, but {pace:g} was asked for.")
+        self._set_pace(pace)
+        self._pace_anew(now)
+        return self.until
+
+    def present(self) -> dict[str, Any]:
+        """The scene as it stands at the first tick not yet granted: everything that has taken effect done to it."""
+        return changed(self._scene, [event for tick, event in self.events if tick <= self.until])
 
     def stop(self) -> int:
         """End the run at the first tick not yet granted; returns it."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -10,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from haploop.controller.dissipation import ElementError, PluginError, load_plugin
 from haploop.launch.clock import Clock, ClockError
 from haploop.launch.mistakes import SceneError
+from haploop.launch.options import options
 from haploop.launch.output import OutputError, keep_plugin
 from haploop.launch.roster import Roster
 
@@ -17,6 +19,11 @@ if TYPE_CHECKING:
     from haploop.launch.supervisor import RunRequest
 
 Answer = tuple[bool, str, dict[str, Any]]
+
+
+def in_words(pace: float) -> float | str:
+    """A pace as people write it."""
+    return "free" if math.isinf(pace) else pace
 
 
 class Commands:
@@ -30,9 +37,11 @@ class Commands:
         self._rate = request.scene["clock"]["control_rate"]
         self._verbs = {
             "status": self._status,
+            "options": self._options,
             "pause": self._pause,
             "resume": self._resume,
             "step": self._step,
+            "pace": self._pace,
             "stop": self._stop,
             "swap": self._swap,
             "set": self._set,
@@ -65,12 +74,18 @@ class Commands:
             "end": clock.end,
             "control_rate": self._rate,
             "paused": clock.paused,
+            "pace": in_words(clock.pace),
             "nodes": roster.table(),
             "telemetry": {role: addresses["telemetry"] for role, addresses in roster.endpoints().items()},
             **({"status": logger.status} if logger else {}),
         }
         state = "paused" if clock.paused else "running"
         return f"{state} at {self._at(data['tick'])} of {clock.end}", data
+
+    def _options(self) -> tuple[str, dict[str, Any]]:
+        """What can be set and swapped in now: units, bounds, present values."""
+        data = options(self._clock.present(), self._request.kinds)
+        return f"{len(data['settable'])} keys can be set, {len(data['kinds'])} kinds swapped in", data
 
     def _pause(self) -> tuple[str, dict[str, Any]]:
         tick = self._clock.pause()
@@ -88,6 +103,14 @@ class Commands:
         self._clock.note({"step": ticks})
         tick = self._clock.step(ticks, time.monotonic())
         return f"stepping to {self._at(tick)}", {"tick": tick}
+
+    def _pace(self, pace: float | str) -> tuple[str, dict[str, Any]]:
+        rate = math.inf if pace == "free" else pace
+        if isinstance(rate, bool) or not isinstance(rate, int | float):
+            raise ClockError(f"A pace is a number above 0, or free, but {pace!r} was asked for.")
+        tick = self._clock.run_at(rate, time.monotonic())
+        self._clock.note({"pace": in_words(rate)})
+        return f"pace {in_words(rate)} from {self._at(tick)} on", {"tick": tick}
 
     def _stop(self) -> tuple[str, dict[str, Any]]:
         tick = self._clock.stop()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
 from pydantic_core import PydanticCustomError
@@ -10,8 +10,8 @@ from pydantic_core import PydanticCustomError
 from haploop.launch.layers import KeyPath, Layers
 from haploop.launch.mistakes import counted, nearest
 from haploop.launch.number import Number
-from haploop.launch.scene import EventTable, Wall, number_of
-from haploop.protocol.ticks import Timebase
+from haploop.launch.scene import Clock, EventTable, Wall, number_of
+from haploop.protocol.ticks import DELAY, Timebase, whole_count
 
 if TYPE_CHECKING:
     from haploop.controller.dissipation import Element
@@ -41,11 +41,11 @@ def check_events(
         if isinstance(event.get("swap"), dict):
             _swap(layers, key, event, slots)
         if isinstance(event.get("set"), dict):
-            settable = _settable(slots, has_wall, kinds)
+            settable = settable_keys(slots, has_wall, kinds)
             settings[index] = {
                 name: value
                 for name, given in event["set"].items()
-                if (value := _setting(layers, (*key, "set", name), given, settable)) is not None
+                if (value := _setting(layers, (*key, "set", name), given, settable, time)) is not None
             }
     return settings
 
@@ -74,8 +74,8 @@ def _swap(layers: Layers, key: KeyPath, event: dict[str, Any], slots: list[Any])
         layers.complain((*key, "element"), expected, f"is {element}")
 
 
-def _settable(slots: list[Any], has_wall: bool, kinds: Mapping[str, type[Element]]) -> dict[str, Number]:
-    """Every key that can be set at this moment of the run, and how its value is read."""
+def settable_keys(slots: list[Any], has_wall: bool, kinds: Mapping[str, type[Element]]) -> dict[str, Number]:
+    """Every key that can be set at a moment of the run when these kinds are at work, and how its value is read."""
     wall = {f"wall.{name}": number_of(Wall, name) for name in SETTABLE_OF_WALL if has_wall}
     elements = {
         f"dissipation.{slot}.{name}": Number(quantity)
@@ -83,10 +83,12 @@ def _settable(slots: list[Any], has_wall: bool, kinds: Mapping[str, type[Element
         if isinstance(kind, str) and kind in kinds
         for name, (quantity, _) in kinds[kind].parameters().items()
     }
-    return wall | elements
+    return wall | {DELAY: number_of(Clock, "round_trip_delay")} | elements
 
 
-def _setting(layers: Layers, key: KeyPath, given: Any, settable: dict[str, Number]) -> float | None:
+def _setting(
+    layers: Layers, key: KeyPath, given: Any, settable: dict[str, Number], time: Timebase | None
+) -> float | None:
     name = str(key[-1])
     if isinstance(given, dict):
         layers.complain(
@@ -95,14 +97,36 @@ def _setting(layers: Layers, key: KeyPath, given: Any, settable: dict[str, Numbe
             "is a table",
         )
     elif name not in settable:
-        allowed = ", ".join(settable) or "nothing, since the scene has neither a wall nor elements then"
-        layers.complain(key, f"Allowed at that time: {allowed}.", "cannot be set", _nearest_key(name, settable))
+        expected = f"Allowed at that time: {', '.join(settable)}."
+        layers.complain(key, expected, "cannot be set", _nearest_key(name, settable))
     else:
         try:
-            return settable[name].read(given)
+            value = settable[name].read(given)
         except PydanticCustomError as error:
             layers.complain(key, error.message())
+            return None
+        if name == DELAY and time:
+            complaints: list[str] = []
+            whole_count(value, time.plant_rate, "It", "plant steps", complaints)
+            for sentence in complaints:
+                layers.complain(key, sentence)
+        return value
     return None
+
+
+def changed(scene: dict[str, Any], events: Iterable[dict[str, Any]]) -> dict[str, Any]:
+    """A resolved scene after these resolved events, in order: elements swapped, values set."""
+    now = {**scene, "clock": dict(scene["clock"]), "dissipation": [dict(e) for e in scene.get("dissipation", [])]}
+    now |= {"wall": dict(scene["wall"])} if "wall" in scene else {}
+    for event in events:
+        if "swap" in event:
+            index, table = event["element"], event["swap"]
+            now["dissipation"][index : index + 1] = [] if table["kind"] == NO_ELEMENT else [dict(table)]
+        for key, value in event.get("set", {}).items():
+            table, _, name = key.rpartition(".")
+            place, _, index = table.partition(".")
+            (now[place][int(index)] if index else now[place])[name] = value
+    return now
 
 
 def _nearest_key(name: str, settable: dict[str, Number]) -> str | None:

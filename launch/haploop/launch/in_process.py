@@ -85,6 +85,7 @@ class Loop:
             self._keeper.logger.event(tick, event)
             if "swap" in event or "set" in event:
                 self._controller.schedule(tick, event)
+                self._plant.schedule(tick, event)
             elif event.get("stop"):
                 self._end = min(self._end, tick)
 

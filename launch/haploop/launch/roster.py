@@ -84,7 +84,7 @@ class Roster:
             node.heard += seconds
 
     def table(self) -> list[dict[str, Any]]:
-        """For people: role, pid, tick, how far behind the first, whom it waits for."""
+        """For people: role, pid, tick, how far behind the first, whom it waits for, ticks it skipped."""
         first = max((node.tick for node in self.nodes.values()), default=0)
         return [
             {
@@ -94,6 +94,7 @@ class Roster:
                 "behind_ticks": first - node.tick,
                 "waits_for": node.waits_for,
                 "lossless": node.lossless or node.is_own,
+                "skipped_ticks": node.status.get("skipped_ticks", 0),
             }
             for node in self.nodes.values()
         ]

@@ -34,6 +34,8 @@ def _set(path: list[str], value: float, tick: int, slots: Slots, wall: Wall) -> 
     match path:
         case ["wall", "stiffness" | "position" as name]:
             setattr(wall, name, value)
+        case ["clock", "round_trip_delay"]:
+            pass  # the plant's to do
         case ["dissipation", index, name]:
             slots.set_parameter(int(index), name, value, tick)
         case _:

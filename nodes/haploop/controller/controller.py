@@ -12,7 +12,7 @@ from haploop.controller.estimators import Sample, estimators
 from haploop.controller.recorder import MOTION_COLUMNS, Recorder
 from haploop.controller.slots import Slots
 from haploop.controller.wall import NoWall, Wall
-from haploop.protocol.ticks import Timebase
+from haploop.protocol.ticks import DELAY, Timebase
 
 
 class Controller:
@@ -26,7 +26,7 @@ class Controller:
     """
 
     def __init__(self, scene: dict[str, Any], time: Timebase, kinds: dict[str, type[Element]]) -> None:
-        self._kinds = dict(kinds)
+        self._kinds, self._control_rate = dict(kinds), time.control_rate
         self._start_estimates = estimators(scene, time.period_s)
         self._wall = Wall(scene["wall"]) if "wall" in scene else NoWall()
         self._slots = Slots(scene.get("dissipation", []), self._kinds)
@@ -38,6 +38,8 @@ class Controller:
 
     def schedule(self, tick: int, change: Change) -> None:
         """Have a checked swap or set take effect at ``tick``, before that tick's force."""
+        if DELAY in (values := change.get("set", {})):
+            self.recorder.cover(math.ceil(values[DELAY] * self._control_rate) + 2)
         self._changes.append((tick, change))
         self._next_change = self._changes[0][0]
 

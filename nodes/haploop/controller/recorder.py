@@ -54,6 +54,10 @@ class Recorder:
         """Whether every tick so far has been taken."""
         return not self._rows and not self._cut
 
+    def cover(self, ticks: int) -> None:
+        """Keep a history of at least so many ticks from now on."""
+        self._history_ticks = max(self._history_ticks, ticks)
+
     def cut(self) -> None:
         """End the present block."""
         width = len(self._names)

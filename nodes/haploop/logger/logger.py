@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import time as wall_clock
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -30,7 +31,7 @@ class Logger:
     Attributes:
         time: the integers of the run.
         tick: every interval before it is booked.
-        latest: running books at the ticks booked last, name -> array; with ``latest_from`` the first of them.
+        booked: called with the first of some ticks and the running books at each, name -> array, once they are booked.
     """
 
     def __init__(self, scene: dict[str, Any], time: Timebase, channels: Channels | None) -> None:
@@ -43,8 +44,8 @@ class Logger:
         self._events: list[tuple[int, dict[str, Any]]] = []
         self._counted: dict[str, int] = {}
         self._digest = hashlib.sha256()
-        self.latest: dict[str, np.ndarray] = {}
-        self.latest_from = self.tick = self._first_tick = 0
+        self.booked: Callable[[int, dict[str, np.ndarray]], object] = lambda first, books: None
+        self.tick = self._first_tick = 0
 
     def start(self, plant: dict[str, float], history: list[Block]) -> None:
         """Begin with the plant's state and, when joining a run, the controller's last blocks."""
@@ -120,12 +121,13 @@ class Logger:
         for name in plant.keys() & TALLIES:
             self._counted[name] = self._counted.get(name, 0) + int(plant[name][-1] - plant[name][0])
         motion = motion_columns(plant)
+        first, books = self.tick, self._named(rows)
         self._end_state = {name: column[-1:] for name, column in motion.items()}
-        self.latest_from, self.latest = self.tick, self._named(rows)
         if self._channels:
             self._channels.plant(self.tick, end - self.tick, motion)
-            self._channels.energy(self.latest_from, self.latest)
+            self._channels.energy(first, books)
         self.tick = end
+        self.booked(first, books)
         self._controller.forget_before(end, int(plant["command"][-1]))
         self._log_events()
 
@@ -188,11 +190,15 @@ class Logger:
         """Where the run is and how it looks, for progress lines and viewers."""
         if not self.tick - self._first_tick:
             return {}
+        verdict, figures = self.window.verdict(None), self.window.figures()
         return {
             "t_s": self.tick / self.time.control_rate,
-            "verdict": self.window.verdict(None).word,
-            "oscillation_m": self.window.figures()["oscillation_m"],
+            "verdict": verdict.word,
+            "verdict_rule": verdict.rule,
+            "oscillation_m": figures["oscillation_m"],
+            "displayed_stiffness_N_m": figures["displayed_stiffness_N_m"],
             "residual_J": self.books.residual_J,
+            "moved_J": self.books.moved_J,
         }
 
     def end(self) -> None:

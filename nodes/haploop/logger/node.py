@@ -8,6 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import zmq
 
 from haploop.logger.keeper import Keeper, open_keeper
@@ -55,6 +56,7 @@ class LoggerNode:
         )
         time = Timebase(**welcome["timebase"])
         self.keeper: Keeper = open_keeper(welcome["scene"], time, out, welcome["context"].get("attachments", {}))
+        self.keeper.logger.booked = self._publish_energy
         states: dict[str, dict[str, Any]] = {}
         early = []
         while len(states) < 2:
@@ -94,6 +96,8 @@ class LoggerNode:
             if tick != reported or (idle and tick != self._judged_at):
                 self._report(tick)
                 reported = tick
+            if self._publisher:
+                self._publisher.serve()
             self.keeper.flush_when_due()
         return self.finish("")
 
@@ -122,16 +126,11 @@ class LoggerNode:
             self._member.progress(tick, self._status)
         else:
             self._member.progress(tick)
-        if self._publisher:
-            self._publisher.serve()
-            if self._publisher.heard:
-                self._publish_energy()
 
-    def _publish_energy(self) -> None:
-        assert self._publisher
-        first, latest = self.keeper.logger.latest_from, self.keeper.logger.latest
-        columns = {name: column.tobytes() for name, column in latest.items()}
-        self._publisher.publish("ENERGY_BLOCK", first, self.keeper.logger.tick - first, columns, self._status)
+    def _publish_energy(self, first: int, books: dict[str, np.ndarray]) -> None:
+        if self._publisher and self._publisher.heard:
+            columns = {name: column.tobytes() for name, column in books.items()}
+            self._publisher.publish("ENERGY_BLOCK", first, self.keeper.logger.tick - first, columns, self._status)
 
     def save(self, failed: str) -> dict[str, Any] | None:
         """Finish because of what ``failed`` says, with the blocks that are here already; None if nothing has begun."""

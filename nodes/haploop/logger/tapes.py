@@ -40,8 +40,9 @@ class PlantTape:
         keep = max(0, (self.end - self.tick) * self._steps)
         for name, data in block["columns"].items():
             new = as_float64(data)
-            kept = self._columns.get(name, new[:0])
-            self._columns[name] = np.concatenate([kept if name.startswith(PIECES) else kept[:keep], new])
+            rows = None if name.startswith(PIECES) else keep
+            kept = self._columns.get(name, np.zeros(rows or 0))  # what begins to be counted was 0 before
+            self._columns[name] = np.concatenate([kept[:rows], new])
         self.end += block["ticks"]
 
     def first_tick_from(self, command: int) -> int:

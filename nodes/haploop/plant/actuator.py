@@ -26,12 +26,20 @@ class Actuator:
     """
 
     def __init__(self, line: Line, table: dict[str, Any], time: Timebase) -> None:
-        self._line, self._steps = line, time.steps_per_tick
+        self._steps = time.steps_per_tick
         self._resolution, self._most = table.get("resolution"), table.get("saturation")
         self._command, self._force = -1, 0.0
         self._saturated = Tally()
+        self._take(line)
+
+    def _take(self, line: Line) -> None:
+        self._line, self.receive = line, line.receive
         self.tallies = line.tallies | ({SATURATED: self._saturated} if self._most is not None else {})
-        self.receive = line.receive
+
+    def retimed(self, delay_steps: int, tick: int) -> Actuator:
+        """The same with another delay of the commands from ``tick`` on."""
+        self._take(self._line.retimed(delay_steps, tick))
+        return self
 
     def holds(self, tick: int) -> list[Hold]:
         """The forces the device feels in interval ``tick``, in order."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import repeat
 from typing import TYPE_CHECKING, Any, Protocol
 
 from haploop.protocol.ticks import Timebase
@@ -26,6 +27,10 @@ class Line(Protocol):
 
     def holds(self, tick: int) -> list[Hold]:
         """The forces held in interval ``tick``, in order: all its steps, no hold of none."""
+        ...
+
+    def retimed(self, delay_steps: int, tick: int, /) -> Line:
+        """A line on which the commands from ``tick`` on have another delay, in plant steps; the others are on it."""
         ...
 
 
@@ -56,6 +61,7 @@ class CommandLine:
     """
 
     def __init__(self, time: Timebase) -> None:
+        self._time = time
         self._lookahead, self._late_steps = divmod(time.delay_steps, time.steps_per_tick)
         self._prompt_steps = time.steps_per_tick - self._late_steps
         self._forces: list[Any] = [0.0] * (self._lookahead + 1)
@@ -81,3 +87,14 @@ class CommandLine:
             del self._forces[: at - 1]
             self._first += at - 1
         return holds
+
+    def retimed(self, delay_steps: int, tick: int) -> Line:
+        """A line that lets commands overtake; those before ``tick``, all received, are on it or in effect."""
+        from haploop.plant.uncertain_line import UncertainLine
+
+        n, d = self._time.steps_per_tick, self._time.delay_steps
+        acting = max((tick * n - 1 - d) // n, -1)
+        on_their_way = [(k * n + d, self._forces[k - self._first], k) for k in range(acting + 1, tick)]
+        line = UncertainLine(self._time, repeat(0).__next__, repeat(False).__next__)
+        line.take_over(self._forces[acting - self._first], acting, on_their_way, tick)
+        return line.retimed(delay_steps, tick)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from array import array
+from itertools import accumulate
 from typing import Any
 
 import numpy as np
@@ -49,6 +50,7 @@ class LinearMotion:
         late = time.delay_steps % self._steps
         self._cuts = [(0, late), (late, self._steps - late)] if late else [(0, self._steps)]
         self._starts: list[float] = []
+        self._parts: list[tuple[list[tuple[int, int]], list[float]]] = []
         self._last: Hold = (0, 0.0, -1)
 
     def advance(self, tick: int, holds: list[Hold]) -> None:
@@ -121,15 +123,35 @@ class LinearMotion:
     def take_record(self, tick: int) -> dict[str, np.ndarray]:
         """x, v, x_low, force, command at every plant step from interval ``tick`` on and at the end; starts anew.
 
-        Step i of a hold that began at y is y plus the flow of i steps, plus D; the end is the present state itself.
-        Every interval is cut alike, so the i-th holds of all intervals are filled in at once.
+        The end is the present state itself.
         """
-        cuts, n = self._cuts, self._steps
-        starts = np.frombuffer(array("d", self._starts)).reshape(-1, len(cuts), 6)
-        self._starts = []
+        parts = [*self._parts, (self._cuts, self._starts)]
+        self._parts, self._starts = [], []
+        filled = []
+        for cuts, starts in parts:
+            filled.append(self._filled(tick, cuts, starts))
+            tick += len(filled[-1][0])
+        end = self.x, self.v, self._x_low, self.force, self.command
+        return {
+            name: np.concatenate([*(column.ravel() for column in columns), [last]])
+            for name, last, *columns in zip(RECORD, end, *filled, strict=True)
+        }
+
+    def cut_as(self, counts: tuple[int, ...]) -> None:
+        """From the next interval on the holds have these numbers of steps."""
+        self._parts.append((self._cuts, self._starts))
+        firsts = accumulate(counts, initial=0)
+        self._cuts, self._starts = list(zip(firsts, counts, strict=False)), []
+
+    def _filled(self, tick: int, cuts: list[tuple[int, int]], of_holds: list[float]) -> list[np.ndarray]:
+        """The record of a part, from interval ``tick`` on and without its end; shape (intervals, n) each.
+
+        Step i of a hold that began at y is y plus the flow of i steps, plus D. Every interval of a part is cut alike,
+        so the i-th holds of all its intervals are filled in at once.
+        """
+        starts = np.frombuffer(array("d", of_holds)).reshape(-1, len(cuts), 6)
         ticks = len(starts)
-        columns = {name: np.empty(ticks * n + 1) for name in RECORD}
-        columns_of_ticks = [column[:-1].reshape(ticks, n) for column in columns.values()]
+        columns = [np.empty((ticks, self._steps)) for _ in RECORD]
         response = self._between(tick, ticks)
         for index, (first, count) in enumerate(cuts):
             x, x_low, v, v_low, force, command = (entry[:, None] for entry in starts[:, index].T)
@@ -141,10 +163,8 @@ class LinearMotion:
             if not first:  # the state itself, as it stood at the end of the interval before
                 at_x[:, :1], at_v[:, :1] = x, v
             rows = at_x, at_v, dx - (at_x - x), force, command
-            for column, row in zip(columns_of_ticks, rows, strict=True):
+            for column, row in zip(columns, rows, strict=True):
                 column[:, during] = row
-        for column, end in zip(columns.values(), (self.x, self.v, self._x_low, self.force, self.command), strict=True):
-            column[-1] = end
         return columns
 
     def _between(self, tick: int, ticks: int) -> np.ndarray:

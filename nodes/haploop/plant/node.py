@@ -49,6 +49,8 @@ class PlantNode:
         """Work until the run ends; returns the tick it ended at."""
         member, plant = self._member, self._plant
         while plant.stop_reason is None and not (member.last and plant.tick >= member.until):
+            for tick, event in member.take_events():
+                plant.schedule(tick, event)
             plant.run_until(min(plant.tick + self._block.ticks, member.until), self._loop.exchange)
             self._flush()
             member.poll()

@@ -7,9 +7,11 @@ from collections.abc import Callable
 from typing import Any
 
 from haploop.plant.command_line import Hold, line_of
+from haploop.plant.linear_motion import LinearMotion
 from haploop.plant.motion import motion_of
+from haploop.plant.retimed_line import RetimedLine
 from haploop.plant.sensors import accelerometer, accelerometer_is_used, position_sensor
-from haploop.protocol.ticks import Timebase
+from haploop.protocol.ticks import DELAY, Timebase
 
 # From the first tick and its samples to the commands that answer them.
 Exchange = Callable[[int, list[tuple[float, ...]]], list[float]]
@@ -26,6 +28,7 @@ class Plant:
     def __init__(self, scene: dict[str, Any], time: Timebase) -> None:
         self._motion = motion_of(scene, time)
         self._steps, self._most = time.steps_per_tick, time.lookahead_ticks + 1
+        self._control_rate = time.control_rate
         self._line = line_of(scene, time)
         self._tallies = dict(self._line.tallies)
         self._limit_m = scene["diverged_beyond"]
@@ -37,6 +40,7 @@ class Plant:
         self._measure = self._measure_both if accelerometer_is_used(scene) else self._measure_position
         self._interval_due = self._unusable = False
         self._block_first = 0
+        self._delays: list[tuple[int, int]] = []
         self.tick = 0
         self.stop_reason: str | None = None
 
@@ -46,11 +50,32 @@ class Plant:
     def _measure_both(self) -> tuple[float, ...]:
         return self._quantise(self._motion.x), self._acceleration(self.tick)
 
-    def run_until(self, end: int, exchange: Exchange) -> None:
-        """Work up to tick ``end``, or to where the plant stops by itself; ``exchange`` turns samples into commands.
+    def schedule(self, tick: int, change: dict[str, Any]) -> None:
+        """Have a change take effect at ``tick``, if it is one of the line's delay: command ``tick`` is the first."""
+        if DELAY in (values := change.get("set", {})):
+            self._delays.append((tick, round(values[DELAY] * self._steps * self._control_rate)))
 
-        It is given the first tick of at most L + 1 samples and returns the forces in N that answer them.
+    def run_until(self, end: int, exchange: Exchange) -> None:
+        """Work up to tick ``end``, or to where the plant stops by itself; delays change on the way.
+
+        ``exchange`` is given the first tick of at most L + 1 samples and returns the forces in N that answer them.
         """
+        while self._delays and self._delays[0][0] < end:
+            tick, delay_steps = self._delays.pop(0)
+            self._work_until(tick, exchange)
+            if self.stop_reason is None:
+                self._retime(delay_steps)
+        self._work_until(end, exchange)
+
+    def _retime(self, delay_steps: int) -> None:
+        line = self._line.retimed(delay_steps, self.tick)
+        if isinstance(self._motion, LinearMotion) and not isinstance(line, RetimedLine):
+            line = RetimedLine(line, self._motion)
+        self._line, self._most = line, delay_steps // self._steps + 1
+        self._tallies |= line.tallies
+
+    def _work_until(self, end: int, exchange: Exchange) -> None:
+        """The same with one delay."""
         most = self._most
         while (tick := self.tick) < end and self.stop_reason is None:
             samples = self.samples(min(most, end - tick))

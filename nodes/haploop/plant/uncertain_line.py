@@ -41,6 +41,17 @@ class UncertainLine:
         self._dropped, self._lost = Tally(), Tally()
         self.tallies = {DROPPED: self._dropped, LOST: self._lost}
 
+    def take_over(self, force: float, command: int, coming: list[tuple[int, float, int]], received: int) -> None:
+        """Go on for another line: what acts now, what is on its way as (step of effect, force, command), and how many
+        commands have come."""
+        self._acting, self._received = (force, command), received
+        self._coming.extend(coming)
+
+    def retimed(self, delay_steps: int, _tick: int) -> UncertainLine:
+        """The same line with another delay of the commands still to come."""
+        self._delay = delay_steps
+        return self
+
     def receive(self, forces: list[float]) -> None:
         """Take the next commands, in order of their ticks."""
         for command, force in enumerate(forces, self._received):

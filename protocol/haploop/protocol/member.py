@@ -31,6 +31,7 @@ class Member:
         last: whether no further ticks will be granted.
         events: granted events not yet taken, (tick, event), in order.
         garbled: frames from the clock's address that were no messages.
+        refused: what the clock last said no to, "" for nothing: after joining, that this node is no longer a member.
     """
 
     def __init__(self, context: zmq.Context[zmq.Socket[bytes]], role: str, address: str, secret: str) -> None:
@@ -41,6 +42,7 @@ class Member:
         self.last = False
         self.events: list[tuple[int, dict[str, Any]]] = []
         self.garbled = 0
+        self.refused = ""
 
     @property
     def socket(self) -> zmq.Socket[bytes]:
@@ -91,6 +93,8 @@ class Member:
             self.events += [(tick, event) for tick, event in events]
         elif frame.name == "ABORT":
             raise Aborted(frame.fields[0])
+        elif frame.name == "REFUSED":
+            self.refused = frame.fields[0]
         return frame
 
     def take_events(self) -> list[tuple[int, dict[str, Any]]]:
@@ -118,3 +122,7 @@ class Member:
         """Say DONE, FAILED or LEAVE, make sure it goes out, and close."""
         self._socket.send(encode(name, *fields))
         self._socket.close(linger=1000)
+
+    def close(self) -> None:
+        """Close without a word."""
+        self._socket.close(linger=0)

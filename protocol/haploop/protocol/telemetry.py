@@ -81,6 +81,11 @@ class Subscriber:
         self.gaps = dict.fromkeys(addresses, 0)
         self.garbled = 0
 
+    @property
+    def tick(self) -> int:
+        """Every tick before it has come from every publisher, or never will."""
+        return min(self._next_tick.values(), default=0) if len(self._next_tick) == len(self.gaps) else 0
+
     def register(self, poller: zmq.Poller) -> None:
         """Have a poller watch all sockets."""
         for socket in self._sockets:

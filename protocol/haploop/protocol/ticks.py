@@ -8,6 +8,8 @@ from typing import Any
 
 # Decimal fractions such as 0.0003 s are not exact in binary; a whole number of steps is accepted within this.
 _WHOLE_WITHIN = 1e-6
+# The key of a scene by which the delay is set, also while a loop runs.
+DELAY = "clock.round_trip_delay"
 
 
 class TimebaseError(ValueError):

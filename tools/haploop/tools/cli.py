@@ -110,6 +110,18 @@ def step(ticks: Annotated[int, typer.Argument(help="control ticks")] = 1, run: R
 
 
 @app.command()
+def pace(
+    rate: Annotated[str, typer.Argument(help="free, or simulated seconds per second", show_default=False)],
+    run: Run = None,
+    json: Json = False,
+) -> None:
+    """Go on at another pace."""
+    from haploop.tools.live import pace_of
+
+    _ask(run, json, "pace", pace=pace_of(rate))
+
+
+@app.command()
 def stop(run: Run = None, json: Json = False) -> None:
     """End the run in order, with a summary of what ran."""
     _ask(run, json, "stop")

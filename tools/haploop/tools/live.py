@@ -1,10 +1,11 @@
-"""Commands to a running loop: status, pause, resume, step, stop, swap, set."""
+"""Commands to a running loop: status, pause, resume, step, pace, stop, swap, set."""
 
 from __future__ import annotations
 
+import math
 import sys
 import tomllib
-from typing import Any
+from typing import Any, Literal
 
 from haploop.tools.ending import WRONG_USE, leave, plain_errors, print_json
 
@@ -57,6 +58,19 @@ def assignments(texts: list[str]) -> dict[str, Any]:
         except tomllib.TOMLDecodeError:
             table[key.strip()] = value.strip()
     return table
+
+
+def pace_of(text: str) -> float | Literal["free"]:
+    """``free`` or a positive number, simulated seconds per second."""
+    if text == "free":
+        return "free"
+    try:
+        rate = float(text.removesuffix("x"))
+    except ValueError:
+        rate = math.nan
+    if not (rate > 0 and math.isfinite(rate)):
+        leave(f"A pace must be free or a number above 0 (1 is real time), but {text!r} was given.", WRONG_USE)
+    return rate
 
 
 def seconds(text: str | None) -> float | None:

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from haploop.tools.ending import FAILED, WRONG_USE, leave, plain_errors, print_json
+from haploop.tools.live import pace_of
 from haploop.tools.scenes import print_notes
 
 if TYPE_CHECKING:
@@ -73,15 +74,10 @@ def _transport(host: str | None, keys: Path | None, in_process: bool) -> Transpo
 
 
 def _pace(text: str, in_process: bool) -> float:
-    """``free`` or a positive number."""
-    if text == "free":
+    """Infinite, or a positive number."""
+    rate = pace_of(text)
+    if rate == "free":
         return math.inf
-    try:
-        rate = float(text.removesuffix("x"))
-    except ValueError:
-        rate = math.nan
-    if not (rate > 0 and math.isfinite(rate)):
-        leave(f"--pace must be free or a number above 0 (1 is real time), but {text!r} was given.", WRONG_USE)
     if in_process:
         leave("--pace needs the clock of a run as processes; leave out --in-process.", WRONG_USE)
     return rate

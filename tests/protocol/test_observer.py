@@ -1,0 +1,139 @@
+"""A lossy member hears everything it keeps up with, knows what it missed, and never costs the loop anything."""
+
+import time
+
+import numpy as np
+from live_run import going, undisturbed
+
+from haploop.logger import read
+from haploop.protocol.observer import Observer
+
+ALL = ("plant", "controller", "logger")
+
+
+def heard(observer, until=ALL):
+    """Every message up to the end of each stream."""
+    frames = []
+    while not set(until) <= observer.ended.keys():
+        observer.wait(200)
+        frames += observer.turn()
+    return frames
+
+
+def joined(frames, name, column, steps=1):
+    """One column of all blocks of a kind, end to end; the plant's without the state two blocks share."""
+    parts = []
+    for _, frame in frames:
+        if frame.name == name:
+            block = frame.as_dict()
+            parts.append(np.frombuffer(block["columns"][column], "<f8")[: block["ticks"] * steps])
+    return np.concatenate(parts)
+
+
+def test_an_observer_hears_every_tick_of_all_three_streams_and_every_event_at_its_tick(tmp_path):
+    with going(tmp_path, "duration=3", pauses=(7,)) as subject:
+        subject.stands_at(7)
+        context = subject.live.wires()
+        observer = Observer(context, "print", subject.live.clock, ALL)
+        try:
+            while len([None for _, f in observer.turn() if f.name == "STATE"]) < len(ALL):
+                observer.wait(200)
+                if observer._streams.tick == 7:
+                    break
+            subject.ask("set", set={"wall.stiffness": 200.0})
+            subject.ask("resume")
+            frames = heard(observer)
+            events = observer.take_events()
+        finally:
+            context.destroy(linger=0)
+        subject.result()
+    log = read(subject.prepared.out)
+    assert observer.skipped == dict.fromkeys(ALL, 0)
+    assert np.array_equal(joined(frames, "PLANT_BLOCK", "x", 10), log["/plant"]["x"][70:-1])
+    assert np.array_equal(joined(frames, "CONTROLLER_BLOCK", "total"), log["/controller"]["total"][7:])
+    assert np.array_equal(joined(frames, "ENERGY_BLOCK", "wall.true"), log["/energy"]["wall.true"][7:])
+    assert [(tick, next(key for key in event if key != "at")) for tick, event in events] == [
+        (7, "pause"), (7, "set"), (7, "resume"),
+    ]  # fmt: skip
+
+
+def test_one_that_does_not_listen_costs_the_run_no_bit_and_is_told_what_it_missed(tmp_path):
+    """Blocks so short that there are far more of them than any queue holds."""
+    with going(tmp_path, "duration=30", "run.block_ticks=10", pauses=(7, 29_000)) as subject:
+        subject.stands_at(7)
+        context = subject.live.wires()
+        observer = Observer(context, "view", subject.live.clock, ALL)
+        try:
+            while observer._streams.tick < 7:
+                observer.wait(200)
+                observer.turn()
+            subject.ask("resume")
+            subject.stands_at(29_000)
+            for _ in range(10):  # it wakes up, and takes what its queues still hold
+                observer.wait(50)
+                observer.turn()
+            subject.ask("resume")
+            heard(observer)
+        finally:
+            context.destroy(linger=0)
+        summary = subject.result()
+    assert min(observer.skipped.values()) > 1000
+    assert summary["trajectory_sha256"] == undisturbed(subject.prepared)["trajectory_sha256"]
+    assert summary["lost"]["telemetry_gaps"] == 0
+
+
+def test_status_shows_an_observer_with_its_tick_its_lag_and_what_it_skipped(tmp_path):
+    with going(tmp_path, "duration=600", pauses=(300,)) as subject:
+        subject.stands_at(300)
+        context = subject.live.wires()
+        observer = Observer(context, "view", subject.live.clock, ALL)
+        try:
+            rows = []
+            for _ in range(100):
+                observer.wait(50)
+                observer.turn()
+                rows = [node for node in subject.ask("status")[1]["nodes"] if node["role"] == "view"]
+                if rows and rows[0]["tick"] == 300:
+                    break
+            assert rows[0]["skipped_ticks"] == 0
+            assert rows[0]["behind_ticks"] == 0
+            assert not rows[0]["lossless"]
+            observer.leave()
+            for _ in range(100):
+                if not [node for node in subject.ask("status")[1]["nodes"] if node["role"] == "view"]:
+                    break
+                time.sleep(0.02)
+            assert "view" not in {node["role"] for node in subject.ask("status")[1]["nodes"]}
+        finally:
+            context.destroy(linger=0)
+        subject.ask("stop")
+        assert subject.result()["ended"] == "stopped"
+
+
+def test_one_the_clock_has_dropped_joins_again_by_itself_and_hears_each_event_once(tmp_path):
+    with going(tmp_path, "duration=600", pauses=(300,)) as subject:
+        subject.stands_at(300)
+        context = subject.live.wires()
+        observer = Observer(context, "view", subject.live.clock, ALL)
+        try:
+            events = []
+            for _ in range(20):
+                observer.wait(50)
+                observer.turn()
+                events += observer.take_events()
+            # As if the clock had taken it off: the next report is refused.
+            observer._member.leave("LEAVE", 300)
+            first = observer._member
+            observer._member = type(first)(context, "view", subject.live.clock, "")
+            subject.ask("set", set={"wall.stiffness": 200.0})
+            for _ in range(60):
+                observer.wait(50)
+                observer.turn()
+                events += observer.take_events()
+            roles = [node["role"] for node in subject.ask("status")[1]["nodes"]]
+            assert roles.count("view") == 1
+            assert [next(key for key in event if key != "at") for _, event in events] == ["pause", "set"]
+        finally:
+            context.destroy(linger=0)
+        subject.ask("stop")
+        subject.result()

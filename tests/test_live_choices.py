@@ -1,0 +1,119 @@
+"""What a running loop lets people choose, and that each choice takes effect, is on record and can be replayed."""
+
+import math
+
+import pytest
+from clock_makers import clock, granted
+from live_run import going
+from scene_makers import KINDS, WALL, scene
+
+from haploop.launch.clock import ClockError
+from haploop.launch.control import CommandRefused
+from haploop.launch.options import options
+from haploop.launch.replay import replay
+from haploop.logger import read
+
+DAMPING = {"kind": "damping", "damping": 0.5}
+
+
+def test_options_name_every_key_that_can_be_set_with_unit_bounds_and_present_value():
+    data = options(scene(wall=WALL, dissipation=[DAMPING], clock={"round_trip_delay": "2 ms"}), KINDS)
+    settable = data["settable"]
+    assert set(settable) == {"wall.stiffness", "wall.position", "clock.round_trip_delay", "dissipation.0.damping"}
+    assert settable["wall.stiffness"]["unit"] == "N/m"
+    assert settable["wall.stiffness"]["value"] == 150.0
+    assert settable["clock.round_trip_delay"] == {
+        "unit": "s", "at_least": 0, "above": None, "at_most": None, "below": None, "value": 0.002,
+    }  # fmt: skip
+    assert settable["dissipation.0.damping"]["value"] == 0.5
+    assert set(data["kinds"]) == set(KINDS)
+    assert data["kinds"]["damping"]["parameters"]["damping"]["unit"] == "N s/m"
+    assert data["elements"] == [{**DAMPING, "acts": "in-contact"}]
+
+
+def test_options_of_a_scene_without_a_wall_offer_none():
+    assert set(options(scene(), KINDS)["settable"]) == {"clock.round_trip_delay"}
+
+
+def test_the_present_scene_has_every_change_that_has_taken_effect_and_none_that_has_not():
+    subject = clock(
+        event=[
+            {"at": 0.1, "swap": {"kind": "unidirectional-inertia", "mass": 0.02}},
+            {"at": 0.2, "set": {"dissipation.0.mass": 0.03, "wall.stiffness": 200.0, "clock.round_trip_delay": 0.001}},
+            {"at": 0.3, "swap": DAMPING, "element": 1},
+            {"at": 0.9, "swap": {"kind": "none"}, "element": 0},
+        ]
+    )
+    granted(subject, 0)
+    now = subject.present()
+    assert [element["kind"] for element in now["dissipation"]] == ["unidirectional-inertia", "damping"]
+    assert now["dissipation"][0]["mass"] == 0.03
+    assert (now["wall"]["stiffness"], now["clock"]["round_trip_delay"]) == (200.0, 0.001)
+    granted(subject, 600)
+    assert [element["kind"] for element in subject.present()["dissipation"]] == ["damping"]
+    assert subject._scene["wall"]["stiffness"] == 150.0
+
+
+def test_after_a_change_of_pace_time_goes_on_from_where_it_was_at_the_new_pace():
+    subject = clock(pace=1.0)
+    granted(subject, 0, now=0.0)
+    at_100 = granted(subject, 100, now=0.1)
+    assert at_100 == pytest.approx(120, abs=1)
+    subject.run_at(0.1, now=0.1)
+    assert granted(subject, at_100, now=1.1) == pytest.approx(at_100 + 102, abs=2)
+    subject.run_at(math.inf, now=1.1)
+    assert granted(subject, 300, now=1.1) == 700  # the window
+
+
+@pytest.mark.parametrize("pace", [0.0, -1.0, math.nan])
+def test_a_pace_that_is_no_positive_number_is_refused_and_changes_nothing(pace):
+    subject = clock(pace=2.0)
+    with pytest.raises(ClockError, match="above 0"):
+        subject.run_at(pace, now=0.0)
+    assert subject.pace == 2.0
+
+
+def test_a_run_takes_pace_and_delay_while_it_goes_records_them_and_replays_to_the_same_bits(tmp_path):
+    with going(tmp_path, "duration=600", pauses=(500,)) as subject:
+        subject.stands_at(500)
+        assert subject.ask("options")[1]["settable"]["clock.round_trip_delay"]["value"] == 0.002
+        assert subject.ask("pace", pace=20)[0].startswith("pace 20 from tick 500")
+        assert subject.ask("status")[1]["pace"] == 20
+        subject.ask("set", set={"clock.round_trip_delay": "0.3 ms", "wall.stiffness": "0.2 N/mm"})
+        subject.ask("step", ticks=50)
+        subject.stands_at(550)
+        assert subject.ask("options")[1]["settable"]["clock.round_trip_delay"]["value"] == 0.0003
+        subject.ask("set", set={"clock.round_trip_delay": "4 ms"})
+        subject.ask("pace", pace="free")
+        subject.ask("step", ticks=3000)
+        subject.stands_at(3550)
+        subject.ask("stop")
+        summary = subject.result()
+    log = read(subject.prepared.out)
+    commands = log["/events"]
+    assert [event["pace"] for event in commands if "pace" in event] == [20, "free"]
+    assert [event["set"]["clock.round_trip_delay"] for event in commands if "set" in event] == [0.0003, 0.004]
+    assert summary["lost"]["commands_dropped"] > 0
+    assert summary["energy"]["residual_J"] <= 1e-12 * summary["energy"]["moved_J"]
+    assert replay(subject.prepared.out).differences == []
+
+
+@pytest.mark.parametrize(
+    ("verb", "arguments", "says"),
+    [
+        ("pace", {"pace": "quick"}, "above 0, or free"),
+        ("pace", {"pace": -1}, "above 0, or free"),
+        ("pace", {"pace": True}, "above 0, or free"),
+        ("set", {"set": {"clock.round_trip_delay": "0.25 ms"}}, "0.0002 s and 0.0003 s"),
+        ("set", {"set": {"clock.round_trip_delay": -0.001}}, "at least 0"),
+        ("set", {"set": {"clock.plant_rate": 20000}}, "clock.round_trip_delay"),
+    ],
+)
+def test_what_cannot_be_is_refused_with_the_reason(verb, arguments, says, tmp_path):
+    with going(tmp_path, pauses=(10,)) as subject:
+        subject.stands_at(10)
+        with pytest.raises(CommandRefused, match=says):
+            subject.ask(verb, **arguments)
+        assert subject.ask("options")[1]["settable"]["clock.round_trip_delay"]["value"] == 0.002
+        subject.ask("resume")
+        assert subject.result()["ended"] == "done"
