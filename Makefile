@@ -6,7 +6,7 @@ PIP := $(PYTHON) -m pip --python $(BIN)/python -qq --disable-pip-version-check -
 READY := .venv/.installed
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test slow check bench accuracy lock clean
+.PHONY: help demo test slow check bench accuracy notebook lock clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-8s %s\n", $$1, $$2 }' Makefile
@@ -37,8 +37,11 @@ accuracy: $(READY) ## measure what accuracy costs and write docs/accuracy.md (an
 	@$(BIN)/haploop cost --out runs/accuracy
 	@$(BIN)/python -m haploop.tools.accuracy_page runs/accuracy docs
 
+notebook: $(READY) ## run docs/notebook.ipynb anew and keep its figures
+	@$(BIN)/python -m haploop.tools.notebook docs/notebook.ipynb
+
 lock: ## pin every dependency anew with its hashes in requirements.lock (needs uv)
-	$(UV) pip compile pyproject.toml --extra plot --extra dev --output-file requirements.lock --upgrade --quiet \
+	$(UV) pip compile pyproject.toml --all-extras --output-file requirements.lock --upgrade --quiet \
 	  --universal --python-version 3.11 --fork-strategy fewest --generate-hashes \
 	  --no-emit-index-url --no-emit-find-links --no-annotate --no-header
 

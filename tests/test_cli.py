@@ -126,7 +126,7 @@ def test_replay_says_whether_every_bit_agreed(done, tmp_path):
         (("run", FIG6C, "--tcp", "0.0.0.0"), "directory of keys"),
         (("replay", "nowhere"), "nowhere"),
         (("plot", "nowhere"), "nowhere"),
-        (("attach", "scope"), "logger or print"),
+        (("attach", "scope"), "logger, print or plotjuggler"),
         (("swap", "damping", "0.8"), "KEY=VALUE was expected"),
         (("swap", "damping", "damping=0.8", "--at", "soon"), "--at must be a time"),
         (("pause", "--run", "zzzzzz"), "live"),

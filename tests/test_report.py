@@ -15,7 +15,7 @@ from haploop.controller.dissipation import Element, Motion, registry
 from haploop.launch.start import prepare, run
 from haploop.protocol.quantity import Quantity
 from haploop.tools.amounts import amount, fixed
-from haploop.tools.report import PrintedLine, ProgressLine, plugins_table, status_table, summary_table
+from haploop.tools.report import ProgressLine, plugins_table, status_table, summary_table
 
 SCENES = Path(__file__).parents[1] / "launch/scenes"
 STATUS = {"t_s": 1.25, "verdict": "limit-cycle", "oscillation_m": 1.23e-3, "residual_J": 3e-18}
@@ -105,39 +105,45 @@ def test_the_progress_line_shows_time_verdict_oscillation_and_residual_on_a_term
 def test_the_progress_line_keeps_to_one_line(width: int) -> None:
     line = ProgressLine("title", 1e4)
     line.announce("a1b2c3")
-    text = line.line({**STATUS, "t_s": 9999.0}, 123.4, 100, width)
+    text = line.line({**STATUS, "t_s": 9999.0}, 123.4, width)
     assert text.cell_len <= width
     assert "\n" not in text.plain
 
 
 def test_the_bar_fills_with_the_share_of_the_run_that_is_done() -> None:
     line = ProgressLine("title", 2.0)
-    bars = [line.line({**STATUS, "t_s": t}, 0.0, 0, 100).plain for t in (0.0, 1.0, 2.0)]
+    bars = [line.line({**STATUS, "t_s": t}, 0.0, 100).plain for t in (0.0, 1.0, 2.0)]
     assert [bar.count("━") for bar in bars] == [0, 12, 24]
 
 
-def test_the_printed_line_prints_into_a_pipe_and_tells_what_it_skipped(capsys: pytest.CaptureFixture[str]) -> None:
-    with PrintedLine("title", 3.0) as line:
-        line.show(STATUS, skipped_ticks=400)
-    out, err = capsys.readouterr()
-    assert "1.25/3 s" in out
-    assert "skipped 400 ticks" in out
-    assert (out.count("\n"), err) == (1, "")
-
-
-def test_the_status_table_tells_who_is_behind_and_waits() -> None:
-    node = {"pid": 11, "tick": 1210, "behind_ticks": 0, "waits_for": "", "lossless": True}
-    logger = {**node, "role": "logger", "tick": 1200, "behind_ticks": 10, "waits_for": "plant"}
+@pytest.mark.parametrize("width", [80, 120])
+def test_the_status_table_tells_of_every_node_its_tick_its_lag_whom_it_waits_for_and_what_it_skipped(
+    width: int,
+) -> None:
+    node = {"pid": 11, "tick": 1210, "behind_ticks": 0, "waits_for": "", "lossless": True, "skipped_ticks": 0}
+    nodes = [
+        {**node, "role": "plant"},
+        {**node, "role": "controller", "tick": 1209, "behind_ticks": 1},
+        {**node, "role": "logger", "tick": 1200, "behind_ticks": 10, "waits_for": "plant"},
+        {**node, "role": "plotjuggler", "pid": 4194303, "tick": 10, "behind_ticks": 1200, "lossless": False},
+        {**node, "role": "view", "lossless": False, "skipped_ticks": 6000},
+    ]
     data = {
-        "run": "a1b2c3", "title": "a tap", "tick": 1200, "end": 3000, "control_rate": 1000, "paused": True,
-        "nodes": [{**node, "role": "plant"}, logger],
-        "status": STATUS,
+        "run": "a1b2c3", "title": "a tap", "tick": 1200, "end": 3000, "control_rate": 1000, "paused": True, "pace": 0.5,
+        "nodes": nodes, "status": STATUS,
     }  # fmt: skip
-    text = shown(status_table(data), 80)
-    assert "paused  1.2 s of 3 s, tick 1200 of 3000, limit-cycle so far" in text
-    assert row(text, "plant") == ["11", "1210", "0", "–"]
-    assert row(text, "logger") == ["11", "1200", "10", "plant"]
-    assert "paused" not in shown(status_table({**data, "paused": False, "status": {}}))
+    text = shown(status_table(data), width)
+    assert "paused  1.2 s of 3 s, tick 1200 of 3000, at pace 0.5" in text
+    assert "limit-cycle so far, oscillation 1.23 mm" in text
+    assert row(text, "plant") == ["11", "1210", "–", "–", "–"]
+    assert row(text, "controller") == ["11", "1209", "1 tick, 1.00 ms", "–", "–"]
+    assert row(text, "logger") == ["11", "1200", "10 ticks, 10.0 ms", "plant", "–"]
+    assert row(text, "plotjuggler") == ["4194303", "10", "1200 ticks, 1.20 s", "–", "0 ticks"]
+    assert row(text, "view") == ["11", "1210", "–", "–", "6000 ticks"]
+    assert max(map(len, text.splitlines())) <= width
+    going = shown(status_table({**data, "paused": False, "pace": "free", "status": {}}))
+    assert "paused" not in going
+    assert "tick 1200 of 3000, as fast as it goes" in going
 
 
 def test_the_plugins_table_tells_kind_meaning_unit_bounds_and_default() -> None:

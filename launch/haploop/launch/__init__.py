@@ -1,1 +1,34 @@
-"""From a scene file to a finished run: scene, plan, clock and launcher."""
+"""From a scene file to a finished run: scene, plan, clock and launcher.
+
+From Python::
+
+    from haploop.launch import load, run
+
+    scene = load("launch/scenes/fig6c.toml", {"wall.stiffness": "0.2 N/mm"})
+    result = run(scene)                                    # in this process, in memory
+    result.verdict, result.quantity("window.oscillation_m")
+    result["/plant"]["x"], result["/plant"].units["x"]     # an array, and its unit
+    run(scene.swap("damping", at="1.5 s", damping=0.8), out="runs/swapped")
+
+See :func:`haploop.launch.loaded_scene.load`, :class:`haploop.launch.loaded_scene.Scene` and
+:func:`haploop.launch.run_result.run`, which are imported when first used.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from haploop.launch.loaded_scene import Scene, load
+    from haploop.launch.run_result import Result, run
+
+__all__ = ["Result", "Scene", "load", "run"]
+
+_HOMES = {"Scene": "loaded_scene", "load": "loaded_scene", "Result": "run_result", "run": "run_result"}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)

@@ -16,6 +16,7 @@ from haploop.protocol.ticks import Timebase
 
 if TYPE_CHECKING:
     from haploop.controller.dissipation import Element
+    from haploop.logger.memory_log import MemoryLog
 
 Event = dict[str, Any]
 Progress = Callable[[dict[str, Any]], None]
@@ -29,6 +30,7 @@ def run_in_process(
     attachments: dict[str, str] | None = None,
     events: list[tuple[int, Event]] | None = None,
     progress: Progress | None = None,
+    memory: MemoryLog | None = None,
     stop: Callable[[], bool] = lambda: False,
 ) -> dict[str, Any]:
     """Run a resolved scene to its end and return the summary.
@@ -36,10 +38,11 @@ def run_in_process(
     Args:
         scene: the resolved scene.
         kinds: element kinds at hand.
-        out: directory for log and summary; nothing is written when None.
+        out: directory for log and summary; no file is written when None.
         attachments: text files for the log, by name.
         events: (tick, event) in order; the scene's own when None. Pauses are of the wall clock and change nothing.
         progress: called now and then with the logger's status.
+        memory: where to log without a directory.
         stop: asked after every block; True ends the run there.
 
     Raises:
@@ -47,7 +50,7 @@ def run_in_process(
         LogError: the log could not be written.
     """
     time = Timebase.of(scene["clock"], scene["duration"])
-    keeper = open_keeper(scene, time, out, attachments or {})
+    keeper = open_keeper(scene, time, out, attachments or {}, memory)
     loop = Loop(scene, time, kinds, keeper)
     loop.schedule(scene_events(scene, time) if events is None else events)
     try:

@@ -45,11 +45,25 @@ def prepare(
             kinds[kind], sources[kind] = element, plugin
     scene = load(scene_path, overrides, kinds)
     try_out(elements_of(scene), kinds)
-    directory = make_output(out, scene_path)
+    return lay_out(scene, kinds, make_output(out, scene_path), plugins, sources)
+
+
+def lay_out(
+    scene: dict[str, Any],
+    kinds: dict[str, type[Element]],
+    directory: Path,
+    plugins: Sequence[Path] = (),
+    sources: dict[str, Path] | None = None,
+) -> Prepared:
+    """Put a resolved scene and its plugin files into the directory of its run.
+
+    Raises:
+        OutputError: a file cannot be written.
+    """
     attachments = {"scene.toml": write_scene(scene, directory)}
     kept = [keep_plugin(plugin, directory) for plugin in plugins]
     attachments |= {f"plugins/{path.name}": path.read_text(encoding="utf-8") for path in kept}
-    return Prepared(scene, kinds, directory, attachments, kept, sources)
+    return Prepared(scene, kinds, directory, attachments, kept, sources or {})
 
 
 def run(

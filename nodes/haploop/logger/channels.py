@@ -2,22 +2,36 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Mapping
+from typing import Any, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
-from haploop.logger.mcap_log import Log
 from haploop.logger.motion_columns import UNITS
+from haploop.logger.msgpack_table import Floats
 from haploop.logger.tapes import as_float64
 from haploop.protocol.ticks import Timebase
 
 CONTROLLER_UNITS = {"x": "m", "v": "m/s", "a": "m/s^2", "wall": "N", "total": "N", "in_contact": ""}
 
 
+class Sink(Protocol):
+    """Where channels are written to: :class:`haploop.logger.mcap_log.Log`, or what takes the same without a file."""
+
+    def channel(
+        self, topic: str, columns: Mapping[str, str], *, samples_per_message: int | None = None, title: str
+    ) -> int: ...
+
+    def write(self, channel: int, log_times_ns: NDArray[np.int64], values: Floats) -> None: ...
+
+    def message(self, channel: int, log_time_ns: int, obj: dict[str, Any]) -> None: ...
+
+
 class Channels:
     """Writes telemetry to a log: /plant (unless only ticks are wanted), /controller, /energy and /events."""
 
-    def __init__(self, log: Log, time: Timebase, every_step: bool) -> None:
+    def __init__(self, log: Sink, time: Timebase, every_step: bool) -> None:
         self._log, self._time, self._every_step = log, time, every_step
         self._events = log.channel("/events", {}, title="what changed the run, at its tick")
 

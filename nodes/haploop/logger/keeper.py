@@ -11,6 +11,7 @@ from haploop.logger.channels import Channels
 from haploop.logger.log_error import LogError
 from haploop.logger.logger import Logger
 from haploop.logger.mcap_log import Log
+from haploop.logger.memory_log import MemoryLog
 from haploop.protocol.ticks import Timebase
 
 LOG, SUMMARY = "log.mcap", "summary.json"
@@ -21,7 +22,7 @@ _FLUSH_S = 0.4
 class Keeper:
     """Keeps a logger's log flushed and closes everything in order."""
 
-    def __init__(self, logger: Logger, log: Log | None, out: Path | None) -> None:
+    def __init__(self, logger: Logger, log: Log | MemoryLog | None, out: Path | None) -> None:
         self.logger = logger
         self._log, self._out = log, out
         self._flush_due = wall_clock.monotonic() + _FLUSH_S
@@ -58,20 +59,27 @@ class Keeper:
         return summaries.finite(result)
 
 
-def open_keeper(scene: dict[str, Any], time: Timebase, out: Path | None, attachments: dict[str, str]) -> Keeper:
+def open_keeper(
+    scene: dict[str, Any],
+    time: Timebase,
+    out: Path | None,
+    attachments: dict[str, str],
+    memory: MemoryLog | None = None,
+) -> Keeper:
     """A logger with its files in directory ``out``, or without any when None.
 
     Args:
         scene: the resolved scene; ``run.log`` decides what is logged.
         attachments: text files to put into the log, by name (the scene as TOML, plugins).
+        memory: where to log without a directory; when None, only the books are kept then.
 
     Raises:
         LogError: the log cannot be made.
     """
     detail = scene["run"]["log"]
-    if out is None or detail == "none":
+    log = None if detail == "none" else Log(out / LOG) if out else memory
+    if log is None:
         return Keeper(Logger(scene, time, None), None, out)
-    log = Log(out / LOG)
     for name, text in attachments.items():
         log.attach(name, "text/plain", text.encode())
     return Keeper(Logger(scene, time, Channels(log, time, every_step=detail == "steps")), log, out)

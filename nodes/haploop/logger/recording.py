@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
-from typing import Any, NoReturn
+from collections.abc import Iterable, Mapping, Sequence
+from functools import reduce
+from typing import TYPE_CHECKING, Any, NoReturn
 
-import msgpack
 import numpy as np
 from numpy.typing import NDArray
 
-from haploop.logger.log_error import LogError
-from haploop.logger.msgpack_table import Floats, TableLayout, rows_of
+from haploop.logger.msgpack_table import Floats
+
+if TYPE_CHECKING:
+    import pandas
+    import pint
+
+TIMESTAMP = "timestamp"
 
 
 class Table(dict[str, Floats]):
@@ -23,12 +27,33 @@ class Table(dict[str, Floats]):
         units: unit by column name, "" for a pure number.
     """
 
-    def __init__(self, columns: Iterable[tuple[str, Floats]], units: dict[str, str]) -> None:
+    def __init__(self, columns: Iterable[tuple[str, Floats]], units: Mapping[str, str]) -> None:
         super().__init__(columns)
-        self.units = units
+        self.units = {name: units[name] for name in self}
 
     def __missing__(self, name: str) -> NoReturn:
         raise KeyError(f"There is no column {name}; the columns are {', '.join(self)}.")
+
+    def quantity(self, name: str) -> pint.Quantity[Floats]:
+        """A column with its unit, as a quantity of pint's application registry."""
+        import pint
+
+        return pint.get_application_registry().Quantity(self[name], self.units[name])
+
+    def frame(self) -> pandas.DataFrame:
+        """The columns as a data frame indexed by ``timestamp`` (s), with ``frame.attrs["units"]`` by name.
+
+        Raises:
+            ImportError: pandas is missing.
+        """
+        try:
+            import pandas
+        except ImportError as error:
+            raise ImportError("Data frames need pandas; install it with: pip install 'haploop[pandas]'") from error
+        frame = pandas.DataFrame(dict(self))
+        frame = frame.set_index(TIMESTAMP) if TIMESTAMP in self else frame
+        frame.attrs["units"] = dict(self.units)
+        return frame
 
 
 class Recording(dict[str, Any]):
@@ -47,91 +72,57 @@ class Recording(dict[str, Any]):
         self.attachments = attachments
 
     def __missing__(self, topic: str) -> NoReturn:
-        raise KeyError(f"There is no channel {topic} in this log; its channels are {', '.join(self)}.")
+        raise KeyError(f"There is no channel {topic} in this log; its channels are {', '.join(self) or 'none'}.")
 
 
-@dataclass(frozen=True)
-class Run:
-    """Messages of one length: log times in ns, shape (messages,), and their bytes, end to end."""
-
-    log_times_ns: NDArray[np.uint64]
-    payloads: bytes
-    message_bytes: int
-
-    def __iter__(self) -> Iterator[bytes]:
-        for start in range(0, len(self.payloads), self.message_bytes):
-            yield self.payloads[start : start + self.message_bytes]
+Rows = Table | list[Any]
 
 
-class Source:
-    """One MCAP channel's messages while a log is read."""
+def join(pieces: Sequence[tuple[NDArray[np.uint64], Rows]], units: Mapping[str, str] | None = None) -> tuple[Any, Any]:
+    """Pieces of one topic as one, rows in the order of log time and, at the same time, of the pieces.
 
-    def __init__(self, topic: str, layout: TableLayout) -> None:
-        self.topic = topic
-        self.layout = layout
-        self._log_times: list[NDArray[np.uint64]] = []
-        self._columns: list[Sequence[Floats]] = []
-        self._maps: list[Any] = []
+    The tables are used up on the way, so that hardly more than one column is held twice.
 
-    def add(self, runs: Sequence[Run]) -> None:
-        """Take messages in.
+    Args:
+        pieces: log time of every row in ns, and the rows: all tables or all lists of maps.
+        units: the columns there shall be, by unit; those of the pieces when None. A piece without one has NaN there.
 
-        Raises:
-            LogError: they are not what the schema of the channel says.
-        """
-        try:
-            self._add(runs)
-        except (ValueError, TypeError, AttributeError) as error:
-            raise LogError(f"A message on {self.topic} is no msgpack map of its schema's numbers: {error}.") from error
-
-    def _add(self, runs: Sequence[Run]) -> None:
-        log_times_ns = np.concatenate([run.log_times_ns for run in runs])
-        names = self.layout.columns
-        if not names:
-            self._log_times.append(log_times_ns)
-            self._maps.extend(msgpack.unpackb(payload) for run in runs for payload in run)
-            return
-        rows_each: int | list[int] = self.layout.samples or 1
-        columns: Sequence[Floats] | None = self.layout.read(b"".join([run.payloads for run in runs]))
-        if columns is None:
-            # Other programs may order or encode the same numbers otherwise.
-            rows = [rows_of(msgpack.unpackb(payload), names) for run in runs for payload in run]
-            rows_each = [len(of_message) for of_message in rows]
-            flat = np.array([row for of_message in rows for row in of_message], np.float64)
-            columns = list(flat.reshape(-1, len(names)).T)
-        self._log_times.append(np.repeat(log_times_ns, rows_each))
-        self._columns.append(columns)
-
-    def log_times(self) -> NDArray[np.uint64]:
-        """Log time in ns of every row or free map, shape (rows,)."""
-        return np.concatenate([*self._log_times, np.empty(0, np.uint64)])
-
-    def column(self, name: str) -> Floats:
-        """One column, shape (rows,); NaN throughout where this channel has none of the name."""
-        if name not in self.layout.columns:
-            return np.full(len(self.log_times()), np.nan)
-        number = list(self.layout.columns).index(name)
-        return np.concatenate([*(columns[number] for columns in self._columns), np.empty(0)])
-
-    def maps(self) -> list[Any]:
-        """The messages of a channel without columns."""
-        return self._maps
-
-
-def join(sources: Sequence[Source]) -> Table | list[Any]:
-    """All channels of one topic as one, rows in the order of log time and, at the same time, of the file.
-
-    Raises:
-        LogError: some of the channels have columns and some have none.
+    Returns:
+        Log times in ns, shape (rows,), and the rows.
     """
-    log_times = np.concatenate([source.log_times() for source in sources])
-    order = np.argsort(log_times, kind="stable")
-    units: dict[str, str] = {}
-    for source in sources:
-        units = source.layout.columns | units
-    if not units:
-        maps = [one for source in sources for one in source.maps()]
-        return [maps[row] for row in order]
-    if not all(source.layout.columns for source in sources):
-        raise LogError(f"The topic {sources[0].topic} mixes messages with and without columns; read them apart.")
-    return Table(((name, np.concatenate([source.column(name) for source in sources])[order]) for name in units), units)
+    times = np.concatenate([times for times, _ in pieces] or [np.empty(0, np.uint64)])
+    order = None if (times[1:] >= times[:-1]).all() else np.argsort(times, kind="stable")
+    times_in_order = times if order is None else times[order]
+    tables = [rows for _, rows in pieces if isinstance(rows, Table)]
+    if not tables and not units:
+        maps = [one for _, rows in pieces for one in rows]
+        return times_in_order, maps if order is None else [maps[row] for row in order]
+    if units is None:
+        units = reduce(merge_columns, [table.units for table in tables])
+    columns = _joined_columns(tables, [len(times) for times, _ in pieces], units, order)
+    return times_in_order, Table(columns, units)
+
+
+def _joined_columns(
+    tables: Sequence[Table], rows: Sequence[int], units: Mapping[str, str], order: NDArray[Any] | None
+) -> Iterable[tuple[str, Floats]]:
+    for name in units:
+        parts = [
+            table.pop(name) if name in table else np.full(count, np.nan)
+            for table, count in zip(tables, rows, strict=True)
+        ]
+        column = parts[0] if len(parts) == 1 else np.concatenate([*parts, np.empty(0)])
+        yield name, column if order is None else column[order]
+
+
+def merge_columns(known: Mapping[str, str], new: Mapping[str, str]) -> dict[str, str]:
+    """The columns of both, by unit, each in its own order: a new one comes after the one it follows."""
+    names, at = list(known), 0
+    for name in new:
+        if name in known:
+            at = names.index(name) + 1
+        else:
+            names.insert(at, name)
+            at += 1
+    units = {**new, **known}
+    return {name: units[name] for name in names}

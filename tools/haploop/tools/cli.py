@@ -79,7 +79,7 @@ def plugins(plugin: Plugin = None, json: Json = False) -> None:
 
 @app.command()
 def status(run: Run = None, json: Json = False) -> None:
-    """Show the live runs: every node, its tick, whom it waits for."""
+    """Show the live runs: every node, its tick, its lag, whom it waits for, what it skipped."""
     from haploop.tools.live import show_status
 
     show_status(run, json)
@@ -159,14 +159,20 @@ def set_(
 
 @app.command()
 def attach(
-    what: Annotated[str, typer.Argument(help="logger or print", show_default=False)],
+    what: Annotated[str, typer.Argument(help="logger, print or plotjuggler", show_default=False)],
     out: Annotated[Path | None, typer.Option(help="directory of the attached logger [runs/RUN-TIME]")] = None,
+    port: Annotated[
+        int | None, typer.Option(min=0, max=65535, help="of this machine, for PlotJuggler; 0: any free one [9872]")
+    ] = None,
     run: Run = None,
 ) -> None:
-    """Join a running loop: with a second logger, or to print what happens."""
+    """Join a running loop: with a second logger, to show it as a live table, or to pass it on to PlotJuggler.
+
+    The logger holds the loop up rather than miss anything; the others never do, and say what they skipped.
+    """
     from haploop.tools.attach import attach_to
 
-    attach_to(what, out, run)
+    attach_to(what, out, run, port)
 
 
 @app.command()
@@ -183,6 +189,26 @@ def replay(directory: Directory, json: Json = False) -> None:
     from haploop.tools.replay import replay_run
 
     replay_run(directory, json)
+
+
+@app.command()
+def export(
+    directory: Annotated[Path, typer.Argument(help="directory of a run, or its log", show_default=False)],
+    to: Annotated[str, typer.Option(help="csv, npz, parquet or json-mcap (for Foxglove)", show_default=False)],
+    out: Annotated[
+        Path | None, typer.Option(help="directory (csv, parquet: a file a channel) or file [beside the log]")
+    ] = None,
+    topics: Annotated[str | None, typer.Option(help="only these channels, comma-separated [all]")] = None,
+    force: Annotated[bool, typer.Option("--force", help="write over files that exist")] = False,
+) -> None:
+    """Write a run's log in the format of other programs, names and units kept; stdout names the files.
+
+    Any length of log takes the same memory. A number that is not there, an element's before it was swapped in, is NaN
+    in npz and parquet, an empty cell in csv, and left out in json-mcap, as are numbers that are not finite.
+    """
+    from haploop.tools.export import export_run
+
+    export_run(directory, to, out, topics, force)
 
 
 @app.command()

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from haploop.tools.amounts import amount, parameters, spring
+from haploop.tools.event_words import event_words
 from haploop.tools.figure_data import Book, RunData
 from haploop.tools.figure_style import GREY, INK, LARGE, SMALL, TEXT, VERDICTS
 from haploop.tools.plant_words import counts, plant_books
@@ -124,7 +125,7 @@ def event_lines(run: RunData) -> list[str]:
     """What the numbers at the events stand for, as lines that fit below the figure."""
     lines = [""]
     for number, event in enumerate(run.events, start=1):
-        words = f"{number} at {event['timestamp']:g} s: {_event_words(event)}"
+        words = f"{number} at {event['timestamp']:g} s: {event_words(event)}"
         if lines[-1] and len(lines[-1]) + len(words) + 5 > _LINE_LETTERS:
             if len(lines) == _MOST_LINES:
                 lines[-1] += f"     and {len(run.events) - number + 1} more"
@@ -132,18 +133,6 @@ def event_lines(run: RunData) -> list[str]:
             lines.append("")
         lines[-1] += ("     " if lines[-1] else "") + words[:_LINE_LETTERS]
     return [line for line in lines if line]
-
-
-def _event_words(event: dict[str, Any]) -> str:
-    if "swap" in event:
-        table = event["swap"]
-        kind, values = table["kind"], parameters({name: value for name, value in table.items() if name != "kind"})
-        if kind == "none":
-            return f"element {event.get('element') or 0} is removed"
-        return f"element {event.get('element') or 0} becomes {kind}" + (f" ({values})" if values else "")
-    if "set" in event:
-        return "set " + ", ".join(f"{key} = {value:g}" for key, value in event["set"].items())
-    return event.get("refused") or next((verb for verb in ("pause", "resume", "stop") if verb in event), "changed")
 
 
 def draw_events(figure: Figure | SubFigure, lines: list[str]) -> None:

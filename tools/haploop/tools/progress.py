@@ -27,8 +27,6 @@ class ProgressLine:
         console: where to show it; stderr when None.
     """
 
-    _on_stderr = True
-
     def __init__(self, title: str, duration_s: float, console: Console | None = None) -> None:
         self._title, self._duration_s = title, duration_s
         self._console = console
@@ -40,7 +38,7 @@ class ProgressLine:
     def __enter__(self) -> Self:
         from haploop.tools.report import console
 
-        self._console = self._console or console(stderr=self._on_stderr)
+        self._console = self._console or console(stderr=True)
         if self._console.is_terminal:
             from rich.live import Live
 
@@ -58,7 +56,7 @@ class ProgressLine:
         """Name the run, as other terminals may call it."""
         self._run_id = run_id
 
-    def update(self, status: dict[str, Any], skipped_ticks: int = 0) -> None:
+    def update(self, status: dict[str, Any]) -> None:
         """Take the logger's status; cheap, and shown a few times a second at most."""
         now = time.monotonic()
         if not status or now < self._due:
@@ -67,13 +65,11 @@ class ProgressLine:
         # Real time counts from the first status on: starting up is not running.
         self._began = self._began or (now, status["t_s"])
         elapsed_s, done_s = now - self._began[0], status["t_s"] - self._began[1]
-        self._show(status, done_s / elapsed_s if elapsed_s > 0 else 0.0, skipped_ticks)
-
-    def _show(self, status: dict[str, Any], factor: float, skipped_ticks: int) -> None:
         if self._live:
-            self._live.update(self.line(status, factor, skipped_ticks, self._live.console.width), refresh=True)
+            factor = done_s / elapsed_s if elapsed_s > 0 else 0.0
+            self._live.update(self.line(status, factor, self._live.console.width), refresh=True)
 
-    def line(self, status: dict[str, Any], factor: float, skipped_ticks: int, width: int) -> Text:
+    def line(self, status: dict[str, Any], factor: float, width: int) -> Text:
         """The line for a status, cut to ``width`` columns; ``factor`` is simulated over real time, 0 if unknown."""
         from rich.text import Text
 
@@ -89,24 +85,8 @@ class ProgressLine:
             f" {fixed(factor)}×" if factor else "",
             "  ", (verdict, VERDICT_STYLES.get(verdict, "bold")),
             f"  {amount(status['oscillation_m'], 'm')} p-p",
-            (f"  skipped {skipped_ticks} ticks" if skipped_ticks else "", "yellow"),
             f"  residual {status['residual_J']:.0e} J",
             (f"  {self._title}", "dim"),
         )  # fmt: skip
         text.truncate(width, overflow="ellipsis")
         return text
-
-
-class PrintedLine(ProgressLine):
-    """The same on stdout, for whoever looks on; into a pipe it prints line after line."""
-
-    _on_stderr = False
-
-    def show(self, status: dict[str, Any], skipped_ticks: int = 0) -> None:
-        """Take the logger's status and how many ticks' worth never came."""
-        self.update(status, skipped_ticks)
-
-    def _show(self, status: dict[str, Any], factor: float, skipped_ticks: int) -> None:
-        super()._show(status, factor, skipped_ticks)
-        if not self._live:
-            print(self.line(status, factor, skipped_ticks, 120).plain, flush=True)

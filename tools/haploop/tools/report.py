@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from haploop.tools.amounts import amount, fixed, parameters, spring
 from haploop.tools.plant_words import counts, plant_books
-from haploop.tools.progress import PrintedLine, ProgressLine
+from haploop.tools.progress import ProgressLine
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from haploop.protocol.quantity import Quantity
 
 __all__ = [
-    "PrintedLine",
     "ProgressLine",
     "console",
     "plugins_table",
@@ -153,32 +152,40 @@ def _rounded(value: float | None, beside: float | None) -> float | None:
 
 
 def status_table(data: dict[str, Any]) -> RenderableType:
-    """One live run: how far it is, how it looks, and who waits for whom."""
+    """One live run: how far it is, how it looks, and of every node its lag, whom it waits for and what it skipped."""
     from rich.console import Group
     from rich.text import Text
 
-    rate = data["control_rate"]
+    rate, pace = data["control_rate"], data.get("pace", "free")
+    at_pace = "as fast as it goes" if pace == "free" else f"at pace {pace:g}"
     state = ("paused", "bold yellow") if data["paused"] else ("running", "bold green")
-    where = f"  {data['tick'] / rate:g} s of {data['end'] / rate:g} s, tick {data['tick']} of {data['end']}"
+    where = f"  {data['tick'] / rate:g} s of {data['end'] / rate:g} s, tick {data['tick']} of {data['end']}, {at_pace}"
     head = Text.assemble((data.get("run", ""), "bold"), "  " if data.get("run") else "", data["title"])
-    status = data.get("status") or {}
-    looks = f", {status['verdict']} so far, oscillation {amount(status['oscillation_m'], 'm')}" if status else ""
-    return Group(head, Text.assemble(state, where, looks), _nodes(data["nodes"]))
+    parts: list[RenderableType] = [head, Text.assemble(state, where)]
+    if status := data.get("status"):
+        word = status["verdict"]
+        looks = f" so far, oscillation {amount(status['oscillation_m'], 'm')} peak to peak"
+        parts.append(Text.assemble((word, VERDICT_STYLES.get(word, "bold")), looks))
+    return Group(*parts, _nodes(data["nodes"], rate))
 
 
-def _nodes(nodes: list[dict[str, Any]]) -> Table:
+def _nodes(nodes: list[dict[str, Any]], control_rate: float) -> Table:
     from rich import box
     from rich.table import Table
+    from rich.text import Text
 
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
-    table.add_column("node")
-    for name in ("pid", "tick", "ticks behind"):
-        table.add_column(name, justify="right")
+    table.add_column("node", no_wrap=True)
+    for name in ("pid", "tick", "behind"):
+        table.add_column(name, justify="right", no_wrap=True)
     table.add_column("waits for")
+    table.add_column("skipped", justify="right", no_wrap=True)
     for node in nodes:
-        role = node["role"] + ("" if node.get("lossless", True) else " (may skip)")
-        counts = (str(node[key]) for key in ("pid", "tick", "behind_ticks"))
-        table.add_row(role, *counts, node["waits_for"] or "–")
+        behind, skipped = node["behind_ticks"], node.get("skipped_ticks", 0)
+        ticks = f"{behind} tick{'s' * (behind != 1)}"
+        lag = f"{ticks}, {amount(behind / control_rate, 's')}" if behind else "–"
+        skips = "–" if node.get("lossless", True) else Text(f"{skipped} ticks", "yellow" if skipped else "")
+        table.add_row(Text(node["role"]), str(node["pid"]), str(node["tick"]), lag, node["waits_for"] or "–", skips)
     return table
 
 

@@ -27,7 +27,7 @@ def registry(plugin_files: list[Path] | None = None) -> dict[str, type[Element]]
     kinds: dict[str, type[Element]] = {}
     for point in sorted(entry_points(group=ENTRY_POINT_GROUP), key=lambda p: p.name):
         try:
-            kinds[point.name] = _checked(point.load(), f"entry point {point.name} = {point.value}")
+            kinds[point.name] = checked(point.load(), f"entry point {point.name} = {point.value}")
         except Exception as error:
             raise PluginError(f"The installed element {point.name!r} ({point.value}) does not load: {error}") from error
     for path in plugin_files or []:
@@ -51,13 +51,18 @@ def load_plugin(path: Path) -> dict[str, type[Element]]:
         line = f", line {error.lineno}" if isinstance(error, SyntaxError) else ""
         raise PluginError(f"The plugin {path}{line} does not load: {type(error).__name__}: {error}") from error
     found = [c for c in vars(module).values() if inspect.isclass(c) and c.__module__ == module.__name__]
-    elements = [_checked(c, str(path)) for c in found if issubclass(c, Element)]
+    elements = [checked(c, str(path)) for c in found if issubclass(c, Element)]
     if not elements:
         raise PluginError(f"The plugin {path} defines no element; a class derived from Element was expected.")
     return {element.kind: element for element in elements}
 
 
-def _checked(element: object, origin: str) -> type[Element]:
+def checked(element: object, origin: str) -> type[Element]:
+    """An element that has a kind, a force and well declared parameters.
+
+    Raises:
+        PluginError: it is none; ``origin`` says where it came from.
+    """
     if not (inspect.isclass(element) and issubclass(element, Element)):
         raise PluginError(f"{origin} must name a class derived from Element, but gives {element!r}.")
     if not isinstance(getattr(element, "kind", None), str):

@@ -1,0 +1,99 @@
+"""The records of an MCAP file: the whole ones, one after the other, and what stands inside a chunk.
+
+The frame of the file is read by the ``mcap`` library's own records; messages of equal length that stand end to end in a
+chunk, as this project's logs have them, are gathered by NumPy all at once.
+"""
+
+from __future__ import annotations
+
+import os
+import struct
+from collections.abc import Iterator
+from dataclasses import dataclass
+from io import BytesIO
+from typing import IO
+
+import numpy as np
+from mcap.data_stream import ReadDataStream
+from mcap.opcode import Opcode
+from mcap.records import Chunk
+from mcap.stream_reader import get_chunk_data_stream
+from numpy.typing import NDArray
+
+_PREFIX = struct.Struct("<BQ")
+_MESSAGE = struct.Struct("<HIQQ")
+
+
+@dataclass(frozen=True)
+class MessageRun:
+    """Messages of one channel and one length: log times in ns, shape (messages,), and their bytes, end to end."""
+
+    channel: int
+    log_times_ns: NDArray[np.uint64]
+    payloads: bytes
+    message_bytes: int
+
+    def __iter__(self) -> Iterator[bytes]:
+        for start in range(0, len(self.payloads), self.message_bytes):
+            yield self.payloads[start : start + self.message_bytes]
+
+
+def records(stream: IO[bytes]) -> Iterator[tuple[int, bytes]]:
+    """Opcode and content of each whole record that is left in a file as it is now."""
+    end = os.fstat(stream.fileno()).st_size
+    while len(prefix := stream.read(_PREFIX.size)) == _PREFIX.size:
+        opcode, length = _PREFIX.unpack(prefix)
+        if stream.tell() + length > end:
+            return
+        yield opcode, stream.read(length)
+
+
+def chunk_body(content: bytes) -> bytes:
+    """The records in a chunk, unpacked and checked against their CRC.
+
+    Raises:
+        ValueError, RuntimeError, McapError: the chunk is damaged.
+    """
+    chunk = Chunk.read(ReadDataStream(BytesIO(content)))
+    body, size = get_chunk_data_stream(chunk, validate_crc=True)
+    return body.read(size)
+
+
+def lone_message(content: bytes) -> bytes:
+    """A message that stands outside of any chunk, as a chunk's body would hold it."""
+    return _PREFIX.pack(Opcode.MESSAGE, len(content)) + content
+
+
+def parts(body: bytes) -> Iterator[MessageRun | tuple[int, bytes]]:
+    """What stands in a chunk's body, in order: runs of messages, and other records by opcode and content.
+
+    Raises:
+        ValueError, struct.error: the body is damaged.
+    """
+    at = 0
+    while at < len(body):
+        opcode, length = _PREFIX.unpack_from(body, at)
+        end = at + _PREFIX.size + length
+        if opcode == Opcode.MESSAGE:
+            run, end = _run(body, at, end)
+            yield run
+        else:
+            yield opcode, body[at + _PREFIX.size : end]
+        at = end
+
+
+def _run(body: bytes, start: int, end: int) -> tuple[MessageRun, int]:
+    """The messages like the one in ``start:end`` that stand end to end from it on, and where the last of them ends."""
+    if end > len(body):
+        raise ValueError("a message is longer than its chunk")
+    size, head_end = end - start, start + _PREFIX.size + 2  # the head is opcode, length and channel
+    # Looking further ahead is only worth it where a second message follows the first.
+    followed = body[end : end + head_end - start] == body[start:head_end]
+    messages = np.frombuffer(body, np.uint8, ((len(body) - start) // size if followed else 1) * size, start)
+    messages = messages.reshape(-1, size)
+    alike = (messages[:, : head_end - start] == messages[0, : head_end - start]).all(axis=1)
+    messages = messages if alike.all() else messages[: alike.argmin()]
+    data = _PREFIX.size + _MESSAGE.size
+    channel, _, _, _ = _MESSAGE.unpack_from(body, start + _PREFIX.size)
+    log_times = messages[:, data - 16 : data - 8].copy().view("<u8")[:, 0]
+    return MessageRun(channel, log_times, messages[:, data:].tobytes(), size - data), start + messages.size

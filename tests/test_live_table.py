@@ -1,0 +1,214 @@
+"""The live table shows the newest of everything that was heard, with its units, and fits into a terminal."""
+
+from __future__ import annotations
+
+import io
+from typing import Any
+
+import numpy as np
+import pytest
+from rich.console import Console
+
+from haploop.protocol.wire import Frame
+from haploop.tools.attach_print import Lines
+from haploop.tools.event_words import event_words
+from haploop.tools.live_table import ending, live_line, live_table
+from haploop.tools.watched import Watched
+
+WELCOME = {
+    "scene": {"title": "a tap on a wall [of 0.15 N/mm]"},
+    "timebase": {"plant_rate": 10_000, "control_rate": 1_000, "delay_steps": 0, "ticks": 3000},
+    "context": {"out": "/nowhere"},
+}
+DAMPING = {"book": 0, "kind": "damping", "parameters": {"damping": 0.8, "acts": "in-contact"}, "from_tick": 0}
+BELOW = {"position": -0.06, "stiffness": 150.0, "into_wall": -1.0}
+STATUS = {"t_s": 1.25, "verdict": "limit-cycle", "oscillation_m": 4.7e-3, "residual_J": 3e-18}
+
+
+def columns(**values: float) -> dict[str, bytes]:
+    """Two rows, of which the last one counts."""
+    return {name.replace("__", "."): np.array([9.99, value]).tobytes() for name, value in values.items()}
+
+
+def frames(
+    x: float = -0.0612, wall: dict[str, float] = BELOW, elements: Any = (DAMPING,), to: int = 1250
+) -> list[tuple[str, Frame]]:
+    """One block of each publisher up to a tick."""
+    forces = {f"dissipation__{index}": 0.03 for index in range(len(elements))}
+    plant = columns(x=x, v=0.012, force=0.18) | {"pieces.step": b""}
+    controller = columns(x=x, wall=0.15, total=0.18, **forces)
+    books = columns(hand_work=1e-2, moved=2e-2, wall__sampled=-1.1e-2, wall__true=-1.23e-2) | columns(
+        damping__sampled=0.5e-3, damping__true=0.6e-3, residual=3e-18
+    )
+    return [
+        ("plant", Frame("PLANT_BLOCK", [to - 1, 1, plant])),
+        ("controller", Frame("CONTROLLER_BLOCK", [to - 1, 1, controller, list(elements), wall])),
+        ("logger", Frame("ENERGY_BLOCK", [to - 1, 1, books, STATUS])),
+    ]
+
+
+def watched(**options: Any) -> Watched:
+    subject = Watched("a1b2c3", WELCOME)
+    subject.take([], 0.0)
+    subject.take(frames(**options), 1.0)
+    return subject
+
+
+def shown(subject: Watched, width: int = 80) -> str:
+    terminal = Console(width=width, file=io.StringIO(), highlight=False)
+    terminal.print(live_table(subject))
+    return terminal.file.getvalue()  # pyright: ignore[reportAttributeAccessIssue]
+
+
+def row(text: str, begins: str) -> str:
+    """The line that begins with some words, without them."""
+    [line] = [line for line in text.splitlines() if line.strip().startswith(begins)]
+    return " ".join(line.strip().removeprefix(begins).split())
+
+
+@pytest.mark.parametrize("width", [60, 80, 120])
+def test_the_table_holds_the_last_value_of_everything(width: int) -> None:
+    text = shown(watched(), width)
+    assert text.splitlines()[0].startswith("a1b2c3  a tap on a wall [of 0.15 N/mm]")
+    assert "1.250 s of 3 s, tick 1250" in text
+    assert row(text, "so far").startswith("limit-cycle oscillation 4.70 mm")
+    assert row(text, "position") == "−61.2 mm 1.20 mm inside the wall"
+    assert row(text, "velocity") == "12.0 mm/s"
+    assert row(text, "damping") == "600 µJ 500 µJ"
+    assert row(text, "residual, 1.5e-16 of what moved") == "3.00e−18 J"
+    assert row(text, "skipped") == "0 ticks"
+    assert max(map(len, text.splitlines())) <= width
+
+
+def test_the_force_is_told_in_its_parts() -> None:
+    text = shown(watched(elements=(DAMPING, DAMPING)), 140)
+    assert row(text, "force") == "180 mN commanded: wall 150 mN, damping 30.0 mN, damping (1) 30.0 mN"
+
+
+@pytest.mark.parametrize(
+    ("x", "into_wall", "words"),
+    [(-0.06, -1.0, "0 m outside"), (-0.048, -1.0, "12.0 mm outside"), (-0.048, 1.0, "12.0 mm inside")],
+)
+def test_the_wall_has_its_two_sides(x: float, into_wall: float, words: str) -> None:
+    assert words in row(shown(watched(x=x, wall={**BELOW, "into_wall": into_wall})), "position")
+
+
+def test_without_a_wall_there_is_no_side_of_it_no_force_and_no_book() -> None:
+    text = shown(watched(wall={"position": 0.0, "stiffness": 0.0, "into_wall": 0.0}), 120)
+    assert "wall" not in text.partition("\n")[2]
+
+
+def test_a_run_that_stands_still_is_shown_from_what_its_publishers_say_on_joining() -> None:
+    subject = Watched("a1b2c3", WELCOME)
+    _, (_, controller), _ = frames()
+    state = {"tick": 500, "x": -0.061, "v": 0.0, "force": 0.1, "command": 499}
+    subject.take(
+        [
+            ("plant", Frame("STATE", [500, state])),
+            ("controller", Frame("STATE", [500, {"history": [controller.as_dict()]}])),
+            ("logger", Frame("STATE", [500, STATUS])),
+        ],
+        0.0,
+    )
+    subject.note(500, {"at": 0.5, "pause": True})
+    text = shown(subject)
+    assert row(text, "paused").endswith("0.500 s of 3 s, tick 500")
+    assert row(text, "position") == "−61.0 mm 1.00 mm inside the wall"
+    assert row(text, "so far").startswith("limit-cycle")
+    subject.note(500, {"resume": True})
+    assert "paused" not in shown(subject)
+
+
+def test_before_anything_came_there_are_dashes_and_no_error() -> None:
+    text = shown(Watched("a1b2c3", WELCOME))
+    assert row(text, "position") == "–"
+    assert row(text, "waiting").endswith("0.000 s of 3 s, tick 0")
+
+
+def test_the_real_time_factor_is_that_of_the_last_seconds() -> None:
+    subject = Watched("a1b2c3", WELCOME)
+    for second in range(11):
+        subject.take(frames(to=1000 + 50 * second), float(second))
+    assert subject.factor == pytest.approx(0.05)
+    for second in range(11, 21):
+        subject.take(frames(to=1500 + 200 * (second - 10)), float(second))
+    assert subject.factor == pytest.approx(0.2)
+    for second in range(21, 31):
+        subject.take([], float(second))
+    assert subject.factor is None
+
+
+def test_a_change_is_shown_with_its_time_and_tick_whatever_is_in_its_words() -> None:
+    """Square brackets are no markup."""
+    subject = watched()
+    subject.note(1200, {"refused": "swap of element 0 at tick 1200 was refused: ValueError: [red] is no number"})
+    assert "[red] is no number, at 1.2 s (tick 1200)" in shown(subject, 200)
+
+
+@pytest.mark.parametrize(
+    ("event", "words"),
+    [
+        ({"swap": {"kind": "damping", "damping": 0.8}, "element": 0}, "element 0 becomes damping (damping 0.8)"),
+        ({"swap": {"kind": "none"}, "element": 1}, "element 1 is removed"),
+        ({"set": {"wall.stiffness": 200.0, "clock.round_trip_delay": 0.002}}, "set wall.stiffness = 200, clock.round"),
+        ({"pace": 0.1}, "pace 0.1"),
+        ({"pace": "free"}, "as fast as it goes"),
+        ({"pause": True, "at": 0.5}, "pause"),
+        ({"step": 10}, "step"),
+        ({"stop": True, "by": "signal"}, "stop"),
+    ],
+)
+def test_every_kind_of_event_has_its_words(event: dict[str, Any], words: str) -> None:
+    assert event_words(event).startswith(words)
+
+
+def summary(**changes: Any) -> dict[str, Any]:
+    ran = {"ended": "done", "why": "", "verdict": "steady", "window": {"oscillation_m": 1e-6}}
+    return ran | {"energy": {"residual_J": 4e-18}} | changes
+
+
+def test_at_the_end_the_verdict_is_that_of_the_summary() -> None:
+    subject = watched(to=3000)
+    subject.end("", summary())
+    assert row(shown(subject), "verdict").startswith("steady oscillation 1.00 µm")
+    assert ending(subject) == "Run a1b2c3 ended at tick 3000, 3 s."
+
+
+@pytest.mark.parametrize(
+    ("failure", "its_summary", "words"),
+    [
+        ("", summary(ended="stopped"), "ended at tick 1250, 1.25 s (stopped)."),
+        ("", summary(ended="diverged", why="the device was at 2 m."), "(diverged): the device was at 2 m."),
+        ("The plant was killed by SIGKILL.", None, "(failed): The plant was killed by SIGKILL."),
+        ("", None, "ended at tick 1250, 1.25 s."),
+    ],
+)
+def test_how_it_ended_is_a_sentence(failure: str, its_summary: dict[str, Any] | None, words: str) -> None:
+    subject = watched()
+    subject.end(failure, its_summary)
+    assert ending(subject).endswith(words)
+
+
+def test_the_line_for_a_pipe_has_numbers_and_units_and_what_was_skipped() -> None:
+    subject = watched()
+    words = "1.250 s  x −61.2 mm  force 180 mN  limit-cycle  4.70 mm p-p  residual 3.00e−18 J"
+    assert live_line(subject).startswith(words)
+    assert "skipped" not in live_line(subject)
+    subject.skipped_ticks = 400
+    assert live_line(subject).endswith("skipped 400 ticks")
+
+
+def test_into_a_pipe_go_lines_one_for_every_change_and_none_twice(capsys: pytest.CaptureFixture[str]) -> None:
+    lines, subject = Lines(), watched()
+    subject.note(1000, {"pause": True})
+    lines.show(subject)
+    lines.show(subject)
+    first = capsys.readouterr().out.splitlines()
+    subject.note(1250, {"resume": True})
+    lines.show(subject)
+    subject.end("", summary())
+    lines.show(subject)
+    rest = capsys.readouterr().out.splitlines()
+    assert [line.split("  ")[:2] for line in first] == [["1.000 s", "pause"], ["1.250 s", "x −61.2 mm"]]
+    assert [line.split("  ")[1] for line in rest] == ["resume", "x −61.2 mm"]
+    assert "steady" in rest[-1]

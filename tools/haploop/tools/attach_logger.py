@@ -1,0 +1,61 @@
+"""``haploop attach logger``: a second logger, with a log and a summary of its own."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Any
+
+from haploop.launch import run_directory
+from haploop.launch.interrupts import interrupts
+from haploop.launch.output import make_output, write_scene
+from haploop.launch.run_directory import LiveRun
+from haploop.logger.node import LoggerNode
+from haploop.logger.tapes import TelemetryGap
+from haploop.protocol.member import Aborted, Member, Refused
+from haploop.protocol.processes import OBSERVER
+from haploop.protocol.transport import Wires
+from haploop.tools.ending import FAILED, WRONG_USE, leave
+from haploop.tools.report import print_summary
+
+
+def attach_logger(run_id: str | None, out: Path | None) -> None:
+    """Log a run from where it is; lossless, so a slow one slows the run."""
+    run = run_directory.find(run_id)
+    directory = make_output(out, Path(f"attached-{run.id}"))
+    wires = run.wires()
+    try:
+        with interrupts(usual_from=2) as received:
+            summary = _log(run, wires, directory, received)
+    except Refused as error:
+        leave(str(error), WRONG_USE)
+    finally:
+        wires.destroy(linger=500)
+    if summary is None:
+        leave(f"Run {run.id} ended before anything could be logged.", FAILED)
+    print_summary(summary)
+    print(directory, file=sys.stderr)
+    if summary["ended"] == "failed":
+        leave(summary["why"], FAILED)
+
+
+def _log(run: LiveRun, wires: Wires, directory: Path, received: list[int]) -> dict[str, Any] | None:
+    """Log until the run ends or a signal comes; the summary, or None if nothing came."""
+
+    def reason_to_leave() -> str | None:
+        if received:
+            return ""
+        return None if run_directory.is_live(run) else f"The launcher of run {run.id} has ended without a word."
+
+    member = Member(wires, OBSERVER, run.clock, "")
+    node = LoggerNode(member, wires, None, reason_to_leave)
+    try:
+        welcome = member.join({})
+        write_scene(welcome["scene"], directory)
+        node.start(welcome, directory)
+        print(f"logging run {run.id} from tick {node.keeper.logger.tick} on; Ctrl-C leaves", file=sys.stderr)
+        tick, summary = node.run()
+        member.leave("LEAVE", tick)
+        return summary
+    except (Aborted, TelemetryGap) as error:
+        return node.save(str(error))
