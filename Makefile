@@ -17,10 +17,10 @@ demo: $(READY) ## run the scene of figure 6c into runs/demo and draw it; the las
 	@$(BIN)/haploop plot runs/demo
 
 test: $(READY) ## run the tests
-	@$(BIN)/pytest -q -m "not slow"
+	@$(BIN)/pytest -q -n auto --dist worksteal -m "not slow"
 
 slow: $(READY) ## run the slow tests (that there are none is no failure: pytest then exits with 5)
-	@$(BIN)/pytest -q -m slow || [ $$? -eq 5 ]
+	@$(BIN)/pytest -q -n auto --dist worksteal -m slow || [ $$? -eq 5 ]
 
 check: $(READY) ## lint, format, types and the arrows between the packages
 	@$(BIN)/ruff check

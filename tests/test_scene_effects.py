@@ -208,8 +208,8 @@ def test_an_effect_can_be_named_on_the_command_line_alone(tmp_path):
 
 
 def test_no_effect_can_be_changed_while_a_loop_runs():
-    """Only gains of the controller are live; the plant is what it is."""
+    """Gains of the controller and the line's delay are live; the device is what it is."""
     event = {"at": 0.5, "set": {"friction.kinetic": 0.1}}
     [mistake] = mistakes(friction={"kinetic": 0.05}, wall={"position": 0, "stiffness": 1}, event=[event])
     assert mistake.startswith("event.0.set.friction.kinetic cannot be set")
-    assert mistake.endswith("Allowed at that time: wall.stiffness, wall.position.")
+    assert mistake.endswith("Allowed at that time: wall.stiffness, wall.position, clock.round_trip_delay.")
