@@ -30,7 +30,10 @@ def run(
     set: Set = None,
     out: Annotated[Path | None, typer.Option(help="directory to write to, new or empty [runs/SCENE-TIME]")] = None,
     in_process: Annotated[bool, typer.Option("--in-process", help="everything in one process, same bits")] = False,
-    pace: Annotated[str, typer.Option(help="free, or simulated seconds per second")] = "free",
+    pace: Annotated[
+        str | None, typer.Option(help="free, or simulated seconds per second [free; 1 with --view]", show_default=False)
+    ] = None,
+    view: Annotated[bool, typer.Option("--view", help="show it in the browser, which may steer it")] = False,
     plugin: Plugin = None,
     tcp: Annotated[str | None, typer.Option(metavar="ADDRESS", help="TCP sockets, such as 127.0.0.1")] = None,
     keys: Annotated[Path | None, typer.Option(metavar="DIR", help="CURVE keys for TCP; made where missing")] = None,
@@ -38,8 +41,11 @@ def run(
 ) -> None:
     """Run a scene to its end; other terminals can steer and watch it meanwhile."""
     from haploop.tools.run import run_scene
+    from haploop.tools.view import viewing
 
-    run_scene(scene, set or [], out, in_process, pace, plugin or [], tcp, keys, json)
+    rate = pace or ("1" if view else "free")
+    with viewing(view, in_process) as announced:
+        run_scene(scene, set or [], out, in_process, rate, plugin or [], tcp, keys, json, announced)
 
 
 @app.command()
@@ -173,6 +179,20 @@ def attach(
     from haploop.tools.attach import attach_to
 
     attach_to(what, out, run, port)
+
+
+@app.command()
+def view(
+    run: Annotated[str | None, typer.Option("--run", metavar="ID", help="which run to show first [the newest]")] = None,
+    port: Annotated[int, typer.Option(min=0, max=65535, metavar="PORT", help="of this machine; 0: any free one")] = 0,
+    since: Annotated[str, typer.Option(metavar="start|now", help="with what was logged before, or without")] = "start",
+    browser: Annotated[bool, typer.Option("--browser/--no-browser", help="open the page")] = True,
+    led: Annotated[bool, typer.Option("--led", hidden=True)] = False,
+) -> None:
+    """Look at runs of this machine in the browser as they go, and steer them; until Ctrl-C."""
+    from haploop.tools.view import view as show
+
+    show(run, port, since, browser, led)
 
 
 @app.command()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -25,8 +26,9 @@ def run_scene(
     tcp: str | None,
     keys: Path | None,
     as_json: bool,
+    announced: Callable[[str], object] = lambda run_id: None,
 ) -> None:
-    """Run a scene, show how it goes and what came of it."""
+    """Run a scene, show how it goes and what came of it; ``announced`` is told the run's id."""
     from haploop.launch.start import prepare, run
     from haploop.tools.report import ProgressLine, print_summary
 
@@ -40,13 +42,18 @@ def run_scene(
 
         try:
             with ProgressLine(title, duration_s) as line:
+
+                def told(run_id: str) -> None:
+                    line.announce(run_id)
+                    announced(run_id)
+
                 summary = run(
                     prepared,
                     in_process=in_process,
                     pace=rate,
                     transport=transport,
                     progress=line.update,
-                    announced=line.announce,
+                    announced=told,
                 )
         except RunFailed as error:
             leave(f"{error}\nWhat was logged is in {prepared.out}.", FAILED)

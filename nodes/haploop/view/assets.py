@@ -1,0 +1,52 @@
+"""The files of the page: its own, and those of uPlot as they lie in the installed package."""
+
+from __future__ import annotations
+
+import importlib.util
+from pathlib import Path
+
+_OWN = Path(__file__).with_name("static")
+_OF_UPLOT = ("uPlot.iife.js", "uPlot.min.css")
+TYPES = {
+    ".html": "text/html",
+    ".css": "text/css",
+    ".js": "text/javascript",
+    ".svg": "image/svg+xml",
+}
+
+
+class MissingExtra(RuntimeError):
+    """Something is not installed that the page needs; the message says what, and how to get it."""
+
+
+def check_installed() -> None:
+    """Look for what the page needs beside haploop itself, without loading it.
+
+    Raises:
+        MissingExtra: some of it is not there.
+    """
+    if importlib.util.find_spec("aiohttp") is None or _uplot() is None:
+        raise MissingExtra(
+            "haploop view needs aiohttp and uplot-python; install them with pip install 'haploop[view]'."
+        )
+
+
+def _uplot() -> Path | None:
+    """Where the installed package keeps uPlot's files; importing it would load far more."""
+    spec = importlib.util.find_spec("uplot")
+    places = spec.submodule_search_locations if spec else None
+    folders = [Path(place, "static") for place in places or ()]
+    return next((folder for folder in folders if all((folder / name).is_file() for name in _OF_UPLOT)), None)
+
+
+def assets() -> dict[str, Path]:
+    """Every file the page may ask for, by name.
+
+    Raises:
+        MissingExtra: uPlot is not installed.
+    """
+    check_installed()
+    folder = _uplot()
+    assert folder
+    own = {path.name: path for path in _OWN.iterdir() if path.suffix in TYPES}
+    return own | {name: folder / name for name in _OF_UPLOT}

@@ -1,0 +1,78 @@
+"""Who may look and who may steer: this machine's browser alone, and to steer only with the link that was printed.
+
+A page from elsewhere reaches a server on loopback too, through the browser of whoever visits it. It can make that
+browser send requests, but not with another Host (its own name may resolve to this machine: DNS rebinding), not with
+another Origin, and it can neither read the answers nor guess a token.
+"""
+
+from __future__ import annotations
+
+import hmac
+import secrets
+
+HOST = "127.0.0.1"
+_NAMES = (HOST, "localhost")
+
+
+class Guard:
+    """The names, the token and the key of one server.
+
+    Attributes:
+        token: what every command must carry.
+    """
+
+    def __init__(self, port: int) -> None:
+        self._hosts = [f"{name}:{port}" for name in _NAMES]
+        self.token = secrets.token_urlsafe(24)
+        self._key: str | None = secrets.token_urlsafe(24)
+
+    @property
+    def address(self) -> str:
+        """Where the page is."""
+        return f"http://{self._hosts[0]}/"
+
+    @property
+    def link(self) -> str:
+        """The page with the token in its fragment, which no browser sends to any server."""
+        return f"{self.address}#token={self.token}"
+
+    @property
+    def entrance(self) -> str:
+        """A link that leads to the page with its token once: a browser is started with it, for all users to see."""
+        return f"{self.address}enter/{self._key}"
+
+    def admits(self, key: str) -> bool:
+        """Whether this is the key of the entrance, which is then used up."""
+        if self._key is None or not hmac.compare_digest(key.encode(), self._key.encode()):
+            return False
+        self._key = None
+        return True
+
+    def knows_host(self, host: str | None) -> bool:
+        """Whether a request is for this server by one of its own names."""
+        return host in self._hosts
+
+    def knows_origin(self, origin: str | None) -> bool:
+        """Whether a request comes from a page of this server."""
+        return origin in [f"http://{host}" for host in self._hosts]
+
+    def may_steer(self, token: str) -> bool:
+        """Whether this is the token, in a time that does not tell how much of it is right."""
+        return hmac.compare_digest(token.encode(), self.token.encode())
+
+    @property
+    def headers(self) -> dict[str, str]:
+        """What every answer says of itself: nothing from elsewhere in it, and no page of others around it."""
+        sockets = " ".join(f"ws://{host}" for host in self._hosts)
+        return {
+            "Content-Security-Policy": (
+                f"default-src 'self'; connect-src 'self' {sockets}; "
+                "base-uri 'none'; form-action 'self'; frame-ancestors 'none'; object-src 'none'"
+            ),
+            "X-Frame-Options": "DENY",
+            "X-Content-Type-Options": "nosniff",
+            "Referrer-Policy": "no-referrer",
+            "Cross-Origin-Opener-Policy": "same-origin",
+            "Cross-Origin-Resource-Policy": "same-origin",
+            "Cache-Control": "no-store",
+        }

@@ -1,0 +1,46 @@
+// Numbers as people read them: with a prefix that suits their size, and their unit.
+
+const PREFIXES = [[1e3, "k"], [1, ""], [1e-3, "m"], [1e-6, "µ"], [1e-9, "n"]];
+const MOST_DECIMALS = 4;
+export const NONE = "–";
+
+const minus = (text) => text.replaceAll("-", "−");
+
+/** Whether there is a number at all. */
+export const isNumber = (value) => typeof value === "number" && Number.isFinite(value);
+
+/** `digits` significant digits without powers of ten; digits before the point are never rounded away. */
+export function fixed(value, digits = 3) {
+  if (value === 0) return "0";
+  const beforePoint = Math.floor(Math.log10(Math.abs(value))) + 1;
+  return minus(value.toFixed(Math.min(20, Math.max(0, digits - beforePoint))));
+}
+
+/** A number with its unit: "5.14 mm"; a dash for no number, powers of ten where no prefix helps. */
+export function amount(value, unit, digits = 3) {
+  if (!isNumber(value)) return NONE;
+  const size = Math.abs(value);
+  const [factor, letter] = size === 0 ? [1, ""] : PREFIXES.find(([f]) => size >= f * 0.9995) ?? PREFIXES.at(-1);
+  if (size && !(size / factor >= 1e-3 && size / factor < 1e5)) return `${power(value, digits)} ${unit}`;
+  return `${fixed(value / factor, digits)} ${letter}${unit}`;
+}
+
+/** A number in powers of ten: "2.1e−16". */
+export const power = (value, digits = 2) => (isNumber(value) ? minus(value.toExponential(digits - 1)) : NONE);
+
+/** A number of a fixed number of decimals, so that it keeps its place while it changes. */
+export const steady = (value, decimals) =>
+  isNumber(value) ? minus(value.toFixed(decimals).replace(/^-(0\.?0*)$/, "$1")) : NONE;
+
+/** The shortest text of a number that a form can take back: no more digits than a scene would have. */
+export const plain = (value) => String(Number(value.toPrecision(12)));
+
+const isWhole = (value) => value >= 0.5 && Math.abs(value - Math.round(value)) < 1e-6 * value;
+
+/** The numbers along an axis, all with the decimals their step needs; powers of ten where that would be many. */
+export function axisNumbers(splits, step) {
+  let decimals = 0;
+  while (decimals <= MOST_DECIMALS && !isWhole(step * 10 ** decimals)) decimals += 1;
+  if (decimals <= MOST_DECIMALS) return splits.map((value) => steady(value, decimals));
+  return splits.map((value) => (value === 0 ? "0" : power(value, 2)));
+}

@@ -1,0 +1,38 @@
+// How the axes of every chart look: one hand for all of them.
+
+import { axisNumbers } from "./amounts.js";
+import { colour } from "./palette.js";
+
+export const FONT = 'system-ui, -apple-system, "Segoe UI", Roboto, "Helvetica Neue", Arial, sans-serif';
+// Axes keep their size whatever stands on them: the charts stay below each other, and nothing jumps.
+const LEFT_PX = 52;
+const BOTTOM_PX = 20;
+const BARE_PX = 5;
+const LABEL_PX = 17;
+
+const common = () => ({
+  stroke: () => colour("ink"),
+  font: `12px ${FONT}`,
+  labelFont: `12px ${FONT}`,
+  labelSize: LABEL_PX,
+  gap: 3,
+  grid: { stroke: () => colour("grid"), width: 1 },
+  ticks: { stroke: () => colour("grid"), width: 1, size: 4 },
+});
+
+const numbers = (u, splits, axis, space, step) => axisNumbers(splits, step);
+
+/** The axis to the left. */
+export const leftAxis = (label) => ({ ...common(), scale: "y", label, size: LEFT_PX, space: 24, values: numbers });
+
+/** The axis below. */
+export const bottomAxis = (label) => ({ ...common(), scale: "x", label, size: BOTTOM_PX, space: 56, values: numbers });
+
+/** The axis below a chart whose times stand below another one. */
+export const bareAxis = () => ({
+  ...common(),
+  scale: "x",
+  size: BARE_PX,
+  space: 56,
+  values: (u, splits) => splits.map(() => null),
+});

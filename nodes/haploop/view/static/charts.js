@@ -1,0 +1,68 @@
+// All charts of the page, filled from one picture at a time.
+
+import { amount, isNumber } from "./amounts.js";
+import { byId } from "./dom.js";
+import { Loops } from "./loops.js";
+import { linesFor } from "./palette.js";
+import { scaled, times } from "./picture.js";
+import { TimeChart } from "./time_chart.js";
+
+const CHARTS = {
+  position: { label: "position", unit: "mm", factor: 1e3, decimals: 3, least: 0.01, zero: false, times: false },
+  force: { label: "force", unit: "N", factor: 1, decimals: 3, least: 0.001, zero: true, times: false },
+  energy: { label: "energy taken", unit: "mJ", factor: 1e3, decimals: 3, least: 1e-6, zero: true, times: true },
+};
+const NO_TIMES = new Float64Array(0);
+
+export class Charts {
+  /** @param {import("./look.js").Look} look what is looked at. */
+  constructor(look) {
+    this.look = look;
+    this.charts = Object.fromEntries(
+      Object.entries(CHARTS).map(([name, options]) => [name, new TimeChart(byId(name), options, look)]),
+    );
+    this.loops = new Loops(byId("loop"), byId("momentum"));
+    new ResizeObserver(([{ contentRect }]) => look.fit(contentRect.width)).observe(byId("position"));
+  }
+
+  /**
+   * Draw a picture.
+   *
+   * @param {object} picture as decoded.
+   * @param {object} state the run's state.
+   * @param {object[]} marks what changed the run.
+   */
+  show({ from_s, to_s, tables }, state, marks) {
+    this.look.shown = [from_s, to_s];
+    for (const [name, chart] of Object.entries(this.charts)) {
+      const lines = tables[name] ? linesOf(tables[name], CHARTS[name].factor) : [];
+      chart.show([from_s, to_s], tables[name] ? times(tables[name]) : NO_TIMES, lines, {
+        wall: name === "position" ? wallOf(lines, state) : null,
+        marks,
+        note: name === "energy" ? residual(state) : "",
+      });
+    }
+    this.loops.show(tables);
+  }
+
+  /** Fit all axes closely the next time: another stretch of time is looked at. */
+  refit() {
+    for (const { range } of Object.values(this.charts)) range.forget();
+    for (const { ranges } of this.loops.charts) ranges.forEach((range) => range.forget());
+  }
+}
+
+/** Every column as a line in the unit of its chart; the residual is a number beside the chart, too small for a line. */
+function linesOf({ columns }, factor) {
+  const drawn = columns.filter(({ name }) => name !== "residual");
+  const looks = linesFor(drawn);
+  return drawn.map(({ name, label, values }, i) => ({ key: name, label, line: looks[i], values: scaled(values, factor) }));
+}
+
+/** The wall's face and the side its material is on. */
+function wallOf(lines, { wall }) {
+  const face = lines.find(({ key }) => key === "wall");
+  return face && wall?.into_wall ? { values: face.values, side: Math.sign(wall.into_wall) } : null;
+}
+
+const residual = ({ residual_J: rest }) => (isNumber(rest) ? `residual ${amount(rest, "J", 2)}` : "");

@@ -1,0 +1,114 @@
+// One number of a form: its name, unit and bounds, and whether what was typed can be used.
+
+import { plain } from "./amounts.js";
+import { make, put } from "./dom.js";
+
+// Lengths and times are small: shown, and read, in thousandths of their SI unit.
+const SHOWN_AS = { m: ["mm", 1e3], s: ["ms", 1e3] };
+const NUMBER = /^[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d{1,3})?$/i;
+const WITH_UNIT = /^[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d{1,3})?\s*[^\d\s.,+-].*$/i;
+const BOUNDS = [
+  ["at_least", "at least", "≥", (value, bound) => value >= bound],
+  ["above", "above", ">", (value, bound) => value > bound],
+  ["at_most", "at most", "≤", (value, bound) => value <= bound],
+  ["below", "below", "<", (value, bound) => value < bound],
+];
+
+/** A dotted name that may be broken after its dots and underscores. */
+const breakable = (name) => name.split(/(?<=[._])/).flatMap((part, i) => (i ? [make("wbr"), part] : [part]));
+
+export class Field {
+  /**
+   * @param {string} id of the input.
+   * @param {string} name as the run calls the number.
+   * @param {object} quantity unit (SI), and at_least, above, at_most, below: null where there is no such bound.
+   */
+  constructor(id, name, quantity) {
+    this.name = name;
+    this.quantity = quantity;
+    [this.unit, this.factor] = SHOWN_AS[quantity.unit] ?? [quantity.unit, 1];
+    this.input = make("input", { id, type: "text", inputmode: "decimal", autocomplete: "off", spellcheck: "false" });
+    this.input.setAttribute("aria-describedby", `${id}-unit ${id}-problem`);
+    this.problem = make("span", { class: "problem", id: `${id}-problem`, role: "alert" });
+    const unit = make("span", { class: "unit", id: `${id}-unit` }, [this.unit, this.bounds()].filter(Boolean).join(", "));
+    this.element = make("p", { class: "field" }, make("label", { for: id }, ...breakable(name)), this.input, unit, this.problem);
+    this.input.addEventListener("input", () => this.complain(this.complaint()));
+    this.present = "";
+  }
+
+  bounds() {
+    return BOUNDS.filter(([key]) => this.quantity[key] != null)
+      .map(([key, , sign]) => `${sign} ${plain(this.quantity[key] * this.factor)}`)
+      .join(", ");
+  }
+
+  /** The number as it is now, in SI; shown unless something else is being typed. */
+  show(value) {
+    const wasTouched = this.touched;
+    this.present = value == null ? "" : plain(value * this.factor);
+    if (!wasTouched && this.input.value !== this.present) this.input.value = this.present;
+  }
+
+  /** Whether something else stands in the field than the number as it is. */
+  get touched() {
+    return this.input.value.trim() !== this.present;
+  }
+
+  /** What was typed was taken. */
+  settle() {
+    this.present = this.input.value = this.text;
+    this.complain("");
+  }
+
+  /** Back to the number as it is. */
+  reset() {
+    this.input.value = this.present;
+    this.complain("");
+  }
+
+  get text() {
+    return this.input.value.trim().replaceAll("−", "-");
+  }
+
+  /** Why what stands in the field cannot be used; "" when it can, as far as the page knows. */
+  complaint() {
+    const { text, unit } = this;
+    if (!text) return "A number is needed.";
+    if (/^[+-]?\d+,\d+/.test(text)) return `Write a point, not a comma: ${text.replace(",", ".")}`;
+    if (!NUMBER.test(text) && !WITH_UNIT.test(text)) return unit ? `It must be a number in ${unit}, or text with its unit such as "1 ${unit}".` : "It must be a number.";
+    if (!NUMBER.test(text)) return ""; // the run knows all units
+    if (!Number.isFinite(Number(text))) return "It must be a number that a float can hold.";
+    const broken = BOUNDS.find(([key, , , holds]) => this.quantity[key] != null && !holds(Number(text) / this.factor, this.quantity[key]));
+    return broken ? `It must be ${broken[1]} ${plain(this.quantity[broken[0]] * this.factor)} ${unit}`.trimEnd() + "." : "";
+  }
+
+  /** Show why it cannot be used, or that it can (""). */
+  complain(problem) {
+    put(this.problem, problem);
+    if (problem) this.input.setAttribute("aria-invalid", "true");
+    else this.input.removeAttribute("aria-invalid");
+  }
+
+  /** As the run takes it: a number in SI, or text with its unit, which the run converts exactly. */
+  value() {
+    if (!NUMBER.test(this.text)) return this.text;
+    return this.factor === 1 ? Number(this.text) : `${this.text} ${this.unit}`;
+  }
+}
+
+/** Complain where needed; the first field that cannot be used, focused, or undefined. */
+export function firstWrong(fields) {
+  for (const field of fields) field.complain(field.complaint());
+  const wrong = fields.find((field) => field.complaint());
+  wrong?.input.focus();
+  return wrong;
+}
+
+/** Show a refusal beside the field it names, or else in the form's own place. */
+export function refuse(text, fields, place) {
+  const named = fields.find(({ name }) => text.includes(name));
+  if (named) {
+    named.complain(text);
+    named.input.focus();
+  } else put(place, text);
+}

@@ -1,0 +1,59 @@
+// The answer at once: the verdict, the state of the run and the numbers that tell how it goes.
+
+import { amount, fixed, isNumber, NONE, power, steady } from "./amounts.js";
+import { byId, put, sign } from "./dom.js";
+
+const WORDS = { running: "running", paused: "paused", ended: "ended", waiting: "waiting", failed: "failed", lost: "not connected" };
+const VERDICTS = new Set(["steady", "limit-cycle", "diverged", "no-contact"]);
+
+/** Show a state; `phase` is its phase, or "lost" without a connection. */
+export function showHeader(state, phase) {
+  document.body.dataset.phase = phase;
+  const sought = byId("phase");
+  sought.dataset.phase = phase;
+  sign(sought, `phase-${phase}`, WORDS[phase] ?? phase);
+  put(byId("title"), state.title || "haploop");
+  byId("title").title = state.title || "";
+  put(document.querySelector("title"), state.title ? `${state.verdict || WORDS[phase]}: ${state.title}` : "haploop");
+  showVerdict(state);
+  put(byId("oscillation"), amount(state.oscillation_m, "m"));
+  put(byId("stiffness"), stiffness(state));
+  put(byId("residual"), share(state));
+  put(byId("factor"), factor(state));
+  put(byId("skipped"), isNumber(state.skipped_ticks) ? `${state.skipped_ticks} ticks` : NONE);
+  showTime(state);
+}
+
+function showVerdict({ verdict, verdict_rule: rule }) {
+  const known = VERDICTS.has(verdict) ? verdict : "none";
+  const sought = byId("verdict");
+  sought.dataset.verdict = known;
+  sought.title = rule || "";
+  sign(sought, `verdict-${known}`, verdict || "no verdict");
+}
+
+/** A number of at most six digits, in powers of ten beyond. */
+const short = (value) => (Math.abs(value) < 1e5 ? fixed(value) : power(value, 3));
+
+function stiffness({ displayed_stiffness_N_m: displayed, wall }) {
+  if (!isNumber(displayed)) return NONE;
+  return wall?.into_wall ? `${short(displayed)} of ${short(wall.stiffness)} N/m` : `${short(displayed)} N/m`;
+}
+
+function share({ residual_J: residual, moved_J: moved }) {
+  return isNumber(residual) && moved > 0 ? power(Math.abs(residual) / moved) : NONE;
+}
+
+function factor({ real_time_factor: real, pace }) {
+  if (!isNumber(real)) return NONE;
+  return `${fixed(real)}×${isNumber(pace) && pace !== 1 ? ` of ${fixed(pace, 2)}×` : ""}`;
+}
+
+function showTime({ tick, end_tick: end, control_rate: rate }) {
+  const known = isNumber(tick) && isNumber(rate) && rate > 0;
+  put(byId("time"), known ? `${steady(tick / rate, 3)} of ${plainSeconds(end / rate)} s` : NONE);
+  byId("time").title = known ? `tick ${tick} of ${end}` : "";
+  byId("progress").value = known && end > 0 ? tick / end : 0;
+}
+
+const plainSeconds = (seconds) => (isNumber(seconds) ? String(Number(seconds.toPrecision(6))) : NONE);

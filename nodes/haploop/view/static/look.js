@@ -1,0 +1,86 @@
+// Which stretch of simulated time is looked at: the last seconds, as they come, or one that stands still.
+
+export const SPANS_S = [0.2, 1, 2, 10, null];
+const LEAST_POINTS = 200;
+const MOST_POINTS = 2000;
+const LEAST_SPAN_S = 0.005;
+
+export class Look {
+  /** @param {() => void} changed called after every change. */
+  constructor(changed) {
+    this.changed = changed;
+    this.span_s = 2;
+    this.end_s = null;
+    this.points = 1000;
+    // What there is to look at, and what is on the page now.
+    this.first_s = 0;
+    this.last_s = 0;
+    this.shown = [0, 0];
+  }
+
+  get frozen() {
+    return this.end_s !== null;
+  }
+
+  /** As the server wants to be asked. */
+  wish() {
+    return { span_s: this.span_s, points: this.points, end_s: this.end_s };
+  }
+
+  /** So many seconds, or null for everything since the start. */
+  show(span_s) {
+    this.span_s = span_s;
+    if (span_s === null) this.end_s = null;
+    this.changed();
+  }
+
+  /** The next span of the row: +1 longer, -1 shorter. */
+  widen(by) {
+    const spans = SPANS_S.map((span) => span ?? Infinity);
+    const now = this.span_s ?? Infinity;
+    const next = by > 0 ? spans.find((span) => span > now) : spans.findLast((span) => span < now);
+    if (next !== undefined) this.show(next === Infinity ? null : next);
+  }
+
+  /** Stand still, or go along with the run again. */
+  freeze(on = !this.frozen) {
+    if (!on) return this.live();
+    this.end_s = this.shown[1];
+    this.span_s ??= Math.max(LEAST_SPAN_S, this.shown[1] - this.shown[0]);
+    return this.changed();
+  }
+
+  live() {
+    if (!this.frozen) return;
+    this.end_s = null;
+    if (!SPANS_S.includes(this.span_s)) this.span_s = 2;
+    this.changed();
+  }
+
+  /** Look at the time from ... to ..., s. */
+  at(from_s, to_s) {
+    this.span_s = Math.max(LEAST_SPAN_S, to_s - from_s);
+    this.end_s = this.within(to_s);
+    this.changed();
+  }
+
+  /** Go back (negative) or on by a part of what is shown. */
+  shift(part) {
+    const [from_s, to_s] = this.shown;
+    if (this.span_s === null || (!this.frozen && part > 0)) return;
+    this.end_s = this.within(to_s + part * (to_s - from_s));
+    this.changed();
+  }
+
+  within(end_s) {
+    return Math.max(Math.min(end_s, this.last_s), Math.min(this.first_s + this.span_s, this.last_s));
+  }
+
+  /** As many points as the charts are wide. */
+  fit(width_px) {
+    const points = Math.min(MOST_POINTS, Math.max(LEAST_POINTS, Math.round(width_px)));
+    if (Math.abs(points - this.points) < 50) return;
+    this.points = points;
+    this.changed();
+  }
+}

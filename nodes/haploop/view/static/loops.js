@@ -1,0 +1,70 @@
+// The two loops of Choi et al. 2022: force against penetration (Fig. 3) and virtual momentum against velocity (Fig. 4).
+
+import { LoopChart } from "./loop_chart.js";
+import { linesFor } from "./palette.js";
+import { dots, line } from "./paths.js";
+import { scaled } from "./picture.js";
+
+const MM = 1e3;
+const GRAMS = 1e3;
+const DOT_PX = 3;
+const NOW_PX = 7;
+const NO_WALL = "No wall, so no loop of force and penetration.";
+const NO_INERTIA = "No virtual inertia at work, so no loop of momentum and velocity.";
+const LINES = {
+  pressing: { colour: "pressing", width: 1.5 },
+  releasing: { colour: "releasing", width: 1.5, dash: [6, 2] },
+  spring: { colour: "ink", width: 1, dash: [4, 3] },
+  now: { colour: "mark", width: 0, filled: true },
+};
+
+const whole = (u, xs, ys) => line(u, xs, ys);
+const inPixels = (size) => (u, xs, ys) => dots(u, xs, ys, size * devicePixelRatio);
+
+export class Loops {
+  constructor(loop, momentum) {
+    this.loop = new LoopChart(loop, { x: "penetration (mm)", y: "force out of the wall (N)", least: [0.01, 0.001] });
+    this.momentum = new LoopChart(momentum, { x: "velocity (m/s)", y: "momentum (g m/s)", least: [1e-4, 1e-4] });
+    this.charts = [this.loop, this.momentum];
+  }
+
+  /** Show the loops among the tables of a picture, or say why there is none. */
+  show({ loop, momentum }) {
+    this.loop.show(loop ? forceLoop(loop) : [], loop ? "" : NO_WALL);
+    this.momentum.show(momentum ? momentumLoops(momentum) : [], momentum ? "" : NO_INERTIA);
+  }
+}
+
+/** Pressing and releasing told apart, beside the spring it should be; what lies outside the wall is left out. */
+function forceLoop({ columns, stiffness }) {
+  const [depth, force] = columns.map(({ values }) => values);
+  const x = new Float64Array(depth.length);
+  let deepest = 0;
+  for (let i = 0; i < x.length; i++) {
+    x[i] = depth[i] > 0 || force[i] !== 0 ? depth[i] * MM : NaN;
+    if (depth[i] > deepest) deepest = depth[i];
+  }
+  const presses = (i) => x[i + 1] > x[i];
+  const parts = [
+    { key: "pressing", label: "pressing", path: (u, xs, ys) => line(u, xs, ys, presses) },
+    { key: "releasing", label: "releasing", path: (u, xs, ys) => line(u, xs, ys, (i) => !presses(i)) },
+  ].map((part) => ({ ...part, line: LINES[part.key], x, y: force }));
+  if (Number.isFinite(stiffness)) {
+    const spring = { x: [0, deepest * MM], y: [0, stiffness * deepest] };
+    parts.push({ key: "spring", label: "ideal spring", line: LINES.spring, path: whole, ...spring });
+  }
+  parts.push({ key: "now", label: "", line: LINES.now, path: inPixels(NOW_PX), x: x.slice(-1), y: force.slice(-1) });
+  return parts;
+}
+
+/** A loop for every virtual inertia: its samples as dots, joined by a thin line. */
+function momentumLoops({ columns: [velocity, ...momenta] }) {
+  const looks = linesFor(momenta);
+  return momenta.flatMap(({ name, label, values }, i) => {
+    const pair = { x: velocity.values, y: scaled(values, GRAMS), key: name };
+    return [
+      { ...pair, label, line: { ...looks[i], width: 0.7, dash: [] }, path: whole },
+      { ...pair, label: "", line: { ...looks[i], filled: true }, path: inPixels(DOT_PX) },
+    ];
+  });
+}

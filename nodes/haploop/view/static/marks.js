@@ -1,0 +1,64 @@
+// Marks in a chart over time: a line at the tick of everything that changed the run, with a short label.
+
+import { FONT } from "./axes.js";
+import { colour } from "./palette.js";
+
+const CHANGES = new Set(["swap", "set", "stop"]);
+const LANES = 2;
+const TEXT_PX = 12;
+const GAP_PX = 4;
+
+/** What took effect, tick by tick: [{tick, t_s, words, changes}], in order. */
+export function marksOf(events) {
+  const marks = new Map();
+  for (const { tick, t_s, kind } of events) {
+    if (kind === "refused") continue;
+    const mark = marks.get(tick) ?? { tick, t_s, words: [], changes: false };
+    if (!mark.words.includes(kind)) mark.words.push(kind);
+    mark.changes ||= CHANGES.has(kind);
+    marks.set(tick, mark);
+  }
+  return [...marks.values()].sort((a, b) => a.tick - b.tick);
+}
+
+/** Draw the marks that lie in the chart; a label that has no room is left out, its line never is. */
+export function drawMarks(u, marks) {
+  const { left, top, width, height } = u.bbox;
+  const { min, max } = u.scales.x;
+  const ratio = devicePixelRatio;
+  const { ctx } = u;
+  const free = Array(LANES).fill(-Infinity);
+  ctx.save();
+  ctx.beginPath();
+  ctx.rect(left, top, width, height);
+  ctx.clip();
+  ctx.font = `${TEXT_PX * ratio}px ${FONT}`;
+  ctx.textBaseline = "top";
+  ctx.textAlign = "left";
+  ctx.lineWidth = ratio;
+  for (const mark of marks.filter(({ t_s }) => t_s >= min && t_s <= max)) {
+    const x = Math.round(left + ((mark.t_s - min) / (max - min)) * width) + 0.5;
+    ctx.strokeStyle = colour(mark.changes ? "mark" : "grey");
+    ctx.setLineDash(mark.changes ? [] : [2 * ratio, 3 * ratio]);
+    ctx.beginPath();
+    ctx.moveTo(x, top);
+    ctx.lineTo(x, top + height);
+    ctx.stroke();
+    drawLabel(ctx, `${mark.tick} ${mark.words.join(", ")}`, x, u.bbox, free, ratio);
+  }
+  ctx.restore();
+}
+
+/** Write a label beside its line, in the first lane that is free there. */
+function drawLabel(ctx, text, x, { left, top, width }, free, ratio) {
+  const wide = ctx.measureText(text).width + 2 * GAP_PX * ratio;
+  const start = x + wide > left + width ? x - wide : x;
+  const lane = free.findIndex((end) => end <= start);
+  if (lane < 0) return;
+  free[lane] = start + wide;
+  const y = top + lane * (TEXT_PX + GAP_PX) * ratio;
+  ctx.fillStyle = colour("veil");
+  ctx.fillRect(start + ratio, y, wide - 2 * ratio, (TEXT_PX + 3) * ratio);
+  ctx.fillStyle = ctx.strokeStyle;
+  ctx.fillText(text, start + GAP_PX * ratio, y + 2 * ratio);
+}

@@ -1,0 +1,46 @@
+// The range of an axis that follows its data without trembling at every picture.
+
+const MARGIN = 0.07;
+// Data that fill less than this of the axis draw it closer.
+const FILLED = 0.5;
+
+/** Smallest and largest of some columns and `extra` numbers; NaN counts for nothing. */
+export function extent(columns, extra = []) {
+  let low = Infinity;
+  let high = -Infinity;
+  for (const values of [...columns, extra]) {
+    for (let i = 0; i < values.length; i++) {
+      if (values[i] < low) low = values[i];
+      if (values[i] > high) high = values[i];
+    }
+  }
+  return [low, high];
+}
+
+export class Range {
+  /** @param {number} least the axis never covers less than this. */
+  constructor(least) {
+    this.least = least;
+    this.now = [-least, least];
+    this.forget();
+  }
+
+  /** Fit closely the next time. */
+  forget() {
+    this.fresh = true;
+  }
+
+  /** The range to show for data from `low` to `high`; the last one where there are no data. */
+  follow(low, high) {
+    if (!(low <= high)) return this.now;
+    const [bottom, top] = this.now;
+    const needed = Math.max(high - low, this.least);
+    if (this.fresh || low < bottom || high > top || needed < FILLED * (top - bottom)) {
+      const middle = (low + high) / 2;
+      const half = needed * (0.5 + MARGIN);
+      this.now = [middle - half, middle + half];
+      this.fresh = false;
+    }
+    return this.now;
+  }
+}

@@ -1,0 +1,48 @@
+// Who may steer, and how an order goes to the run and its answer comes back.
+
+import { byId, put } from "./dom.js";
+import { maySteer } from "./stream.js";
+
+const WATCHING = "Watching only: open the link that haploop view printed to steer.";
+const REASONS = {
+  lost: "No connection to haploop view; trying again.",
+  waiting: "Waiting for a run: start one with haploop run SCENE.",
+  ended: "The run has ended; the next one will come up here by itself.",
+  failed: "The run has failed.",
+};
+// What a key inside a scene is called by the clock: of no use to who typed a number into a form.
+const WHERE = /^live event: (event\.\d+\.)?(swap\.|set\.)?/gm;
+
+/** Why nothing can be steered now; "" when it can. */
+export const obstacle = (phase) => REASONS[phase] ?? (maySteer() ? "" : WATCHING);
+
+/** Enable or disable all that steers, and say why. */
+export function allow(phase, why) {
+  const reason = obstacle(phase);
+  for (const fieldset of document.querySelectorAll("fieldset[data-steers]")) fieldset.disabled = reason !== "";
+  put(byId("notice"), [reason, why].filter(Boolean).join(" "));
+}
+
+export class Steering {
+  /** @param {import("./stream.js").Stream} stream carries the orders. */
+  constructor(stream) {
+    this.stream = stream;
+  }
+
+  /** Give an order; the answer {ok, text}, also told on the page unless `quiet` and refused. */
+  async order(verb, args = {}, { quiet = false } = {}) {
+    const { ok, text } = await this.stream.command(verb, args);
+    const answer = { ok, text: text.replace(WHERE, "") };
+    if (ok || !quiet) say(answer);
+    else say({ ok: true, text: "" });
+    return answer;
+  }
+}
+
+/** Tell what came of an order. */
+export function say({ ok, text }) {
+  const said = byId("said");
+  said.dataset.ok = String(ok);
+  said.setAttribute("role", ok ? "status" : "alert");
+  put(said, ok ? text : `Refused: ${text}`);
+}

@@ -1,0 +1,77 @@
+// The line to haploop view: what it tells, what is asked of it. A lost line is taken up again by itself.
+
+const FIRST_WAIT_MS = 250;
+const LONGEST_WAIT_MS = 2000;
+const LOST = "The connection to haploop view is lost, so nothing was sent.";
+const UNANSWERED = "The connection to haploop view was lost before the answer came; look whether it took effect.";
+
+/** The token of the link that haploop view printed; it stands after the #, which no server ever sees. */
+const token = () => new URLSearchParams(location.hash.slice(1)).get("token") ?? "";
+
+/** Whether the page was opened with a link that lets it steer. */
+export const maySteer = () => token() !== "";
+
+export class Stream {
+  /**
+   * @param {object} heard what to call: connected(boolean), state(state), events(list), picture(buffer).
+   */
+  constructor(heard) {
+    this.heard = heard;
+    this.wish = null;
+    this.waiting = new Map();
+    this.commands = 0;
+    this.waitMs = FIRST_WAIT_MS;
+    this.open();
+  }
+
+  open() {
+    this.socket = new WebSocket(`ws://${location.host}/stream`);
+    this.socket.binaryType = "arraybuffer";
+    this.socket.onopen = () => {
+      this.waitMs = FIRST_WAIT_MS;
+      this.heard.connected(true);
+      if (this.wish) this.send(this.wish);
+    };
+    this.socket.onmessage = ({ data }) => (typeof data === "string" ? this.hear(JSON.parse(data)) : this.heard.picture(data));
+    this.socket.onclose = () => {
+      for (const answer of this.waiting.values()) answer({ ok: false, text: UNANSWERED });
+      this.waiting.clear();
+      this.heard.connected(false);
+      setTimeout(() => this.open(), this.waitMs);
+      this.waitMs = Math.min(2 * this.waitMs, LONGEST_WAIT_MS);
+    };
+  }
+
+  hear(message) {
+    if (message.type === "state") this.heard.state(message);
+    else if (message.type === "events") this.heard.events(message.events);
+    else if (message.type === "answer") {
+      this.waiting.get(message.id)?.(message);
+      this.waiting.delete(message.id);
+    }
+  }
+
+  send(message) {
+    const open = this.socket.readyState === WebSocket.OPEN;
+    if (open) this.socket.send(JSON.stringify(message));
+    return open;
+  }
+
+  /** Ask for pictures of a stretch of time: {span_s, points, end_s}. Said again after every new connection. */
+  watch(wish) {
+    this.wish = { type: "watch", ...wish };
+    this.send(this.wish);
+  }
+
+  /** Have the run do something; the answer, {ok, text}, comes whatever happens. */
+  command(verb, args) {
+    const id = ++this.commands;
+    return new Promise((answer) => {
+      this.waiting.set(id, answer);
+      if (!this.send({ type: "command", id, token: token(), verb, arguments: args })) {
+        this.waiting.delete(id);
+        answer({ ok: false, text: LOST });
+      }
+    });
+  }
+}

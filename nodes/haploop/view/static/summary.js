@@ -1,0 +1,51 @@
+// What came of a run that has ended: the figures and books of its summary.json.
+
+import { amount, fixed, isNumber, NONE } from "./amounts.js";
+import { byId, make } from "./dom.js";
+
+const CAUSES = { sampling_and_hold_J: "sampling and hold", quantisation_J: "quantisation", delay_J: "delay" };
+const HOW = { done: "to its end", stopped: "stopped early", diverged: "ended by divergence", failed: "failed" };
+
+/** Show a summary and where it lies; hidden while there is none. */
+export function showSummary(summary, out) {
+  const panel = byId("summary");
+  panel.hidden = !summary;
+  const known = summary ? `${summary.trajectory_sha256} ${out}` : "";
+  if (!summary || panel.dataset.known === known) return;
+  panel.dataset.known = known;
+  panel.replaceChildren(
+    make("h2", { id: "summary-title" }, `Ended: ${summary.verdict}`),
+    make("p", { class: "about" }, summary.verdict_rule ?? ""),
+    figures(summary),
+    books(summary.energy ?? {}),
+    make("p", { class: "about" }, "In ", make("code", {}, out)),
+  );
+}
+
+function figures({ duration_s, ended, extremes = {}, real_time_factor: factor, lost = {} }) {
+  const rows = {
+    ran: `${isNumber(duration_s) ? fixed(duration_s, 4) : NONE} s, ${HOW[ended] ?? ended}`,
+    "position from": `${amount(extremes.x_min_m, "m")} to ${amount(extremes.x_max_m, "m")}`,
+    "largest force": amount(extremes.force_max_N, "N"),
+    "real time": isNumber(factor) ? `${fixed(factor)}×` : NONE,
+    "commands lost, dropped": `${lost.commands_lost ?? 0}, ${lost.commands_dropped ?? 0}`,
+  };
+  return make("dl", { class: "rows" }, ...Object.entries(rows).map(([name, text]) => make("div", {}, make("dt", {}, name), make("dd", {}, text))));
+}
+
+/** Every book with what it took by its own account (sampled) and in truth. */
+function books({ wall = {}, elements = [], moved_J: moved, residual_J: residual }) {
+  const head = ["book", "sampled", "true"].map((text) => make("th", { scope: "col" }, text));
+  const rows = [["wall", wall.sampled_J, wall.true_J]];
+  for (const [key, words] of Object.entries(CAUSES)) {
+    if (wall.leak) rows.push([`leak by ${words}`, undefined, wall.leak[key]]);
+  }
+  for (const { kind, from_tick: from, to_tick: to, sampled_J, true_J } of elements) {
+    rows.push([`${kind}, ticks ${from} to ${to}`, sampled_J, true_J]);
+  }
+  rows.push(["moved in all", undefined, moved], ["residual", undefined, residual]);
+  const body = rows.map(([name, ...numbers]) =>
+    make("tr", {}, make("th", { scope: "row" }, name), ...numbers.map((value) => make("td", {}, value === undefined ? "" : amount(value, "J")))),
+  );
+  return make("table", {}, make("thead", {}, make("tr", {}, ...head)), make("tbody", {}, ...body));
+}

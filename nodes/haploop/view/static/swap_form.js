@@ -1,0 +1,87 @@
+// The form that swaps a dissipation element: which one, what it becomes, and that kind's parameters.
+
+import { byId, make, put } from "./dom.js";
+import { Field, firstWrong, refuse } from "./field.js";
+
+const REMOVE = "none";
+
+export class SwapForm {
+  /** @param {import("./steering.js").Steering} steering carries the order. */
+  constructor(steering) {
+    this.steering = steering;
+    this.kinds = {};
+    this.elements = [];
+    this.known = "";
+    this.fields = [];
+    byId("swap-element").addEventListener("change", () => this.takeElement());
+    byId("swap-kind").addEventListener("change", () => this.takeKind());
+    byId("swap").addEventListener("submit", (event) => {
+      event.preventDefault();
+      this.swap();
+    });
+  }
+
+  /** Follow the run: its kinds, and the elements at work. What is being typed stays. */
+  update(options) {
+    const known = JSON.stringify([options.kinds, options.elements.map(({ kind }) => kind)]);
+    if (known === this.known) return;
+    const isFirst = this.known === "";
+    Object.assign(this, { known, kinds: options.kinds, elements: options.elements });
+    const names = this.elements.map(({ kind }, i) => [String(i), `${i}: ${kind}`]);
+    choices("swap-element", [...names, [String(this.elements.length), `${this.elements.length}: add one`]]);
+    this.offerKinds();
+    if (isFirst) this.takeElement();
+    else if (!byId("swap-kind").value) this.takeKind();
+  }
+
+  get index() {
+    return Number(byId("swap-element").value);
+  }
+
+  offerKinds() {
+    const kinds = Object.keys(this.kinds).map((kind) => [kind, kind]);
+    choices("swap-kind", this.index < this.elements.length ? [...kinds, [REMOVE, "none: remove it"]] : kinds);
+  }
+
+  /** Another element is chosen: start from what it is now. */
+  takeElement() {
+    this.offerKinds();
+    const element = this.elements[this.index];
+    if (element && element.kind in this.kinds) byId("swap-kind").value = element.kind;
+    if (element?.acts) byId("swap-acts").value = element.acts;
+    this.takeKind(element);
+  }
+
+  /** Another kind is chosen: its parameters, with their defaults or those of `element`, become fields. */
+  takeKind(element) {
+    const kind = byId("swap-kind").value;
+    const { about = "", parameters = {} } = this.kinds[kind] ?? {};
+    put(byId("swap-about"), kind === REMOVE ? "The element is removed; those after it move up." : about);
+    byId("swap-where").hidden = kind === REMOVE;
+    this.fields = Object.entries(parameters).map(([name, quantity]) => {
+      const field = new Field(`swap-${name}`, name, quantity);
+      field.show(element?.kind === kind ? element[name] : quantity.default);
+      return field;
+    });
+    byId("swap-fields").replaceChildren(...this.fields.map(({ element: row }) => row));
+    put(byId("swap-problem"), "");
+  }
+
+  async swap() {
+    put(byId("swap-problem"), "");
+    const kind = byId("swap-kind").value;
+    if (!kind || firstWrong(this.fields)) return;
+    const values = Object.fromEntries(this.fields.map((field) => [field.name, field.value()]));
+    const table = kind === REMOVE ? { kind } : { kind, acts: byId("swap-acts").value, ...values };
+    const answer = await this.steering.order("swap", { swap: table, element: this.index }, { quiet: true });
+    if (!answer.ok) refuse(answer.text, this.fields, byId("swap-problem"));
+  }
+}
+
+/** Offer these [value, text] pairs in a select; what was chosen stays chosen where it still can be. */
+function choices(id, pairs) {
+  const select = byId(id);
+  const before = select.value;
+  select.replaceChildren(...pairs.map(([value, text]) => make("option", { value }, text)));
+  if (pairs.some(([value]) => value === before)) select.value = before;
+}

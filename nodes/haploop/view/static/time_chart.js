@@ -1,0 +1,151 @@
+// A chart over simulated time: lines of one unit, the events that changed the run, a cursor shared with its neighbours.
+
+import { steady } from "./amounts.js";
+import { bareAxis, bottomAxis, leftAxis } from "./axes.js";
+import { make } from "./dom.js";
+import { Legend, stroke } from "./legend.js";
+import { drawMarks } from "./marks.js";
+import { colour } from "./palette.js";
+import { halfPlane, line as linePath } from "./paths.js";
+import { extent, Range } from "./range.js";
+
+const CURSORS = "haploop";
+
+export class TimeChart {
+  /**
+   * @param {HTMLElement} host takes the chart.
+   * @param {object} options label and unit of the left axis; decimals of the numbers in the legend; least: the axis
+   *   never covers less; zero: the axis always shows 0; times: whether the times stand below it.
+   * @param {import("./look.js").Look} look what dragging in the chart changes.
+   */
+  constructor(host, options, look) {
+    Object.assign(this, { host, options, look });
+    this.range = new Range(options.least);
+    this.legend = new Legend(host, () => this.retoggle());
+    this.plot = host.appendChild(make("div", { class: "plot" }));
+    this.lines = [];
+    this.columns = [];
+    this.t = new Float64Array(0);
+    this.span = [0, 1];
+    this.marks = [];
+    this.wall = null;
+    this.note = "";
+    this.build();
+    new ResizeObserver(() => this.resize()).observe(this.plot);
+  }
+
+  build() {
+    this.u?.destroy();
+    const { label, unit, times } = this.options;
+    const series = this.lines.map(({ line, label: name, key }) => ({
+      label: name,
+      stroke: stroke(line),
+      width: line.width,
+      dash: line.dash,
+      show: this.legend.isShown(key),
+      auto: false,
+      points: { show: false },
+      paths: (u, i) => ({ stroke: linePath(u, u.data[0], u.data[i]) }),
+    }));
+    const options = {
+      ...this.size(),
+      padding: [4, 14, 2, 0],
+      legend: { show: false },
+      scales: {
+        x: { time: false, auto: false, range: (u, min, max) => [min, max] },
+        y: { auto: false, range: () => this.range.now },
+      },
+      series: [{}, ...series],
+      axes: [times ? bottomAxis("simulated time (s)") : bareAxis(), leftAxis(`${label} (${unit})`)],
+      cursor: {
+        y: false,
+        points: { show: false },
+        drag: { x: true, y: false, setScale: false, dist: 6 },
+        sync: { key: CURSORS, scales: ["x", null], filters: { sub: (type) => type === "mousemove" } },
+        bind: { dblclick: () => () => this.look.live() },
+      },
+      hooks: {
+        drawClear: [(u) => this.shade(u)],
+        draw: [(u) => drawMarks(u, this.marks)],
+        setCursor: [() => this.tell()],
+        setSelect: [(u) => this.select(u)],
+      },
+    };
+    this.u = new uPlot(options, [this.t, ...this.columns], this.plot);
+    this.draw();
+  }
+
+  /**
+   * Show lines: a key, a name, a look and numbers each.
+   *
+   * @param {[number, number]} span first and last time, s.
+   * @param {Float64Array} t times of the numbers, s.
+   * @param {{key: string, label: string, line: object, values: ArrayLike<number>}[]} lines
+   * @param {object} more wall: {values, side} to shade, or null; marks; note for the end of the legend.
+   */
+  show(span, t, lines, { wall = null, marks = [], note = "" } = {}) {
+    const signature = (list) => JSON.stringify(list.map(({ key, label }) => [key, label]));
+    const isNew = signature(lines) !== signature(this.lines);
+    Object.assign(this, { span, t, lines, wall, marks, note, columns: lines.map(({ values }) => values) });
+    this.rerange();
+    if (isNew) {
+      this.legend.name(lines);
+      this.build();
+    }
+    this.draw();
+  }
+
+  rerange() {
+    const shown = this.lines.filter(({ key }) => this.legend.isShown(key)).map(({ values }) => values);
+    this.range.follow(...extent(shown, this.options.zero && shown.length ? [0] : []));
+  }
+
+  draw() {
+    this.u.setData([this.t, ...this.columns], false);
+    this.u.setScale("x", { min: this.span[0], max: this.span[1] });
+    this.tell();
+  }
+
+  retoggle() {
+    this.range.forget();
+    this.rerange();
+    this.lines.forEach(({ key }, i) => this.u.setSeries(i + 1, { show: this.legend.isShown(key) }, false));
+    this.draw();
+  }
+
+  shade(u) {
+    if (!this.wall || !this.legend.isShown("wall")) return;
+    u.ctx.save();
+    u.ctx.beginPath();
+    u.ctx.rect(u.bbox.left, u.bbox.top, u.bbox.width, u.bbox.height);
+    u.ctx.clip();
+    u.ctx.fillStyle = colour("wall-fill");
+    u.ctx.fill(halfPlane(u, this.t, this.wall.values, this.wall.side));
+    u.ctx.restore();
+  }
+
+  /** The numbers under the cursor, or the last ones. */
+  tell() {
+    if (!this.u) return;
+    const at = this.u.cursor.idx ?? this.t.length - 1;
+    const { decimals } = this.options;
+    const texts = this.columns.map((values) => steady(values[at], decimals));
+    const time = this.u.cursor.idx == null ? "" : `at ${steady(this.t[at], 4)} s`;
+    this.legend.tell(texts, time || this.note);
+  }
+
+  select(u) {
+    const { left, width } = u.select;
+    if (width > 0) this.look.at(u.posToVal(left, "x"), u.posToVal(left + width, "x"));
+    u.setSelect({ left: 0, width: 0, top: 0, height: 0 }, false);
+  }
+
+  size() {
+    return { width: Math.max(80, this.plot.clientWidth), height: Math.max(60, this.plot.clientHeight) };
+  }
+
+  resize() {
+    const size = this.size();
+    if (size.width !== this.u.width || size.height !== this.u.height) this.u.setSize(size);
+  }
+}

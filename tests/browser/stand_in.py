@@ -1,0 +1,195 @@
+"""haploop view as the page sees it, without a run: serves the page, tells it what a test wants, hears what it says."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import threading
+from collections.abc import Callable
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+from aiohttp import WSMsgType, web
+
+STATIC = Path(__file__).parents[2] / "nodes/haploop/view/static"
+TOKEN = "a-token"
+HEADERS = {"Content-Security-Policy": "default-src 'self'", "Cache-Control": "no-store"}
+QUANTITY = {"at_least": None, "above": None, "at_most": None, "below": None}
+NEWTONS_PER_METRE = {**QUANTITY, "unit": "N/m", "above": 0.0}
+KILOGRAMS = {**QUANTITY, "unit": "kg", "above": 0.0}
+DAMPING = {**QUANTITY, "unit": "N s/m", "at_least": 0.0}
+OPTIONS = {
+    "settable": {
+        "wall.stiffness": {**NEWTONS_PER_METRE, "value": 150.0},
+        "wall.position": {**QUANTITY, "unit": "m", "value": -0.06},
+        "clock.round_trip_delay": {**QUANTITY, "unit": "s", "at_least": 0.0, "value": 0.002},
+        "dissipation.0.damping": {**DAMPING, "value": 0.4},
+        "dissipation.1.mass": {**KILOGRAMS, "value": 0.01},
+    },
+    "kinds": {
+        "damping": {"about": "A force against the velocity.", "parameters": {"damping": {**DAMPING, "default": None}}},
+        "unidirectional-inertia": {
+            "about": "Virtual inertia that only ever takes energy out (Choi et al. 2022, eq. 9).",
+            "parameters": {"mass": {**KILOGRAMS, "default": 0.01}},
+        },
+    },
+    "elements": [
+        {"kind": "damping", "acts": "in-contact", "damping": 0.4},
+        {"kind": "unidirectional-inertia", "acts": "in-contact", "mass": 0.01},
+    ],
+}
+RUNNING = {
+    "type": "state", "phase": "running", "why": "", "run": "abc123", "out": "runs/fig6c",
+    "title": "Fig. 6(c): a 0.15 N/mm wall with unidirectional inertia",
+    "tick": 1500, "end_tick": 3000, "control_rate": 1000, "plant_rate": 10000, "pace": 1.0, "real_time_factor": 0.98,
+    "verdict": "limit-cycle", "verdict_rule": "In the last 0.5 s x crossed its trend line 24 times.",
+    "oscillation_m": 0.00535, "displayed_stiffness_N_m": 137.2, "residual_J": 2.1e-18, "moved_J": 6.2e-3,
+    "nodes": [
+        {"role": "plant", "pid": 11, "tick": 1500, "behind_ticks": 0, "waits_for": "controller", "lossless": True,
+         "skipped_ticks": 0},
+        {"role": "controller", "pid": 12, "tick": 1499, "behind_ticks": 1, "waits_for": "", "lossless": True,
+         "skipped_ticks": 0},
+        {"role": "logger", "pid": 13, "tick": 1480, "behind_ticks": 20, "waits_for": "", "lossless": True,
+         "skipped_ticks": 0},
+        {"role": "view", "pid": 14, "tick": 1460, "behind_ticks": 40, "waits_for": "", "lossless": False,
+         "skipped_ticks": 12},
+    ],
+    "skipped_ticks": 12, "first_s": 0.0, "options": OPTIONS, "elements": OPTIONS["elements"],
+    "wall": {"position": -0.06, "stiffness": 150.0, "into_wall": -1.0}, "delay_s": 0.002, "summary": None,
+}  # fmt: skip
+WAITING: dict[str, Any] = {
+    "type": "state", "phase": "waiting", "why": "", "run": None, "title": None, "out": None, "tick": None,
+    "end_tick": None, "control_rate": None, "plant_rate": None, "pace": None, "real_time_factor": None,
+    "verdict": None, "verdict_rule": None, "oscillation_m": None, "displayed_stiffness_N_m": None, "residual_J": None,
+    "moved_J": None, "nodes": [], "skipped_ticks": 0, "first_s": None, "options": None, "elements": [], "wall": None,
+    "delay_s": None, "summary": None,
+}  # fmt: skip
+
+
+class StandIn:
+    """A server of the page in a thread of its own.
+
+    Attributes:
+        heard: every message of the page, in order.
+        answer: gives (ok, text) for a command.
+        url: the link to open, token included.
+    """
+
+    def __init__(self) -> None:
+        self.heard: list[dict[str, Any]] = []
+        self.answer: Callable[[dict[str, Any]], tuple[bool, str] | None] = lambda command: (True, "done")
+        self._told: dict[str, str] = {}
+        self._picture: bytes | None = None
+        self._sockets: set[web.WebSocketResponse] = set()
+        self._loop = asyncio.new_event_loop()
+        self._thread = threading.Thread(target=self._loop.run_forever)
+        self._thread.start()
+        self._port = 0
+        self.start()
+
+    @property
+    def url(self) -> str:
+        return f"{self.origin}/#token={TOKEN}"
+
+    @property
+    def origin(self) -> str:
+        return f"http://127.0.0.1:{self._port}"
+
+    def commands(self) -> list[dict[str, Any]]:
+        """What was ordered: verb and arguments."""
+        return [message for message in self.heard if message["type"] == "command"]
+
+    def watches(self) -> list[dict[str, Any]]:
+        """Which stretches of time were asked for."""
+        return [message for message in self.heard if message["type"] == "watch"]
+
+    # From the test's thread
+
+    def start(self) -> None:
+        """Serve, on the same port as before if there was one."""
+        self._do(self._start())
+
+    def stop(self) -> None:
+        """Be gone, as when haploop view is ended."""
+        self._do(self._stop())
+
+    def close(self) -> None:
+        """End the thread, too."""
+        self.stop()
+        self._loop.call_soon_threadsafe(self._loop.stop)
+        self._thread.join()
+        self._loop.close()
+
+    def tell(self, *messages: dict[str, Any]) -> None:
+        """Send messages to every page, and to those that come later the last of each type."""
+        for message in messages:
+            text = json.dumps(message)
+            self._told[message["type"]] = text
+            self._do(self._send(text))
+
+    def state(self, **changes: Any) -> None:
+        """A running loop, but for some changes."""
+        self.tell(RUNNING | changes)
+
+    def show(self, picture: bytes) -> None:
+        """Send a picture to every page."""
+        self._picture = picture
+        self._do(self._send(picture))
+
+    def _do(self, work: Any) -> None:
+        asyncio.run_coroutine_threadsafe(work, self._loop).result(20)
+
+    # In the server's thread
+
+    async def _start(self) -> None:
+        app = web.Application()
+        app.router.add_get("/", self._file(STATIC / "index.html"))
+        app.router.add_get("/stream", self._stream)
+        uplot = find_spec("uplot")
+        assert uplot
+        assert uplot.origin
+        for path in [*STATIC.iterdir(), *(Path(uplot.origin).parent / "static").glob("uPlot.*")]:
+            app.router.add_get(f"/static/{path.name}", self._file(path))
+        self._runner = web.AppRunner(app, shutdown_timeout=0.1)
+        await self._runner.setup()
+        site = web.TCPSite(self._runner, "127.0.0.1", self._port, reuse_address=True)
+        await site.start()
+        self._port = self._runner.addresses[0][1]
+
+    async def _stop(self) -> None:
+        for socket in list(self._sockets):
+            await socket.close()
+        await self._runner.cleanup()
+
+    def _file(self, path: Path) -> Callable[[web.Request], Any]:
+        async def serve(request: web.Request) -> web.FileResponse:
+            return web.FileResponse(path, headers=HEADERS)
+
+        return serve
+
+    async def _stream(self, request: web.Request) -> web.WebSocketResponse:
+        socket = web.WebSocketResponse()
+        await socket.prepare(request)
+        for text in self._told.values():
+            await socket.send_str(text)
+        if self._picture:
+            await socket.send_bytes(self._picture)
+        self._sockets.add(socket)
+        async for message in socket:
+            if message.type is WSMsgType.TEXT:
+                await self._hear(socket, json.loads(message.data))
+        self._sockets.discard(socket)
+        return socket
+
+    async def _hear(self, socket: web.WebSocketResponse, message: dict[str, Any]) -> None:
+        self.heard.append(message)
+        if message["type"] == "command" and (answer := self.answer(message)):
+            await socket.send_json({"type": "answer", "id": message["id"], "ok": answer[0], "text": answer[1]})
+
+    async def _send(self, message: str | bytes) -> None:
+        for socket in list(self._sockets):
+            if isinstance(message, str):
+                await socket.send_str(message)
+            else:
+                await socket.send_bytes(message)

@@ -1,0 +1,124 @@
+"""What the page answers at once: verdict, state and numbers, with and without a run, with and without a server."""
+
+import pytest
+from browser.pictures import contact
+from browser.stand_in import RUNNING, WAITING
+from playwright.sync_api import expect
+
+LEAK = {"total_J": -1.2e-3, "sampling_and_hold_J": -1e-4, "quantisation_J": 2e-6, "delay_J": -1.1e-3}
+SUMMARY = {
+    "title": RUNNING["title"], "duration_s": 3.0, "ended": "done", "verdict": "steady",
+    "verdict_rule": "In the last 0.5 s x crossed its trend line 0 times.", "trajectory_sha256": "ab" * 32,
+    "extremes": {"x_min_m": -0.0642, "x_max_m": 0.0, "force_max_N": 0.81}, "real_time_factor": 21.0,
+    "lost": {"commands_dropped": 3, "commands_lost": 0, "telemetry_gaps": 0},
+    "energy": {
+        "wall": {"sampled_J": -1.1e-3, "true_J": -1.3e-3, "leak": LEAK},
+        "elements": [{"kind": "damping", "from_tick": 0, "to_tick": 3000, "sampled_J": 9e-4, "true_J": 1e-3}],
+        "moved_J": 6e-3, "residual_J": 2e-18,
+    },
+}  # fmt: skip
+ENDED = {"phase": "ended", "tick": 3000, "verdict": "steady", "options": None, "summary": SUMMARY, "nodes": []}
+
+
+def test_without_a_run_it_says_how_to_start_one_and_offers_nothing_that_steers(stand_in, open_page):
+    stand_in.tell(WAITING)
+    page = open_page(stand_in.url)
+    expect(page.locator("#waiting")).to_contain_text("haploop run SCENE")
+    expect(page.locator("#phase")).to_have_text("waiting")
+    expect(page.locator("#pause")).to_be_disabled()
+    expect(page.locator("#swap")).to_be_hidden()
+    expect(page.locator("#verdict")).to_have_text("no verdict")
+    assert "NaN" not in page.inner_text("body")
+    assert "null" not in page.inner_text("body")
+
+
+@pytest.mark.parametrize("word", ["steady", "limit-cycle", "diverged", "no-contact"])
+def test_a_verdict_is_a_word_a_shape_of_its_own_and_a_colour(word, stand_in, open_page):
+    stand_in.state(verdict=word)
+    page = open_page(stand_in.url)
+    expect(page.locator("#verdict")).to_have_text(word)
+    assert page.get_attribute("#verdict use", "href") == f"#verdict-{word}"
+    shapes = page.evaluate("[...document.querySelectorAll('.shapes symbol')].map(s => s.innerHTML)")
+    assert len(set(shapes)) == len(shapes)
+    white = page.evaluate("getComputedStyle(document.querySelector('#verdict')).color")
+    assert white == "rgb(255, 255, 255)"
+
+
+def test_the_header_has_the_numbers_with_their_units(stand_in, open_page):
+    stand_in.state()
+    page = open_page(stand_in.url)
+    expect(page.locator("#oscillation")).to_have_text("5.35 mm")
+    expect(page.locator("#stiffness")).to_have_text("137 of 150 N/m")
+    expect(page.locator("#residual")).to_have_text("3.4e−16")
+    expect(page.locator("#factor")).to_have_text("0.980×")
+    expect(page.locator("#skipped")).to_have_text("12 ticks")
+    expect(page.locator("#time")).to_have_text("1.500 of 3 s")
+    stand_in.state(displayed_stiffness_N_m=None, oscillation_m=None, real_time_factor=None, pace="free")
+    expect(page.locator("#stiffness")).to_have_text("–")
+    expect(page.locator("#oscillation")).to_have_text("–")
+
+
+def test_it_shows_who_waits_for_whom_and_what_each_node_skipped(stand_in, open_page):
+    stand_in.state()
+    page = open_page(stand_in.url)
+    rows = page.locator("#nodes tr")
+    expect(rows).to_have_count(4)
+    assert rows.nth(0).locator("th, td").all_inner_texts() == ["plant", "1500", "0", "→ controller", "0"]
+    assert rows.nth(3).locator("th, td").all_inner_texts() == ["view", "1460", "40", "", "12"]
+    stand_in.state(nodes=RUNNING["nodes"][:2])
+    expect(rows).to_have_count(2)
+
+
+def test_after_the_end_it_shows_what_came_of_the_run_and_its_last_picture(stand_in, open_page):
+    stand_in.state(**ENDED)
+    stand_in.show(contact())
+    page = open_page(stand_in.url)
+    expect(page.locator("#phase")).to_have_text("ended")
+    summary = page.locator("#summary")
+    expect(summary).to_contain_text("Ended: steady")
+    expect(summary).to_contain_text("leak by delay")
+    expect(summary).to_contain_text("−1.10 mJ")
+    expect(summary).to_contain_text("runs/fig6c")
+    expect(page.locator("#swap")).to_be_hidden()
+    expect(page.locator("#pause")).to_be_disabled()
+    expect(page.locator("#freeze")).to_be_enabled()
+    expect(page.locator("#force .legend")).to_contain_text("total")
+
+
+def test_a_failed_run_says_why(stand_in, open_page):
+    stand_in.state(phase="failed", why="The plant was killed by SIGKILL.", options=None)
+    page = open_page(stand_in.url)
+    expect(page.locator("#phase")).to_have_text("failed")
+    expect(page.locator("#notice")).to_contain_text("The plant was killed by SIGKILL.")
+
+
+def test_a_lost_server_is_told_and_taken_up_again_with_the_same_question(stand_in, open_page):
+    stand_in.state()
+    page = open_page(stand_in.url)
+    expect(page.locator("#phase")).to_have_text("running")
+    page.keyboard.press("[")
+    stand_in.stop()
+    expect(page.locator("#phase")).to_have_text("not connected")
+    expect(page.locator("#notice")).to_contain_text("No connection")
+    expect(page.locator("#pause")).to_be_disabled()
+    asked = stand_in.watches()[-1]
+    stand_in.heard.clear()
+    stand_in.start()
+    expect(page.locator("#phase")).to_have_text("running")
+    expect(page.locator("#pause")).to_be_enabled()
+    assert stand_in.watches()[0] == asked
+    assert asked["span_s"] == 1
+
+
+def test_the_next_run_takes_the_place_of_the_one_that_has_ended_and_is_shown_live(stand_in, open_page):
+    stand_in.state(**ENDED)
+    stand_in.show(contact())
+    page = open_page(stand_in.url)
+    page.click("#freeze")
+    expect(page.locator("#freeze")).to_have_text("Go live")
+    stand_in.state(run="def456", title="another", tick=10)
+    expect(page.locator("#title")).to_have_text("another")
+    expect(page.locator("#freeze")).to_have_text("Freeze")
+    expect(page.locator("#summary")).to_be_hidden()
+    expect(page.locator("#swap")).to_be_visible()
+    assert stand_in.watches()[-1]["end_s"] is None

@@ -1,0 +1,249 @@
+"""What the charts show: the numbers that came, broken where none came, the wall on its side, marks at their ticks."""
+
+import math
+import re
+
+import pytest
+from browser.pictures import contact, picture, table
+from playwright.sync_api import expect
+
+NAN = math.nan
+ROWS = 400
+# Whether a colour (r, g, b) is nearly there in a column of pixels of a chart, at parts (0 .. 1) of its plot's width.
+SEEN = """([chart, parts, colour]) => {
+    const canvas = document.querySelector(`#${chart} canvas`);
+    const over = document.querySelector(`#${chart} .u-over`);
+    const ratio = canvas.width / canvas.clientWidth;
+    const box = ["offsetLeft", "offsetTop", "offsetWidth", "offsetHeight"].map(key => over[key] * ratio);
+    return parts.map(part => {
+        const x = Math.round(box[0] + part * (box[2] - 1));
+        const { data } = canvas.getContext("2d").getImageData(x - 1, box[1], 3, box[3]);
+        let first = null, last = null;
+        for (let i = 0; i < data.length; i += 4) {
+            const off = Math.hypot(...[0, 1, 2].map(c => data[i + c] - colour[c]));
+            if (data[i + 3] > 150 && off < 60) {
+                last = Math.floor(i / 12) / box[3];
+                first ??= last;
+            }
+        }
+        return first === null ? null : [first, last];
+    });
+}"""
+RGB = """name => {
+    const probe = document.body.appendChild(document.createElement("i"));
+    probe.style.color = `var(--${name})`;
+    const rgb = getComputedStyle(probe).color.match(/[\\d.]+/g).map(Number);
+    probe.remove();
+    return rgb;
+}"""
+
+
+def seen(page, chart, parts, name):
+    """First and last height (0 top .. 1 bottom) at which a colour stands at some parts of the width; None for none."""
+    return page.evaluate(SEEN, [chart, parts, page.evaluate(RGB, name)[:3]])
+
+
+@pytest.fixture
+def page(stand_in, open_page):
+    stand_in.state()
+    page = open_page(stand_in.url)
+    expect(page.locator("#phase")).to_have_text("running")
+    return page
+
+
+def positions(x, wall=None):
+    columns = [("x", "m", "position", x)]
+    if wall:
+        columns.append(("wall", "m", "wall", [wall] * len(x)))
+    return picture(0.0, 2.0, table("position", 0.0, 2.0 / (len(x) - 1), *columns))
+
+
+def settled(page, chart, text):
+    """Wait until a chart's legend says so: then the picture is drawn."""
+    expect(page.locator(f"#{chart} .legend")).to_contain_text(text)
+
+
+def test_a_line_goes_through_its_values_and_is_broken_where_there_are_none(stand_in, page):
+    ramp = [0.01 * i / (ROWS - 1) for i in range(ROWS)]
+    hole = [NAN if 0.4 < i / ROWS < 0.6 else value for i, value in enumerate(ramp)]
+    stand_in.show(positions(hole))
+    settled(page, "position", "10.000")
+    left, gap, right = seen(page, "position", [0.2, 0.5, 0.8], "ink")
+    assert gap is None
+    assert left
+    assert right
+    height = 1 / (1 + 2 * 0.07)
+    for part, (first, last) in ((0.2, left), (0.8, right)):
+        expected = 0.5 + height * (0.5 - part)
+        assert first - 0.03 <= expected <= last + 0.03
+
+
+@pytest.mark.parametrize(("into_wall", "solid"), [(-1.0, "below"), (1.0, "above")])
+def test_the_wall_is_shaded_on_the_side_of_its_material(into_wall, solid, stand_in, page):
+    stand_in.state(wall={"position": 0.005, "stiffness": 150.0, "into_wall": into_wall})
+    stand_in.show(positions([0.01 * (i % 2) for i in range(ROWS)], wall=0.005))
+    settled(page, "position", "wall")
+    page.click("#position .legend button >> nth=0")
+    filled = page.evaluate(
+        """() => {
+            const canvas = document.querySelector("#position canvas");
+            const over = document.querySelector("#position .u-over");
+            const ratio = canvas.width / canvas.clientWidth, draw = canvas.getContext("2d");
+            const x = Math.round((over.offsetLeft + 0.37 * over.offsetWidth) * ratio);
+            return [0.1, 0.9].map(part => {
+                const y = Math.round((over.offsetTop + part * over.offsetHeight) * ratio);
+                const { data } = draw.getImageData(x, y, 9, 3);
+                return [3, 7, 11].some(i => data[i] > 20 && data[i] < 90);
+            });
+        }"""
+    )
+    assert filled == ([False, True] if solid == "below" else [True, False])
+
+
+def test_every_part_has_its_line_its_name_and_its_number(stand_in, page):
+    stand_in.show(contact())
+    settled(page, "force", "0: damping")
+    names = page.locator("#force .legend .name").all_inner_texts()
+    assert names == ["wall", "0: damping", "1: unidirectional-inertia", "total"]
+    assert page.locator("#energy .legend .name").all_inner_texts() == ["wall", "damping", "unidirectional-inertia"]
+    expect(page.locator("#energy .note")).to_have_text("residual 2.1e−18 J")
+    expect(page.locator("#energy .legend")).to_contain_text("0.300")
+    looks = page.evaluate(
+        "[...document.querySelectorAll('#force .legend line')]"
+        ".map(l => [getComputedStyle(l).stroke, l.getAttribute('stroke-dasharray')].join())"
+    )
+    assert len(set(looks)) == 4
+    dashes = [look.rsplit(")", 1)[1] for look in looks]
+    assert len(set(dashes[1:3])) == 2, "elements differ without colour, too"
+
+
+def test_an_element_has_the_same_colour_in_force_energy_and_momentum(stand_in, page):
+    stand_in.show(contact())
+    settled(page, "force", "unidirectional-inertia")
+    stroke = "line => getComputedStyle(line).stroke"
+
+    def colour(chart, number):
+        return page.locator(f"#{chart} .legend line").nth(number).evaluate(stroke)
+
+    assert colour("force", 1) == colour("energy", 1)
+    assert colour("force", 2) == colour("energy", 2) == colour("momentum", 0)
+    assert colour("force", 1) != colour("force", 2)
+
+
+def test_a_line_can_be_hidden_and_brought_back_and_stays_hidden_in_the_next_picture(stand_in, page):
+    stand_in.show(positions([0.004] * ROWS, wall=0.0))
+    settled(page, "position", "4.000")
+    assert seen(page, "position", [0.5], "ink")[0]
+    button = page.locator("#position .legend button").first
+    button.click()
+    expect(button).to_have_attribute("aria-pressed", "false")
+    assert seen(page, "position", [0.5], "ink")[0] is None
+    stand_in.show(positions([0.003] * ROWS, wall=0.0))
+    settled(page, "position", "3.000")
+    assert seen(page, "position", [0.5], "ink")[0] is None
+    button.click()
+    assert seen(page, "position", [0.5], "ink")[0]
+
+
+def test_of_pictures_that_come_faster_than_the_screen_the_last_is_what_stays(stand_in, page):
+    for i in range(100):
+        stand_in.show(positions([0.001 * i] * ROWS))
+    settled(page, "position", "99.000")
+
+
+def test_what_changed_the_run_is_marked_at_its_tick_in_every_chart_over_time_and_listed(stand_in, page):
+    events = [
+        {"tick": 500, "t_s": 0.5, "text": "element 0 becomes damping (0.8 N s/m)", "kind": "swap"},
+        {"tick": 1200, "t_s": 1.2, "text": "swap refused: it raised", "kind": "refused"},
+    ]
+    stand_in.show(contact())
+    settled(page, "force", "total")
+    for chart in ("position", "force", "energy"):
+        assert seen(page, chart, [0.25], "mark") == [None], chart
+    stand_in.tell({"type": "events", "events": events})
+    expect(page.locator("#events li").last).to_contain_text("tick 500 element 0 becomes damping (0.8 N s/m)")
+    for chart in ("position", "force", "energy"):
+        line, refused = seen(page, chart, [0.25, 0.6], "mark")
+        assert line, chart
+        assert line[1] - line[0] > 0.9, f"the mark in {chart} goes from top to bottom"
+        assert refused is None, "what was refused took no effect"
+
+
+def test_a_click_on_an_event_shows_its_moment(stand_in, page):
+    stand_in.tell({"type": "events", "events": [{"tick": 500, "t_s": 0.5, "text": "set", "kind": "set"}]})
+    stand_in.show(contact())
+    page.locator("#events button").click()
+    expect(page.locator("#freeze")).to_have_text("Go live")
+    asked = stand_in.watches()[-1]
+    assert (asked["span_s"], asked["end_s"]) == (pytest.approx(0.2), pytest.approx(0.6))
+
+
+def test_dragging_in_a_chart_looks_closer_and_a_double_click_goes_back_to_now(stand_in, page):
+    stand_in.show(contact())
+    settled(page, "force", "total")
+    box = page.locator("#force .u-over").bounding_box()
+    page.mouse.move(box["x"] + box["width"] * 0.25, box["y"] + 20)
+    page.mouse.down()
+    page.mouse.move(box["x"] + box["width"] * 0.5, box["y"] + 20, steps=5)
+    page.mouse.up()
+    expect(page.locator("#freeze")).to_have_text("Go live")
+    asked = stand_in.watches()[-1]
+    assert (asked["span_s"], asked["end_s"]) == (pytest.approx(0.5, abs=0.02), pytest.approx(1.0, abs=0.02))
+    page.mouse.dblclick(box["x"] + 50, box["y"] + 30)
+    expect(page.locator("#freeze")).to_have_text("Freeze")
+    assert stand_in.watches()[-1]["end_s"] is None
+
+
+def test_under_the_cursor_all_charts_tell_their_numbers_of_that_time(stand_in, page):
+    stand_in.show(contact())
+    settled(page, "energy", "0.300")
+    box = page.locator("#position .u-over").bounding_box()
+    page.mouse.move(box["x"] + box["width"] * 0.5, box["y"] + 20)
+    settled(page, "energy", "0.15")
+    for chart in ("position", "force", "energy"):
+        expect(page.locator(f"#{chart} .note")).to_have_text(re.compile(r"at (0\.99|1\.00)\d\d s"))
+
+
+def test_without_wall_or_inertia_the_loops_say_that_there_is_none(stand_in, page):
+    stand_in.show(positions([0.001] * ROWS))
+    expect(page.locator("#loop .absent")).to_contain_text("No wall")
+    expect(page.locator("#momentum .absent")).to_contain_text("No virtual inertia")
+    stand_in.show(contact())
+    expect(page.locator("#loop .absent")).to_be_empty()
+    expect(page.locator("#loop .legend")).to_contain_text("ideal spring")
+    expect(page.locator("#momentum .legend")).to_contain_text("unidirectional-inertia")
+
+
+def test_the_ideal_spring_is_as_steep_as_the_wall(stand_in, page):
+    """At the deepest point its line and a loop of the same stiffness meet; of half the stiffness, they do not."""
+    depth = [0.002 * math.sin(math.pi * i / 199) for i in range(200)]
+
+    def spring(stiffness):
+        rows = table("loop", 0.0, 1e-3, ("penetration", "m", "", depth), ("force", "N", "", [150 * d for d in depth]))
+        return picture(0.0, 0.2, {**rows, "stiffness": stiffness})
+
+    def height(stiffness):
+        """Where the dashed line is, near the deepest point, when the loop itself is hidden."""
+        stand_in.show(spring(stiffness))
+        expect(page.locator("#loop .legend button")).to_have_count(3)
+        parts = [0.84 + 0.005 * i for i in range(9)]
+        found = [place for place in seen(page, "loop", parts, "ink") if place]
+        assert found
+        return sum(first for first, _ in found) / len(found)
+
+    stand_in.show(spring(150.0))
+    for name in ("pressing", "releasing"):
+        page.locator("#loop .legend").get_by_text(name).click()
+    steep = height(150.0)
+    settled_at = page.locator("#loop .legend button[aria-pressed=false]")
+    expect(settled_at).to_have_count(2)
+    assert steep < 0.25
+    stand_in.show(spring(75.0))
+    page.wait_for_timeout(200)
+    assert height(75.0) > steep + 0.3
+
+
+def test_a_scene_of_many_elements_is_drawn_with_all_of_them(stand_in, page):
+    forces = [(f"element.{i}.damping", "N", f"element {i}: damping", [0.1 * i] * ROWS) for i in range(10)]
+    stand_in.show(picture(0.0, 2.0, table("force", 0.0, 2.0 / (ROWS - 1), *forces)))
+    expect(page.locator("#force .legend li")).to_have_count(10)

@@ -1,0 +1,159 @@
+"""The page on a desk and on a phone, in light and dark: everything is there, nothing is covered or cut off."""
+
+import pytest
+from browser.conftest import DESK, PHONE
+from browser.pictures import contact
+from playwright.sync_api import expect
+
+MAIN = ["#verdict", "#position", "#force", "#energy", "#pause", "[data-step='100']", "#stop", "#freeze", "#help"]
+# Elements of the header and controls whose boxes overlap although neither holds the other.
+OVERLAPS = """() => {
+    const those = "h1, #phase, #verdict, .figures div, nav button, nav label, .chart, .panel";
+    const all = [...document.querySelectorAll(those)]
+        .filter(e => e.offsetParent && e.getClientRects().length);
+    const box = new Map(all.map(e => [e, e.getBoundingClientRect()]));
+    const name = e => e.id || e.textContent.trim().slice(0, 20);
+    const found = [];
+    for (const a of all) for (const b of all) {
+        if (a === b || a.contains(b) || b.contains(a)) continue;
+        const p = box.get(a), q = box.get(b);
+        const wide = Math.min(p.right, q.right) - Math.max(p.left, q.left);
+        const high = Math.min(p.bottom, q.bottom) - Math.max(p.top, q.top);
+        if (wide > 2 && high > 2) found.push(`${name(a)} | ${name(b)}`);
+    }
+    return found;
+}"""
+# Texts that do not fit into their box and are cut off without a sign of it.
+CUT = """() => [...document.querySelectorAll("button, dd, dt, .unit, td, th, #verdict span, .word")]
+    .filter(e => e.offsetParent && e.scrollWidth > e.clientWidth + 1 && e.clientWidth > 0)
+    .map(e => e.textContent.trim())"""
+# Text that is hard to read: less contrast with its background than 4.5 (WCAG 2.1, 1.4.3), or smaller than 12 px.
+FAINT = """() => {
+    const rgb = text => text.match(/[\\d.]+/g).map(Number);
+    const light = ([r, g, b]) => [r, g, b].map(v => v / 255)
+        .map(v => v <= 0.03928 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4)
+        .reduce((sum, v, i) => sum + v * [0.2126, 0.7152, 0.0722][i], 0);
+    const behind = e => {
+        for (let at = e; at; at = at.parentElement) {
+            const colour = rgb(getComputedStyle(at).backgroundColor);
+            if (colour.length < 4 || colour[3] > 0.9) return colour;
+        }
+        return [255, 255, 255];
+    };
+    const texts = [...document.querySelectorAll("body *")].filter(e => e.offsetParent
+        && !e.closest("svg, :disabled, .uplot")
+        && [...e.childNodes].some(n => n.nodeType === 3 && n.textContent.trim()));
+    return texts.map(e => {
+        const style = getComputedStyle(e);
+        const [a, b] = [light(rgb(style.color)), light(behind(e))].sort((x, y) => y - x);
+        const contrast = (a + 0.05) / (b + 0.05);
+        return contrast < 4.5 || parseFloat(style.fontSize) < 12
+            ? `${e.textContent.trim().slice(0, 30)}: ${contrast.toFixed(2)}, ${style.fontSize}` : "";
+    }).filter(Boolean);
+}"""
+EVENTS = [
+    {"tick": 400 + 3 * i, "t_s": 0.4 + 0.003 * i, "text": f"wall.stiffness = {150 + i} N/m", "kind": "set"}
+    for i in range(12)
+]
+
+
+@pytest.fixture(params=["light", "dark"])
+def scheme(request):
+    return request.param
+
+
+def shown(stand_in, open_page, viewport, scheme, **options):
+    stand_in.state()
+    stand_in.tell({"type": "events", "events": EVENTS})
+    stand_in.show(contact())
+    page = open_page(stand_in.url, viewport=viewport, color_scheme=scheme, **options)
+    expect(page.locator("#force .legend")).to_contain_text("total")
+    page.wait_for_timeout(200)
+    return page
+
+
+def test_on_a_desk_the_answer_the_charts_and_the_controls_are_there_without_scrolling(stand_in, open_page, scheme):
+    page = shown(stand_in, open_page, DESK, scheme)
+    height, width = page.evaluate("[document.documentElement.scrollHeight, document.documentElement.scrollWidth]")
+    assert (height, width) == (DESK["height"], DESK["width"])
+    for selector in MAIN:
+        box = page.locator(selector).bounding_box()
+        assert box["y"] >= 0, selector
+        assert box["y"] + box["height"] <= DESK["height"], selector
+    for chart in ("position", "force", "energy"):
+        assert page.locator(f"#{chart} .u-over").bounding_box()["height"] > 80, chart
+    for loop in ("loop", "momentum"):
+        box = page.locator(f"#{loop} .u-over").bounding_box()
+        assert 0.5 < box["width"] / box["height"] < 2, loop
+
+
+@pytest.mark.parametrize("viewport", [DESK, PHONE, {"width": 1920, "height": 1080}, {"width": 820, "height": 1180}])
+def test_nothing_covers_anything_and_no_text_is_cut_off(viewport, stand_in, open_page, scheme):
+    page = shown(stand_in, open_page, viewport, scheme)
+    assert page.evaluate(OVERLAPS) == []
+    assert page.evaluate(CUT) == []
+    assert page.evaluate("document.documentElement.scrollWidth") == viewport["width"], "no scrolling sideways"
+
+
+def test_a_box_that_covers_another_would_be_found(stand_in, open_page):
+    page = shown(stand_in, open_page, DESK, "light")
+    page.evaluate("document.querySelector('#verdict').style.marginLeft = '-300px'")
+    assert page.evaluate(OVERLAPS) != []
+    page.evaluate("document.querySelector('#pause').style.width = '10px'")
+    page.evaluate("document.querySelector('#pause').style.minWidth = '0'")
+    assert "Pause" in page.evaluate(CUT)
+
+
+@pytest.mark.parametrize("viewport", [DESK, PHONE])
+def test_all_text_is_large_enough_and_stands_out(viewport, stand_in, open_page, scheme):
+    page = shown(stand_in, open_page, viewport, scheme)
+    assert page.evaluate(FAINT) == []
+
+
+def test_the_charts_of_time_have_one_time_axis_in_common(stand_in, open_page):
+    page = shown(stand_in, open_page, DESK, "light")
+    boxes = [page.locator(f"#{chart} .u-over").bounding_box() for chart in ("position", "force", "energy")]
+    assert len({(box["x"], box["width"]) for box in boxes}) == 1
+
+
+def test_on_a_phone_fingers_find_their_targets(stand_in, open_page):
+    page = shown(stand_in, open_page, PHONE, "light", has_touch=True, is_mobile=True)
+    for selector in ("#pause", "[data-step='1']", "#stop", "#freeze", "#swap-do", "#swap-damping"):
+        assert page.locator(selector).bounding_box()["height"] >= 40, selector
+
+
+def test_the_page_stays_where_it_is_while_numbers_change(stand_in, open_page):
+    page = shown(stand_in, open_page, DESK, "light")
+    those = ".figures div, .chart, nav > *, #verdict"
+    places = f"[...document.querySelectorAll('{those}')].map(e => e.getBoundingClientRect().x)"
+    before = page.evaluate(places)
+    stand_in.state(oscillation_m=-1.2345e-9, verdict="steady", residual_J=None, real_time_factor=12.3, skipped_ticks=0)
+    expect(page.locator("#verdict")).to_have_text("steady")
+    assert page.evaluate(places) == before
+
+
+def test_light_and_dark_change_places_while_the_page_is_open(stand_in, open_page):
+    page = shown(stand_in, open_page, DESK, "light")
+    brightness = """() => {
+        const canvas = document.querySelector("#force canvas");
+        const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
+        let dark = 0, light = 0;
+        for (let i = 0; i < data.length; i += 4) {
+            if (data[i + 3] > 200) data[i] + data[i + 1] + data[i + 2] < 380 ? dark++ : light++;
+        }
+        return dark > light ? "dark lines" : "light lines";
+    }"""
+    assert page.evaluate(brightness) == "dark lines"
+    page.emulate_media(color_scheme="dark")
+    page.wait_for_timeout(200)
+    assert page.evaluate(brightness) == "light lines"
+
+
+def test_every_control_has_a_name(stand_in, open_page):
+    page = shown(stand_in, open_page, DESK, "light")
+    nameless = page.evaluate(
+        """() => [...document.querySelectorAll("button, input, select")].filter(e => !e.closest("dialog"))
+            .filter(e => !(e.getAttribute("aria-label") || e.labels?.[0]?.textContent.trim() || e.textContent.trim()))
+            .map(e => e.outerHTML)"""
+    )
+    assert nameless == []

@@ -1,0 +1,319 @@
+"""Steering from the page: orders that go out as they were meant, and what is refused is told and changes nothing."""
+
+import pytest
+from browser.pictures import contact
+from browser.stand_in import OPTIONS, RUNNING, TOKEN
+from playwright.sync_api import expect
+
+
+@pytest.fixture
+def page(stand_in, open_page):
+    stand_in.state()
+    page = open_page(stand_in.url)
+    expect(page.locator("#pause")).to_be_enabled()
+    return page
+
+
+def order(stand_in, page, act):
+    """What is ordered by ``act``; the page has heard the answer."""
+    page.evaluate("document.querySelector('#said').textContent = ''")
+    act()
+    expect(page.locator("#said")).not_to_be_empty()
+    return [(command["verb"], command["arguments"]) for command in stand_in.commands()][-1]
+
+
+def test_every_order_carries_the_token_of_the_link(stand_in, page):
+    assert order(stand_in, page, lambda: page.click("#pause")) == ("pause", {})
+    assert stand_in.commands()[-1]["token"] == TOKEN
+
+
+def test_without_the_token_the_page_watches_says_why_and_orders_nothing(stand_in, open_page):
+    stand_in.state()
+    page = open_page(stand_in.origin + "/")
+    expect(page.locator("#notice")).to_contain_text("open the link that haploop view printed to steer")
+    for control in ("#pause", "#stop", "#swap-do", "[data-step='1']", "[name=pace] >> nth=0"):
+        expect(page.locator(control)).to_be_disabled()
+    for key in (" ", ".", "1", "2", "3", "-", "=", "x", "s"):
+        page.keyboard.press(key)
+    page.keyboard.press("[")
+    expect(page.locator("[name=span][value='1']")).to_be_checked()
+    assert stand_in.commands() == []
+
+
+@pytest.mark.parametrize(
+    ("selector", "expected"),
+    [
+        ("#pause", ("pause", {})),
+        ("[data-step='1']", ("step", {"ticks": 1})),
+        ("[data-step='10']", ("step", {"ticks": 10})),
+        ("[data-step='100']", ("step", {"ticks": 100})),
+        ("label:has([name=pace][value='0.1'])", ("pace", {"pace": 0.1})),
+        ("label:has([name=pace][value='free'])", ("pace", {"pace": "free"})),
+    ],
+)
+def test_a_button_orders_what_it_says(selector, expected, stand_in, page):
+    assert order(stand_in, page, lambda: page.click(selector)) == expected
+
+
+@pytest.mark.parametrize(
+    ("key", "expected"),
+    [
+        (" ", ("pause", {})),
+        (".", ("step", {"ticks": 1})),
+        ("2", ("step", {"ticks": 10})),
+        ("3", ("step", {"ticks": 100})),
+        ("-", ("pace", {"pace": 0.1})),
+        ("=", ("pace", {"pace": 1})),
+        ("+", ("pace", {"pace": "free"})),
+    ],
+)
+def test_a_key_orders_what_the_help_says(key, expected, stand_in, page):
+    assert order(stand_in, page, lambda: page.keyboard.press(key)) == expected
+
+
+def test_a_paused_run_is_resumed_by_the_same_button_and_key(stand_in, page):
+    stand_in.state(phase="paused")
+    expect(page.locator("#pause")).to_have_text("Resume")
+    assert order(stand_in, page, lambda: page.keyboard.press(" "))[0] == "resume"
+    assert order(stand_in, page, lambda: page.click("#pause"))[0] == "resume"
+
+
+def test_a_key_that_is_typed_into_a_field_steers_nothing(stand_in, page):
+    page.fill("#swap-fields input", "")
+    page.locator("#swap-fields input").press_sequentially("0.123 kg")
+    page.focus("#freeze")
+    page.keyboard.press(" ")
+    expect(page.locator("#freeze")).to_have_text("Go live")
+    assert stand_in.commands() == []
+    assert page.input_value("#swap-fields input") == "0.123 kg"
+
+
+def test_to_stop_is_asked_first_and_may_be_taken_back(stand_in, page):
+    page.keyboard.press("x")
+    expect(page.locator("#stopping")).to_be_visible()
+    page.keyboard.press("Escape")
+    expect(page.locator("#stopping")).to_be_hidden()
+    page.click("#stop")
+    page.get_by_role("button", name="Go on").click()
+    assert stand_in.commands() == []
+    page.click("#stop")
+    assert order(stand_in, page, lambda: page.get_by_role("button", name="End the run").click()) == ("stop", {})
+
+
+def test_a_swap_sends_kind_where_it_acts_and_its_parameters_and_the_answer_is_told(stand_in, page):
+    stand_in.answer = lambda command: (True, "element 1 becomes damping at tick 1500 (1.5 s)")
+    page.select_option("#swap-element", "1")
+    page.select_option("#swap-kind", "damping")
+    page.select_option("#swap-acts", "always")
+    page.fill("#swap-damping", "0.8")
+    swapped = order(stand_in, page, lambda: page.click("#swap-do"))
+    assert swapped == ("swap", {"swap": {"kind": "damping", "acts": "always", "damping": 0.8}, "element": 1})
+    expect(page.locator("#said")).to_have_text("element 1 becomes damping at tick 1500 (1.5 s)")
+
+
+def test_one_can_be_added_past_the_end_and_one_removed(stand_in, page):
+    page.select_option("#swap-element", "2")
+    assert "none" not in page.locator("#swap-kind option").evaluate_all("all => all.map(o => o.value)")
+    page.select_option("#swap-kind", "unidirectional-inertia")
+    assert page.input_value("#swap-mass") == "0.01", "the default"
+    assert order(stand_in, page, lambda: page.click("#swap-do"))[1]["element"] == 2
+    page.select_option("#swap-element", "0")
+    page.select_option("#swap-kind", "none")
+    assert order(stand_in, page, lambda: page.click("#swap-do")) == ("swap", {"swap": {"kind": "none"}, "element": 0})
+
+
+def test_the_form_starts_from_the_element_as_it_is_and_says_what_a_kind_does(stand_in, page):
+    assert page.input_value("#swap-kind") == "damping"
+    assert page.input_value("#swap-damping") == "0.4"
+    page.select_option("#swap-element", "1")
+    assert page.input_value("#swap-kind") == "unidirectional-inertia"
+    expect(page.locator("#swap-about")).to_contain_text("only ever takes energy out")
+    expect(page.locator("#swap-mass-unit")).to_have_text("kg, > 0")
+
+
+WRONG = [
+    ("", "A number is needed."),
+    ("-0.8", "It must be at least 0 N s/m."),
+    ("0,8", "Write a point, not a comma: 0.8"),
+    ("much", 'It must be a number in N s/m, or text with its unit such as "1 N s/m".'),
+    ("nan", "It must be a number in N s/m"),
+    ("1e999", "It must be a number"),
+]
+
+
+@pytest.mark.parametrize(("text", "reason"), WRONG)
+def test_a_wrong_value_is_refused_beside_its_field_before_anything_is_sent(text, reason, stand_in, page):
+    page.fill("#swap-damping", text)
+    page.keyboard.press("Enter")
+    problem = page.locator("#swap-damping-problem")
+    expect(problem).to_contain_text(reason)
+    expect(problem).to_have_attribute("role", "alert")
+    expect(page.locator("#swap-damping")).to_have_attribute("aria-invalid", "true")
+    expect(page.locator("#swap-damping")).to_be_focused()
+    assert stand_in.commands() == []
+    page.fill("#swap-damping", "0.8")
+    expect(problem).to_be_empty()
+
+
+@pytest.mark.parametrize("text", ["0.8 N s/m", "800 mN s/m", ".5", "1e-3", "+2"])
+def test_whatever_the_run_may_understand_is_sent(text, stand_in, page):
+    page.fill("#swap-damping", text)
+    sent = order(stand_in, page, lambda: page.keyboard.press("Enter"))[1]["swap"]["damping"]
+    assert sent == (text if "N" in text else float(text))
+
+
+def test_what_the_run_refuses_is_told_beside_the_field_that_it_names(stand_in, page):
+    stand_in.answer = lambda command: (False, 'live event: event.0.swap.damping is "1 kg". kg has another dimension.')
+    page.fill("#swap-damping", "1 kg")
+    page.keyboard.press("Enter")
+    expect(page.locator("#swap-damping-problem")).to_have_text('damping is "1 kg". kg has another dimension.')
+    assert page.input_value("#swap-damping") == "1 kg", "what was typed stays to be mended"
+    assert page.input_value("#swap-kind") == "damping"
+
+
+def test_what_the_run_refuses_without_naming_a_field_is_told_in_the_form(stand_in, page):
+    stand_in.answer = lambda command: (False, "The run ends at tick 3000, 3 s; nothing can change from there on.")
+    page.click("#swap-do")
+    expect(page.locator("#swap-problem")).to_contain_text("The run ends at tick 3000")
+
+
+def test_settable_numbers_show_their_present_values_lengths_in_mm_and_times_in_ms(page):
+    shown = {key: page.input_value(f"[id='set-{key}']") for key in OPTIONS["settable"]}
+    assert shown == {
+        "wall.stiffness": "150", "wall.position": "-60", "clock.round_trip_delay": "2", "dissipation.0.damping": "0.4",
+        "dissipation.1.mass": "0.01",
+    }  # fmt: skip
+    expect(page.locator("[id='set-clock.round_trip_delay-unit']")).to_have_text("ms, ≥ 0")
+
+
+def test_only_what_was_changed_is_set_and_a_number_in_mm_or_ms_goes_out_with_its_unit(stand_in, page):
+    expect(page.locator("#set-do")).to_be_disabled()
+    page.fill("[id='set-wall.position']", "-58.5")
+    page.fill("[id='set-clock.round_trip_delay']", "1.2")
+    page.fill("[id='set-wall.stiffness']", "0.2 N/mm")
+    assert order(stand_in, page, lambda: page.click("#set-do")) == (
+        "set",
+        {"set": {"wall.stiffness": "0.2 N/mm", "wall.position": "-58.5 mm", "clock.round_trip_delay": "1.2 ms"}},
+    )
+    expect(page.locator("#set-do")).to_be_disabled()
+
+
+def test_what_is_being_typed_survives_news_of_the_run_and_the_rest_follows_it(stand_in, page):
+    page.fill("[id='set-wall.stiffness']", "180")
+    settable = OPTIONS["settable"]
+    changed = {**settable, "wall.stiffness": {**settable["wall.stiffness"], "value": 160.0},
+               "dissipation.0.damping": {**settable["dissipation.0.damping"], "value": 0.7}}  # fmt: skip
+    stand_in.state(options={**OPTIONS, "settable": changed})
+    expect(page.locator("[id='set-dissipation.0.damping']")).to_have_value("0.7")
+    assert page.input_value("[id='set-wall.stiffness']") == "180"
+    expect(page.locator("[id='set-wall.stiffness']")).to_be_focused()
+    page.click("#set-undo")
+    assert page.input_value("[id='set-wall.stiffness']") == "160"
+    assert stand_in.commands() == []
+
+
+def test_a_field_that_has_gone_with_its_element_takes_nothing_else_with_it(stand_in, page):
+    """After a swap there are other keys; what is typed in those that stay is kept, and so is the place of the caret."""
+    page.fill("[id='set-wall.stiffness']", "180")
+    settable = {key: value for key, value in OPTIONS["settable"].items() if not key.startswith("dissipation.1")}
+    stand_in.state(options={**OPTIONS, "settable": settable, "elements": OPTIONS["elements"][:1]})
+    expect(page.locator("#set-fields input")).to_have_count(4)
+    assert page.input_value("[id='set-wall.stiffness']") == "180"
+    expect(page.locator("[id='set-wall.stiffness']")).to_be_focused()
+    expect(page.locator("#swap-element option")).to_have_text(["0: damping", "1: add one"])
+
+
+def test_a_refused_set_leaves_what_was_typed_and_names_the_field(stand_in, page):
+    key = "live event: event.0.set.clock.round_trip_delay"
+    said = f"{key} is 0.00025. It is no whole number of plant steps; 0.0002 s or 0.0003 s is."
+    stand_in.answer = lambda command: (False, said)
+    page.fill("[id='set-wall.stiffness']", "180")
+    page.fill("[id='set-clock.round_trip_delay']", "0.25")
+    page.keyboard.press("Enter")
+    problem = page.locator("[id='set-clock.round_trip_delay-problem']")
+    expect(problem).to_contain_text("0.0002 s or 0.0003 s is.")
+    expect(page.locator("[id='set-wall.stiffness-problem']")).to_be_empty()
+    assert page.input_value("[id='set-clock.round_trip_delay']") == "0.25"
+    expect(page.locator("#set-do")).to_be_enabled()
+
+
+def test_a_pace_that_is_refused_shows_the_pace_as_it_is(stand_in, page):
+    stand_in.answer = lambda command: (False, "A pace is a number above 0, or free.")
+    page.click("label:has([name=pace][value='free'])")
+    expect(page.locator("#said")).to_have_text("Refused: A pace is a number above 0, or free.")
+    expect(page.locator("#said")).to_have_attribute("role", "alert")
+    expect(page.locator("[name=pace][value='1']")).to_be_checked()
+
+
+def test_an_order_whose_answer_never_comes_is_told(stand_in, page):
+    stand_in.answer = lambda command: None
+    page.click("#pause")
+    stand_in.stop()
+    expect(page.locator("#said")).to_contain_text("lost before the answer came")
+
+
+def test_with_the_keyboard_alone_an_element_is_swapped(stand_in, page):
+    """s goes to the form; arrows, tab and digits do the rest."""
+    page.keyboard.press("s")
+    expect(page.locator("#swap-kind")).to_be_focused()
+    page.keyboard.press("ArrowDown")
+    page.keyboard.press("Tab")
+    expect(page.locator("#swap-mass")).to_be_focused()
+    page.keyboard.press("Control+a")
+    page.keyboard.type("0.02")
+    swapped = order(stand_in, page, lambda: page.keyboard.press("Enter"))
+    assert swapped == (
+        "swap",
+        {"swap": {"kind": "unidirectional-inertia", "acts": "in-contact", "mass": 0.02}, "element": 0},
+    )
+
+
+def test_every_control_can_be_reached_by_tab(stand_in, page):
+    """From the top to the last button, none left out: a group of radio buttons counts as one."""
+    reached = set()
+    for _ in range(80):
+        page.keyboard.press("Tab")
+        reached.add(page.evaluate("document.activeElement.id || document.activeElement.getAttribute('name') || ''"))
+    wanted = {"pause", "pace", "stop", "span", "earlier", "freeze", "help", "swap-element", "swap-kind", "swap-damping"}
+    wanted |= {"swap-acts", "swap-do", "set-wall.stiffness", "events"}
+    assert wanted - reached == set()
+
+
+def test_spans_freezing_and_scrolling_ask_for_that_stretch_of_time(stand_in, page):
+    stand_in.show(contact(1.0, 3.0))
+    expect(page.locator("#force .legend")).to_contain_text("total")
+
+    def asked(act):
+        before = len(stand_in.watches())
+        act()
+        page.wait_for_timeout(100)
+        watches = stand_in.watches()[before:]
+        return [(watch["span_s"], watch["end_s"]) for watch in watches]
+
+    stand_in.state(tick=3000, end_tick=60000)
+    page.wait_for_timeout(100)
+    assert asked(lambda: page.keyboard.press("]")) == [(10, None)]
+    assert asked(lambda: page.click("label:has([name=span][value='2'])")) == [(2, None)]
+    page.click("h1")
+    assert asked(lambda: page.keyboard.press("f")) == [(2, 3)]
+    assert asked(lambda: page.keyboard.press("ArrowLeft")) == [(2, 2)]
+    assert asked(lambda: page.click("#earlier")) == [(2, 2)]
+    assert asked(lambda: page.click("#freeze")) == [(2, None)]
+    assert asked(lambda: page.click("label:has([name=span][value='all'])")) == [(None, None)]
+    assert RUNNING["first_s"] == 0.0
+
+
+def test_a_link_of_an_earlier_server_is_told_apart(stand_in, page):
+    """The server refuses the token; the page says what it said."""
+    stand_in.answer = lambda command: (False, "This link is of an earlier haploop view; open the one it printed last.")
+    page.click("#pause")
+    expect(page.locator("#said")).to_contain_text("open the one it printed last")
+
+
+def test_the_help_names_every_key(page):
+    page.keyboard.press("?")
+    expect(page.locator("#keys")).to_be_visible()
+    names = page.locator("#key-list kbd").all_inner_texts()
+    assert {"Space", "s", "e", "f", "[", "]", "x", "?"} <= set(names)
+    page.keyboard.press("Escape")
+    expect(page.locator("#keys")).to_be_hidden()

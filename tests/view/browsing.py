@@ -1,0 +1,151 @@
+"""A server of the live page, and what a page in a browser does with it."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
+from typing import Any
+
+import aiohttp
+import numpy as np
+
+from haploop.tools.view import LiveRuns
+from haploop.view.guard import Guard
+from haploop.view.runs import Runs
+from haploop.view.serve import listen, serve
+
+# A test gives up after so long. It says nothing about how long anything may take.
+PATIENCE_S = 40.0
+
+
+def decode(data: bytes) -> dict[str, Any]:
+    """A picture: its header, every table with its columns by name as ``values``."""
+    length = int.from_bytes(data[:4], "little")
+    assert (4 + length) % 8 == 0
+    picture = json.loads(data[4 : 4 + length])
+    at, tables = 4 + length, {}
+    for table in picture["tables"]:
+        size = table["rows"] * len(table["columns"])
+        rows = np.frombuffer(data, "<f4", size, at).reshape(len(table["columns"]), table["rows"])
+        names = [column["name"] for column in table["columns"]]
+        tables[table["name"]] = {**table, "values": dict(zip(names, rows, strict=True))}
+        at += -(-4 * size // 8) * 8
+    assert at == len(data)
+    return {**picture, "tables": tables}
+
+
+class Tab:
+    """A page that is connected.
+
+    Attributes:
+        state, events: as told last; None before.
+        picture: the last one, decoded; None before.
+        pictures: how many have come.
+        closed: (code, reason) once the server has closed.
+    """
+
+    def __init__(self, socket: aiohttp.ClientWebSocketResponse, token: str) -> None:
+        self.socket, self.token = socket, token
+        self.state: Any = None
+        self.events: Any = None
+        self.picture: Any = None
+        self.pictures = 0
+        self.closed: tuple[int | None, str] | None = None
+        self._answers: dict[int, dict[str, Any]] = {}
+        self._asked = 0
+        self.reading = asyncio.create_task(self._read())
+
+    async def _read(self) -> None:
+        reason = ""
+        async for message in self.socket:
+            if message.type is aiohttp.WSMsgType.BINARY:
+                self.picture, self.pictures = decode(message.data), self.pictures + 1
+                continue
+            told = json.loads(message.data)
+            if told["type"] == "answer":
+                self._answers[told["id"]] = told
+            elif told["type"] == "events":
+                self.events = told["events"]
+            else:
+                self.state = told
+        self.closed = self.socket.close_code, reason
+
+    async def until(self, what: str, look: Callable[[], Any]) -> Any:
+        """The first true answer of ``look``."""
+        give_up = asyncio.get_running_loop().time() + PATIENCE_S
+        while not (found := look()):
+            assert asyncio.get_running_loop().time() < give_up, f"{what} has not come; the state is {self.state}"
+            await asyncio.sleep(0.01)
+        return found
+
+    async def phase(self, phase: str) -> dict[str, Any]:
+        """Wait for a phase; returns the state."""
+        return await self.until(
+            f"phase {phase}", lambda: self.state if (self.state or {}).get("phase") == phase else None
+        )
+
+    async def watch(self, **what: Any) -> dict[str, Any]:
+        """Watch something; returns the first picture that shows it."""
+        await self.socket.send_json({"type": "watch", **what})
+        seen, span_s, end_s = self.pictures, what.get("span_s"), what.get("end_s")
+
+        def shows() -> bool:
+            if self.pictures == seen:
+                return False
+            from_s, to_s = self.picture["from_s"], self.picture["to_s"]
+            return (span_s is None or abs(to_s - from_s - span_s) < 1e-9) and (
+                end_s is None or abs(to_s - end_s) < 1e-9
+            )
+
+        await self.until("the picture asked for", shows)
+        return self.picture
+
+    async def ask(self, verb: str, **arguments: Any) -> tuple[bool, str]:
+        """A command; returns whether it was done, and the answer."""
+        return await self.send(verb, arguments, self.token)
+
+    async def send(self, verb: str, arguments: dict[str, Any], token: str) -> tuple[bool, str]:
+        """A command with some token."""
+        self._asked += 1
+        number = self._asked
+        await self.socket.send_json(
+            {"type": "command", "id": number, "token": token, "verb": verb, "arguments": arguments}
+        )
+        answer = await self.until("an answer", lambda: self._answers.get(number))
+        return answer["ok"], answer["text"]
+
+
+class Site:
+    """A server and a browser's way to it."""
+
+    def __init__(self, guard: Guard, session: aiohttp.ClientSession) -> None:
+        self.guard, self.session = guard, session
+
+    @property
+    def address(self) -> str:
+        return self.guard.address.rstrip("/")
+
+    async def tab(self, **headers: str) -> Tab:
+        """Open the page's stream."""
+        socket = await self.session.ws_connect(
+            f"{self.address}/stream", headers={"Origin": self.address, **headers}, max_msg_size=0
+        )
+        return Tab(socket, self.guard.token)
+
+
+@asynccontextmanager
+async def site(runs: Runs | None = None, **options: Any) -> AsyncIterator[Site]:
+    """A server on a free port, and a session of a browser."""
+    ready: asyncio.Future[Guard] = asyncio.get_running_loop().create_future()
+    end = asyncio.Event()
+    server = asyncio.create_task(serve(runs or LiveRuns(), listen(0), serving=ready.set_result, end=end, **options))
+    await asyncio.wait((ready, server), return_when=asyncio.FIRST_COMPLETED)
+    assert ready.done(), server.result()
+    async with aiohttp.ClientSession() as session:
+        try:
+            yield Site(ready.result(), session)
+        finally:
+            end.set()
+            await asyncio.wait_for(server, 20)

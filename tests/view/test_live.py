@@ -1,0 +1,374 @@
+"""The page of a real run: it shows what was logged, what it asks for is done or refused, and the run does not mind."""
+
+import asyncio
+import json
+import os
+import signal
+
+import numpy as np
+import pytest
+from live_run import going, undisturbed
+from view.browsing import site
+
+from haploop.launch.failure import RunFailed
+from haploop.logger import read
+
+TOUCHING = ("wall.position=-0.001", "duration=600", "run.deadline=30")
+
+
+def follow(play, tmp_path, *overrides, options=None, **how):
+    """A run, a server, and a page that plays its part: ``play(run, tab, site)``."""
+
+    async def scenario(run):
+        async with site(**(options or {})) as here:
+            return await play(run, await here.tab(), here)
+
+    with going(tmp_path, *(overrides or TOUCHING), **how) as run:
+        return asyncio.run(scenario(run))
+
+
+async def stands(run, tick):
+    """Wait until the run stands still at a tick."""
+    await asyncio.to_thread(run.stands_at, tick)
+
+
+async def has_logged(run, ticks):
+    """Wait until so many ticks can be read from the log."""
+    for _ in range(400):
+        log = read(run.prepared.out)
+        if len(log.get("/energy", {}).get("timestamp", ())) >= ticks:
+            return log
+        await asyncio.sleep(0.05)
+    raise AssertionError(f"the log does not get to {ticks} ticks")
+
+
+def same(column, truth):
+    """Every float32 that is nearest to a logged number, and nothing else."""
+    np.testing.assert_array_equal(column, np.asarray(truth, np.float32))
+
+
+async def whole(tab, run, ticks, **watch):
+    """A picture of everything since the start, once all three streams of it are there."""
+    begins = {"position": "x", "force": "total", "energy": "residual"}
+    await tab.until("the end", lambda: tab.state and tab.state.get("tick", 0) >= ticks)
+    await tab.watch(**{"span_s": None, "points": 8000} | watch)
+
+    def is_whole():
+        tables = tab.picture["tables"]
+        return tables.keys() >= begins.keys() and all(
+            np.isfinite(tables[name]["values"][column][0]) for name, column in begins.items()
+        )
+
+    await tab.until("the start", is_whole)
+    return tab.picture
+
+
+def test_every_sample_of_the_picture_is_the_logs(tmp_path):
+    """Joined in mid-run: what came before it joined is there as well, bit for bit as float32."""
+
+    async def play(run, tab, here):
+        await stands(run, 600)
+        log = await has_logged(run, 600)
+        picture = await whole(tab, run, 600)
+        tables = picture["tables"]
+        assert {name: table["envelope"] for name, table in tables.items()} == dict.fromkeys(tables, False)
+        position, force, energy = (tables[name]["values"] for name in ("position", "force", "energy"))
+        assert (tables["position"]["t0_s"], tables["position"]["rows"]) == (0.0, 6000)
+        same(position["x"], log["/plant"]["x"])
+        same(position["x_measured"], np.repeat(log["/controller"]["x"], 10))
+        assert (position["wall"] == np.float32(-0.001)).all()
+        same(force["wall"], log["/controller"]["wall"])
+        same(force["total"], log["/controller"]["total"])
+        same(force["element.0.unidirectional-inertia"], log["/controller"]["dissipation.0"])
+        same(energy["wall"], log["/energy"]["wall.true"])
+        same(energy["unidirectional-inertia"], log["/energy"]["unidirectional-inertia.true"])
+        same(energy["residual"], log["/energy"]["residual"])
+        units = {column["name"]: column["unit"] for table in tables.values() for column in table["columns"]}
+        assert (units["x"], units["total"], units["residual"], units["v"]) == ("m", "N", "J", "m/s")
+
+        loop, momentum = tables["loop"], tables["momentum"]
+        t, x, f = (log["/plant"][name][2000:] for name in ("t", "x", "force"))
+        assert (loop["t0_s"], loop["dt_s"], loop["stiffness"]) == (t[0], 1e-4, 150.0)
+        same(loop["values"]["penetration"], (x + 0.001) * -1.0)
+        same(loop["values"]["force"], f)
+        v, f = (log["/controller"][name][200:] for name in ("v", "dissipation.0"))
+        same(momentum["values"]["v"], v[:-1])
+        same(momentum["values"]["p.0"], np.where(f != 0.0, 0.01, 0.0)[:-1] * v[1:])
+
+    follow(play, tmp_path, pauses=(600,))
+
+
+def test_a_long_view_is_an_envelope_that_touches_every_extreme(tmp_path):
+    async def play(run, tab, here):
+        await stands(run, 3000)
+        log = await has_logged(run, 3000)
+        picture = await whole(tab, run, 3000, points=200)
+        table = picture["tables"]["position"]
+        assert table["envelope"]
+        assert table["rows"] <= 2 * 200
+        buckets = table["rows"] // 2
+        ticks = round(table["dt_s"] * 2000)
+        assert table["t0_s"] == pytest.approx(ticks / 4000)
+        x = np.full(buckets * ticks * 10, np.nan)
+        x[:30_000] = log["/plant"]["x"]
+        x = x.reshape(buckets, -1).astype(np.float32)
+        pairs = np.sort(table["values"]["x"].reshape(-1, 2))
+        np.testing.assert_array_equal(pairs[:, 0], np.nanmin(x, axis=1))
+        np.testing.assert_array_equal(pairs[:, 1], np.nanmax(x, axis=1))
+
+    follow(play, tmp_path, pauses=(3000,))
+
+
+def test_the_window_is_what_the_page_watches(tmp_path):
+    """The last seconds, seconds further back, and nothing where nothing is."""
+
+    async def play(run, tab, here):
+        await stands(run, 1000)
+        log = await has_logged(run, 1000)
+        await whole(tab, run, 1000)
+        recent = await tab.watch(span_s=0.2, points=1000)
+        assert (recent["from_s"], recent["to_s"]) == (0.8, 1.0)
+        same(recent["tables"]["position"]["values"]["x"], log["/plant"]["x"][8000:])
+        back = await tab.watch(span_s=0.1, points=1000, end_s=0.5)
+        assert (back["from_s"], back["to_s"]) == (0.4, 0.5)
+        same(back["tables"]["position"]["values"]["x"], log["/plant"]["x"][4000:5000])
+        same(back["tables"]["force"]["values"]["total"], log["/controller"]["total"][400:500])
+        same(back["tables"]["loop"]["values"]["force"], log["/plant"]["force"][4000:5000])
+        nothing = await tab.watch(span_s=1.0, end_s=1000.0)
+        assert nothing["tables"] == {}
+        early = await tab.watch(span_s=5.0)
+        assert (early["from_s"], early["to_s"]) == (0.0, 5.0)
+
+    follow(play, tmp_path, pauses=(1000,))
+
+
+def test_since_now_shows_nothing_older(tmp_path):
+    async def play(run, tab, here):
+        await stands(run, 500)
+        async with site(from_start=False) as other:
+            late = await other.tab()
+            await late.phase("paused")
+            await asyncio.to_thread(run.ask, "step", ticks=50)
+            await late.until("the step", lambda: late.state["tick"] >= 550)
+            await asyncio.sleep(1.0)  # longer than it takes to read a log
+            assert late.state["first_s"] == 0.5
+            picture = await late.watch(span_s=None, points=1000)
+            assert (picture["from_s"], picture["to_s"]) == (0.5, 0.55)
+            assert picture["tables"]["position"]["rows"] == 500
+
+    follow(play, tmp_path, pauses=(500,))
+
+
+def test_commands_of_the_page_reach_the_run_and_what_took_effect_is_told_with_its_tick(tmp_path):
+    async def play(run, tab, here):
+        await stands(run, 500)
+        state = await tab.phase("paused")
+        assert await tab.ask("swap", swap={"kind": "damping", "damping": "0.8 N s/m"}, element=0) == (
+            True,
+            "element 0 becomes damping at tick 500 (0.5 s)",
+        )
+        assert (await tab.ask("set", set={"wall.stiffness": 200, "clock.round_trip_delay": "1 ms"}))[0]
+        assert (await tab.ask("step", ticks=7))[0]
+        await stands(run, 507)
+        assert (await tab.ask("pace", pace=0.5))[0]
+        assert (await tab.ask("resume"))[0]
+        state = await tab.phase("running")
+        assert (await tab.ask("pause"))[0]
+        state = await tab.phase("paused")
+        await tab.until("the delay", lambda: tab.state["delay_s"] == 0.001)
+        await tab.until("the wall", lambda: tab.state["wall"]["stiffness"] == 200.0)
+        state = tab.state
+        assert state["pace"] == 0.5
+        assert [element["kind"] for element in state["elements"]] == ["damping"]
+        await tab.until("all events", lambda: [event["kind"] for event in tab.events][-1:] == ["pause"])
+        told = [(event["tick"], event["kind"], event["text"]) for event in tab.events]
+        assert told[:4] == [
+            (500, "pause", "paused"),
+            (500, "swap", "element 0 becomes damping (0.8 N s/m)"),
+            (500, "set", "wall.stiffness = 200 N/m, clock.round_trip_delay = 0.001 s"),
+            (500, "step", "7 ticks on"),
+        ]
+        assert tuple(kind for _, kind, _ in told[4:6]) == ("pace", "resume")
+
+        tick = state["tick"]
+        log = await has_logged(run, min(tick, 600))
+        picture = await whole(tab, run, 507, span_s=0.02, end_s=0.507)
+        force = picture["tables"]["force"]["values"]
+        assert np.isnan(force["element.0.damping"][:13]).all()
+        assert np.isnan(force["element.0.unidirectional-inertia"][13:]).all()
+        same(force["element.0.damping"][13:], log["/controller"]["dissipation.0"][500:507])
+        assert {"damping", "unidirectional-inertia"} <= picture["tables"]["energy"]["values"].keys()
+        assert (await tab.ask("stop"))[0]
+        await tab.phase("ended")
+
+    follow(play, tmp_path, pauses=(500,))
+
+
+def at_work(state):
+    """The one element with its mass, and the stiffness of the wall."""
+    (element,) = state["elements"]
+    return element["kind"], element["parameters"]["mass"], state["wall"]["stiffness"]
+
+
+REFUSED = [
+    ("swap", {"swap": {"kind": "dampng", "damping": 0.8}}, "damping"),
+    ("swap", {"swap": {"kind": "damping", "damping": -1}}, "at least 0"),
+    ("swap", {"swap": {"kind": "damping", "damping": "0.8 N/m"}}, "N/m"),
+    ("swap", {"swap": {"kind": "damping", "damping": 1}, "element": 9}, "element"),
+    ("swap", {"swap": 5}, "must be a table"),
+    ("swap", {"surprise": 1}, "cannot be used"),
+    ("set", {"set": {"wall.stiffness": -1}}, "wall.stiffness"),
+    ("set", {"set": {"clock.round_trip_delay": 0.00015}}, "whole number"),
+    ("step", {"ticks": 0}, "at least one tick"),
+    ("pace", {"pace": -1}, "pace"),
+    ("pace", {"pace": 10**30}, "cannot be used"),
+    ("pause", {"verb": "stop"}, "cannot be used"),
+    ("pause", {"run": 1}, "cannot be used"),
+]
+
+
+def test_what_is_refused_comes_back_as_a_sentence_and_changes_nothing(tmp_path):
+    async def play(run, tab, here):
+        await stands(run, 300)
+        before = await tab.phase("paused")
+        for verb, arguments, reason in REFUSED:
+            ok, text = await tab.send(verb, arguments, tab.token)
+            assert not ok, text
+            assert reason in text
+        assert not (await tab.send("stop", {}, "guess"))[0]
+        await stands(run, 300)
+        assert [at_work(tab.state), at_work(before)] == [("unidirectional-inertia", 0.01, 150.0)] * 2
+        assert [event["kind"] for event in tab.events] == ["pause"]
+        assert (await tab.ask("resume"))[0]
+        await asyncio.to_thread(run.result)
+
+    with_events = ("wall.position=-0.001", "duration=0.5", "run.deadline=30")
+    follow(play, tmp_path, *with_events, pauses=(300,))
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text())
+    assert summary["ended"] == "done"
+    assert [element["kind"] for element in summary["energy"]["elements"]] == ["unidirectional-inertia"]
+
+
+def test_the_end_is_told_with_the_summary_and_what_was_seen_can_still_be_looked_at(tmp_path):
+    async def play(run, tab, here):
+        await tab.phase("paused")
+        await tab.ask("resume")
+        state = await tab.phase("ended")
+        summary = json.loads((tmp_path / "out" / "summary.json").read_text())
+        assert state["summary"] == summary
+        assert (state["verdict"], state["verdict_rule"]) == (summary["verdict"], summary["verdict_rule"])
+        assert state["residual_J"] == summary["energy"]["residual_J"]
+        picture = await whole(tab, run, 500)
+        log = read(tmp_path / "out")
+        x = picture["tables"]["position"]["values"]["x"]
+        same(x[:5001], log["/plant"]["x"])  # the end state is there too
+        assert np.isnan(x[5001:]).all()
+        later = await here.tab()
+        await later.phase("ended")
+        assert (await later.ask("pause"))[1].endswith("is over; nothing about it can change any more.")
+
+    follow(play, tmp_path, "duration=0.5", "wall.position=-0.001", pauses=(200,))
+
+
+def test_the_next_run_is_taken_up_and_the_first_stays_on_show_until_then(tmp_path):
+    async def scenario():
+        async with site() as here:
+            tab = await here.tab()
+            await tab.phase("waiting")
+            for name in ("first", "second"):
+                await asyncio.to_thread(one_run, tab, tmp_path / name, f"title={name}")
+                state = await tab.phase("ended")
+                assert state["title"] == name
+                await tab.until("its picture", lambda: tab.picture["tables"])
+
+    def one_run(tab, directory, title):
+        with going(directory, "duration=0.3", "wall.position=-0.001", title, pauses=(100,)) as run:
+            for _ in range(2000):
+                if (tab.state or {}).get("run") == run.live.id:
+                    break
+                run.stands_at(100)
+            run.ask("resume")
+            run.result()
+
+    asyncio.run(scenario())
+
+
+def test_a_failed_run_says_why(tmp_path):
+    async def play(run, tab, here):
+        state = await tab.until("the nodes", lambda: tab.state if (tab.state or {}).get("nodes") else None)
+        os.kill(next(node["pid"] for node in state["nodes"] if node["role"] == "plant"), signal.SIGKILL)
+        state = await tab.phase("failed")
+        assert "The plant was killed by SIGKILL" in state["why"]
+        state = await tab.until("the summary", lambda: tab.state if tab.state["summary"] else None)
+        assert state["summary"]["ended"] == "failed"
+        with pytest.raises(RunFailed):
+            await asyncio.to_thread(run.result)
+
+    follow(play, tmp_path, pauses=(100,))
+
+
+def test_pages_that_come_go_and_say_nothing_leave_the_bits_of_the_run_alone(tmp_path):
+    """Pictures all the while, one page that reads nothing, one that leaves without a word."""
+
+    async def play(run, tab, here):
+        await tab.phase("paused")
+        deaf = await here.session.ws_connect(f"{here.address}/stream", headers={"Origin": here.address})
+        deaf._response.connection.transport.pause_reading()
+        rude = await here.tab()
+        await rude.socket.send_json({"type": "watch", "span_s": None, "points": 8000})
+        await tab.ask("pace", pace=2)
+        await tab.ask("resume")
+        await rude.until("pictures", lambda: rude.pictures > 3)
+        rude.reading.cancel()
+        rude.socket._response.connection.transport.abort()
+        await tab.phase("ended")
+        assert tab.pictures > 10
+        return tab.state["skipped_ticks"]
+
+    with going(tmp_path, "duration=3", pauses=(100,)) as run:
+
+        async def scenario():
+            async with site() as here:
+                return await play(run, await here.tab(), here)
+
+        assert asyncio.run(scenario()) == 0
+        summary = run.result()
+        assert summary["trajectory_sha256"] == undisturbed(run.prepared)["trajectory_sha256"]
+        assert summary["lost"]["telemetry_gaps"] == 0
+
+
+def test_a_paused_run_sends_its_picture_once(tmp_path):
+    """Nothing new is nothing sent; a change of what is watched is answered at once."""
+
+    async def play(run, tab, here):
+        await stands(run, 300)
+        await whole(tab, run, 300)
+        await asyncio.sleep(0.7)
+        seen = tab.pictures
+        states = tab.state
+        await asyncio.sleep(1.0)
+        assert tab.pictures == seen
+        assert tab.state is not states
+        await tab.watch(span_s=0.1)
+        assert tab.pictures == seen + 1
+
+    follow(play, tmp_path, pauses=(300,))
+
+
+def test_who_waits_for_whom_and_what_can_be_chosen_is_told(tmp_path):
+    async def play(run, tab, here):
+        await stands(run, 300)
+        state = await tab.until(
+            "options and nodes", lambda: tab.state if tab.state["options"] and tab.state["nodes"] else 0
+        )
+        assert {node["role"] for node in state["nodes"]} == {"plant", "controller", "logger", "view"}
+        assert all(not node["lossless"] for node in state["nodes"] if node["role"] == "view")
+        assert state["options"]["settable"]["wall.stiffness"]["value"] == 150.0
+        assert "damping" in state["options"]["kinds"]
+        assert state["elements"][0]["kind"] == "unidirectional-inertia"
+        assert (state["wall"]["stiffness"], state["wall"]["into_wall"]) == (150.0, -1.0)
+        assert (state["end_tick"], state["control_rate"], state["plant_rate"]) == (600_000, 1000, 10_000)
+        assert state["real_time_factor"] is None
+        assert state["run"] == run.live.id
+
+    follow(play, tmp_path, pauses=(300,))

@@ -1,0 +1,147 @@
+"""What a picture of a history holds, and the form in which it travels."""
+
+import math
+
+import numpy as np
+import pytest
+from view.browsing import decode
+
+from haploop.protocol.ticks import Timebase
+from haploop.view.at_work import at_work
+from haploop.view.event_lines import event_lines
+from haploop.view.history import History
+from haploop.view.picture import picture
+from haploop.view.watch import Watch
+
+TIME = Timebase(10_000, 1_000, 0, 100_000)
+WALL = {"position": 0.0, "stiffness": 100.0, "into_wall": -1.0}
+NO_WALL = {"position": 0.0, "stiffness": 0.0, "into_wall": 0.0}
+
+
+def element(kind, **parameters):
+    return {"kind": kind, "parameters": {**parameters, "acts": "in-contact"}}
+
+
+def heard(ticks=100, elements=(), wall=WALL, books=None):
+    """A history of some ticks of made-up numbers."""
+    history = History(TIME, 0)
+    row, steps = np.arange(float(ticks)), np.arange(ticks * 10 + 1.0)
+    history.plant(0, {"x": steps, "v": steps, "force": -steps})
+    forces = {f"dissipation.{place}": row * (place + 2) for place in range(len(elements))}
+    history.controlled(0, {"x": row, "v": row / 10, "wall": row, "total": row, **forces}, list(elements), wall)
+    history.booked(0, {"wall.true": row, "residual": row * 1e-20, **(books or {})})
+    return history
+
+
+def seen(history, **watch):
+    return decode(picture(history, Watch(**watch)))
+
+
+def test_nothing_heard_is_an_empty_picture():
+    assert seen(History(TIME, 0))["tables"] == {}
+    assert seen(History(TIME, 0), span_s=None)["tables"] == {}
+
+
+def test_without_a_wall_there_is_none_to_draw_and_no_loop():
+    tables = seen(heard(wall=NO_WALL))["tables"]
+    assert "loop" not in tables
+    assert "wall" not in tables["force"]["values"]
+    assert "wall" not in tables["energy"]["values"]
+    assert np.isnan(tables["position"]["values"]["wall"]).all()
+
+
+def test_without_an_inertia_there_is_no_momentum():
+    assert "momentum" not in seen(heard(elements=[element("damping", damping=1.0)]))["tables"]
+
+
+def test_the_momentum_of_an_inertia_counts_only_while_it_is_at_work():
+    """m[k-1] v[k] against v[k-1], m[k] being 0 where its force is (Choi et al. 2022, eq. 8)."""
+    history = heard(elements=[element("damping", damping=1.0), element("unidirectional-inertia", mass=0.02)])
+    momentum = seen(history)["tables"]["momentum"]
+    v = np.arange(100.0) / 10
+    mass = np.where(np.arange(100) == 0, 0.0, 0.02)
+    np.testing.assert_array_equal(momentum["values"]["v"], v[:-1].astype(np.float32))
+    np.testing.assert_array_equal(momentum["values"]["p.1"], (mass[:-1] * v[1:]).astype(np.float32))
+    assert momentum["columns"][1]["label"] == "element 1: unidirectional-inertia"
+
+
+def test_a_book_that_is_closed_is_shown_only_while_its_energy_changes():
+    row = np.arange(100.0)
+    books = {"damping.true": np.where(row < 10, row, 9.0), "damping-2.true": np.zeros(100), "brake.true": row * 0.0}
+    history = heard(elements=[element("damping", damping=1.0)], books=books)
+    shown = [column["name"] for column in seen(history, span_s=0.05)["tables"]["energy"]["columns"]]
+    assert shown == ["wall", "damping-2", "residual"]
+    shown = [column["name"] for column in seen(history, span_s=1.0)["tables"]["energy"]["columns"]]
+    assert shown == ["wall", "damping", "damping-2", "residual"]
+
+
+def test_numbers_beyond_what_a_float32_holds_do_not_break_the_picture():
+    history = History(TIME, 0)
+    history.booked(0, {"wall.true": np.array([1e300, np.inf]), "residual": np.array([np.nan, 1e-320])})
+    history.controlled(0, {name: np.zeros(2) for name in ("x", "v", "wall", "total")}, [], WALL)
+    assert seen(history)["tables"]["energy"]["values"]["wall"].tolist() == [math.inf, math.inf]
+
+
+def test_bodies_beyond_the_device_are_shown_where_they_are():
+    history, steps = History(TIME, 0), np.arange(101.0)
+    names: list[str] = ["x", "v", "force", "cable.stretch", "cable.rate"]
+    columns = dict.fromkeys(names, steps)
+    history.plant(0, columns)
+    np.testing.assert_array_equal(seen(history)["tables"]["position"]["values"]["tip_x"], 2 * steps[:-1])
+
+
+def test_a_swap_and_a_set_change_what_is_at_work_from_their_tick_on_and_a_refused_one_does_not():
+    scene = {
+        "wall": {"position": 0.1, "stiffness": 5.0, "occupies": "above"},
+        "dissipation": [{"kind": "damping", "damping": 1.0, "acts": "always"}],
+    }
+    swap = {"swap": {"kind": "bad", "mass": 1.0}, "element": 0}
+    events = [
+        (3, {"set": {"wall.stiffness": 7.0, "dissipation.0.damping": 2.0}}),
+        (4, swap),
+        (4, {"refused": "swap of element 0 to bad (mass = 1.0) at tick 4 was refused: ValueError: no"}),
+        (5, {"swap": {"kind": "inertia", "mass": 1.0}, "element": 1}),
+        (6, {"pause": True}),
+        (8, {"swap": {"kind": "none"}, "element": 0}),
+    ]
+    found = [
+        (span.from_tick, [e["kind"] for e in span.elements], span.wall["stiffness"]) for span in at_work(scene, events)
+    ]
+    assert found == [
+        (0, ["damping"], 5.0),
+        (3, ["damping"], 7.0),
+        (5, ["damping", "inertia"], 7.0),
+        (8, ["inertia"], 7.0),
+    ]
+    assert at_work(scene, events)[1].elements[0]["parameters"] == {"damping": 2.0, "acts": "always"}
+    assert at_work(scene, [])[0].wall == {"position": 0.1, "stiffness": 5.0, "into_wall": 1.0}
+
+
+DAMPING = {"swap": {"kind": "damping", "damping": 0.8, "acts": "in-contact"}}
+ALWAYS = {"swap": {"kind": "damping", "damping": 0.8, "acts": "always"}}
+
+
+@pytest.mark.parametrize(
+    ("event", "text"),
+    [
+        (DAMPING | {"element": 1}, "element 1 becomes damping (0.8 N s/m)"),
+        (ALWAYS, "element 0 becomes damping (0.8 N s/m, acts always)"),
+        ({"swap": {"kind": "none"}, "element": 2}, "element 2 removed"),
+        ({"set": {"wall.stiffness": 200.0}}, "wall.stiffness = 200 N/m"),
+        ({"pause": True}, "paused"),
+        ({"resume": True}, "resumed"),
+        ({"step": 1}, "1 tick on"),
+        ({"step": 7}, "7 ticks on"),
+        ({"stop": True, "by": "signal"}, "stopped"),
+        ({"pace": 0.1}, "pace 0.1×"),
+        ({"pace": "free"}, "pace free"),
+        ({"refused": "No."}, "No."),
+    ],
+)  # fmt: skip
+def test_an_event_is_told_in_words_with_its_units(event, text):
+    options = {
+        "kinds": {"damping": {"parameters": {"damping": {"unit": "N s/m"}}}},
+        "settable": {"wall.stiffness": {"unit": "N/m"}},
+    }
+    (line,) = event_lines([(1500, event)], 1000, options)
+    assert (line["tick"], line["t_s"], line["text"]) == (1500, 1.5, text)

@@ -1,0 +1,179 @@
+"""A track keeps the newest rows in full and all since the start ever coarser: no peak is lost, memory is bounded."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from haploop.protocol.ticks import Timebase
+from haploop.view.extremes import extremes
+from haploop.view.history import History
+from haploop.view.ring import Ring
+from haploop.view.track import MOST_COLUMNS, Track
+
+VALUES = st.one_of(st.floats(-10, 10, width=32), st.just(float("nan")))
+
+
+def least_and_greatest(values):
+    """Per bucket, shape (buckets, 2): what the slow way finds."""
+    found = []
+    for bucket in values:
+        known = bucket[~np.isnan(bucket)]
+        found.append((known.min(), known.max()) if len(known) else (np.nan, np.nan))
+    return np.array(found)
+
+
+@given(st.lists(VALUES, min_size=12, max_size=12))
+def test_extremes_are_the_least_and_the_greatest_in_the_order_in_which_they_came(values):
+    values = np.array(values)
+    pairs = extremes(values[None], 4)[0].reshape(3, 2)
+    for bucket, (first, second) in zip(values.reshape(3, 4), pairs, strict=True):
+        known = bucket[~np.isnan(bucket)]
+        if not len(known):
+            assert np.isnan((first, second)).all()
+            continue
+        assert {first, second} == {known.min(), known.max()}
+        assert np.flatnonzero(bucket == first)[0] <= np.flatnonzero(bucket == second)[-1]
+
+
+@given(st.lists(VALUES, min_size=64, max_size=64))
+def test_extremes_of_extremes_are_those_of_the_values_themselves(values):
+    values = np.array([values])
+    once, twice = extremes(values, 16), extremes(extremes(values, 4), 8)
+    np.testing.assert_array_equal(np.sort(once.reshape(-1, 2)), np.sort(twice.reshape(-1, 2)))
+
+
+@given(st.lists(st.integers(1, 10), max_size=30), st.integers(1, 3))
+def test_a_ring_holds_at_least_the_newest_of_its_capacity(pieces, columns):
+    ring, all_values = Ring(10, columns), np.empty((columns, 0))
+    for count in pieces:
+        piece = np.arange(columns * count, dtype=float).reshape(columns, count) + 1000 * all_values.shape[1]
+        ring.append(piece)
+        all_values = np.concatenate([all_values, piece], axis=1)
+        assert ring.end == all_values.shape[1]
+        assert ring.start <= max(0, ring.end - 10)
+        np.testing.assert_array_equal(ring.between(ring.start, ring.end), all_values[:, ring.start :])
+
+
+def fed(rows_per_tick, ticks, recent_ticks=512, seed=1, pieces=(37, 1, 400, 5)):
+    """A track with random rows, and the rows."""
+    random = np.random.default_rng(seed)
+    rows = random.normal(size=ticks * rows_per_tick)
+    rows[random.random(len(rows)) < 0.1] = np.nan
+    track, at, number = Track(rows_per_tick, recent_ticks, 0), 0, 0
+    while at < ticks:
+        end = min(ticks, at + pieces[number % len(pieces)])
+        track.append(at, {"x": rows[at * rows_per_tick : end * rows_per_tick]})
+        at, number = end, number + 1
+    return track, rows
+
+
+@pytest.mark.parametrize("rows_per_tick", [1, 10])
+@pytest.mark.parametrize("bucket", [1, 2, 8, 64, 1024])
+@pytest.mark.parametrize("ticks", [300, 4000, 70_001])
+def test_an_envelope_keeps_every_least_and_every_greatest_value(rows_per_tick, bucket, ticks):
+    """Level by level and in the unfinished last bucket too."""
+    track, rows = fed(rows_per_tick, ticks)
+    for from_tick in (0, ticks // 3, ticks - 200):
+        wide = track.bucket_from(from_tick, bucket)
+        first = track.aligned(from_tick, wide)
+        end = ticks + (first - ticks) % wide
+        pairs = track.envelope(["x"], first, end, wide)[0].reshape(-1, 2)
+        padded = np.full((end - first) * rows_per_tick, np.nan)
+        padded[: len(rows) - first * rows_per_tick] = rows[first * rows_per_tick :]
+        np.testing.assert_array_equal(np.sort(pairs), least_and_greatest(padded.reshape(len(pairs), -1)))
+
+
+def test_an_envelope_that_ends_in_the_past_knows_nothing_of_what_came_later():
+    track, rows = fed(1, 5000)
+    pairs = track.envelope(["x"], 1024, 2048, 64)[0].reshape(-1, 2)
+    np.testing.assert_array_equal(np.sort(pairs), least_and_greatest(rows[1024:2048].reshape(-1, 64)))
+
+
+def test_the_newest_rows_are_held_as_they_came_and_what_is_not_there_is_nan():
+    track, rows = fed(10, 3000)
+    found = track.rows(["x", "y"], 2600, 3100)
+    np.testing.assert_array_equal(found[0, :4000], rows[26_000:])
+    assert np.isnan(found[0, 4000:]).all()
+    assert np.isnan(found[1]).all()
+
+
+def test_a_gap_stays_unknown_and_what_is_known_is_passed_over():
+    track = Track(1, 512, 0)
+    track.append(0, {"x": np.arange(100.0)})
+    track.append(50, {"x": np.full(60, -1.0)})
+    track.append(1500, {"x": np.full(10, 2.0)})
+    rows = track.rows(["x"], 1000, 1510)[0]
+    assert np.isnan(rows[:500]).all()
+    assert (rows[500:] == 2.0).all()
+    pairs = track.envelope(["x"], 0, 1536, 8)[0].reshape(-1, 2)
+    np.testing.assert_array_equal(pairs[12], [-1.0, 99.0][::-1])
+    assert np.isnan(pairs[14:187]).all()
+
+
+def test_a_column_that_comes_in_mid_run_is_unknown_before_and_kept_from_there_on():
+    track = Track(1, 512, 0)
+    track.append(0, {"x": np.zeros(5000)})
+    track.append(5000, {"x": np.zeros(1000), "y": np.arange(1000.0)})
+    pairs = track.envelope(["y"], 0, 6016, 64)[0].reshape(-1, 2)
+    assert np.isnan(pairs[:78]).all()
+    np.testing.assert_array_equal(pairs[80], [120.0, 183.0])
+    np.testing.assert_array_equal(track.rows(["y"], 5900, 6000)[0], np.arange(900.0, 1000.0))
+
+
+def test_columns_without_end_replace_the_oldest_that_is_gone_and_never_one_that_is_there():
+    track = Track(1, 512, 0)
+    for number in range(3 * MOST_COLUMNS):
+        track.append(10 * number, {"x": np.full(10, 1.0), f"book-{number}": np.full(10, float(number))})
+    last = 3 * MOST_COLUMNS - 1
+    assert len(track.names) == MOST_COLUMNS
+    assert "x" in track.names
+    assert "book-1" not in track.names
+    newest = track.rows([f"book-{last}", "x"], 10 * last - 10, 10 * last + 10)
+    np.testing.assert_array_equal(newest[0], [np.nan] * 10 + [last] * 10)
+    assert (newest[1] == 1.0).all()
+
+
+def size_bytes(history):
+    """Memory of every array of a history."""
+    return sum(level.ring._values.nbytes for track in history.tracks for level in track._levels)
+
+
+def test_the_memory_of_a_history_stays_bounded_over_a_million_ticks():
+    """Ten times as long a run takes a few coarse levels more, a fifth of what it took."""
+    history = History(Timebase(10_000, 1_000, 0, 1_000_000), 0)
+    sizes = {}
+    block = np.sin(np.arange(10_001) / 500.0)
+    ticks = block[:1000]
+    columns = {"x": ticks, "v": ticks, "wall": ticks, "total": ticks, "dissipation.0": ticks}
+    elements = [{"kind": "damping", "parameters": {"damping": 0.1, "acts": "in-contact"}}]
+    wall = {"position": 0.0, "stiffness": 100.0, "into_wall": -1.0}
+    for tick in range(0, 1_000_000, 1000):
+        history.plant(tick, {"x": block, "v": block, "force": block})
+        history.controlled(tick, columns, elements, wall)
+        history.booked(tick, {"wall.true": ticks, "damping.true": ticks, "residual": ticks, "hand_work": ticks})
+        sizes[tick] = size_bytes(history)
+    assert sizes[999_000] < 1.25 * sizes[99_000]
+    assert history.first_tick == 0
+    assert history.end_tick == 1_000_000
+    bucket = history.steps.bucket_from(0, 1)
+    whole = history.steps.envelope(["x"], 0, 1_000_000 // bucket * bucket, bucket)
+    assert (whole.min(), whole.max()) == (block.min(), block.max())
+
+
+@pytest.mark.parametrize("rows_per_tick", [1, 10])
+def test_any_amount_may_come_at_once_and_any_gap_may_lie_between(rows_per_tick):
+    """Twenty times what is held in full, after a gap of as much."""
+    ticks = 100_000
+    rows = np.random.default_rng(2).normal(size=ticks * rows_per_tick)
+    track = Track(rows_per_tick, 5000, 0)
+    track.append(ticks, {"x": rows})
+    assert track.end_tick == 2 * ticks
+    assert track.first_tick == ticks
+    bucket = track.bucket_from(ticks, 1)
+    first, end = track.aligned(ticks, bucket), 2 * ticks + -2 * ticks % bucket
+    pairs = track.envelope(["x"], first, end, bucket)[0].reshape(-1, 2)
+    padded = np.full((end - first) * rows_per_tick, np.nan)
+    at = (ticks - first) * rows_per_tick
+    padded[at : at + len(rows)] = rows
+    np.testing.assert_array_equal(np.sort(pairs), least_and_greatest(padded.reshape(len(pairs), -1)))

@@ -1,0 +1,226 @@
+"""``haploop view`` and ``haploop run --view`` as a user starts them."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import re
+import signal
+import socket
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import aiohttp
+import pytest
+from faults.launched import SCENE, Launched, alive, command, processes, wait_for
+from live_run import going, undisturbed
+from view.browsing import Tab
+
+LINK = re.compile(r"(http://127\.0\.0\.1:\d+)/#token=(\S+)")
+
+
+@pytest.fixture
+def launched() -> Iterator[Callable[..., Launched]]:
+    """Start haploop; whatever the test leaves running is ended."""
+    started: list[Launched] = []
+
+    def start(*arguments: Any, **options: Any) -> Launched:
+        started.append(Launched(*arguments, **options))
+        return started[-1]
+
+    yield start
+    for process in started:
+        process.clear_away()
+
+
+def link(viewer: Launched) -> tuple[str, str]:
+    """Address and token, as the viewer prints them."""
+    found = wait_for("the link", lambda: LINK.search(viewer.stderr))
+    return found[1], found[2]
+
+
+def browse(viewer: Launched, play: Callable[[Tab], Any]) -> Any:
+    """Open the page of a viewer and do something there."""
+    address, token = link(viewer)
+
+    async def scenario() -> Any:
+        async with aiohttp.ClientSession() as session:
+            ws = await session.ws_connect(f"{address}/stream", headers={"Origin": address}, max_msg_size=0)
+            return await play(Tab(ws, token))
+
+    return asyncio.run(scenario())
+
+
+def test_view_waits_for_a_run_and_ends_quietly_with_ctrl_c(launched):
+    viewer = launched("view", "--no-browser")
+    browse(viewer, lambda tab: tab.phase("waiting"))
+    viewer.signal(signal.SIGINT)
+    assert viewer.end(0) == ""
+    assert "Traceback" not in viewer.stderr
+
+
+def test_view_ends_with_ctrl_c_while_a_page_is_open(launched):
+    viewer = launched("view", "--no-browser")
+
+    async def play(tab: Tab) -> None:
+        await tab.phase("waiting")
+        viewer.signal(signal.SIGINT)
+        await tab.until("the end of the page", lambda: tab.closed)
+        assert tab.closed == (1001, "")
+
+    browse(viewer, play)
+    viewer.end(0)
+
+
+def test_a_taken_port_is_named(launched):
+    with socket.socket() as other:
+        other.bind(("127.0.0.1", 0))
+        other.listen()
+        port = other.getsockname()[1]
+        answer = command("view", "--no-browser", "--port", str(port))
+    assert answer.returncode == 2
+    assert f"Port {port} of 127.0.0.1 cannot be used" in answer.stderr
+
+
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        (["--run", "nobody"], "No run is live"),
+        (["--since", "yesterday"], "--since must be start or now, but 'yesterday' was given."),
+    ],
+)
+def test_wrong_use_of_view_says_what_was_expected(words, sentence):
+    answer = command("view", "--no-browser", *words)
+    assert answer.returncode == 2
+    assert sentence in answer.stderr
+
+
+def test_the_browser_is_opened_with_a_link_that_holds_no_token(launched, tmp_path, monkeypatch):
+    """A command line is there for all users of the machine to see."""
+    opened = tmp_path / "opened"
+    browser = tmp_path / "browser"
+    browser.write_text(f'#!/bin/sh\necho "$1" > {opened}\n')
+    browser.chmod(0o755)
+    monkeypatch.setenv("BROWSER", f"{browser} %s")
+    viewer = launched("view")
+    address, token = link(viewer)
+    entrance = wait_for("the browser", lambda: opened.exists() and opened.read_text().strip())
+    assert entrance.startswith(f"{address}/enter/")
+    assert token not in entrance
+
+
+def test_run_with_view_serves_the_run_and_stays_until_ctrl_c(launched, tmp_path, monkeypatch):
+    """In real time; the run ends, the page shows its summary, and the viewer goes with the launcher."""
+    monkeypatch.delenv("DISPLAY", raising=False)
+    run = launched("run", str(SCENE), "--set", "duration=1", "--view", "--json", out=tmp_path / "out")
+
+    async def play(tab: Tab) -> dict[str, Any]:
+        return await tab.phase("ended")
+
+    state = browse(run, play)
+    assert state["summary"]["ticks"] == 1000
+    assert state["pace"] == 1.0
+    run.says("Ctrl-C ends it")
+    viewers = [pid for pid, parent, _, _ in processes() if parent == run.pid]
+    assert len(viewers) == 1
+    run.signal(signal.SIGINT)
+    assert '"ended": "done"' in run.end(0)
+    wait_for("the end of the viewer", lambda: not alive(viewers))
+
+
+def test_a_viewer_that_dies_is_no_matter_to_its_run(launched, tmp_path):
+    run = launched("run", str(SCENE), "--set", "duration=2", "--view", out=tmp_path / "out")
+    link(run)
+    viewers = [pid for pid, parent, _, args in processes() if parent == run.pid and " view " in args]
+    assert len(viewers) == 1
+    os.kill(viewers[0], signal.SIGKILL)
+    run.end(0)
+
+
+def test_a_viewer_whose_launcher_is_killed_goes_too(launched, tmp_path):
+    run = launched("run", str(SCENE), "--set", "duration=600", "--view", out=tmp_path / "out")
+    link(run)
+    viewers = [pid for pid, parent, _, args in processes() if parent == run.pid and " view " in args]
+    run.signal(signal.SIGKILL)
+    run.end(-signal.SIGKILL)
+    wait_for("the end of the viewer", lambda: not alive(viewers))
+
+
+def test_view_of_a_run_in_one_process_is_refused(tmp_path):
+    answer = command("run", str(SCENE), "--in-process", "--view", "--out", str(tmp_path / "out"))
+    assert answer.returncode == 2
+    assert "leave out --in-process" in answer.stderr
+    assert not (tmp_path / "out").exists()
+
+
+def test_view_without_aiohttp_says_how_to_get_it(tmp_path):
+    """Nothing is started, not even the run."""
+    blocked = tmp_path / "sitecustomize.py"
+    blocked.write_text(
+        "import importlib.util\nfound = importlib.util.find_spec\n"
+        "importlib.util.find_spec = lambda name, *rest: None if name == 'aiohttp' else found(name, *rest)\n"
+    )
+    for words in (["view"], ["run", str(SCENE), "--view", "--out", str(tmp_path / "out")]):
+        answer = _run_with(tmp_path, words)
+        assert answer.returncode == 2
+        assert "pip install 'haploop[view]'" in answer.stderr
+    assert not (tmp_path / "out").exists()
+
+
+def _run_with(folder: Path, words: list[str]):
+    import subprocess
+
+    environment = {**os.environ, "PYTHONPATH": str(folder)}
+    return subprocess.run(
+        [sys.executable, "-m", "haploop.tools.cli", *words], capture_output=True, text=True, env=environment, timeout=40
+    )
+
+
+def skipped(run: Any) -> list[int]:
+    """What the clock knows of the viewers' skipped ticks."""
+    return [node["skipped_ticks"] for node in run.ask("status")[1]["nodes"] if node["role"] == "view"]
+
+
+def stopped_for(launched, tmp_path, seconds: float, *overrides: str, **options: Any) -> None:
+    """Stop a viewer while its run goes on; it costs the run nothing, and the viewer is told what it missed."""
+    with going(tmp_path, "run.deadline=2", *overrides, pauses=(200,), **options) as run:
+        viewer = launched("view", "--no-browser")
+
+        async def before(tab: Tab) -> None:
+            await tab.phase("paused")
+            assert tab.state["skipped_ticks"] == 0
+
+        async def after(tab: Tab) -> dict[str, Any]:
+            await tab.phase("paused")
+            return await tab.until("what was skipped", lambda: tab.state if tab.state["skipped_ticks"] else None)
+
+        browse(viewer, before)
+        viewer.signal(signal.SIGSTOP)
+        run.ask("resume")
+        wait_for("time", lambda: viewer.stood_for(seconds))
+        end = run.ask("pause")[1]["tick"]
+        assert end > 1000
+        run.stands_at(end)
+        viewer.signal(signal.SIGCONT)
+        run.stands_at(run.ask("step", ticks=10)[1]["tick"])  # a gap shows when something follows it
+        state = browse(viewer, after)
+        wait_for("the report", lambda: skipped(run) == [state["skipped_ticks"]])
+        run.ask("resume")
+        run.ask("pace", pace="free")
+        summary = run.result()
+        assert summary["trajectory_sha256"] == undisturbed(run.prepared)["trajectory_sha256"]
+        assert summary["ended"] == "done"
+        viewer.signal(signal.SIGINT)
+        viewer.end(0)
+
+
+def test_a_stopped_viewer_costs_the_run_nothing_and_is_told_what_it_missed(launched, tmp_path):
+    """At free pace with blocks of 10 ticks, so that its queues are full in no time."""
+    stopped_for(launched, tmp_path, 2.5, "duration=40", "run.block_ticks=10", "run.log=ticks")
+
+
+@pytest.mark.slow
+def test_a_viewer_stopped_for_ten_seconds_in_real_time_costs_the_run_nothing(launched, tmp_path):
+    stopped_for(launched, tmp_path, 10.0, "duration=15", pace=1.0)
