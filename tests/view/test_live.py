@@ -54,8 +54,8 @@ async def whole(tab, run, ticks, **watch):
     await tab.watch(**{"span_s": None, "points": 8000} | watch)
 
     def is_whole():
-        tables = tab.picture["tables"]
-        return tables.keys() >= begins.keys() and all(
+        tables, from_start = tab.picture["tables"], "span_s" in watch or tab.picture["from_s"] == 0.0
+        return (from_start and tables.keys() >= begins.keys()) and all(
             np.isfinite(tables[name]["values"][column][0]) for name, column in begins.items()
         )
 

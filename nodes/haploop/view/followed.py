@@ -13,7 +13,7 @@ import zmq
 
 from haploop.protocol.member import Aborted, Refused
 from haploop.protocol.observer import Observer
-from haploop.protocol.ticks import Timebase
+from haploop.protocol.ticks import DELAY, Timebase
 from haploop.view.at_work import at_work
 from haploop.view.heard import hear
 from haploop.view.history import History
@@ -23,7 +23,6 @@ ROLE = "view"
 _STREAMS = ("plant", "controller", "logger")
 # Real time is counted over so much of it, and over no less.
 _FACTOR_S, _LEAST_FACTOR_S = 1.0, 0.3
-DELAY = "clock.round_trip_delay"
 
 
 class Followed:
