@@ -214,6 +214,20 @@ def test_without_wall_or_inertia_the_loops_say_that_there_is_none(stand_in, page
     expect(page.locator("#momentum .legend")).to_contain_text("unidirectional-inertia")
 
 
+def test_pressing_and_releasing_are_told_apart_anew_in_every_picture(stand_in, page):
+    """A straight way in and, in the next picture, the same way out: each has the one colour and not the other."""
+    way_in = [1e-5 * i for i in range(1, 201)]
+    for depth, colour, other in ((way_in, "pressing", "releasing"), (way_in[::-1], "releasing", "pressing")):
+        force = [150 * d for d in depth]
+        loop = table("loop", 0.0, 1e-3, ("penetration", "m", "", depth), ("force", "N", "", force))
+        stand_in.show(picture(0.0, 0.2, {**loop, "stiffness": None}))
+        expect(page.locator("#loop .legend button")).to_have_count(2)
+        page.wait_for_timeout(200)
+        parts = [0.4 + 0.01 * i for i in range(20)]
+        assert any(seen(page, "loop", parts, colour)), colour
+        assert not any(seen(page, "loop", parts, other)), colour
+
+
 def test_the_ideal_spring_is_as_steep_as_the_wall(stand_in, page):
     """At the deepest point its line and a loop of the same stiffness meet; of half the stiffness, they do not."""
     depth = [0.002 * math.sin(math.pi * i / 199) for i in range(200)]

@@ -134,6 +134,7 @@ def test_the_form_starts_from_the_element_as_it_is_and_says_what_a_kind_does(sta
 WRONG = [
     ("", "A number is needed."),
     ("-0.8", "It must be at least 0 N s/m."),
+    ("-1e3", "It must be at least 0 N s/m."),
     ("0,8", "Write a point, not a comma: 0.8"),
     ("much", 'It must be a number in N s/m, or text with its unit such as "1 N s/m".'),
     ("nan", "It must be a number in N s/m"),

@@ -7,6 +7,8 @@ import { make, put } from "./dom.js";
 const SHOWN_AS = { m: ["mm", 1e3], s: ["ms", 1e3] };
 const NUMBER = /^[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d{1,3})?$/i;
 const WITH_UNIT = /^[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d{1,3})?\s*[^\d\s.,+-].*$/i;
+// An old number that comes after an order was taken is not shown for so long.
+const HELD_MS = 2000;
 const BOUNDS = [
   ["at_least", "at least", "≥", (value, bound) => value >= bound],
   ["above", "above", ">", (value, bound) => value > bound],
@@ -31,9 +33,12 @@ export class Field {
     this.input.setAttribute("aria-describedby", `${id}-unit ${id}-problem`);
     this.problem = make("span", { class: "problem", id: `${id}-problem`, role: "alert" });
     const unit = make("span", { class: "unit", id: `${id}-unit` }, [this.unit, this.bounds()].filter(Boolean).join(", "));
-    this.element = make("p", { class: "field" }, make("label", { for: id }, ...breakable(name)), this.input, unit, this.problem);
+    const label = make("label", { for: id }, ...breakable(name));
+    this.element = make("p", { class: "field" }, label, this.input, unit, this.problem);
     this.input.addEventListener("input", () => this.complain(this.complaint()));
     this.present = "";
+    this.before = undefined;
+    this.heldUntil = 0;
   }
 
   bounds() {
@@ -44,7 +49,9 @@ export class Field {
 
   /** The number as it is now, in SI; shown unless something else is being typed. */
   show(value) {
+    if (performance.now() < this.heldUntil && value === this.before) return;
     const wasTouched = this.touched;
+    this.before = value;
     this.present = value == null ? "" : plain(value * this.factor);
     if (!wasTouched && this.input.value !== this.present) this.input.value = this.present;
   }
@@ -54,8 +61,9 @@ export class Field {
     return this.input.value.trim() !== this.present;
   }
 
-  /** What was typed was taken. */
+  /** What was typed was taken: it stays until the run tells so too, in its own words. */
   settle() {
+    this.heldUntil = performance.now() + HELD_MS;
     this.present = this.input.value = this.text;
     this.complain("");
   }
@@ -75,11 +83,16 @@ export class Field {
     const { text, unit } = this;
     if (!text) return "A number is needed.";
     if (/^[+-]?\d+,\d+/.test(text)) return `Write a point, not a comma: ${text.replace(",", ".")}`;
-    if (!NUMBER.test(text) && !WITH_UNIT.test(text)) return unit ? `It must be a number in ${unit}, or text with its unit such as "1 ${unit}".` : "It must be a number.";
-    if (!NUMBER.test(text)) return ""; // the run knows all units
+    if (!NUMBER.test(text)) {
+      if (WITH_UNIT.test(text)) return ""; // the run knows all units
+      return unit ? `It must be a number in ${unit}, or text with its unit such as "1 ${unit}".` : "It must be a number.";
+    }
     if (!Number.isFinite(Number(text))) return "It must be a number that a float can hold.";
-    const broken = BOUNDS.find(([key, , , holds]) => this.quantity[key] != null && !holds(Number(text) / this.factor, this.quantity[key]));
-    return broken ? `It must be ${broken[1]} ${plain(this.quantity[broken[0]] * this.factor)} ${unit}`.trimEnd() + "." : "";
+    const value = Number(text) / this.factor;
+    const broken = BOUNDS.find(([key, , , holds]) => this.quantity[key] != null && !holds(value, this.quantity[key]));
+    if (!broken) return "";
+    const [key, words] = broken;
+    return `${`It must be ${words} ${plain(this.quantity[key] * this.factor)} ${unit}`.trimEnd()}.`;
   }
 
   /** Show why it cannot be used, or that it can (""). */

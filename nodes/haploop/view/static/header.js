@@ -3,7 +3,7 @@
 import { amount, fixed, isNumber, NONE, power, steady } from "./amounts.js";
 import { byId, put, sign } from "./dom.js";
 
-const WORDS = { running: "running", paused: "paused", ended: "ended", waiting: "waiting", failed: "failed", lost: "not connected" };
+const WORDS = { lost: "not connected" };
 const VERDICTS = new Set(["steady", "limit-cycle", "diverged", "no-contact"]);
 
 /** Show a state; `phase` is its phase, or "lost" without a connection. */
@@ -14,7 +14,7 @@ export function showHeader(state, phase) {
   sign(sought, `phase-${phase}`, WORDS[phase] ?? phase);
   put(byId("title"), state.title || "haploop");
   byId("title").title = state.title || "";
-  put(document.querySelector("title"), state.title ? `${state.verdict || WORDS[phase]}: ${state.title}` : "haploop");
+  put(document.querySelector("title"), state.title ? `${state.verdict || phase}: ${state.title}` : "haploop");
   showVerdict(state);
   put(byId("oscillation"), amount(state.oscillation_m, "m"));
   put(byId("stiffness"), stiffness(state));
@@ -44,7 +44,8 @@ function share({ residual_J: residual, moved_J: moved }) {
   return isNumber(residual) && moved > 0 ? power(Math.abs(residual) / moved) : NONE;
 }
 
-function factor({ real_time_factor: real, pace }) {
+function factor({ real_time_factor: now, pace, summary }) {
+  const real = summary?.real_time_factor ?? now;
   if (!isNumber(real)) return NONE;
   return `${fixed(real)}×${isNumber(pace) && pace !== 1 ? ` of ${fixed(pace, 2)}×` : ""}`;
 }

@@ -28,7 +28,7 @@ export class LoopChart {
   build() {
     this.u?.destroy();
     const axis = (i) => ({ auto: false, range: () => this.ranges[i].now });
-    const series = this.parts.map(({ key, label, line, path }) => ({
+    const series = this.parts.map(({ key, label, line }) => ({
       label,
       stroke: line.filled ? undefined : stroke(line),
       fill: line.filled ? stroke(line) : undefined,
@@ -37,7 +37,7 @@ export class LoopChart {
       show: this.legend.isShown(key),
       auto: false,
       paths: (u, i) => {
-        const drawn = path(u, ...u.data[i]);
+        const drawn = this.parts[i - 1].path(u, ...u.data[i]);
         return line.filled ? { stroke: null, fill: drawn } : { stroke: drawn, fill: null };
       },
       facets: [{ scale: "x", auto: false }, { scale: "y", auto: false }],

@@ -11,9 +11,9 @@ export function showNodes(nodes) {
     const row = body.rows[i] ?? body.appendChild(emptyRow());
     row.title = `process ${node.pid}; ${node.lossless ? "the run waits for it" : "the run never waits for it"}`;
     row.classList.toggle("waits", Boolean(node.waits_for));
-    [node.role, node.tick, node.behind_ticks, node.waits_for ? `→ ${node.waits_for}` : "", node.skipped_ticks ?? 0].forEach(
-      (text, cell) => put(row.cells[cell], String(text)),
-    );
+    const waits = node.waits_for ? `→ ${node.waits_for}` : "";
+    const texts = [node.role, node.tick, node.behind_ticks, waits, node.skipped_ticks ?? 0];
+    texts.forEach((text, cell) => put(row.cells[cell], String(text)));
   });
 }
 

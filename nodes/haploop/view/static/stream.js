@@ -32,7 +32,10 @@ export class Stream {
       this.heard.connected(true);
       if (this.wish) this.send(this.wish);
     };
-    this.socket.onmessage = ({ data }) => (typeof data === "string" ? this.hear(JSON.parse(data)) : this.heard.picture(data));
+    this.socket.onmessage = ({ data }) => {
+      if (typeof data === "string") this.hear(JSON.parse(data));
+      else this.heard.picture(data);
+    };
     this.socket.onclose = () => {
       for (const answer of this.waiting.values()) answer({ ok: false, text: UNANSWERED });
       this.waiting.clear();

@@ -30,7 +30,8 @@ function figures({ duration_s, ended, extremes = {}, real_time_factor: factor, l
     "real time": isNumber(factor) ? `${fixed(factor)}×` : NONE,
     "commands lost, dropped": `${lost.commands_lost ?? 0}, ${lost.commands_dropped ?? 0}`,
   };
-  return make("dl", { class: "rows" }, ...Object.entries(rows).map(([name, text]) => make("div", {}, make("dt", {}, name), make("dd", {}, text))));
+  const entries = Object.entries(rows).map(([name, text]) => make("div", {}, make("dt", {}, name), make("dd", {}, text)));
+  return make("dl", { class: "rows" }, ...entries);
 }
 
 /** Every book with what it took by its own account (sampled) and in truth. */
@@ -44,8 +45,7 @@ function books({ wall = {}, elements = [], moved_J: moved, residual_J: residual 
     rows.push([`${kind}, ticks ${from} to ${to}`, sampled_J, true_J]);
   }
   rows.push(["moved in all", undefined, moved], ["residual", undefined, residual]);
-  const body = rows.map(([name, ...numbers]) =>
-    make("tr", {}, make("th", { scope: "row" }, name), ...numbers.map((value) => make("td", {}, value === undefined ? "" : amount(value, "J")))),
-  );
+  const cell = (value) => make("td", {}, value === undefined ? "" : amount(value, "J"));
+  const body = rows.map(([name, ...numbers]) => make("tr", {}, make("th", { scope: "row" }, name), ...numbers.map(cell)));
   return make("table", {}, make("thead", {}, make("tr", {}, ...head)), make("tbody", {}, ...body));
 }

@@ -7,6 +7,7 @@ import { Legend, stroke } from "./legend.js";
 import { drawMarks } from "./marks.js";
 import { colour } from "./palette.js";
 import { halfPlane, line as linePath } from "./paths.js";
+import { last } from "./picture.js";
 import { extent, Range } from "./range.js";
 
 const CURSORS = "haploop";
@@ -49,7 +50,7 @@ export class TimeChart {
     }));
     const options = {
       ...this.size(),
-      padding: [4, 14, 2, 0],
+      padding: [8, 14, 2, 0],
       legend: { show: false },
       scales: {
         x: { time: false, auto: false, range: (u, min, max) => [min, max] },
@@ -127,10 +128,10 @@ export class TimeChart {
   /** The numbers under the cursor, or the last ones. */
   tell() {
     if (!this.u) return;
-    const at = this.u.cursor.idx ?? this.t.length - 1;
+    const at = this.u.cursor.idx;
     const { decimals } = this.options;
-    const texts = this.columns.map((values) => steady(values[at], decimals));
-    const time = this.u.cursor.idx == null ? "" : `at ${steady(this.t[at], 4)} s`;
+    const texts = this.columns.map((values) => steady(at == null ? last(values) : values[at], decimals));
+    const time = at == null ? "" : `at ${steady(this.t[at], 4)} s`;
     this.legend.tell(texts, time || this.note);
   }
 
