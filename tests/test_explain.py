@@ -24,7 +24,7 @@ RECORDED = json.loads((Path(__file__).parent / "bytecode.json").read_text())
 @pytest.mark.skipif(MINOR not in RECORDED, reason=f"no numbers are recorded for Python {MINOR}")
 @pytest.mark.parametrize("name", ["fig6a", "fig6b", "fig6c", "tap"])
 def test_scenes_without_effects_execute_what_they_did_before_there_were_any(name):
-    """Recorded before the effects were built: not one instruction more in plant or controller."""
+    """Recorded with the effects left out: not one instruction more in plant or controller for all they can be."""
     counted = operations(load(SCENES / f"{name}.toml"), KINDS)
     assert [counted.plant, counted.controller, counted.ticks] == RECORDED[MINOR][name]
 

@@ -1,6 +1,5 @@
 """What the page answers at once: verdict, state and numbers, with and without a run, with and without a server."""
 
-import pytest
 from browser.pictures import contact
 from browser.stand_in import RUNNING, WAITING
 from playwright.sync_api import expect
@@ -32,12 +31,16 @@ def test_without_a_run_it_says_how_to_start_one_and_offers_nothing_that_steers(s
     assert "null" not in page.inner_text("body")
 
 
-@pytest.mark.parametrize("word", ["steady", "limit-cycle", "diverged", "no-contact"])
-def test_a_verdict_is_a_word_a_shape_of_its_own_and_a_colour(word, stand_in, open_page):
-    stand_in.state(verdict=word)
+def test_a_verdict_is_a_word_a_shape_of_its_own_and_a_colour(stand_in, open_page):
     page = open_page(stand_in.url)
-    expect(page.locator("#verdict")).to_have_text(word)
-    assert page.get_attribute("#verdict use", "href") == f"#verdict-{word}"
+    grounds = set()
+    for word in ("steady", "limit-cycle", "diverged", "no-contact"):
+        stand_in.state(verdict=word)
+        expect(page.locator("#verdict")).to_have_text(word)
+        assert page.get_attribute("#verdict use", "href") == f"#verdict-{word}"
+        page.wait_for_timeout(200)
+        grounds.add(page.evaluate("getComputedStyle(document.querySelector('#verdict')).backgroundColor"))
+    assert len(grounds) == 4
     shapes = page.evaluate("[...document.querySelectorAll('.shapes symbol')].map(s => s.innerHTML)")
     assert len(set(shapes)) == len(shapes)
     white = page.evaluate("getComputedStyle(document.querySelector('#verdict')).color")

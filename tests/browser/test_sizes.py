@@ -3,8 +3,10 @@
 import pytest
 from browser.conftest import DESK, PHONE
 from browser.pictures import contact
+from faults.launched import first_and_slowly
 from playwright.sync_api import expect
 
+TABLET, LARGE = {"width": 820, "height": 1180}, {"width": 1920, "height": 1080}
 MAIN = ["#verdict", "#position", "#force", "#energy", "#pause", "[data-step='100']", "#stop", "#freeze", "#help"]
 # Elements of the header and controls whose boxes overlap although neither holds the other.
 OVERLAPS = """() => {
@@ -57,7 +59,7 @@ EVENTS = [
 ]
 
 
-@pytest.fixture(params=["light", "dark"])
+@pytest.fixture(params=first_and_slowly("dark", "light"))
 def scheme(request):
     return request.param
 
@@ -87,7 +89,7 @@ def test_on_a_desk_the_answer_the_charts_and_the_controls_are_there_without_scro
         assert 0.5 < box["width"] / box["height"] < 2, loop
 
 
-@pytest.mark.parametrize("viewport", [DESK, PHONE, {"width": 1920, "height": 1080}, {"width": 820, "height": 1180}])
+@pytest.mark.parametrize("viewport", [DESK, *first_and_slowly(PHONE, TABLET, LARGE)])
 def test_nothing_covers_anything_and_no_text_is_cut_off(viewport, stand_in, open_page, scheme):
     page = shown(stand_in, open_page, viewport, scheme)
     assert page.evaluate(OVERLAPS) == []

@@ -46,7 +46,7 @@ def drawn(seed: int) -> tuple[dict[str, Any], Truth]:
     """
     rng = np.random.default_rng(seed)
     for _ in range(20):
-        candidate = scene(**_tables(seed, rng))
+        candidate = scene(**tables_of(seed, rng))
         truth = simulate(candidate)
         if is_comparable(candidate, truth):
             return candidate, truth
@@ -61,7 +61,7 @@ def is_comparable(candidate: dict[str, Any], truth: Truth) -> bool:
     return bool(np.abs(truth.x - beside.x).max() <= 1e-12 * np.abs(truth.x).max())
 
 
-def _tables(seed: int, rng: np.random.Generator) -> dict[str, Any]:
+def tables_of(seed: int, rng: np.random.Generator) -> dict[str, Any]:
     plant_rate, control_rate = RATES[seed % len(RATES)]
     delay = DELAYS[seed % len(DELAYS)]
     side = 1.0 if rng.random() < 0.3 else -1.0

@@ -39,7 +39,7 @@ def relative_residual(resolved, x: np.ndarray, v: np.ndarray) -> float:
     """What the plant's books leave unexplained of a motion without commands, over the energy moved."""
     books = PlantBooks(resolved, Timebase.of(resolved["clock"], resolved["duration"]))
     columns = {"x": x, "v": v, "force": np.zeros(len(x))}
-    changes = books.increments(0, columns, np.diff(x), [])
+    changes = np.stack(list(books.increments(0, columns, np.diff(x), [])))
     moved = books.stored_J(columns) + np.abs(changes).sum() / 2
     signs = np.array([1.0 if name == "hand_work" else -1.0 for name in books.names])
     return abs(math.fsum((changes * signs[:, None]).ravel())) / moved

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from haploop.controller.changes import Change, apply_change
@@ -25,6 +25,9 @@ class Controller:
         recorder: what happened at every tick, in blocks.
     """
 
+    # What makes an element's force a number, or raises.
+    _number: Callable[[Any], Any] = float
+
     def __init__(self, scene: dict[str, Any], time: Timebase, kinds: dict[str, type[Element]]) -> None:
         self._kinds, self._control_rate = dict(kinds), time.control_rate
         self._start_estimates = estimators(scene, time.period_s)
@@ -35,6 +38,11 @@ class Controller:
         self._next_change = math.inf
         self.recorder = Recorder(self._wall, self._slots, history_ticks=time.lookahead_ticks + 2)
         self.tick = 0
+
+    @property
+    def into_wall(self) -> float:
+        """Direction that leads into the wall, 0.0 without one."""
+        return self._motion.into_wall
 
     def schedule(self, tick: int, change: Change) -> None:
         """Have a checked swap or set take effect at ``tick``, before that tick's force."""
@@ -61,14 +69,13 @@ class Controller:
         motion.x = x = sample[0]
         motion.v = v = self._velocity(x, sample)
         motion.a = a = self._acceleration(v, sample)
-        contact, f_wall = wall.meet(x)
+        contact, total = wall.meet(x)
         motion.contact = contact
-        total = f_wall
-        row = [x, v, a, f_wall]
+        row = [x, v, a, total]
         try:
             for slot in self._slots.slots:
-                force = float(slot.force(motion))
-                total += force
+                force = self._number(slot.force(motion))
+                total = total + force
                 row.append(force)
         except Exception as error:
             raise self._blame(len(row) - len(MOTION_COLUMNS), error) from error

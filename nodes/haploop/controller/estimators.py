@@ -7,6 +7,8 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
+from haploop.protocol.arrays import each
+
 Sample = Sequence[Any]
 # From the newest input and the sample it came with to the estimate; what it remembers is its own.
 Estimator = Callable[[Any, Sample], Any]
@@ -34,7 +36,7 @@ def low_passed(raw: Estimator, cutoff_hz: float, period_s: float, first: Any) ->
     Delays slow signals by T / gain - T, about 1 / (2 pi fc); white noise of standard deviation sigma in u becomes
     sqrt(gain / (2 - gain)) sigma.
     """
-    gain = 1.0 - math.exp(-2.0 * math.pi * cutoff_hz * period_s)
+    gain = 1.0 - each(math.exp, -2.0 * math.pi * cutoff_hz * period_s)
     y = first
 
     def estimate(u: Any, sample: Sample) -> Any:

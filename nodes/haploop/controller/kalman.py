@@ -27,6 +27,7 @@ import numpy as np
 import numpy.typing as npt
 
 from haploop.controller.estimators import Sample
+from haploop.protocol.arrays import each
 
 Array = npt.NDArray[np.float64]
 # Decimals of a gain times the least surprise it meets: LAPACK's last bits, which differ between machines, lie beyond.
@@ -94,8 +95,9 @@ def kalman_of(scene: dict[str, Any], period_s: float) -> partial[Kalman]:
     table, noises = scene["velocity"], [position_noise_m(scene)]
     if table.get("accelerometer"):
         noises.append(table.get("accelerometer_noise", _accelerometer_noise_m_s2(scene, period_s)))
-    gain, _ = steady_state(table["jerk_density"], noises, period_s)
-    return partial(FusedKalman if len(noises) > 1 else Kalman, gain.tolist(), period_s)
+    gain = each(lambda jerk, *noises: steady_state(jerk, list(noises), period_s)[0], table["jerk_density"], *noises)
+    rows = gain.tolist() if gain.ndim == 2 else [list(row) for row in gain]
+    return partial(FusedKalman if len(noises) > 1 else Kalman, rows, period_s)
 
 
 def jerk_density_limits(noise_m: float, period_s: float) -> tuple[float, float]:
@@ -144,7 +146,7 @@ def position_noise_m(scene: dict[str, Any]) -> float:
     if "measurement_noise" in scene["velocity"]:
         return scene["velocity"]["measurement_noise"]
     rounding = scene.get("encoder", {}).get("resolution", 0.0) / math.sqrt(12.0)
-    return math.hypot(rounding, scene.get("noise", {}).get("deviation", 0.0))
+    return each(math.hypot, rounding, scene.get("noise", {}).get("deviation", 0.0))
 
 
 def _accelerometer_noise_m_s2(scene: dict[str, Any], period_s: float) -> float:

@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
+import copy
 import math
-from typing import Any
+from collections.abc import Iterator
+from itertools import chain
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from haploop.logger.plant_books import plant_books
-from haploop.logger.sums import RunningSums, sum_in_order, sum_rows
+from haploop.logger.sums import RunningSums, sum_by_tick, sum_in_order
 from haploop.logger.tapes import ControllerTape
 from haploop.logger.wall_books import CAUSES, held_J, ideal_and_undelayed
+from haploop.protocol.arrays import first_row, of_loop
 from haploop.protocol.ticks import Timebase
+
+if TYPE_CHECKING:
+    from haploop.logger.tape_array import ControllerTapeArray
 
 
 class Books:
@@ -33,14 +40,14 @@ class Books:
         self._time = time
         self._plant = plant_books(scene, time)
         self._has_wall = "wall" in scene
-        self._sums = RunningSums()
+        self._sums = RunningSums(*([scene["loops"]] if "loops" in scene else []))
         self._rows: dict[str, int] = {}
         self._open([*self._plant.names, *(CAUSES if self._has_wall else ()), "moved"])
         self._accounts = 0
         self._open_account("wall")
         self._stored_at_start_J = 0.0
-        self._wall: tuple[float, float] | None = None
-        self.wall_changes_J = 0.0
+        self._wall: tuple[Any, Any] | None = None
+        self.wall_changes_J: Any = 0.0
 
     @property
     def names(self) -> list[str]:
@@ -62,7 +69,7 @@ class Books:
         """Book the intervals from ``tick`` on that ``plant`` covers.
 
         Args:
-            tick: first interval.
+            tick: first interval; in all of them the wall is the same.
             plant: telemetry columns of the plant with ticks * n + 1 rows.
             tape: controller rows of these ticks and of all commands in effect in them.
             into_wall: direction into the wall, +1 or -1.
@@ -71,75 +78,105 @@ class Books:
             The books as they stand at each of these ticks, shape (rows, ticks), rows as ``names``: true and plant
             books up to the tick's step, sampled books with the tick's sample.
         """
-        n = self._time.steps_per_tick
-        ticks = (len(plant["x"]) - 1) // n
-        forces = {"wall": tape.columns["wall"]}
-        for book, force in tape.forces_opened_before(tick + ticks).items():
-            forces[str(book)] = force
-            if f"{book}.true" not in self._rows:
-                self._open_account(str(book))
-
-        by_step = self._flows_by_step(tick, plant, tape, forces, into_wall)
-        added = np.zeros((len(self._rows), ticks))
-        rows = [self._rows[name] for name in by_step]
-        added[rows] = sum_in_order(np.stack(list(by_step.values())).reshape(len(rows), ticks, n))
-        sampled_rows = [self._rows[f"{account}.sampled"] for account in forces]
-        added[sampled_rows] = self._sampled(tick, ticks, tape, np.stack(list(forces.values())))
-
+        added, sampled_rows = self._added(tick, plant, tape, into_wall)
         totals = self._sums.add(added)
         at_ticks = totals[:, :-1]
         at_ticks[sampled_rows] = totals[sampled_rows, 1:]
         return at_ticks
 
+    def book_loops(self, tick: int, plant: dict[str, np.ndarray], tape: ControllerTapeArray, into_wall: float) -> None:
+        """The same for many loops at once; all columns have a last axis for them."""
+        self._sums.add_of_loops(self._added(tick, plant, tape, into_wall)[0])
+
+    def _added(
+        self, tick: int, plant: dict[str, np.ndarray], tape: ControllerTape | ControllerTapeArray, into_wall: float
+    ) -> tuple[np.ndarray, list[int]]:
+        """What each tick adds to each book, shape (rows, ticks), and which rows are of sampled books."""
+        ticks = (len(plant["x"]) - 1) // self._time.steps_per_tick
+        forces = {"wall": tape.wall_forces()}
+        for book, force in tape.forces_opened_before(tick + ticks).items():
+            forces[str(book)] = force
+            if f"{book}.true" not in self._rows:
+                self._open_account(str(book))
+
+        added = np.zeros((len(self._rows), ticks, *self._sums.sums.shape[1:]))
+        by_step = self._flows_by_step(tick, plant, tape, forces, into_wall)
+        sum_by_tick(((self._rows[name], flow) for name, flow in by_step), added)
+        for name in ("moved", "ideal"):
+            if name in self._rows:
+                added[self._rows[name]] *= 0.5
+        sampled_rows = [self._rows[f"{account}.sampled"] for account in forces]
+        added[sampled_rows] = self._sampled(tick, ticks, tape, list(forces.values()))
+        return added, sampled_rows
+
     def _flows_by_step(
         self,
         tick: int,
         plant: dict[str, np.ndarray],
-        tape: ControllerTape,
+        tape: ControllerTape | ControllerTapeArray,
         forces: dict[str, np.ndarray],
         into_wall: float,
-    ) -> dict[str, np.ndarray]:
-        """What every plant step adds to each book, by name; arrays of shape (steps,)."""
+    ) -> Iterator[tuple[str, np.ndarray]]:
+        """What every plant step adds to each book, by name; twice that for ``moved`` and ``ideal``. Shape (steps,)."""
         n = self._time.steps_per_tick
         x = plant["x"]
-        dx = np.diff(x) + np.diff(plant["x_low"])
+        dx = np.diff(x, axis=0) + np.diff(plant["x_low"], axis=0)
         commanded = self._in_effect(plant["command"][:-1].astype(np.intp), tape, forces)
-        plant_flows = self._plant.increments(tick * n, plant, dx, commanded.values())
-        by_step = dict(zip(self._plant.names, plant_flows, strict=True))
-        by_step |= {f"{account}.true": -force * dx for account, force in commanded.items()}
-        by_step["moved"] = sum_rows(np.abs(flow) for flow in by_step.values()) / 2.0
+        way_back, moved = -dx, np.zeros_like(dx)
+        magnitude = np.empty_like(dx)
+        of_plant = zip(self._plant.names, self._plant.increments(tick * n, plant, dx, commanded.values()), strict=True)
+        true = ((f"{account}.true", force * way_back) for account, force in commanded.items())
+        for name, flow in chain(of_plant, true):
+            moved += np.abs(flow, out=magnitude)
+            yield name, flow
+        yield "moved", moved
         if self._has_wall:
-            at = tick - tape.first
-            rows = {
-                name: tape.columns[name][at : at + len(dx) // n] for name in ("wall", "wall_position", "wall_stiffness")
-            }
-            self._note_wall(float(x[0]), (float(rows["wall_position"][0]), float(rows["wall_stiffness"][0])), into_wall)
-            by_step |= zip(CAUSES, ideal_and_undelayed(x, dx, rows, into_wall, n), strict=True)
-        return by_step
+            position, stiffness = (
+                first_row(tape.rows(f"wall_{of}", tick, tick + 1)) for of in ("position", "stiffness")
+            )
+            self._note_wall(first_row(x), (position, stiffness), into_wall)
+            force = tape.rows("wall", tick, tick + len(dx) // n)
+            springs = ideal_and_undelayed(x, dx, force, (position, stiffness), into_wall, n)
+            yield from zip(CAUSES, springs, strict=True)
 
     @staticmethod
-    def _in_effect(command: np.ndarray, tape: ControllerTape, forces: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    def _in_effect(
+        command: np.ndarray, tape: ControllerTape | ControllerTapeArray, forces: dict[str, np.ndarray]
+    ) -> dict[str, np.ndarray]:
         """The force of every account that was commanded over each step, N; 0 before the first command."""
         index = np.maximum(command - tape.first, 0)
         before_first = command < 0
-        found = {account: force[index] for account, force in forces.items()}
+        found = {account: force.take(index, axis=0) for account, force in forces.items()}
         for force in found.values():
             force[before_first] = 0.0
         return found
 
-    def _note_wall(self, x: float, wall: tuple[float, float], into_wall: float) -> None:
-        if self._wall and wall != self._wall:
-            self.wall_changes_J += held_J(x, wall, into_wall) - held_J(x, self._wall, into_wall)
+    def _note_wall(self, x: Any, wall: tuple[Any, Any], into_wall: float) -> None:
+        if self._wall and not np.array_equal(wall, self._wall):
+            change_J = held_J(x, wall, into_wall) - held_J(x, self._wall, into_wall)
+            self.wall_changes_J = self.wall_changes_J + change_J
         self._wall = wall
 
     @staticmethod
-    def _sampled(tick: int, ticks: int, tape: ControllerTape, forces: np.ndarray) -> np.ndarray:
+    def _sampled(
+        tick: int, ticks: int, tape: ControllerTape | ControllerTapeArray, forces: list[np.ndarray]
+    ) -> np.ndarray:
         """-f[k-1] (x_m[k] - x_m[k-1]) for every tick; nothing at the first tick there is."""
-        at = tick - tape.first
-        if at == 0:
-            known = tape.columns["x"][:ticks]
-            return np.concatenate([np.zeros((len(forces), 1)), forces[:, : ticks - 1] * -np.diff(known)], axis=1)
-        return forces[:, at - 1 : at + ticks - 1] * -np.diff(tape.columns["x"][at - 1 : at + ticks])
+        first, end = max(tick - 1, tape.first), tick + ticks
+        way_back = -np.diff(tape.rows("x", first, end), axis=0)
+        known = slice(first - tape.first, end - 1 - tape.first)
+        added = np.zeros((len(forces), ticks, *way_back.shape[1:]))
+        for row, force in zip(added, forces, strict=True):
+            row[ticks - len(way_back) :] = force[known] * way_back
+        return added
+
+    def of_loop(self, loop: int) -> Books:
+        """The books of one loop out of those of many."""
+        one = copy.copy(self)
+        one._sums = self._sums.of_loop(loop)
+        one._stored_at_start_J = of_loop(self._stored_at_start_J, loop)
+        one.wall_changes_J = of_loop(self.wall_changes_J, loop)
+        return one
 
     def total(self, name: str) -> float:
         """One book as it stands, J."""

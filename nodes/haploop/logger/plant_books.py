@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from haploop.logger.sums import sum_rows
 from haploop.plant.flow import motion_integrals, natural_rate, real_for
-from haploop.plant.hand_force import HandForce
+from haploop.plant.hand_force import hand_force
 from haploop.plant.mechanics import Mechanics
+from haploop.protocol.arrays import each, first_row
 from haploop.protocol.ticks import Timebase
 
 if TYPE_CHECKING:
@@ -49,19 +50,21 @@ class PlantBooks:
 
     def __init__(self, scene: dict[str, Any], time: Timebase) -> None:
         m = self.mechanics = Mechanics.of(scene)
-        self._tau = HandForce(scene.get("hand", {}).get("force"), time.plant_rate)
-        self._real = real_for(m.damping / m.mass_kg, time.step_s)
-        integrals = motion_integrals(m.mass_kg, m.damping, m.stiffness, time.step_s)
+        self._tau, step_s = hand_force(scene, time.plant_rate), time.step_s
+        self._real = real_for(np.max(m.damping / m.mass_kg), step_s)
+        integrals = each(motion_integrals, m.mass_kg, m.damping, m.stiffness, step_s)
         self._square, self._lag = (integral.astype(self._real) for integral in integrals)
-        self._rate = natural_rate(m.mass_kg, m.stiffness, time.step_s)
+        if "loops" in scene:
+            self._square, self._lag = self._square.reshape(3, 3, -1), self._lag.reshape(3, -1)
+        self._rate = each(natural_rate, m.mass_kg, m.stiffness, step_s)
         self._is_limited = "actuator" in scene
         self.names = ["hand_work", *(f"{name}_heat" for name in m.dampers), "kinetic", "spring"]
         self.names += ["actuator"] * self._is_limited
 
     def increments(
         self, first_step: int, columns: dict[str, np.ndarray], dx: np.ndarray, commanded: Iterable[np.ndarray]
-    ) -> np.ndarray:
-        """What each step adds to each book, J.
+    ) -> Iterator[np.ndarray]:
+        """What each step adds to each book, J; of many loops at once where the arrays have a last axis for them.
 
         Args:
             first_step: step of the first state.
@@ -69,32 +72,42 @@ class PlantBooks:
             dx: displacement over each step, shape (steps,), with the digits that the difference of two x has lost.
             commanded: the force of the wall and of every element over each step, shape (steps,) each.
 
-        Returns:
-            Shape (books, steps), ordered as ``names``.
+        Yields:
+            Shape (steps,) each, ordered as ``names``.
         """
+        for book in self._increments(first_step, columns, dx, commanded):
+            yield book.astype(float, copy=False)
+
+    def _increments(
+        self, first_step: int, columns: dict[str, np.ndarray], dx: np.ndarray, commanded: Iterable[np.ndarray]
+    ) -> Iterator[np.ndarray]:
         m, x, v, force = self.mechanics, columns["x"], columns["v"], columns["force"][:-1]
         tau = self._tau.at_steps(first_step, first_step + len(x))
-        start_x, start_v, dv = x[:-1], v[:-1], np.diff(v)
-        rise = np.diff(tau)
+        start_x, start_v, dv = x[:-1], v[:-1], np.diff(v, axis=0)
+        rise = np.diff(tau, axis=0)
         wide_v = np.asarray(start_v, self._real)
-        net = force + tau[:-1] - m.damping * wide_v - m.stiffness * (start_x - m.rest_m)
+        stretch = start_x - m.rest_m
+        net = force + tau[:-1] - m.damping * wide_v - m.stiffness * stretch
         scale = 1.0 / (m.mass_kg * self._rate)
-        rates = np.stack([wide_v, net * scale, rise * scale])
-        square = sum_products(self._square, rates)
-        lagged = self._lag[0] * rates[0] + self._lag[1] * rates[1] + self._lag[2] * rates[2]
-        books = [
-            (tau[:-1] + rise / 2.0) * dx + rise * lagged,
-            *(damping * square for damping in m.dampers.values()),
-            m.mass_kg * dv * (start_v + dv / 2.0),
-            m.stiffness * dx * (start_x - m.rest_m + dx / 2.0),
-        ]
+        rates = [wide_v, net * scale, rise * scale]
+        yield self._hand_work(tau, rise, dx, rates)
+        square = sum_products(self._square, rates if rise.any() else rates[:2])
+        for damping in m.dampers.values():
+            yield damping * square
+        yield m.mass_kg * dv * (start_v + dv * 0.5)
+        yield m.stiffness * dx * (stretch + dx * 0.5)
         if self._is_limited:
-            books.append(beyond_limits(commanded, force) * dx)
-        return np.stack(books).astype(float)
+            yield beyond_limits(commanded, force) * dx
 
-    def stored_J(self, columns: dict[str, np.ndarray]) -> float:
+    def _hand_work(self, tau: np.ndarray, rise: np.ndarray, dx: np.ndarray, rates: Sequence[np.ndarray]) -> np.ndarray:
+        if not rise.any():
+            return tau[:-1] * dx
+        lagged = self._lag[0] * rates[0] + self._lag[1] * rates[1] + self._lag[2] * rates[2]
+        return (tau[:-1] + rise / 2.0) * dx + rise * lagged
+
+    def stored_J(self, columns: dict[str, np.ndarray]) -> Any:
         """Kinetic and spring energy in the first state of some telemetry."""
-        return self.mechanics.kinetic_J(float(columns["v"][0])) + self.mechanics.spring_J(float(columns["x"][0]))
+        return self.mechanics.kinetic_J(first_row(columns["v"])) + self.mechanics.spring_J(first_row(columns["x"]))
 
 
 def beyond_limits(commanded: Iterable[np.ndarray], force: np.ndarray) -> np.ndarray:
@@ -102,10 +115,13 @@ def beyond_limits(commanded: Iterable[np.ndarray], force: np.ndarray) -> np.ndar
     return sum_rows(commanded) - force
 
 
-def sum_products(form: np.ndarray, w: np.ndarray) -> np.ndarray:
-    """w' Q w for every column of w, term by term in a fixed order (a matrix product may reorder with its size)."""
-    total = np.zeros(w.shape[1], w.dtype)
-    for i in range(len(form)):
-        for j in range(i, len(form)):
+def sum_products(form: np.ndarray, w: Sequence[np.ndarray]) -> np.ndarray:
+    """w' Q w at every step, term by term in a fixed order (a matrix product may reorder with its size).
+
+    Entries of w that are left out at its end are 0.
+    """
+    total = form[0, 0] * w[0] * w[0]
+    for i in range(len(w)):
+        for j in range(max(i, 1), len(w)):
             total += (form[i, j] if i == j else 2.0 * form[i, j]) * w[i] * w[j]
     return total

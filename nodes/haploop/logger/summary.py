@@ -71,21 +71,32 @@ def summary(
         accounts: every element's book: kind, parameters, from_tick, to_tick.
         diverged: why the plant ended by itself, or None.
     """
-    verdict = window.verdict(diverged)
     wall_s = ran.pop("wall_s")
-    return {
+    factor = ran["duration_s"] / wall_s if wall_s else 0.0
+    ran |= {"versions": versions(), "wall_s": wall_s, "real_time_factor": factor}
+    return outcome(scene, ran, window, books, accounts, diverged)
+
+
+def outcome(
+    scene: dict[str, Any],
+    ran: dict[str, Any],
+    window: Window,
+    books: Books | None,
+    accounts: list[dict[str, Any]],
+    diverged: str | None,
+) -> dict[str, Any]:
+    """What came of a run: ``ran``, the verdict and what it rests on, and the energies where there are books."""
+    verdict = window.verdict(diverged)
+    came = {
         "title": scene["title"],
         "seed": scene["seed"],
         **ran,
-        "versions": versions(),
-        "wall_s": wall_s,
-        "real_time_factor": ran["duration_s"] / wall_s if wall_s else 0.0,
         "verdict": verdict.word,
         "verdict_rule": verdict.rule,
         "extremes": {"x_min_m": window.x_min_m, "x_max_m": window.x_max_m, "force_max_N": window.force_max_N},
         "window": window.figures(),
-        "energy": energy(books, accounts, "wall" in scene),
     }
+    return came | ({"energy": energy(books, accounts, "wall" in scene)} if books else {})
 
 
 def write(summary: dict[str, Any], path: Path) -> None:
@@ -102,8 +113,8 @@ def write(summary: dict[str, Any], path: Path) -> None:
 
 def finite(value: Any) -> Any:
     """The same structure with None for every number that JSON cannot hold."""
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
     if isinstance(value, dict):
         return {key: finite(entry) for key, entry in value.items()}
-    if isinstance(value, list | tuple):
-        return [finite(entry) for entry in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
+    return [finite(entry) for entry in value] if isinstance(value, list | tuple) else value

@@ -38,6 +38,24 @@ def sum_rows(rows: Iterable[np.ndarray]) -> np.ndarray:
     return total
 
 
+def sum_by_tick(flows: Iterable[tuple[int, np.ndarray]], by_tick: np.ndarray) -> None:
+    """Sum flows over the steps of each tick, from first to last.
+
+    Args:
+        flows: (row, what is added at each step), shape (ticks * n,), or (ticks * n, loops).
+        by_tick: takes the sums, shape (rows, ticks), or (rows, ticks, loops).
+    """
+    ticks, *loops = by_tick.shape[1:]
+    if loops in ([], [1]):
+        rows, steps = zip(*flows, strict=True)
+        sums = sum_in_order(np.stack(steps).reshape(len(rows), ticks, -1))
+        by_tick[list(rows)] = sums.reshape(len(rows), *by_tick.shape[1:])
+        return
+    for row, flow in flows:  # one after the other, while it is in the cache
+        # Over an axis that is not the last NumPy adds row after row; a last axis of length 1 is none to it.
+        np.add.reduce(flow.reshape(ticks, -1, *loops), axis=1, out=by_tick[row])
+
+
 class RunningSums:
     """Several running sums, each a float and the sum of the rounding errors of its additions.
 
@@ -45,19 +63,28 @@ class RunningSums:
     the errors are summed beside (Ogita, Rump and Oishi 2005, cascaded summation), so that sum + error carries about
     twice the digits of a float.
 
+    Args:
+        loops: nothing, or of how many loops there are sums: all arrays then have one more axis, the last.
+
     Attributes:
         sums, errors: shape (rows,).
     """
 
-    def __init__(self) -> None:
-        self.sums = np.zeros(0)
-        self.errors = np.zeros(0)
+    def __init__(self, *loops: int) -> None:
+        self.sums = np.zeros((0, *loops))
+        self.errors = np.zeros((0, *loops))
 
     def grow(self, rows: int) -> None:
         """Make room for ``rows`` sums in all; new ones start at 0."""
-        missing = np.zeros(rows - len(self.sums))
+        missing = np.zeros((rows - len(self.sums), *self.sums.shape[1:]))
         self.sums = np.concatenate([self.sums, missing])
         self.errors = np.concatenate([self.errors, missing])
+
+    def of_loop(self, loop: int) -> RunningSums:
+        """The sums of one loop out of those of many."""
+        one = RunningSums()
+        one.sums, one.errors = self.sums[:, loop], self.errors[:, loop]
+        return one
 
     def add(self, increments: np.ndarray) -> np.ndarray:
         """Add column after column.
@@ -75,3 +102,14 @@ class RunningSums:
         errors = np.add.accumulate(np.concatenate([self.errors[:, None], lost], axis=1), axis=1)
         self.sums, self.errors = sums[:, -1].copy(), errors[:, -1].copy()
         return sums + errors
+
+    def add_of_loops(self, increments: np.ndarray) -> None:
+        """Add column after column, shape (rows, columns, loops), to the same bits as ``add`` for each loop."""
+        sums, errors = self.sums, self.errors
+        for column in range(increments.shape[1]):
+            increment = increments[:, column]
+            after = sums + increment
+            added = after - sums
+            errors = errors + ((sums - (after - added)) + (increment - added))
+            sums = after
+        self.sums, self.errors = sums, errors

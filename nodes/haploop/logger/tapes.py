@@ -108,6 +108,14 @@ class ControllerTape:
         """Where the block that holds ``tick`` ends: up to there the elements are the same."""
         return next((end for end in self._part_ends if end > tick), self.end)
 
+    def rows(self, name: str, first: int, end: int) -> np.ndarray:
+        """A column at the ticks first ... end - 1."""
+        return self.columns[name][first - self.first : end - self.first]
+
+    def wall_forces(self) -> np.ndarray:
+        """Force of the wall at all ticks kept."""
+        return self.columns["wall"]
+
     def forces_opened_before(self, tick: int) -> dict[int, np.ndarray]:
         """``forces`` without the books that open at ``tick`` or later."""
         return {book: force for book, force in self.forces.items() if self._opened[book] < tick}

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from functools import lru_cache
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -25,6 +26,19 @@ class Verdict:
     rule: str
 
 
+class Extremes(NamedTuple):
+    """Of a whole run: least and greatest position in m, greatest force in N."""
+
+    x_min_m: float
+    x_max_m: float
+    force_max_N: float
+
+
+def keep_steps(plant_rate: int) -> int:
+    """The plant steps a window covers."""
+    return math.ceil(WINDOW_S * plant_rate)
+
+
 class Window:
     """Keeps what the last ``WINDOW_S`` seconds (or the second half of a shorter run) need to be judged.
 
@@ -34,11 +48,12 @@ class Window:
 
     def __init__(self, plant_rate: int, steps_per_tick: int, resolution_m: float) -> None:
         self._rate, self._steps_per_tick = plant_rate, steps_per_tick
-        self._keep_steps = math.ceil(WINDOW_S * plant_rate)
+        self._keep_steps = keep_steps(plant_rate)
         self.swing_m = max(resolution_m, SMALLEST_SWING_M)
         self._x = np.zeros(0)
         self._ticks = {name: np.zeros(0) for name in CONTROLLER_COLUMNS}
         self._steps = 0
+        self._swung: tuple[int, tuple[int, float]] = -1, (0, 0.0)
         self.x_min_m, self.x_max_m, self.force_max_N = math.inf, -math.inf, 0.0
 
     def add(self, x: np.ndarray, force: np.ndarray, rows: dict[str, np.ndarray]) -> None:
@@ -52,6 +67,12 @@ class Window:
         self.x_max_m = max(self.x_max_m, float(x.max()))
         self.force_max_N = max(self.force_max_N, float(np.abs(force).max(initial=0.0)))
 
+    def filled(self, x: np.ndarray, rows: dict[str, np.ndarray], steps: int, extremes: Extremes) -> Window:
+        """This window with what another kept of a run: x and the controller's rows to its end, after so many steps."""
+        self._x, self._ticks, self._steps = x, rows, steps
+        self.x_min_m, self.x_max_m, self.force_max_N = extremes
+        return self
+
     def _last(self) -> tuple[np.ndarray, dict[str, np.ndarray], int]:
         """x at the plant steps of the window, controller columns at its ticks, and its first step."""
         steps = min(self._keep_steps, self._steps if self._steps >= self._keep_steps else self._steps // 2)
@@ -61,6 +82,12 @@ class Window:
         rows = {name: column[len(column) - ticks :] for name, column in self._ticks.items()}
         return self._x[-steps - 1 :], rows, first
 
+    def _swings(self) -> tuple[int, float]:
+        """``swings`` of the window, found once."""
+        if self._swung[0] != self._steps:
+            self._swung = self._steps, swings(self._last()[0], self.swing_m)
+        return self._swung[1]
+
     def figures(self) -> dict[str, Any]:
         """The ``window`` entry of the summary.
 
@@ -69,7 +96,7 @@ class Window:
         r of e^(r t) by which the swings grow (decay where negative); null where nothing swings.
         """
         x, rows, first = self._last()
-        crossings, growth = swings(x, self.swing_m)
+        crossings, growth = self._swings()
         inside = rows["in_contact"] > 0
         depth = rows["wall_position"][inside] - rows["x"][inside]
         real = np.abs(depth) > ROUNDING * np.abs(rows["wall_position"][inside])
@@ -87,12 +114,12 @@ class Window:
         """Judge the window; ``diverged`` is why the plant ended by itself, if it did."""
         if diverged:
             return Verdict("diverged", f"{diverged}.")
-        x, rows, _ = self._last()
+        _, rows, _ = self._last()
         if not rows["in_contact"].any():
             return Verdict(
                 "no-contact", f"No tick of the last {WINDOW_S:g} s (second half of a shorter run) was in contact."
             )
-        crossings, growth = swings(x, self.swing_m)
+        crossings, growth = self._swings()
         seen = (
             f"In the last {WINDOW_S:g} s (second half of a shorter run) x crossed its trend line {crossings} times "
             f"by more than {self.swing_m * 1e6:.3g} um, its second half {growth:.2f} times as wide as its first; "
@@ -104,6 +131,13 @@ class Window:
 def _rate(growth: float, seconds: float) -> float | None:
     """r in 1/s if what is ``growth`` times as wide in the second half of ``seconds`` follows e^(r t)."""
     return 2.0 * math.log(growth) / seconds if growth > 0.0 else None
+
+
+@lru_cache(maxsize=4)
+def _centred(count: int) -> tuple[np.ndarray, float]:
+    """So many equal steps around 0, and the sum of their squares."""
+    t = np.arange(count) - (count - 1) / 2.0
+    return t, np.dot(t, t)
 
 
 def swings(x: np.ndarray, swing_m: float) -> tuple[int, float]:
@@ -118,9 +152,9 @@ def swings(x: np.ndarray, swing_m: float) -> tuple[int, float]:
     """
     if len(x) < 4:
         return 0, 0.0
-    t = np.arange(len(x)) - (len(x) - 1) / 2.0
+    t, square = _centred(len(x))
     offset = x - x.mean()
-    offset = offset - t * (np.dot(t, offset) / np.dot(t, t))
+    offset = offset - t * (np.dot(t, offset) / square)
     side = np.sign(offset)[np.abs(offset) > swing_m]
     first, second = np.ptp(offset[: len(x) // 2]), np.ptp(offset[len(x) // 2 :])
     return int(np.count_nonzero(np.diff(side))), float(second / first) if first > 0 else 0.0

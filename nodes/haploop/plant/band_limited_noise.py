@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from haploop.plant.random_stream import Draw
+from haploop.protocol.arrays import each
 
 
 def band_limited_noise(normal: Draw, deviation: float, cutoff_Hz: float, period_s: float) -> Draw:
@@ -26,7 +27,7 @@ def band_limited_noise(normal: Draw, deviation: float, cutoff_Hz: float, period_
         The noise at the next tick, in the unit of ``deviation``; the first call is tick 0.
     """
     decay = -math.tau * cutoff_Hz * period_s
-    keep, fresh = math.exp(decay), deviation * math.sqrt(-math.expm1(2.0 * decay))
+    keep, fresh = each(math.exp, decay), deviation * each(math.sqrt, -each(math.expm1, 2.0 * decay))
     noise = None
 
     def at_next_tick():

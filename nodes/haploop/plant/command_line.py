@@ -35,7 +35,7 @@ class Line(Protocol):
 
 
 def line_of(scene: dict[str, Any], time: Timebase) -> Line:
-    """The line of a scene, and the actuator at its end."""
+    """The line of a scene, or of many in a stacked one, and the actuator at its end."""
     line: Line = CommandLine(time)
     if "jitter" in scene or "loss" in scene:
         from haploop.plant.uncertain_line import uncertain_line
@@ -43,7 +43,10 @@ def line_of(scene: dict[str, Any], time: Timebase) -> Line:
         line = uncertain_line(scene, time)
     actuator = scene.get("actuator", {})
     if "saturation" in actuator or "resolution" in actuator:
-        from haploop.plant.actuator import Actuator
+        if "loops" in scene:
+            from haploop.plant.actuator_array import ActuatorArray as Actuator
+        else:
+            from haploop.plant.actuator import Actuator
 
         line = Actuator(line, actuator, time)
     return line

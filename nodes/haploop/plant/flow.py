@@ -4,8 +4,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
 
 import numpy as np
+
+from haploop.protocol.arrays import each
 
 Matrix = np.ndarray
 Real = float | np.floating
@@ -95,8 +99,12 @@ class StepFlow:
     @classmethod
     def of(cls, mass: float, damping: float, stiffness: float, step_s: float) -> StepFlow:
         """The exact flow over ``step_s`` seconds for mass in kg (> 0), damping in N s/m, stiffness in N/m."""
-        increment = flow_minus_identity(_rates(mass, damping, stiffness, step_s), _wide(step_s))
-        return cls(*(float(entry) for entry in _to_state(increment, mass, stiffness, step_s).ravel()))
+
+        def entries(mass: float, damping: float, stiffness: float) -> tuple[float, ...]:
+            increment = _over_a_step(mass, damping, stiffness, step_s)
+            return tuple(float(entry) for entry in _to_state(increment, mass, stiffness, step_s).ravel())
+
+        return cls(*each(entries, mass, damping, stiffness))
 
 
 @dataclass(frozen=True)
@@ -106,7 +114,7 @@ class HeldFlow:
     E(i + 1) = E(i) + E(1) + E(1) E(i) for E = e^{A i h} - I, which never subtracts the identity.
 
     Attributes:
-        coefficients: shape (steps + 1, 6), row i for i steps.
+        coefficients: shape (steps + 1, 6), row i for i steps; of many loops at once (steps + 1, 6, loops).
     """
 
     coefficients: np.ndarray
@@ -114,16 +122,27 @@ class HeldFlow:
     @classmethod
     def of(cls, mass: float, damping: float, stiffness: float, step_s: float, steps: int) -> HeldFlow:
         """For up to ``steps`` steps of ``step_s`` seconds; mass in kg (> 0), damping in N s/m, stiffness in N/m."""
-        one = flow_minus_identity(_rates(mass, damping, stiffness, step_s), _wide(step_s))
-        flow, rows = np.zeros_like(one), []
-        for _ in range(steps + 1):
-            rows.append(_to_state(flow, mass, stiffness, step_s)[:, :3].ravel().astype(float))
-            flow = flow + one + one @ flow
-        return cls(np.array(rows))
 
-    def by_count(self) -> list[tuple[float, ...]]:
-        """The coefficients as plain floats, one tuple for each number of steps."""
-        return [tuple(row) for row in self.coefficients.tolist()]
+        def rows(mass: float, damping: float, stiffness: float) -> np.ndarray:
+            one = _over_a_step(mass, damping, stiffness, step_s)
+            flow, rows = np.zeros_like(one), []
+            for _ in range(steps + 1):
+                rows.append(_to_state(flow, mass, stiffness, step_s)[:, :3].ravel().astype(float))
+                flow = flow + one + one @ flow
+            return np.array(rows)
+
+        return cls(each(rows, mass, damping, stiffness))
+
+    def by_count(self) -> list[tuple[Any, ...]]:
+        """The coefficients, one tuple for each number of steps: plain floats, or arrays over many loops."""
+        rows = self.coefficients
+        return [tuple(row) for row in (rows.tolist() if rows.ndim == 2 else rows)]
+
+
+@lru_cache(maxsize=4096)
+def _over_a_step(mass: float, damping: float, stiffness: float, step_s: float) -> Matrix:
+    """e^{A h} - I in the coordinates of ``_rates``."""
+    return flow_minus_identity(_rates(mass, damping, stiffness, step_s), _wide(step_s))
 
 
 def _rates(mass: float, damping: float, stiffness: float, step_s: float) -> Matrix:

@@ -23,28 +23,42 @@ class HandForce:
 
     def __init__(self, table: dict[str, Any] | None, plant_rate: int) -> None:
         self._profile = PROFILES[table["kind"]](table) if table else np.zeros_like
-        self._plant_rate = plant_rate
+        self._plant_rate, self._piece_steps = plant_rate, _PIECE_STEPS
         self._pieces: dict[int, np.ndarray] = {}
 
     def at_steps(self, first: int, last: int) -> np.ndarray:
         """tau at the steps first ... last - 1, shape (last - first,)."""
-        pieces = range(first // _PIECE_STEPS, (last - 1) // _PIECE_STEPS + 1)
+        size = self._piece_steps
+        pieces = range(first // size, (last - 1) // size + 1)
         joined = np.concatenate([self._piece(index) for index in pieces])
-        start = first - pieces.start * _PIECE_STEPS
+        start = first - pieces.start * size
         return joined[start : start + last - first]
 
     def _piece(self, index: int) -> np.ndarray:
         if index not in self._pieces:
             if len(self._pieces) > 2:
                 self._pieces.clear()
-            steps = np.arange(index * _PIECE_STEPS, (index + 1) * _PIECE_STEPS)
-            self._pieces[index] = self._profile(steps / self._plant_rate)
+            self._pieces[index] = self._profile(self._times(index))
         return self._pieces[index]
+
+    def _times(self, index: int) -> np.ndarray:
+        """The times of the steps of a piece, s."""
+        return np.arange(index * self._piece_steps, (index + 1) * self._piece_steps) / self._plant_rate
+
+
+def hand_force(scene: dict[str, Any], plant_rate: int) -> HandForce:
+    """The hand force of a resolved scene, or of many in a stacked one."""
+    table = scene.get("hand", {}).get("force")
+    if "loops" in scene:
+        from haploop.plant.hand_force_array import HandForceArray
+
+        return HandForceArray(table, plant_rate)
+    return HandForce(table, plant_rate)
 
 
 def _constant(table: dict[str, Any]) -> Profile:
     """tau = value."""
-    return lambda t: np.full_like(t, table["value"])
+    return lambda t: np.zeros_like(t) + table["value"]
 
 
 def _ramp(table: dict[str, Any]) -> Profile:

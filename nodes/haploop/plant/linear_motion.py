@@ -10,7 +10,7 @@ import numpy as np
 
 from haploop.plant.command_line import Hold
 from haploop.plant.flow import HeldFlow, StepFlow
-from haploop.plant.hand_force import HandForce
+from haploop.plant.hand_force import hand_force
 from haploop.plant.mechanics import Mechanics
 from haploop.protocol.ticks import Timebase
 
@@ -34,15 +34,19 @@ class LinearMotion:
         x, v: position in m and velocity in m/s at the end of the last interval.
     """
 
+    # How the rows of an array are to be used, one by one.
+    _rows = staticmethod(np.ndarray.tolist)
+
     def __init__(self, scene: dict[str, Any], time: Timebase) -> None:
         self._mechanics = m = Mechanics.of(scene)
         self._steps = time.steps_per_tick
         self._held = HeldFlow.of(m.mass_kg, m.damping, m.stiffness, time.step_s, self._steps)
         self._over = self._held.by_count()
         self._step = StepFlow.of(m.mass_kg, m.damping, m.stiffness, time.step_s)
-        self._tau = HandForce(scene.get("hand", {}).get("force"), time.plant_rate)
+        self._tau = hand_force(scene, time.plant_rate)
         self._spring_at_origin_N = m.stiffness * m.rest_m
         self._pieces: dict[int, np.ndarray] = {}
+        self._piece_ticks = _PIECE_TICKS
         self._response: list[list[float]] = []
         self._response_first = self._response_end = 0
         self.x, self.v = m.start
@@ -77,9 +81,9 @@ class LinearMotion:
 
     def _respond_from(self, tick: int) -> None:
         """What tau adds to x and v over each of the next intervals."""
-        piece = tick // _PIECE_TICKS
-        self._response_first, self._response_end = piece * _PIECE_TICKS, (piece + 1) * _PIECE_TICKS
-        self._response = self._responses(piece)[:, -1].tolist()
+        piece = tick // self._piece_ticks
+        self._response_first, self._response_end = piece * self._piece_ticks, (piece + 1) * self._piece_ticks
+        self._response = self._rows(self._responses(piece)[:, -1])
 
     def _responses(self, piece: int) -> np.ndarray:
         """D at the steps of the intervals of a piece, from each interval's start; shape (intervals, n + 1, 2)."""
@@ -90,12 +94,12 @@ class LinearMotion:
         return self._pieces[piece]
 
     def _make_responses(self, piece: int) -> np.ndarray:
-        n, s = self._steps, self._step
-        first = piece * _PIECE_TICKS * n
-        force = self._tau.at_steps(first, first + _PIECE_TICKS * n + 1) + self._spring_at_origin_N
-        start, rise = force[:-1].reshape(-1, n), np.diff(force).reshape(-1, n)
+        n, s, ticks = self._steps, self._step, self._piece_ticks
+        first = piece * ticks * n
+        force = self._tau.at_steps(first, first + ticks * n + 1) + self._spring_at_origin_N
+        start, rise = (rows.reshape(ticks, n, *force.shape[1:]) for rows in (force[:-1], np.diff(force, axis=0)))
         push_x, push_v = s.x_force * start + s.x_slope * rise, s.v_force * start + s.v_slope * rise
-        response = np.zeros((_PIECE_TICKS, n + 1, 2))
+        response = np.zeros((ticks, n + 1, 2, *push_x.shape[2:]))
         x, v = response[:, 0, 0], response[:, 0, 1]
         for i in range(n):
             x, v = x + (s.x_x * x + s.x_v * v + push_x[:, i]), v + (s.v_x * x + s.v_v * v + push_v[:, i])
@@ -104,9 +108,12 @@ class LinearMotion:
 
     def acceleration(self, tick: int) -> float:
         """Acceleration at ``tick``, the present one, under the force held over the step that ends there, m/s^2."""
-        m, step = self._mechanics, tick * self._steps
-        load = float(self._tau.at_steps(step, step + 1)[0])
+        m, load = self._mechanics, self._load(tick * self._steps)
         return (self.force + load - m.damping * self.v - m.stiffness * (self.x - m.rest_m)) / m.mass_kg
+
+    def _load(self, step: int) -> Any:
+        """tau at a step, N."""
+        return float(self._tau.at_steps(step, step + 1)[0])
 
     # The record of every plant step
 
@@ -155,22 +162,38 @@ class LinearMotion:
         response = self._between(tick, ticks)
         for index, (first, count) in enumerate(cuts):
             x, x_low, v, v_low, force, command = (entry[:, None] for entry in starts[:, index].T)
-            x_x, x_v, x_force, v_x, v_v, v_force = self._held.coefficients[:count].T
-            during = slice(first, first + count)
-            dx = x_x * x + x_v * v + x_force * force + x_low + response[:, during, 0]
-            dv = v_x * x + v_v * v + v_force * force + v_low + response[:, during, 1]
-            at_x, at_v = x + dx, v + dv
-            if not first:  # the state itself, as it stood at the end of the interval before
-                at_x[:, :1], at_v[:, :1] = x, v
-            rows = at_x, at_v, dx - (at_x - x), force, command
-            for column, row in zip(columns, rows, strict=True):
+            known = not first  # the state itself, as it stood at the end of the interval before
+            during, held = slice(first + known, first + count), self._held.coefficients[known:count]
+            dx = change_over(held[:, :3], response[:, during, 0], x, v, force, x_low)
+            dv = change_over(held[:, 3:], response[:, during, 1], x, v, force, v_low)
+            at_x = x + dx
+            rows = at_x, v + dv, dx - (at_x - x), force, command
+            for column, row, begin in zip(columns, rows, (x, v, x_low, force, command), strict=True):
                 column[:, during] = row
+                if known:
+                    column[:, :1] = begin
         return columns
 
     def _between(self, tick: int, ticks: int) -> np.ndarray:
         """D at the steps of some intervals, their ends left out; shape (ticks, n, 2)."""
-        first, last = tick // _PIECE_TICKS, max(tick, tick + ticks - 1) // _PIECE_TICKS
+        first, last = tick // self._piece_ticks, max(tick, tick + ticks - 1) // self._piece_ticks
         pieces = [self._responses(piece) for piece in range(first, last + 1)]
         joined = pieces[0] if len(pieces) == 1 else np.concatenate(pieces)
-        start = tick - first * _PIECE_TICKS
+        start = tick - first * self._piece_ticks
         return joined[start : start + ticks, :-1]
+
+
+def change_over(held: np.ndarray, response: np.ndarray, x: Any, v: Any, force: Any, low: Any) -> np.ndarray:
+    """What the plant steps of holds add to a state, from the beginning of each hold, one hold an interval.
+
+    Args:
+        held: coefficients of x, v and force over these steps, shape (steps, 3).
+        response: the state's D at these steps of every interval, shape (intervals, steps).
+        x, v: at the beginning of every hold, shape (intervals, 1).
+        force: held, N, shape (intervals, 1).
+        low: what rounding left of the state at the beginning, shape (intervals, 1).
+
+    Returns:
+        Shape (intervals, steps); all shapes may have one more axis, for many loops.
+    """
+    return held[:, 0] * x + held[:, 1] * v + held[:, 2] * force + low + response

@@ -5,15 +5,15 @@ from __future__ import annotations
 from typing import Any
 
 from haploop.plant.band_limited_noise import band_limited_noise
-from haploop.plant.random_stream import Draw, RandomStream
+from haploop.plant.random_stream import Draw, stream_of
 
 
-def position_noise(table: dict[str, Any], seed: int, period_s: float) -> Draw:
+def position_noise(table: dict[str, Any], seed: Any, period_s: float) -> Draw:
     """Noise in m at the next tick, to be added before the encoder rounds; stationary from tick 0 on.
 
     Args:
         table: the resolved ``[noise]`` table: deviation in m, cutoff in Hz.
-        seed: the scene's.
+        seed: the scene's, or one for each of many scenes.
         period_s: one tick.
     """
-    return band_limited_noise(RandomStream(seed, "noise").normal(), table["deviation"], table["cutoff"], period_s)
+    return band_limited_noise(stream_of(seed, "noise").normal(), table["deviation"], table["cutoff"], period_s)

@@ -119,10 +119,7 @@ class Plant:
         motion.advance(tick, holds)
         self._interval_due = False
         if not -self._limit_m <= motion.x <= self._limit_m:
-            if math.isfinite(motion.x):
-                self._stop(tick + 1, f"the device was at {motion.x:g} m, beyond the limit of {self._limit_m:g} m")
-            else:
-                self._stop(tick + 1, f"the arithmetic failed, not the device: its position came out as {motion.x}")
+            self._stop(tick + 1, beyond(motion.x, self._limit_m))
             return False
         return True
 
@@ -155,3 +152,10 @@ class Plant:
         record |= {name: tally.column(*steps) for name, tally in self._tallies.items()}
         self._block_first = reached
         return first, reached - first, {name: column.tobytes() for name, column in record.items()}
+
+
+def beyond(x: float, limit_m: float) -> str:
+    """Why a run ends with the device at x, not within ``limit_m`` of 0."""
+    if math.isfinite(x):
+        return f"the device was at {x:g} m, beyond the limit of {limit_m:g} m"
+    return f"the arithmetic failed, not the device: its position came out as {x}"

@@ -1,9 +1,13 @@
-"""Choice and rounding written once, for a float of one loop or an array over many loops."""
+"""Choice and rounding written once, for a float of one loop or an array over many loops, its last axis."""
 
 from __future__ import annotations
 
 import math
-from typing import Any
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    import numpy as np
 
 
 def where(condition: Any, yes: Any, no: Any) -> Any:
@@ -16,17 +20,17 @@ def where(condition: Any, yes: Any, no: Any) -> Any:
 
 
 def rint(value: Any) -> Any:
-    """Nearest whole number, halves to even, as ``numpy.rint``; values are finite."""
+    """Nearest whole number, halves to even, as ``numpy.rint``, but never -0.0; values of one loop are finite."""
     if value.__class__ is float:
         return float(round(value))
-    return value.__array_namespace__().rint(value)
+    return value.__array_namespace__().rint(value) + 0.0
 
 
 def floor(value: Any) -> Any:
-    """Greatest whole number not above ``value``; values are finite."""
+    """Greatest whole number not above ``value``, but never -0.0; values of one loop are finite."""
     if isinstance(value, float):
         return float(math.floor(value))
-    return value.__array_namespace__().floor(value)
+    return value.__array_namespace__().floor(value) + 0.0
 
 
 def nearest_multiple(value: Any, unit: Any) -> Any:
@@ -35,4 +39,54 @@ def nearest_multiple(value: Any, unit: Any) -> Any:
     if counts.__class__ is float:
         return unit * float(round(counts)) if counts - counts == 0.0 else value
     xp = counts.__array_namespace__()
-    return xp.where(xp.isfinite(counts), unit * xp.rint(counts), value)
+    return xp.where(xp.isfinite(counts), unit * (xp.rint(counts) + 0.0), value)
+
+
+def each(function: Callable[..., Any], *numbers: Any) -> Any:
+    """What ``function`` gives of these numbers; where some are arrays, of those of every loop by themselves.
+
+    Coefficients of many loops come so from the same code as those of one, to the same bits. Where equal numbers recur
+    they are asked for once.
+
+    Args:
+        function: from floats to a float, an array, or a tuple of these.
+        numbers: floats, or arrays of shape (loops,).
+
+    Returns:
+        The result, or the results stacked along a new last axis.
+    """
+    if not any(getattr(number, "shape", ()) for number in numbers):
+        return function(*numbers)
+    import numpy as np
+
+    rows = list(zip(*(column.tolist() for column in np.broadcast_arrays(*numbers)), strict=True))
+    known = {row: function(*row) for row in dict.fromkeys(rows)}
+    found = [known[row] for row in rows]
+    if isinstance(found[0], tuple):
+        return tuple(np.stack(parts, axis=-1) for parts in zip(*found, strict=True))
+    return np.stack(found, axis=-1)
+
+
+def rows_of(values: Sequence[Any], loops: int) -> np.ndarray:
+    """One number for all loops, or an array over them, in each row; shape (rows, loops)."""
+    import numpy as np
+
+    rows = np.empty((len(values), loops))
+    for row, value in zip(rows, values, strict=True):
+        row[:] = value
+    return rows
+
+
+def first_row(column: np.ndarray) -> Any:
+    """The first entry of a column: a float, or an array over many loops."""
+    row = column[0]
+    return row if row.shape else float(row)
+
+
+def of_loop(value: Any, loop: int) -> Any:
+    """The same for one loop: of every array within dicts and lists its number."""
+    if isinstance(value, dict):
+        return {key: of_loop(entry, loop) for key, entry in value.items()}
+    if isinstance(value, list):
+        return [of_loop(entry, loop) for entry in value]
+    return value[loop].item() if getattr(value, "shape", ()) else value

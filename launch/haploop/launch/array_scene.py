@@ -1,0 +1,76 @@
+"""Scenes of one structure stacked into one: what differs from scene to scene becomes an array."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Sequence
+from typing import Any
+
+import numpy as np
+
+from haploop.plant.flow import real_for
+from haploop.plant.mechanics import Mechanics
+from haploop.plant.motion import needs_chain
+from haploop.plant.sensors import accelerometer_is_used
+from haploop.protocol.ticks import DELAY
+
+# What says nothing of what is simulated.
+_ASIDE = ("title", "seed", "run")
+_TIMES = ("clock", "duration", "at")
+
+
+def runs_in_arrays(scene: dict[str, Any]) -> bool:
+    """Whether a resolved scene's loop takes the same way whatever its numbers, so that many run as one.
+
+    Not so: bodies in a row and what moves them with jitter, loss, friction or another integrator than the exact flow;
+    an accelerometer that is not ideal; a delay that changes; a device whose damping needs the widest float.
+    """
+    if needs_chain(scene) or ("accelerometer" in scene and accelerometer_is_used(scene)):
+        return False
+    if any(DELAY in event.get("set", {}) for event in scene.get("event", [])):
+        return False
+    m = Mechanics.of(scene)
+    return real_for(m.damping / m.mass_kg, 1.0 / scene["clock"]["plant_rate"]) is np.float64
+
+
+def structure(scene: dict[str, Any]) -> Hashable:
+    """What scenes that are stacked must have in common: all but the values of their numbers.
+
+    Times are common, too: the clock, the duration, when events come, the points of a recorded force. So is whether a
+    number is 0, which may mean that something is not there.
+    """
+    shared = {key: value for key, value in scene.items() if key not in _ASIDE}
+    return _structure(shared, by_value=False)
+
+
+def _structure(value: Any, by_value: bool) -> Hashable:
+    if value.__class__ is float:
+        return value if by_value else value != 0.0
+    if value.__class__ is dict:
+        parts: list[Hashable] = []
+        for key, entry in value.items():
+            parts += (key, _structure(entry, by_value or key in _TIMES))
+        return tuple(parts)
+    if value.__class__ is list:
+        of_numbers = bool(value) and value[0].__class__ is not dict
+        return tuple([_structure(item, by_value or of_numbers) for item in value])
+    return value
+
+
+def stacked(scenes: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    """One scene of many with the same structure; numbers that differ are arrays of shape (loops,).
+
+    Its key ``loops`` is their count.
+    """
+    return {key: _stacked([scene[key] for scene in scenes]) for key in scenes[0]} | {"loops": len(scenes)}
+
+
+def _stacked(values: Sequence[Any]) -> Any:
+    first = values[0]
+    if isinstance(first, dict):
+        return {key: _stacked([value[key] for value in values]) for key in first}
+    if isinstance(first, list):
+        return [_stacked(items) for items in zip(*values, strict=True)]
+    if isinstance(first, bool) or not isinstance(first, int | float):
+        return first
+    column = np.array(values)
+    return first if (column == first).all() else column

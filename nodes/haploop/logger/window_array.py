@@ -1,0 +1,86 @@
+"""The last half second of many runs at once."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+
+import numpy as np
+
+from haploop.logger.tape_array import Row
+from haploop.logger.window import CONTROLLER_COLUMNS, Extremes, Window, keep_steps
+from haploop.protocol.ticks import Timebase
+
+# Loops whose windows are laid out together: reading one loop alone out of a wide array is slow.
+_TOGETHER = 32
+
+
+class WindowArray:
+    """Keeps what ``Window`` keeps of every loop, in rings that are written once.
+
+    Args:
+        resolutions_m: encoder step of each loop, 0 without one; a number, or shape (loops,).
+    """
+
+    def __init__(self, time: Timebase, resolutions_m: float | np.ndarray, loops: int) -> None:
+        self._time = time
+        kept = min(keep_steps(time.plant_rate), time.ticks * time.steps_per_tick)
+        self._resolutions = np.broadcast_to(resolutions_m, loops)
+        self._x = np.zeros((kept + 1, loops))
+        self._ticks = {name: np.zeros((kept // time.steps_per_tick + 1, loops)) for name in CONTROLLER_COLUMNS}
+        self._steps = 0
+        self._x_min, self._x_max = np.full(loops, np.inf), np.full(loops, -np.inf)
+        self._force_max = np.zeros(loops)
+
+    def add(self, x: np.ndarray, held_N: np.ndarray, rows: Sequence[Row]) -> None:
+        """Take the states of some intervals (end state included), the forces held and the controller's rows.
+
+        Args:
+            x: shape (ticks * n + 1, loops).
+            held_N: of every hold, shape (holds, loops).
+            rows: one a tick.
+        """
+        if not self._steps:
+            self._x[0] = x[0]
+        ticks = self._steps // self._time.steps_per_tick
+        _write(self._x, self._steps + 1, x[1:])
+        for tick, row in enumerate(rows, ticks):
+            for name, ring in self._ticks.items():
+                ring[tick % len(ring)] = row.columns[name]
+        self._steps += len(x) - 1
+        self._x_min = np.minimum(self._x_min, x.min(axis=0))
+        self._x_max = np.maximum(self._x_max, x.max(axis=0))
+        self._force_max = np.maximum(self._force_max, np.abs(held_N).max(axis=0))
+
+    def windows(self, loops: Iterable[int]) -> Iterator[Window]:
+        """The window of each of these loops, as it would be had the loop run alone."""
+        wanted = np.fromiter(loops, np.intp)
+        n, steps = self._time.steps_per_tick, self._steps
+        for first in range(0, len(wanted), _TOGETHER):
+            some = wanted[first : first + _TOGETHER]
+            x = _read(self._x, steps + 1, some)
+            ticks = {name: _read(ring, steps // n, some) for name, ring in self._ticks.items()}
+            for index, loop in enumerate(some):
+                yield Window(self._time.plant_rate, n, float(self._resolutions[loop])).filled(
+                    x[index],
+                    {name: column[index] for name, column in ticks.items()},
+                    steps,
+                    Extremes(float(self._x_min[loop]), float(self._x_max[loop]), float(self._force_max[loop])),
+                )
+
+
+def _write(ring: np.ndarray, at: int, rows: np.ndarray) -> None:
+    """Put row ``at`` and those after it into a ring, in which row i lies at i modulo its length."""
+    skipped = max(0, len(rows) - len(ring))
+    rows, at = rows[skipped:], (at + skipped) % len(ring)
+    before_wrap = min(len(rows), len(ring) - at)
+    ring[at : at + before_wrap] = rows[:before_wrap]
+    ring[: len(rows) - before_wrap] = rows[before_wrap:]
+
+
+def _read(ring: np.ndarray, end: int, loops: np.ndarray) -> np.ndarray:
+    """The rows before ``end`` that a ring still holds, oldest first, of some loops; shape (loops, rows)."""
+    count = min(end, len(ring))
+    first = (end - count) % len(ring)
+    wanted = slice(loops[0], loops[-1] + 1) if loops[-1] - loops[0] == len(loops) - 1 else loops
+    rows = np.concatenate([ring[first : first + count, wanted], ring[: max(0, first + count - len(ring)), wanted]])
+    return np.ascontiguousarray(rows.T)

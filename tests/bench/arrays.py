@@ -1,0 +1,87 @@
+"""Arrays of scenes against the loop in one process and against a compiled kernel, on one core."""
+
+from __future__ import annotations
+
+import argparse
+import importlib.util
+import statistics
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from haploop.controller.dissipation import registry
+from haploop.launch.array_run import run_array
+from haploop.launch.in_process import run_in_process
+from haploop.launch.scene_file import load
+from haploop.tools.machine import machine
+
+SCENE = Path(__file__).parents[2] / "launch" / "scenes" / "fig6b.toml"
+
+
+def paper_scenes(count: int, duration: float) -> list[dict[str, Any]]:
+    """Figure 6(b) over a square of stiffness and damping, from steady contacts to wide limit cycles."""
+    base = load(SCENE, [f"duration={duration}"])
+    side = round(count**0.5)
+    return [
+        {
+            **base,
+            "wall": {**base["wall"], "stiffness": stiffness},
+            "dissipation": [{**base["dissipation"][0], "damping": damping}],
+        }
+        for stiffness in np.linspace(20.0, 400.0, side).tolist()
+        for damping in np.linspace(0.02, 2.0, side).tolist()
+    ]
+
+
+def measured_us(run: Callable[[], Any], ticks: int) -> float:
+    """Processor time per tick of one scene."""
+    began = time.process_time()
+    run()
+    return (time.process_time() - began) / ticks * 1e6
+
+
+def main() -> None:
+    """Measure in turn, repeat, print medians and ratios."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--scenes", type=int, default=10_000)
+    parser.add_argument("--duration", type=float, default=1.0)
+    parser.add_argument("--repeats", type=int, default=3)
+    options = parser.parse_args()
+    scenes, kinds = paper_scenes(options.scenes, options.duration), registry()
+    few = scenes[:: max(1, len(scenes) // 20)]
+    ticks_of = round(options.duration * scenes[0]["clock"]["control_rate"])
+    rows: dict[str, tuple[Callable[[], Any], int]] = {
+        "one process, with the books": (lambda: [run_in_process(scene, kinds) for scene in few], len(few)),
+        "arrays, with the books": (lambda: run_array(scenes, kinds), len(scenes)),
+        "arrays, without": (lambda: run_array(scenes, kinds, energy=False), len(scenes)),
+    }
+    if importlib.util.find_spec("numba"):
+        from array_kernel import run_kernel
+
+        run_kernel(scenes[:1], True)
+        rows["numba kernel, with the books"] = (lambda: run_kernel(scenes, True), len(scenes))
+        rows["numba kernel, without"] = (lambda: run_kernel(scenes, False), len(scenes))
+    seen: dict[str, list[float]] = {name: [] for name in rows}
+    for _ in range(options.repeats):
+        for name, (run, count) in rows.items():
+            seen[name].append(measured_us(run, count * ticks_of))
+    table = Table(title=f"{len(scenes)} scenes, medians of {options.repeats}; {machine()}", title_justify="left")
+    for heading in ("what", "µs per tick", "least - most", "in one process / this", "this / kernel"):
+        table.add_column(heading)
+    medians = {name: statistics.median(values) for name, values in seen.items()}
+    alone = medians["one process, with the books"]
+    for name, median in medians.items():
+        kernel = medians.get("numba kernel, without" if name.endswith("without") else "numba kernel, with the books")
+        spread = f"{min(seen[name]):.3g} - {max(seen[name]):.3g}"
+        ratio = f"{median / kernel:.2f}" if kernel else ""
+        table.add_row(name, f"{median:.3g}", spread, f"{alone / median:.1f}", ratio)
+    Console(width=120).print(table)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,48 @@
+"""Scenes of one structure that differ in every number that may differ."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from physics.random_scenes import tables_of
+from scene_makers import scene
+
+# Numbers that scenes of one structure share.
+_SHARED = {"clock", "duration", "at", "time", "run", "diverged_beyond"}
+ESTIMATORS: list[dict[str, Any]] = [
+    {},
+    {"velocity": {"cutoff": 90.0}, "acceleration": {"cutoff": 60.0}},
+    {"velocity": {"estimator": "window", "ticks": 4}},
+    {"velocity": {"estimator": "foaw", "ticks": 6}},
+    {"velocity": {"estimator": "foaw", "ticks": 5, "fit": "best", "bound": 2e-5, "cutoff": 150.0}},
+    {"velocity": {"estimator": "kalman", "jerk_density": 2e3}, "acceleration": {"source": "kalman"}},
+    {"acceleration": {"source": "accelerometer", "cutoff": 80.0}},
+    {"acceleration": {"estimator": "foaw", "ticks": 4, "bound": 0.05}},
+]
+
+
+def drawn_base(seed: int) -> dict[str, Any]:
+    """A scene with all that runs in arrays; what is random in it, too."""
+    rng = np.random.default_rng(seed)
+    tables = tables_of(seed, rng)
+    if seed % 2:
+        tables |= {"noise": {"deviation": 3e-6, "cutoff": 120.0}, "seed": seed}
+        tables["encoder"] = {"resolution": 1e-5, "rounding": "floor" if seed % 4 == 1 else "nearest"}
+    if seed % 3 == 1:
+        tables["actuator"] = {"saturation": 0.25} | ({"resolution": 2e-3} if seed % 2 else {})
+    tables |= ESTIMATORS[seed % len(ESTIMATORS)] if "encoder" in tables else {}
+    return scene(**tables)
+
+
+def varied(base: dict[str, Any], rng: np.random.Generator) -> dict[str, Any]:
+    """The same structure, every number by up to a tenth another one, and another seed."""
+    return _varied(base, rng) | {"seed": int(rng.integers(2**62)), "title": f"varied {rng.integers(1000)}"}
+
+
+def _varied(value: Any, rng: np.random.Generator) -> Any:
+    if isinstance(value, dict):
+        return {key: entry if key in _SHARED else _varied(entry, rng) for key, entry in value.items()}
+    if isinstance(value, list):
+        return [_varied(entry, rng) if isinstance(entry, dict) else entry for entry in value]
+    return value * rng.uniform(0.9, 1.1) if isinstance(value, float) else value

@@ -1,0 +1,289 @@
+"""Arrays of scenes: each scene comes to what it comes to alone, bit for bit, whatever becomes of the others."""
+
+from __future__ import annotations
+
+import copy
+import math
+from typing import Annotated, Any
+
+import numpy as np
+import pytest
+from physics.varied_scenes import drawn_base, varied
+from scene_makers import KINDS, WALL, scene
+
+from haploop.controller.dissipation import Element, Motion, Quantity, where
+from haploop.launch import array_loop, array_run
+from haploop.launch.array_loop import LoopArray
+from haploop.launch.array_run import run_array
+from haploop.launch.array_scene import runs_in_arrays, stacked, structure
+from haploop.launch.in_process import run_in_process
+from haploop.logger.summary import OF_THE_MACHINE
+
+PUSH = {"mass": 0.01, "stiffness": 10.0, "damping": 0.01, "force": {"kind": "ramp", "value": -0.8, "rise_time": 0.05}}
+
+
+def alone(made: dict[str, Any], kinds: dict[str, type[Element]] = KINDS) -> dict[str, Any]:
+    summary = run_in_process(made, kinds)
+    return {key: value for key, value in summary.items() if key not in OF_THE_MACHINE}
+
+
+def together(scenes: list[dict[str, Any]], kinds: dict[str, type[Element]] = KINDS) -> list[dict[str, Any] | None]:
+    loops = LoopArray(scenes, kinds, trajectories=True)
+    loops.run()
+    return loops.results
+
+
+def pressed(**tables: Any) -> dict[str, Any]:
+    """A hand pushes the device into a wall with a damper."""
+    whole: dict[str, Any] = {
+        "duration": 0.15,
+        "clock": {"round_trip_delay": 0.0013},
+        "hand": PUSH,
+        "encoder": {"resolution": 1e-5},
+        "wall": {"position": -0.002, "stiffness": 300.0},
+        "dissipation": [{"kind": "damping", "damping": 0.2}],
+    }
+    return scene(**{**whole, **tables})
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_a_scene_out_of_an_array_has_every_bit_of_the_scene_alone(seed: int) -> None:
+    rng = np.random.default_rng(1000 + seed)
+    base = drawn_base(seed)
+    scenes = [base, *(varied(base, rng) for _ in range(4))]
+    assert runs_in_arrays(base)
+    assert len({structure(each) for each in scenes}) == 1
+    assert together(scenes) == [alone(each) for each in scenes]
+
+
+@pytest.mark.parametrize("seed", [3, 10])
+def test_so_has_one_of_many_in_blocks_of_few_ticks(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(array_loop, "BLOCK", 3_000)
+    rng = np.random.default_rng(seed)
+    base = drawn_base(seed)
+    scenes = [varied(base, rng) for _ in range(77)]
+    assert together(scenes) == [alone(each) for each in scenes]
+
+
+@pytest.mark.parametrize("count", [1, 2, 3])
+def test_so_has_one_of_very_few(count: int) -> None:
+    """What NumPy makes of axes of length 1 is its own."""
+    scenes = [pressed(wall={"position": -0.002, "stiffness": 300.0 + i}) for i in range(count)]
+    assert together(scenes) == [alone(each) for each in scenes]
+
+
+def test_one_number_by_one_bit_is_another_trajectory() -> None:
+    made = pressed()
+    other = copy.deepcopy(made)
+    other["wall"]["stiffness"] = math.nextafter(300.0, math.inf)
+    first, second, third = (result["trajectory_sha256"] for result in together([made, other, made]) if result)
+    assert first == third != second
+
+
+def test_how_the_loops_are_cut_into_blocks_changes_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    base = drawn_base(7)
+    scenes = [base, varied(base, np.random.default_rng(1))]
+    results = []
+    for block in (1, 2_000, 10**9):
+        monkeypatch.setattr(array_loop, "BLOCK", block)
+        results.append(together(scenes))
+    assert results[0] == results[1] == results[2]
+
+
+def diverging() -> list[dict[str, Any]]:
+    """Some of these swing up and away, each at its time; some do not."""
+    return [
+        pressed(
+            duration=0.6,
+            diverged_beyond=0.05,
+            clock={"round_trip_delay": 0.004},
+            dissipation=[{"kind": "damping", "damping": damping, "acts": "always"}],
+            velocity={"estimator": "foaw", "ticks": 4},
+        )
+        for damping in np.linspace(1.0, 12.0, 16).tolist()
+    ]
+
+
+def test_loops_that_diverge_leave_with_their_results_and_disturb_no_other() -> None:
+    scenes = diverging()
+    expected = [alone(each) for each in scenes]
+    ends = {result["ticks"] for result in expected}
+    assert {"diverged", "done"} == {result["ended"] for result in expected}
+    assert len(ends) > 5
+    assert together(scenes) == expected
+
+
+def test_what_all_loops_share_stays_whole_when_some_are_dropped() -> None:
+    """A trace of as many points, and forms of as many rows, as there are loops."""
+    trace = {"kind": "trace", "time": [0.0, 0.1, 0.2], "force": [-0.5, -2.0, -1.0]}
+    scenes = [
+        pressed(hand={**PUSH, "force": trace}, diverged_beyond=beyond, dissipation=[]) for beyond in (0.003, 0.5, 0.006)
+    ]
+    expected = [alone(each) for each in scenes]
+    assert [result["ended"] for result in expected] == ["diverged", "done", "diverged"]
+    assert together(scenes) == expected
+
+
+def test_loops_that_have_ended_are_dropped_from_the_arrays(monkeypatch: pytest.MonkeyPatch) -> None:
+    sizes = []
+
+    class Spy(array_loop.LinearMotionArray):
+        def advance(self, tick: int, holds: Any) -> None:
+            super().advance(tick, holds)
+            sizes.append(len(self.x))
+
+    monkeypatch.setattr(array_loop, "LinearMotionArray", Spy)
+    scenes = diverging()
+    together(scenes)
+    assert sizes[0] == len(scenes)
+    assert sizes[-1] <= len(scenes) / 2
+
+
+class Stiffening(Element):
+    """Written for one loop alone."""
+
+    kind = "stiffening"
+    force_N: Annotated[float, Quantity("N", at_least=0)] = 0.05
+
+    def force(self, motion: Motion) -> float:
+        return -math.tanh(motion.v / 0.01) * self.force_N if motion.v > 0 else 0.0
+
+
+class Counting(Element):
+    """Keeps a state in a list of its own; refuses after many ticks where it is strong."""
+
+    kind = "counting"
+    force_N: Annotated[float, Quantity("N", at_least=0)] = 0.05
+
+    def __post_init__(self) -> None:
+        self.sums: list[Any] = [0.0]
+
+    def force(self, motion: Motion) -> Any:
+        self.sums[0] = self.sums[0] + abs(motion.v)
+        return where(self.sums[0] * self.force_N > 0.5, math.inf, -self.force_N * motion.v)
+
+
+def test_an_element_that_takes_no_arrays_is_run_loop_by_loop() -> None:
+    kinds = KINDS | {"stiffening": Stiffening}
+    made = pressed()
+    scenes = [{**made, "dissipation": [{"kind": "stiffening", "force_N": f, "acts": "always"}]} for f in (0.1, 0.2)]
+    results = run_array(scenes, kinds, trajectories=True, fewest=1)
+    assert results == [alone(each, kinds) for each in scenes]
+
+
+def test_a_loop_whose_force_is_no_finite_number_fails_as_it_does_alone() -> None:
+    kinds = KINDS | {"counting": Counting}
+    made = pressed()
+    forces = (0.001, 0.002, 0.5, 0.003)
+    scenes = [{**made, "dissipation": [{"kind": "counting", "force_N": f, "acts": "always"}]} for f in forces]
+    expected = [alone(each, kinds) for each in scenes]
+    assert [result["ended"] for result in expected] == ["done", "done", "failed", "done"]
+    assert [result is None for result in together(scenes, kinds)] == [False, False, True, False]
+    assert run_array(scenes, kinds, trajectories=True, fewest=1) == expected
+
+
+def test_a_change_that_is_refused_for_one_loop_is_made_in_the_others() -> None:
+    class Choosy(Element):
+        """Refuses a number that its declaration allows."""
+
+        kind = "choosy"
+        force_N: Annotated[float, Quantity("N", at_least=0)]
+
+        def __post_init__(self) -> None:
+            if self.force_N > 0.25:
+                raise ValueError("too strong")
+
+        def force(self, motion: Motion) -> Any:
+            return -self.force_N * motion.into_wall
+
+    kinds = KINDS | {"choosy": Choosy}
+    made = pressed()
+    scenes = [
+        {**made, "event": [{"at": 0.05, "element": 0, "swap": {"kind": "choosy", "force_N": f, "acts": "always"}}]}
+        for f in (0.1, 0.2, 0.3)
+    ]
+    results = run_array(scenes, kinds, trajectories=True, fewest=1)
+    assert results == [alone(each, kinds) for each in scenes]
+    assert [len(result["energy"]["elements"]) for result in results] == [2, 2, 1]
+
+
+def test_a_loop_that_cannot_go_on_is_a_result_with_its_reason() -> None:
+    class Broken(Element):
+        """Raises."""
+
+        kind = "broken"
+
+        def force(self, motion: Motion) -> Any:
+            raise RuntimeError("out of order")
+
+    made = pressed()
+    broken = {**made, "dissipation": [{"kind": "broken", "acts": "always"}]}
+    first, second = run_array([broken, made], KINDS | {"broken": Broken}, fewest=1)
+    assert (first["ended"], second["ended"]) == ("failed", "done")
+    assert "out of order" in first["why"]
+
+
+def test_scenes_of_many_structures_come_back_in_their_order() -> None:
+    effects: list[dict[str, Any]] = [
+        {},
+        {"friction": {"kinetic": 0.01}},
+        {"jitter": {"kind": "uniform", "most": 0.001}},
+        {"actuator": {"saturation": 0.3, "bandwidth": 200.0}},
+        {"actuator": {"resolution": 0.01}},
+        {"dissipation": []},
+        {"clock": {"round_trip_delay": 0.0}},
+        {"event": [{"at": 0.05, "stop": True}]},
+        {"event": [{"at": 0.0, "stop": True}]},
+        {"event": [{"at": 0.05, "set": {"clock.round_trip_delay": 0.003}}]},
+    ]
+    scenes = [
+        pressed(device={"mass": mass, "damping": 0.1}, **tables, seed=3) for mass in (0.01, 0.02) for tables in effects
+    ]
+    assert run_array(scenes, KINDS, trajectories=True, fewest=1) == [alone(each) for each in scenes]
+
+
+def test_what_is_not_asked_for_is_left_out_and_all_else_stays() -> None:
+    scenes = [pressed(), pressed(friction={"kinetic": 0.01})]
+    whole = run_array(scenes, KINDS, trajectories=True, fewest=1)
+    for result, full in zip(run_array(scenes, KINDS, energy=False, fewest=1), whole, strict=True):
+        assert result == {key: value for key, value in full.items() if key not in ("energy", "trajectory_sha256")}
+
+
+def test_chunks_cover_a_group_and_none_is_longer_than_allowed(monkeypatch: pytest.MonkeyPatch) -> None:
+    scenes = [pressed(wall={"position": -0.002, "stiffness": k}) for k in np.linspace(100, 300, 11).tolist()]
+    seen = []
+
+    class Spy(LoopArray):
+        def __init__(self, chunk: list[dict[str, Any]], *args: Any, **kwargs: Any) -> None:
+            seen.append(len(chunk))
+            super().__init__(chunk, *args, **kwargs)
+
+    monkeypatch.setattr(array_run, "LoopArray", Spy)
+    results = run_array(scenes, KINDS, trajectories=True, fewest=2, most=4)
+    assert seen == [3, 4, 4]
+    assert results == [alone(each) for each in scenes]
+
+
+def test_only_numbers_and_titles_may_differ_within_a_structure() -> None:
+    base = pressed(event=[{"at": 0.05, "set": {"wall.stiffness": 100.0}}])
+    same = copy.deepcopy(base) | {"title": "another", "seed": 9}
+    same["device"]["mass"] *= 2
+    same["event"][0]["set"]["wall.stiffness"] = 50.0
+    assert structure(base) == structure(same)
+    for key, value in {
+        "duration": 0.2,
+        "wall": WALL | {"occupies": "above"},
+        "clock": {**base["clock"], "round_trip_delay": 0.0},
+        "event": [{**base["event"][0], "at": 0.06}],
+        "device": {**base["device"], "damping": 0.0},
+        "velocity": {"cutoff": 50.0},
+    }.items():
+        assert structure(base) != structure({**base, key: value}), key
+
+
+def test_numbers_that_are_equal_stay_one_number() -> None:
+    scenes = [pressed(wall={"position": -0.002, "stiffness": k}) for k in (100.0, 200.0)]
+    made = stacked(scenes)
+    assert made["wall"]["stiffness"].tolist() == [100.0, 200.0]
+    assert made["wall"]["position"] == -0.002
+    assert made["loops"] == 2

@@ -1,0 +1,120 @@
+"""Loops are dropped from every array that can be reached, and from nothing else."""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+
+from haploop.controller.dissipation import Motion
+from haploop.controller.estimators import estimators
+from haploop.launch.array_state import keep
+from haploop.plant.noise import position_noise
+from haploop.plant.random_stream_array import RandomStreamArray
+
+KEPT = np.array([True, False, True, True, False])
+FIVE = np.arange(5.0)
+THREE = [0.0, 2.0, 3.0]
+
+
+class Pair(NamedTuple):
+    a: Any
+    b: Any
+
+
+@dataclass(frozen=True)
+class Frozen:
+    values: np.ndarray
+
+
+class Holder:
+    """All the places an array can be in."""
+
+    def __init__(self) -> None:
+        self.plain, self.table = FIVE.copy(), np.stack([FIVE, FIVE + 10.0])
+        self.shared, self.number, self.text = np.zeros((5, 1)), 5.0, "five!"
+        self.list, self.deque = [FIVE, 1.0], deque([FIVE, FIVE], maxlen=2)
+        self.dict, self.tuple, self.pair = {"a": [FIVE]}, (FIVE, 2), Pair(FIVE, "b")
+        self.frozen, self.me = Frozen(FIVE), self
+        self.objects = np.array([object() for _ in range(5)], object)
+        self.extend = self.list.append
+        remembered = FIVE
+
+        def function() -> Any:
+            return remembered
+
+        self.function = function
+
+
+def test_everything_reached_loses_the_loops() -> None:
+    held = Holder()
+    of_first, of_third = held.objects[0], held.objects[2]
+    keep([held], KEPT)
+    found = [
+        held.plain, held.table[0], held.table[1] - 10.0, held.list[0], *held.deque, held.dict["a"][0], held.tuple[0],
+        held.pair.a, held.frozen.values, held.function(),
+    ]  # fmt: skip
+    assert [values.tolist() for values in found] == [THREE] * len(found)
+    assert held.objects.tolist()[:2] == [of_first, of_third]
+    assert (held.shared.shape, held.number, held.text, held.list[1], held.tuple[1]) == ((5, 1), 5.0, "five!", 1.0, 2)
+    held.extend(7)
+    assert held.list[-1] == 7
+    assert isinstance(held.pair, Pair)
+    assert held.deque.maxlen == 2
+
+
+def test_a_motion_with_slots_loses_the_loops() -> None:
+    motion = Motion(1e-3, -1.0)
+    motion.v = FIVE  # pyright: ignore[reportAttributeAccessIssue]
+    keep([motion], KEPT)
+    assert np.asarray(motion.v).tolist() == THREE
+    assert motion.period_s == 1e-3
+
+
+@pytest.mark.parametrize(
+    "tables",
+    [
+        {"velocity": {"cutoff": np.linspace(10, 50, 5)}},
+        {"velocity": {"estimator": "foaw", "ticks": 3, "bound": np.linspace(1e-5, 5e-5, 5)}},
+        {"velocity": {"estimator": "window", "ticks": 3}, "acceleration": {"cutoff": 30.0}},
+    ],
+)
+def test_estimators_go_on_with_the_loops_that_are_kept(tables: dict[str, Any]) -> None:
+    rng = np.random.default_rng(1)
+    x = rng.normal(size=(12, 5)) * 1e-3
+    whole, cut = (estimators(tables, 1e-3)((x[0],)) for _ in range(2))
+    for tick, row in enumerate(x):
+        if tick == 6:
+            keep([cut], KEPT)
+        of_cut = row[KEPT] if tick >= 6 else row
+        v = whole[0](row, (row,))
+        v_cut = cut[0](of_cut, (of_cut,))
+        assert v_cut.tolist() == (v[KEPT] if tick >= 6 else v).tolist()
+        a, a_cut = whole[1](v, (row,)), cut[1](v_cut, (of_cut,))
+        assert a_cut.tolist() == (a[KEPT] if tick >= 6 else a).tolist()
+
+
+@pytest.mark.parametrize("before", [0, 100, 128, 5000])
+def test_each_loop_draws_what_it_draws_alone_also_after_others_have_left(before: int) -> None:
+    seeds, table = np.array([3, 1, 4, 1, 5]), {"deviation": 2.0, "cutoff": np.linspace(10, 50, 5)}
+    noise = position_noise(table, seeds, 1e-3)
+    alone = [
+        position_noise({"deviation": 2.0, "cutoff": cutoff}, int(seed), 1e-3)
+        for seed, cutoff in zip(seeds, table["cutoff"].tolist(), strict=True)
+    ]
+    for _ in range(before):
+        assert noise().tolist() == [draw() for draw in alone]
+    keep([noise], KEPT)
+    kept = [draw for draw, stays in zip(alone, KEPT, strict=True) if stays]
+    for _ in range(300):
+        assert noise().tolist() == [draw() for draw in kept]
+
+
+def test_draws_cross_the_pieces_of_a_stream_as_those_of_one_loop_do() -> None:
+    from haploop.plant.random_stream import RandomStream
+
+    many, one = RandomStreamArray(np.array([7, 8]), "noise").normal(), RandomStream(8, "noise").normal()
+    assert [many()[1] for _ in range(9000)] == [one() for _ in range(9000)]
