@@ -98,6 +98,7 @@ def test_a_scenes_own_setting_is_one_of_the_candidates(smooth):
     assert settings == [("exact", 1_000), ("exact", 10_000), ("euler", 5_000)]
 
 
+@pytest.mark.slow
 def test_the_command_measures_prints_and_then_only_prints(smooth, tmp_path):
     """A scene without a stored reference: one is made."""
     options = ["--rates", "5k,10000", "--methods", "euler,exact", "--repeats", "1", "--no-processes"]

@@ -78,6 +78,7 @@ def test_a_line_goes_through_its_values_and_is_broken_where_there_are_none(stand
         assert first - 0.03 <= expected <= last + 0.03
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("into_wall", "solid"), [(-1.0, "below"), (1.0, "above")])
 def test_the_wall_is_shaded_on_the_side_of_its_material(into_wall, solid, stand_in, page):
     stand_in.state(wall={"position": 0.005, "stiffness": 150.0, "into_wall": into_wall})
@@ -117,6 +118,7 @@ def test_every_part_has_its_line_its_name_and_its_number(stand_in, page):
     assert len(set(dashes[1:3])) == 2, "elements differ without colour, too"
 
 
+@pytest.mark.slow
 def test_an_element_has_the_same_colour_in_force_energy_and_momentum(stand_in, page):
     stand_in.show(contact())
     settled(page, "force", "unidirectional-inertia")
@@ -130,6 +132,7 @@ def test_an_element_has_the_same_colour_in_force_energy_and_momentum(stand_in, p
     assert colour("force", 1) != colour("force", 2)
 
 
+@pytest.mark.slow
 def test_a_line_can_be_hidden_and_brought_back_and_stays_hidden_in_the_next_picture(stand_in, page):
     stand_in.show(positions([0.004] * ROWS, wall=0.0))
     settled(page, "position", "4.000")
@@ -145,12 +148,14 @@ def test_a_line_can_be_hidden_and_brought_back_and_stays_hidden_in_the_next_pict
     assert seen(page, "position", [0.5], "ink")[0]
 
 
+@pytest.mark.slow
 def test_of_pictures_that_come_faster_than_the_screen_the_last_is_what_stays(stand_in, page):
     for i in range(100):
         stand_in.show(positions([0.001 * i] * ROWS))
     settled(page, "position", "99.000")
 
 
+@pytest.mark.slow
 def test_what_changed_the_run_is_marked_at_its_tick_in_every_chart_over_time_and_listed(stand_in, page):
     events = [
         {"tick": 500, "t_s": 0.5, "text": "element 0 becomes damping (0.8 N s/m)", "kind": "swap"},
@@ -169,6 +174,7 @@ def test_what_changed_the_run_is_marked_at_its_tick_in_every_chart_over_time_and
         assert refused is None, "what was refused took no effect"
 
 
+@pytest.mark.slow
 def test_a_click_on_an_event_shows_its_moment(stand_in, page):
     stand_in.tell({"type": "events", "events": [{"tick": 500, "t_s": 0.5, "text": "set", "kind": "set"}]})
     stand_in.show(contact())
@@ -178,6 +184,7 @@ def test_a_click_on_an_event_shows_its_moment(stand_in, page):
     assert (asked["span_s"], asked["end_s"]) == (pytest.approx(0.2), pytest.approx(0.6))
 
 
+@pytest.mark.slow
 def test_dragging_in_a_chart_looks_closer_and_a_double_click_goes_back_to_now(stand_in, page):
     stand_in.show(contact())
     settled(page, "force", "total")
@@ -194,6 +201,7 @@ def test_dragging_in_a_chart_looks_closer_and_a_double_click_goes_back_to_now(st
     assert stand_in.watches()[-1]["end_s"] is None
 
 
+@pytest.mark.slow
 def test_under_the_cursor_all_charts_tell_their_numbers_of_that_time(stand_in, page):
     stand_in.show(contact())
     settled(page, "energy", "0.300")
@@ -204,6 +212,7 @@ def test_under_the_cursor_all_charts_tell_their_numbers_of_that_time(stand_in, p
         expect(page.locator(f"#{chart} .note")).to_have_text(re.compile(r"at (0\.99|1\.00)\d\d s"))
 
 
+@pytest.mark.slow
 def test_without_wall_or_inertia_the_loops_say_that_there_is_none(stand_in, page):
     stand_in.show(positions([0.001] * ROWS))
     expect(page.locator("#loop .absent")).to_contain_text("No wall")
@@ -214,6 +223,7 @@ def test_without_wall_or_inertia_the_loops_say_that_there_is_none(stand_in, page
     expect(page.locator("#momentum .legend")).to_contain_text("unidirectional-inertia")
 
 
+@pytest.mark.slow
 def test_pressing_and_releasing_are_told_apart_anew_in_every_picture(stand_in, page):
     """A straight way in and, in the next picture, the same way out: each has the one colour and not the other."""
     way_in = [1e-5 * i for i in range(1, 201)]
@@ -257,6 +267,7 @@ def test_the_ideal_spring_is_as_steep_as_the_wall(stand_in, page):
     assert height(75.0) > steep + 0.3
 
 
+@pytest.mark.slow
 def test_a_scene_of_many_elements_is_drawn_with_all_of_them(stand_in, page):
     forces = [(f"element.{i}.damping", "N", f"element {i}: damping", [0.1 * i] * ROWS) for i in range(10)]
     stand_in.show(picture(0.0, 2.0, table("force", 0.0, 2.0 / (ROWS - 1), *forces)))

@@ -73,6 +73,7 @@ def test_a_swap_in_mid_contact_takes_effect_at_its_tick_is_marked_and_stands_in_
     assert books == [("unidirectional-inertia", 0, 1000), ("damping", 1000, 1100)]
 
 
+@pytest.mark.slow
 def test_a_refused_value_is_told_with_the_reason_and_nothing_has_changed(running, viewing):
     run = running(sets=STANDS_AT_1000)
     _, page = viewing()
@@ -93,6 +94,7 @@ def test_a_refused_value_is_told_with_the_reason_and_nothing_has_changed(running
     assert [event for event in events(run) if "swap" in event or "set" in event] == []
 
 
+@pytest.mark.slow
 def test_pause_steps_set_and_pace_reach_the_run(running, viewing):
     run = running(sets=AT_THE_WALL, pace=("--pace", "1"))
     _, page = viewing()
@@ -126,6 +128,7 @@ def test_pause_steps_set_and_pace_reach_the_run(running, viewing):
     ]
 
 
+@pytest.mark.slow
 def test_what_the_page_draws_are_the_numbers_of_the_log(running, viewing):
     """Position, forces and loop of the last 0.1 s, as 32-bit floats, sample by sample."""
     run = running(sets=STANDS_AT_1000)
@@ -161,6 +164,7 @@ def test_what_the_page_draws_are_the_numbers_of_the_log(running, viewing):
     assert np.array_equal(total[::rows], controller["total"][900:1000].astype(np.float32))
 
 
+@pytest.mark.slow
 def test_after_the_end_the_page_shows_what_came_of_the_run_and_then_the_next_run(running, viewing):
     first = running(sets=("duration=1",), pace=("--pace", "2"))
     _, page = viewing()
@@ -176,6 +180,7 @@ def test_after_the_end_the_page_shows_what_came_of_the_run_and_then_the_next_run
     expect(page.locator("#pause")).to_be_enabled()
 
 
+@pytest.mark.slow
 def test_a_viewer_started_anew_on_its_port_is_found_again_but_its_old_link_steers_no_more(running, viewing, launched):
     run = running(sets=STANDS_AT_1000)
     viewer, page = viewing()
@@ -196,6 +201,7 @@ def test_a_viewer_started_anew_on_its_port_is_found_again_but_its_old_link_steer
     stands_at(page, 1001)
 
 
+@pytest.mark.slow
 def test_before_the_first_run_it_waits_and_takes_up_the_run_when_it_comes(running, viewing):
     _, page = viewing()
     expect(page.locator("#waiting")).to_be_visible()
@@ -204,6 +210,7 @@ def test_before_the_first_run_it_waits_and_takes_up_the_run_when_it_comes(runnin
     expect(page.locator("#waiting")).to_be_hidden()
 
 
+@pytest.mark.slow
 def test_the_loop_computes_the_same_bits_whatever_is_watched_and_however(running, viewing):
     sets = ("duration=2", "wall.position=-0.001")
     alone = running(sets=sets, pace=())

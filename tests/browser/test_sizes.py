@@ -97,6 +97,7 @@ def test_nothing_covers_anything_and_no_text_is_cut_off(viewport, stand_in, open
     assert page.evaluate("document.documentElement.scrollWidth") == viewport["width"], "no scrolling sideways"
 
 
+@pytest.mark.slow
 def test_a_box_that_covers_another_would_be_found(stand_in, open_page):
     page = shown(stand_in, open_page, DESK, "light")
     page.evaluate("document.querySelector('#verdict').style.marginLeft = '-300px'")
@@ -106,24 +107,28 @@ def test_a_box_that_covers_another_would_be_found(stand_in, open_page):
     assert "Pause" in page.evaluate(CUT)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("viewport", [DESK, PHONE])
 def test_all_text_is_large_enough_and_stands_out(viewport, stand_in, open_page, scheme):
     page = shown(stand_in, open_page, viewport, scheme)
     assert page.evaluate(FAINT) == []
 
 
+@pytest.mark.slow
 def test_the_charts_of_time_have_one_time_axis_in_common(stand_in, open_page):
     page = shown(stand_in, open_page, DESK, "light")
     boxes = [page.locator(f"#{chart} .u-over").bounding_box() for chart in ("position", "force", "energy")]
     assert len({(box["x"], box["width"]) for box in boxes}) == 1
 
 
+@pytest.mark.slow
 def test_on_a_phone_fingers_find_their_targets(stand_in, open_page):
     page = shown(stand_in, open_page, PHONE, "light", has_touch=True, is_mobile=True)
     for selector in ("#pause", "[data-step='1']", "#stop", "#freeze", "#swap-do", "#swap-damping"):
         assert page.locator(selector).bounding_box()["height"] >= 40, selector
 
 
+@pytest.mark.slow
 def test_the_page_stays_where_it_is_while_numbers_change(stand_in, open_page):
     page = shown(stand_in, open_page, DESK, "light")
     those = ".figures div, .chart, nav > *, #verdict"
@@ -134,6 +139,7 @@ def test_the_page_stays_where_it_is_while_numbers_change(stand_in, open_page):
     assert page.evaluate(places) == before
 
 
+@pytest.mark.slow
 def test_light_and_dark_change_places_while_the_page_is_open(stand_in, open_page):
     page = shown(stand_in, open_page, DESK, "light")
     brightness = """() => {
@@ -151,6 +157,7 @@ def test_light_and_dark_change_places_while_the_page_is_open(stand_in, open_page
     assert page.evaluate(brightness) == "light lines"
 
 
+@pytest.mark.slow
 def test_every_control_has_a_name(stand_in, open_page):
     page = shown(stand_in, open_page, DESK, "light")
     nameless = page.evaluate(

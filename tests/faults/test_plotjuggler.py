@@ -141,6 +141,7 @@ def attached(launched, *arguments):
     return node, re.findall(r"tcp://127\.0\.0\.1:\d+", node.stderr)[0]
 
 
+@pytest.mark.slow
 def test_it_waits_for_a_run_survives_its_end_and_goes_on_with_the_next(running, launched):
     """The times of the second run begin at 0 again, as its own do."""
     node, address = attached(launched)
@@ -172,6 +173,7 @@ def test_a_run_that_was_named_is_the_only_one_and_its_failure_is_told(running, l
     assert "The plant was killed by SIGKILL" in node.stderr
 
 
+@pytest.mark.slow
 def test_stopped_for_long_it_costs_the_run_nothing_and_is_told_what_it_missed(running, launched):
     """Blocks so short that there are far more of them than any queue holds."""
     run = running(sets=("duration=12", "run.block_ticks=10", "event=[{at=0.5, pause=true}]"), pace=())

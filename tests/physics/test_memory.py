@@ -17,7 +17,8 @@ from haploop.protocol.ticks import Timebase
 SCENES = Path(__file__).parents[2] / "launch/scenes"
 
 
-@pytest.mark.parametrize("name", ["fig6c", pytest.param("all_effects", marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["fig6c", "all_effects"])
 def test_plant_and_controller_hold_no_more_in_their_sixth_thousand_ticks_than_in_their_third(name):
     """Blocks are taken as a node takes them; the responses to the hand's force, kept for a while, come and go."""
     scene = load(SCENES / f"{name}.toml", ["duration=60", "diverged_beyond=1e9"])

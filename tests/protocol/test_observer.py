@@ -3,6 +3,7 @@
 import time
 
 import numpy as np
+import pytest
 from live_run import going, undisturbed
 
 from haploop.logger import read
@@ -57,6 +58,7 @@ def test_an_observer_hears_every_tick_of_all_three_streams_and_every_event_at_it
     ]  # fmt: skip
 
 
+@pytest.mark.slow
 def test_one_that_does_not_listen_costs_the_run_no_bit_and_is_told_what_it_missed(tmp_path):
     """Blocks so short that there are far more of them than any queue holds."""
     with going(tmp_path, "duration=30", "run.block_ticks=10", pauses=(7, 29_000)) as subject:

@@ -139,6 +139,7 @@ def test_a_viewer_that_dies_is_no_matter_to_its_run(launched, tmp_path):
     run.end(0)
 
 
+@pytest.mark.slow
 def test_a_viewer_whose_launcher_is_killed_goes_too(launched, tmp_path):
     run = launched("run", str(SCENE), "--set", "duration=600", "--view", out=tmp_path / "out")
     link(run)
@@ -216,6 +217,7 @@ def stopped_for(launched, tmp_path, seconds: float, *overrides: str, **options: 
         viewer.end(0)
 
 
+@pytest.mark.slow
 def test_a_stopped_viewer_costs_the_run_nothing_and_is_told_what_it_missed(launched, tmp_path):
     """At free pace with blocks of 10 ticks, so that its queues are full in no time."""
     stopped_for(launched, tmp_path, 2.5, "duration=40", "run.block_ticks=10", "run.log=ticks")
