@@ -8,42 +8,17 @@ from typing import Annotated, Any
 
 import numpy as np
 import pytest
+from array_makers import PUSH, alone, diverging, pressed, together
 from physics.varied_scenes import drawn_base, varied
-from scene_makers import KINDS, WALL, scene
+from scene_makers import KINDS, WALL
 
 from haploop.controller.dissipation import Element, Motion, Quantity, where
 from haploop.launch import array_loop, array_run
 from haploop.launch.array_loop import LoopArray
 from haploop.launch.array_run import run_array
 from haploop.launch.array_scene import runs_in_arrays, stacked, structure
-from haploop.launch.in_process import run_in_process
-from haploop.logger.summary import OF_THE_MACHINE
-
-PUSH = {"mass": 0.01, "stiffness": 10.0, "damping": 0.01, "force": {"kind": "ramp", "value": -0.8, "rise_time": 0.05}}
-
-
-def alone(made: dict[str, Any], kinds: dict[str, type[Element]] = KINDS) -> dict[str, Any]:
-    summary = run_in_process(made, kinds)
-    return {key: value for key, value in summary.items() if key not in OF_THE_MACHINE}
-
-
-def together(scenes: list[dict[str, Any]], kinds: dict[str, type[Element]] = KINDS) -> list[dict[str, Any] | None]:
-    loops = LoopArray(scenes, kinds, trajectories=True)
-    loops.run()
-    return loops.results
-
-
-def pressed(**tables: Any) -> dict[str, Any]:
-    """A hand pushes the device into a wall with a damper."""
-    whole: dict[str, Any] = {
-        "duration": 0.15,
-        "clock": {"round_trip_delay": 0.0013},
-        "hand": PUSH,
-        "encoder": {"resolution": 1e-5},
-        "wall": {"position": -0.002, "stiffness": 300.0},
-        "dissipation": [{"kind": "damping", "damping": 0.2}],
-    }
-    return scene(**{**whole, **tables})
+from haploop.plant import motion_array
+from haploop.plant.linear_motion_array import LinearMotionArray
 
 
 @pytest.mark.parametrize("seed", range(40))
@@ -90,20 +65,6 @@ def test_how_the_loops_are_cut_into_blocks_changes_nothing(monkeypatch: pytest.M
     assert results[0] == results[1] == results[2]
 
 
-def diverging() -> list[dict[str, Any]]:
-    """Some of these swing up and away, each at its time; some do not."""
-    return [
-        pressed(
-            duration=0.6,
-            diverged_beyond=0.05,
-            clock={"round_trip_delay": 0.004},
-            dissipation=[{"kind": "damping", "damping": damping, "acts": "always"}],
-            velocity={"estimator": "foaw", "ticks": 4},
-        )
-        for damping in np.linspace(1.0, 12.0, 16).tolist()
-    ]
-
-
 def test_loops_that_diverge_leave_with_their_results_and_disturb_no_other() -> None:
     scenes = diverging()
     expected = [alone(each) for each in scenes]
@@ -127,12 +88,12 @@ def test_what_all_loops_share_stays_whole_when_some_are_dropped() -> None:
 def test_loops_that_have_ended_are_dropped_from_the_arrays(monkeypatch: pytest.MonkeyPatch) -> None:
     sizes = []
 
-    class Spy(array_loop.LinearMotionArray):
+    class Spy(LinearMotionArray):
         def advance(self, tick: int, holds: Any) -> None:
             super().advance(tick, holds)
             sizes.append(len(self.x))
 
-    monkeypatch.setattr(array_loop, "LinearMotionArray", Spy)
+    monkeypatch.setattr(motion_array, "LinearMotionArray", Spy)
     scenes = diverging()
     together(scenes)
     assert sizes[0] == len(scenes)

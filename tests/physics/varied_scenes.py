@@ -9,7 +9,7 @@ from physics.random_scenes import tables_of
 from scene_makers import scene
 
 # Numbers that scenes of one structure share.
-_SHARED = {"clock", "duration", "at", "time", "run", "diverged_beyond"}
+_SHARED = {"clock", "duration", "at", "delay", "time", "run", "diverged_beyond"}
 ESTIMATORS: list[dict[str, Any]] = [
     {},
     {"velocity": {"cutoff": 90.0}, "acceleration": {"cutoff": 60.0}},
@@ -32,6 +32,28 @@ def drawn_base(seed: int) -> dict[str, Any]:
     if seed % 3 == 1:
         tables["actuator"] = {"saturation": 0.25} | ({"resolution": 2e-3} if seed % 2 else {})
     tables |= ESTIMATORS[seed % len(ESTIMATORS)] if "encoder" in tables else {}
+    return scene(**tables)
+
+
+def drawn_chain(seed: int) -> dict[str, Any]:
+    """Bodies in a row, with any of a cable, a grip, an actuator's bandwidth and an accelerometer that is not ideal."""
+    rng = np.random.default_rng([seed, 1])
+    tables = tables_of(seed, rng)
+    tables |= {"seed": seed, "duration": 0.15}
+    if seed % 2:
+        tables["transmission"] = {"motor_mass": 0.02, "stiffness": 2e4, "damping": 0.4, "motor_damping": 0.05}
+    if seed % 3 == 0 and "hand" in tables:
+        tables["hand"] = {**tables["hand"], "grip": {"stiffness": 600.0, "damping": 2.0}}
+    if seed % 4 < 2 or seed % 6 == 2:
+        limits = {"saturation": 0.25, "resolution": 2e-3} if seed % 5 < 2 else {}
+        tables["actuator"] = {"bandwidth": rng.uniform(100.0, 400.0), **limits}
+    if seed % 5 > 1:
+        step_s = 1.0 / tables["clock"]["plant_rate"]
+        sensor: dict[str, Any] = {"range": 15.0, "resolution": 0.01, "noise_density": 3e-3, "bias": 0.1}
+        sensor |= {"bandwidth": 260.0, "delay": 3 * step_s}
+        for name in rng.choice(sorted(sensor), rng.integers(3), replace=False):
+            del sensor[name]
+        tables |= {"accelerometer": sensor, "acceleration": {"source": "accelerometer"}}
     return scene(**tables)
 
 

@@ -14,9 +14,9 @@ from haploop.launch.array_state import keep
 from haploop.launch.in_process import scene_events
 from haploop.logger.logger_array import End, LoggerArray
 from haploop.plant.command_line import line_of
-from haploop.plant.linear_motion_array import LinearMotionArray
+from haploop.plant.motion_array import motion_of
 from haploop.plant.plant import beyond
-from haploop.plant.sensors import accelerometer_is_used, position_sensor
+from haploop.plant.sensors import accelerometer, accelerometer_is_used, position_sensor
 from haploop.protocol.ticks import Timebase
 
 if TYPE_CHECKING:
@@ -58,8 +58,8 @@ class LoopArray:
     ) -> None:
         self._scenes, scene = scenes, stacked(scenes)
         self._time = time = Timebase.of(scene["clock"], scene["duration"])
-        self._motion, self._line = LinearMotionArray(scene, time), line_of(scene, time)
-        self._quantise = position_sensor(scene, time)
+        self._motion, self._line = motion_of(scene, time), line_of(scene, time)
+        self._quantise, self._sensor = position_sensor(scene, time), accelerometer(scene, time)
         self._feels = accelerometer_is_used(scene)
         self._controller = ControllerArray(scene, time, kinds)
         self._logger = LoggerArray(scene, time, energy=energy, trajectories=trajectories)
@@ -106,7 +106,7 @@ class LoopArray:
 
     def _work(self, tick: int) -> None:
         motion, x_m = self._motion, self._quantise(self._motion.x)
-        sample = (x_m, motion.acceleration(tick)) if self._feels else (x_m,)
+        sample = (x_m, self._felt(tick)) if self._feels else (x_m,)
         forces = self._controller.answer([sample])
         self._line.receive(forces)
         self._in_flight += forces
@@ -114,6 +114,10 @@ class LoopArray:
         waiting = tick + 1 - self._logger.tick
         if waiting * self._time.steps_per_tick * len(self._ended) >= BLOCK:
             self._book()
+
+    def _felt(self, tick: int) -> Any:
+        acceleration = self._motion.acceleration(tick)
+        return self._sensor.reading(acceleration) if self._sensor else acceleration
 
     def _book(self) -> None:
         rows = self._controller.recorder.take_rows()
@@ -144,13 +148,16 @@ class LoopArray:
                 index = int(self._scene_of[place])
                 ends[index] = End(place, self._scenes[index], float(x[place]), float(v[place]), reason)
         counted = dict.fromkeys(self._line.tallies, getattr(self._line, "saturated", 0))
+        if self._sensor:
+            counted |= dict.fromkeys(self._sensor.tallies, getattr(self._sensor, "clipped", 0))
         outcomes = self._logger.outcomes(list(ends.values()), ended, counted)
         for index, outcome in zip(ends, outcomes, strict=True):
             self.results[index] = outcome
 
     def _drop_ended(self) -> None:
         on = ~self._ended
-        keep([self._motion, self._line, self._quantise, self._controller, self._logger, self._in_flight], on)
+        parts = [self._motion, self._line, self._quantise, self._sensor, self._controller, self._logger]
+        keep([*parts, self._in_flight], on)
         self._limit_m = self._limit_m[on] if isinstance(self._limit_m, np.ndarray) else self._limit_m
         self._scene_of, self._ended = self._scene_of[on], self._ended[on]
 

@@ -7,36 +7,39 @@ from typing import Any
 
 import numpy as np
 
+from haploop.plant.chain import Chain
 from haploop.plant.flow import real_for
 from haploop.plant.mechanics import Mechanics
-from haploop.plant.motion import needs_chain
-from haploop.plant.sensors import accelerometer_is_used
+from haploop.plant.motion import integrator_of, needs_chain
 from haploop.protocol.ticks import DELAY
 
 # What says nothing of what is simulated.
 _ASIDE = ("title", "seed", "run")
-_TIMES = ("clock", "duration", "at")
+_TIMES = ("clock", "duration", "at", "delay")
 
 
 def runs_in_arrays(scene: dict[str, Any]) -> bool:
     """Whether a resolved scene's loop takes the same way whatever its numbers, so that many run as one.
 
-    Not so: bodies in a row and what moves them with jitter, loss, friction or another integrator than the exact flow;
-    an accelerometer that is not ideal; a delay that changes; a device whose damping needs the widest float.
+    Not so: friction, jitter, loss, another integrator than the exact flow; a delay that changes; bodies whose damping
+    needs the widest float.
     """
-    if needs_chain(scene) or ("accelerometer" in scene and accelerometer_is_used(scene)):
+    if integrator_of(scene) != "exact" or scene.keys() & {"friction", "jitter", "loss"}:
         return False
     if any(DELAY in event.get("set", {}) for event in scene.get("event", [])):
         return False
+    step_s = 1.0 / scene["clock"]["plant_rate"]
+    if needs_chain(scene):
+        return Chain.of(scene).real_for(step_s) is np.float64
     m = Mechanics.of(scene)
-    return real_for(m.damping / m.mass_kg, 1.0 / scene["clock"]["plant_rate"]) is np.float64
+    return real_for(m.damping / m.mass_kg, step_s) is np.float64
 
 
 def structure(scene: dict[str, Any]) -> Hashable:
     """What scenes that are stacked must have in common: all but the values of their numbers.
 
-    Times are common, too: the clock, the duration, when events come, the points of a recorded force. So is whether a
-    number is 0, which may mean that something is not there.
+    Times are common, too: the clock, the duration, delays, when events come, the points of a recorded force. So is
+    whether a number is 0, which may mean that something is not there.
     """
     shared = {key: value for key, value in scene.items() if key not in _ASIDE}
     return _structure(shared, by_value=False)

@@ -1,8 +1,9 @@
-"""Dropping loops from everything that holds an array of them."""
+"""Reaching every array that something holds, to drop loops from it or to put another in its place."""
 
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Callable
 from types import BuiltinFunctionType, FunctionType, MethodType, ModuleType
 from typing import Any
 
@@ -20,22 +21,39 @@ def keep(root: Any, loops: np.ndarray) -> None:
     Args:
         loops: whether each loop is kept, shape (loops,).
     """
+
+    def kept(array: np.ndarray) -> np.ndarray:
+        is_over_loops = array.ndim and array.shape[-1] == len(loops)
+        return np.compress(loops, array, axis=-1) if is_over_loops else array
+
     if len(loops) > 1:
-        _Keeper(loops).visit(root)
+        replace_arrays(root, kept)
 
 
-class _Keeper:
+def replace_arrays(root: Any, change: Callable[[np.ndarray], np.ndarray]) -> None:
+    """Put ``change(array)`` in place of every array that can be reached from ``root``, place by place.
+
+    Attributes, slots, containers and what functions close over are followed, always in the same order.
+    """
+    replace(root, np.ndarray, change)
+
+
+def replace(root: Any, kinds: type | tuple[type, ...], change: Callable[[Any], Any]) -> None:
+    """The same for everything of some kinds."""
+    _Walk(kinds, change).visit(root)
+
+
+class _Walk:
     """One walk through everything."""
 
-    def __init__(self, loops: np.ndarray) -> None:
-        self._loops = loops
+    def __init__(self, kinds: type | tuple[type, ...], change: Callable[[Any], Any]) -> None:
+        self._kinds, self._change = kinds, change
         self._seen: dict[int, Any] = {}
 
     def visit(self, value: Any) -> Any:
-        """What takes the place of ``value``; all but arrays and tuples stay what they are."""
-        if isinstance(value, np.ndarray):
-            is_over_loops = value.ndim and value.shape[-1] == len(self._loops)
-            return np.compress(self._loops, value, axis=-1) if is_over_loops else value
+        """What takes the place of ``value``; all but what is to be replaced and tuples stay what they are."""
+        if isinstance(value, self._kinds):
+            return self._change(value)
         if isinstance(value, tuple):
             items = [self.visit(item) for item in value]
             changed = any(new is not old for new, old in zip(items, value, strict=True))

@@ -41,6 +41,11 @@ class ControllerArray(Controller):
         super().__init__(scene, time, kinds)
         self.recorder = RecorderArray(self._wall, self._slots, history_ticks=0)
 
+    @property
+    def carried(self) -> list[Any]:
+        """What remembers from tick to tick; a tick must have been answered."""
+        return [self._velocity, self._acceleration, self._wall, self._slots, self._motion]
+
     @staticmethod
     def _number(force: Any) -> Any:
         """What is no number raises, as ``float`` does."""

@@ -92,12 +92,20 @@ class FusedKalman(Kalman):
 
 def kalman_of(scene: dict[str, Any], period_s: float) -> partial[Kalman]:
     """The filter of a scene's ``[velocity]`` table, to be started with the first sample."""
-    table, noises = scene["velocity"], [position_noise_m(scene)]
-    if table.get("accelerometer"):
-        noises.append(table.get("accelerometer_noise", _accelerometer_noise_m_s2(scene, period_s)))
+    table, noises = scene["velocity"], assumed_noises(scene, period_s).values()
     gain = each(lambda jerk, *noises: steady_state(jerk, list(noises), period_s)[0], table["jerk_density"], *noises)
     rows = gain.tolist() if gain.ndim == 2 else [list(row) for row in gain]
     return partial(FusedKalman if len(noises) > 1 else Kalman, rows, period_s)
+
+
+def assumed_noises(scene: dict[str, Any], period_s: float) -> dict[str, float]:
+    """The standard deviations that the filter of a scene counts on, by their keys in ``[velocity]``."""
+    table = scene["velocity"]
+    noises = {"measurement_noise": position_noise_m(scene)}
+    if table.get("accelerometer"):
+        noise = table.get("accelerometer_noise", _accelerometer_noise_m_s2(scene, period_s))
+        noises["accelerometer_noise"] = noise
+    return noises
 
 
 def jerk_density_limits(noise_m: float, period_s: float) -> tuple[float, float]:

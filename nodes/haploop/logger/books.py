@@ -21,6 +21,16 @@ if TYPE_CHECKING:
     from haploop.logger.tape_array import ControllerTapeArray
 
 
+def sampled_flow(x_m: np.ndarray, force: np.ndarray) -> np.ndarray:
+    """-f[k-1] (x_m[k] - x_m[k-1]), J (Choi et al. 2022, eq. 4).
+
+    Args:
+        x_m: positions as measured at consecutive ticks, m, shape (ticks + 1,).
+        force: commanded at all of them but the last, N, shape (ticks,) or (forces, ticks).
+    """
+    return force * -np.diff(x_m, axis=0)
+
+
 class Books:
     """Running energies in joules; positive for the wall and the elements means taken out of the device.
 
@@ -163,11 +173,11 @@ class Books:
     ) -> np.ndarray:
         """-f[k-1] (x_m[k] - x_m[k-1]) for every tick; nothing at the first tick there is."""
         first, end = max(tick - 1, tape.first), tick + ticks
-        way_back = -np.diff(tape.rows("x", first, end), axis=0)
+        x_m = tape.rows("x", first, end)
         known = slice(first - tape.first, end - 1 - tape.first)
-        added = np.zeros((len(forces), ticks, *way_back.shape[1:]))
+        added = np.zeros((len(forces), ticks, *x_m.shape[1:]))
         for row, force in zip(added, forces, strict=True):
-            row[ticks - len(way_back) :] = force[known] * way_back
+            row[ticks + 1 - len(x_m) :] = sampled_flow(x_m, force[known])
         return added
 
     def of_loop(self, loop: int) -> Books:

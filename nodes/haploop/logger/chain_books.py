@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
+from functools import reduce
+from itertools import accumulate
+from operator import add
 from typing import Any
 
 import numpy as np
 
-from haploop.logger.chain_forms import ChainForms
+from haploop.logger.chain_forms import ChainForms, ChainFormsArray
 from haploop.logger.chain_moves import Columns, Moves
 from haploop.logger.plant_books import beyond_limits
 from haploop.logger.sums import sum_rows
 from haploop.plant.chain import Chain
-from haploop.plant.hand_force import HandForce
+from haploop.plant.hand_force import hand_force
+from haploop.protocol.arrays import first_row
 from haploop.protocol.ticks import Timebase
 
 
@@ -39,8 +43,8 @@ class ChainBooks:
     def __init__(self, scene: dict[str, Any], time: Timebase) -> None:
         # A sensor takes no energy.
         self._chain = replace(Chain.of(scene), sensor=None)
-        self._tau = HandForce(scene.get("hand", {}).get("force"), time.plant_rate)
-        self._forms = ChainForms(self._chain, time.step_s)
+        self._tau = hand_force(scene, time.plant_rate)
+        self._forms = (ChainFormsArray if "loops" in scene else ChainForms)(self._chain, time.step_s)
         self._rubs, self._is_limited = "friction" in scene, "actuator" in scene
         self._heats = [name for name in self._forms.names if name.endswith("_heat")]
         friction, actuator = ["friction_heat"] * self._rubs, ["actuator"] * self._is_limited
@@ -49,11 +53,11 @@ class ChainBooks:
 
     def increments(
         self, first_step: int, columns: Columns, dx: np.ndarray, commanded: Iterable[np.ndarray]
-    ) -> np.ndarray:
+    ) -> Iterator[np.ndarray]:
         """What each step adds to each book, J; see ``PlantBooks.increments``."""
         moves, steps = Moves.of(self._chain, first_step, columns), len(dx)
         tau, force = self._tau.at_steps(first_step, first_step + steps + 1), columns["force"][:-1]
-        rise = np.diff(tau)[moves.step]
+        rise = np.diff(tau, axis=0)[moves.step]
         start = tau[:-1][moves.step] + rise * moves.elapsed
         found = self._forms.integrals(moves, force[moves.step], start, rise)
         integrals = dict(zip(self._forms.names, found, strict=True))
@@ -64,15 +68,14 @@ class ChainBooks:
         if self._rubs:
             books["friction_heat"] = -moves.friction * moves.ways[0] + moves.snap
         books |= {"kinetic": self._kinetic(moves), "spring": self._spring(moves, way)}
+        for name, book in books.items():
+            by_step = _by_step(book, moves.step, steps)
+            if name == "friction_heat":
+                self.least_friction_J = min(self.least_friction_J, float(by_step.min(initial=0.0)))
+            yield by_step
         if self._is_limited:
-            books["actuator"] = integrals.get("lag", np.zeros(len(moves.step)))
-        by_step = np.stack([_by_step(books[name], moves.step, steps) for name in self.names])
-        if self._rubs:
-            least = by_step[self.names.index("friction_heat")].min(initial=0.0)
-            self.least_friction_J = min(self.least_friction_J, float(least))
-        if self._is_limited:
-            by_step[-1] += beyond_limits(commanded, force) * dx
-        return by_step
+            lag = _by_step(integrals.get("lag", np.zeros(way.shape)), moves.step, steps)
+            yield lag + beyond_limits(commanded, force) * dx
 
     def _kinetic(self, moves: Moves) -> np.ndarray:
         n, masses = self._chain.count, self._chain.masses_kg
@@ -88,15 +91,15 @@ class ChainBooks:
             parts.append(link.stiffness * change * (stretch + change / 2.0))
         return sum_rows(parts)
 
-    def stored_J(self, columns: Columns) -> float:
+    def stored_J(self, columns: Columns) -> Any:
         """Kinetic and spring energy in the first state of some telemetry."""
         chain, n = self._chain, self._chain.count
-        state = [float(columns[name][0]) for name in chain.states]
-        velocities = np.cumsum(state[n : 2 * n]).tolist()
-        stiffness, rest = chain.spring
+        state = [first_row(columns[name]) for name in chain.states]
+        (stiffness, rest), velocities = chain.spring, accumulate(state[n : 2 * n])
         energies = [mass * v * v for mass, v in zip(chain.masses_kg, velocities, strict=True)]
         energies += [link.stiffness * s * s for link, s in zip(chain.links, state[1:n], strict=True)]
-        return sum([*energies, stiffness * (sum(state[:n]) - rest) ** 2]) / 2.0
+        beyond = reduce(add, state[:n]) - rest
+        return reduce(add, [*energies, stiffness * beyond * beyond]) / 2.0
 
 
 def _by_step(values: np.ndarray, step: np.ndarray, steps: int) -> np.ndarray:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from haploop.logger.chain_moves import Moves
 from haploop.plant.chain import Chain
 from haploop.plant.chain_flow import ChainIntegrals
-from haploop.plant.flow import real_for
+from haploop.plant.chain_tables import tables_of
 
 
 class ChainForms:
@@ -22,20 +24,16 @@ class ChainForms:
     def __init__(self, chain: Chain, step_s: float) -> None:
         self._chain = chain
         self._flows = {stuck: ChainIntegrals(chain, step_s, stuck) for stuck in (False, True)}
-        n = chain.count
-        damping_rate = np.abs(chain.rates()[n : 2 * n, n : 2 * n]).max()
-        self._real = real_for(float(damping_rate), step_s)
+        self._real = chain.real_for(step_s)
         self._rates = {stuck: chain.rates(stuck).astype(self._real) for stuck in (False, True)}
         self._made: dict[tuple[int, bool], tuple[np.ndarray, np.ndarray]] = {}
         bodies, rates = _velocities(chain)
         self._products = [(damping, bodies[body], bodies[body]) for body, damping in chain.grounded.values()]
         self._products += [(link.damping, *[rates[i + 1]] * 2) for i, link in enumerate(chain.links)]
-        self.names = [f"{name}_heat" for name in (*chain.grounded, *(link.name for link in chain.links))]
         if chain.actuator_rate is not None:
             force = np.eye(len(chain.states))[chain.states.index("actuator")]
             self._products.append((1.0 / chain.actuator_rate, force, bodies[0]))
-            self.names.append("lag")
-        self.names.append("swing")
+        self.names = names_of(chain)
         self._last = bodies[-1]
 
     def integrals(self, moves: Moves, force: np.ndarray, tau: np.ndarray, rise: np.ndarray) -> np.ndarray:
@@ -53,17 +51,17 @@ class ChainForms:
         # The hand's spring pulls as far as it is from its rest; so written no digits go to where the rest lies.
         states = moves.states.copy()
         states[0] = states[0] - self._chain.spring[1] + moves.lows[0]
-        acting = np.concatenate([states, [force, moves.friction, tau]]).astype(self._real)
-        result = np.empty((len(self.names), len(force)))
+        acting = [of.astype(self._real, copy=False) for of in (*states, force, moves.friction, tau)]
+        result = np.empty((len(self.names), *force.shape))
         for level, stuck, which in moves.groups():
-            rates = _matrix_times(self._rates[stuck], acting[:, which])
-            w = np.concatenate([rates, [rise[which]]])
-            products, swing = self._forms(level, stuck)
+            rates = [_sum_of(row, acting, which) for row in self._rates[stuck]]
+            w = [*rates, rise[which]]
+            products, swing = self.forms(level, stuck)
             result[:-1, which] = _forms_of(products, w)
-            result[-1, which] = _matrix_times(swing[None], w)[0]
+            result[-1, which] = _sum_of(swing, w, slice(None))
         return result
 
-    def _forms(self, level: int, stuck: bool) -> tuple[np.ndarray, np.ndarray]:
+    def forms(self, level: int, stuck: bool) -> tuple[np.ndarray, np.ndarray]:
         """(forms of all products, shape (products, rates, rates); form of the swing, shape (rates,))."""
         if (level, stuck) not in self._made:
             flow = self._flows[stuck]
@@ -79,19 +77,36 @@ def _velocities(chain: Chain) -> tuple[np.ndarray, np.ndarray]:
     return chain.absolute() @ rates, rates
 
 
-def _matrix_times(matrix: np.ndarray, columns: np.ndarray) -> np.ndarray:
-    """Their product, term by term in a fixed order (a matrix product may reorder with its size)."""
-    total = np.zeros((len(matrix), columns.shape[1]), columns.dtype)
-    for row, entries in enumerate(matrix):
-        for entry, column in zip(entries.tolist(), columns, strict=True):
-            if entry:
-                total[row] += entry * column
+class ChainFormsArray(ChainForms):
+    """``ChainForms`` of many loops without friction, whose forms need no wide float; all arrays have a last axis."""
+
+    def __init__(self, chain: Chain, step_s: float) -> None:
+        def made(chain: Chain) -> tuple[np.ndarray, ...]:
+            return chain.rates().astype(float), *ChainForms(chain, step_s).forms(level=0, stuck=False)
+
+        rates, products, swing = tables_of(made, chain)
+        self._chain, self._real, self.names = chain, np.float64, names_of(chain)
+        self._rates, self._made = {False: rates}, {(0, False): (products, swing)}
+
+
+def names_of(chain: Chain) -> list[str]:
+    """What ``ChainForms.integrals`` tells, in its order."""
+    heats = [f"{name}_heat" for name in (*chain.grounded, *(link.name for link in chain.links))]
+    return [*heats, *["lag"] * (chain.actuator_rate is not None), "swing"]
+
+
+def _sum_of(factors: np.ndarray, columns: Sequence[np.ndarray], which: slice | np.ndarray) -> np.ndarray:
+    """The sum of factor times column, term by term in a fixed order (a matrix product may reorder with its size)."""
+    total = np.zeros_like(columns[0][which])
+    for factor, column in zip(factors, columns, strict=True):
+        if factor.any():
+            total = total + factor * column[which]
     return total
 
 
-def _forms_of(forms: np.ndarray, w: np.ndarray) -> np.ndarray:
+def _forms_of(forms: np.ndarray, w: Sequence[np.ndarray]) -> np.ndarray:
     """w' Q w of every form Q and every column of w, in a fixed order; shape (forms, columns)."""
-    total = np.zeros((len(forms), w.shape[1]), w.dtype)
+    total = np.zeros((len(forms), *w[0].shape), w[0].dtype)
     for i in range(len(w)):
         for j in range(i, len(w)):
             entries = forms[:, i, j] if i == j else 2.0 * forms[:, i, j]

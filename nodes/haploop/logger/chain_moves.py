@@ -28,6 +28,8 @@ class Moves:
         changes: change of every rate, up to where the next begins, shape (lengths, moves), m/s.
         friction: on body 0, N.
         snap: kinetic energy friction took from body 0 in stopping it at the end, J.
+
+    All but ``step`` may have a last axis for many loops, whose steps are all whole; of length 1 where they are alike.
     """
 
     step: np.ndarray
@@ -45,33 +47,34 @@ class Moves:
     def of(cls, chain: Chain, first_step: int, columns: Columns) -> Moves:
         """Read the columns of some intervals, their end state included; see PLANT_BLOCK in the protocol."""
         n, steps = chain.count, len(columns["x"]) - 1
-        zero = np.zeros(steps + 1)
+        zero = np.zeros((steps + 1, *[1] * (columns["x"].ndim - 1)))
 
         def table(name: str) -> np.ndarray:
             """A column at every step, at the end, and where every piece begins; 0 in a row that has none."""
-            return np.concatenate([columns.get(name, zero), columns.get(f"pieces.{name}", zero[:0])])
+            column, of_pieces = columns.get(name, zero), columns.get(f"pieces.{name}", zero[:0])
+            return np.concatenate([column, of_pieces]) if len(of_pieces) else column
 
-        step, begins = _in_order(steps, columns.get("pieces.step", zero[:0]).astype(np.int64) - first_step)
-        path = np.append(begins, steps)
-        states = np.stack([table(name) for name in chain.states])[:, path]
-        lows = np.stack([table(f"{name}_low") for name in chain.positions])[:, path]
+        step, begins = _in_order(steps, columns.get("pieces.step", zero[:0]).ravel().astype(np.int64) - first_step)
+        path = np.append(begins, steps) if len(begins) > steps else slice(None)
+        states = np.stack([table(name)[path] for name in chain.states])
+        lows = np.stack([table(f"{name}_low")[path] for name in chain.positions])
         level = table("level")[begins].astype(np.int64)
         return cls(
             step=step,
             level=level,
             is_stuck=table("stuck")[begins] > 0.0,
-            elapsed=_elapsed(step, level),
+            elapsed=_elapsed(step, level.ravel()).reshape(level.shape),
             states=states[:, :-1],
             lows=lows[:, :-1],
-            ways=np.diff(states[:n]) + np.diff(lows),
-            changes=np.diff(states[n : 2 * n]),
+            ways=np.diff(states[:n], axis=1) + np.diff(lows, axis=1),
+            changes=np.diff(states[n : 2 * n], axis=1),
             friction=table("friction")[begins],
             snap=table("snap_J")[begins],
         )
 
     def groups(self) -> list[tuple[int, bool, np.ndarray | slice]]:
         """(level, is_stuck, which moves) of all moves that last equally long under the same flow."""
-        kinds = self.level * 2 + self.is_stuck
+        kinds = (self.level * 2 + self.is_stuck).ravel()
         found = np.unique(kinds).tolist()
         if len(found) == 1:
             return [(found[0] // 2, bool(found[0] % 2), slice(None))]

@@ -83,15 +83,15 @@ class PlantBooks:
     ) -> Iterator[np.ndarray]:
         m, x, v, force = self.mechanics, columns["x"], columns["v"], columns["force"][:-1]
         tau = self._tau.at_steps(first_step, first_step + len(x))
-        start_x, start_v, dv = x[:-1], v[:-1], np.diff(v, axis=0)
-        rise = np.diff(tau, axis=0)
-        wide_v = np.asarray(start_v, self._real)
+        start_x, start_v, dv = x[:-1], v[:-1], v[1:] - v[:-1]
+        rise = tau[1:] - tau[:-1]
+        wide_v = start_v.astype(self._real, copy=False)
         stretch = start_x - m.rest_m
         net = force + tau[:-1] - m.damping * wide_v - m.stiffness * stretch
         scale = 1.0 / (m.mass_kg * self._rate)
         rates = [wide_v, net * scale, rise * scale]
         yield self._hand_work(tau, rise, dx, rates)
-        square = sum_products(self._square, rates if rise.any() else rates[:2])
+        square = sum_products(self._square, rates if self._rises(rise) else rates[:2])
         for damping in m.dampers.values():
             yield damping * square
         yield m.mass_kg * dv * (start_v + dv * 0.5)
@@ -99,8 +99,13 @@ class PlantBooks:
         if self._is_limited:
             yield beyond_limits(commanded, force) * dx
 
+    @staticmethod
+    def _rises(rise: np.ndarray) -> bool:
+        """Whether the force of the hand changes over any step."""
+        return bool(rise.any())
+
     def _hand_work(self, tau: np.ndarray, rise: np.ndarray, dx: np.ndarray, rates: Sequence[np.ndarray]) -> np.ndarray:
-        if not rise.any():
+        if not self._rises(rise):
             return tau[:-1] * dx
         lagged = self._lag[0] * rates[0] + self._lag[1] * rates[1] + self._lag[2] * rates[2]
         return (tau[:-1] + rise / 2.0) * dx + rise * lagged

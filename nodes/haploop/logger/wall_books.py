@@ -43,9 +43,10 @@ def ideal_and_undelayed(
         Shape (ticks * n,) each, ordered as ``CAUSES``; all arrays may have a last axis for many loops.
     """
     n, (position, stiffness) = steps_per_tick, wall
-    depth = np.maximum(0.0, (x - position) * into_wall)
+    xp = x.__array_namespace__()
+    depth = xp.maximum(0.0, (x - position) * into_wall)
     before, after = depth[:-1], depth[1:]
     held = into_wall * stiffness * depth[:-1:n]
     yield stiffness * (after - before) * (after + before)
-    yield np.repeat(held, n, axis=0) * dx
-    yield np.repeat(-force, n, axis=0) * dx
+    yield xp.repeat(held, n, axis=0) * dx
+    yield xp.repeat(-force, n, axis=0) * dx

@@ -19,14 +19,16 @@ class WindowArray:
 
     Args:
         resolutions_m: encoder step of each loop, 0 without one; a number, or shape (loops,).
+        spare_ticks: ticks to be kept beyond the window.
     """
 
-    def __init__(self, time: Timebase, resolutions_m: float | np.ndarray, loops: int) -> None:
-        self._time = time
-        kept = min(keep_steps(time.plant_rate), time.ticks * time.steps_per_tick)
+    def __init__(self, time: Timebase, resolutions_m: float | np.ndarray, loops: int, *, spare_ticks: int = 0) -> None:
+        self._time, n = time, time.steps_per_tick
+        kept_ticks = min(keep_steps(time.plant_rate) // n + 2, time.ticks + 1) + spare_ticks
         self._resolutions = np.broadcast_to(resolutions_m, loops)
-        self._x = np.zeros((kept + 1, loops))
-        self._ticks = {name: np.zeros((kept // time.steps_per_tick + 1, loops)) for name in CONTROLLER_COLUMNS}
+        # The state at step s is in row s - 1, so that an interval, but for its start, lies in one piece.
+        self._x = np.zeros((kept_ticks * n, loops))
+        self._ticks = {name: np.zeros((kept_ticks, loops)) for name in CONTROLLER_COLUMNS}
         self._steps = 0
         self._x_min, self._x_max = np.full(loops, np.inf), np.full(loops, -np.inf)
         self._force_max = np.zeros(loops)
@@ -40,9 +42,9 @@ class WindowArray:
             rows: one a tick.
         """
         if not self._steps:
-            self._x[0] = x[0]
+            self._x[-1] = x[0]
         ticks = self._steps // self._time.steps_per_tick
-        _write(self._x, self._steps + 1, x[1:])
+        _write(self._x, self._steps, x[1:])
         for tick, row in enumerate(rows, ticks):
             for name, ring in self._ticks.items():
                 ring[tick % len(ring)] = row.columns[name]
@@ -57,7 +59,7 @@ class WindowArray:
         n, steps = self._time.steps_per_tick, self._steps
         for first in range(0, len(wanted), _TOGETHER):
             some = wanted[first : first + _TOGETHER]
-            x = _read(self._x, steps + 1, some)
+            x = _read(self._x, steps + len(self._x), some)
             ticks = {name: _read(ring, steps // n, some) for name, ring in self._ticks.items()}
             for index, loop in enumerate(some):
                 yield Window(self._time.plant_rate, n, float(self._resolutions[loop])).filled(

@@ -6,10 +6,12 @@ import math
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
+
 from haploop.plant.band_limited_noise import band_limited_noise
-from haploop.plant.random_stream import Draw, RandomStream
+from haploop.plant.random_stream import Draw, stream_of
 from haploop.plant.tally import CLIPPED, Tally
-from haploop.protocol.arrays import nearest_multiple
+from haploop.protocol.arrays import clipped, each, nearest_multiple
 from haploop.protocol.ticks import Timebase
 
 
@@ -36,9 +38,10 @@ class Accelerometer:
         self._clipped = Tally()
         self.tallies: dict[str, Tally] = {}
         self._stages: list[Callable[[float], float]] = []
-        if bias := table["bias"]:
+        bias = table["bias"]
+        if np.any(bias):
             self._stages.append(lambda a: a + bias)
-        if table["noise_density"]:
+        if np.any(table["noise_density"]):
             noise = _noise(table, seed, time)
             self._stages.append(lambda a: a + noise())
         if "range" in table:
@@ -59,21 +62,25 @@ class Accelerometer:
         if -most <= reading <= most:
             return reading
         self._clipped.note(tick * self._steps)
-        return max(min(reading, most), -most)  # in this order what is no number stays none
+        return clipped(reading, most)
 
 
-def _noise(table: dict[str, Any], seed: int, time: Timebase) -> Draw:
-    normal, density = RandomStream(seed, "accelerometer").normal(), table["noise_density"]
+def _noise(table: dict[str, Any], seed: Any, time: Timebase) -> Draw:
+    normal, density = stream_of(seed, "accelerometer").normal(), table["noise_density"]
     if "bandwidth" not in table:
         deviation = density * math.sqrt(time.control_rate / 2.0)
         return lambda: deviation * normal()
-    deviation = density * math.sqrt(math.pi / 2.0 * table["bandwidth"])
+    deviation = density * each(math.sqrt, math.pi / 2.0 * table["bandwidth"])
     return band_limited_noise(normal, deviation, table["bandwidth"], time.period_s)
 
 
-def _rounded(resolution: float, most: float) -> Callable[[float], float]:
+def _rounded(resolution: Any, most: Any) -> Callable[[Any], Any]:
     """Rounding to whole counts that keeps to the last count within the range."""
-    if math.isfinite(most):
-        counts = math.floor(most / resolution * (1.0 + 1e-12))  # 0.3 holds three counts of 0.1
-        most = min(most, counts * resolution)
-    return lambda reading: max(min(nearest_multiple(reading, resolution), most), -most)
+    most = each(_last_count, resolution, most)
+    return lambda reading: clipped(nearest_multiple(reading, resolution), most)
+
+
+def _last_count(resolution: float, most: float) -> float:
+    if math.isinf(most):
+        return most
+    return min(most, math.floor(most / resolution * (1.0 + 1e-12)) * resolution)  # 0.3 holds three counts of 0.1

@@ -41,6 +41,10 @@ class Actuator:
         self._take(self._line.retimed(delay_steps, tick))
         return self
 
+    def forget_before(self, tick: int) -> None:
+        """As a ``CommandLine`` does, if the line is one."""
+        self._line.forget_before(tick)  # pyright: ignore[reportAttributeAccessIssue]
+
     def holds(self, tick: int) -> list[Hold]:
         """The forces the device feels in interval ``tick``, in order."""
         step = tick * self._steps

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
-
 from haploop.plant.actuator import Actuator
 from haploop.protocol.arrays import nearest_multiple, where
 
@@ -24,7 +22,7 @@ class ActuatorArray(Actuator):
             force = nearest_multiple(force, self._resolution)
         if self._most is None:
             return force
-        most, is_finite = self._most, np.isfinite(force)
+        most, is_finite = self._most, force - force == 0.0
         clipped = where(force > most, most, where(force < -most, -most, force))
         self.saturated = self.saturated + (is_finite & (clipped != force))
         return where(is_finite, clipped, force)

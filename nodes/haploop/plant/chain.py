@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from haploop.plant.flow import real_for
 from haploop.plant.sensors import accelerometer_is_used
 
 Matrix = np.ndarray
@@ -76,7 +77,7 @@ class Chain:
                 masses.append(hand["mass"])
                 links.append(Link("grip", grip["stiffness"], grip["damping"]))
             else:
-                masses[-1] += hand["mass"]
+                masses[-1] = masses[-1] + hand["mass"]
             grounded["hand"] = (len(bodies) - 1, hand["damping"])
             spring = hand["stiffness"], hand["rest"]
         bandwidth = scene.get("actuator", {}).get("bandwidth")
@@ -86,7 +87,7 @@ class Chain:
             grounded=grounded,
             links=tuple(links),
             spring=spring,
-            actuator_rate=2.0 * np.pi * bandwidth if bandwidth else None,
+            actuator_rate=None if bandwidth is None else 2.0 * np.pi * bandwidth,
             sensor=_sensor(scene, cable is not None),
             start=(device["position"], device["velocity"]),
         )
@@ -108,9 +109,9 @@ class Chain:
         actuator = ["actuator"] if self.actuator_rate is not None else []
         return *self.positions, *rates, *actuator, *(["accelerometer"] if self.sensor else [])
 
-    def start_state(self) -> np.ndarray:
-        """All states at t = 0."""
-        z = np.zeros(len(self.states))
+    def start_state(self, *loops: int) -> np.ndarray:
+        """All states at t = 0, shape (states,); of so many loops (states, loops)."""
+        z = np.zeros((len(self.states), *loops))
         z[0], z[self.count] = self.start
         return z
 
@@ -161,6 +162,11 @@ class Chain:
             rates[-1] = rate * accelerations[body]
             rates[-1, size - 1] -= rate
         return rates
+
+    def real_for(self, step_s: float) -> type[np.floating]:
+        """The float in which forms of rates are to be summed; see ``flow.real_for``."""
+        n = self.count
+        return real_for(float(np.abs(self.rates()[n : 2 * n, n : 2 * n]).max()), step_s)
 
     def scales(self, step_s: float) -> np.ndarray:
         """Factors that make (states, command, friction, load) velocities: c for lengths, h/m for forces, h for y.

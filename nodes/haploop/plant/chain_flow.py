@@ -71,18 +71,26 @@ class Responses:
     """A flow, and D: what the load alone does from zero within each interval.
 
     Args:
+        flow: of many loops, too: its tables then have a last axis for them.
         loads: load in N at the steps first ... last - 1.
         steps: plant steps an interval has.
+        piece_ticks: D is made for so many intervals at a time, on a fixed grid.
     """
 
-    def __init__(self, flow: ChainFlow, loads: Callable[[int, int], np.ndarray], steps: int) -> None:
+    def __init__(
+        self,
+        flow: ChainFlow,
+        loads: Callable[[int, int], np.ndarray],
+        steps: int,
+        piece_ticks: int = _PIECE_TICKS,
+    ) -> None:
         self.flow = flow
-        self._loads, self._n = loads, steps
+        self._loads, self._n, self._piece_ticks = loads, steps, piece_ticks
         self._pieces: dict[int, np.ndarray] = {}
 
     def of_interval(self, tick: int) -> np.ndarray:
         """D at the steps of interval ``tick`` and at its end, shape (n + 1, states)."""
-        piece, at = divmod(tick, _PIECE_TICKS)
+        piece, at = divmod(tick, self._piece_ticks)
         if piece not in self._pieces:
             self._pieces = {piece: self._made(piece)}
         return self._pieces[piece][at]
@@ -90,14 +98,17 @@ class Responses:
     def _made(self, piece: int) -> np.ndarray:
         n, table = self._n, self.flow.step
         size = table.shape[1]
-        first = piece * _PIECE_TICKS * n
-        load = self._loads(first, first + _PIECE_TICKS * n + 1)
-        start, rise = load[:-1].reshape(-1, n).T, np.diff(load).reshape(-1, n).T
-        response = np.zeros((n + 1, size, _PIECE_TICKS))
+        ticks, loads = self._piece_ticks, self._loads
+        first = piece * ticks * n
+        load = loads(first, first + ticks * n + 1)
+        start, rise = (rows.reshape(ticks, n, *load.shape[1:]) for rows in (load[:-1], np.diff(load, axis=0)))
+        shape = np.broadcast_shapes((size, ticks, *load.shape[1:]), table[0, :, None].shape)
+        response = np.zeros((n + 1, *shape))
+        acting = np.zeros((size + 4, *shape[1:]))
         for i in range(n):
-            acting = np.vstack([response[i], np.zeros((2, _PIECE_TICKS)), start[i], rise[i]])
+            acting[:size], acting[-2], acting[-1] = response[i], start[:, i], rise[:, i]
             response[i + 1] = response[i] + np.add.reduce(table[:, :, None] * acting[:, None])
-        return np.ascontiguousarray(response.transpose(2, 0, 1))
+        return np.ascontiguousarray(np.moveaxis(response, 2, 0))
 
 
 class ChainIntegrals:

@@ -10,7 +10,7 @@ import numpy as np
 from haploop.plant.chain import Chain
 from haploop.plant.command_line import Hold
 from haploop.plant.felt_acceleration import felt_acceleration
-from haploop.plant.hand_force import HandForce
+from haploop.plant.hand_force import hand_force
 from haploop.protocol.ticks import Timebase
 
 HELD = ("force", "command")
@@ -23,6 +23,8 @@ class Interval(NamedTuple):
         states, lows: at every plant step and at the end, shape (n + 1, states); what rounding left of the states.
         held: force and command tick (and whatever else) held over every step, shape (n, columns).
         at_ends: friction in N and whether body 0 is stuck at the end of every step, shape (n, 2).
+
+    Of many loops at once all have one more axis, the last.
     """
 
     states: np.ndarray
@@ -45,11 +47,11 @@ class ChainHistory(ABC):
     def __init__(self, scene: dict[str, Any], time: Timebase) -> None:
         self._chain = chain = Chain.of(scene)
         self._n, self._v, self._step_s = time.steps_per_tick, chain.count, time.step_s
-        self._tau = HandForce(scene.get("hand", {}).get("force"), time.plant_rate)
+        self._tau = hand_force(scene, time.plant_rate)
         self._rest_N = chain.spring[0] * chain.spring[1]
         self._intervals: list[Interval] = []
-        self.z = chain.start_state()
-        self.low = np.zeros(len(self.z))
+        self.z = chain.start_state(*([scene["loops"]] if "loops" in scene else []))
+        self.low = np.zeros_like(self.z)
         self._last_held = self._held_before()
         self._publish()
         self._feel, self._felt = felt_acceleration(scene, chain, time, self.loads)
@@ -70,14 +72,14 @@ class ChainHistory(ABC):
 
     def _begin(self, holds: list[Hold]) -> Interval:
         """An interval of which the start is known, and what is held in it."""
-        states, lows = np.empty((2, self._n + 1, len(self.z)))
+        states, lows = np.empty((2, self._n + 1, *self.z.shape))
         states[0], lows[0] = self.z, self.low
-        held = np.empty((self._n, len(self.held_names)))
+        held = np.empty((self._n, len(self.held_names), *self.z.shape[1:]))
         first = 0
         for count, force, command in holds:
             held[first : first + count, 0], held[first : first + count, 1] = force, command
             first += count
-        return Interval(states, lows, held, np.zeros((self._n, 2)))
+        return Interval(states, lows, held, np.zeros((self._n, 2, *[1] * (self.z.ndim - 1))))
 
     @abstractmethod
     def advance(self, tick: int, holds: list[Hold]) -> None:

@@ -23,7 +23,7 @@ class ChainMotion(ChainHistory):
     def __init__(self, scene: dict[str, Any], time: Timebase) -> None:
         super().__init__(scene, time)
         self._free = self._responses(time, stuck=False)
-        self._acting = np.zeros(len(self.z) + 2)
+        self._acting = np.zeros((len(self.z) + 2, *self.z.shape[1:]))
 
     def _responses(self, time: Timebase, stuck: bool) -> Responses:
         return Responses(ChainFlow(self._chain, time.step_s, self._n, stuck), self.loads, self._n)

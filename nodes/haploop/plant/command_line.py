@@ -91,6 +91,12 @@ class CommandLine:
             self._first += at - 1
         return holds
 
+    def forget_before(self, tick: int) -> None:
+        """Keep no command but those in flight at interval ``tick`` and the last one in effect before it."""
+        newest_gone = tick - self._lookahead - 1 - self._first
+        del self._forces[:newest_gone]
+        self._first += newest_gone
+
     def retimed(self, delay_steps: int, tick: int) -> Line:
         """A line that lets commands overtake; those before ``tick``, all received, are on it or in effect."""
         from haploop.plant.uncertain_line import UncertainLine

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from haploop.plant.chain import Chain, sensor_body
+from haploop.plant.chain_tables import tables_of
 from haploop.plant.sensors import accelerometer_is_used
 from haploop.protocol.ticks import Timebase
 
@@ -36,17 +37,30 @@ def felt_acceleration(
         state = chain.states.index("accelerometer")
 
         def feel_filtered(interval: Interval, _step: int) -> None:
-            felt.extend(interval.states[1:, state].tolist())
+            felt.extend(rows(interval.states[1:, state]))
 
         return feel_filtered, lambda: felt[0]
 
     body = sensor_body(table, "transmission" in scene)
-    free, stuck = (chain.accelerations(stuck)[body].astype(float)[:, None] for stuck in (False, True))
+
+    def factors_of(chain: Chain) -> tuple[np.ndarray, ...]:
+        return tuple(chain.accelerations(stuck)[body].astype(float) for stuck in (False, True))
+
+    free, stuck = (factors[:, None] for factors in tables_of(factors_of, chain, of_many="loops" in scene))
 
     def feel(interval: Interval, step: int) -> None:
-        friction, is_stuck = interval.at_ends.T
+        friction, is_stuck = interval.at_ends.swapaxes(0, 1)
         command = interval.held[:, 0]
-        acting = np.vstack([interval.states[1:].T, command, friction, loads(step, step + len(command))])
-        felt.extend(np.add.reduce(np.where(is_stuck > 0.0, stuck, free) * acting).tolist())
+        acting = [*interval.states[1:].swapaxes(0, 1), command, friction, loads(step, step + len(command))]
+        factors = np.where(is_stuck > 0.0, stuck, free)
+        total = factors[0] * acting[0]
+        for factor, of in zip(factors[1:], acting[1:], strict=True):
+            total = total + factor * of
+        felt.extend(rows(total))
 
     return feel, lambda: felt[0]
+
+
+def rows(column: np.ndarray) -> list[Any]:
+    """Numbers of one loop, or arrays over many."""
+    return column.tolist() if column.ndim == 1 else list(column)

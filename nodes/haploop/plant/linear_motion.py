@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from array import array
+from collections.abc import Iterator
 from itertools import accumulate
 from typing import Any
 
@@ -94,17 +95,31 @@ class LinearMotion:
         return self._pieces[piece]
 
     def _make_responses(self, piece: int) -> np.ndarray:
-        n, s, ticks = self._steps, self._step, self._piece_ticks
+        n, ticks = self._steps, self._piece_ticks
         first = piece * ticks * n
         force = self._tau.at_steps(first, first + ticks * n + 1) + self._spring_at_origin_N
         start, rise = (rows.reshape(ticks, n, *force.shape[1:]) for rows in (force[:-1], np.diff(force, axis=0)))
-        push_x, push_v = s.x_force * start + s.x_slope * rise, s.v_force * start + s.v_slope * rise
-        response = np.zeros((ticks, n + 1, 2, *push_x.shape[2:]))
-        x, v = response[:, 0, 0], response[:, 0, 1]
-        for i in range(n):
-            x, v = x + (s.x_x * x + s.x_v * v + push_x[:, i]), v + (s.v_x * x + s.v_v * v + push_v[:, i])
-            response[:, i + 1, 0], response[:, i + 1, 1] = x, v
+        states = list(self._driven(start, rise))
+        response = np.zeros((ticks, n + 1, 2, *states[0][0].shape[1:]))
+        for i, (x, v) in enumerate(states, 1):
+            response[:, i, 0], response[:, i, 1] = x, v
         return response
+
+    def _driven(self, start: Any, rise: Any) -> Iterator[tuple[Any, Any]]:
+        """D at every step of intervals but their start, from the load at the start of each step and its rise over it.
+
+        Args:
+            start, rise: N, shape (intervals, n); both and what is yielded may have a last axis for many loops.
+
+        Yields:
+            What is added to x and v, shape (intervals,) each.
+        """
+        s = self._step
+        push_x, push_v = s.x_force * start + s.x_slope * rise, s.v_force * start + s.v_slope * rise
+        x = v = push_x[:, 0] - push_x[:, 0]
+        for i in range(self._steps):
+            x, v = x + (s.x_x * x + s.x_v * v + push_x[:, i]), v + (s.v_x * x + s.v_v * v + push_v[:, i])
+            yield x, v
 
     def acceleration(self, tick: int) -> float:
         """Acceleration at ``tick``, the present one, under the force held over the step that ends there, m/s^2."""

@@ -29,6 +29,10 @@ def accelerometer(scene: dict[str, Any], time: Timebase) -> Accelerometer | None
     """What reads the true acceleration; None where it is read as it is, or not at all."""
     if "accelerometer" not in scene or not accelerometer_is_used(scene):
         return None
+    if "loops" in scene:
+        from haploop.plant.accelerometer_array import AccelerometerArray
+
+        return AccelerometerArray(scene["accelerometer"], scene["seed"], time)
     from haploop.plant.accelerometer import Accelerometer
 
     return Accelerometer(scene["accelerometer"], scene["seed"], time)

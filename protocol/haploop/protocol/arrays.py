@@ -42,6 +42,11 @@ def nearest_multiple(value: Any, unit: Any) -> Any:
     return xp.where(xp.isfinite(counts), unit * (xp.rint(counts) + 0.0), value)
 
 
+def clipped(value: Any, most: Any) -> Any:
+    """``value``, but not beyond +-``most``; what is no number stays none."""
+    return where(value > most, most, where(value < -most, -most, value))
+
+
 def each(function: Callable[..., Any], *numbers: Any) -> Any:
     """What ``function`` gives of these numbers; where some are arrays, of those of every loop by themselves.
 

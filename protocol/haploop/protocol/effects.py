@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 # What bodies in a row, or forces that change between ticks, are moved by in place of ``haploop.plant.linear_motion``.
-_HISTORY = tuple(f"haploop.plant.{name}" for name in ("chain_history", "chain", "felt_acceleration"))
+_HISTORY = tuple(f"haploop.plant.{name}" for name in ("chain_history", "chain", "chain_tables", "felt_acceleration"))
 _EXACT = tuple(f"haploop.plant.{name}" for name in ("chain_motion", "chain_flow"))
 _CHAIN = (*_EXACT, *_HISTORY)
 _EXACT_RUBBING = tuple(f"haploop.plant.friction_{name}" for name in ("motion", "walk"))

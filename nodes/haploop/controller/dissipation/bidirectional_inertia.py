@@ -10,6 +10,7 @@ class BidirectionalInertia(Element):
     """f = -m a[k]: stores and returns kinetic energy, and dissipates by its delay (Choi et al. 2022, eq. 6-8)."""
 
     kind = "bidirectional-inertia"
+    linear = True
     mass: Annotated[float, Quantity("kg", at_least=0)]
 
     def force(self, motion: Motion):

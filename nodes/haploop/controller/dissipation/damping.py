@@ -10,6 +10,7 @@ class Damping(Element):
     """f = -b v[k]: dissipates while slow and smooth; held and delayed, it generates energy at high frequency."""
 
     kind = "damping"
+    linear = True
     damping: Annotated[float, Quantity("N s/m", at_least=0)]
 
     def force(self, motion: Motion):

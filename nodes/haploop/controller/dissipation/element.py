@@ -43,9 +43,14 @@ class Element(ABC):
     writes ``force``. It becomes a dataclass by itself. State across ticks goes into attributes set in
     ``__post_init__``: a swap makes a new object, so state is fresh after it. ``force`` is called at every tick,
     in contact or not, and is written with arithmetic and ``where`` so that it serves floats and arrays alike.
+
+    Attributes:
+        linear: whether the force is a linear function of the motion, past ticks included; a loop of such elements
+            has an exact limit of stability.
     """
 
     kind: ClassVar[str]
+    linear: ClassVar[bool] = False
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)

@@ -43,17 +43,29 @@ def load_plugin(path: Path) -> dict[str, type[Element]]:
     """
     try:
         source = Path(path).read_text(encoding="utf-8")
+    except (OSError, ValueError) as error:
+        raise PluginError(f"The plugin {path} does not load: {type(error).__name__}: {error}") from error
+    return load_source(source, str(path))
+
+
+def load_source(source: str, origin: str) -> dict[str, type[Element]]:
+    """The elements that the text of a Python file defines, by kind; ``origin`` is the file.
+
+    Raises:
+        PluginError: the text cannot be run, or defines no usable element.
+    """
+    try:
         module = ModuleType("haploop_plugin_" + hashlib.sha256(source.encode()).hexdigest()[:12])
-        module.__file__ = str(path)
+        module.__file__ = origin
         sys.modules[module.__name__] = module  # dataclasses and type hints look the names up there
-        exec(compile(source, str(path), "exec"), module.__dict__)
+        exec(compile(source, origin, "exec"), module.__dict__)
     except (Exception, SystemExit) as error:
         line = f", line {error.lineno}" if isinstance(error, SyntaxError) else ""
-        raise PluginError(f"The plugin {path}{line} does not load: {type(error).__name__}: {error}") from error
+        raise PluginError(f"The plugin {origin}{line} does not load: {type(error).__name__}: {error}") from error
     found = [c for c in vars(module).values() if inspect.isclass(c) and c.__module__ == module.__name__]
-    elements = [checked(c, str(path)) for c in found if issubclass(c, Element)]
+    elements = [checked(c, origin) for c in found if issubclass(c, Element)]
     if not elements:
-        raise PluginError(f"The plugin {path} defines no element; a class derived from Element was expected.")
+        raise PluginError(f"The plugin {origin} defines no element; a class derived from Element was expected.")
     return {element.kind: element for element in elements}
 
 

@@ -1,0 +1,53 @@
+"""Loops run together and alone, for the tests of arrays of scenes."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from scene_makers import KINDS, scene
+
+from haploop.controller.dissipation import Element
+from haploop.launch.array_loop import LoopArray
+from haploop.launch.in_process import run_in_process
+from haploop.logger.summary import OF_THE_MACHINE
+
+PUSH = {"mass": 0.01, "stiffness": 10.0, "damping": 0.01, "force": {"kind": "ramp", "value": -0.8, "rise_time": 0.05}}
+
+
+def alone(made: dict[str, Any], kinds: dict[str, type[Element]] = KINDS) -> dict[str, Any]:
+    summary = run_in_process(made, kinds)
+    return {key: value for key, value in summary.items() if key not in OF_THE_MACHINE}
+
+
+def together(scenes: list[dict[str, Any]], kinds: dict[str, type[Element]] = KINDS) -> list[dict[str, Any] | None]:
+    loops = LoopArray(scenes, kinds, trajectories=True)
+    loops.run()
+    return loops.results
+
+
+def pressed(**tables: Any) -> dict[str, Any]:
+    """A hand pushes the device into a wall with a damper."""
+    whole: dict[str, Any] = {
+        "duration": 0.15,
+        "clock": {"round_trip_delay": 0.0013},
+        "hand": PUSH,
+        "encoder": {"resolution": 1e-5},
+        "wall": {"position": -0.002, "stiffness": 300.0},
+        "dissipation": [{"kind": "damping", "damping": 0.2}],
+    }
+    return scene(**{**whole, **tables})
+
+
+def diverging() -> list[dict[str, Any]]:
+    """Some of these swing up and away, each at its time; some do not."""
+    return [
+        pressed(
+            duration=0.6,
+            diverged_beyond=0.05,
+            clock={"round_trip_delay": 0.004},
+            dissipation=[{"kind": "damping", "damping": damping, "acts": "always"}],
+            velocity={"estimator": "foaw", "ticks": 4},
+        )
+        for damping in np.linspace(1.0, 12.0, 16).tolist()
+    ]
