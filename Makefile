@@ -33,6 +33,7 @@ bench: $(READY) ## measure speed, memory, what each effect and the live page cos
 	@$(BIN)/python tests/bench/memory.py
 	@$(BIN)/python tests/bench/ablation.py
 	@$(BIN)/python tests/bench/view.py
+	@$(BIN)/python tests/bench/sweep.py
 
 accuracy: $(READY) ## measure what accuracy costs and write docs/accuracy.md (an hour; stopped, it goes on where it was)
 	@$(BIN)/haploop cost --out runs/accuracy

@@ -5,10 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from array_makers import alone, diverging, together
+from physics.effect_tables import EFFECTS, tap
 from physics.varied_scenes import drawn_chain, varied
 from scene_makers import scene
 
+from haploop.launch import array_loop
 from haploop.launch.array_scene import runs_in_arrays, structure
+
+LINES = {"friction", "jitter", "loss"}
 
 
 @pytest.mark.parametrize("seed", range(30))
@@ -38,3 +42,36 @@ def test_chains_that_diverge_leave_with_their_results_and_disturb_no_other() -> 
     assert {"diverged", "done"} == {result["ended"] for result in expected}
     assert len({result["ticks"] for result in expected}) > 3
     assert together(scenes) == expected
+
+
+@pytest.mark.parametrize("effects", [(), ("transmission", "grip"), ("bandwidth", "noise"), tuple(set(EFFECTS) - LINES)])
+@pytest.mark.parametrize("seed", range(4))
+def test_loops_with_friction_stick_slip_and_are_booked_as_they_are_alone(effects: tuple[str, ...], seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    base = tap(("friction", *effects), duration=0.15, clock={"round_trip_delay": [0.0, 0.0013, 0.002, 0.003][seed]})
+    scenes = [
+        {**base, "wall": {**base["wall"], "stiffness": stiffness}, "seed": index}
+        for index, stiffness in enumerate(rng.uniform(50.0, 3000.0, 5).tolist())
+    ]
+    assert runs_in_arrays(base)
+    results = together(scenes)
+    assert results == [alone(each) for each in scenes]
+    assert all(result and result["energy"]["friction_heat_J"] > 1e-5 for result in results)
+
+
+def test_loops_with_friction_that_diverge_disturb_no_other(monkeypatch: pytest.MonkeyPatch) -> None:
+    """In blocks of a tick, and in blocks in which many loops switch."""
+    scenes = [scene(**{**made, "friction": {"kinetic": 0.02}}) for made in diverging()[::3]]
+    expected = [alone(each) for each in scenes]
+    assert {"diverged", "done"} == {result["ended"] for result in expected}
+    for block in (1, 10**4):
+        monkeypatch.setattr(array_loop, "BLOCK", block)
+        assert together(scenes) == expected
+
+
+def test_friction_that_needs_every_step_walked_and_bodies_that_differ_go_alone() -> None:
+    base = tap(("friction",))
+    curved = tap((), friction={"kinetic": 0.04, "breakaway": 0.05, "stribeck_velocity": 0.01})
+    other = {**base, "device": {**base["device"], "mass": 0.06}}
+    assert not runs_in_arrays(curved)
+    assert structure(base) != structure(other)

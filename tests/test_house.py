@@ -66,7 +66,7 @@ def test_an_arrow_that_goes_up_or_sideways_is_caught(importer: str, imported: st
     assert f"{importer.split('/', 1)[1].replace('/', '.')}.offender -> {imported}" in report.stdout
 
 
-def test_a_wheel_holds_every_module_scene_device_hand_reference_and_the_live_page(tmp_path: Path) -> None:
+def test_a_wheel_holds_every_module_scene_sweep_device_hand_reference_and_the_live_page(tmp_path: Path) -> None:
     build = [sys.executable, "-m", "hatchling", "build", "--target", "wheel", "--directory", str(tmp_path)]
     subprocess.run(build, cwd=HOUSE, check=True, capture_output=True)
     (wheel,) = tmp_path.glob("*.whl")
@@ -77,7 +77,7 @@ def test_a_wheel_holds_every_module_scene_device_hand_reference_and_the_live_pag
     }
     toml = {
         "haploop" / file.relative_to(HOUSE)
-        for kind in ("scenes", "devices", "hands")
+        for kind in ("scenes", "sweeps", "devices", "hands")
         for file in HOUSE.glob(f"launch/{kind}/**/*.toml")
     }
     references = {file.relative_to(HOUSE / "tools") for file in HOUSE.glob("tools/haploop/**/references/*.json")}

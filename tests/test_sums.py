@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from haploop.logger.sums import RunningSums, sum_by_tick, sum_in_order
+from haploop.logger.sums import RunningSums, by_tick, sum_in_order
 
 amounts = st.floats(-1e6, 1e6, allow_subnormal=False)
 
@@ -78,15 +78,14 @@ def test_sums_within_a_tick_run_from_first_to_last_whatever_the_memory_layout(n)
 def test_sums_and_running_sums_of_many_loops_have_every_bit_of_those_of_one(n, loops):
     rng = np.random.default_rng(n)
     flows = rng.normal(size=(3, 4 * n, loops)) * 10.0 ** rng.integers(-8, 8, (3, 4 * n, loops))
-    together, many = np.zeros((5, 4, loops)), RunningSums(loops)
-    sum_by_tick(zip([4, 0, 2], flows, strict=True), together)
-    many.grow(5)
+    together, many = np.stack([by_tick(flow, n) for flow in flows]), RunningSums(loops)
+    many.grow(3)
     many.add_of_loops(together)
     for loop in range(loops):
-        alone, one = np.zeros((5, 4)), RunningSums()
-        sum_by_tick(zip([4, 0, 2], flows[..., loop], strict=True), alone)
-        one.grow(5)
+        alone, one = np.stack([by_tick(flow[:, loop], n) for flow in flows]), RunningSums()
+        one.grow(3)
         one.add(alone)
+        assert alone.tolist() == sum_in_order(flows[..., loop].reshape(3, 4, n)).tolist()
         assert together[..., loop].tolist() == alone.tolist()
         assert (many.of_loop(loop).sums.tolist(), many.of_loop(loop).errors.tolist()) == (
             one.sums.tolist(),

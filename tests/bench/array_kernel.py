@@ -7,6 +7,7 @@ from typing import Any
 import numba  # pyright: ignore[reportMissingImports]
 import numpy as np
 
+from haploop.logger.plant_books import as_squares
 from haploop.plant.flow import HeldFlow, motion_integrals, natural_rate
 from haploop.plant.linear_motion import LinearMotion
 from haploop.plant.mechanics import Mechanics
@@ -18,7 +19,7 @@ BOOKS = 11
 @numba.njit(cache=False, fastmath=False)
 def _loops(  # pragma: no cover
     stiffness, damping, position, resolution, period, ticks, lookahead, held, response, tau, square, lag, m, b, k,
-    dampers, scale, with_books, out, trace,
+    dampers, with_books, out, trace,
 ):  # fmt: skip
     n = held.shape[0] - 1
     window = trace.shape[0] - 1
@@ -46,10 +47,10 @@ def _loops(  # pragma: no cover
             if tick >= lookahead:
                 force, wall_acting, damper_acting = forces[acting, 0], forces[acting, 1], forces[acting, 2]
             strongest = max(strongest, abs(force))
-            depth = stiffness[cell] * max(0.0, position - x)
+            before = max(0.0, position - x)
             from_x, from_v, from_low = x, v, x_low
             to_x, to_v, to_low, dv = x, v, x_low, 0.0
-            added[:] = 0.0
+            work = speed2 = way = 0.0
             for step in range(1, n + 1):
                 dx = held[step, 0] * x + held[step, 1] * v + held[step, 2] * force + x_low + response[tick, step, 0]
                 dv = held[step, 3] * x + held[step, 4] * v + held[step, 5] * force + v_low + response[tick, step, 1]
@@ -60,35 +61,30 @@ def _loops(  # pragma: no cover
                 trace[steps % (window + 1)] = to_x
                 if with_books:
                     at = tick * n + step - 1
-                    way, change = (to_x - from_x) + (to_low - from_low), to_v - from_v
+                    moved = (to_x - from_x) + (to_low - from_low)
                     rise = tau[at + 1] - tau[at]
                     net = force + tau[at] - b * from_v - k * from_x
-                    w0, w1, w2 = from_v, net * scale, rise * scale
-                    speed2 = (
-                        square[0, 0] * w0 * w0 + 2.0 * square[0, 1] * w0 * w1 + 2.0 * square[0, 2] * w0 * w2
-                        + square[1, 1] * w1 * w1 + 2.0 * square[1, 2] * w1 * w2 + square[2, 2] * w2 * w2
-                    )  # fmt: skip
-                    lagged = lag[0] * w0 + lag[1] * w1 + lag[2] * w2
-                    work = (tau[at] + rise / 2.0) * way + rise * lagged
-                    heat0, heat1 = dampers[0] * speed2, dampers[1] * speed2
-                    kinetic = m * change * (from_v + change / 2.0)
-                    spring = k * way * (from_x + way / 2.0)
-                    true0, true1 = -wall_acting * way, -damper_acting * way
-                    before, after = max(0.0, position - from_x), max(0.0, position - to_x)
-                    added[0] += work
-                    added[1] += heat0
-                    added[2] += heat1
-                    added[3] += kinetic
-                    added[4] += spring
-                    added[5] += true0
-                    added[6] += true1
-                    added[7] += (
-                        abs(work) + abs(heat0) + abs(heat1) + abs(kinetic) + abs(spring) + abs(true0) + abs(true1)
-                    ) / 2.0
-                    added[8] += stiffness[cell] * (after - before) * (after + before) / 2.0
-                    added[9] += -depth * way
-                    added[10] += -wall * way
+                    first = from_v + square[1] * net + square[2] * rise
+                    second = net + square[4] * rise
+                    speed2 += square[0] * first * first + square[3] * second * second + square[5] * rise * rise
+                    lagged = lag[0] * from_v + lag[1] * net + lag[2] * rise
+                    work += (tau[at] + rise * 0.5) * moved + rise * lagged
+                    way += moved
                     from_x, from_v, from_low = to_x, to_v, to_low
+            if with_books:
+                change, after = to_v - v, max(0.0, position - to_x)
+                added[0] = work
+                added[1], added[2] = dampers[0] * speed2, dampers[1] * speed2
+                added[3] = m * change * (v + change * 0.5)
+                added[4] = k * way * (x + way * 0.5)
+                added[5], added[6] = -wall_acting * way, -damper_acting * way
+                added[7] = 0.0
+                for book in range(7):
+                    added[7] += abs(added[book])
+                added[7] *= 0.5
+                added[8] = 0.5 * stiffness[cell] * (after - before) * (after + before)
+                added[9] = -stiffness[cell] * before * way
+                added[10] = -wall * way
             x, v_before, v = to_x, v, to_v
             x_low, v_low = to_low, dv - (to_v - v_before)
             if with_books:
@@ -116,6 +112,8 @@ def run_kernel(scenes: list[dict[str, Any]], energy: bool) -> np.ndarray:
     held = HeldFlow.of(m.mass_kg, m.damping, m.stiffness, time.step_s, n).coefficients
     pieces = [motion._responses(piece) for piece in range(-(-time.ticks // 256))]
     square, lag = motion_integrals(m.mass_kg, m.damping, m.stiffness, time.step_s)
+    push = 1.0 / (m.mass_kg * natural_rate(m.mass_kg, m.stiffness, time.step_s))
+    scales = np.array([1.0, push, push])
     out = np.zeros((len(scenes), 4 + BOOKS))
     _loops(
         np.array([scene["wall"]["stiffness"] for scene in scenes]),
@@ -128,13 +126,12 @@ def run_kernel(scenes: list[dict[str, Any]], energy: bool) -> np.ndarray:
         held,
         np.concatenate(pieces),
         motion._tau.at_steps(0, time.ticks * n + 1),
-        square.astype(float),
-        lag.astype(float),
+        as_squares(square * np.outer(scales, scales)).astype(float),
+        (lag * scales).astype(float),
         m.mass_kg,
         m.damping,
         m.stiffness,
         np.array(list(m.dampers.values())),
-        1.0 / (m.mass_kg * natural_rate(m.mass_kg, m.stiffness, time.step_s)),
         energy,
         out,
         np.zeros(min(time.plant_rate // 2, time.ticks * n) + 1),

@@ -7,6 +7,7 @@ import importlib.util
 import statistics
 import time
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -66,6 +67,15 @@ def main() -> None:
         run_kernel(scenes[:1], True)
         rows["numba kernel, with the books"] = (lambda: run_kernel(scenes, True), len(scenes))
         rows["numba kernel, without"] = (lambda: run_kernel(scenes, False), len(scenes))
+    if importlib.util.find_spec("jax"):
+        from haploop.launch.compiled_run import compiling, results_of_compiled
+
+        for name, energy in {"compiled, with the books": True, "compiled, without": False}.items():
+            run = partial(lambda energy: list(results_of_compiled(scenes, kinds, energy=energy, least=0)), energy)
+            run()
+            rows[name] = (run, len(scenes))
+        programs, seconds = compiling()
+        print(f"{programs} programs compiled in {seconds:.1f} s, before all that is measured")
     seen: dict[str, list[float]] = {name: [] for name in rows}
     for _ in range(options.repeats):
         for name, (run, count) in rows.items():

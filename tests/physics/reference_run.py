@@ -90,7 +90,7 @@ def _books(
         "device_heat_J": mechanics.b_device * math.fsum(square),
         "hand_heat_J": mechanics.b_hand * math.fsum(square),
         "stored_J": mechanics.stored_J(float(x[-1]), float(v[-1])),
-        "moved_J": start + math.fsum(np.abs(parts).sum(axis=0)) / 2.0,
+        "moved_J": start + math.fsum(np.abs(np.reshape(parts, (len(parts), -1, n)).sum(axis=2)).sum(axis=0)) / 2.0,
         "wall": account(wall_forces) | _leak(controller, x, dx, n, wall_forces, applied(wall_forces)),
         "elements": [
             {"kind": e.table["kind"], "from_tick": e.from_tick, "to_tick": e.to_tick} | account(e.forces)

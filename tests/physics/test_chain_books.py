@@ -48,7 +48,7 @@ def booked(case: str) -> tuple[dict[str, np.ndarray], np.ndarray]:
     """What every step adds to each book, and to the true books of those who commanded; shape (steps,) each, J."""
     resolved, motion = made(case)
     books, way = books_of(resolved), np.diff(motion.columns["x"])
-    flows = np.stack(list(books.increments(0, motion.columns, way, motion.commanded)))
+    flows = np.stack(list(books.by_step(0, motion.columns, way, motion.commanded)))
     return dict(zip(books.names, flows, strict=True)), -(motion.commanded[0] + motion.commanded[1]) * way
 
 
@@ -92,7 +92,7 @@ def test_the_motions_made_by_hand_hold_pieces_of_all_sorts():
 def test_energy_that_friction_took_in_stopping_a_body_is_missed_without_its_book():
     resolved, motion = made("cable grip friction")
     books, forgetful = books_of(resolved), motion.columns | {"pieces.snap_J": 0.0 * motion.columns["pieces.snap_J"]}
-    flows = np.stack(list(books.increments(0, forgetful, np.diff(motion.columns["x"]), motion.commanded)))
+    flows = np.stack(list(books.by_step(0, forgetful, np.diff(motion.columns["x"]), motion.commanded)))
     _, true = booked("cable grip friction")
     assert unexplained(dict(zip(books.names, flows, strict=True)), true) > 1e-3
 
@@ -113,7 +113,7 @@ def test_blocks_of_any_size_add_the_same_bits(case):
     for first, end in pairwise([0, 1, 2, 7, 8, 30, 59, len(way)]):
         commanded = [force[first:end] for force in motion.commanded]
         parts.append(
-            np.stack(list(books.increments(first, block_of(motion.columns, first, end), way[first:end], commanded)))
+            np.stack(list(books.by_step(first, block_of(motion.columns, first, end), way[first:end], commanded)))
         )
     assert np.array_equal(np.concatenate(parts, axis=1), np.stack(list(flows.values())))
 
@@ -176,7 +176,7 @@ def test_friction_never_gives_heat_back_in_any_step(name):
     resolved = resolved_of(name)
     plant, books = run(resolved).plant, books_of(resolved)
     way = np.diff(plant["x"]) + np.diff(plant["x_low"])
-    heat = list(books.increments(0, plant, way, [plant["force"][:-1]]))[books.names.index("friction_heat")]
+    heat = list(books.by_step(0, plant, way, [plant["force"][:-1]]))[books.names.index("friction_heat")]
     assert len(plant["pieces.step"]) > 10
     assert books.least_friction_J == min(0.0, heat.min()) > -1e-15 * heat.max()
 

@@ -27,7 +27,8 @@ BLOCK = 32_768
 # An operand that is the same for all loops, or for all steps of a tick, is copied into buffers of NumPy's unless these
 # are shorter than a row of loops; that triples the time such an operation takes.
 _BUFFER = 512
-# Loops that have ended are computed on, unheeded, until they are more than this share.
+# Loops that have ended are computed on, unheeded, until they are more than this share; not with friction, which might
+# switch in them for ever.
 _UNHEEDED = 0.25
 
 
@@ -68,6 +69,7 @@ class LoopArray:
         self._limit_m = scene["diverged_beyond"]
         self._scene_of = np.arange(len(scenes))
         self._ended = np.zeros(len(scenes), bool)
+        self._unheeded = 0.0 if "friction" in scene else _UNHEEDED
         self._schedule(scene)
         self.results: list[dict[str, Any] | None] = [None] * len(scenes)
 
@@ -134,7 +136,7 @@ class LoopArray:
         reasons = [f"{beyond(*where)}, at tick {tick + 1}" for where in zip(x, limit_m, strict=True)]
         self._finish(ends, "diverged", reasons)
         self._ended[ends] = True
-        if np.count_nonzero(self._ended) > _UNHEEDED * len(self._ended):
+        if np.count_nonzero(self._ended) > self._unheeded * len(self._ended):
             self._drop_ended()
 
     def _finish(self, places: np.ndarray, ended: str, reasons: list[str] | None = None) -> None:

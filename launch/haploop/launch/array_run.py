@@ -51,7 +51,7 @@ def results_of(
         ``trajectory_sha256`` only where asked for. A run that failed has ``title``, ``seed``, ``ended`` and ``why``.
     """
     alone = set(range(len(scenes)))
-    for group in _groups(scenes):
+    for group in groups(scenes):
         for chunk in _chunks(group, fewest, most):
             together = _together([scenes[index] for index in chunk], kinds, energy, trajectories)
             for index, result in zip(chunk, together, strict=True):
@@ -62,13 +62,13 @@ def results_of(
         yield index, _alone(scenes[index], kinds, energy, trajectories)
 
 
-def _groups(scenes: Sequence[Scene]) -> list[list[int]]:
+def groups(scenes: Sequence[Scene]) -> list[list[int]]:
     """Indices of the scenes of each structure that runs in arrays."""
-    groups: dict[Hashable, list[int]] = {}
+    found: dict[Hashable, list[int]] = {}
     for index, scene in enumerate(scenes):
         if runs_in_arrays(scene):
-            groups.setdefault(structure(scene), []).append(index)
-    return list(groups.values())
+            found.setdefault(structure(scene), []).append(index)
+    return list(found.values())
 
 
 def _chunks(group: list[int], fewest: int, most: int) -> list[list[int]]:
@@ -91,7 +91,7 @@ def _together(
     try:
         loops = LoopArray(scenes, kinds, energy=energy, trajectories=trajectories)
         loops.run()
-    except ElementError:
+    except (ElementError, ArithmeticError):
         return [None] * len(scenes)
     return loops.results
 

@@ -8,41 +8,44 @@ from typing import Any
 import numpy as np
 
 from haploop.plant.chain import Chain
-from haploop.plant.flow import real_for
-from haploop.plant.mechanics import Mechanics
+from haploop.plant.friction_walk import goes_by_whole_steps
 from haploop.plant.motion import integrator_of, needs_chain
 from haploop.protocol.ticks import DELAY
 
 # What says nothing of what is simulated.
 _ASIDE = ("title", "seed", "run")
 _TIMES = ("clock", "duration", "at", "delay")
+# Loops with friction have the same bodies.
+_BODIES = ("device", "hand", "transmission", "friction", "actuator", "accelerometer")
 
 
 def runs_in_arrays(scene: dict[str, Any]) -> bool:
     """Whether a resolved scene's loop takes the same way whatever its numbers, so that many run as one.
 
-    Not so: friction, jitter, loss, another integrator than the exact flow; a delay that changes; bodies whose damping
-    needs the widest float.
+    Not so: jitter, loss, another integrator than the exact flow; a delay that changes; a chain whose damping needs the
+    widest float; friction that has to be walked step by step.
     """
-    if integrator_of(scene) != "exact" or scene.keys() & {"friction", "jitter", "loss"}:
+    if integrator_of(scene) != "exact" or scene.keys() & {"jitter", "loss"}:
+        return False
+    if "friction" in scene and not goes_by_whole_steps(scene):
         return False
     if any(DELAY in event.get("set", {}) for event in scene.get("event", [])):
         return False
-    step_s = 1.0 / scene["clock"]["plant_rate"]
-    if needs_chain(scene):
-        return Chain.of(scene).real_for(step_s) is np.float64
-    m = Mechanics.of(scene)
-    return real_for(m.damping / m.mass_kg, step_s) is np.float64
+    return not needs_chain(scene) or Chain.of(scene).real_for(1.0 / scene["clock"]["plant_rate"]) is np.float64
 
 
 def structure(scene: dict[str, Any]) -> Hashable:
     """What scenes that are stacked must have in common: all but the values of their numbers.
 
     Times are common, too: the clock, the duration, delays, when events come, the points of a recorded force. So is
-    whether a number is 0, which may mean that something is not there.
+    whether a number is 0, which may mean that something is not there, and where there is friction all that moves.
     """
-    shared = {key: value for key, value in scene.items() if key not in _ASIDE}
-    return _structure(shared, by_value=False)
+    by_value = _BODIES if "friction" in scene else ()
+    return tuple(
+        (key, _structure(value, by_value=key in _TIMES or key in by_value))
+        for key, value in scene.items()
+        if key not in _ASIDE
+    )
 
 
 def _structure(value: Any, by_value: bool) -> Hashable:

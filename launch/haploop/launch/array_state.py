@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from haploop.plant.hand_force_array import HandForceArray
+from haploop.protocol.arrays import Shared
 
 
 def keep(root: Any, loops: np.ndarray) -> None:
@@ -76,6 +77,8 @@ class _Walk:
                 for cell in value.__closure__ or ():
                     cell.cell_contents = self.visit(cell.cell_contents)
             case HandForceArray() if value.is_shared:
+                pass
+            case Shared():
                 pass
             case MethodType() | BuiltinFunctionType():
                 self.visit(value.__self__)

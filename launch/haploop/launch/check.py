@@ -47,7 +47,7 @@ def resolve(layers: Layers, kinds: Mapping[str, type[Element]]) -> dict[str, Any
         schema = whole_schema(kinds)
         tagged = _TAGGED if len(kinds) > 1 else _TAGGED - {("dissipation", 0)}  # one kind alone is no choice
         for detail in error.errors(include_url=False):
-            _complain(layers, detail["type"], detail["msg"], _plain(detail["loc"], tagged), schema)
+            complain(layers, detail["type"], detail["msg"], _plain(detail["loc"], tagged), schema)
     check_combinations(layers)
     check_estimators(layers)
     if scene:
@@ -92,14 +92,14 @@ def _timebase(layers: Layers) -> Timebase | None:
         return None
 
 
-def _complain(layers: Layers, what: str, message: str, key: KeyPath, schema: Schema) -> None:
-    """One mistake that pydantic found, as a sentence."""
+def complain(layers: Layers, what: str, message: str, key: KeyPath, schema: Schema) -> None:
+    """Add a mistake that pydantic found, as a sentence; ``schema`` is that of the whole file."""
     rule = schema_at(schema, key, layers.data)
     match what:
         case "extra_forbidden":
             *table, name = key
             keys = list(schema_at(schema, tuple(table), layers.data).get("properties", {}))
-            where = f"[{'.'.join(map(str, table))}]" if table else "a scene"
+            where = f"[{'.'.join(map(str, table))}]" if table else f"a {schema['title'].lower()}"
             layers.complain(key, f"Allowed: {', '.join(keys)}.", f"is not a key of {where}", nearest(name, keys))
         case "missing":
             layers.complain(key, f"It must be {_form(rule)}.", "is missing")

@@ -121,8 +121,8 @@ def _read(layers: Layers, path: Path, chain: tuple[Path, ...]) -> None:
     layers.lay(table, str(path))
 
 
-def parse(path: Path) -> dict[str, Any]:
-    """The tables of one TOML file.
+def parse(path: Path, what: str = "scene", needs: str = "a duration and a [device]") -> dict[str, Any]:
+    """The tables of one TOML file, which is a ``what`` and needs some keys at least.
 
     Raises:
         SceneError: it is missing, empty, no file, no text or no TOML (with line and column).
@@ -130,15 +130,15 @@ def parse(path: Path) -> dict[str, Any]:
     try:
         if table := tomllib.loads(path.read_bytes().decode("utf-8-sig")):
             return table
-        problem = "The file is empty; a scene needs at least a duration and a [device]."
+        problem = f"The file is empty; a {what} needs at least {needs}."
     except FileNotFoundError:
         problem = "There is no such file."
     except IsADirectoryError:
-        problem = "This is a directory; a scene is a TOML file."
+        problem = f"This is a directory; a {what} is a TOML file."
     except OSError as error:
         problem = f"The file cannot be read: {error.strerror}."
     except UnicodeDecodeError as error:
-        problem = f"A scene must be UTF-8 text, but byte {error.start} is not."
+        problem = f"A {what} must be UTF-8 text, but byte {error.start} is not."
     except ValueError as error:
         problem = f"This is not TOML: {error}."
     except RecursionError:

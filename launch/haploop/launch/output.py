@@ -45,6 +45,12 @@ def write_scene(scene: dict[str, Any], out: Path) -> str:
     return text
 
 
+def kept_name(path: Path) -> str:
+    """The name under which a plugin file is kept: its own with its digest, unless that is its name already."""
+    digest = hashlib.sha256(path.read_bytes()).hexdigest()[:12]
+    return path.name if path.stem.endswith(f"-{digest}") else f"{path.stem}-{digest}.py"
+
+
 def keep_plugin(path: Path, out: Path) -> Path:
     """Copy a plugin file into the run's directory under a name that holds its digest, so that a replay finds it.
 
@@ -52,10 +58,9 @@ def keep_plugin(path: Path, out: Path) -> Path:
         OutputError: the file cannot be read or copied.
     """
     try:
-        source = path.read_bytes()
-        name = f"{path.stem}-{hashlib.sha256(source).hexdigest()[:12]}.py"
+        name = kept_name(path)
         (out / PLUGINS).mkdir(exist_ok=True)
-        (out / PLUGINS / name).write_bytes(source)
+        (out / PLUGINS / name).write_bytes(path.read_bytes())
     except OSError as error:
         raise OutputError(f"The plugin {path} cannot be copied into {out / PLUGINS}: {error.strerror}.") from error
     return out / PLUGINS / name

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 from haploop.launch.layers import Layers
@@ -18,15 +18,15 @@ def lay_overrides(layers: Layers, overrides: Iterable[str]) -> None:
     """
     for text in overrides:
         name, equals, value = text.partition("=")
-        path = _key_path(name)
+        path = key_path(name)
         if not equals or not path:
             expected = "It must read KEY=VALUE with a dotted key, such as dissipation.0.mass=0.02."
             layers.mistakes.append(Mistake(COMMAND_LINE, text, "cannot be read", expected))
-        elif complaint := _lay(layers, path, _value(value)):
+        elif complaint := lay_value(layers, path, _value(value)):
             layers.mistakes.append(Mistake(COMMAND_LINE, name.strip(), "cannot be set", complaint))
 
 
-def _lay(layers: Layers, path: list[str], value: Any) -> str | None:
+def lay_value(layers: Layers, path: Sequence[str], value: Any) -> str | None:
     """Make the way to the last part, then lay the value there; the sentence to say when there is no such way."""
     key: tuple[str | int, ...] = ()
     node: Any = layers.data
@@ -55,7 +55,7 @@ def _lay(layers: Layers, path: list[str], value: Any) -> str | None:
     return None
 
 
-def _key_path(name: str) -> list[str]:
+def key_path(name: str) -> list[str]:
     """The parts of a dotted key, read as TOML reads it, so that a part may be quoted; empty when it is none."""
     try:
         node: Any = tomllib.loads(f"{name} = 0") if "\n" not in name else {}

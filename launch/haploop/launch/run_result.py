@@ -29,6 +29,11 @@ if TYPE_CHECKING:
 _UNITS = {"_N_m": "N/m", "_m_s": "m/s", "_1_s": "1/s", "_m": "m", "_s": "s", "_N": "N", "_J": "J"}
 
 
+def unit_of(key: str) -> str:
+    """The unit of a number of a summary, by its key; "" for none."""
+    return next((unit for end, unit in _UNITS.items() if key.endswith(end)), "")
+
+
 @dataclass(frozen=True, eq=False)
 class Result:
     """A finished run.
@@ -73,8 +78,7 @@ class Result:
         value: Any = self.summary
         for part in key.split("."):
             value = value[int(part) if isinstance(value, list) else part]
-        unit = next((unit for end, unit in _UNITS.items() if key.endswith(end)), "")
-        return pint.get_application_registry().Quantity(math.nan if value is None else value, unit)
+        return pint.get_application_registry().Quantity(math.nan if value is None else value, unit_of(key))
 
     def __repr__(self) -> str:
         swing_mm = 1e3 * (self.summary["window"]["oscillation_m"] or 0.0)

@@ -31,7 +31,17 @@ def load(
     Raises:
         SceneError: the scene cannot be run; it holds every mistake.
     """
-    layers = read_layers(Path(path))
+    return resolved(read_layers(Path(path)), overrides, kinds)
+
+
+def resolved(
+    layers: Layers, overrides: Sequence[str] = (), kinds: Mapping[str, type[Element]] | None = None
+) -> dict[str, Any]:
+    """As ``load``, of layers that were read already.
+
+    Raises:
+        SceneError: the scene cannot be run; it holds every mistake.
+    """
     lay_overrides(layers, overrides)
     layers.data.setdefault("title", layers.path.stem)
     _read_recording(layers)

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 Schema = dict[str, Any]
 
 
-class _TomlSchema(GenerateJsonSchema):
+class TomlSchema(GenerateJsonSchema):
     """TOML has no null, and a key left out may come from the scene that this one extends."""
 
     def nullable_schema(self, schema: core_schema.NullableSchema) -> Schema:
@@ -50,7 +50,7 @@ def json_schema(kinds: Mapping[str, type[Element]]) -> Schema:
 
 def whole_schema(kinds: Mapping[str, type[Element]]) -> Schema:
     """The JSON Schema of a scene after everything it extends has been merged into it."""
-    schema = scene_model(kinds).model_json_schema(schema_generator=_TomlSchema)
+    schema = scene_model(kinds).model_json_schema(schema_generator=TomlSchema)
     recording = {"type": "string", "description": "a CSV of time in s and force in N, in place of time and force"}
     schema["$defs"]["Trace"]["properties"]["file"] = recording
     return schema

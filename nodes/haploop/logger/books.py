@@ -5,13 +5,12 @@ from __future__ import annotations
 import copy
 import math
 from collections.abc import Iterator
-from itertools import chain
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from haploop.logger.plant_books import plant_books
-from haploop.logger.sums import RunningSums, sum_by_tick, sum_in_order
+from haploop.logger.sums import RunningSums, by_tick, sum_in_order, sum_rows
 from haploop.logger.tapes import ControllerTape
 from haploop.logger.wall_books import CAUSES, held_J, ideal_and_undelayed
 from haploop.protocol.arrays import first_row, of_loop
@@ -28,7 +27,7 @@ def sampled_flow(x_m: np.ndarray, force: np.ndarray) -> np.ndarray:
         x_m: positions as measured at consecutive ticks, m, shape (ticks + 1,).
         force: commanded at all of them but the last, N, shape (ticks,) or (forces, ticks).
     """
-    return force * -np.diff(x_m, axis=0)
+    return force * -(x_m[1:] - x_m[:-1])
 
 
 class Books:
@@ -52,6 +51,7 @@ class Books:
         self._has_wall = "wall" in scene
         self._sums = RunningSums(*([scene["loops"]] if "loops" in scene else []))
         self._rows: dict[str, int] = {}
+        self._balance: list[tuple[float, int]] = []
         self._open([*self._plant.names, *(CAUSES if self._has_wall else ()), "moved"])
         self._accounts = 0
         self._open_account("wall")
@@ -65,6 +65,8 @@ class Books:
 
     def _open(self, names: list[str]) -> None:
         for name in names:
+            if sign := self._sign(name):
+                self._balance.append((sign, len(self._rows)))
             self._rows[name] = len(self._rows)
         self._sums.grow(len(self._rows))
 
@@ -110,56 +112,53 @@ class Books:
                 self._open_account(str(book))
 
         added = np.zeros((len(self._rows), ticks, *self._sums.sums.shape[1:]))
-        by_step = self._flows_by_step(tick, plant, tape, forces, into_wall)
-        sum_by_tick(((self._rows[name], flow) for name, flow in by_step), added)
-        for name in ("moved", "ideal"):
-            if name in self._rows:
-                added[self._rows[name]] *= 0.5
+        moved = added[self._rows["moved"]]
+        dx = _displacements(plant)
+        for name, flow in self._exchanged(tick, plant, dx, tape, forces):
+            added[self._rows[name]] = flow
+            moved += np.abs(flow)
+        moved *= 0.5
+        if self._has_wall:
+            for name, flow in self._springs(tick, plant["x"], dx, tape, into_wall):
+                added[self._rows[name]] = flow
         sampled_rows = [self._rows[f"{account}.sampled"] for account in forces]
         added[sampled_rows] = self._sampled(tick, ticks, tape, list(forces.values()))
         return added, sampled_rows
 
-    def _flows_by_step(
+    def _exchanged(
         self,
         tick: int,
         plant: dict[str, np.ndarray],
+        dx: np.ndarray,
         tape: ControllerTape | ControllerTapeArray,
         forces: dict[str, np.ndarray],
-        into_wall: float,
     ) -> Iterator[tuple[str, np.ndarray]]:
-        """What every plant step adds to each book, by name; twice that for ``moved`` and ``ideal``. Shape (steps,)."""
+        """What every interval adds to each book of the balance, by name; shape (ticks,)."""
         n = self._time.steps_per_tick
-        x = plant["x"]
-        dx = np.diff(x, axis=0) + np.diff(plant["x_low"], axis=0)
-        commanded = self._in_effect(plant["command"][:-1].astype(np.intp), tape, forces)
-        way_back, moved = -dx, np.zeros_like(dx)
-        magnitude = np.empty_like(dx)
-        of_plant = zip(self._plant.names, self._plant.increments(tick * n, plant, dx, commanded.values()), strict=True)
-        true = ((f"{account}.true", force * way_back) for account, force in commanded.items())
-        for name, flow in chain(of_plant, true):
-            moved += np.abs(flow, out=magnitude)
-            yield name, flow
-        yield "moved", moved
-        if self._has_wall:
-            position, stiffness = (
-                first_row(tape.rows(f"wall_{of}", tick, tick + 1)) for of in ("position", "stiffness")
-            )
-            self._note_wall(first_row(x), (position, stiffness), into_wall)
-            force = tape.rows("wall", tick, tick + len(dx) // n)
-            springs = ideal_and_undelayed(x, dx, force, (position, stiffness), into_wall, n)
-            yield from zip(CAUSES, springs, strict=True)
+        command = plant["command"][:-1].astype(np.intp)
+        commanded = (_in_effect(force, command, tape.first) for force in forces.values())
+        yield from zip(self._plant.names, self._plant.increments(tick * n, plant, dx, commanded), strict=True)
+        late = self._time.delay_steps % n
+        ways = [(first, by_tick(dx, n, first, end)) for first, end in ((0, late), (late, n)) if first < end]
+        by_interval = command.reshape(-1, n)
+        uneven = np.any([(by_interval[:, i] != by_interval[:, i - 1]) for i in range(1, n) if i != late], axis=0)
+        for account, force in forces.items():
+            flow = sum_rows(-_in_effect(force, command[first::n], tape.first) * way for first, way in ways)
+            if uneven.any():
+                by_step = -_in_effect(force, command, tape.first) * dx
+                flow[uneven] = by_tick(by_step, n)[uneven]
+            yield f"{account}.true", flow
 
-    @staticmethod
-    def _in_effect(
-        command: np.ndarray, tape: ControllerTape | ControllerTapeArray, forces: dict[str, np.ndarray]
-    ) -> dict[str, np.ndarray]:
-        """The force of every account that was commanded over each step, N; 0 before the first command."""
-        index = np.maximum(command - tape.first, 0)
-        before_first = command < 0
-        found = {account: force.take(index, axis=0) for account, force in forces.items()}
-        for force in found.values():
-            force[before_first] = 0.0
-        return found
+    def _springs(
+        self, tick: int, x: np.ndarray, dx: np.ndarray, tape: ControllerTape | ControllerTapeArray, into_wall: float
+    ) -> Iterator[tuple[str, np.ndarray]]:
+        """What every interval adds to the causes of the wall's leak, by name; shape (ticks,)."""
+        n = self._time.steps_per_tick
+        x, way = x[::n], by_tick(dx, n)
+        position, stiffness = (first_row(tape.rows(f"wall_{of}", tick, tick + 1)) for of in ("position", "stiffness"))
+        self._note_wall(first_row(x), (position, stiffness), into_wall)
+        force = tape.rows("wall", tick, tick + len(way))
+        yield from zip(CAUSES, ideal_and_undelayed(x, way, force, (position, stiffness), into_wall), strict=True)
 
     def _note_wall(self, x: Any, wall: tuple[Any, Any], into_wall: float) -> None:
         if self._wall and not np.array_equal(wall, self._wall):
@@ -207,21 +206,34 @@ class Books:
     def residual_J(self) -> float:
         """What the books leave unexplained, in magnitude."""
         parts = []
-        for sign, row in self._balance():
+        for sign, row in self._balance:
             parts += sign * float(self._sums.sums[row]), sign * float(self._sums.errors[row])
         return abs(math.fsum(parts)) if all(map(math.isfinite, parts)) else math.inf
 
     def residuals(self, at_ticks: np.ndarray) -> np.ndarray:
         """The signed residual at each tick from the rows that ``book`` returned, shape (ticks,)."""
-        signs, rows = zip(*self._balance(), strict=True)
+        signs, rows = zip(*self._balance, strict=True)
         return sum_in_order((at_ticks[list(rows)] * np.array(signs)[:, None]).T)
 
-    def _balance(self) -> list[tuple[float, int]]:
-        """Sign and row of every book that is part of the balance; what a plugin only asked for is not."""
-        signs = [(self._sign(name), row) for name, row in self._rows.items()]
-        return [(sign, row) for sign, row in signs if sign]
-
     def _sign(self, name: str) -> float:
+        """How a book counts in the balance, 0 where it is no part of it."""
         if name == "hand_work":
             return 1.0
         return -1.0 if name in self._plant.names or name.endswith(".true") else 0.0
+
+
+def _displacements(plant: dict[str, np.ndarray]) -> np.ndarray:
+    """How far the device goes in each plant step, with the digits that the difference of two positions has lost, m."""
+    x, low = plant["x"], plant["x_low"]
+    return (x[1:] - x[:-1]) + (low[1:] - low[:-1])
+
+
+def _in_effect(force: np.ndarray, command: np.ndarray, first: int) -> np.ndarray:
+    """What an account commanded where each of these commands is in effect, N; 0 before the first command.
+
+    Args:
+        force: of the commands from ``first`` on.
+    """
+    found = force.take(np.maximum(command - first, 0), axis=0)
+    found[command < 0] = 0.0
+    return found

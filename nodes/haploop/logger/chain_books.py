@@ -14,7 +14,7 @@ import numpy as np
 from haploop.logger.chain_forms import ChainForms, ChainFormsArray
 from haploop.logger.chain_moves import Columns, Moves
 from haploop.logger.plant_books import beyond_limits
-from haploop.logger.sums import sum_rows
+from haploop.logger.sums import by_tick, sum_rows
 from haploop.plant.chain import Chain
 from haploop.plant.hand_force import hand_force
 from haploop.protocol.arrays import first_row
@@ -37,16 +37,17 @@ class ChainBooks:
 
     Attributes:
         names: the books, in the order of the rows of ``increments``; heats end in ``_heat``.
+        forms: the integrals.
         least_friction_J: the least heat of friction in any step so far, 0 or above but for rounding.
     """
 
     def __init__(self, scene: dict[str, Any], time: Timebase) -> None:
         # A sensor takes no energy.
         self._chain = replace(Chain.of(scene), sensor=None)
-        self._tau = hand_force(scene, time.plant_rate)
-        self._forms = (ChainFormsArray if "loops" in scene else ChainForms)(self._chain, time.step_s)
+        self._n, self._tau = time.steps_per_tick, hand_force(scene, time.plant_rate)
+        self.forms: Any = (ChainFormsArray if "loops" in scene else ChainForms)(self._chain, time.step_s)
         self._rubs, self._is_limited = "friction" in scene, "actuator" in scene
-        self._heats = [name for name in self._forms.names if name.endswith("_heat")]
+        self._heats = [name for name in self.forms.names if name.endswith("_heat")]
         friction, actuator = ["friction_heat"] * self._rubs, ["actuator"] * self._is_limited
         self.names = ["hand_work", *self._heats, *friction, "kinetic", "spring", *actuator]
         self.least_friction_J = 0.0
@@ -54,13 +55,26 @@ class ChainBooks:
     def increments(
         self, first_step: int, columns: Columns, dx: np.ndarray, commanded: Iterable[np.ndarray]
     ) -> Iterator[np.ndarray]:
-        """What each step adds to each book, J; see ``PlantBooks.increments``."""
-        moves, steps = Moves.of(self._chain, first_step, columns), len(dx)
-        tau, force = self._tau.at_steps(first_step, first_step + steps + 1), columns["force"][:-1]
+        """What each interval adds to each book, J; see ``PlantBooks.increments``."""
+        for book in self.by_step(first_step, columns, dx, commanded):
+            yield by_tick(book, self._n)
+
+    def by_step(
+        self, first_step: int, columns: Columns, dx: np.ndarray, commanded: Iterable[np.ndarray]
+    ) -> Iterator[np.ndarray]:
+        """What each step adds to each book, J, shape (steps,) each."""
+        tau, force = self._tau.at_steps(first_step, first_step + len(dx) + 1), columns["force"][:-1]
+        return self.of_moves(Moves.of(self._chain, first_step, columns), tau, force, dx, commanded)
+
+    def of_moves(
+        self, moves: Moves, tau: np.ndarray, force: np.ndarray, dx: np.ndarray, commanded: Iterable[np.ndarray]
+    ) -> Iterator[np.ndarray]:
+        """The same from the moves that the steps consist of, tau at the steps and at the end, and the force held."""
+        steps = len(dx)
         rise = np.diff(tau, axis=0)[moves.step]
         start = tau[:-1][moves.step] + rise * moves.elapsed
-        found = self._forms.integrals(moves, force[moves.step], start, rise)
-        integrals = dict(zip(self._forms.names, found, strict=True))
+        found = self.forms.integrals(moves, force[moves.step], start, rise)
+        integrals = dict(zip(self.forms.names, found, strict=True))
         risen = np.ldexp(rise, -moves.level)
         way = sum_rows(moves.ways)
         books = {"hand_work": (start + risen / 2.0) * way + risen * integrals["swing"]}
@@ -104,4 +118,4 @@ class ChainBooks:
 
 def _by_step(values: np.ndarray, step: np.ndarray, steps: int) -> np.ndarray:
     """The sum over the moves of each step, in their order."""
-    return values if len(values) == steps else np.bincount(step, values, steps)
+    return values if len(values) == steps == step[-1] + 1 else np.bincount(step, values, steps)

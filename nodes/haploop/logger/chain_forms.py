@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -98,8 +99,9 @@ def names_of(chain: Chain) -> list[str]:
 def _sum_of(factors: np.ndarray, columns: Sequence[np.ndarray], which: slice | np.ndarray) -> np.ndarray:
     """The sum of factor times column, term by term in a fixed order (a matrix product may reorder with its size)."""
     total = np.zeros_like(columns[0][which])
-    for factor, column in zip(factors, columns, strict=True):
-        if factor.any():
+    counts: Any = (factors.any(axis=-1) if factors.ndim > 1 else factors).tolist()
+    for factor, column, there in zip(factors, columns, counts, strict=True):
+        if there:
             total = total + factor * column[which]
     return total
 
@@ -107,9 +109,10 @@ def _sum_of(factors: np.ndarray, columns: Sequence[np.ndarray], which: slice | n
 def _forms_of(forms: np.ndarray, w: Sequence[np.ndarray]) -> np.ndarray:
     """w' Q w of every form Q and every column of w, in a fixed order; shape (forms, columns)."""
     total = np.zeros((len(forms), *w[0].shape), w[0].dtype)
+    counts: Any = forms.any(axis=(0, *range(3, forms.ndim))).tolist()
     for i in range(len(w)):
         for j in range(i, len(w)):
-            entries = forms[:, i, j] if i == j else 2.0 * forms[:, i, j]
-            if entries.any():
+            if counts[i][j]:
+                entries = forms[:, i, j] if i == j else 2.0 * forms[:, i, j]
                 total += entries[:, None] * (w[i] * w[j])
     return total

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -71,6 +71,10 @@ class Moves:
             friction=table("friction")[begins],
             snap=table("snap_J")[begins],
         )
+
+    def within(self, which: np.ndarray) -> Moves:
+        """Some of the moves of one loop."""
+        return Moves(*(getattr(self, field.name)[..., which] for field in fields(self)))
 
     def groups(self) -> list[tuple[int, bool, np.ndarray | slice]]:
         """(level, is_stuck, which moves) of all moves that last equally long under the same flow."""

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from haploop.logger.sums import sum_rows
-from haploop.plant.flow import motion_integrals, natural_rate, real_for
+from haploop.logger.sums import by_tick, sum_rows
+from haploop.plant.flow import motion_integrals, natural_rate
 from haploop.plant.hand_force import hand_force
 from haploop.plant.mechanics import Mechanics
 from haploop.protocol.arrays import each, first_row
@@ -26,6 +26,10 @@ def plant_books(scene: dict[str, Any], time: Timebase) -> PlantBooks | ChainBook
     """
     bandwidth = "bandwidth" in scene.get("actuator", {})
     if bandwidth or "grip" in scene.get("hand", {}) or scene.keys() & {"friction", "transmission"}:
+        if "friction" in scene and "loops" in scene:
+            from haploop.logger.friction_books_array import FrictionBooksArray
+
+            return FrictionBooksArray(scene, time)
         from haploop.logger.chain_books import ChainBooks
 
         return ChainBooks(scene, time)
@@ -33,14 +37,15 @@ def plant_books(scene: dict[str, Any], time: Timebase) -> PlantBooks | ChainBook
 
 
 class PlantBooks:
-    """What every plant step moves between the hand's muscles, the dampers, the mass and the spring.
+    """What every interval moves between the hand's muscles, the dampers, the mass and the spring.
 
-    Over a step from x, v to x+, v+ with dx = x+ - x, under the held force f and tau linear in time:
+    Over a plant step from x, v to x+, v+ with dx = x+ - x, under the held force f and tau linear in time:
         work of tau        integral tau v dt = (tau + tau+)/2 dx + (tau+ - tau) integral (t - h/2)/h v dt
-        heat of damper i   b_i integral v^2 dt = b_i w' S w,  w = (v, a/c, tau' h/(m c))
-        kinetic change     m (v+ - v) (v+ + v) / 2
-        spring change      k dx ((x+ + x)/2 - x_rest)
+        heat of damper i   b_i integral v^2 dt = b_i w' S w,  w = (v, m a, tau' h)
         actuator           (f_commanded - f) dx, what saturation and steps of force keep from the device
+    all summed over the steps of an interval; and over a whole interval, in which x goes by X and v by V:
+        kinetic change     m V (v + V / 2)
+        spring change      k X (x - x_rest + X / 2)
     Nothing is taken from the balance, so that its residual is a proof. Forces times dx (and not times v) keep the
     books of a device at rest under load at rest too.
 
@@ -50,13 +55,17 @@ class PlantBooks:
 
     def __init__(self, scene: dict[str, Any], time: Timebase) -> None:
         m = self.mechanics = Mechanics.of(scene)
-        self._tau, step_s = hand_force(scene, time.plant_rate), time.step_s
-        self._real = real_for(np.max(m.damping / m.mass_kg), step_s)
-        integrals = each(motion_integrals, m.mass_kg, m.damping, m.stiffness, step_s)
-        self._square, self._lag = (integral.astype(self._real) for integral in integrals)
+        self._n, self._tau, step_s = time.steps_per_tick, hand_force(scene, time.plant_rate), time.step_s
+
+        def forms(mass: float, damping: float, stiffness: float) -> tuple[np.ndarray, np.ndarray]:
+            square, lag = motion_integrals(mass, damping, stiffness, step_s)
+            push = 1.0 / (np.longdouble(mass) * natural_rate(mass, stiffness, step_s))
+            scales = np.array([1.0, push, push])
+            return as_squares(square * np.outer(scales, scales)).astype(float), (lag * scales).astype(float)
+
+        self._square, self._lag = each(forms, m.mass_kg, m.damping, m.stiffness)
         if "loops" in scene:
-            self._square, self._lag = self._square.reshape(3, 3, -1), self._lag.reshape(3, -1)
-        self._rate = each(natural_rate, m.mass_kg, m.stiffness, step_s)
+            self._square, self._lag = self._square.reshape(6, -1), self._lag.reshape(3, -1)
         self._is_limited = "actuator" in scene
         self.names = ["hand_work", *(f"{name}_heat" for name in m.dampers), "kinetic", "spring"]
         self.names += ["actuator"] * self._is_limited
@@ -64,40 +73,35 @@ class PlantBooks:
     def increments(
         self, first_step: int, columns: dict[str, np.ndarray], dx: np.ndarray, commanded: Iterable[np.ndarray]
     ) -> Iterator[np.ndarray]:
-        """What each step adds to each book, J; of many loops at once where the arrays have a last axis for them.
+        """What each interval adds to each book, J; of many loops at once where the arrays have a last axis for them.
 
         Args:
             first_step: step of the first state.
-            columns: plant telemetry of these steps, the end state included; shape (steps + 1,) each.
-            dx: displacement over each step, shape (steps,), with the digits that the difference of two x has lost.
-            commanded: the force of the wall and of every element over each step, shape (steps,) each.
+            columns: plant telemetry of whole intervals, the end state included; shape (ticks * n + 1,) each.
+            dx: displacement over each step, shape (ticks * n,), with the digits that the difference of two x has lost.
+            commanded: the force of the wall and of every element over each step, shape (ticks * n,) each.
 
         Yields:
-            Shape (steps,) each, ordered as ``names``.
+            Shape (ticks,) each, ordered as ``names``.
         """
-        for book in self._increments(first_step, columns, dx, commanded):
-            yield book.astype(float, copy=False)
-
-    def _increments(
-        self, first_step: int, columns: dict[str, np.ndarray], dx: np.ndarray, commanded: Iterable[np.ndarray]
-    ) -> Iterator[np.ndarray]:
-        m, x, v, force = self.mechanics, columns["x"], columns["v"], columns["force"][:-1]
+        n, m, x, v, force = self._n, self.mechanics, columns["x"], columns["v"], columns["force"][:-1]
         tau = self._tau.at_steps(first_step, first_step + len(x))
-        start_x, start_v, dv = x[:-1], v[:-1], v[1:] - v[:-1]
         rise = tau[1:] - tau[:-1]
-        wide_v = start_v.astype(self._real, copy=False)
-        stretch = start_x - m.rest_m
-        net = force + tau[:-1] - m.damping * wide_v - m.stiffness * stretch
-        scale = 1.0 / (m.mass_kg * self._rate)
-        rates = [wide_v, net * scale, rise * scale]
-        yield self._hand_work(tau, rise, dx, rates)
-        square = sum_products(self._square, rates if self._rises(rise) else rates[:2])
+        net = force + tau[:-1] - m.damping * v[:-1] - m.stiffness * (x[:-1] - m.rest_m)
+        rates = [v[:-1], net, rise] if self._rises(rise) else [v[:-1], net]
+        yield by_tick(self._hand_work(tau, rise, dx, rates), n)
+        square = by_tick(sum_squares(self._square, rates), n)
         for damping in m.dampers.values():
             yield damping * square
-        yield m.mass_kg * dv * (start_v + dv * 0.5)
-        yield m.stiffness * dx * (stretch + dx * 0.5)
+        at_ticks, way = x[::n], by_tick(dx, n)
+        yield self._kinetic(v[::n])
+        yield m.stiffness * way * (at_ticks[:-1] - m.rest_m + way * 0.5)
         if self._is_limited:
-            yield beyond_limits(commanded, force) * dx
+            yield by_tick(beyond_limits(commanded, force) * dx, n)
+
+    def _kinetic(self, v: np.ndarray) -> np.ndarray:
+        start, change = v[:-1], v[1:] - v[:-1]
+        return self.mechanics.mass_kg * change * (start + change * 0.5)
 
     @staticmethod
     def _rises(rise: np.ndarray) -> bool:
@@ -105,10 +109,11 @@ class PlantBooks:
         return bool(rise.any())
 
     def _hand_work(self, tau: np.ndarray, rise: np.ndarray, dx: np.ndarray, rates: Sequence[np.ndarray]) -> np.ndarray:
-        if not self._rises(rise):
+        if len(rates) < 3:
             return tau[:-1] * dx
-        lagged = self._lag[0] * rates[0] + self._lag[1] * rates[1] + self._lag[2] * rates[2]
-        return (tau[:-1] + rise / 2.0) * dx + rise * lagged
+        of_v, of_net, of_rise = self._lag
+        lagged = rise * of_v * rates[0] + rise * of_net * rates[1] + rise * of_rise * rise
+        return (tau[:-1] + rise * 0.5) * dx + lagged
 
     def stored_J(self, columns: dict[str, np.ndarray]) -> Any:
         """Kinetic and spring energy in the first state of some telemetry."""
@@ -120,13 +125,26 @@ def beyond_limits(commanded: Iterable[np.ndarray], force: np.ndarray) -> np.ndar
     return sum_rows(commanded) - force
 
 
-def sum_products(form: np.ndarray, w: Sequence[np.ndarray]) -> np.ndarray:
-    """w' Q w at every step, term by term in a fixed order (a matrix product may reorder with its size).
+def as_squares(form: np.ndarray) -> np.ndarray:
+    """What makes w' Q w of three entries a sum of squares a (w0 + b w1 + c w2)^2 + d (w1 + e w2)^2 + f w2^2.
 
-    Entries of w that are left out at its end are 0.
+    Q is positive: no term is below 0, and where they are far apart none cancels another.
+
+    Returns:
+        (a, b, c, d, e, f).
     """
-    total = form[0, 0] * w[0] * w[0]
-    for i in range(len(w)):
-        for j in range(max(i, 1), len(w)):
-            total += (form[i, j] if i == j else 2.0 * form[i, j]) * w[i] * w[j]
-    return total
+    a = form[0, 0]
+    b, c = form[0, 1:] / a
+    d, rest = form[1, 1] - a * b * b, form[1, 2] - a * b * c
+    e = rest / d if d else 0.0 * rest
+    return np.array([a, b, c, d, e, form[2, 2] - a * c * c - e * rest])
+
+
+def sum_squares(factors: np.ndarray, w: Sequence[np.ndarray]) -> np.ndarray:
+    """The sum of ``as_squares`` at every step; an entry of w that is left out at its end is 0."""
+    a, b, c, d, e, f = factors
+    first, second = w[0] + b * w[1], w[1]
+    if len(w) < 3:
+        return a * (first * first) + d * (second * second)
+    first, second = first + c * w[2], second + e * w[2]
+    return a * (first * first) + d * (second * second) + f * w[2] * w[2]

@@ -15,6 +15,7 @@ from haploop.logger.window import Window
 
 # Entries that differ between two runs of the same scene.
 OF_THE_MACHINE = ("wall_s", "real_time_factor", "versions")
+_FINITE = (str, int, bool)
 
 
 def versions() -> dict[str, str]:
@@ -116,5 +117,10 @@ def finite(value: Any) -> Any:
     if isinstance(value, float):
         return value if math.isfinite(value) else None
     if isinstance(value, dict):
-        return {key: finite(entry) for key, entry in value.items()}
+        return {
+            key: entry
+            if (kind := entry.__class__) in _FINITE or (kind is float and math.isfinite(entry))
+            else finite(entry)
+            for key, entry in value.items()
+        }
     return [finite(entry) for entry in value] if isinstance(value, list | tuple) else value

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import Any
 
 import numpy as np
 
@@ -38,22 +39,19 @@ def sum_rows(rows: Iterable[np.ndarray]) -> np.ndarray:
     return total
 
 
-def sum_by_tick(flows: Iterable[tuple[int, np.ndarray]], by_tick: np.ndarray) -> None:
-    """Sum flows over the steps of each tick, from first to last.
+def by_tick(flow: Any, steps_per_tick: int, first: int = 0, end: int | None = None) -> Any:
+    """Sum over the steps of each tick, or over those from ``first`` on before ``end``, in their order.
 
     Args:
-        flows: (row, what is added at each step), shape (ticks * n,), or (ticks * n, loops).
-        by_tick: takes the sums, shape (rows, ticks), or (rows, ticks, loops).
+        flow: what is added at each step, shape (ticks * n,), or (ticks * n, loops).
+
+    Returns:
+        Shape (ticks,), or (ticks, loops).
     """
-    ticks, *loops = by_tick.shape[1:]
-    if loops in ([], [1]):
-        rows, steps = zip(*flows, strict=True)
-        sums = sum_in_order(np.stack(steps).reshape(len(rows), ticks, -1))
-        by_tick[list(rows)] = sums.reshape(len(rows), *by_tick.shape[1:])
-        return
-    for row, flow in flows:  # one after the other, while it is in the cache
-        # Over an axis that is not the last NumPy adds row after row; a last axis of length 1 is none to it.
-        np.add.reduce(flow.reshape(ticks, -1, *loops), axis=1, out=by_tick[row])
+    total = flow[first::steps_per_tick].copy()
+    for step in range(first + 1, steps_per_tick if end is None else end):
+        total += flow[step::steps_per_tick]
+    return total
 
 
 class RunningSums:

@@ -155,6 +155,6 @@ def swings(x: np.ndarray, swing_m: float) -> tuple[int, float]:
     t, square = _centred(len(x))
     offset = x - x.mean()
     offset = offset - t * (np.dot(t, offset) / square)
-    side = np.sign(offset)[np.abs(offset) > swing_m]
+    is_above = offset[np.abs(offset) > swing_m] > 0.0
     first, second = np.ptp(offset[: len(x) // 2]), np.ptp(offset[len(x) // 2 :])
-    return int(np.count_nonzero(np.diff(side))), float(second / first) if first > 0 else 0.0
+    return int(np.count_nonzero(is_above[1:] != is_above[:-1])), float(second / first) if first > 0 else 0.0

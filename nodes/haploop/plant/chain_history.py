@@ -39,6 +39,7 @@ class ChainHistory(ABC):
     Attributes:
         x, v: position in m and velocity in m/s of body 0 at the end of the last interval.
         force, command: what is held last, N, and the tick of its command; 0 and -1 before the first.
+        last_held: force and command and whatever else is held last, shape (columns,).
         z, low: all states and what rounding left of them.
     """
 
@@ -52,11 +53,11 @@ class ChainHistory(ABC):
         self._intervals: list[Interval] = []
         self.z = chain.start_state(*([scene["loops"]] if "loops" in scene else []))
         self.low = np.zeros_like(self.z)
-        self._last_held = self._held_before()
+        self.last_held = self._held_before()
         self._publish()
         self._feel, self._felt = felt_acceleration(scene, chain, time, self.loads)
-        begun = np.append(self._last_held[2:], (0.0, 0.0))[None, :2]
-        self._feel(Interval(np.stack([self.z, self.z]), np.zeros(0), self._last_held[None], begun), 0)
+        begun = np.append(self.last_held[2:], (0.0, 0.0))[None, :2]
+        self._feel(Interval(np.stack([self.z, self.z]), np.zeros(0), self.last_held[None], begun), 0)
 
     def _held_before(self) -> np.ndarray:
         """What is held at the start, before any command has come."""
@@ -64,7 +65,7 @@ class ChainHistory(ABC):
 
     def _publish(self) -> None:
         self.x, self.v = float(self.z[0]), float(self.z[self._v])
-        self.force, self.command = float(self._last_held[0]), int(self._last_held[1])
+        self.force, self.command = float(self.last_held[0]), int(self.last_held[1])
 
     def loads(self, first: int, last: int) -> np.ndarray:
         """Load on the last body at the steps first ... last - 1, N."""
@@ -88,7 +89,7 @@ class ChainHistory(ABC):
     def _accept(self, tick: int, interval: Interval) -> None:
         """The interval went this way."""
         self._intervals.append(interval)
-        self.z, self.low, self._last_held = interval.states[-1], interval.lows[-1], interval.held[-1]
+        self.z, self.low, self.last_held = interval.states[-1], interval.lows[-1], interval.held[-1]
         self._publish()
         self._feel(interval, tick * self._n + 1)
 
@@ -104,7 +105,7 @@ class ChainHistory(ABC):
         chain, done = self._chain, self._intervals
         states = np.vstack([*(interval.states[:-1] for interval in done), self.z])
         lows = np.vstack([*(interval.lows[:-1] for interval in done), self.low])
-        held = np.vstack([*(interval.held for interval in done), self._last_held])
+        held = np.vstack([*(interval.held for interval in done), self.last_held])
         self._intervals = []
         record = dict(zip(chain.states, states.T, strict=True))
         record |= {f"{name}_low": low for name, low in zip(chain.positions, lows.T, strict=False)}

@@ -49,7 +49,7 @@ class ChainMotionArray(ChainMotion):
 
     def _publish(self) -> None:
         self.x, self.v = self.z[0], self.z[self._v]
-        self.force, self.command = self._last_held[0], int(self._last_held[1, 0])
+        self.force, self.command = self.last_held[0], int(self.last_held[1, 0])
 
     def advance(self, tick: int, holds: list[Hold]) -> None:
         """Move through interval ``tick`` under the forces held in it."""

@@ -39,9 +39,13 @@ class Mode:
     def decide_at_rest(self, z: np.ndarray, command: float, load: float) -> None:
         """Where v is exactly 0: stick, or slip where the other forces pull (command and load in N)."""
         if z[self._v] == 0.0:
-            force = self._force.on(z, command, load)
-            self.is_stuck = bool(self._friction.holds(force))
-            self.direction = math.copysign(1.0, force)
+            holds, direction = self.at_rest(z, command, load)
+            self.is_stuck, self.direction = bool(holds), float(direction)
+
+    def at_rest(self, z: Any, command: Any, load: Any) -> tuple[Any, Any]:
+        """Whether a body at rest sticks, and where the other forces pull it."""
+        force = self._force.on(z, command, load)
+        return self._friction.holds(force), np.copysign(1.0, force)
 
     def friction_at(self, v: float) -> float:
         """The friction force at velocity v, N; none at rest."""

@@ -10,6 +10,7 @@ from haploop.plant.chain_history import HELD, Interval
 from haploop.plant.chain_motion import ChainMotion
 from haploop.plant.command_line import Hold
 from haploop.plant.friction import Friction
+from haploop.plant.friction_mode import Mode
 from haploop.plant.friction_walk import Walk
 from haploop.protocol.ticks import Timebase
 
@@ -34,7 +35,7 @@ class FrictionMotion(ChainMotion):
 
     def _held_before(self) -> np.ndarray:
         self._walk = Walk(self._chain, self._friction, self._step_s)
-        mode = self._mode = self._walk.mode
+        mode = self.mode = self._walk.mode
         mode.start(self.z, float(self.loads(0, 1)[0]))
         return np.array([0.0, -1.0, mode.friction_at(self.z[self._v]), float(mode.is_stuck)])
 
@@ -53,17 +54,26 @@ class FrictionMotion(ChainMotion):
 
     def _as_it_goes(self, interval: Interval, begin: int, holds: list[Hold], tick: int, loads: np.ndarray) -> int:
         """Follow the present mode from step ``begin`` on; returns the first step in which it does not hold."""
-        mode, states, command = self._mode, interval.states, interval.held[begin:, 0]
-        mode.decide_at_rest(states[begin], command[0], loads[begin])
-        friction = 0.0 if mode.is_stuck else -mode.direction * self._friction.kinetic_N
+        mode = self.mode
+        mode.decide_at_rest(interval.states[begin], interval.held[begin, 0], loads[begin])
+        friction = self.slipping(mode)
         self._follow(interval, begin, holds, self._clamped if mode.is_stuck else self._free, tick, friction)
         interval.held[begin:, 2:] = interval.at_ends[begin:] = friction, mode.is_stuck
-        starts, ends, load, end_load = states[begin:-1].T, states[begin + 1 :].T, loads[begin:-1], loads[begin + 1 :]
+        goes_on = self.goes_on(interval, begin, friction, loads)
+        return self._n if goes_on.all() else begin + int(goes_on.argmin())
+
+    def slipping(self, mode: Mode) -> Any:
+        """The friction force while the mode holds, the same at every speed, N."""
+        return 0.0 if mode.is_stuck else -mode.direction * self._friction.kinetic_N
+
+    def goes_on(self, interval: Interval, begin: int, friction: Any, loads: np.ndarray) -> np.ndarray:
+        """Whether the mode holds throughout each step from ``begin`` on; of one loop or, on its last axis, of many."""
+        mode, states, command = self.mode, interval.states.swapaxes(0, 1), interval.held[begin:, 0]
+        starts, ends, load, end_load = states[:, begin:-1], states[:, begin + 1 :], loads[begin:-1], loads[begin + 1 :]
         goes_on = mode.goes_on(ends, command, end_load)
         if mode.is_stuck:
             goes_on &= mode.goes_on(starts, command, load)
-        goes_on &= ~mode.may_pause(starts, ends, command, load, end_load, friction, 1.0)
-        return self._n if goes_on.all() else begin + int(goes_on.argmin())
+        return goes_on & ~mode.may_pause(starts, ends, command, load, end_load, friction, 1.0)
 
     def _through(self, interval: Interval, step: int, tick: int, loads: np.ndarray) -> None:
         """Through one step, whatever happens in it."""
@@ -71,8 +81,16 @@ class FrictionMotion(ChainMotion):
         load, rise = float(loads[step]), float(loads[step + 1] - loads[step])
         through = self._walk.through(tick * self._n + step, states[step], lows[step], float(held[step, 0]), load, rise)
         states[step + 1], lows[step + 1], held[step, 2], held[step, 3] = through
-        at_ends[step] = self._mode.friction_at(states[step + 1, self._v]), self._mode.is_stuck
+        at_ends[step] = self.mode.friction_at(states[step + 1, self._v]), self.mode.is_stuck
 
     def take_record(self, tick: int) -> dict[str, np.ndarray]:
         """As without friction; the pieces of the steps within which friction switched come beside, ``pieces.*``."""
-        return super().take_record(tick) | self._walk.take_pieces()
+        return super().take_record(tick) | self.take_pieces()
+
+    def take_pieces(self) -> dict[str, np.ndarray]:
+        """The pieces of steps since the last call; see ``Walk.take_pieces``."""
+        return self._walk.take_pieces()
+
+    def take_interval(self) -> Interval:
+        """The last interval, which is then in no record."""
+        return self._intervals.pop()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 
@@ -138,6 +139,12 @@ class Walk:
         rows = np.array(self._pieces, float).reshape(-1, len(names))
         self._pieces = []
         return {f"pieces.{name}": np.ascontiguousarray(rows[:, i]) for i, name in enumerate(names)}
+
+
+def goes_by_whole_steps(scene: dict[str, Any]) -> bool:
+    """Whether a step in which nothing switches is one piece; see ``Walk.whole_steps``."""
+    is_slow = parts_of_a_step(Chain.of(scene), 1.0 / scene["clock"]["plant_rate"]) == 1
+    return is_slow and Friction(scene["friction"]).is_constant
 
 
 def parts_of_a_step(chain: Chain, step_s: float) -> int:

@@ -99,7 +99,7 @@ class LinearMotion:
         first = piece * ticks * n
         force = self._tau.at_steps(first, first + ticks * n + 1) + self._spring_at_origin_N
         start, rise = (rows.reshape(ticks, n, *force.shape[1:]) for rows in (force[:-1], np.diff(force, axis=0)))
-        states = list(self._driven(start, rise))
+        states = list(self._driven(start.swapaxes(0, 1), rise.swapaxes(0, 1)))
         response = np.zeros((ticks, n + 1, 2, *states[0][0].shape[1:]))
         for i, (x, v) in enumerate(states, 1):
             response[:, i, 0], response[:, i, 1] = x, v
@@ -109,16 +109,16 @@ class LinearMotion:
         """D at every step of intervals but their start, from the load at the start of each step and its rise over it.
 
         Args:
-            start, rise: N, shape (intervals, n); both and what is yielded may have a last axis for many loops.
+            start, rise: N, shape (n, intervals); both and what is yielded may have a last axis for many loops.
 
         Yields:
             What is added to x and v, shape (intervals,) each.
         """
         s = self._step
         push_x, push_v = s.x_force * start + s.x_slope * rise, s.v_force * start + s.v_slope * rise
-        x = v = push_x[:, 0] - push_x[:, 0]
+        x = v = push_x[0] - push_x[0]
         for i in range(self._steps):
-            x, v = x + (s.x_x * x + s.x_v * v + push_x[:, i]), v + (s.v_x * x + s.v_v * v + push_v[:, i])
+            x, v = x + (s.x_x * x + s.x_v * v + push_x[i]), v + (s.v_x * x + s.v_v * v + push_v[i])
             yield x, v
 
     def acceleration(self, tick: int) -> float:
@@ -198,7 +198,7 @@ class LinearMotion:
         return joined[start : start + ticks, :-1]
 
 
-def change_over(held: np.ndarray, response: np.ndarray, x: Any, v: Any, force: Any, low: Any) -> np.ndarray:
+def change_over(held: Any, response: Any, x: Any, v: Any, force: Any, low: Any) -> Any:
     """What the plant steps of holds add to a state, from the beginning of each hold, one hold an interval.
 
     Args:

@@ -14,6 +14,10 @@ if TYPE_CHECKING:
 
 def motion_of(scene: dict[str, Any], time: Timebase) -> LinearMotionArray | ChainMotionArray:
     """The least that moves the loops of a stacked scene."""
+    if "friction" in scene:
+        from haploop.plant.friction_motion_array import FrictionMotionArray
+
+        return FrictionMotionArray(scene, time)
     if needs_chain(scene):
         from haploop.plant.chain_motion_array import ChainMotionArray
 

@@ -88,6 +88,20 @@ def first_row(column: np.ndarray) -> Any:
     return row if row.shape else float(row)
 
 
+class Shared:
+    """Holds what all loops share: no array in it has an axis for them."""
+
+    def __init__(self, held: Any) -> None:
+        self.held = held
+
+
+def of_one(scene: dict[str, Any]) -> dict[str, Any]:
+    """The scene of the first loop of a stacked one."""
+    one = of_loop(scene, 0)
+    del one["loops"]
+    return one
+
+
 def of_loop(value: Any, loop: int) -> Any:
     """The same for one loop: of every array within dicts and lists its number."""
     if isinstance(value, dict):

@@ -197,10 +197,10 @@ def view(
 
 @app.command()
 def plot(directory: Directory) -> None:
-    """Draw a run; the last line names the figure's file."""
-    from haploop.tools.scenes import plot_run
+    """Draw a run, or the map of a sweep as far as it goes; the last line names the figure's file."""
+    from haploop.tools.scenes import plot_directory
 
-    plot_run(directory)
+    plot_directory(directory)
 
 
 @app.command()
@@ -252,6 +252,73 @@ def cost(
     from haploop.tools.cost import cost as measure
 
     measure(Request(scenes or [], methods, rates, out, tolerance, repeats, processes), json)
+
+
+@app.command()
+def sweep(
+    sweep: Annotated[Path, typer.Argument(help="sweep file (TOML)", show_default=False)],
+    set: Set = None,
+    out: Annotated[
+        Path | None, typer.Option(help="directory; one that holds this sweep goes on [runs/SWEEP-TIME]")
+    ] = None,
+    workers: Annotated[int | None, typer.Option(help="processes [one a core]", show_default=False)] = None,
+    dask: Annotated[str | None, typer.Option(metavar="ADDRESS", help="scheduler of a Dask cluster to run on")] = None,
+    jax: Annotated[bool, typer.Option("--jax", help="run compiled, on CPU or GPU, within a tolerance")] = False,
+    plugin: Plugin = None,
+    json: Json = False,
+) -> None:
+    """Run a scene over one to three axes into a table (Parquet); with [bisect], find where its verdict changes.
+
+    Can be stopped or killed; the same command with the same --out goes on. `haploop plot DIR` draws the map.
+    """
+    from haploop.tools.sweep.command import Request
+    from haploop.tools.sweep.command import sweep as run_sweep
+
+    run_sweep(Request(sweep, set or [], out, workers, dask, jax, plugin or []), json)
+
+
+@app.command()
+def dissipate(
+    recording: Annotated[Path, typer.Argument(help="CSV, TSV, directory of a run or its log", show_default=False)],
+    damping: Annotated[list[str] | None, typer.Option(metavar="B", help='damping, N s/m or "0.0027 N s/mm"')] = None,
+    mass: Annotated[list[str] | None, typer.Option(metavar="M", help="bi- and unidirectional inertia, kg")] = None,
+    element: Annotated[
+        list[str] | None, typer.Option(metavar="ELEMENT", help='any other: "KIND KEY=VALUE ..."')
+    ] = None,
+    position: Annotated[
+        str | None, typer.Option(metavar="COLUMN", help="name or number from 1 [x or position]")
+    ] = None,
+    time: Annotated[str | None, typer.Option(metavar="COLUMN", help="of the time [t, time or timestamp]")] = None,
+    rate: Annotated[float | None, typer.Option(min=1e-6, max=1e9, help="samples a second, in place of times")] = None,
+    velocity: Annotated[str | None, typer.Option(metavar="COLUMN", help="recorded, not estimated")] = None,
+    acceleration: Annotated[str | None, typer.Option(metavar="COLUMN", help="recorded, not estimated")] = None,
+    unit: Annotated[
+        str | None, typer.Option(help="of length, such as mm, or metres a count [the header's (unit), m]")
+    ] = None,
+    time_unit: Annotated[str | None, typer.Option(help="such as ms [the header's (unit), s]")] = None,
+    wall: Annotated[str | None, typer.Option(metavar="POSITION", help="elements act beyond it only, m or text")] = None,
+    occupies: Annotated[str, typer.Option(metavar="below|above", help="which side of it the wall is")] = "below",
+    delay: Annotated[str | None, typer.Option(metavar="TIME", help="age of a force as it acts [0; a run's]")] = None,
+    set: Annotated[
+        list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="velocity.cutoff, acceleration.estimator ...")
+    ] = None,
+    plugin: Plugin = None,
+    out: Annotated[Path | None, typer.Option(help="the figure's file [beside the recording]")] = None,
+    json: Json = False,
+) -> None:
+    """Tell what elements would have dissipated on a motion that was recorded, which they do not change.
+
+    One pass in flat memory. The last line names the figure's file.
+    """
+    from haploop.tools.dissipate.command import Request
+    from haploop.tools.dissipate.command import dissipate as book
+    from haploop.tools.dissipate.setting import Asked
+    from haploop.tools.dissipate.text_recording import Layout
+    from haploop.tools.live import seconds
+
+    asked = Asked(damping or [], mass or [], element or [], wall, occupies, set or [])
+    layout = Layout(position, time, rate, velocity, acceleration, unit, time_unit)
+    book(Request(recording, asked, layout, seconds(delay, "--delay"), plugin or [], out), json)
 
 
 def main() -> None:

@@ -73,7 +73,7 @@ def pace_of(text: str) -> float | Literal["free"]:
     return rate
 
 
-def seconds(text: str | None) -> float | None:
+def seconds(text: str | None, option: str = "--at") -> float | None:
     """A time given in seconds, or with its unit."""
     if text is None:
         return None
@@ -87,4 +87,4 @@ def seconds(text: str | None) -> float | None:
     try:
         return float(Number(Quantity("s", at_least=0), "time").read(text))
     except ValueError as error:
-        leave(f"--at must be a time such as 1.5 or '1500 ms', but {text!r} was given: {error}", WRONG_USE)
+        leave(f"{option} must be a time such as 1.5 or '1500 ms', but {text!r} was given: {error}", WRONG_USE)

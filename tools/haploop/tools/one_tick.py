@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
@@ -18,6 +19,8 @@ from haploop.tools.stable_ranges import crossings
 
 # No wall is softer than this, and none stiffer is looked at.
 _LEAST_N_M, _MOST_N_M = 1e-3, 1e12
+# So near to a crossing as computed the end of a range is looked for first.
+_NEAR = 1e-9
 
 
 class NotLinear(ValueError):
@@ -83,17 +86,24 @@ class OneTickMap:
         The first begins at 0 unless the loop grows however soft its wall is. A virtual inertia or a structural mode
         may leave others above it.
         """
+        return list(self._ranges())
+
+    def _ranges(self) -> Iterator[tuple[float, float]]:
+        """The stable ranges, one after the other."""
         inner = [k for k in crossings(self.without_wall, self.pushed) if _LEAST_N_M < k < _MOST_N_M]
         edges = [_LEAST_N_M, *inner, _MOST_N_M]
         probes = [(low * high) ** 0.5 for low, high in pairwise(edges)]
-        stable = [self.growth(probe) < 1.0 for probe in probes]
-        ends = [0.0] if stable[0] else []
-        for before, after, was, then in zip(probes, probes[1:], stable, stable[1:], strict=False):
-            if was != then:
-                ends.append(self._end_between(before, after, was))
-        if len(ends) % 2:
-            ends.append(np.inf)
-        return list(zip(ends[::2], ends[1::2], strict=True))
+        begin, before = 0.0, False
+        for at, probe in enumerate(probes):
+            stable = self.growth(probe) < 1.0
+            if at and stable != before:
+                end = self._end_near(edges[at], probes[at - 1], probe, low_is_stable=before)
+                if before:
+                    yield begin, end
+                begin = end
+            before = stable
+        if before:
+            yield begin, np.inf
 
     def stiffness_limit(self) -> float:
         """The smallest stiffness with rho(M) = 1 in N/m: the end of the first stable range.
@@ -101,14 +111,17 @@ class OneTickMap:
         Raises:
             NeverStable: the loop grows even with the softest wall.
         """
-        ranges = self.stable_ranges()
-        if ranges and not ranges[0][0]:
-            return ranges[0][1]
-        above = f" It is stable from {ranges[0][0]:.6g} to {ranges[0][1]:.6g} N/m." if ranges else ""
+        low, limit = next(self._ranges(), (np.inf, np.inf))
+        if not low:
+            return limit
+        above = f" It is stable from {low:.6g} to {limit:.6g} N/m." if low < limit else ""
         raise NeverStable(f"The loop is unstable even with a wall of {_LEAST_N_M:g} N/m; it needs damping.{above}")
 
-    def _end_between(self, low: float, high: float, low_is_stable: bool) -> float:
-        """Where a stable range ends between two stiffnesses: the last that is stable."""
+    def _end_near(self, edge: float, low: float, high: float, low_is_stable: bool) -> float:
+        """The last stable stiffness between two of which one is stable; it should be next to ``edge``."""
+        for near in (edge * (1.0 - _NEAR), edge * (1.0 + _NEAR)):
+            if low < near < high:
+                low, high = (near, high) if (self.growth(near) < 1.0) == low_is_stable else (low, near)
         while low < (middle := (low + high) / 2.0) < high:
             if (self.growth(middle) < 1.0) == low_is_stable:
                 low = middle

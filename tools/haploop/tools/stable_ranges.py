@@ -23,8 +23,10 @@ def crossings(without_wall: np.ndarray, pushed: np.ndarray) -> list[float]:
     a, b, c = _balanced(without_wall, pushed)
     found = []
     for z in [*_real_on_the_circle(a, b, c), -1.0]:
-        on = z / abs(z)
-        gain = c @ np.linalg.lstsq(on * np.eye(len(a)) - a, b, rcond=None)[0]
+        try:
+            gain = c @ np.linalg.solve(z / abs(z) * np.eye(len(a)) - a, b)
+        except np.linalg.LinAlgError:
+            continue  # a pole of the loop without a wall: K = 0
         if gain.real < 0.0:
             found.append(float(-1.0 / gain.real))
     return sorted(found)

@@ -1,0 +1,104 @@
+"""Compiled blocks, kept for all groups of loops of the same structure, and how jax is asked for them."""
+
+from __future__ import annotations
+
+import os
+from collections import Counter, OrderedDict
+from collections.abc import Callable, Hashable
+from contextlib import AbstractContextManager
+from functools import lru_cache
+from importlib import import_module
+from time import perf_counter
+from typing import Any, NamedTuple
+
+import jax
+
+from haploop.launch.compiled_block import Block, Carry, Given, Rings
+
+# How many are kept.
+_MOST = 64
+# On a CPU a loop over ticks is one function of machine code if XLA takes its arrays for small; else every operation is
+# a call of its own, which takes longer than what it does. There is no other way to say so than before jax first runs.
+_ONE_FUNCTION = "xla_cpu_small_while_loop_byte_threshold"
+# Arrays of loops fill the widest registers there are.
+_WIDE: dict[str, Any] = {"xla_cpu_prefer_vector_width": 512}
+_FLAGS, _OPTIONS = "XLA_FLAGS", "--xla_backend_extra_options="
+
+
+class Program(NamedTuple):
+    """A compiled block.
+
+    Attributes:
+        block: what was compiled; what it knows of the leaves holds for all groups of loops.
+        call: the machine code.
+    """
+
+    block: Block
+    call: Callable[[Carry, Rings, Given], tuple[Carry, Rings]]
+
+
+class Programs:
+    """Programs by what they depend on; the one not used for longest goes first.
+
+    Attributes:
+        seconds: spent on compiling so far.
+        count: how many were compiled so far.
+        asked: how many ticks of loops of a structure were asked for so far.
+    """
+
+    def __init__(self) -> None:
+        self._kept: OrderedDict[Hashable, Program] = OrderedDict()
+        self.seconds, self.count = 0.0, 0
+        self.asked = Counter[Hashable]()
+
+    def known(self, key: Hashable) -> Program | None:
+        """The program of a key, if it was compiled before."""
+        if key in self._kept:
+            self._kept.move_to_end(key)
+        return self._kept.get(key)
+
+    def compiled(self, key: Hashable, block: Block, args: tuple[Carry, Rings, Given]) -> Program:
+        """Compile a block for arguments of these shapes."""
+        began = perf_counter()
+        lowered = jax.jit(block.run, donate_argnums=(0, 1)).lower(*args)
+        program = Program(block, lowered.compile(_WIDE if jax.default_backend() == "cpu" else None))
+        self.seconds, self.count = self.seconds + perf_counter() - began, self.count + 1
+        self._kept[key] = program
+        if len(self._kept) > _MOST:
+            self._kept.popitem(last=False)
+        return program
+
+
+PROGRAMS = Programs()
+
+
+def in_double() -> AbstractContextManager[object]:
+    """Within it jax computes in float64; outside it is as it was."""
+    enable_x64: Any = getattr(jax, "enable_x64", None)
+    if enable_x64 is None:  # jax before 0.8
+        enable_x64 = import_module("jax.experimental").enable_x64
+    return enable_x64(True)
+
+
+@lru_cache(maxsize=1)
+def most() -> int:
+    """How many loops suit the device: on a CPU so many that what a tick works on stays in the cache."""
+    before = os.environ.get(_FLAGS, "")
+    if _OPTIONS not in before:
+        os.environ[_FLAGS] = f"{before} {_OPTIONS}{_ONE_FUNCTION}=1000000000"
+    try:
+        on_cpu = jax.default_backend() == "cpu"
+    finally:
+        os.environ[_FLAGS] = before
+        if not before:
+            del os.environ[_FLAGS]
+    if not on_cpu:
+        return 16384
+    return 512 if _makes_one_function() else 1024
+
+
+def _makes_one_function() -> bool:
+    """Whether XLA does, of a loop that it would not by itself; it may have been started before."""
+    many = jax.numpy.zeros(4096)
+    loop = jax.jit(lambda count: jax.lax.fori_loop(0, count, lambda _, x: x * 0.5 + x[::-1], many))
+    return "xla_cpu_small_call" in (loop.lower(9).compile().as_text() or "")

@@ -1,0 +1,46 @@
+"""Recordings made in the tests: text files of motions with known energies, and what is made of them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scene_makers import KINDS
+
+from haploop.tools.dissipate.booking import Booking
+from haploop.tools.dissipate.command import Request, dissipation_of
+from haploop.tools.dissipate.outcome import Outcome
+from haploop.tools.dissipate.samples import Floats, Samples
+from haploop.tools.dissipate.setting import Asked, setting_of_text
+from haploop.tools.dissipate.text_recording import Layout
+
+PERIOD_S = 1e-3
+
+
+def write(path: Path, columns: Mapping[str, Any], mark: str = ",") -> Path:
+    """A text file of these columns, every number exact."""
+    rows = [mark.join(columns), *(mark.join(map(repr, map(float, row))) for row in zip(*columns.values(), strict=True))]
+    path.write_text("\n".join(rows) + "\n", encoding="utf-8")
+    return path
+
+
+def outcome(path: Path, *, delay_s: float | None = None, layout: Layout | None = None, **asked: Any) -> Outcome:
+    """What comes of a recording."""
+    return dissipation_of(Request(path, Asked(**asked), layout or Layout(), delay_s), KINDS)
+
+
+def booking(
+    delay_s: float, *, recorded: frozenset[str] = frozenset(), period_s: float = PERIOD_S, **asked: Any
+) -> Booking:
+    """An account of elements on samples that are handed to it."""
+    setting = setting_of_text(Asked(**asked), Path("made.csv"), period_s, recorded, KINDS)
+    return Booking(setting, period_s, delay_s, KINDS, recorded)
+
+
+def samples(x: Floats, begins: bool = True, first: int = 0, **more: Any) -> Samples:
+    """Positions a period apart."""
+    t = np.arange(first, first + len(x), dtype=float) * PERIOD_S
+    more = {"v_m_s": None, "a_m_s2": None, "between_x_m": None} | more
+    return Samples(t_s=t, x_m=x, true_x_m=x, begins=begins, **more)

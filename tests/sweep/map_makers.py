@@ -1,0 +1,66 @@
+"""Tables of sweeps as the engine writes them, made by running or by hand."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+from scene_makers import KINDS
+
+from haploop.launch.array_run import run_array
+from haploop.launch.resolved import to_toml
+from haploop.tools.sweep.map_data import AMPLITUDE, MapData, data_of
+
+UNITS = {
+    "wall.stiffness": "N/m",
+    "dissipation.0.damping": "N s/m",
+    "dissipation.0.mass": "kg",
+    "clock.round_trip_delay": "s",
+    "device.mass": "kg",
+    "device.damping": "N s/m",
+    "hand.force.value": "N",
+}
+Result = dict[str, Any]
+Scene = dict[str, Any]
+
+
+def cells_of(axes: Mapping[str, Sequence[Any]], seeds: int = 1) -> list[dict[str, Any]]:
+    """A dict of every cell: the axes' values by key, and the seed."""
+    values = itertools.product(*axes.values(), range(1, seeds + 1))
+    return [dict(zip([*axes, "seed"], cell, strict=True)) for cell in values]
+
+
+def ran(axes: Mapping[str, Sequence[Any]], scene_of: Callable[[dict[str, Any]], Scene], seeds: int = 1) -> MapData:
+    """The map of scenes that are run, in arrays where they can."""
+    cells = cells_of(axes, seeds)
+    scenes = [scene_of(cell) for cell in cells]
+    results = run_array(scenes, KINDS, energy=False)
+    return table(axes, cells, results, scenes)
+
+
+def table(
+    axes: Mapping[str, Sequence[Any]],
+    cells: Sequence[dict[str, Any]],
+    results: Sequence[Result],
+    scenes: Sequence[Scene | None],
+    title: str = "a sweep",
+) -> MapData:
+    """The map of results that are given: summaries, or ``ended`` and ``why`` alone."""
+    columns: dict[str, list[Any]] = {key: [cell[key] for cell in cells] for key in [*axes, "seed"]}
+    columns["cell"] = [*range(len(cells))]
+    columns["verdict"] = [result.get("verdict") for result in results]
+    columns[AMPLITUDE] = [result.get("window", {}).get("oscillation_m") for result in results]
+    columns["ended"] = [result.get("ended", "done") for result in results]
+    columns["why"] = [result.get("why", "") for result in results]
+    columns["scene"] = [None if scene is None else to_toml(scene) for scene in scenes]
+    base = next((scene for scene in scenes if scene is not None), {"title": "none"})
+    sweep = {"title": title, "base": base, "axes": {key: [*values] for key, values in axes.items()}}
+    return data_of(columns, UNITS, sweep)
+
+
+def said(verdict: str | None, oscillation_m: float | None = None) -> Result:
+    """A result with a verdict; one that failed where there is none."""
+    if verdict is None:
+        return {"ended": "failed", "why": "A plugin raised."}
+    return {"verdict": verdict, "window": {"oscillation_m": oscillation_m}}

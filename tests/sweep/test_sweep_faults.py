@@ -1,0 +1,249 @@
+"""Sweeps as a user starts them, killed, interrupted, out of disk or beside one another."""
+
+from __future__ import annotations
+
+import os
+import resource
+import signal
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pyarrow.parquet
+import pytest
+from faults.launched import Launched, alive, processes, wait_for
+from sweep.sweep_files import PRESS, sweep_file, swept
+
+from haploop.tools.sweep.table import read
+
+# Such scenes go into no array: so many take so long that something can be done to the sweep meanwhile.
+SLOW_PRESS = PRESS.replace("duration = 0.05", "duration = 0.5") + '[clock]\nintegrator = "rk4"\n'
+SLOW = '[axes]\n"wall.stiffness" = { from = 6, to = 480, step = 6 }\n'
+CELLS = 80
+LIMIT_BYTES = 30_000
+
+
+@pytest.fixture
+def launched() -> Iterator[Callable[..., Launched]]:
+    """Start haploop; whatever the test leaves running is ended."""
+    started: list[Launched] = []
+
+    def start(*arguments: Any, **options: Any) -> Launched:
+        started.append(Launched(*arguments, **options))
+        return started[-1]
+
+    yield start
+    for process in started:
+        process.clear_away()
+
+
+def parts(out: Path) -> list[Path]:
+    return [path for path in (out / "parts").glob("*.parquet") if path.exists()] if out.exists() else []
+
+
+def workers_of(pid: int) -> list[int]:
+    return [child for child, parent, _, words in processes() if parent == pid and "multiprocessing.spawn" in words]
+
+
+def cells(out: Path) -> list[int]:
+    return sorted(cell for part in parts(out) for cell in pyarrow.parquet.read_table(part)["cell"].to_pylist())
+
+
+def limit_files() -> None:
+    """As on a disk that is full after so many bytes: every write beyond fails."""
+    resource.setrlimit(resource.RLIMIT_FSIZE, (LIMIT_BYTES, LIMIT_BYTES))
+
+
+def test_killed_it_leaves_no_process_and_goes_on_with_what_is_missing(
+    launched: Callable[..., Launched], tmp_path: Path
+) -> None:
+    out, path = tmp_path / "out", sweep_file(tmp_path, SLOW, SLOW_PRESS)
+    run = launched("sweep", str(path), "--workers", "2", out=out)
+    wait_for("two workers and two parts", lambda: len(workers_of(run.pid)) == 2 and len(parts(out)) >= 2)
+    children = workers_of(run.pid)
+    run.signal(signal.SIGKILL)
+    run.end(-signal.SIGKILL)
+    wait_for("the end of the workers", lambda: not alive(children))
+    before = cells(out)
+    stamps = {part: part.stat().st_mtime_ns for part in parts(out)}
+    assert 0 < len(before) < CELLS
+    assert not read(out).finished
+    again = launched("sweep", str(path), "--workers", "2", out=out)
+    wait_for("more parts", lambda: len(parts(out)) > len(stamps) or not again.is_there())
+    assert {part: part.stat().st_mtime_ns for part in stamps if part.exists()} in (stamps, {})
+    again.end(0)
+    table = read(out)
+    assert table.finished
+    assert table["cell"].tolist() == list(range(CELLS))
+    whole = swept(tmp_path, SLOW, SLOW_PRESS, out=tmp_path / "whole", workers=2)
+    assert {name: column.tolist() for name, column in table.columns.items()} == {
+        name: column.tolist() for name, column in whole.columns.items()
+    }
+
+
+@pytest.mark.slow
+def test_interrupted_once_it_stores_what_is_under_way_and_says_how_to_go_on(
+    launched: Callable[..., Launched], tmp_path: Path
+) -> None:
+    out, path = tmp_path / "out", sweep_file(tmp_path, SLOW, SLOW_PRESS)
+    run = launched("sweep", str(path), "--workers", "2", out=out)
+    wait_for("a part", lambda: parts(out))
+    run.signal(signal.SIGINT)
+    run.end(1)
+    assert "Stopping after the cells under way; once more ends at once." in run.stderr
+    assert f"to go on: haploop sweep {out / 'sweep.toml'} --out {out}" in run.stderr
+    assert "Traceback" not in run.stderr
+    done = cells(out)
+    assert 0 < len(done) < CELLS
+    again = launched("sweep", str(out / "sweep.toml"), "--workers", "2", out=out)
+    again.end(0)
+    assert read(out)["cell"].tolist() == list(range(CELLS))
+
+
+def test_interrupted_twice_it_ends_at_once_and_keeps_what_was_stored(
+    launched: Callable[..., Launched], tmp_path: Path
+) -> None:
+    out = tmp_path / "out"
+    path = sweep_file(tmp_path, SLOW, SLOW_PRESS.replace("duration = 0.5", "duration = 2000.0"))
+    run = launched("sweep", str(path), "--workers", "2", out=out)
+    # The first cells take minutes: when the workers are busy, nothing is done yet.
+    wait_for("busy workers", lambda: (out / "parts").exists() and len(workers_of(run.pid)) == 2)
+    children = workers_of(run.pid)
+    run.signal(signal.SIGINT)
+    run.says("Stopping")
+    run.signal(signal.SIGINT)
+    run.end(1)
+    assert "Interrupted at once" in run.stderr
+    assert "Traceback" not in run.stderr
+    wait_for("the end of the workers", lambda: not alive(children))
+
+
+def test_a_full_disk_is_said_and_loses_nothing_that_was_written(
+    launched: Callable[..., Launched], tmp_path: Path
+) -> None:
+    """The first part is small and fits."""
+    text = 'repeat = 20\n[axes]\n"wall.stiffness" = { from = 10, to = 400, step = 10 }\n'
+    out, path = tmp_path / "out", sweep_file(tmp_path, text)
+    run = launched("sweep", str(path), "--workers", "1", out=out, before=limit_files)
+    run.end(1)
+    assert f"Writing {out}" in run.stderr
+    assert "File too large" in run.stderr
+    assert "the same command goes on" in run.stderr
+    assert "Traceback" not in run.stderr
+    assert not list(out.rglob("*.part"))
+    kept = cells(out)
+    assert kept
+    assert f"The {len(kept)} cells written before are safe" in run.stderr
+    again = launched("sweep", str(path), "--workers", "1", out=out)
+    again.end(0)
+    assert read(out)["cell"].tolist() == list(range(800))
+
+
+def test_a_second_sweep_into_the_same_directory_is_refused(launched: Callable[..., Launched], tmp_path: Path) -> None:
+    out, path = tmp_path / "out", sweep_file(tmp_path, SLOW, SLOW_PRESS)
+    run = launched("sweep", str(path), "--workers", "1", out=out)
+    wait_for("a part", lambda: parts(out))
+    second = launched("sweep", str(path), "--workers", "1", out=out)
+    second.end(2)
+    assert f"Another sweep (process {run.pid}) is writing to {out}" in second.stderr
+    assert run.is_there()
+
+
+def test_a_directory_that_vanishes_is_said(launched: Callable[..., Launched], tmp_path: Path) -> None:
+    import shutil
+
+    out, path = tmp_path / "out", sweep_file(tmp_path, SLOW, SLOW_PRESS)
+    run = launched("sweep", str(path), "--workers", "1", out=out)
+    wait_for("a part", lambda: parts(out))
+    shutil.rmtree(out, ignore_errors=True)
+    run.end(1)
+    assert "failed: No such file or directory." in run.stderr
+    assert "Traceback" not in run.stderr
+
+
+def test_a_directory_that_holds_something_else_is_refused(launched: Callable[..., Launched], tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    out.mkdir()
+    (out / "kept.txt").write_text("mine")
+    run = launched("sweep", str(sweep_file(tmp_path)), out=out)
+    run.end(2)
+    assert "must be new or empty" in run.stderr
+    assert [path.name for path in out.iterdir()] == ["kept.txt"]
+
+
+@pytest.mark.parametrize(
+    ("missing", "options", "said"),
+    [
+        ("pyarrow", [], "pip install 'haploop[parquet]'"),
+        ("jax", ["--jax"], "pip install 'haploop[jax]'"),
+        ("distributed", ["--dask", "tcp://127.0.0.1:1"], "pip install 'haploop[cluster]'"),
+    ],
+)
+def test_what_is_not_installed_is_named_before_anything_is_started(
+    missing: str, options: list[str], said: str, tmp_path: Path
+) -> None:
+    (tmp_path / "hidden" / missing).mkdir(parents=True)
+    (tmp_path / "hidden" / missing / "__init__.py").write_text(f"raise ModuleNotFoundError('no {missing}')")
+    command = [
+        sys.executable,
+        "-m",
+        "haploop.tools.cli",
+        "sweep",
+        str(sweep_file(tmp_path)),
+        "--out",
+        str(tmp_path / "o"),
+    ]
+    environment = {**os.environ, "PYTHONPATH": str(tmp_path / "hidden")}
+    run = subprocess.run([*command, *options], capture_output=True, text=True, env=environment)
+    assert run.returncode == 2
+    assert said in run.stderr
+    assert "Traceback" not in run.stderr
+
+
+def test_a_number_of_workers_below_one_is_refused(launched: Callable[..., Launched], tmp_path: Path) -> None:
+    run = launched("sweep", str(sweep_file(tmp_path)), "--workers", "0")
+    run.end(2)
+    assert "--workers must be at least 1" in run.stderr
+
+
+def test_a_plugin_that_kills_its_worker_in_one_cell_is_one_row(
+    launched: Callable[..., Launched], tmp_path: Path
+) -> None:
+    plugin = tmp_path / "deadly.py"
+    plugin.write_text(
+        "import os\nfrom typing import Annotated\n"
+        "from haploop.controller.dissipation import Element, Motion, Quantity\n\n\n"
+        'class Deadly(Element):\n    """Ends its process where it is strong."""\n\n    kind = "deadly"\n'
+        '    force_N: Annotated[float, Quantity("N", at_least=0)] = 0.1\n\n'
+        "    def __post_init__(self):\n        self.ticks = 0\n\n"
+        "    def force(self, motion: Motion):\n        self.ticks += 1\n"
+        "        if self.force_N > 0.85 and self.ticks > 20:\n            os._exit(3)\n"
+        "        return -self.force_N * motion.v\n"
+    )
+    text = '[set]\ndissipation = [{ kind = "deadly" }]\n[axes]\n'
+    text += '"dissipation.0.force_N" = { from = 0.1, to = 0.9, step = 0.1 }\n'
+    run = launched(
+        "sweep", str(sweep_file(tmp_path, text)), "--workers", "2", "--plugin", str(plugin), out=tmp_path / "out"
+    )
+    run.end(0)
+    table = read(tmp_path / "out")
+    assert table["ended"].tolist() == ["done"] * 8 + ["failed"]
+    assert "The process that ran it died" in table["why"][8]
+
+
+@pytest.mark.slow
+def test_on_a_dask_cluster_the_table_is_the_same(launched: Callable[..., Launched], tmp_path: Path) -> None:
+    distributed = pytest.importorskip("distributed")
+    whole = swept(tmp_path, out=tmp_path / "whole")
+    with distributed.LocalCluster(
+        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None, host="127.0.0.1"
+    ) as cluster:
+        out = tmp_path / "out"
+        run = launched("sweep", str(tmp_path / "sweep.toml"), "--dask", cluster.scheduler_address, out=out)
+        run.end(0)
+    table = read(out)
+    assert {name: column.tolist() for name, column in table.columns.items()} == {
+        name: column.tolist() for name, column in whole.columns.items()
+    }

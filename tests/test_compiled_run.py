@@ -1,0 +1,214 @@
+"""The compiled way: the loops of arrays, within a stated tolerance, whatever becomes of the others."""
+
+from __future__ import annotations
+
+import copy
+import math
+import sys
+from typing import Annotated, Any
+
+import numpy as np
+import pytest
+from array_makers import PUSH, alone, pressed
+from physics.varied_scenes import drawn_base, varied
+from scene_makers import KINDS
+
+from haploop.controller.dissipation import Element, Motion, Quantity, where
+from haploop.launch.array_loop import LoopArray
+from haploop.launch.array_run import run_array
+from haploop.launch.compiled_run import compiling, results_of_compiled
+
+jax = pytest.importorskip("jax")
+
+# Of the largest excursion of each loop.
+TOLERANCE = 1e-11
+
+
+def compiled(scenes: list[dict[str, Any]], kinds: dict[str, type[Element]] = KINDS, **options: Any) -> list[Any]:
+    results = dict(results_of_compiled(scenes, kinds, fewest=1, least=0, most=16, **options))
+    return [results[index] for index in range(len(scenes))]
+
+
+def loops_of(scenes: list[dict[str, Any]], by_program: bool) -> LoopArray:
+    """All loops run to their ends, none dropped."""
+    if not by_program:
+        loops = LoopArray(scenes, KINDS)
+        loops._drop_ended = lambda: None
+        loops.run()
+        return loops
+    from haploop.launch import compiled_programs
+    from haploop.launch.compiled_loop import CompiledLoops
+
+    compiled_programs.most()
+    with compiled_programs.in_double():
+        loops = CompiledLoops(scenes, KINDS, energy=True, size=len(scenes), programs=compiled_programs.PROGRAMS)
+        loops.run()
+    return loops
+
+
+def positions(loops: LoopArray, ticks: int) -> np.ndarray:
+    return loops._logger._window._x[: ticks * loops._time.steps_per_tick]
+
+
+def check_motion(seed: int) -> None:
+    """Every position of a run of 0.2 s, which the window holds whole, and the energies at its end."""
+    rng = np.random.default_rng(1000 + seed)
+    base = drawn_base(seed)
+    scenes = [base, *(varied(base, rng) for _ in range(15))]
+    beside = copy.deepcopy(scenes)
+    for each in beside:
+        each["device"]["position"] += 1e-16
+    found, expected, nudged = loops_of(scenes, True), loops_of(scenes, False), loops_of(beside, False)
+    ticks = min(result["ticks"] for result in expected.results if result)
+    x, truth, other = (positions(loops, ticks) for loops in (found, expected, nudged))
+    scale = np.abs(truth).max(axis=0)
+    steady = np.abs(other - truth).max(axis=0) < 1e-12 * scale
+    assert np.count_nonzero(steady) >= 8, "few of these loops can be compared; the test needs another scene"
+    assert (np.abs(x - truth).max(axis=0) < TOLERANCE * scale)[steady].all()
+    for loop in np.flatnonzero(steady):
+        result, by_array = found.results[loop], expected.results[loop]
+        assert result
+        assert by_array
+        assert (result["verdict"], result["ticks"], result["why"]) == tuple(
+            by_array[key] for key in ("verdict", "ticks", "why")
+        )
+        energy, exact = result["energy"], by_array["energy"]
+        assert energy["residual_J"] < 1e-12 * energy["moved_J"]
+        assert [account["true_J"] for account in energy["elements"]] == pytest.approx(
+            [account["true_J"] for account in exact["elements"]], rel=1e-9, abs=1e-11 * exact["moved_J"]
+        )
+        assert energy["wall"]["leak"] == pytest.approx(exact["wall"]["leak"], rel=1e-9, abs=1e-11 * exact["moved_J"])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(40))
+def test_drawn_loops_move_as_in_arrays(seed: int) -> None:
+    """Noise, estimators, actuators, changes while the loop runs."""
+    check_motion(seed)
+
+
+def many(count: int, **tables: Any) -> list[dict[str, Any]]:
+    """Loops that differ in their walls alone; one program serves all of this structure."""
+    return [pressed(wall={"position": -0.002, "stiffness": 200.0 + i}, **tables) for i in range(count)]
+
+
+def agree(found: Any, expected: Any, within: float = 1e-9) -> bool:
+    """Whether two results say the same, numbers to within a relative error, or what is nothing beside 1."""
+    if isinstance(expected, dict):
+        return found.keys() == expected.keys() and all(agree(found[key], expected[key], within) for key in expected)
+    if isinstance(expected, list):
+        return len(found) == len(expected) and all(map(agree, found, expected))
+    if isinstance(expected, float):
+        return math.isclose(found, expected, rel_tol=within, abs_tol=1e-11)
+    return found == expected
+
+
+def test_results_are_those_of_arrays_but_for_the_last_digits() -> None:
+    scenes = many(13)
+    assert agree(compiled(scenes), run_array(scenes, KINDS))
+    assert not agree(compiled(scenes), run_array(many(14)[1:], KINDS))
+
+
+def test_a_program_serves_all_scenes_of_its_structure_and_jax_stays_as_it_was() -> None:
+    compiled(many(16))
+    count = compiling()[0]
+    others = many(29, device={"mass": 0.02, "damping": 0.2})
+    assert agree(compiled(others), run_array(others, KINDS))
+    assert compiling()[0] == count
+    assert jax.numpy.zeros(1).dtype == np.float32
+
+
+def test_what_is_not_asked_for_is_left_out() -> None:
+    scenes = many(16)
+    for result, whole in zip(compiled(scenes, energy=False), compiled(scenes), strict=True):
+        assert agree(result, {key: value for key, value in whole.items() if key != "energy"})
+
+
+def test_scenes_too_few_to_be_worth_it_are_run_in_arrays_to_the_same_bits() -> None:
+    count, scenes = compiling()[0], many(16, duration=0.149)
+    assert list(results_of_compiled(scenes, KINDS)) == list(enumerate(run_array(scenes, KINDS)))
+    assert compiling()[0] == count
+
+
+def test_loops_that_diverge_stand_still_where_they_did() -> None:
+    """Each at its time, within blocks and across them; those that stay disturb none."""
+    scenes = [
+        pressed(
+            duration=0.6,
+            diverged_beyond=0.05,
+            clock={"round_trip_delay": 0.004},
+            dissipation=[{"kind": "damping", "damping": damping, "acts": "always"}],
+        )
+        for damping in np.linspace(1.0, 12.0, 16).tolist()
+    ]
+    expected = run_array(scenes, KINDS)
+    assert len({result["ticks"] for result in expected}) > 5
+    for result, exact in zip(compiled(scenes), expected, strict=True):
+        assert {key: result[key] for key in ("ticks", "steps", "ended", "verdict")} == {
+            key: exact[key] for key in ("ticks", "steps", "ended", "verdict")
+        }
+        assert agree(result["final"], exact["final"], 1e-6)
+        assert result["energy"]["residual_J"] < 1e-12 * result["energy"]["moved_J"]
+        assert result["energy"]["moved_J"] == pytest.approx(exact["energy"]["moved_J"], rel=1e-6)
+
+
+class Gripping(Element):
+    """Written for arrays; remembers how far it went."""
+
+    kind = "gripping"
+    force_N: Annotated[float, Quantity("N", at_least=0)] = 0.05
+
+    def __post_init__(self) -> None:
+        self.sums: list[Any] = [0.0]
+
+    def force(self, motion: Motion) -> Any:
+        self.sums[0] = self.sums[0] + abs(motion.v)
+        return where(self.sums[0] > 1.0, -self.force_N * motion.v, 0.0)
+
+
+class Asking(Element):
+    """Written for one loop alone: asks for the number itself."""
+
+    kind = "asking"
+    force_N: Annotated[float, Quantity("N", at_least=0)] = 0.05
+
+    def force(self, motion: Motion) -> float:
+        return -math.tanh(motion.v / 0.01) * self.force_N if motion.v > 0 else 0.0
+
+
+class Counting(Element):
+    """Acts at every third tick."""
+
+    kind = "counting"
+    force_N: Annotated[float, Quantity("N", at_least=0)] = 0.05
+
+    def __post_init__(self) -> None:
+        self.tick = 0
+
+    def force(self, motion: Motion) -> Any:
+        self.tick += 1
+        return motion.v * (-self.force_N if self.tick % 3 == 0 else 0.0)
+
+
+@pytest.mark.parametrize("element", [Gripping, Asking, Counting])
+def test_an_element_of_any_kind_comes_to_what_it_comes_to_alone(element: type[Element]) -> None:
+    """One that cannot be compiled, or whose code goes another way at every tick, is run by arrays or alone."""
+    kinds, count = KINDS | {element.kind: element}, compiling()[0]
+    made = pressed(duration=0.1)
+    forces = (0.1, 0.2, 0.3)
+    scenes = [{**made, "dissipation": [{"kind": element.kind, "force_N": f, "acts": "always"}]} for f in forces]
+    for result, exact in zip(compiled(scenes, kinds), [alone(each, kinds) for each in scenes], strict=True):
+        del exact["trajectory_sha256"]
+        assert agree(result, exact)
+    assert (compiling()[0] > count) == (element is Gripping)
+
+
+def test_bodies_in_a_row_go_their_own_way_to_the_same_bits() -> None:
+    scenes = many(2, friction={"kinetic": 0.01}, hand=PUSH)
+    assert compiled(scenes) == run_array(scenes, KINDS)
+
+
+def test_without_jax_the_error_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "haploop.launch.compiled_programs", None)
+    with pytest.raises(ImportError, match=r"pip install 'haploop\[jax\]'"):
+        list(results_of_compiled(many(16), KINDS))

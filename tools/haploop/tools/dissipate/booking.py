@@ -1,0 +1,212 @@
+"""Elements at work on a recorded motion that they do not change, and what they would have taken out of it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from haploop.controller.controller import Controller
+from haploop.controller.dissipation import ElementError
+from haploop.controller.estimators import Estimator, Sample
+from haploop.logger.books import sampled_flow
+from haploop.logger.sums import RunningSums
+from haploop.logger.tapes import as_float64
+from haploop.protocol.ticks import Timebase
+from haploop.tools.dissipate.samples import Floats, Samples
+
+if TYPE_CHECKING:
+    from haploop.controller.dissipation import Element
+
+
+class Booked(NamedTuple):
+    """The books as they stand at some samples.
+
+    Attributes:
+        t_s, x_m: of the samples, shape (samples,).
+        sampled_J, true_J: of every element, shape (elements, samples).
+        added_J: what the true books gained since the sample before, shape (elements, samples).
+    """
+
+    t_s: Floats
+    x_m: Floats
+    sampled_J: Floats
+    true_J: Floats
+    added_J: Floats
+
+
+class Booking:
+    """Estimates, elements and books, sample by sample, as they are in a run.
+
+    sampled  E += -f[k-1] (x_m[k] - x_m[k-1]), all the controller can know (Choi et al. 2022, eq. 4)
+    true     E += -f_held dx: command k is held for a period from t_k + d on, d = (L + mu) T; in the period after
+             sample k command k - L - 1 still holds for mu T, and command k - L for the rest
+
+    After a gap everything begins anew but for the sums; what happened within it is not known and not booked.
+
+    Args:
+        scene: resolved: estimators, wall and elements of a controller.
+        period_s: T.
+        delay_s: d.
+        kinds: element kinds at hand.
+        recorded: which of "velocity" and "acceleration" come with the samples and are taken as they are.
+
+    Attributes:
+        taken_J, given_J: what the true books gained in all periods in which they gained, and lost in the others.
+        strongest_N: the largest force of every element.
+    """
+
+    def __init__(
+        self,
+        scene: dict[str, Any],
+        period_s: float,
+        delay_s: float,
+        kinds: Mapping[str, type[Element]],
+        recorded: frozenset[str],
+    ) -> None:
+        self._scene, self._kinds, self._recorded = scene, dict(kinds), recorded
+        periods = delay_s / period_s
+        self._lookahead = math.floor(periods + 1e-9)
+        self._late = max(0.0, periods - self._lookahead)
+        self._time = MeasuredTime.of_period(period_s, self._lookahead)
+        self._count = len(scene["dissipation"])
+        self._sums = RunningSums()
+        self._sums.grow(2 * self._count)
+        self._events = _wall_events(scene, self._time)
+        self.taken_J, self.given_J, self.strongest_N = np.zeros((3, self._count))
+
+    def add(self, piece: Samples) -> Booked:
+        """Book a piece.
+
+        Raises:
+            ElementError: an element raised, or gave something that is no finite number.
+        """
+        if piece.begins:
+            self._begin()
+        first, count = len(self._last_x), len(piece.x_m)
+        forces = np.hstack([self._forces, self._answer(piece)])
+        x_m, true_x = np.append(self._last_x, piece.x_m), np.append(self._last_true_x, piece.true_x_m)
+        between = self._between(piece, true_x)
+        periods = slice(1 - first, count), slice(2 - first, count + 1)  # of the old and the new command in each
+        known = forces[:, self._lookahead + 2 - first : self._lookahead + 1 + count]
+        added = np.zeros((2 * self._count, count))
+        added[: self._count, 1 - first :] = sampled_flow(x_m, known)
+        added[self._count :, 1 - first :] = _held(forces[:, periods[0]], forces[:, periods[1]], true_x, between)
+        self._forces = forces[:, -self._lookahead - 2 :]
+        self._last_x, self._last_true_x = piece.x_m[-1:], piece.true_x_m[-1:]
+        self._last_between = None if piece.between_x_m is None else piece.between_x_m[-1:]
+        self.strongest_N = np.fmax(self.strongest_N, np.abs(forces).max(axis=1))
+        totals = self._add(added)[:, 1:]
+        sampled, true = np.split(totals, 2)
+        return Booked(piece.t_s, piece.x_m, sampled, true, added[self._count :])
+
+    def finish(self, end_x_m: float) -> None:
+        """Book the true energy of the period after the last sample, at whose end the device was there."""
+        true_x = np.append(self._last_true_x, end_x_m)
+        between = self._last_between if self._last_between is not None else self._on_a_line(true_x)
+        held = _held(self._forces[:, :1], self._forces[:, 1:2], true_x, between)
+        self._add(np.vstack([np.zeros_like(held), held]))
+
+    @property
+    def sampled_J(self) -> Floats:
+        """The sampled books now, shape (elements,)."""
+        return (self._sums.sums + self._sums.errors)[: self._count]
+
+    @property
+    def true_J(self) -> Floats:
+        """The true books now, shape (elements,)."""
+        return (self._sums.sums + self._sums.errors)[self._count :]
+
+    def _begin(self) -> None:
+        self._controller = RecordedController(self._scene, self._time, self._kinds, self._recorded)
+        for tick, event in self._events:
+            self._controller.schedule(tick, event)
+        self._forces = np.zeros((self._count, self._lookahead + 2))
+        self._last_x = self._last_true_x = np.empty(0)
+        self._last_between: Floats | None = None
+
+    def _answer(self, piece: Samples) -> Floats:
+        """Force of every element at every sample, N, shape (elements, samples)."""
+        nothing = [0.0] * len(piece.x_m)
+        v, a = (nothing if column is None else column.tolist() for column in (piece.v_m_s, piece.a_m_s2))
+        controller = self._controller
+        controller.answer(list(zip(piece.x_m.tolist(), a, v, strict=True)))
+        blocks = controller.recorder.take()
+        if controller.recorder.trouble:
+            raise ElementError(f"On this recording {controller.recorder.trouble}.")
+        rows = [[as_float64(block["columns"][f"dissipation.{i}"]) for block in blocks] for i in range(self._count)]
+        return np.array([np.concatenate(row) for row in rows])
+
+    def _between(self, piece: Samples, true_x: Floats) -> Floats:
+        """Where the device was when the command changed, in every period that ends within the piece."""
+        if piece.between_x_m is None:
+            return self._on_a_line(true_x)
+        last = np.empty(0) if self._last_between is None else self._last_between
+        return np.append(last, piece.between_x_m)[:-1]
+
+    def _on_a_line(self, true_x: Floats) -> Floats:
+        return true_x[:-1] + self._late * np.diff(true_x)
+
+    def _add(self, added: Floats) -> Floats:
+        true = added[self._count :]
+        self.taken_J += np.maximum(true, 0.0).sum(axis=1)
+        self.given_J -= np.minimum(true, 0.0).sum(axis=1)
+        return self._sums.add(added)
+
+
+def _held(old: Floats, new: Floats, true_x: Floats, between: Floats) -> Floats:
+    """-f dx over each period of two held forces, shape (elements, periods)."""
+    return -(old * (between - true_x[:-1]) + new * (true_x[1:] - between))
+
+
+def _wall_events(scene: dict[str, Any], time: Timebase) -> list[tuple[int, dict[str, Any]]]:
+    """What changes the wall, by tick; it is the wall's place that says when elements act."""
+    found = []
+    for event in scene.get("event", []):
+        of_wall = {key: value for key, value in event.get("set", {}).items() if key.startswith("wall.")}
+        if of_wall:
+            found.append((time.first_tick_at(event["at"]), {"set": of_wall}))
+    return found
+
+
+@dataclass(frozen=True)
+class MeasuredTime(Timebase):
+    """The time of samples whose period is what it is, and no whole number of Hz.
+
+    Attributes:
+        measured_s: the period.
+    """
+
+    measured_s: float
+
+    @classmethod
+    def of_period(cls, period_s: float, lookahead: int) -> MeasuredTime:
+        """Of samples ``period_s`` apart; commands take effect ``lookahead`` of them later, or one more."""
+        rate = max(1, round(1.0 / period_s))
+        return cls(rate, rate, lookahead, 1, period_s)
+
+    @property
+    def period_s(self) -> float:
+        return self.measured_s
+
+
+class RecordedController(Controller):
+    """A controller that is given samples (x, acceleration, velocity) and takes what was recorded for an estimate."""
+
+    def __init__(
+        self, scene: dict[str, Any], time: Timebase, kinds: dict[str, type[Element]], recorded: frozenset[str]
+    ) -> None:
+        super().__init__(scene, time, kinds)
+        computed = self._start_estimates
+
+        def start(first: Sample) -> tuple[Estimator, Estimator]:
+            velocity, acceleration = computed(first)
+            return (
+                (lambda _x, sample: sample[2]) if "velocity" in recorded else velocity,
+                (lambda _v, sample: sample[1]) if "acceleration" in recorded else acceleration,
+            )
+
+        self._start_estimates = start

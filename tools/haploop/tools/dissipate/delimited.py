@@ -1,0 +1,178 @@
+"""Numbers from text: CSV, TSV or columns set apart by blanks, of any length, block by block."""
+
+from __future__ import annotations
+
+import csv
+import itertools
+import re
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from haploop.launch.mistakes import nearest
+from haploop.tools.dissipate.samples import Floats, RecordingError
+
+_BLOCK_ROWS = 16_384
+_UNIT = re.compile(r"(.*?)\s*[(\[]([^)\]]*)[)\]]\s*")
+
+
+@dataclass(frozen=True)
+class Column:
+    """One column of a file.
+
+    Attributes:
+        index: from 0.
+        name: as in the header, without the unit; its number where there is no header.
+        unit: from the header's brackets, "" without.
+    """
+
+    index: int
+    name: str
+    unit: str
+
+
+class DelimitedFile:
+    """Text of one row a line; a header line, lines that begin with # and empty lines may be there.
+
+    Cells are set apart by tabs, semicolons, commas or blanks, whichever the first row has, in this order. With
+    semicolons a comma is taken for the decimal point.
+
+    Attributes:
+        columns: as the header names them, or by number from 1.
+        has_header: whether the first line names them.
+    """
+
+    def __init__(self, path: Path) -> None:
+        """Look at how the file begins.
+
+        Raises:
+            RecordingError: there is no such file, or no row in it.
+        """
+        self.path = path
+        with self._lines() as lines:
+            first = list(itertools.islice((line for line in lines if line.strip()), 50))
+        rows = [line for line in first if not line.startswith("#")]
+        if not rows:
+            raise RecordingError(f"{path} is empty: a line for every sample was expected.")
+        self._delimiter = next((mark for mark in "\t;," if mark in rows[0]), None)
+        cells = self._cells(rows[:1])[0]
+        self.has_header = not any(_is_number(self._number_text(cell)) for cell in cells if cell.strip())
+        if not self.has_header and first[0].startswith("#"):
+            named = self._cells([first[0].lstrip("# ")])[0]
+            cells = named if len(named) == len(cells) else [str(i + 1) for i in range(len(cells))]
+        elif not self.has_header:
+            cells = [str(i + 1) for i in range(len(cells))]
+        self.columns = [_column(index, cell) for index, cell in enumerate(cells)]
+
+    def column(self, given: str, what: str) -> Column:
+        """The column of this name, or with this number from 1.
+
+        Raises:
+            RecordingError: there is none; it names the nearest.
+        """
+        found = [c for c in self.columns if given.strip() in (c.name, f"{c.name} ({c.unit})", f"{c.name} [{c.unit}]")]
+        found = found or [c for c in self.columns if c.name.lower() == given.strip().lower()]
+        if not found and given.isdecimal() and 1 <= int(given) <= len(self.columns):
+            found = [self.columns[int(given) - 1]]
+        if len(found) > 1:
+            raise RecordingError(
+                f"{self.path} has {len(found)} columns {given!r}; give the {what} by its number from 1."
+            )
+        if not found:
+            names = ", ".join(c.name for c in self.columns)
+            hint = nearest(given, [c.name for c in self.columns])
+            mean = f" Did you mean {hint}?" if hint else ""
+            raise RecordingError(
+                f"There is no column {given!r} in {self.path} for the {what}.{mean} There are: {names}."
+            )
+        return found[0]
+
+    def find(self, names: Sequence[str]) -> Column | None:
+        """The first column that has one of these names, whatever the case of its letters."""
+        known = {column.name.lower(): column for column in reversed(self.columns)}
+        return next((known[name] for name in names if name in known), None)
+
+    def blocks(self, columns: Sequence[Column]) -> Iterator[tuple[Floats, Floats]]:
+        """Numbers of these columns, shape (rows, columns), and the line of each row, shape (rows,).
+
+        A cell that is empty, missing at the end of a line, or not finite is NaN.
+
+        Raises:
+            RecordingError: a cell is neither a number nor empty, or its quotes do not end; it names the line.
+        """
+        wanted = [column.index for column in columns]
+        with self._lines() as lines:
+            numbered = ((n, line) for n, line in enumerate(lines, 1) if line.strip() and not line.startswith("#"))
+            if self.has_header:
+                next(numbered)
+            while chunk := list(itertools.islice(numbered, _BLOCK_ROWS)):
+                rows = self._cells([line for _, line in chunk])
+                if len(rows) != len(chunk):
+                    line = next((n for n, line in chunk if line.count('"') % 2), chunk[0][0])
+                    raise RecordingError(f"Line {line} of {self.path}: a quotation mark is not closed.")
+                table = np.array([self._row(cells, wanted, n) for cells, (n, _) in zip(rows, chunk, strict=True)])
+                table[~np.isfinite(table)] = np.nan
+                yield table, np.array([float(n) for n, _ in chunk])
+
+    def _row(self, cells: Sequence[str], wanted: Sequence[int], line: int) -> list[float]:
+        try:
+            return [float(cells[index]) for index in wanted]
+        except (ValueError, IndexError):
+            return [self._number(cells, index, line) for index in wanted]
+
+    def _number(self, cells: Sequence[str], index: int, line: int) -> float:
+        text = self._number_text(cells[index]) if index < len(cells) else ""
+        if not text:
+            return np.nan
+        if not _is_number(text):
+            name = self.columns[index].name
+            raise RecordingError(f"Line {line} of {self.path}: a number was expected in column {name}, not {text!r}.")
+        return float(text)
+
+    def _number_text(self, cell: str) -> str:
+        text = cell.strip()
+        return text.replace(",", ".") if self._delimiter == ";" else text
+
+    def _cells(self, lines: Iterable[str]) -> list[list[str]]:
+        if self._delimiter is None:
+            return [line.split() for line in lines]
+        return list(csv.reader(lines, delimiter=self._delimiter))
+
+    def _lines(self) -> _Lines:
+        return _Lines(self.path)
+
+
+class _Lines:
+    """The lines of a text file; what keeps it from being one is a ``RecordingError``."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+
+    def __enter__(self) -> Iterator[str]:
+        try:
+            self._file = self._path.open(encoding="utf-8-sig", newline=None)
+        except OSError as error:
+            raise RecordingError(f"The recording {self._path} cannot be read: {error.strerror}.") from error
+        return iter(self._file)
+
+    def __exit__(self, kind: object, error: BaseException | None, _trace: object) -> None:
+        self._file.close()
+        if isinstance(error, UnicodeDecodeError):
+            raise RecordingError(f"The recording {self._path} must be UTF-8 text, which it is not.") from error
+        if isinstance(error, csv.Error):
+            raise RecordingError(f"The recording {self._path} is no table of text: {error}.") from error
+
+
+def _column(index: int, cell: str) -> Column:
+    match = _UNIT.fullmatch(cell)
+    return Column(index, match[1].strip(), match[2].strip()) if match else Column(index, cell.strip(), "")
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True

@@ -1,0 +1,157 @@
+"""The figure: the recorded motion, and what every element would have taken out of it (as Choi et al. 2022, Fig. 8)."""
+
+from __future__ import annotations
+
+import textwrap
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from haploop.tools.amounts import prefix_for
+from haploop.tools.dissipate.outcome import Outcome, in_words
+from haploop.tools.dissipate.report import answer, row_of
+from haploop.tools.dissipate.samples import Floats
+from haploop.tools.figure_file import empty_figure
+from haploop.tools.figure_style import (
+    CLOSE,
+    ELEMENTS,
+    FAINT,
+    GREY,
+    INK,
+    LARGE,
+    SMALL,
+    TEXT,
+    WALL,
+    WALL_FILL,
+    dress,
+    element_colour,
+    few_ticks,
+    legend,
+)
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure, SubFigure
+
+_COLUMNS = ("", "true", "sampled", "took", "gave back", "largest force")
+_AT = (0.04, 0.46, 0.585, 0.71, 0.835, 1.0)
+# As many as there are colours.
+_MOST = len(ELEMENTS)
+# Letters that the width has room for.
+_LINE_LETTERS = 170
+
+
+def figure_of(outcome: Outcome) -> Figure:
+    """Motion and energies, whole and close, the table, and what is to be known.
+
+    Raises:
+        FigureError: matplotlib is missing.
+    """
+    figure = empty_figure(13.0, 7.8)
+    header, body = figure.subfigures(2, 1, squeeze=False, height_ratios=(0.085, 1.0))[:, 0]
+    lines, close = outcome.course.lines(), outcome.course.close
+    rows = 1 + min(len(outcome.elements), _MOST)
+    grid = body.add_gridspec(3, 2, width_ratios=(1.4, 1.0), height_ratios=(0.8, 1.6, max(0.14 * rows, 0.55)))
+    motion, energy = body.add_subplot(grid[0, 0]), body.add_subplot(grid[1, 0])
+    _motion(motion, outcome, lines, "Recorded motion", whole=True)
+    _energies(energy, outcome, lines, "Energy that would have been taken out of the device (fed to it below 0)")
+    near = [body.add_subplot(grid[row, 1]) for row in range(2)]
+    if close is None:
+        for ax in near:
+            ax.set_axis_off()
+        near[0].text(0.5, 0.5, "No element gave anything back.", ha="center", fontsize=TEXT, color=GREY)
+    else:
+        _motion(near[0], outcome, close, "Where most was given back", whole=False)
+        since = close.copy()
+        since[2:] -= close[2:, :1]
+        _energies(near[1], outcome, since, "Energy there, since its beginning")
+        for ax in (motion, energy):
+            ax.axvspan(close[0, 0], close[0, -1], color=CLOSE, alpha=0.5, zorder=0.5, linewidth=0, gid="close")
+        for ax in near:
+            few_ticks(ax)
+    _table(body.add_subplot(grid[2, 0]), outcome, rows)
+    _words(body.add_subplot(grid[2, 1]), outcome)
+    _header(header, outcome)
+    body.align_ylabels()
+    return figure
+
+
+def _motion(ax: Axes, outcome: Outcome, lines: Floats, title: str, whole: bool) -> None:
+    """Position over time, with the wall as far as it is in view; the whole view reaches to it."""
+    factor, letter = prefix_for([float(np.abs(lines[1]).max())])
+    t, x = lines[0], lines[1] / factor
+    low, high = float(x.min()), float(x.max())
+    wall = None if outcome.setting.get("event") else outcome.setting.get("wall")
+    surface = wall["position"] / factor if wall else low
+    if whole:
+        low, high = min(low, surface), max(high, surface)
+    margin = 0.06 * (high - low) or 1.0
+    if wall:
+        far = min(low - margin, surface) if wall["occupies"] == "below" else max(high + margin, surface)
+        ax.axhspan(far, surface, color=WALL_FILL, zorder=0, linewidth=0, gid="wall")
+        ax.axhline(surface, color=WALL, linewidth=1.0, zorder=1)
+    ax.plot(t, x, color=INK, linewidth=1.0, gid="position")
+    ax.set_ylim(low - margin, high + margin)
+    _common(ax, outcome, t)
+    dress(ax, title, "time (s)", f"position ({letter}m)")
+
+
+def _energies(ax: Axes, outcome: Outcome, lines: Floats, title: str) -> None:
+    count, agree = len(outcome.elements), outcome.books_agree
+    books = lines[2:]
+    factor, letter = prefix_for([float(np.abs(books).max())])
+    for index, element in enumerate(outcome.elements[:_MOST]):
+        colour, name = element_colour(index), element.label
+        ax.plot(lines[0], books[count + index] / factor, color=colour, linewidth=1.5, label=name, gid=f"{name}.true")
+        if not agree:
+            dashed = {"color": colour, "linewidth": 1.0, "dashes": (4, 2)}
+            ax.plot(lines[0], books[index] / factor, **dashed, gid=f"{name}.sampled")
+    if not agree:
+        for label, style in (("true", "-"), ("sampled", (0, (4, 2)))):
+            ax.plot([], [], color=GREY, linestyle=style, linewidth=1.3, label=label)
+        legend(ax, only=("true", "sampled"), loc="upper left", bbox_to_anchor=(0.0, 1.0), ncols=1)
+    ax.axhline(0.0, color=GREY, linewidth=0.8, zorder=0)
+    _common(ax, outcome, lines[0])
+    dress(ax, title, "time (s)", f"energy ({letter}J)")
+
+
+def _common(ax: Axes, outcome: Outcome, t: Floats) -> None:
+    """The span of the times, and what of it is missing."""
+    for from_s, to_s in outcome.notes.gaps_s:
+        if from_s < t[-1] and to_s > t[0]:
+            ax.axvspan(from_s, to_s, color=FAINT, alpha=0.45, zorder=0.4, linewidth=0, gid="gap")
+    ax.set_xlim(float(t[0]), float(t[-1]))
+
+
+def _table(ax: Axes, outcome: Outcome, rows: int) -> None:
+    """The numbers of every element, in the colours of the lines."""
+    ax.set_axis_off()
+    ax.set_xlim(0.0, 1.0)
+    ax.set_ylim(max(rows, 4) + 0.2, -0.2)
+    for number, cells in enumerate([_COLUMNS, *(row_of(element) for element in outcome.elements[: rows - 1])]):
+        y = number + 0.5
+        if number:
+            colour = element_colour(number - 1)
+            ax.plot([0.0, 0.025], [y, y], color=colour, linewidth=2.5, solid_capstyle="butt")
+        for x, cell, align in zip(_AT, cells, ("left", *["right"] * 5), strict=True):
+            weight = "normal" if number else "bold"
+            ax.text(x, y, cell, ha=align, va="center", fontsize=TEXT, color=INK, fontweight=weight)
+
+
+def _words(ax: Axes, outcome: Outcome) -> None:
+    """What is to be known, beside the table."""
+    ax.set_axis_off()
+    more = len(outcome.elements) - _MOST
+    sentences = ([f"Left out here: {more} more element{'s' * (more > 1)}."] if more > 0 else []) + in_words(outcome)
+    wrapped = [line for sentence in sentences for line in textwrap.wrap(sentence, 84)]
+    ax.text(0.0, 1.0, "\n".join(wrapped[:9]), va="top", fontsize=SMALL, color=GREY, transform=ax.transAxes, gid="words")
+
+
+def _header(figure: SubFigure, outcome: Outcome) -> None:
+    figure.text(0.008, 0.72, outcome.name, fontsize=LARGE, color=INK, va="center", gid="title")
+    words = textwrap.shorten(_capital(answer(outcome)), _LINE_LETTERS, placeholder=" …")
+    figure.text(0.008, 0.2, words, fontsize=TEXT + 1, color=INK, va="center", gid="answer")
+
+
+def _capital(sentence: str) -> str:
+    return sentence[:1].upper() + sentence[1:]

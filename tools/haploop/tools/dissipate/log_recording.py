@@ -1,0 +1,135 @@
+"""A run's log as a recording: what the controller measured at every tick, and where the plant was at every step."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+
+from haploop.logger.log_stream import Batch, LogStream
+from haploop.logger.recording import Table
+from haploop.protocol.ticks import DELAY, Timebase, TimebaseError
+from haploop.tools.dissipate.samples import Floats, Notes, RecordingError, Samples
+
+_COLUMNS = {"/controller": ("timestamp", "x", "v", "a"), "/plant": ("x",)}
+
+
+def scene_of_log(path: Path) -> dict[str, Any]:
+    """The resolved scene in a run's log.
+
+    Raises:
+        FileNotFoundError, LogError: as for ``LogStream``.
+        RecordingError: no scene is attached.
+    """
+    log = LogStream(path, topics=())
+    for _ in log:
+        if "scene.toml" in log.attachments:
+            break
+    beside = log.path.with_name("scene.toml")
+    if "scene.toml" not in log.attachments and not beside.exists():
+        raise RecordingError(f"The log {log.path} holds no scene, so its rates and estimates are not known.")
+    text = log.attachments.get("scene.toml")
+    return tomllib.loads(text.decode() if text else beside.read_text(encoding="utf-8"))
+
+
+class LogRecording:
+    """Samples of a run's log; in between, the plant's own steps, where they were logged.
+
+    The force of tick k would have acted from step k n + d on, n steps a tick, d the scene's delay or another one.
+
+    Args:
+        path: a run's directory or its log.
+        scene: the scene in it.
+        delay_s: of the forces; that of the scene when None.
+        estimated: which of "velocity" and "acceleration" are to be estimated anew, not taken as the run had them.
+        readings: whether the accelerations in the log are readings of an accelerometer, for estimates to read.
+    """
+
+    def __init__(
+        self, path: Path, scene: dict[str, Any], delay_s: float | None, estimated: frozenset[str], readings: bool
+    ) -> None:
+        self._path, self.name = path, scene["title"]
+        delay_s = scene["clock"]["round_trip_delay"] if delay_s is None else delay_s
+        try:
+            time = Timebase.of({**scene["clock"], "round_trip_delay": delay_s}, scene["duration"])
+        except TimebaseError as error:
+            raise RecordingError(f"The {error}") from error
+        self.period_s, self.delay_s, self.notes = time.period_s, delay_s, Notes()
+        self._readings = readings
+        self._n, self._late = time.steps_per_tick, time.delay_steps % time.steps_per_tick
+        self.recorded = frozenset({"velocity", "acceleration"}) - estimated
+        self.between = "plant steps" if scene["run"]["log"] == "steps" else "straight lines"
+        self._remark(scene)
+
+    def _remark(self, scene: dict[str, Any]) -> None:
+        remarks = self.notes.remarks
+        uncertain = [f"[{table}]" for table in ("jitter", "loss") if table in scene]
+        if uncertain:
+            remarks.append(f"The forces are taken to arrive after the delay alone, without {' and '.join(uncertain)}.")
+        if any(DELAY in event.get("set", {}) for event in scene.get("event", [])):
+            remarks.append("The delay changed during the run; the forces are taken to arrive after that of the scene.")
+        limits = [key for key in ("resolution", "saturation", "bandwidth") if key in scene.get("actuator", {})]
+        if limits:
+            remarks.append("The forces are those commanded, without what the actuator would have made of them.")
+
+    def samples(self) -> Iterator[Samples]:
+        """All samples, a chunk of the log at a time."""
+        log = LogStream(self._path, _COLUMNS, {name for names in _COLUMNS.values() for name in names})
+        waiting, first = _Waiting(self._n, self._late, self.between == "plant steps"), True
+        for batch in log:
+            waiting.add(batch)
+            rows = waiting.whole()
+            if len(rows["x"]):
+                self.notes.rows += len(rows["x"])
+                yield self._samples(rows, first)
+                first = False
+        if self.notes.rows < 2:
+            raise RecordingError(f"The log {log.path} holds fewer than two ticks of the controller.")
+        if log.cut:
+            self.notes.remarks.append(log.cut)
+
+    def _samples(self, rows: dict[str, Floats], first: bool) -> Samples:
+        v = rows["v"] if "velocity" in self.recorded else None
+        a = rows["a"] if "acceleration" in self.recorded or self._readings else None
+        end = float(rows["end"][-1]) if "end" in rows else None
+        true, between = rows.get("true", rows["x"]), rows.get("between")
+        return Samples(rows["timestamp"], rows["x"], v, a, true, between, first, end)
+
+
+class _Waiting:
+    """Rows of both channels that wait for those of the other.
+
+    Args:
+        n: plant steps a tick.
+        late: step of a tick at which a delayed force changes.
+        of_steps: whether the plant's steps were logged.
+    """
+
+    def __init__(self, n: int, late: int, of_steps: bool) -> None:
+        self._n, self._late, self._of_steps = n, late, of_steps
+        self._controller: dict[str, Floats] = {name: np.empty(0) for name in _COLUMNS["/controller"]}
+        self._plant = np.empty(0)
+
+    def add(self, batch: Batch) -> None:
+        """Take the rows of a batch."""
+        rows = cast(Table, batch.rows)
+        if batch.topic == "/plant":
+            self._plant = np.concatenate([self._plant, rows["x"]])
+        else:
+            self._controller = {name: np.concatenate([kept, rows[name]]) for name, kept in self._controller.items()}
+
+    def whole(self) -> dict[str, Floats]:
+        """Columns of all ticks of which the period's end is known, with where the plant was at and within them."""
+        n, ticks = self._n, len(self._controller["x"])
+        if self._of_steps:
+            ticks = min(ticks, max(0, len(self._plant) - 1) // n)
+        rows = {name: column[:ticks] for name, column in self._controller.items()}
+        self._controller = {name: column[ticks:] for name, column in self._controller.items()}
+        if self._of_steps:
+            steps = self._plant[: ticks * n].reshape(ticks, n)
+            rows |= {"true": steps[:, 0], "between": steps[:, self._late], "end": self._plant[n::n][:ticks]}
+            self._plant = self._plant[ticks * n :]
+        return rows

@@ -1,0 +1,93 @@
+"""Recorded motion, piece by piece."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+
+class RecordingError(ValueError):
+    """A recording that cannot be used; the message says why and what to do."""
+
+
+@dataclass(frozen=True)
+class Samples:
+    """Consecutive samples, one control period apart.
+
+    Attributes:
+        t_s: time of every sample, shape (samples,).
+        x_m: what the controller read, shape (samples,).
+        v_m_s, a_m_s2: velocity and acceleration as recorded; None where they are to be estimated.
+        true_x_m: where the device was, shape (samples,).
+        between_x_m: where it was within the period after each sample, when a delayed force changes, shape (samples,);
+            None for a straight line from sample to sample.
+        begins: whether a gap lies before it, or nothing at all.
+        end_x_m: where the device was a period after the last sample; None where the next piece tells it, or nothing.
+    """
+
+    t_s: Floats
+    x_m: Floats
+    v_m_s: Floats | None
+    a_m_s2: Floats | None
+    true_x_m: Floats
+    between_x_m: Floats | None
+    begins: bool
+    end_x_m: float | None = None
+
+
+@dataclass
+class Notes:
+    """What was found on the way through a recording.
+
+    Attributes:
+        rows: samples that were used.
+        unusable_rows: rows left out, since a number in them is missing or not finite.
+        gaps_s: where samples are missing, from and to; the first hundred.
+        gaps, missing_s: how many there are, and their length in all.
+        uneven: periods that are more than a tenth off the others.
+        remarks: what else people should know, a sentence each.
+    """
+
+    rows: int = 0
+    unusable_rows: int = 0
+    gaps_s: list[tuple[float, float]] = field(default_factory=list)
+    gaps: int = 0
+    missing_s: float = 0.0
+    uneven: int = 0
+    remarks: list[str] = field(default_factory=list)
+
+    def gap(self, from_s: float, to_s: float) -> None:
+        """Samples are missing between these two."""
+        self.gaps, self.missing_s = self.gaps + 1, self.missing_s + to_s - from_s
+        if len(self.gaps_s) < 100:
+            self.gaps_s.append((from_s, to_s))
+
+
+class Recording(Protocol):
+    """A recording that can be gone through once.
+
+    Attributes:
+        name: what to call it.
+        period_s: the control period T.
+        delay_s: after what time a force acts on the device.
+        between: how the motion between two samples is known: "plant steps" or "straight lines".
+        recorded: which of "velocity" and "acceleration" are recorded, not estimated.
+        notes: complete when all samples have come.
+    """
+
+    name: str
+    period_s: float
+    delay_s: float
+    between: str
+    recorded: frozenset[str]
+    notes: Notes
+
+    def samples(self) -> Iterator[Samples]:
+        """All samples, in pieces of any length."""
+        ...

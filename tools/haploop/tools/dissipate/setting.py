@@ -1,0 +1,138 @@
+"""The controller that a recorded motion is given to: estimators, wall and elements, as a resolved scene."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from haploop.launch.layers import Layers
+from haploop.launch.overrides import key_path
+from haploop.launch.scene_file import resolved
+from haploop.plant.sensors import accelerometer_is_used
+from haploop.tools.dissipate.samples import RecordingError
+from haploop.tools.live import assignments
+
+if TYPE_CHECKING:
+    from haploop.controller.dissipation import Element
+
+Kinds = Mapping[str, "type[Element]"]
+# What a recorded motion can be given to; encoder tells the estimators what the positions were rounded to.
+_ESTIMATES = ("velocity", "acceleration", "encoder")
+_ESTIMATED = frozenset({"velocity", "acceleration"})
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What is to be found out.
+
+    Attributes:
+        dampings, masses: of damping, and of bi- and unidirectional inertia; numbers in SI units or text with a unit.
+        elements: others, each as "KIND KEY=VALUE ...".
+        wall, occupies: where a wall begins, and on which side of it the elements then act; they always act without.
+        overrides: ``KEY=VALUE`` for ``[velocity]``, ``[acceleration]`` and ``[encoder]``.
+    """
+
+    dampings: Sequence[str] = ()
+    masses: Sequence[str] = ()
+    elements: Sequence[str] = ()
+    wall: str | None = None
+    occupies: str = "below"
+    overrides: Sequence[str] = field(default_factory=tuple)
+
+    def tables(self) -> frozenset[str]:
+        """The tables that the overrides speak of.
+
+        Raises:
+            RecordingError: one is not asked here.
+        """
+        found = set()
+        for text in self.overrides:
+            table = (key_path(text.partition("=")[0]) or [text])[0]
+            if table not in _ESTIMATES:
+                raise RecordingError(
+                    f"--set {text} has no meaning here: a recorded motion stays as it is. "
+                    "What can be set are keys of [velocity], [acceleration] and [encoder]."
+                )
+            found.add(table)
+        return frozenset(found)
+
+    def estimated_anew(self) -> frozenset[str]:
+        """Which of "velocity" and "acceleration" the overrides change, or what they are estimated from."""
+        return _ESTIMATED if self.tables() - {"acceleration"} else _ESTIMATED & self.tables()
+
+
+def setting_of_text(
+    asked: Asked, path: Path, period_s: float, recorded: frozenset[str], kinds: Kinds
+) -> dict[str, Any]:
+    """For a recording in a text file.
+
+    Raises:
+        RecordingError: what is asked does not fit the recording.
+        SceneError: a number or a kind is wrong.
+    """
+    if clash := sorted(asked.tables() & recorded):
+        raise RecordingError(f"Give either a column of the {clash[0]} or --set for its estimate, not both.")
+    rate = max(1, round(1.0 / period_s))
+    device = {"mass": 1.0, "damping": 0.0}
+    data = {"title": path.stem, "duration": 1.0 / rate, "device": device}
+    made = _setting({**data, "clock": {"plant_rate": rate, "control_rate": rate}}, asked, path, kinds)
+    if accelerometer_is_used(made) and "acceleration" not in recorded:
+        raise RecordingError("The estimates read an accelerometer; say with --acceleration which column that is.")
+    return made
+
+
+def setting_of_log(asked: Asked, path: Path, scene: dict[str, Any], kinds: Kinds) -> dict[str, Any]:
+    """For a run's log: its own estimators and wall, unless others are asked for; its events but those of the wall go.
+
+    Raises:
+        RecordingError, SceneError: as for a text file.
+    """
+    keys = ("title", "duration", "clock", "device", "encoder", "noise", "accelerometer", *_ESTIMATED, "wall")
+    data = {key: scene[key] for key in keys if key in scene}
+    made = _setting(data, asked, path, kinds)
+    if asked.overrides and accelerometer_is_used(made) and not holds_readings(scene):
+        raise RecordingError("The estimates read an accelerometer, but its readings are not in the log.")
+    walls = [event for event in scene.get("event", []) if any(key.startswith("wall.") for key in event.get("set", {}))]
+    return {**made, "event": [] if asked.wall else walls}
+
+
+def holds_readings(scene: dict[str, Any]) -> bool:
+    """Whether the accelerations in a run's log are the accelerometer's readings themselves."""
+    table = scene.get("acceleration", {})
+    return table.get("source") == "accelerometer" and "cutoff" not in table
+
+
+def _setting(data: dict[str, Any], asked: Asked, path: Path, kinds: Kinds) -> dict[str, Any]:
+    if asked.wall is not None:
+        position = next(iter(assignments([f"wall={asked.wall}"]).values()))
+        data["wall"] = {"position": position, "stiffness": 0.0, "occupies": asked.occupies}
+    tables = _elements(asked)
+    if "wall" not in data:
+        _refuse_what_needs_a_wall(tables)
+        tables = [{"acts": "always", **table} for table in tables]
+    return resolved(Layers(path, {**data, "dissipation": tables}), asked.overrides, kinds)
+
+
+def _elements(asked: Asked) -> list[dict[str, Any]]:
+    """A ``[[dissipation]]`` table for each element."""
+    tables = [{"kind": "damping", "damping": _value(text)} for text in asked.dampings]
+    for kind in ("bidirectional-inertia", "unidirectional-inertia"):
+        tables += [{"kind": kind, "mass": _value(text)} for text in asked.masses]
+    for text in asked.elements:
+        kind, *parameters = shlex.split(text) or [""]
+        tables.append({"kind": kind, **assignments(parameters)})
+    if not tables:
+        raise RecordingError("Say which elements: --damping 2.7, --mass 0.0018, or --element KIND KEY=VALUE in quotes.")
+    return tables
+
+
+def _value(text: str) -> Any:
+    return assignments([f"value={text}"])["value"]
+
+
+def _refuse_what_needs_a_wall(tables: list[dict[str, Any]]) -> None:
+    if any(table["kind"] == "unidirectional-damping" for table in tables):
+        raise RecordingError("Unidirectional damping acts on the way into a wall; say where it begins with --wall.")

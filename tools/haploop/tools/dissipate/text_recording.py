@@ -1,0 +1,202 @@
+"""A recording in a text file: which columns, in which units, how regular, and what is missing."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+
+from haploop.launch.units import from_text
+from haploop.tools.dissipate.delimited import Column, DelimitedFile
+from haploop.tools.dissipate.samples import Floats, Notes, RecordingError, Samples
+
+# What columns are called where nothing is said.
+_TIMES = ("t", "time", "timestamp", "time_s", "t_s", "seconds")
+_POSITIONS = ("x", "position", "pos", "position_m", "x_m", "displacement")
+# Samples this many periods apart have a gap between them; those this much off the others are uneven.
+_GAP, _UNEVEN = 1.5, 0.1
+# No period is shorter or longer.
+_PERIODS_S = 1e-7, 1e3
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Which columns to read and what their numbers mean; None for what is to be found out, or is not there.
+
+    Attributes:
+        position, time, velocity, acceleration: names, or numbers from 1.
+        rate_Hz: samples a second, where there is no time.
+        length: unit of the position, such as "mm", or metres a unit; also that of the others, a second and a second^2.
+        time_unit: unit of the time.
+    """
+
+    position: str | None = None
+    time: str | None = None
+    rate_Hz: float | None = None
+    velocity: str | None = None
+    acceleration: str | None = None
+    length: str | None = None
+    time_unit: str | None = None
+
+
+class TextRecording:
+    """Samples of a text file, a control period apart; between them the device moves in straight lines.
+
+    The period is the median of those at the beginning, or that of the rate. The times are otherwise asked only where
+    samples are missing: a controller that counts its ticks takes no notice of how late each of them is.
+    """
+
+    between = "straight lines"
+
+    def __init__(self, path: Path, layout: Layout, delay_s: float) -> None:
+        """Find the columns and the period.
+
+        Raises:
+            RecordingError: a column, a unit or a rate is missing or wrong, or there are fewer than two samples.
+        """
+        self.name, self.delay_s, self.notes = path.name, delay_s, Notes()
+        self._file = file = DelimitedFile(path)
+        self._rate_Hz = layout.rate_Hz
+        self._columns, self._scales = self._choose(file, layout)
+        self.recorded = frozenset(name for name in ("velocity", "acceleration") if name in self._columns)
+        self.period_s = 1.0 / layout.rate_Hz if layout.rate_Hz else self._median_period()
+
+    def _choose(self, file: DelimitedFile, layout: Layout) -> tuple[dict[str, Column], dict[str, float]]:
+        """Column and scale to SI of everything that is read."""
+        given = {
+            "time": layout.time,
+            "position": layout.position,
+            "velocity": layout.velocity,
+            "acceleration": layout.acceleration,
+        }
+        columns = {what: file.column(name, what) for what, name in given.items() if name is not None}
+        if "position" not in columns:
+            columns["position"] = self._guessed(file, _POSITIONS, "position")
+        if layout.rate_Hz is None and "time" not in columns:
+            columns["time"] = self._guessed(file, _TIMES, "time")
+        if layout.rate_Hz is not None and "time" in columns:
+            raise RecordingError("Give either the column of the time or the rate, not both.")
+        units = {
+            "time": (layout.time_unit, "s"),
+            "position": (layout.length, "m"),
+            "velocity": (_per_second(layout.length, 1), "m/s"),
+            "acceleration": (_per_second(layout.length, 2), "m/s^2"),
+        }
+        return columns, {
+            what: _scale(units[what][0] or column.unit, units[what][1]) for what, column in columns.items()
+        }
+
+    @staticmethod
+    def _guessed(file: DelimitedFile, names: tuple[str, ...], what: str) -> Column:
+        if found := file.find(names):
+            return found
+        there = ", ".join(column.name for column in file.columns)
+        instead = " or --rate" if what == "time" else ""
+        raise RecordingError(
+            f"Which column of {file.path} is the {what}? Name it with --{what}{instead}. There are: {there}."
+        )
+
+    def _median_period(self) -> float:
+        block = next(self._rows(), None)
+        if block is None or len(block[0]["time"]) < 2:
+            raise RecordingError(f"{self._file.path} holds fewer than two samples.")
+        period_s = float(np.median(np.diff(block[0]["time"])))
+        if period_s <= 0.0:
+            raise RecordingError(
+                f"The times in column {self._columns['time'].name} of {self._file.path} do not increase; "
+                "give the rate with --rate if samples came faster than their clock."
+            )
+        if not _PERIODS_S[0] <= period_s <= _PERIODS_S[1]:
+            raise RecordingError(
+                f"The samples are {period_s:g} s apart; is the unit of the time right? Give --time-unit."
+            )
+        return period_s
+
+    def samples(self) -> Iterator[Samples]:
+        """All samples, in pieces without a gap."""
+        last_s: float | None = None
+        for columns, lines in self._rows():
+            t = columns["time"]
+            steps = np.diff(t, prepend=t[:1] if last_s is None else last_s)
+            self._refuse_disorder(t, steps, lines, last_s)
+            is_gap = steps > _GAP * self.period_s
+            is_gap[0] |= last_s is None
+            self._note(t, steps, is_gap, last_s)
+            starts = [0, *np.flatnonzero(is_gap[1:]) + 1, len(t)]
+            for first, end in pairwise(starts):
+                yield self._piece(columns, first, end, bool(is_gap[first]))
+            last_s = float(t[-1])
+        if self.notes.rows < 2:
+            raise RecordingError(f"{self._file.path} holds fewer than two samples.")
+
+    def _piece(self, columns: dict[str, Floats], first: int, end: int, begins: bool) -> Samples:
+        part = {name: column[first:end] for name, column in columns.items()}
+        x = part["position"]
+        return Samples(part["time"], x, part.get("velocity"), part.get("acceleration"), x, None, begins)
+
+    def _rows(self) -> Iterator[tuple[dict[str, Floats], Floats]]:
+        """SI columns by what they are, of all rows that can be used, and their lines; times are made where needed."""
+        names, row = list(self._columns), 0
+        self.notes.rows = self.notes.unusable_rows = 0
+        for table, lines in self._file.blocks(list(self._columns.values())):
+            columns = {name: table[:, i] * self._scales[name] for i, name in enumerate(names)}
+            if self._rate_Hz:
+                columns["time"] = np.arange(row, row + len(table)) / self._rate_Hz
+            row += len(table)
+            usable = np.isfinite(table).all(axis=1)
+            self.notes.rows += int(usable.sum())
+            self.notes.unusable_rows += int((~usable).sum())
+            if usable.any():
+                yield {name: column[usable] for name, column in columns.items()}, lines[usable]
+
+    def _refuse_disorder(self, t: Floats, steps: Floats, lines: Floats, last_s: float | None) -> None:
+        wrong = np.flatnonzero(steps <= 0.0)
+        wrong = wrong[wrong > 0] if last_s is None else wrong
+        if len(wrong):
+            at = int(wrong[0])
+            before = t[at - 1] if at else last_s
+            raise RecordingError(
+                f"Line {lines[at]:.0f} of {self._file.path}: the times must increase, but {t[at]:.9g} s follows "
+                f"{before:.9g} s; sort the rows, or give the rate with --rate if they are in order."
+            )
+
+    def _note(self, t: Floats, steps: Floats, is_gap: np.ndarray, last_s: float | None) -> None:
+        known = ~is_gap
+        self.notes.uneven += int((np.abs(steps[known] / self.period_s - 1.0) > _UNEVEN).sum())
+        for at in np.flatnonzero(is_gap):
+            before = t[at - 1] if at else last_s
+            if before is not None:
+                self.notes.gap(float(before), float(t[at]))
+
+
+def _per_second(length: str | None, power: int) -> str | None:
+    """A unit of velocity (1) or acceleration (2) that goes with one of length."""
+    if length is None or _as_number(length) is not None:
+        return length
+    return f"{length}/s" if power == 1 else f"{length}/s^2"
+
+
+def _scale(unit: str, si: str) -> float:
+    """How many SI units one of these is."""
+    number = _as_number(unit)
+    if number is not None:
+        if not (math.isfinite(number) and number):
+            raise RecordingError(f"A unit cannot be {unit} {si}.")
+        return number
+    if not unit:
+        return 1.0
+    try:
+        return float(from_text(f"1 {unit}", si))
+    except ValueError as error:
+        raise RecordingError(f"{unit!r} is no unit for numbers in {si}: {error}") from error
+
+
+def _as_number(text: str) -> float | None:
+    try:
+        return float(text)
+    except ValueError:
+        return None

@@ -1,0 +1,1 @@
+"""Many scenes at once: ``haploop sweep``, its table, its boundaries and its maps."""

@@ -1,0 +1,96 @@
+"""Title and one line of words above the maps, and the room they leave for panels and a column of signs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from haploop.tools.figure_file import empty_figure
+from haploop.tools.figure_style import GREY, INK, LARGE, SMALL, TEXT
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure, SubFigure
+    from matplotlib.text import Text
+
+# A screen's 1280 pixels wide.
+WIDTH_IN, SIDE_IN, _HEADER_IN = 11.64, 2.75, 0.8
+# Height of a row of panels, by how many rows there are.
+_HEIGHTS_IN = {1: 6.0, 2: 3.6}
+_LEAST_HEIGHT_IN = 2.7
+# Words that are too long get this much smaller before they are cut off.
+_SMALLEST = 0.78
+# How far a panel's title may reach into the gap beside it, as a multiple of the panel's width.
+_BEYOND = 1.05
+
+
+class Sheet:
+    """A figure with a header, panels in rows, and a column beside them.
+
+    Args:
+        panels: how many.
+
+    Attributes:
+        axes: of the panels, row by row; all that are there share their scales.
+        columns: panels in a row.
+        side, side_in: the column and its size.
+
+    Raises:
+        FigureError: matplotlib is missing.
+    """
+
+    def __init__(self, panels: int, title: str, line: str) -> None:
+        self.columns = panels if panels <= 3 else 2 if panels == 4 else 3 if panels <= 9 else 4
+        rows = -(-panels // self.columns)
+        body_in = rows * _HEIGHTS_IN.get(rows, _LEAST_HEIGHT_IN)
+        self.figure: Figure = empty_figure(WIDTH_IN, _HEADER_IN + body_in)
+        header, body = self.figure.subfigures(2, 1, squeeze=False, height_ratios=(_HEADER_IN, body_in))[:, 0]
+        widths = WIDTH_IN - SIDE_IN, SIDE_IN
+        left, self.side = body.subfigures(1, 2, squeeze=False, width_ratios=widths)[0]
+        self.side_in = SIDE_IN, body_in
+        grid = left.add_gridspec(rows, self.columns)
+        self.axes: list[Axes] = [
+            left.add_subplot(grid[number // self.columns, number % self.columns]) for number in range(panels)
+        ]
+        _write(header, title, 0.70, LARGE, INK, "title", bold=True)
+        _write(header, line, 0.24, SMALL, GREY, "description")
+
+    def is_left(self, number: int) -> bool:
+        """Whether a panel is the first of its row."""
+        return number % self.columns == 0
+
+    def is_low(self, number: int) -> bool:
+        """Whether there is no panel below a panel."""
+        return number + self.columns >= len(self.axes)
+
+
+def _write(header: SubFigure, words: str, y: float, size: float, colour: str, gid: str, bold: bool = False) -> None:
+    """One line, smaller if it has to be, cut off if that does not do."""
+    weight = "bold" if bold else "normal"
+    text = header.text(0.008, y, words, fontsize=size, color=colour, va="center", fontweight=weight, gid=gid)
+    room = header.figure.bbox.width * 0.984
+    width = text.get_window_extent().width
+    if width > room:
+        smallest = size * _SMALLEST
+        text.set_fontsize(max(smallest, size * room / width))
+        width = text.get_window_extent().width
+    if width > room:
+        text.set_text(words[: int(len(words) * room / width) - 2].rstrip() + " …")
+
+
+def panel_title(ax: Axes, words: str) -> Text:
+    """What a panel's cells have in common, above it."""
+    return ax.set_title(words, loc="left", fontsize=TEXT, fontweight="bold", color=INK)
+
+
+def fit_title(ax: Axes, titles: Sequence[str]) -> None:
+    """The first of some titles that is no wider than its panel, which has its place; the last, cut off, if need be."""
+    room, width = ax.get_window_extent().width * _BEYOND, 0.0
+    for words in titles:
+        width = panel_title(ax, words).get_window_extent().width
+        if width <= room:
+            return
+    panel_title(ax, titles[-1]).set_fontsize(TEXT * max(_SMALLEST, room / width))
+    if room < _SMALLEST * width:
+        words = titles[-1][: int(len(titles[-1]) * room / (_SMALLEST * width)) - 2]
+        panel_title(ax, f"{words}…").set_fontsize(TEXT * _SMALLEST)

@@ -1,0 +1,90 @@
+"""Reading a sweep's table, finished or not, as NumPy columns."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from haploop.tools.sweep.columns import CELL, SCENE, pyarrow
+
+SWEEP, TABLE, BOUNDARY, PARTS = "sweep.toml", "table.parquet", "boundary.parquet", "parts"
+
+
+class TableError(Exception):
+    """There is no sweep's table to be read; the message says why."""
+
+
+@dataclass(frozen=True)
+class SweepTable:
+    """What came of a sweep so far; ``table["wall.stiffness"]`` is a column.
+
+    Attributes:
+        columns: by name, equally long, in the order of the cells: float64 (NaN where there is nothing), int64, bool,
+            or objects (str, None where there is nothing).
+        units: of the columns that have one.
+        sweep: the resolved sweep.
+        boundary: the columns of the boundaries; empty where none were sought, or as long as the sweep goes on.
+        finished: whether every cell is there.
+    """
+
+    columns: dict[str, np.ndarray]
+    units: dict[str, str]
+    sweep: dict[str, Any]
+    boundary: dict[str, np.ndarray]
+    finished: bool
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        if name not in self.columns:
+            raise KeyError(f"There is no column {name}; there are {', '.join(self.columns)}.")
+        return self.columns[name]
+
+    def __len__(self) -> int:
+        return len(self.columns[CELL])
+
+
+def is_sweep(directory: Path) -> bool:
+    """Whether a directory is that of a sweep."""
+    return (Path(directory) / SWEEP).is_file()
+
+
+def read(directory: str | Path, *, scenes: bool = True) -> SweepTable:
+    """The table of a sweep, of a running or interrupted one as far as it is written.
+
+    Args:
+        directory: that the sweep writes to.
+        scenes: whether to read the column ``scene``, which is by far the largest.
+
+    Raises:
+        TableError: there is no sweep there, or its table cannot be read.
+        NeedsPyarrow: pyarrow is not installed.
+    """
+    directory, arrow = Path(directory), pyarrow()
+    try:
+        sweep = tomllib.loads((directory / SWEEP).read_text(encoding="utf-8"))
+        finished = (directory / TABLE).exists()
+        files = [directory / TABLE] if finished else sorted((directory / PARTS).glob("*.parquet"))
+        tables = [arrow.parquet.read_table(file, columns=_wanted(arrow, file, scenes)) for file in files]
+        boundary = directory / BOUNDARY
+        boundaries = _columns(arrow.parquet.read_table(boundary)) if finished and boundary.exists() else {}
+    except (OSError, ValueError) as error:
+        raise TableError(f"{directory} holds no sweep that can be read: {error}") from error
+    if not tables:
+        raise TableError(f"The sweep in {directory} has no finished cell yet.")
+    whole = arrow.concat_tables(tables).sort_by(CELL)
+    units = {field.name: (field.metadata or {}).get(b"unit", b"").decode() for field in whole.schema}
+    return SweepTable(
+        _columns(whole), {name: unit for name, unit in units.items() if unit}, sweep, boundaries, finished
+    )
+
+
+def _wanted(arrow: Any, file: Path, scenes: bool) -> Sequence[str] | None:
+    return None if scenes else [name for name in arrow.parquet.read_schema(file).names if name != SCENE]
+
+
+def _columns(table: Any) -> dict[str, np.ndarray]:
+    return {name: table[name].to_numpy() for name in table.column_names}
