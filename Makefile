@@ -6,7 +6,7 @@ PIP := $(PYTHON) -m pip --python $(BIN)/python -qq --disable-pip-version-check -
 READY := .venv/.installed
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test slow check bench accuracy notebook lock clean
+.PHONY: help demo test slow check bench accuracy paper notebook lock clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-8s %s\n", $$1, $$2 }' Makefile
@@ -38,6 +38,11 @@ bench: $(READY) ## measure speed, memory, what each effect and the live page cos
 accuracy: $(READY) ## measure what accuracy costs and write docs/accuracy.md (an hour; stopped, it goes on where it was)
 	@$(BIN)/haploop cost --out runs/accuracy
 	@$(BIN)/python -m haploop.tools.accuracy_page runs/accuracy docs
+
+paper: $(READY) ## make every figure of the paper and write docs/paper.md (within 20 minutes on two cores)
+	@$(BIN)/haploop paper --out runs/paper
+	@$(BIN)/python -m haploop.tools.paper.page runs/paper docs
+	@cp runs/paper/fig6?_nearest.toml launch/scenes/paper/
 
 notebook: $(READY) ## run docs/notebook.ipynb anew and keep its figures
 	@$(BIN)/python -m haploop.tools.notebook docs/notebook.ipynb

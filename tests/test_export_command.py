@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import os
-import resource
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+from faults.launched import on_a_disk_of
 from log_makers import cut, swapped_run
 from mcap.writer import Writer
 from typer.testing import CliRunner, Result
@@ -72,13 +72,9 @@ def test_a_place_that_cannot_be_written_to_is_refused(run: Path, tmp_path: Path)
 def test_a_disk_that_fills_leaves_nothing_behind(to: str, tmp_path: Path) -> None:
     needs(to)
     run = swapped_run(tmp_path / "out", 3_000, hard=False)
-
-    def limit_files() -> None:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, 100_000))
-
     command = [sys.executable, "-m", "haploop.tools.cli", "export", str(run), "--to", to]
     quiet = {**os.environ, "PYTHONDONTWRITEBYTECODE": "1"}
-    ended = subprocess.run(command, capture_output=True, text=True, preexec_fn=limit_files, env=quiet)
+    ended = subprocess.run(on_a_disk_of(100_000, command), capture_output=True, text=True, env=quiet)
     assert ended.returncode == 1, ended.stderr
     assert f"Writing to {run} failed (File too large)" in ended.stderr
     assert "Traceback" not in ended.stderr

@@ -95,6 +95,7 @@ def test_a_run_grows_by_the_spectral_radius(tables: dict[str, Any], of_limit: fl
     assert growth_of(run({**pressed, "duration": 0.8})) == pytest.approx(loop.growth(stiffness), abs=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("tables", LINEAR.values(), ids=LINEAR)
 def test_runs_on_either_side_confirm_the_limit(tables: dict[str, Any]) -> None:
     assert stiffness_limit(scene(**PLAIN, **tables), KINDS).confirmed

@@ -174,6 +174,22 @@ GOLDEN = {
     "swap": (["device"], 2, ["encoder"]),
     "tap": (["device"], 2, ["encoder"]),
     "premium_tap": (["device", "hand"], 4, ["hand.grip", "friction", "encoder", "actuator.saturation"]),
+    "premium_press": (
+        ["motor", "tip", "hand"],
+        18,  # three positions, three velocities, accelerometer, its noise, ten steps of delay
+        [
+            "transmission",
+            "hand.grip",
+            "friction",
+            "accelerometer.bandwidth",
+            "accelerometer.delay",
+            "encoder",
+            "accelerometer",
+            "accelerometer.range",
+            "acceleration.source = accelerometer",
+            "actuator.saturation",
+        ],
+    ),
     "all_effects": (
         ["motor", "tip", "hand"],
         20,  # three positions, three velocities, actuator, accelerometer, two kinds of noise, ten steps of delay

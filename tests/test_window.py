@@ -8,7 +8,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from haploop.logger.window import Window, swings
+from haploop.logger.window import Window
+from haploop.logger.window_look import swings
 
 RATE, N = 10_000, 10
 WALL = -0.06
@@ -107,5 +108,5 @@ def test_a_position_on_the_face_but_for_rounding_counts_for_no_stiffness():
 
 def test_crossings_are_counted_from_beyond_one_side_to_beyond_the_other():
     x = np.array([0.0, 2.0, 0.5, 2.0, -2.0, 0.5, -2.0, 2.0, -2.0, 0.0])
-    assert swings(x, 1.0)[0] == 3
-    assert swings(np.zeros(3), 1.0) == (0, 0.0)
+    assert swings(x[None], np.ones(1))[0] == [3]
+    assert swings(np.zeros((1, 3)), np.ones(1)) == ([0], [0.0])

@@ -13,16 +13,54 @@ from haploop.plant.linear_motion import LinearMotion
 from haploop.plant.mechanics import Mechanics
 from haploop.protocol.ticks import Timebase
 
-BOOKS = 11
+BOOKS, FIGURES = 11, 9
+
+
+@numba.njit(cache=False, fastmath=False)
+def _judge(trace, steps, measured, totals, ticks, position, swing, out):  # pragma: no cover
+    """Width, crossings and growth of the swings about the trend line, and what the ticks in contact show."""
+    kept, rows = min(steps, len(trace) - 1) + 1, min(ticks, len(measured))
+    first = (steps + 1 - kept) % len(trace)
+    low, high, mean = np.inf, -np.inf, 0.0
+    for i in range(kept):
+        value = trace[(first + i) % len(trace)]
+        low, high, mean = min(low, value), max(high, value), mean + value
+    mean /= kept
+    slope, square = 0.0, 0.0
+    for i in range(kept):
+        t = i - (kept - 1) / 2.0
+        slope, square = slope + t * (trace[(first + i) % len(trace)] - mean), square + t * t
+    slope /= square
+    crossings, side = 0, 0
+    lows, highs = np.full(2, np.inf), np.full(2, -np.inf)
+    for i in range(kept):
+        offset = trace[(first + i) % len(trace)] - mean - slope * (i - (kept - 1) / 2.0)
+        half = int(i >= kept // 2)
+        lows[half], highs[half] = min(lows[half], offset), max(highs[half], offset)
+        if abs(offset) > swing:
+            now = 1 if offset > 0.0 else -1
+            crossings += side == -now
+            side = now
+    inside, real, stiffness, depths = 0, 0, 0.0, 0.0
+    for i in range(rows):
+        depth = position - measured[i]
+        if depth > 0.0:
+            inside, depths = inside + 1, depths + depth
+            if depth > 1e-12 * abs(position):
+                real, stiffness = real + 1, stiffness + totals[i] / depth
+    out[0], out[1] = high - low, crossings
+    out[2] = (highs[1] - lows[1]) / (highs[0] - lows[0]) if highs[0] > lows[0] else 0.0
+    out[3] = 1.0 - inside / rows
+    out[4], out[5] = stiffness / max(real, 1), depths / max(inside, 1)
 
 
 @numba.njit(cache=False, fastmath=False)
 def _loops(  # pragma: no cover
     stiffness, damping, position, resolution, period, ticks, lookahead, held, response, tau, square, lag, m, b, k,
-    dampers, with_books, out, trace,
+    dampers, with_books, out, trace, measured_in, totals_in,
 ):  # fmt: skip
     n = held.shape[0] - 1
-    window = trace.shape[0] - 1
+    window, rows = trace.shape[0] - 1, len(measured_in)
     forces = np.zeros((lookahead + 1, 3))
     books, errors, added = np.zeros(BOOKS), np.zeros(BOOKS), np.zeros(BOOKS)
     for cell in range(len(stiffness)):
@@ -40,6 +78,7 @@ def _loops(  # pragma: no cover
             if inside > 0.0:
                 wall = stiffness[cell] * inside
                 damper = -damping[cell] * speed
+            measured_in[tick % rows], totals_in[tick % rows] = measured, wall + damper
             slot = tick % (lookahead + 1)
             forces[slot, 0], forces[slot, 1], forces[slot, 2] = wall + damper, wall, damper
             acting = (tick - lookahead) % (lookahead + 1)
@@ -96,15 +135,13 @@ def _loops(  # pragma: no cover
                     books[book] = after_sum
             if not abs(x) <= 1.0:
                 break
-        low, high = np.inf, -np.inf
-        for value in trace:
-            low, high = min(low, value), max(high, value)
-        out[cell, 0], out[cell, 1], out[cell, 2], out[cell, 3] = least, most, strongest, high - low
-        out[cell, 4 : 4 + BOOKS] = books + errors
+        out[cell, 0], out[cell, 1], out[cell, 2] = least, most, strongest
+        _judge(trace, steps, measured_in, totals_in, steps // n, position, resolution, out[cell, 3:FIGURES])
+        out[cell, FIGURES:] = books + errors
 
 
 def run_kernel(scenes: list[dict[str, Any]], energy: bool) -> np.ndarray:
-    """Least, greatest position, greatest force, width of the last half second and the books; shape (scenes, 15)."""
+    """Extremes, what the window shows and the books, as ``results_of`` tells them; shape (scenes, FIGURES + BOOKS)."""
     first = scenes[0]
     time = Timebase.of(first["clock"], first["duration"])
     m, n = Mechanics.of(first), time.steps_per_tick
@@ -114,7 +151,7 @@ def run_kernel(scenes: list[dict[str, Any]], energy: bool) -> np.ndarray:
     square, lag = motion_integrals(m.mass_kg, m.damping, m.stiffness, time.step_s)
     push = 1.0 / (m.mass_kg * natural_rate(m.mass_kg, m.stiffness, time.step_s))
     scales = np.array([1.0, push, push])
-    out = np.zeros((len(scenes), 4 + BOOKS))
+    out, kept = np.zeros((len(scenes), FIGURES + BOOKS)), min(time.control_rate // 2, time.ticks)
     _loops(
         np.array([scene["wall"]["stiffness"] for scene in scenes]),
         np.array([scene["dissipation"][0]["damping"] for scene in scenes]),
@@ -135,5 +172,6 @@ def run_kernel(scenes: list[dict[str, Any]], energy: bool) -> np.ndarray:
         energy,
         out,
         np.zeros(min(time.plant_rate // 2, time.ticks * n) + 1),
+        *np.zeros((2, kept)),
     )
     return out

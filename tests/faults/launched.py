@@ -66,6 +66,12 @@ def command(*arguments: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run([*HAPLOOP, *arguments], capture_output=True, text=True, timeout=PATIENCE_S)
 
 
+def on_a_disk_of(size_bytes: int, command: list[str]) -> list[str]:
+    """The command as on a disk that is full after so many bytes: every write beyond fails, in its children too."""
+    limit = "import os, resource, sys; resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[1]),) * 2)"
+    return [sys.executable, "-c", f"{limit}; os.execv(sys.argv[2], sys.argv[2:])", str(size_bytes), *command]
+
+
 def same_bits(log: Recording, truth: Recording) -> int:
     """How many ticks of the controller a log holds, every number in it being the undisturbed run's, bit for bit."""
     for topic, names in (("/plant", ("timestamp", "x", "v")), ("/controller", ("timestamp", "x", "v", "a", "total"))):
@@ -83,13 +89,12 @@ class Launched:
         took_s: wall time from the last :meth:`signal` or :meth:`kill` to the end, for people who read the output.
     """
 
-    def __init__(self, *arguments: str, out: Path | None = None, before: Callable[[], None] | None = None) -> None:
+    def __init__(self, *arguments: str, out: Path | None = None, disk_bytes: int | None = None) -> None:
         self.out = out
         command = [*HAPLOOP, *arguments, *(("--out", str(out)) if out else ())]
         self._said = tempfile.TemporaryFile()  # noqa: SIM115 (it goes with this object)
-        self._process = subprocess.Popen(
-            command, stdout=subprocess.PIPE, stderr=self._said, text=True, preexec_fn=before
-        )
+        command = on_a_disk_of(disk_bytes, command) if disk_bytes else command
+        self._process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=self._said, text=True)
         self.pid = self._process.pid
         self.nodes: dict[str, int] = {}
         self._since = time.monotonic()

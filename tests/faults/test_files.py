@@ -2,7 +2,6 @@
 
 import json
 import os
-import resource
 import shutil
 import signal
 
@@ -15,13 +14,8 @@ from haploop.launch import run_directory
 LIMIT_BYTES = 4_000_000
 
 
-def limit_files():
-    """As on a disk that is full after so many bytes: every write beyond fails, in this process and its children."""
-    resource.setrlimit(resource.RLIMIT_FSIZE, (LIMIT_BYTES, LIMIT_BYTES))
-
-
 def test_a_disk_that_fills_ends_the_run_with_an_error_that_names_the_file_and_the_log_reads(running, undisturbed):
-    run = running(before=limit_files, pace=())
+    run = running(disk_bytes=LIMIT_BYTES, pace=())
     run.end(1)
     run.leaves_nothing()
     assert f"Writing the log {run.out / 'log.mcap'} failed after" in run.stderr
@@ -33,7 +27,7 @@ def test_a_disk_that_fills_ends_the_run_with_an_error_that_names_the_file_and_th
 
 def test_a_disk_that_fills_ends_a_run_in_one_process_with_the_same_error(launched, tmp_path, undisturbed):
     out = tmp_path / "out"
-    run = launched("run", str(SCENE), "--set", "duration=600", "--in-process", out=out, before=limit_files)
+    run = launched("run", str(SCENE), "--set", "duration=600", "--in-process", out=out, disk_bytes=LIMIT_BYTES)
     run.end(1)
     assert f"Writing the log {out / 'log.mcap'} failed after" in run.stderr
     assert "Traceback" not in run.stderr

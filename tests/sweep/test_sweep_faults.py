@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import resource
 import signal
 import subprocess
 import sys
@@ -49,11 +48,6 @@ def workers_of(pid: int) -> list[int]:
 
 def cells(out: Path) -> list[int]:
     return sorted(cell for part in parts(out) for cell in pyarrow.parquet.read_table(part)["cell"].to_pylist())
-
-
-def limit_files() -> None:
-    """As on a disk that is full after so many bytes: every write beyond fails."""
-    resource.setrlimit(resource.RLIMIT_FSIZE, (LIMIT_BYTES, LIMIT_BYTES))
 
 
 def test_killed_it_leaves_no_process_and_goes_on_with_what_is_missing(
@@ -126,7 +120,7 @@ def test_a_full_disk_is_said_and_loses_nothing_that_was_written(
     """The first part is small and fits."""
     text = 'repeat = 20\n[axes]\n"wall.stiffness" = { from = 10, to = 400, step = 10 }\n'
     out, path = tmp_path / "out", sweep_file(tmp_path, text)
-    run = launched("sweep", str(path), "--workers", "1", out=out, before=limit_files)
+    run = launched("sweep", str(path), "--workers", "1", out=out, disk_bytes=LIMIT_BYTES)
     run.end(1)
     assert f"Writing {out}" in run.stderr
     assert "File too large" in run.stderr

@@ -13,7 +13,7 @@ from haploop.logger.plant_books import plant_books
 from haploop.logger.sums import RunningSums, by_tick, sum_in_order, sum_rows
 from haploop.logger.tapes import ControllerTape
 from haploop.logger.wall_books import CAUSES, held_J, ideal_and_undelayed
-from haploop.protocol.arrays import first_row, of_loop
+from haploop.protocol.arrays import first_row
 from haploop.protocol.ticks import Timebase
 
 if TYPE_CHECKING:
@@ -179,36 +179,40 @@ class Books:
             row[ticks + 1 - len(x_m) :] = sampled_flow(x_m, force[known])
         return added
 
-    def of_loop(self, loop: int) -> Books:
-        """The books of one loop out of those of many."""
-        one = copy.copy(self)
-        one._sums = self._sums.of_loop(loop)
-        one._stored_at_start_J = of_loop(self._stored_at_start_J, loop)
-        one.wall_changes_J = of_loop(self.wall_changes_J, loop)
-        return one
+    def of_loops(self, loops: np.ndarray) -> Books:
+        """The books of some loops, whose places are ``loops``, out of those of many."""
+        some = copy.copy(self)
+        some._sums = self._sums.of_loops(loops)
+        some._stored_at_start_J, some.wall_changes_J = (
+            np.broadcast_to(value, self._sums.sums.shape[1:])[loops]
+            for value in (self._stored_at_start_J, self.wall_changes_J)
+        )
+        return some
 
-    def total(self, name: str) -> float:
-        """One book as it stands, J."""
+    def total(self, name: str) -> Any:
+        """One book as it stands, J; shape (loops,) where there are many."""
         row = self._rows[name]
-        return float(self._sums.sums[row] + self._sums.errors[row])
+        total = self._sums.sums[row] + self._sums.errors[row]
+        return total if total.shape else float(total)
 
     @property
-    def stored_J(self) -> float:
+    def stored_J(self) -> Any:
         """Kinetic and spring energy now."""
         return self._stored_at_start_J + self.total("kinetic") + self.total("spring")
 
     @property
-    def moved_J(self) -> float:
+    def moved_J(self) -> Any:
         """Energy that changed its place so far."""
         return abs(self._stored_at_start_J) + self.total("moved")
 
     @property
-    def residual_J(self) -> float:
+    def residual_J(self) -> Any:
         """What the books leave unexplained, in magnitude."""
-        parts = []
-        for sign, row in self._balance:
-            parts += sign * float(self._sums.sums[row]), sign * float(self._sums.errors[row])
-        return abs(math.fsum(parts)) if all(map(math.isfinite, parts)) else math.inf
+        parts = [sign * of[row] for sign, row in self._balance for of in (self._sums.sums, self._sums.errors)]
+        columns = np.array(parts)
+        if columns.ndim == 1:
+            return _magnitude(columns.tolist())
+        return np.array([_magnitude(of_one) for of_one in columns.T.tolist()])
 
     def residuals(self, at_ticks: np.ndarray) -> np.ndarray:
         """The signed residual at each tick from the rows that ``book`` returned, shape (ticks,)."""
@@ -220,6 +224,10 @@ class Books:
         if name == "hand_work":
             return 1.0
         return -1.0 if name in self._plant.names or name.endswith(".true") else 0.0
+
+
+def _magnitude(parts: list[float]) -> float:
+    return abs(math.fsum(parts)) if all(map(math.isfinite, parts)) else math.inf
 
 
 def _displacements(plant: dict[str, np.ndarray]) -> np.ndarray:

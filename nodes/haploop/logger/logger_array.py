@@ -9,10 +9,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from haploop.logger.books import Books
-from haploop.logger.summary import finite, outcome
+from haploop.logger.summary import energy, finite, outcome
 from haploop.logger.tape_array import ControllerTapeArray, Row
 from haploop.logger.window_array import WindowArray
-from haploop.protocol.arrays import of_loop
+from haploop.protocol.arrays import by_loop, of_loops
 from haploop.protocol.ticks import Timebase
 
 # Steps of a trajectory that are hashed together.
@@ -92,26 +92,41 @@ class LoggerArray:
             ended: "done", "stopped" or "diverged".
             counted: what was counted besides, by name of the tally, shape (loops,).
         """
-        windows = self._window.windows([end.loop for end in ends])
-        for (loop, scene, x, v, reason), window in zip(ends, windows, strict=True):
+        places = np.array([end.loop for end in ends], np.intp)
+        windows = self._window.windows(places)
+        tallies = [(name.partition("."), by_loop(of_loops(of, places), len(ends))) for name, of in counted.items()]
+        for index, (end, window, energies) in enumerate(zip(ends, windows, self._energies(ends, places), strict=True)):
             ran: dict[str, Any] = {
                 "duration_s": self.tick / self._time.control_rate,
                 "ticks": self.tick,
                 "steps": self.tick * self._time.steps_per_tick,
                 "from_tick": 0,
                 "ended": ended,
-                "why": reason or "",
-                "final": {"x_m": x, "v_m_s": v},
+                "why": end.reason or "",
+                "final": {"x_m": end.x_m, "v_m_s": end.v_m_s},
                 "lost": {"commands_dropped": 0, "commands_lost": 0, "telemetry_gaps": 0},
             }
-            for name, counts in counted.items():
-                entry, _, what = name.partition(".")
-                ran.setdefault(entry, {})[what] = of_loop(counts, loop)
+            for (entry, _, what), counts in tallies:
+                ran.setdefault(entry, {})[what] = counts[index]
             if self._trajectories:
-                ran["trajectory_sha256"] = self._trajectories.digest(loop)
-            books = self._books.of_loop(loop) if self._books else None
-            accounts = [of_loop(account, loop) for account in self._accounts.values()]
-            yield finite(outcome(scene, ran, window, books, accounts, reason))
+                ran["trajectory_sha256"] = self._trajectories.digest(end.loop)
+            yield finite(outcome(end.scene, ran, window, end.reason)) | energies
+
+    def _energies(self, ends: Sequence[End], places: np.ndarray) -> list[dict[str, Any]]:
+        """The ``energy`` entry of each summary; none without books."""
+        if not self._books or not ends:
+            return [{} for _ in ends]
+        accounts = of_loops([*self._accounts.values()], places)
+        entry = energy(self._books.of_loops(places), accounts, "wall" in ends[0].scene)
+        entries = by_loop({"energy": entry}, len(places))
+        return entries if _is_finite(entry) else [finite(entry) for entry in entries]
+
+
+def _is_finite(value: Any) -> bool:
+    """Whether all numbers of all loops are finite."""
+    if isinstance(value, dict | list):
+        return all(map(_is_finite, value.values() if isinstance(value, dict) else value))
+    return isinstance(value, str) or bool(np.isfinite(value).all())
 
 
 class Trajectories:

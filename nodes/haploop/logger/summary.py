@@ -25,7 +25,7 @@ def versions() -> dict[str, str]:
 
 
 def energy(books: Books, accounts: list[dict[str, Any]], has_wall: bool) -> dict[str, Any]:
-    """The ``energy`` entry: every book as it stands at the end of the run.
+    """The ``energy`` entry: every book as it stands at the end of the run; arrays where the books are of many loops.
 
     The wall's leak is its true book less what an ideal spring would hold now (``ideal_J``, against the start), but for
     what changes of the wall in contact put into that spring (``changes_J``).
@@ -75,20 +75,13 @@ def summary(
     wall_s = ran.pop("wall_s")
     factor = ran["duration_s"] / wall_s if wall_s else 0.0
     ran |= {"versions": versions(), "wall_s": wall_s, "real_time_factor": factor}
-    return outcome(scene, ran, window, books, accounts, diverged)
+    return outcome(scene, ran, window, diverged) | {"energy": energy(books, accounts, "wall" in scene)}
 
 
-def outcome(
-    scene: dict[str, Any],
-    ran: dict[str, Any],
-    window: Window,
-    books: Books | None,
-    accounts: list[dict[str, Any]],
-    diverged: str | None,
-) -> dict[str, Any]:
-    """What came of a run: ``ran``, the verdict and what it rests on, and the energies where there are books."""
+def outcome(scene: dict[str, Any], ran: dict[str, Any], window: Window, diverged: str | None) -> dict[str, Any]:
+    """What came of a run but for its energies: ``ran``, the verdict and what it rests on."""
     verdict = window.verdict(diverged)
-    came = {
+    return {
         "title": scene["title"],
         "seed": scene["seed"],
         **ran,
@@ -97,7 +90,6 @@ def outcome(
         "extremes": {"x_min_m": window.x_min_m, "x_max_m": window.x_max_m, "force_max_N": window.force_max_N},
         "window": window.figures(),
     }
-    return came | ({"energy": energy(books, accounts, "wall" in scene)} if books else {})
 
 
 def write(summary: dict[str, Any], path: Path) -> None:

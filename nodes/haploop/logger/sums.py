@@ -78,11 +78,11 @@ class RunningSums:
         self.sums = np.concatenate([self.sums, missing])
         self.errors = np.concatenate([self.errors, missing])
 
-    def of_loop(self, loop: int) -> RunningSums:
-        """The sums of one loop out of those of many."""
-        one = RunningSums()
-        one.sums, one.errors = self.sums[:, loop], self.errors[:, loop]
-        return one
+    def of_loops(self, loops: np.ndarray) -> RunningSums:
+        """The sums of some loops, whose places are ``loops``, out of those of many."""
+        some = RunningSums(len(loops))
+        some.sums, some.errors = self.sums[:, loops], self.errors[:, loops]
+        return some
 
     def add(self, increments: np.ndarray) -> np.ndarray:
         """Add column after column.

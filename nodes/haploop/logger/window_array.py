@@ -8,6 +8,7 @@ import numpy as np
 
 from haploop.logger.tape_array import Row
 from haploop.logger.window import CONTROLLER_COLUMNS, Extremes, Window, keep_steps
+from haploop.logger.window_look import Span, look
 from haploop.protocol.ticks import Timebase
 
 # Loops whose windows are laid out together: reading one loop alone out of a wide array is slow.
@@ -56,18 +57,17 @@ class WindowArray:
     def windows(self, loops: Iterable[int]) -> Iterator[Window]:
         """The window of each of these loops, as it would be had the loop run alone."""
         wanted = np.fromiter(loops, np.intp)
-        n, steps = self._time.steps_per_tick, self._steps
+        n, rate, steps = self._time.steps_per_tick, self._time.plant_rate, self._steps
+        span = Span.of(steps, keep_steps(rate), n)
         for first in range(0, len(wanted), _TOGETHER):
             some = wanted[first : first + _TOGETHER]
+            windows = [Window(rate, n, resolution) for resolution in self._resolutions[some].tolist()]
             x = _read(self._x, steps + len(self._x), some)
             ticks = {name: _read(ring, steps // n, some) for name, ring in self._ticks.items()}
-            for index, loop in enumerate(some):
-                yield Window(self._time.plant_rate, n, float(self._resolutions[loop])).filled(
-                    x[index],
-                    {name: column[index] for name, column in ticks.items()},
-                    steps,
-                    Extremes(float(self._x_min[loop]), float(self._x_max[loop]), float(self._force_max[loop])),
-                )
+            seen = look(x, ticks, span, rate, np.array([window.swing_m for window in windows]))
+            extremes = (of[some].tolist() for of in (self._x_min, self._x_max, self._force_max))
+            for window, shown, *ends in zip(windows, seen, *extremes, strict=True):
+                yield window.judged(steps, shown, Extremes(*ends))
 
 
 def _write(ring: np.ndarray, at: int, rows: np.ndarray) -> None:

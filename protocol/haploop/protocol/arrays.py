@@ -109,3 +109,25 @@ def of_loop(value: Any, loop: int) -> Any:
     if isinstance(value, list):
         return [of_loop(entry, loop) for entry in value]
     return value[loop].item() if getattr(value, "shape", ()) else value
+
+
+def of_loops(value: Any, places: np.ndarray) -> Any:
+    """The same for some loops: of every array within dicts and lists the numbers at these places."""
+    if isinstance(value, dict):
+        return {key: of_loops(entry, places) for key, entry in value.items()}
+    if isinstance(value, list):
+        return [of_loops(entry, places) for entry in value]
+    return value[places] if getattr(value, "shape", ()) else value
+
+
+def by_loop(value: Any, loops: int) -> list[Any]:
+    """The same for each of so many loops by itself: of every array within dicts and lists its number."""
+    if isinstance(value, dict):
+        return [dict(zip(value, row, strict=True)) for row in _rows([*value.values()], loops)]
+    if isinstance(value, list):
+        return [list(row) for row in _rows(value, loops)]
+    return value.tolist() if getattr(value, "shape", ()) else [value] * loops
+
+
+def _rows(entries: list[Any], loops: int) -> list[tuple[Any, ...]]:
+    return list(zip(*(by_loop(entry, loops) for entry in entries), strict=True)) if entries else [()] * loops

@@ -1,0 +1,96 @@
+"""Why it buzzes: the cause is named right where only one exists."""
+
+from typing import Any
+
+import pytest
+from scene_makers import KINDS, scene
+
+from haploop.tools.advise.buzz import Buzz, why
+from haploop.tools.advise.effects_off import causes, freed
+from haploop.tools.advise.steady import Judge
+from haploop.tools.advise.words import buzz_sentences
+
+HAND = {"force": {"kind": "minimum-jerk", "value": -1.0, "rise_time": 0.2}, "stiffness": 20.0, "damping": 0.3}
+BASE: dict[str, Any] = {"device": {"mass": 0.05, "damping": 0.2, "position": 1e-3}, "hand": HAND}
+LATE = scene(
+    **BASE,
+    clock={"round_trip_delay": 0.005},
+    wall={"position": 0.0, "stiffness": 300.0},
+    encoder={"resolution": 1e-6},
+)
+COARSE = scene(
+    **BASE,
+    clock={"round_trip_delay": 0.001},
+    wall={"position": 0.0, "stiffness": 200.0},
+    encoder={"resolution": 5e-5},
+    dissipation=[{"kind": "unidirectional-inertia", "mass": 0.03}],
+)
+# Inertia rendered from an accelerometer at the far end of a cable.
+RINGING = scene(
+    **BASE,
+    wall={"position": 0.0, "stiffness": 200.0},
+    encoder={"resolution": 1e-6},
+    transmission={"motor_mass": 0.003, "stiffness": 4300.0, "damping": 0.05},
+    acceleration={"source": "accelerometer"},
+    accelerometer={"mount": "tip"},
+    dissipation=[{"kind": "bidirectional-inertia", "mass": 0.02}],
+)
+
+
+@pytest.fixture(scope="module")
+def late() -> Buzz:
+    with Judge(KINDS, workers=1) as judge:
+        return why(LATE, judge)
+
+
+@pytest.mark.parametrize(
+    ("read", "name"),
+    [(COARSE, "quantisation"), pytest.param(RINGING, "structural mode", marks=pytest.mark.slow)],
+    ids=lambda x: str(x)[:8],
+)
+def test_the_one_cause_of_a_buzz_is_named_and_no_other(read, name):
+    with Judge(KINDS, workers=1) as judge:
+        found = why(read, judge)
+    assert not found.steady
+    assert [w.names for w in found.alone if w.steady and not w.is_element] == [(name,)]
+    assert buzz_sentences(found)[0].startswith(f"It buzzes because of the {name}: without it the wall is steady up to")
+
+
+def test_without_delay_the_wall_of_the_late_loop_is_as_stiff_as_its_damping_allows(late):
+    [free] = [w for w in late.alone if w.names == ("delay",)]
+    assert free.limit
+    assert free.limit.stiffness_N_m == pytest.approx(0.5 / 0.0005, rel=0.05)
+    assert late.limit.stiffness_N_m == pytest.approx(0.5 / 0.0055, rel=0.05)
+
+
+def test_the_shares_of_the_leak_of_a_buzzing_wall_add_up(late):
+    assert sum(w.leak_share for w in late.alone if w.leak_share) == pytest.approx(1.0)
+    [free] = [w for w in late.alone if w.names == ("delay",)]
+    assert free.leak_share
+    assert free.leak_share > 0.8
+
+
+def test_a_wall_that_does_not_buzz_is_told_how_far_it_is_from_it():
+    soft = {**LATE, "wall": {**LATE["wall"], "stiffness": 30.0}}
+    with Judge(KINDS, workers=1) as judge:
+        found = why(soft, judge)
+    assert found.steady
+    assert buzz_sentences(found)[0].startswith("It does not buzz: its wall of 0.030 N/mm could be 3.0 times as stiff")
+
+
+def test_delay_is_named_where_it_is_the_one_cause(late):
+    assert not late.steady
+    assert [w.names for w in late.alone if w.steady] == [("delay",)]
+    assert buzz_sentences(late)[0].startswith("It buzzes because of the delay: without it")
+
+
+def test_only_what_a_scene_has_can_be_a_cause():
+    assert [cause.name for cause in causes(LATE)] == ["sampling and hold", "quantisation", "delay"]
+    assert {cause.name for cause in causes(RINGING)} >= {"structural mode", "bidirectional inertia"}
+
+
+def test_a_rigid_transmission_keeps_mass_and_damping():
+    [mode] = [cause for cause in causes(RINGING) if cause.name == "structural mode"]
+    rigid = freed(RINGING, [mode])
+    assert "transmission" not in rigid
+    assert rigid["device"]["mass"] == pytest.approx(0.053)

@@ -1,0 +1,92 @@
+"""Claims, the page they are told on, and the figures they belong to."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from haploop.tools.paper.claims import VERDICTS, Claim, Finding
+from haploop.tools.paper.command import paper
+from haploop.tools.paper.figures import figure, numbers
+from haploop.tools.paper.page import page
+from haploop.tools.paper.work import Work
+
+DOCS = Path(__file__).parents[2] / "docs"
+CLAIM = Claim("III, Fig. 4", "inertia dissipates | stores")
+
+
+def test_an_assumption_belongs_to_one_verdict_alone() -> None:
+    assert CLAIM.holds("1 J").verdict == "holds"
+    assert CLAIM.assuming("slow", "1 J").verdict == "holds under a stated assumption"
+    assert CLAIM.fails("1 J").verdict == "does not hold here"
+    for verdict, assumption in [(VERDICTS[0], "slow"), (VERDICTS[1], ""), (VERDICTS[2], "slow"), ("perhaps", "")]:
+        with pytest.raises(ValueError, match="verdict"):
+            Finding(CLAIM, verdict, "1 J", assumption)  # pyright: ignore[reportArgumentType]
+
+
+def test_what_is_kept_of_a_finding_reads_back_to_it() -> None:
+    for finding in (CLAIM.holds("1"), CLAIM.assuming("slow", "2"), CLAIM.fails("3")):
+        assert Finding.of(finding.as_dict()) == finding
+
+
+def test_the_page_tells_every_finding_by_section_and_what_was_not_made(tmp_path: Path) -> None:
+    made = {}
+    for number, place in ((5, "IV"), (3, "V.A, item 1"), (4, "II, Fig. 3")):
+        claim = Claim(place, f"of figure {number}")
+        made[number] = {
+            "title": f"title {number}", "small": False, "caption": "seen", "notes": ["#### Note"],
+            "files": [f"figure_{number}.png", f"figure_{number}.npz"], "findings": [claim.holds("a | b").as_dict()],
+        }  # fmt: skip
+    text = page(made, "paper/")
+    rows = [line for line in text.splitlines() if "of figure" in line]
+    assert [row.split("of figure ")[1][0] for row in rows] == ["4", "5", "3"]
+    assert all(row.count("|") == 6 for row in rows)  # a stroke within a cell would make a column of its own
+    assert "![title 3](paper/figure_3.png)" in text
+    assert "`figure_3.npz`" in text
+    assert "#### Note" in text
+    assert "6 (" in next(line for line in text.splitlines() if line.startswith("Not made here"))
+    assert "trial" not in text
+    assert "trial" in page({3: made[3] | {"small": True}})
+
+
+@pytest.mark.parametrize("number", numbers())
+def test_every_figure_has_a_title_and_claims_of_its_own(number: int) -> None:
+    module = figure(number)
+    assert module.TITLE
+    assert len(set(module.CLAIMS)) == len(module.CLAIMS) > 0
+    assert all(claim.place and claim.quote for claim in module.CLAIMS)
+
+
+def test_no_claim_is_made_twice() -> None:
+    claims = [claim for number in numbers() for claim in figure(number).CLAIMS]
+    assert len(set(claims)) == len(claims)
+
+
+def test_a_figure_that_is_not_there_is_refused_with_those_that_are(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit) as left:
+        paper([1], tmp_path / "out", small=True, workers=1)
+    assert left.value.code == 2
+    assert "no figure 1" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
+def test_data_of_a_figure_reads_back(tmp_path: Path) -> None:
+    work = Work(tmp_path, 3)
+    work.data("some", {"x_m": [1.0, 2.0]})
+    assert np.load(tmp_path / "some.npz")["x_m"].tolist() == [1.0, 2.0]
+
+
+def test_the_page_in_the_documentation_tells_every_claim_of_its_figures_and_shows_their_pictures() -> None:
+    text = (DOCS / "paper.md").read_text(encoding="utf-8")
+    told = [int(number) for number in re.findall(r'id="figure-(\d+)"', text)]
+    assert {3, 4, 5, 6} <= set(told)
+    for number in told:
+        missing = [claim.quote for claim in figure(number).CLAIMS if claim.quote not in text]
+        assert missing == []
+    pictures = re.findall(r"!\[.*?\]\((.*?)\)", text)
+    assert len(pictures) >= len(told)
+    assert all((DOCS / picture).is_file() for picture in pictures)
+    assert "--small" not in text

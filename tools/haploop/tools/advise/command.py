@@ -1,0 +1,132 @@
+"""``haploop advise``: which wall a device can render safely, and why it buzzes beyond."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import sys
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from haploop.tools.ending import FAILED, WRONG_USE, leave, plain_errors, print_json
+from haploop.tools.scenes import kinds_with, print_notes
+
+if TYPE_CHECKING:
+    from haploop.tools.advise.advice import Advice
+
+ADVICE, SCENE, FIGURE = "advice.json", "advice.toml", "figure.png"
+_STAGES = 9
+
+
+@dataclass(frozen=True)
+class Request:
+    """What is asked.
+
+    Attributes:
+        device: name of a preset, or a scene file.
+        hand, delay, estimator: in place of the scene's own; None leaves them.
+        overrides: ``KEY=VALUE``.
+        plugins: files with elements.
+        workers: processes; as many as there are cores when None.
+        out: directory to write to; a new one below runs/ when None.
+    """
+
+    device: str
+    hand: str | None
+    delay: str | None
+    estimator: str | None
+    overrides: list[str]
+    plugins: list[Path]
+    workers: int | None
+    out: Path | None
+
+
+def advise(request: Request, as_json: bool) -> None:
+    """Search, write what was found into the directory, print it."""
+    from haploop.launch.elements import elements_of, try_out
+    from haploop.launch.output import make_output
+    from haploop.tools.advise.advice import advice
+    from haploop.tools.advise.steady import Judge
+    from haploop.tools.advise.subject import NotFound, subject
+
+    if request.workers is not None and request.workers < 1:
+        leave(f"--workers must be at least 1, but {request.workers} was given.", WRONG_USE)
+    with plain_errors():
+        kinds = kinds_with(request.plugins)
+        try:
+            asked = subject(request.device, request.hand, request.delay, request.estimator, request.overrides, kinds)
+        except NotFound as error:
+            leave(str(error), WRONG_USE)
+        try_out(elements_of(asked.scene), kinds)
+        print_notes(asked.scene)
+        out = make_output(request.out, Path(f"advice-{asked.name}"))
+        try:
+            with _progress() as (stage, told), Judge(kinds, request.plugins, request.workers, told) as judge:
+                found = advice(asked, kinds, judge, stage)
+        except KeyboardInterrupt:
+            leave(f"Interrupted; nothing was written to {out}.", FAILED)
+    data = _written(found, out)
+    if as_json:
+        print_json(data)
+    else:
+        from haploop.tools.advise.screen import report
+        from haploop.tools.report import console
+
+        console().print(report(found))
+    for path in data["files"].values():
+        print(path, file=sys.stderr)
+
+
+def _written(found: Advice, out: Path) -> dict:
+    """Write scene, figure and data; returns the data with the files in it."""
+    from haploop.launch.resolved import to_toml
+    from haploop.logger.summary import finite
+    from haploop.tools.advise.advice import as_data
+    from haploop.tools.advise.chart import draw
+    from haploop.tools.figure_data import FigureError
+
+    files = {}
+    data = as_data(found)
+    try:
+        if found.scene:
+            (out / SCENE).write_text(to_toml(found.scene), encoding="utf-8")
+            files["scene"] = str(out / SCENE)
+        with contextlib.suppress(FigureError):
+            files["figure"] = str(draw(found, out / FIGURE))
+        files["data"] = str(out / ADVICE)
+        data["files"] = files
+        (out / ADVICE).write_text(json.dumps(finite(data), indent=2) + "\n", encoding="utf-8")
+    except OSError as error:
+        leave(f"{out} cannot be written to: {error.strerror}.", FAILED)
+    return data
+
+
+@contextlib.contextmanager
+def _progress() -> Iterator[tuple[Callable[[str], None], Callable[[int], None]]]:
+    """A bar of the stages on a terminal, with the runs so far; a line a stage elsewhere."""
+    from rich import progress
+
+    from haploop.tools.report import console
+
+    screen = console(stderr=True)
+    columns = (
+        "{task.description}",
+        progress.BarColumn(bar_width=24),
+        "{task.fields[runs]} runs",
+        progress.TimeElapsedColumn(),
+    )
+    shown = screen.is_terminal
+    with progress.Progress(*columns, console=screen, disable=not shown, transient=True) as bars:
+        task = bars.add_task("starting", total=_STAGES, runs=0)
+
+        def stage(name: str) -> None:
+            if not shown:
+                print(f"{name} ...", file=sys.stderr)
+            bars.update(task, description=name, advance=1)
+
+        def told(runs: int) -> None:
+            bars.update(task, runs=runs)
+
+        yield stage, told

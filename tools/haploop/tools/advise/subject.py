@@ -1,0 +1,152 @@
+"""What is asked about: a device that comes with haploop, or a scene, with its hand, delay and estimator."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from haploop.launch.layers import Layers, read_layers
+from haploop.launch.mistakes import nearest
+from haploop.launch.scene_file import resolved
+from haploop.tools.cost_grid import scenes_folder
+
+if TYPE_CHECKING:
+    from haploop.controller.dissipation import Element
+
+# The only measured hand there is, along the axis of Choi et al. 2022.
+DEFAULT_HAND = "fu_cavusoglu_y"
+# What each estimator needs beside its name. The windows are short enough for a contact at 1 kHz.
+ESTIMATORS: dict[str, dict[str, dict[str, Any]]] = {
+    "difference": {"velocity": {"estimator": "difference"}, "acceleration": {"source": "encoder"}},
+    "window": {"velocity": {"estimator": "window", "ticks": 5}},
+    "foaw": {"velocity": {"estimator": "foaw", "ticks": 15}},
+    "kalman": {"velocity": {"estimator": "kalman", "jerk_density": 100.0}, "acceleration": {"source": "kalman"}},
+    "accelerometer": {"acceleration": {"source": "accelerometer"}},
+}
+
+
+class NotFound(ValueError):
+    """No such device, hand or estimator; the message names the nearest."""
+
+
+@dataclass(frozen=True)
+class Subject:
+    """A scene to advise on.
+
+    Attributes:
+        name: of the preset or the scene file.
+        scene: resolved; events that change it are taken as done from the start.
+        has_task: whether it came with a task of its own; a preset has none.
+        notes: what was assumed, one sentence each.
+    """
+
+    name: str
+    scene: dict[str, Any]
+    has_task: bool
+    notes: tuple[str, ...]
+
+
+def subject(
+    device: str,
+    hand: str | None,
+    delay: str | None,
+    estimator: str | None,
+    overrides: Sequence[str],
+    kinds: Mapping[str, type[Element]],
+) -> Subject:
+    """The scene that the arguments of the command name.
+
+    Raises:
+        NotFound: a name that is none.
+        SceneError: the scene cannot be run.
+    """
+    path, is_preset = _device(device)
+    layers, notes = read_layers(path), []
+    if hand is None and is_preset and "hand" not in layers.data:
+        hand = DEFAULT_HAND
+        notes.append(f"The hand is {hand}, a pen-like grip (Fu and Cavusoglu 2012); --hand names another.")
+    if hand is not None:
+        _lay_hand(layers, hand)
+    if estimator is not None:
+        _lay_estimator(layers, estimator)
+    if is_preset:
+        task = {"title": path.stem, "duration": 1.0, "wall": {"position": 0.0, "stiffness": 1000.0}}
+        layers.lay(task, str(path))
+    delays = [] if delay is None else [f"clock.round_trip_delay={delay}"]
+    scene = resolved(layers, [*delays, *overrides], kinds)
+    if scene.get("event"):
+        scene = settled(scene)
+        notes.append("What the scene's events change is taken as changed from the start.")
+    return Subject(path.stem, scene, not is_preset, tuple(notes))
+
+
+def settled(scene: dict[str, Any]) -> dict[str, Any]:
+    """The scene with its swaps and sets done from the start, and without events."""
+    from haploop.launch.layers import Layers
+    from haploop.launch.overrides import lay_overrides
+    from haploop.launch.resolved import inline
+
+    layers = Layers(Path(scene["title"]), {key: value for key, value in scene.items() if key != "event"})
+    elements = list(scene.get("dissipation", []))
+    for event in scene["event"]:
+        if "swap" in event:
+            elements[event["element"] : event["element"] + 1] = [event["swap"]]
+            layers.data["dissipation"] = elements
+        lay_overrides(layers, [f"{key}={inline(value)}" for key, value in event.get("set", {}).items()])
+    left = [table for table in elements if table["kind"] != "none"]
+    return {key: value for key, value in layers.data.items() if key != "dissipation"} | (
+        {"dissipation": left} if left else {}
+    )
+
+
+def presets(folder: str) -> dict[str, Path]:
+    """The files of launch/devices, hands or scenes, by name."""
+    return {path.stem: path for path in sorted(scenes_folder().with_name(folder).glob("*.toml"))}
+
+
+def _device(name: str) -> tuple[Path, bool]:
+    """The file that a name means, and whether it is a device without a task."""
+    path = Path(name)
+    if path.suffix == ".toml" or path.exists():
+        devices = {file.resolve() for file in presets("devices").values()}
+        return path, path.resolve() in devices
+    devices, scenes = presets("devices"), presets("scenes")
+    if name in devices or name in scenes:
+        return (devices | scenes)[name], name in devices
+    raise NotFound(_unknown("DEVICE", name, list(devices | scenes), "the path of a scene file"))
+
+
+def _lay_hand(layers: Layers, name: str) -> None:
+    """Another hand in place of the one there is; the force of its muscles and its place stay."""
+    before = layers.data.pop("hand", None)
+    kept = {key: before[key] for key in ("force", "rest") if key in before} if isinstance(before, dict) else {}
+    if name == "none":
+        if kept:
+            layers.lay({"hand": kept}, "--hand")
+        return
+    path, hands = Path(name), presets("hands")
+    if path.suffix != ".toml":
+        if name not in hands:
+            raise NotFound(_unknown("--hand", name, [*hands, "none"], "the path of a file with a [hand]"))
+        path = hands[name]
+    tables = read_layers(path).data
+    if not isinstance(tables.get("hand"), dict):
+        raise NotFound(f"--hand {name} holds no [hand] table.")
+    layers.lay({"hand": {**tables["hand"], **kept}}, str(path))
+
+
+def _lay_estimator(layers: Layers, name: str) -> None:
+    if name not in ESTIMATORS:
+        raise NotFound(_unknown("--estimator", name, list(ESTIMATORS), ""))
+    for table in ("velocity", "acceleration"):
+        if name != "accelerometer" or table == "acceleration":
+            layers.data.pop(table, None)
+    layers.lay(ESTIMATORS[name], "--estimator")
+
+
+def _unknown(what: str, name: str, allowed: list[str], other: str) -> str:
+    meant = nearest(name, allowed)
+    hint = f"; did you mean {meant}?" if meant else "."
+    return f"{what} {name!r} is unknown{hint} Allowed: {', '.join(allowed)}{f', or {other}' if other else ''}."

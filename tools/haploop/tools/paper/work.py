@@ -1,0 +1,88 @@
+"""Where a figure leaves what it made: picture, data, scenes and findings."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from haploop.launch.resolved import to_toml
+from haploop.tools.figure_file import write_figure
+from haploop.tools.paper.claims import Finding
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from haploop.controller.dissipation import Element
+
+# Names a stage of so many parts; what it returns is called after each of them.
+Stage = Callable[[str, int], Callable[[], None]]
+
+
+def silent(_name: str, _count: int) -> Callable[[], None]:
+    """A stage that shows nothing."""
+    return lambda: None
+
+
+class Work:
+    """One figure in the making.
+
+    Args:
+        out: directory of all figures.
+        number: of the figure.
+        small: whether a version of seconds is wanted, with fewer runs; it need not come to the same verdicts.
+        workers: processes for many runs; as many as there are cores when None.
+        stage: told what goes on.
+
+    Attributes:
+        kinds: elements at hand.
+        caption: what is to be seen, in a sentence or two.
+        notes: whole sections in Markdown that go below the figure on the page.
+    """
+
+    def __init__(
+        self, out: Path, number: int, *, small: bool = False, workers: int | None = None, stage: Stage = silent
+    ) -> None:
+        from haploop.controller.dissipation import registry
+
+        self.out, self.number, self.small, self.workers, self.stage = out, number, small, workers, stage
+        self.kinds: dict[str, type[Element]] = registry()
+        self.caption = ""
+        self.notes: list[str] = []
+        self._files: list[str] = []
+
+    def path(self, name: str) -> Path:
+        """A file of this figure, noted as one that belongs to it."""
+        if name not in self._files:
+            self._files.append(name)
+        return self.out / name
+
+    def figure(self, figure: Figure, name: str) -> None:
+        """Write a picture, ``name`` without its suffix."""
+        write_figure(figure, self.path(f"{name}.png"))
+
+    def data(self, name: str, columns: Mapping[str, Any]) -> None:
+        """Write arrays by name; the unit stands at the end of each name."""
+        arrays: dict[str, Any] = {key: np.asarray(value) for key, value in columns.items()}
+        np.savez_compressed(self.path(f"{name}.npz"), **arrays)
+
+    def scene(self, name: str, scene: dict[str, Any]) -> None:
+        """Write a resolved scene that runs by itself."""
+        self.path(f"{name}.toml").write_text(to_toml(scene), encoding="utf-8")
+
+    def keep(self, title: str, findings: Sequence[Finding]) -> None:
+        """Write what the page needs: figure_N.json."""
+        kept = {
+            "number": self.number,
+            "title": title,
+            "caption": self.caption,
+            "small": self.small,
+            "files": self._files,
+            "findings": [finding.as_dict() for finding in findings],
+            "notes": self.notes,
+        }
+        text = json.dumps(kept, indent=2, ensure_ascii=False) + "\n"
+        (self.out / f"figure_{self.number}.json").write_text(text, encoding="utf-8")
