@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import json
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Callable, Coroutine
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import asynccontextmanager
 from typing import Any
 
@@ -18,6 +19,12 @@ from haploop.view.serve import listen, serve
 
 # A test gives up after so long. It says nothing about how long anything may take.
 PATIENCE_S = 40.0
+
+
+def to_its_end(work: Coroutine[Any, Any, Any]) -> Any:
+    """What a coroutine returns, run on a thread of its own: a browser of other tests may keep a loop on this one."""
+    with ThreadPoolExecutor(1) as thread:
+        return thread.submit(asyncio.run, work).result()
 
 
 def decode(data: bytes) -> dict[str, Any]:

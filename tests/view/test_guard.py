@@ -1,12 +1,11 @@
 """Only this machine's browser may look, only with the printed link may it steer; a page from elsewhere can neither."""
 
-import asyncio
 import socket
 from functools import wraps
 
 import aiohttp
 import pytest
-from view.browsing import site
+from view.browsing import site, to_its_end
 
 from haploop.view import assets
 from haploop.view.guard import Guard
@@ -33,7 +32,7 @@ def scenario(play):
 
     @wraps(play)
     def test(*args, **kwargs):
-        asyncio.run(play(*args, **kwargs))
+        to_its_end(play(*args, **kwargs))
 
     return test
 

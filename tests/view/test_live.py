@@ -8,7 +8,7 @@ import signal
 import numpy as np
 import pytest
 from live_run import going, undisturbed
-from view.browsing import site
+from view.browsing import site, to_its_end
 
 from haploop.launch.failure import RunFailed
 from haploop.logger import read
@@ -24,7 +24,7 @@ def follow(play, tmp_path, *overrides, options=None, **how):
             return await play(run, await here.tab(), here)
 
     with going(tmp_path, *(overrides or TOUCHING), **how) as run:
-        return asyncio.run(scenario(run))
+        return to_its_end(scenario(run))
 
 
 async def stands(run, tick):
@@ -290,7 +290,7 @@ def test_the_next_run_is_taken_up_and_the_first_stays_on_show_until_then(tmp_pat
             run.ask("resume")
             run.result()
 
-    asyncio.run(scenario())
+    to_its_end(scenario())
 
 
 def test_a_failed_run_says_why(tmp_path):
@@ -331,7 +331,7 @@ def test_pages_that_come_go_and_say_nothing_leave_the_bits_of_the_run_alone(tmp_
             async with site() as here:
                 return await play(run, await here.tab(), here)
 
-        assert asyncio.run(scenario()) == 0
+        assert to_its_end(scenario()) == 0
         summary = run.result()
         assert summary["trajectory_sha256"] == undisturbed(run.prepared)["trajectory_sha256"]
         assert summary["lost"]["telemetry_gaps"] == 0

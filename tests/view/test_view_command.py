@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import os
 import re
 import signal
@@ -16,7 +15,7 @@ import aiohttp
 import pytest
 from faults.launched import SCENE, Launched, alive, command, processes, wait_for
 from live_run import going, undisturbed
-from view.browsing import Tab
+from view.browsing import Tab, to_its_end
 
 LINK = re.compile(r"(http://127\.0\.0\.1:\d+)/#token=(\S+)")
 
@@ -50,7 +49,7 @@ def browse(viewer: Launched, play: Callable[[Tab], Any]) -> Any:
             ws = await session.ws_connect(f"{address}/stream", headers={"Origin": address}, max_msg_size=0)
             return await play(Tab(ws, token))
 
-    return asyncio.run(scenario())
+    return to_its_end(scenario())
 
 
 def test_view_waits_for_a_run_and_ends_quietly_with_ctrl_c(launched):

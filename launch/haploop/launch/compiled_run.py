@@ -32,8 +32,9 @@ def results_of_compiled(
 
     **Tolerance.** Every operation is the same in float64, but for products and sums that the compiler makes in one
     rounding. Positions stay within 1e-11 of the largest excursion of the scene alone while no rounding of the encoder,
-    contact or gate falls to the other side; where one does, the loop is another of the same kind from there on, so in
-    long limit cycles it is amplitude and energies that agree, not instants. The books balance as well as alone.
+    contact, gate or window of an estimator falls to the other side; where one does, the loop is another of the same
+    kind from there on, so in long limit cycles it is amplitude and energies that agree, not instants. The books
+    balance as well as alone.
 
     Args:
         scenes, kinds, energy, fewest: as there. A scene whose loop cannot be compiled goes there: bodies in a row,
