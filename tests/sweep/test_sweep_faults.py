@@ -6,12 +6,12 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import pyarrow.parquet
 import pytest
+from faults.conftest import launched as launched
 from faults.launched import Launched, alive, processes, wait_for
 from sweep.sweep_files import PRESS, sweep_file, swept
 
@@ -22,20 +22,6 @@ SLOW_PRESS = PRESS.replace("duration = 0.05", "duration = 0.5") + '[clock]\ninte
 SLOW = '[axes]\n"wall.stiffness" = { from = 6, to = 480, step = 6 }\n'
 CELLS = 80
 LIMIT_BYTES = 30_000
-
-
-@pytest.fixture
-def launched() -> Iterator[Callable[..., Launched]]:
-    """Start haploop; whatever the test leaves running is ended."""
-    started: list[Launched] = []
-
-    def start(*arguments: Any, **options: Any) -> Launched:
-        started.append(Launched(*arguments, **options))
-        return started[-1]
-
-    yield start
-    for process in started:
-        process.clear_away()
 
 
 def parts(out: Path) -> list[Path]:

@@ -7,31 +7,18 @@ import re
 import signal
 import socket
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import aiohttp
 import pytest
+from faults.conftest import launched as launched
 from faults.launched import SCENE, Launched, alive, command, processes, wait_for
 from live_run import going, undisturbed
 from view.browsing import Tab, to_its_end
 
 LINK = re.compile(r"(http://127\.0\.0\.1:\d+)/#token=(\S+)")
-
-
-@pytest.fixture
-def launched() -> Iterator[Callable[..., Launched]]:
-    """Start haploop; whatever the test leaves running is ended."""
-    started: list[Launched] = []
-
-    def start(*arguments: Any, **options: Any) -> Launched:
-        started.append(Launched(*arguments, **options))
-        return started[-1]
-
-    yield start
-    for process in started:
-        process.clear_away()
 
 
 def link(viewer: Launched) -> tuple[str, str]:
