@@ -192,7 +192,9 @@ def test_commands_of_the_page_reach_the_run_and_what_took_effect_is_told_with_it
 
         tick = state["tick"]
         log = await has_logged(run, min(tick, 600))
-        picture = await whole(tab, run, 507, span_s=0.02, end_s=0.507)
+        await whole(tab, run, 507, span_s=0.02, end_s=0.507)
+        await tab.until("all 20 ticks", lambda: len(tab.picture["tables"]["force"]["values"]["total"]) == 20)
+        picture = tab.picture
         force = picture["tables"]["force"]["values"]
         assert np.isnan(force["element.0.damping"][:13]).all()
         assert np.isnan(force["element.0.unidirectional-inertia"][13:]).all()
