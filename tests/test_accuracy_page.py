@@ -185,6 +185,7 @@ def test_the_page_shows_every_scene_point_price_and_what_it_was_measured_on(cost
     assert re.findall(r"\]\((\w+\.png)\)", text) == ["accuracy.png", "accuracy_prices.png"]
 
 
+@pytest.mark.slow
 def test_page_and_figures_are_written_side_by_side(cost: Cost, tmp_path: Path) -> None:
     save(cost, tmp_path)
     target = write(tmp_path, tmp_path / "docs")

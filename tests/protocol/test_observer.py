@@ -112,6 +112,7 @@ def test_status_shows_an_observer_with_its_tick_its_lag_and_what_it_skipped(tmp_
         assert subject.result()["ended"] == "stopped"
 
 
+@pytest.mark.slow
 def test_one_the_clock_has_dropped_joins_again_by_itself_and_hears_each_event_once(tmp_path):
     with going(tmp_path, "duration=600", pauses=(300,)) as subject:
         subject.stands_at(300)
