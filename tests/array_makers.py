@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any
+import math
+from typing import Annotated, Any
 
 import numpy as np
 from scene_makers import KINDS, scene
 
-from haploop.controller.dissipation import Element
+from haploop.controller.dissipation import Element, Motion, Quantity
 from haploop.launch.array_loop import LoopArray
 from haploop.launch.in_process import run_in_process
 from haploop.logger.summary import OF_THE_MACHINE
@@ -51,3 +52,13 @@ def diverging() -> list[dict[str, Any]]:
         )
         for damping in np.linspace(1.0, 12.0, 16).tolist()
     ]
+
+
+class Stiffening(Element):
+    """Written for one loop alone: asks for the number itself."""
+
+    kind = "stiffening"
+    force_N: Annotated[float, Quantity("N", at_least=0)] = 0.05
+
+    def force(self, motion: Motion) -> float:
+        return -math.tanh(motion.v / 0.01) * self.force_N if motion.v > 0 else 0.0

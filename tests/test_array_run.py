@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 import numpy as np
 import pytest
-from array_makers import PUSH, alone, diverging, pressed, together
+from array_makers import PUSH, Stiffening, alone, diverging, pressed, together
 from physics.varied_scenes import drawn_base, varied
 from scene_makers import KINDS, WALL
 
@@ -98,16 +98,6 @@ def test_loops_that_have_ended_are_dropped_from_the_arrays(monkeypatch: pytest.M
     together(scenes)
     assert sizes[0] == len(scenes)
     assert sizes[-1] <= len(scenes) / 2
-
-
-class Stiffening(Element):
-    """Written for one loop alone."""
-
-    kind = "stiffening"
-    force_N: Annotated[float, Quantity("N", at_least=0)] = 0.05
-
-    def force(self, motion: Motion) -> float:
-        return -math.tanh(motion.v / 0.01) * self.force_N if motion.v > 0 else 0.0
 
 
 class Counting(Element):

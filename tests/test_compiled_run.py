@@ -9,7 +9,7 @@ from typing import Annotated, Any
 
 import numpy as np
 import pytest
-from array_makers import PUSH, alone, pressed
+from array_makers import PUSH, Stiffening, alone, pressed
 from physics.varied_scenes import drawn_base, varied
 from scene_makers import KINDS
 
@@ -179,16 +179,6 @@ class Gripping(Element):
         return where(self.sums[0] > 1.0, -self.force_N * motion.v, 0.0)
 
 
-class Asking(Element):
-    """Written for one loop alone: asks for the number itself."""
-
-    kind = "asking"
-    force_N: Annotated[float, Quantity("N", at_least=0)] = 0.05
-
-    def force(self, motion: Motion) -> float:
-        return -math.tanh(motion.v / 0.01) * self.force_N if motion.v > 0 else 0.0
-
-
 class Counting(Element):
     """Acts at every third tick."""
 
@@ -203,7 +193,7 @@ class Counting(Element):
         return motion.v * (-self.force_N if self.tick % 3 == 0 else 0.0)
 
 
-@pytest.mark.parametrize("element", [Gripping, Asking, Counting])
+@pytest.mark.parametrize("element", [Gripping, Stiffening, Counting])
 def test_an_element_of_any_kind_comes_to_what_it_comes_to_alone(element: type[Element]) -> None:
     """One that cannot be compiled, or whose code goes another way at every tick, is run by arrays or alone."""
     kinds, count = KINDS | {element.kind: element}, compiling()[0]
