@@ -50,8 +50,10 @@ def wait_for(what: str, look: Callable[[], Any]) -> Any:
 
 
 def processes() -> list[Row]:
-    """(pid, parent, state, command line) of every process there is."""
-    listing = subprocess.run(["ps", "-A", "-o", "pid=,ppid=,stat=,args="], capture_output=True, text=True, check=True)
+    """(pid, parent, state, command line) of every process there is; ``-ww`` cuts no line at a terminal's width."""
+    listing = subprocess.run(
+        ["ps", "-A", "-ww", "-o", "pid=,ppid=,stat=,args="], capture_output=True, text=True, check=True
+    )
     rows = (line.split(maxsplit=3) for line in listing.stdout.splitlines())
     return [(int(row[0]), int(row[1]), row[2], row[3]) for row in rows if len(row) == 4]
 
