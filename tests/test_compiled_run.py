@@ -13,10 +13,12 @@ from array_makers import PUSH, Stiffening, alone, pressed
 from physics.varied_scenes import drawn_base, varied
 from scene_makers import KINDS
 
+from haploop.controller.controller_array import Row
 from haploop.controller.dissipation import Element, Motion, Quantity, where
 from haploop.launch.array_loop import LoopArray
 from haploop.launch.array_run import run_array
 from haploop.launch.compiled_run import compiling, results_of_compiled
+from haploop.protocol.ticks import Timebase
 
 jax = pytest.importorskip("jax")
 
@@ -143,26 +145,76 @@ def test_scenes_too_few_to_be_worth_it_are_run_in_arrays_to_the_same_bits() -> N
     assert compiling()[0] == count
 
 
-def test_loops_that_diverge_stand_still_where_they_did() -> None:
-    """Each at its time, within blocks and across them; those that stay disturb none."""
+@pytest.mark.parametrize(
+    ("damping", "duration", "diverged_beyond"),
+    [
+        pytest.param((1.0, 12.0), 0.6, 0.05, marks=pytest.mark.slow, id="soon"),
+        pytest.param((6.3, 6.58), 2.0, 0.9, id="late"),
+    ],
+)
+def test_loops_that_diverge_stand_still_where_they_did(
+    damping: tuple[float, float], duration: float, diverged_beyond: float
+) -> None:
+    """Each at its time, within blocks and across them, its last half second as it was; those that stay disturb none."""
     scenes = [
         pressed(
-            duration=0.6,
-            diverged_beyond=0.05,
+            duration=duration,
+            diverged_beyond=diverged_beyond,
             clock={"round_trip_delay": 0.004},
-            dissipation=[{"kind": "damping", "damping": damping, "acts": "always"}],
+            dissipation=[{"kind": "damping", "damping": each, "acts": "always"}],
         )
-        for damping in np.linspace(1.0, 12.0, 16).tolist()
+        for each in np.linspace(*damping, 16).tolist()
     ]
     expected = run_array(scenes, KINDS)
-    assert len({result["ticks"] for result in expected}) > 5
+    ends = {result["ticks"] for result in expected}
+    assert len(ends) > 5
+    if duration > 1.0:  # the first has run for longer than what is kept of it
+        assert min(ends) > 700
     for result, exact in zip(compiled(scenes), expected, strict=True):
         assert {key: result[key] for key in ("ticks", "steps", "ended", "verdict")} == {
             key: exact[key] for key in ("ticks", "steps", "ended", "verdict")
         }
         assert agree(result["final"], exact["final"], 1e-6)
+        assert agree(result["window"], exact["window"], 1e-6)
         assert result["energy"]["residual_J"] < 1e-12 * result["energy"]["moved_J"]
         assert result["energy"]["moved_J"] == pytest.approx(exact["energy"]["moved_J"], rel=1e-6)
+
+
+def test_windows_read_by_a_program_show_what_they_show_by_themselves() -> None:
+    """Of signals that drift, rest and swing, in and out of contact, whatever the place in the rings where they end."""
+    from haploop.launch.compiled_block import Rings
+    from haploop.launch.compiled_programs import in_double
+    from haploop.launch.compiled_window import CompiledWindow
+
+    time = Timebase.of({"control_rate": 200, "plant_rate": 800, "round_trip_delay": 0.0}, 10.0)
+    rng = np.random.default_rng(5)
+    for ticks in (101, 150, 317):
+        window = CompiledWindow(time, np.array([0.0, 1e-5, 1e-4, 1e-3] * 4), 16, spare_ticks=40)
+        t = np.arange(ticks * 4 + 1)[:, None] / 800
+        size, rate = 10.0 ** rng.uniform(-6, -2, 16), rng.uniform(-3.0, 3.0, 16)
+        x = size * np.exp(rate * t) * np.sin(rng.uniform(5.0, 200.0, 16) * t) + rng.normal(size=16) * 1e-3 * t
+        x[:, 3] = 0.0
+        for first in range(0, ticks, 10):
+            last = min(first + 10, ticks)
+            columns = {
+                "x": x[::4],
+                "total": 100.0 * x[::4],
+                "in_contact": 1.0 * (x[::4] < 0.0),
+                "wall_position": 0 * x[::4],
+            }
+            rows = [Row({name: column[k] for name, column in columns.items()}, {}, []) for k in range(first, last)]
+            window.add(x[first * 4 : last * 4 + 1], x[first * 4 : last * 4 + 1], rows)
+        by_itself = list(window.shown(range(16)))
+        with in_double():
+            window.take(Rings(window._x.reshape(-1, 4, 16), dict(window._ticks)), writable=False)
+            by_program = list(window.shown(range(16)))
+        for one, other in zip(by_itself, by_program, strict=True):
+            assert (one.seen.touched, one.seen.crossings) == (other.seen.touched, other.seen.crossings)
+            assert agree(one.seen.figures, other.seen.figures, 1e-9)
+            assert one.seen.growth == pytest.approx(other.seen.growth, rel=1e-9)
+            assert (one.extremes, one.swing_m) == (other.extremes, other.swing_m)
+        assert any(one.seen.crossings > 3 for one in by_itself)
+        assert not by_program[3].seen.touched
 
 
 class Gripping(Element):

@@ -26,7 +26,7 @@ def judged(x_of_t, seconds: float = 1.0, resolution: float = 0.0, pieces: int = 
         depth = np.maximum(0.0, WALL - at_ticks)
         rows = {"x": at_ticks, "total": 100.0 * depth, "in_contact": (depth > 0).astype(float)}
         window.add(x, np.repeat(100.0 * depth, N), rows | {"wall_position": np.full(len(at_ticks), WALL)})
-    return window.verdict(diverged).word, window.figures(), window
+    return window.shown().verdict(diverged).word, window.shown().seen.figures, window
 
 
 def test_a_device_at_rest_in_the_wall_is_steady_and_shows_the_stiffness_of_the_wall():
@@ -103,7 +103,7 @@ def test_a_position_on_the_face_but_for_rounding_counts_for_no_stiffness():
     x = np.full(6001, 1e-5 * -6000)
     rows = {"x": x[:-1:N], "total": np.full(600, 0.3), "in_contact": np.ones(600), "wall_position": np.full(600, WALL)}
     window.add(x, np.zeros(6000), rows)
-    assert window.figures()["displayed_stiffness_N_m"] is None
+    assert window.shown().seen.figures["displayed_stiffness_N_m"] is None
 
 
 def test_crossings_are_counted_from_beyond_one_side_to_beyond_the_other():

@@ -24,9 +24,9 @@ from haploop.tools.machine import machine
 SCENE = Path(__file__).parents[2] / "launch" / "scenes" / "fig6b.toml"
 
 
-def paper_scenes(count: int, duration: float) -> list[dict[str, Any]]:
+def paper_scenes(count: int, duration_s: float | None = None) -> list[dict[str, Any]]:
     """Figure 6(b) over a square of stiffness and damping, from steady contacts to wide limit cycles."""
-    base = load(SCENE, [f"duration={duration}"])
+    base = load(SCENE, [f"duration={duration_s}"] if duration_s else [])
     side = round(count**0.5)
     return [
         {
@@ -50,12 +50,12 @@ def main() -> None:
     """Measure in turn, repeat, print medians and ratios."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--scenes", type=int, default=10_000)
-    parser.add_argument("--duration", type=float, default=1.0)
+    parser.add_argument("--duration", type=float, help="s; that of the scene when not given")
     parser.add_argument("--repeats", type=int, default=3)
     options = parser.parse_args()
     scenes, kinds = paper_scenes(options.scenes, options.duration), registry()
     few = scenes[:: max(1, len(scenes) // 20)]
-    ticks_of = round(options.duration * scenes[0]["clock"]["control_rate"])
+    ticks_of = round(scenes[0]["duration"] * scenes[0]["clock"]["control_rate"])
     rows: dict[str, tuple[Callable[[], Any], int]] = {
         "one process, with the books": (lambda: [run_in_process(scene, kinds) for scene in few], len(few)),
         "arrays, with the books": (lambda: run_array(scenes, kinds), len(scenes)),
@@ -80,7 +80,7 @@ def main() -> None:
     for _ in range(options.repeats):
         for name, (run, count) in rows.items():
             seen[name].append(measured_us(run, count * ticks_of))
-    table = Table(title=f"{len(scenes)} scenes, medians of {options.repeats}; {machine()}", title_justify="left")
+    table = Table(title=f"{len(scenes)} scenes of {scenes[0]['duration']:g} s, medians of {options.repeats}; {machine()}", title_justify="left")
     for heading in ("what", "µs per tick", "least - most", "in one process / this", "this / kernel"):
         table.add_column(heading)
     medians = {name: statistics.median(values) for name, values in seen.items()}

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import gc
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -152,9 +154,10 @@ class LoopArray:
         counted = dict.fromkeys(self._line.tallies, getattr(self._line, "saturated", 0))
         if self._sensor:
             counted |= dict.fromkeys(self._sensor.tallies, getattr(self._sensor, "clipped", 0))
-        outcomes = self._logger.outcomes(list(ends.values()), ended, counted)
-        for index, outcome in zip(ends, outcomes, strict=True):
-            self.results[index] = outcome
+        with _collector_at_rest():
+            outcomes = self._logger.outcomes(list(ends.values()), ended, counted)
+            for index, outcome in zip(ends, outcomes, strict=True):
+                self.results[index] = outcome
 
     def _drop_ended(self) -> None:
         on = ~self._ended
@@ -162,6 +165,18 @@ class LoopArray:
         keep([*parts, self._in_flight], on)
         self._limit_m = self._limit_m[on] if isinstance(self._limit_m, np.ndarray) else self._limit_m
         self._scene_of, self._ended = self._scene_of[on], self._ended[on]
+
+
+@contextmanager
+def _collector_at_rest() -> Iterator[None]:
+    """No search for cycles among thousands of dictionaries without any: it would take as long as making them."""
+    was_at_work = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if was_at_work:
+            gc.enable()
 
 
 def _keep_freed_memory() -> None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from haploop.controller.dissipation import ElementError
 from haploop.launch.array_loop import LoopArray
-from haploop.launch.array_scene import runs_in_arrays, structure
+from haploop.launch.array_scene import runs_in_arrays, structures
 from haploop.launch.failure import RunFailed
 from haploop.launch.in_process import run_in_process
 from haploop.logger.summary import OF_THE_MACHINE
@@ -65,9 +65,9 @@ def results_of(
 def groups(scenes: Sequence[Scene]) -> list[list[int]]:
     """Indices of the scenes of each structure that runs in arrays."""
     found: dict[Hashable, list[int]] = {}
-    for index, scene in enumerate(scenes):
+    for index, (scene, shape) in enumerate(zip(scenes, structures(scenes), strict=True)):
         if runs_in_arrays(scene):
-            found.setdefault(structure(scene), []).append(index)
+            found.setdefault(shape, []).append(index)
     return list(found.values())
 
 

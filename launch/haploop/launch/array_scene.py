@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Sequence
+from collections.abc import Hashable, Iterable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -40,12 +40,22 @@ def structure(scene: dict[str, Any]) -> Hashable:
     Times are common, too: the clock, the duration, delays, when events come, the points of a recorded force. So is
     whether a number is 0, which may mean that something is not there, and where there is friction all that moves.
     """
-    by_value = _BODIES if "friction" in scene else ()
-    return tuple(
-        (key, _structure(value, by_value=key in _TIMES or key in by_value))
-        for key, value in scene.items()
-        if key not in _ASIDE
-    )
+    return next(structures([scene]))
+
+
+def structures(scenes: Iterable[dict[str, Any]]) -> Iterator[Hashable]:
+    """The same of each; an entry that is the very object of the scene before is not looked at again."""
+    before: dict[str, Any] = {}
+    parts: dict[str, Hashable] = {}
+    for scene in scenes:
+        by_value = _TIMES + _BODIES if "friction" in scene else _TIMES
+        if "friction" in scene or "friction" in before:
+            before = {}
+        for key, value in scene.items():
+            if key not in before or before[key] is not value:
+                parts[key] = key, _structure(value, key in by_value)
+        before = scene
+        yield tuple([parts[key] for key in scene if key not in _ASIDE])
 
 
 def _structure(value: Any, by_value: bool) -> Hashable:

@@ -28,6 +28,9 @@ class Carry(NamedTuple):
         extremes: least and greatest x in m, greatest force in N.
         books: sum and error of every book, by name.
         x_m: measured position at the last tick.
+        past: commands (by the name "command"), forces of the wall and of every element's book, of all ticks from the
+            oldest command that acts in the next interval on, and of one before, tick k in row k modulo L + 2; shape
+            (L + 2, loops) each.
     """
 
     changing: list[Any]
@@ -36,21 +39,19 @@ class Carry(NamedTuple):
     extremes: tuple[Any, Any, Any]
     books: dict[str, tuple[Any, Any]]
     x_m: Any
+    past: Forces
 
 
 class Rings(NamedTuple):
-    """The last ticks, tick k in row k modulo the length.
+    """What a window is read from: the last ticks, tick k in row k modulo the length.
 
     Attributes:
         x: at the plant steps after each tick, up to the next, shape (ticks, n, loops).
         rows: columns of the controller, shape (ticks, loops) each.
-        past: commands (by the name "command"), forces of the wall and of every element's book, of all ticks from the
-            oldest command that acts in the next interval on, and of one before; shape (L + 2, loops) each.
     """
 
     x: Any
     rows: dict[str, Any]
-    past: Forces
 
 
 class Given(NamedTuple):
@@ -61,6 +62,8 @@ class Given(NamedTuple):
         limit_m: beyond which a loop has diverged.
         outside: of every tick, a row each.
         first_tick, ticks: which ticks the block covers.
+        keep_from: ticks from this one on go into the rings; those before into two rows that stay in the cache, as
+            writing all of them to memory would take as long as computing them.
     """
 
     constant: list[Any]
@@ -68,6 +71,7 @@ class Given(NamedTuple):
     outside: Outside
     first_tick: Any
     ticks: Any
+    keep_from: Any
 
 
 class Block:
@@ -126,9 +130,9 @@ class Block:
     def _step(self, state: tuple[Carry, Rings], given: Given, i: Any) -> tuple[Carry, Rings]:
         carry, rings = state
         now = given.first_tick + i
-        size = len(rings.past["command"])
+        size, length = len(carry.past["command"]), rings.x.shape[0]
         before = [
-            {name: ring[(now - ago) % size] for name, ring in rings.past.items()} for ago in (size - 1, size - 2, 1)
+            {name: ring[(now - ago) % size] for name, ring in carry.past.items()} for ago in (size - 1, size - 2, 1)
         ]
         commands = tuple(forces["command"] for forces in before[:2])
         at_tick = given.outside._replace(commands=commands).at(i, rings.x.shape[1])
@@ -138,12 +142,13 @@ class Block:
             return self._report(told, carry.x_m, before, given.ticks > 0)
 
         after, _, (told, added, forces) = self._tick.run(data, at_tick, report)
-        place = now % rings.x.shape[0]
+        # The last row may hold where the loops began.
+        place = jnp.where(now >= given.keep_from, now % length, length - 2 - now % 2)
         rings = Rings(
             rings.x.at[place].set(jnp.stack(told.x.rows[1:])),
             {name: ring.at[place].set(told.row[name]) for name, ring in rings.rows.items()},
-            {name: ring.at[now % size].set(forces[name]) for name, ring in rings.past.items()},
         )
+        past = {name: ring.at[now % size].set(forces[name]) for name, ring in carry.past.items()}
         x, new = told.x, self.split(after)[0]
         least, most, strongest = carry.extremes
         held = Rows([force for _, force in told.held])
@@ -155,9 +160,11 @@ class Block:
         books = {
             name: _add(carry.books[name], added[name]) if name in added else carry.books[name] for name in carry.books
         }
-        changed = Carry(new, carry.running, carry.ticks + 1, extremes, books, told.row["x"])
-        stays = jax.tree.map(lambda new, old: jnp.where(carry.running, new, old) if new.ndim else new, changed, carry)
-        return stays._replace(running=carry.running & (abs(x[-1]) <= given.limit_m)), rings
+        changed = Carry(new, carry.running, carry.ticks + 1, extremes, books, told.row["x"], {})
+        stays = jax.tree.map(
+            lambda new, old: jnp.where(carry.running, new, old) if new.ndim else new, changed, carry._replace(past={})
+        )
+        return stays._replace(running=carry.running & (abs(x[-1]) <= given.limit_m), past=past), rings
 
     def _report(
         self, told: Ticked, x_m_before: Any, before: list[Forces], go: Any

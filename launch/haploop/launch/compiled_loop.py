@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections import deque
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
 import jax
@@ -12,11 +13,12 @@ from haploop.controller.controller_array import Row
 from haploop.launch.array_loop import LoopArray
 from haploop.launch.array_scene import structure
 from haploop.launch.compiled_block import RINGS, Block, Carry, Given, Rings
-from haploop.launch.compiled_programs import Programs
+from haploop.launch.compiled_books import Forces
+from haploop.launch.compiled_programs import Program, Programs
 from haploop.launch.compiled_stand_ins import Outside
 from haploop.launch.compiled_tick import NoTick, Tick
+from haploop.launch.compiled_window import CompiledWindow
 from haploop.logger.chain_books import ChainBooks
-from haploop.logger.window_array import WindowArray
 from haploop.plant.linear_motion_array import LinearMotionArray
 from haploop.plant.plant import beyond
 from haploop.plant.random_stream import Draw
@@ -51,7 +53,9 @@ class CompiledLoops(LoopArray):
         self._key = structure(scenes[0]), frozenset(kinds.items()), energy
         self._has_wall = "wall" in scenes[0]
         resolutions = self._logger._window._resolutions
-        self._window = self._logger._window = WindowArray(self._time, resolutions, size, spare_ticks=BLOCK_TICKS)
+        self._window = self._logger._window = CompiledWindow(self._time, resolutions, size, spare_ticks=BLOCK_TICKS)
+        # A loop of which only the program changes anything needs the window at its end, unless it diverges.
+        self._keep_from = 0 if self._changes else max(0, self._end - self._window.kept_ticks)
 
     def _drop_ended(self) -> None:
         """The size stays."""
@@ -86,7 +90,7 @@ class CompiledLoops(LoopArray):
             self._look_for_ends(tick)
             self._book()
             tick += 1
-            now = self._shapes(tick)
+            now = self._shapes(tick) if tick >= settled - 1 else None
             if tick == until or (tick >= settled and now == before):
                 return tick
             before = now
@@ -105,11 +109,11 @@ class CompiledLoops(LoopArray):
 
     def _by_program(self, first: int, until: int) -> None:
         tick = self._tick(first)
-        given, carry, rings = self._given(tick, first, first), self._carry(), self._rings(tick)
+        given, carry, rings = self._given(tick, first, first), self._carry(tick), self._rings()
         key = (
             *self._key,
             tuple(tick.leaves.whole),
-            *((np.shape(a), np.result_type(a)) for a in jax.tree.leaves((tick.leaves.data, given, carry, rings.past))),
+            *((np.shape(a), np.result_type(a)) for a in jax.tree.leaves((tick.leaves.data, given, carry))),
         )
         program = self._programs.known(key)
         block = program.block if program else Block(tick, self._logger._books is not None, self._has_wall)
@@ -120,23 +124,37 @@ class CompiledLoops(LoopArray):
         given = given._replace(constant=constant)
         program = program or self._programs.compiled(key, block, (carry, rings, given))
         done, data = first, tick.leaves.data
+        before = deque[tuple[Carry, Given]](maxlen=-(-self._window.kept_ticks // BLOCK_TICKS) + 1)
         while done < until and not self._ended.all():
             end = min(done + BLOCK_TICKS, until)
-            self._note_wall_position(done, end)
+            if done - first < len(self._window._ticks["wall_position"]):  # beyond, what would be written is there
+                self._note_wall_position(done, end)
             given = self._given(tick, done, end)._replace(constant=constant)
+            before.append((carry, given))
             carry, rings = program.call(carry, rings, given)
             done = end
             new = np.logical_not(carry.running) & ~self._ended
+            if new.any() and self._keep_from:
+                carry, rings = self._again(program, before, rings)
             if new.any() or done == until:
                 data = block.join([np.array(leaf) for leaf in carry.changing], constant)
                 tick.leaves.put(data, tick.leaves.whole)
-                self._in_flight.extend(row["command"] for row in self._last(rings, done))
+                self._in_flight.extend(row["command"] for row in self._last(carry, done))
                 self._fetch(carry, rings, writable=done == until < self._end)
                 self._report_ends(new, first + np.asarray(carry.ticks))
         whole = [value + count * (done - first) for value, count in zip(tick.leaves.whole, block.counts, strict=True)]
-        commands = [row["command"] for row in self._last(rings, done)]
+        commands = [row["command"] for row in self._last(carry, done)]
         tick.release(data, whole, commands, done - first)
-        self._resume(carry, rings, done)
+        self._resume(carry, done)
+
+    def _again(self, program: Program, before: Iterable[tuple[Carry, Given]], rings: Rings) -> tuple[Carry, Rings]:
+        """Go through the last blocks once more, for the windows of loops that ended; from now on all is kept."""
+        self._keep_from = 0
+        carry = None
+        for start, given in before:
+            carry, rings = program.call(carry or start, rings, given._replace(keep_from=np.int64(0)))
+        assert carry
+        return carry, rings
 
     def _given(self, tick: Tick, first: int, end: int) -> Given:
         """What the program is given for the ticks first ... end - 1."""
@@ -147,7 +165,8 @@ class CompiledLoops(LoopArray):
             response = tick.responses(first, ticks)
         noise = tuple(self._rows_of(draw, end - first) for draw in tick.draws)
         limit_m = np.asarray(self._limit_m)
-        return Given([], limit_m, Outside(tau, response, noise, np.int64(0)), np.int64(first), np.int64(end - first))
+        outside = Outside(tau, response, noise, np.int64(0))
+        return Given([], limit_m, outside, np.int64(first), np.int64(end - first), np.int64(self._keep_from))
 
     def _rows_of(self, draw: Draw, ticks: int) -> np.ndarray:
         """The next random numbers, shape (BLOCK_TICKS,) or (BLOCK_TICKS, loops)."""
@@ -157,7 +176,7 @@ class CompiledLoops(LoopArray):
             rows[row] = draw()
         return rows
 
-    def _carry(self) -> Carry:
+    def _carry(self, tick: Tick) -> Carry:
         """Where a program begins, but for the leaves."""
         loops, books, window = len(self._ended), self._logger._books, self._window
         sums = {}
@@ -166,11 +185,11 @@ class CompiledLoops(LoopArray):
                 sums[name] = books._sums.sums[row], books._sums.errors[row]
         extremes = window._x_min, window._x_max, window._force_max
         x_m = np.broadcast_to(self._logger._tape._kept[-1].columns["x"], loops) if books else np.zeros(loops)
-        return Carry([], ~self._ended, np.zeros(loops, np.int64), extremes, sums, x_m)
+        return Carry([], ~self._ended, np.zeros(loops, np.int64), extremes, sums, x_m, self._past(tick))
 
-    def _rings(self, tick: Tick) -> Rings:
-        """Where a program begins with what it keeps of many ticks."""
-        window, loops = self._window, len(self._ended)
+    def _past(self, tick: Tick) -> Forces:
+        """Commands on their way, and the forces that go with them."""
+        loops = len(self._ended)
         columns: dict[str, list[Any]] = {"command": tick.commands}
         if self._logger._books:
             rows = self._logger._tape._kept
@@ -180,12 +199,16 @@ class CompiledLoops(LoopArray):
         for name, column in columns.items():
             past[name] = np.zeros((len(column) + 1, loops))
             past[name][np.arange(tick.at - len(column), tick.at) % (len(column) + 1)] = rows_of(column, loops)
-        x = window._x.reshape(-1, self._time.steps_per_tick, loops)
-        return Rings(x, {name: window._ticks[name] for name in RINGS}, past)
+        return past
 
-    def _last(self, rings: Rings, tick: int) -> list[dict[str, np.ndarray]]:
+    def _rings(self) -> Rings:
+        """Where a program begins with what windows are read from."""
+        x = self._window._x.reshape(-1, self._time.steps_per_tick, len(self._ended))
+        return Rings(x, {name: self._window._ticks[name] for name in RINGS})
+
+    def _last(self, carry: Carry, tick: int) -> list[dict[str, np.ndarray]]:
         """The forces of the ticks before ``tick`` of which a command has yet to act, or is the last to have acted."""
-        past = {name: np.asarray(ring) for name, ring in rings.past.items()}
+        past = {name: np.asarray(ring) for name, ring in carry.past.items()}
         size = len(past["command"])
         return [{name: ring[k % size].copy() for name, ring in past.items()} for k in range(tick - size + 1, tick)]
 
@@ -196,9 +219,7 @@ class CompiledLoops(LoopArray):
     def _fetch(self, carry: Carry, rings: Rings, *, writable: bool) -> None:
         """Let the logger have what the program has kept."""
         window, books = self._window, self._logger._books
-        held = np.array if writable else np.asarray
-        window._x = held(rings.x).reshape(-1, len(self._ended))
-        window._ticks |= {name: held(ring) for name, ring in rings.rows.items()}
+        window.take(rings, writable=writable)
         window._x_min, window._x_max, window._force_max = map(np.array, carry.extremes)
         if books:
             books._sums.sums, books._sums.errors = (
@@ -219,13 +240,13 @@ class CompiledLoops(LoopArray):
         self._logger.tick, self._window._steps = tick, tick * self._time.steps_per_tick
         self._logger._note_accounts(Row({}, {}, self._controller.recorder._elements))
 
-    def _resume(self, carry: Carry, rings: Rings, tick: int) -> None:
+    def _resume(self, carry: Carry, tick: int) -> None:
         """Have the logger go on from here by itself."""
         self._log_stands_at(tick)
         elements, tape = self._controller.recorder._elements, self._logger._tape
         if self._logger._books:
             tape._kept = []
-            for forces in self._last(rings, tick):
+            for forces in self._last(carry, tick):
                 columns = {"x": np.array(carry.x_m), "wall": forces.pop("wall")}
                 del forces["command"]
                 tape._kept.append(Row(columns, {int(book): force for book, force in forces.items()}, elements))

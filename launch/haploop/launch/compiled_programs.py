@@ -60,7 +60,7 @@ class Programs:
     def compiled(self, key: Hashable, block: Block, args: tuple[Carry, Rings, Given]) -> Program:
         """Compile a block for arguments of these shapes."""
         began = perf_counter()
-        lowered = jax.jit(block.run, donate_argnums=(0, 1)).lower(*args)
+        lowered = jax.jit(block.run, donate_argnums=1).lower(*args)
         program = Program(block, lowered.compile(_WIDE if jax.default_backend() == "cpu" else None))
         self.seconds, self.count = self.seconds + perf_counter() - began, self.count + 1
         self._kept[key] = program
@@ -94,11 +94,4 @@ def most() -> int:
             del os.environ[_FLAGS]
     if not on_cpu:
         return 16384
-    return 512 if _makes_one_function() else 1024
-
-
-def _makes_one_function() -> bool:
-    """Whether XLA does, of a loop that it would not by itself; it may have been started before."""
-    many = jax.numpy.zeros(4096)
-    loop = jax.jit(lambda count: jax.lax.fori_loop(0, count, lambda _, x: x * 0.5 + x[::-1], many))
-    return "xla_cpu_small_call" in (loop.lower(9).compile().as_text() or "")
+    return 1024

@@ -48,7 +48,8 @@ def results_of_compiled(
     Raises:
         ImportError: jax is not installed.
     """
-    size: int = _programs().most() if most is None else most
+    suits: int = _programs().most()  # asked for in any case: it also tells jax how to compile
+    size = suits if most is None else most
     left = set(range(len(scenes)))
     for group in groups(scenes):
         if not _is_worth_compiling(scenes[group[0]], len(group), least):

@@ -166,7 +166,7 @@ class Logger:
             **self._counts(telemetry_gaps),
             "trajectory_sha256": self._digest.hexdigest(),
         }
-        return summary(self._scene, ran, self.window, self.books, self._covered_accounts(), diverged)
+        return summary(self._scene, ran, self.window.shown(), self.books, self._covered_accounts(), diverged)
 
     def _counts(self, telemetry_gaps: int) -> dict[str, dict[str, int]]:
         """What was lost, and what the scene's effects counted, by entry of the summary."""
@@ -190,7 +190,8 @@ class Logger:
         """Where the run is and how it looks, for progress lines and viewers."""
         if not self.tick - self._first_tick:
             return {}
-        verdict, figures = self.window.verdict(None), self.window.figures()
+        shown = self.window.shown()
+        verdict, figures = shown.verdict(None), shown.seen.figures
         return {
             "t_s": self.tick / self.time.control_rate,
             "verdict": verdict.word,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import math
 from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
@@ -93,9 +94,9 @@ class LoggerArray:
             counted: what was counted besides, by name of the tally, shape (loops,).
         """
         places = np.array([end.loop for end in ends], np.intp)
-        windows = self._window.windows(places)
+        shown = self._window.shown(places)
         tallies = [(name.partition("."), by_loop(of_loops(of, places), len(ends))) for name, of in counted.items()]
-        for index, (end, window, energies) in enumerate(zip(ends, windows, self._energies(ends, places), strict=True)):
+        for index, (end, one, energies) in enumerate(zip(ends, shown, self._energies(ends, places), strict=True)):
             ran: dict[str, Any] = {
                 "duration_s": self.tick / self._time.control_rate,
                 "ticks": self.tick,
@@ -110,7 +111,9 @@ class LoggerArray:
                 ran.setdefault(entry, {})[what] = counts[index]
             if self._trajectories:
                 ran["trajectory_sha256"] = self._trajectories.digest(end.loop)
-            yield finite(outcome(end.scene, ran, window, end.reason)) | energies
+            entries = outcome(end.scene, ran, one, end.reason)
+            is_finite = one.is_finite() and math.isfinite(end.v_m_s)
+            yield (entries if is_finite else finite(entries)) | energies
 
     def _energies(self, ends: Sequence[End], places: np.ndarray) -> list[dict[str, Any]]:
         """The ``energy`` entry of each summary; none without books."""

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from haploop.logger.books import Books
-from haploop.logger.window import Window
+from haploop.logger.verdict import Shown
 
 # Entries that differ between two runs of the same scene.
 OF_THE_MACHINE = ("wall_s", "real_time_factor", "versions")
@@ -57,7 +57,7 @@ def energy(books: Books, accounts: list[dict[str, Any]], has_wall: bool) -> dict
 def summary(
     scene: dict[str, Any],
     ran: dict[str, Any],
-    window: Window,
+    shown: Shown,
     books: Books,
     accounts: list[dict[str, Any]],
     diverged: str | None,
@@ -68,27 +68,27 @@ def summary(
         scene: the resolved scene.
         ran: entries that say what ran: duration_s, ticks, steps, wall_s, ended, final, lost and what else was counted,
             trajectory_sha256.
-        window, books: as they stand at the end.
+        shown, books: as they stand at the end.
         accounts: every element's book: kind, parameters, from_tick, to_tick.
         diverged: why the plant ended by itself, or None.
     """
     wall_s = ran.pop("wall_s")
     factor = ran["duration_s"] / wall_s if wall_s else 0.0
     ran |= {"versions": versions(), "wall_s": wall_s, "real_time_factor": factor}
-    return outcome(scene, ran, window, diverged) | {"energy": energy(books, accounts, "wall" in scene)}
+    return outcome(scene, ran, shown, diverged) | {"energy": energy(books, accounts, "wall" in scene)}
 
 
-def outcome(scene: dict[str, Any], ran: dict[str, Any], window: Window, diverged: str | None) -> dict[str, Any]:
+def outcome(scene: dict[str, Any], ran: dict[str, Any], shown: Shown, diverged: str | None) -> dict[str, Any]:
     """What came of a run but for its energies: ``ran``, the verdict and what it rests on."""
-    verdict = window.verdict(diverged)
+    verdict = shown.verdict(diverged)
     return {
         "title": scene["title"],
         "seed": scene["seed"],
         **ran,
         "verdict": verdict.word,
         "verdict_rule": verdict.rule,
-        "extremes": {"x_min_m": window.x_min_m, "x_max_m": window.x_max_m, "force_max_N": window.force_max_N},
-        "window": window.figures(),
+        "extremes": shown.extremes._asdict(),
+        "window": shown.seen.figures,
     }
 
 

@@ -7,7 +7,8 @@ from collections.abc import Iterable, Iterator, Sequence
 import numpy as np
 
 from haploop.logger.tape_array import Row
-from haploop.logger.window import CONTROLLER_COLUMNS, Extremes, Window, keep_steps
+from haploop.logger.verdict import SMALLEST_SWING_M, Extremes, Shown
+from haploop.logger.window import CONTROLLER_COLUMNS, keep_steps
 from haploop.logger.window_look import Span, look
 from haploop.protocol.ticks import Timebase
 
@@ -21,11 +22,15 @@ class WindowArray:
     Args:
         resolutions_m: encoder step of each loop, 0 without one; a number, or shape (loops,).
         spare_ticks: ticks to be kept beyond the window.
+
+    Attributes:
+        kept_ticks: of them the window takes so many at most.
     """
 
     def __init__(self, time: Timebase, resolutions_m: float | np.ndarray, loops: int, *, spare_ticks: int = 0) -> None:
         self._time, n = time, time.steps_per_tick
-        kept_ticks = min(keep_steps(time.plant_rate) // n + 2, time.ticks + 1) + spare_ticks
+        self.kept_ticks = min(keep_steps(time.plant_rate) // n + 2, time.ticks + 1)
+        kept_ticks = self.kept_ticks + spare_ticks
         self._resolutions = np.broadcast_to(resolutions_m, loops)
         # The state at step s is in row s - 1, so that an interval, but for its start, lies in one piece.
         self._x = np.zeros((kept_ticks * n, loops))
@@ -54,20 +59,22 @@ class WindowArray:
         self._x_max = np.maximum(self._x_max, x.max(axis=0))
         self._force_max = np.maximum(self._force_max, np.abs(held_N).max(axis=0))
 
-    def windows(self, loops: Iterable[int]) -> Iterator[Window]:
-        """The window of each of these loops, as it would be had the loop run alone."""
+    def shown(self, loops: Iterable[int]) -> Iterator[Shown]:
+        """What each of these loops shows, as ``Window`` tells it of a loop that ran alone."""
         wanted = np.fromiter(loops, np.intp)
         n, rate, steps = self._time.steps_per_tick, self._time.plant_rate, self._steps
         span = Span.of(steps, keep_steps(rate), n)
         for first in range(0, len(wanted), _TOGETHER):
             some = wanted[first : first + _TOGETHER]
-            windows = [Window(rate, n, resolution) for resolution in self._resolutions[some].tolist()]
+            swing_m = np.maximum(self._resolutions[some], SMALLEST_SWING_M)
             x = _read(self._x, steps + len(self._x), some)
             ticks = {name: _read(ring, steps // n, some) for name, ring in self._ticks.items()}
-            seen = look(x, ticks, span, rate, np.array([window.swing_m for window in windows]))
-            extremes = (of[some].tolist() for of in (self._x_min, self._x_max, self._force_max))
-            for window, shown, *ends in zip(windows, seen, *extremes, strict=True):
-                yield window.judged(steps, shown, Extremes(*ends))
+            seen = look(x, ticks, span, rate, swing_m)
+            yield from map(Shown, seen, self._extremes_of(some), swing_m.tolist())
+
+    def _extremes_of(self, loops: np.ndarray) -> Iterator[Extremes]:
+        columns = (of[loops].tolist() for of in (self._x_min, self._x_max, self._force_max))
+        return map(Extremes, *columns)
 
 
 def _write(ring: np.ndarray, at: int, rows: np.ndarray) -> None:

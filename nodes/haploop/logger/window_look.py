@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+WINDOW_S = 0.5
 CROSSINGS = 4
 # A quantised position on the wall's face may lie inside by this much, relative to the face's position.
 ROUNDING = 1e-12
@@ -19,13 +20,34 @@ class Seen(NamedTuple):
     Attributes:
         touched: whether any tick was in contact.
         crossings, growth: as ``swings`` tells them.
-        figures: the ``window`` entry of the summary.
+        figures: the ``window`` entry of the summary. The displayed stiffness is the mean of total force over
+            penetration, ticks in contact (Choi et al. 2022, V.B.2); ticks whose penetration is a rounding error of the
+            wall's position are left out of it. ``growth_1_s`` is the r of e^(r t) by which the swings grow (decay
+            where negative); None where nothing swings.
     """
 
     touched: bool
     crossings: int
     growth: float
     figures: dict[str, Any]
+
+
+class Measured(NamedTuple):
+    """What was measured in the windows of some runs: a list each.
+
+    Attributes:
+        crossings, growth: as ``swings`` tells them.
+        width_m: peak to peak.
+        inside: ticks in contact.
+        stiffness_N_m, depth_m: displayed stiffness and penetration, means of ticks in contact; None of none.
+    """
+
+    crossings: list[int]
+    growth: list[float]
+    width_m: list[float]
+    inside: list[int]
+    stiffness_N_m: list[float | None]
+    depth_m: list[float | None]
 
 
 class Span(NamedTuple):
@@ -68,25 +90,35 @@ def look(x: np.ndarray, rows: dict[str, np.ndarray], span: Span, rate: int, swin
     """
     x = x[:, -span.steps - 1 :]
     held = {name: column[:, column.shape[1] - span.ticks :] for name, column in rows.items()}
-    crossings, growth = swings(x, swing_m)
     inside = held["in_contact"] > 0
     depth = held["wall_position"] - held["x"]
     real = inside & (np.abs(depth) > ROUNDING * np.abs(held["wall_position"]))
     stiffness = np.divide(held["total"], depth, out=np.zeros_like(depth), where=real)
-    outside = np.count_nonzero(~inside, axis=1) / max(span.ticks, 1)
-    columns: dict[str, list[Any]] = {
-        "oscillation_m": np.ptp(x, axis=1).tolist() if x.shape[1] else [0.0] * len(x),
-        "growth_1_s": [
-            _rate(by, x.shape[1] / rate) if count >= CROSSINGS else None
-            for count, by in zip(crossings, growth, strict=True)
-        ],
-        "outside_fraction": outside.tolist() if span.ticks else [1.0] * len(x),
-        "displayed_stiffness_N_m": _means(stiffness, real),
-        "penetration_mean_m": _means(np.abs(depth), inside),
-    }
-    figures = [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
-    touched, from_s = np.any(inside, axis=1).tolist(), {"from_s": span.first / rate}
-    return [Seen(*of[:3], from_s | of[3]) for of in zip(touched, crossings, growth, figures, strict=True)]
+    measured = Measured(
+        *swings(x, swing_m),
+        np.ptp(x, axis=1).tolist() if x.shape[1] else [0.0] * len(x),
+        np.count_nonzero(inside, axis=1).tolist(),
+        _means(stiffness, real),
+        _means(np.abs(depth), inside),
+    )
+    return seen_of(measured, span, rate)
+
+
+def seen_of(measured: Measured, span: Span, rate: int) -> list[Seen]:
+    """What was measured in each run's window, as the summary tells it."""
+    start_s, seconds = span.first / rate, (span.steps + 1) / rate
+    seen = []
+    for crossings, growth, width_m, inside, stiffness_N_m, depth_m in zip(*measured, strict=True):
+        figures = {
+            "from_s": start_s,
+            "oscillation_m": width_m,
+            "growth_1_s": _rate(growth, seconds) if crossings >= CROSSINGS else None,
+            "outside_fraction": (span.ticks - inside) / span.ticks if span.ticks else 1.0,
+            "displayed_stiffness_N_m": stiffness_N_m,
+            "penetration_mean_m": depth_m,
+        }
+        seen.append(Seen(inside > 0, crossings, growth, figures))
+    return seen
 
 
 def _means(values: np.ndarray, counted: np.ndarray) -> list[float | None]:
@@ -111,8 +143,12 @@ def swings(x: np.ndarray, swing_m: np.ndarray) -> tuple[list[int], list[float]]:
     t, square = _centred(steps)
     offset = x - x.mean(axis=1)[:, None]
     offset -= t * (np.vecdot(t, offset) / square)[:, None]
-    beyond = np.flatnonzero(np.abs(offset) > swing_m[:, None])
-    is_above, run = offset.ravel()[beyond] > 0.0, beyond // steps
+    side = np.zeros((runs, steps + 1), np.int8)  # each run begins on neither side
+    np.subtract((offset > swing_m[:, None]).view(np.int8), (offset < -swing_m[:, None]).view(np.int8), out=side[:, 1:])
+    sides = side.ravel()
+    comes = np.flatnonzero(sides[1:] != sides[:-1]) + 1
+    comes = comes[sides[comes] != 0]
+    run, is_above = comes // (steps + 1), sides[comes] > 0
     crossed = run[1:][(is_above[1:] != is_above[:-1]) & (run[1:] == run[:-1])]
     first, second = (np.ptp(half, axis=1) for half in (offset[:, : steps // 2], offset[:, steps // 2 :]))
     growth = np.divide(second, first, out=np.zeros(runs), where=first > 0.0)

@@ -126,4 +126,4 @@ def _verdict(scene: dict[str, Any], time: Timebase, controller: Controller, x: l
     rows["wall_position"] = np.full(time.ticks, block["wall"]["position"])
     window = Window(time.control_rate, 1, scene.get("encoder", {}).get("resolution", 0.0))
     window.add(np.array(x), np.array(forces), {name: rows[name] for name in CONTROLLER_COLUMNS})
-    return window.verdict(None).word
+    return window.shown().verdict(None).word

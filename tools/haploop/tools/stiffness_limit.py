@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from haploop.controller.kalman import assumed_noises
 from haploop.launch.in_process import run_in_process
-from haploop.logger.window import WINDOW_S
+from haploop.logger.window_look import WINDOW_S
 from haploop.plant.chain import Chain
 from haploop.tools.one_tick import OneTickMap
 
