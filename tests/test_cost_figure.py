@@ -111,6 +111,7 @@ def test_10_kHz_is_marked_for_every_method(figure: Any, cost: Cost) -> None:
         assert len(of(ax, "10 kHz")) == len(METHODS)
 
 
+@pytest.mark.slow
 def test_every_rate_is_written_at_least_once_and_no_label_covers_another_or_a_point(figure: Any, cost: Cost) -> None:
     for ax, _ in panels(figure, cost):
         labels = of(ax, "rate")

@@ -177,6 +177,7 @@ def test_all_groups_are_measured_and_a_second_time_nothing_is(measuring: Measuri
     assert measuring.runs == runs
 
 
+@pytest.mark.slow
 def test_a_measurement_that_was_stopped_goes_on_where_it_was(measuring: Measuring, tmp_path: Path) -> None:
     """In the end every record is there once, as if it had not been stopped."""
     measuring.stop_after = 30

@@ -95,6 +95,7 @@ def test_a_logger_can_join_a_run_that_stands_still(running, attached, alone):
     assert assert_same_from_its_first_tick_on(run.log(), haploop.logger.read(second.out)) == 500
 
 
+@pytest.mark.slow
 def test_a_logger_that_leaves_by_an_interrupt_has_a_whole_log_and_the_run_goes_on(running, attached, alone):
     run = running(sets=(*SHORT, NEVER))
     run.reaches(500)
@@ -124,6 +125,7 @@ def test_a_logger_that_is_killed_does_not_hold_the_run_up_until_the_deadline(run
     assert haploop.logger.read(second.out).truncated
 
 
+@pytest.mark.slow
 def test_a_logger_that_hangs_holds_the_run_up_until_the_deadline_and_is_then_dropped(running, attached, alone):
     """The run waits for it first: a lossless logger may be slow. Woken up, it says that the run went on without it."""
     run = running(sets=(*SHORT, "run.deadline=0.8"))
@@ -150,6 +152,7 @@ def same_bits_so_far(run, second):
     return len(log["x"])
 
 
+@pytest.mark.slow
 def test_a_logger_whose_run_vanishes_ends_by_itself_and_its_log_reads(running, attached):
     run = running()
     run.reaches(200)

@@ -56,6 +56,7 @@ def test_a_printer_costs_the_run_no_bit_and_leaves_at_an_interrupt(running, prin
     assert "Traceback" not in printer.stderr
 
 
+@pytest.mark.slow
 def test_a_run_that_fails_is_told_with_the_reason_and_exit_status_1(running, printing):
     run = running(sets=("duration=600", "event=[{at=0.5, pause=true}]"))
     run.reaches(500)

@@ -127,6 +127,7 @@ def test_when_the_launcher_is_killed_as_the_nodes_start_they_end_by_themselves(r
     assert "Traceback" not in run.stderr
 
 
+@pytest.mark.slow
 def test_a_launcher_that_was_stopped_for_longer_than_the_deadline_blames_nobody(running, undisturbed):
     run = running(sets=("duration=600", "run.deadline=0.7"))
     done = run.reaches(200)

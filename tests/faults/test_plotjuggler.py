@@ -115,6 +115,7 @@ def test_a_viewer_that_comes_late_gets_everything_from_there_on(tmp_path):
         assert parser.column("timestamp").tobytes() == stamps[first:].tobytes(), topic
 
 
+@pytest.mark.slow
 def test_a_viewer_that_does_not_read_costs_the_run_nothing_and_the_node_skips_nothing(tmp_path, capsys, monkeypatch):
     """Nor does the memory of the node grow with it: so many messages are kept, three here, and no more."""
     monkeypatch.setattr(plotjuggler, "_KEPT_MESSAGES", 3)

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from physics.captured import run
 from physics.chain_by_hand import MOST_N, Made, chain_scene, make
+from physics.effect_tables import slowly
 from scene_makers import KINDS, scene
 
 from haploop.controller.controller import Controller
@@ -171,7 +172,7 @@ def test_what_the_actuator_cannot_give_is_booked_as_what_the_elements_asked_for_
     assert abs(expected) > 1e-3 * ran.energy["moved_J"]
 
 
-@pytest.mark.parametrize("name", ["friction", "everything"])
+@pytest.mark.parametrize("name", ["friction", *slowly(["everything"])])
 def test_friction_never_gives_heat_back_in_any_step(name):
     resolved = resolved_of(name)
     plant, books = run(resolved).plant, books_of(resolved)

@@ -148,13 +148,13 @@ LOOPS: dict[str, dict[str, Any]] = {
 
 
 @pytest.mark.parametrize("effects", [ALL, *slowly([(), ("friction",), ("transmission", "grip")])], ids="+".join)
-@pytest.mark.parametrize("case", LOOPS)
+@pytest.mark.parametrize("case", [*[*LOOPS][::2], *slowly([*LOOPS][1::2])])
 def test_a_hard_loop_gives_numbers_and_books_that_close(case, effects):
     assert_sound(run(tap(effects, **LOOPS[case])))
 
 
 @pytest.mark.parametrize("depth", [0.0, 1e-3, *slowly([-1e-3, 1e-15])])
-@pytest.mark.parametrize("speed", [0.0, 1e-15, 1e-9, 1e-3])
+@pytest.mark.parametrize("speed", [0.0, 1e-9, *slowly([1e-15, 1e-3])])
 @pytest.mark.parametrize("effects", [ALL, *slowly([("friction", "transmission")])], ids="+".join)
 def test_a_start_outside_on_or_inside_the_wall_however_slow_is_sound(depth, speed, effects):
     start = {"position": -0.002 - depth, "velocity": -speed}

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 from live_run import Going, going, undisturbed
 
 import haploop.logger
@@ -122,6 +123,7 @@ def test_observers_may_join_a_paused_run_leave_it_hold_it_up_and_be_killed_while
     assert (state["x"], state["v"]) == (log["/plant"]["x"][2000], log["/plant"]["v"][2000])
 
 
+@pytest.mark.slow
 def test_a_viewer_that_stands_still_costs_nothing_and_afterwards_counts_what_it_missed(tmp_path: Path) -> None:
     short_blocks = ("duration=3.0", "run.block_ticks=1", "run.window_blocks=100")
     with going(tmp_path, *short_blocks, pauses=(100, 2900)) as run:

@@ -165,6 +165,7 @@ def test_bounds_are_drawn_where_they_apply_at_the_stiffness_they_allow() -> None
             assert bound.stiffness_N_m == pytest.approx(k, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_a_line_has_its_name_beside_it_in_its_own_colour() -> None:
     drawn = figure_over(loop(), {B: [0.05, 0.1, 0.2, 0.4], K: np.linspace(20.0, 1500.0, 9).tolist()})
     named = {text.get_text(): text.get_color() for text in artists(drawn, "name of a line")}

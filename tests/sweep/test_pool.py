@@ -64,6 +64,7 @@ def deadly(tmp_path: Path) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_of_the_scenes_that_were_under_way_when_a_worker_died_only_the_culprits_have_no_result(deadly: Path) -> None:
     strengths = [0.1 + 0.001 * k for k in range(40)]
     strengths[5] = strengths[17] = 0.9

@@ -36,6 +36,7 @@ def cells(out: Path) -> list[int]:
     return sorted(cell for part in parts(out) for cell in pyarrow.parquet.read_table(part)["cell"].to_pylist())
 
 
+@pytest.mark.slow
 def test_killed_it_leaves_no_process_and_goes_on_with_what_is_missing(
     launched: Callable[..., Launched], tmp_path: Path
 ) -> None:
@@ -100,6 +101,7 @@ def test_interrupted_twice_it_ends_at_once_and_keeps_what_was_stored(
     wait_for("the end of the workers", lambda: not alive(children))
 
 
+@pytest.mark.slow
 def test_a_full_disk_is_said_and_loses_nothing_that_was_written(
     launched: Callable[..., Launched], tmp_path: Path
 ) -> None:
@@ -121,6 +123,7 @@ def test_a_full_disk_is_said_and_loses_nothing_that_was_written(
     assert read(out)["cell"].tolist() == list(range(800))
 
 
+@pytest.mark.slow
 def test_a_second_sweep_into_the_same_directory_is_refused(launched: Callable[..., Launched], tmp_path: Path) -> None:
     out, path = tmp_path / "out", sweep_file(tmp_path, SLOW, SLOW_PRESS)
     run = launched("sweep", str(path), "--workers", "1", out=out)
@@ -131,6 +134,7 @@ def test_a_second_sweep_into_the_same_directory_is_refused(launched: Callable[..
     assert run.is_there()
 
 
+@pytest.mark.slow
 def test_a_directory_that_vanishes_is_said(launched: Callable[..., Launched], tmp_path: Path) -> None:
     import shutil
 
@@ -188,6 +192,7 @@ def test_a_number_of_workers_below_one_is_refused(launched: Callable[..., Launch
     assert "--workers must be at least 1" in run.stderr
 
 
+@pytest.mark.slow
 def test_a_plugin_that_kills_its_worker_in_one_cell_is_one_row(
     launched: Callable[..., Launched], tmp_path: Path
 ) -> None:

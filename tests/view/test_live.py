@@ -142,6 +142,7 @@ def test_the_window_is_what_the_page_watches(tmp_path):
     follow(play, tmp_path, pauses=(1000,))
 
 
+@pytest.mark.slow
 def test_since_now_shows_nothing_older(tmp_path):
     async def play(run, tab, here):
         await stands(run, 500)
@@ -339,6 +340,7 @@ def test_pages_that_come_go_and_say_nothing_leave_the_bits_of_the_run_alone(tmp_
         assert summary["lost"]["telemetry_gaps"] == 0
 
 
+@pytest.mark.slow
 def test_a_paused_run_sends_its_picture_once(tmp_path):
     """Nothing new is nothing sent; a change of what is watched is answered at once."""
 

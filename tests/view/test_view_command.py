@@ -116,6 +116,7 @@ def test_run_with_view_serves_the_run_and_stays_until_ctrl_c(launched, tmp_path,
     wait_for("the end of the viewer", lambda: not alive(viewers))
 
 
+@pytest.mark.slow
 def test_a_viewer_that_dies_is_no_matter_to_its_run(launched, tmp_path):
     run = launched("run", str(SCENE), "--set", "duration=2", "--view", out=tmp_path / "out")
     link(run)
