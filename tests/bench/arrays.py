@@ -80,7 +80,10 @@ def main() -> None:
     for _ in range(options.repeats):
         for name, (run, count) in rows.items():
             seen[name].append(measured_us(run, count * ticks_of))
-    table = Table(title=f"{len(scenes)} scenes of {scenes[0]['duration']:g} s, medians of {options.repeats}; {machine()}", title_justify="left")
+    table = Table(
+        title=f"{len(scenes)} scenes of {scenes[0]['duration']:g} s, medians of {options.repeats}; {machine()}",
+        title_justify="left",
+    )
     for heading in ("what", "µs per tick", "least - most", "in one process / this", "this / kernel"):
         table.add_column(heading)
     medians = {name: statistics.median(values) for name, values in seen.items()}

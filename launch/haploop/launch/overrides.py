@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Iterable, Sequence
+from functools import lru_cache
 from typing import Any
 
 from haploop.launch.layers import Layers
@@ -55,17 +56,18 @@ def lay_value(layers: Layers, path: Sequence[str], value: Any) -> str | None:
     return None
 
 
-def key_path(name: str) -> list[str]:
+@lru_cache(maxsize=256)
+def key_path(name: str) -> tuple[str, ...]:
     """The parts of a dotted key, read as TOML reads it, so that a part may be quoted; empty when it is none."""
     try:
         node: Any = tomllib.loads(f"{name} = 0") if "\n" not in name else {}
     except ValueError:
-        return []
+        return ()
     path = []
     while isinstance(node, dict) and node:
         [(part, node)] = node.items()
         path.append(part)
-    return path
+    return tuple(path)
 
 
 def _value(text: str) -> Any:

@@ -16,7 +16,7 @@ from haploop.launch.elements import elements_of, try_out
 from haploop.launch.layers import Layers
 from haploop.launch.mistakes import Mistake, SceneError
 from haploop.launch.overrides import key_path, lay_value
-from haploop.launch.resolved import inline, to_toml
+from haploop.launch.resolved import Lines, inline, lines_of, to_toml
 from haploop.tools.sweep.columns import CELL, ENDED, NUMBER, SCENE, SEED, TEXT, WHOLE, WHY, Column
 from haploop.tools.sweep.parts import Group
 from haploop.tools.sweep.work import Sources, kinds_of
@@ -161,8 +161,13 @@ class Sweep:
             SEED: values.get(SEED, seed),
             ENDED: ended,
             WHY: result.get("why", ""),
-            SCENE: None if scene is None else to_toml(scene),
+            SCENE: None if scene is None else to_toml(scene, self._lines),
         }
+
+    @cached_property
+    def _lines(self) -> Lines:
+        """What cells share with the base scene, as TOML."""
+        return lines_of(self.base)
 
     def columns(self) -> list[Column]:
         """Of the table."""
@@ -209,12 +214,13 @@ class Sweep:
 
 
 def resolved(values: dict[str, Any], base: dict[str, Any], kinds: dict[str, Any]) -> dict[str, Any]:
-    """A resolved scene with other values at some dotted keys, resolved.
+    """A resolved scene with other values at some dotted keys, resolved; it shares with it what they leave alone.
 
     Raises:
         SceneError: there is no such scene; its mistakes name no file.
     """
-    layers = Layers(Path(), deepcopy(base))
+    others = {path[0] for path in map(key_path, values)}
+    layers = Layers(Path(), base | {key: deepcopy(base[key]) for key in others & base.keys()})
     for key, value in values.items():
         if complaint := lay_value(layers, key_path(key), deepcopy(value)):
             layers.mistakes.append(Mistake("", key, "cannot be set", complaint))
@@ -223,7 +229,8 @@ def resolved(values: dict[str, Any], base: dict[str, Any], kinds: dict[str, Any]
     except SceneError as error:
         raise Refused(error.mistakes) from error
     scene.get("event", []).sort(key=lambda event: event["at"])
-    return scene
+    left = {key: base[key] for key in scene.keys() - others & base.keys()}
+    return {key: left[key] if left.get(key) == entry else entry for key, entry in scene.items()}
 
 
 class Refused(SceneError):
