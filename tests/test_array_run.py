@@ -16,7 +16,7 @@ from haploop.controller.dissipation import Element, Motion, Quantity, where
 from haploop.launch import array_loop, array_run
 from haploop.launch.array_loop import LoopArray
 from haploop.launch.array_run import run_array
-from haploop.launch.array_scene import runs_in_arrays, stacked, structure
+from haploop.launch.array_scene import runs_in_arrays, stacked, structure, structures
 from haploop.plant import motion_array
 from haploop.plant.linear_motion_array import LinearMotionArray
 
@@ -230,6 +230,23 @@ def test_only_numbers_and_titles_may_differ_within_a_structure() -> None:
         "velocity": {"cutoff": 50.0},
     }.items():
         assert structure(base) != structure({**base, key: value}), key
+
+
+def test_the_structures_of_many_scenes_are_those_of_each_whatever_they_share() -> None:
+    """Tables that go from scene to scene as one object, in all orders, with friction and without."""
+    base, rng = pressed(), np.random.default_rng(3)
+    pools = {
+        "device": [base["device"], {**base["device"], "damping": 0.0}, dict(base["device"])],
+        "wall": [base["wall"], {**base["wall"], "stiffness": 7.0}, {**base["wall"], "occupies": "above"}],
+        "friction": [None, {"kinetic": 0.01}, {"kinetic": 0.02}],
+    }
+    scenes = []
+    for _ in range(200):
+        drawn = {key: pool[rng.integers(len(pool))] for key, pool in pools.items()}
+        scenes.append({key: entry for key, entry in {**base, **drawn}.items() if entry is not None})
+    found = list(structures(scenes))
+    assert found == [structure(copy.deepcopy(each)) for each in scenes]
+    assert len(set(found)) > 10
 
 
 def test_numbers_that_are_equal_stay_one_number() -> None:

@@ -10,6 +10,8 @@ from scene_makers import KINDS
 from sweep.sweep_files import GRID, PRESS, loaded, mistakes, sweep_file
 
 from haploop.launch.mistakes import SceneError
+from haploop.launch.resolved import to_toml
+from haploop.launch.scene_file import load as scene_of
 from haploop.tools.sweep.cells import Extra
 from haploop.tools.sweep.sweep_file import load
 
@@ -55,6 +57,19 @@ def test_the_scene_of_a_cell_is_the_base_but_for_its_values_and_seed(tmp_path: P
     assert scene["seed"] == 8
     assert {**scene, "wall": 0, "dissipation": 0, "seed": 0} == {**made.base, "wall": 0, "dissipation": 0, "seed": 0}
     assert made.base["wall"]["stiffness"] == 150.0
+
+
+def test_a_cell_is_the_scene_with_its_values_set_and_its_text_too_though_it_shares_tables(tmp_path: Path) -> None:
+    """Every cell, one after the other: none leaves anything in the base or in those after it."""
+    made = loaded(tmp_path, GRID)
+    before = to_toml(made.base)
+    for cell in range(made.count):
+        scene, (values, seed) = made.scene(cell), made.values(cell)
+        by_itself = scene_of(tmp_path / "press.toml", [f"{key}={value!r}" for key, value in values.items()], KINDS)
+        assert to_toml(scene) == to_toml(by_itself | {"seed": seed})
+        assert made.row(cell, scene, {"ended": "done"})["scene"] == to_toml(scene)
+        assert scene["hand"] is made.base["hand"]
+    assert to_toml(made.base) == before
 
 
 def test_cells_that_differ_in_structure_are_apart_and_their_columns_in_the_order_of_the_file(tmp_path: Path) -> None:
