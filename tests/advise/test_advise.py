@@ -4,14 +4,16 @@ import json
 from pathlib import Path
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from scene_makers import KINDS, scene
 from typer.testing import CliRunner
 
 from haploop.launch.in_process import run_in_process
 from haploop.launch.scene_file import load
 from haploop.tools.advise.families import COARSE, DAMPING, beside, first_choices
-from haploop.tools.advise.gains import rounded_down
-from haploop.tools.advise.subject import DEFAULT_HAND, NotFound, settled, subject
+from haploop.tools.advise.margins import rounded_down
+from haploop.tools.advise.subject import DEFAULT_HAND, WrongAsk, settled, subject
 from haploop.tools.advise.tasks import SEEDS, tasks
 from haploop.tools.advise.variations import Change, corners, scaled, singles
 from haploop.tools.cli import app
@@ -29,8 +31,35 @@ SCENES = Path(__file__).parents[2] / "launch" / "scenes"
 )
 def test_a_wrong_name_is_answered_with_the_nearest(arguments, words):
     device, hand, delay, estimator = arguments
-    with pytest.raises(NotFound, match=words.replace("?", r"\?")):
+    with pytest.raises(WrongAsk, match=words.replace("?", r"\?")):
         subject(device, hand, delay, estimator, (), KINDS)
+
+
+@pytest.mark.parametrize("delay", ["2", "600 ms"])
+def test_a_delay_that_no_task_outlasts_is_refused_and_a_forgotten_unit_is_suspected(delay):
+    with pytest.raises(WrongAsk, match=r'advice is given up to 0.5 s.*write "[0-9.]+ ms" for milliseconds'):
+        subject("touch", None, delay, None, [], KINDS)
+
+
+@given(delay_steps=st.integers(0, 5000))
+def test_a_standard_task_lasts_for_twenty_round_trips_at_least(delay_steps):
+    read = scene(clock={"round_trip_delay": delay_steps / 10_000}, wall={"position": 0.0, "stiffness": 1.0})
+    for task in tasks(read, has_task=False).scenes:
+        assert task["duration"] >= max(1.0, 20 * task["clock"]["round_trip_delay"])
+
+
+def test_a_scene_too_short_for_its_delay_is_judged_by_the_standard_tasks():
+    fig6a = load(SCENES / "fig6a.toml")
+    assert len(tasks(fig6a, has_task=True).scenes) == 1
+    late = {**fig6a, "clock": {**fig6a["clock"], "round_trip_delay": 0.2}}
+    assert len(tasks(late, has_task=True).scenes) == 2
+
+
+def test_a_hasty_look_takes_the_first_task_and_one_seed():
+    noisy = scene(wall={"position": 0.0, "stiffness": 1.0}, noise={"deviation": 1e-6, "cutoff": 100.0})
+    asked = tasks(noisy, has_task=False)
+    [look] = asked.of(100.0, [], thorough=False)
+    assert look == asked.of(100.0, [])[0]
 
 
 def test_a_preset_gets_a_hand_and_standard_tasks_and_says_so():

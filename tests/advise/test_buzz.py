@@ -5,8 +5,9 @@ from typing import Any
 import pytest
 from scene_makers import KINDS, scene
 
-from haploop.tools.advise.buzz import Buzz, why
+from haploop.tools.advise.buzz import Buzz, Without, why
 from haploop.tools.advise.effects_off import causes, freed
+from haploop.tools.advise.largest import Limit
 from haploop.tools.advise.steady import Judge
 from haploop.tools.advise.words import buzz_sentences
 
@@ -35,6 +36,17 @@ RINGING = scene(
     accelerometer={"mount": "tip"},
     dissipation=[{"kind": "bidirectional-inertia", "mass": 0.02}],
 )
+# Damping from a velocity that is filtered at 20 Hz, at a rate at which sampling itself does little.
+LAGGING = scene(
+    device={"mass": 0.05, "damping": 0.05, "position": 1e-3},
+    hand={**HAND, "damping": 0.05},
+    duration=1.5,
+    clock={"control_rate": 5000},
+    wall={"position": 0.0, "stiffness": 12000.0},
+    encoder={"resolution": 1e-6},
+    velocity={"cutoff": 20.0},
+    dissipation=[{"kind": "damping", "damping": 6.0}],
+)
 
 
 @pytest.fixture(scope="module")
@@ -45,8 +57,12 @@ def late() -> Buzz:
 
 @pytest.mark.parametrize(
     ("read", "name"),
-    [(COARSE, "quantisation"), pytest.param(RINGING, "structural mode", marks=pytest.mark.slow)],
-    ids=lambda x: str(x)[:8],
+    [
+        (COARSE, "quantisation"),
+        pytest.param(LAGGING, "estimator lag", marks=pytest.mark.slow),
+        pytest.param(RINGING, "structural mode", marks=pytest.mark.slow),
+    ],
+    ids=lambda x: x.replace(" ", "-") if isinstance(x, str) else "",
 )
 def test_the_one_cause_of_a_buzz_is_named_and_no_other(read, name):
     with Judge(KINDS, workers=1) as judge:
@@ -82,6 +98,18 @@ def test_delay_is_named_where_it_is_the_one_cause(late):
     assert not late.steady
     assert [w.names for w in late.alone if w.steady] == [("delay",)]
     assert buzz_sentences(late)[0].startswith("It buzzes because of the delay: without it")
+
+
+def test_sampling_which_every_loop_has_is_named_after_a_cause_of_its_own_unless_it_allows_twice_as_much():
+    def buzz(without_sampling_N_m: float) -> str:
+        def without(name: str, stiffness: float) -> Without:
+            return Without((name,), "", None, None, True, "steady", 0.0, Limit(stiffness, stiffness), False)
+
+        alone = without("sampling and hold", without_sampling_N_m), without("estimator lag", 1000.0)
+        return buzz_sentences(Buzz(LATE, 100.0, False, "limit-cycle", 1e-3, Limit(50.0, 51.0), (), alone, (), None))[0]
+
+    assert "because of the estimator lag" in buzz(1900.0)
+    assert "because of the sampling and hold" in buzz(2100.0)
 
 
 def test_only_what_a_scene_has_can_be_a_cause():

@@ -7,30 +7,74 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scene_makers import KINDS, scene
 
-from haploop.tools.advise.largest import LEAST_N_M, Limit, Loops, Pace, largest
+from haploop.tools.advise.largest import LEAST_N_M, Limit, Loops, largest
+from haploop.tools.advise.pace import NEAR, WIDE, Pace
 from haploop.tools.advise.steady import Judge, Judgement
 from haploop.tools.advise.tasks import tasks
 from haploop.tools.advise.variations import Change
 from haploop.tools.one_tick import OneTickMap
 
-QUICK, SLOW = Pace((1 / 8, 1 / 4, 1 / 2, 1.0, 2.0, 4.0, 8.0), 5, 0.02), Pace((1.0,), 1, 0.05)
+QUICK, SLOW = WIDE["arrays"], WIDE["alone"]
 
 
 def limit_of(is_steady, start: float, pace: Pace, most: float = 1e5) -> Limit:
     """The limit of a loop of which only this is known."""
-
-    def judged(scenes):
-        return [Judgement(is_steady(k), "", 0.0, {}) for k in scenes]
-
-    made: Any = lambda k: [k]  # noqa: E731
-    return largest({"": Loops(made, start, most)}, judged, pace)[""]
+    return limits_of({"": lambda k, _: is_steady(k)}, start, pace, most)[""]
 
 
-@pytest.mark.parametrize("pace", [QUICK, SLOW])
+def limits_of(cells, start: float, pace: Pace, most: float = 1e5, **rivals: Any) -> dict[str, Limit]:
+    """The limits of loops that are steady or not by a stiffness in N/m, and by whether they are looked at patiently."""
+
+    def judged(looks, patient):
+        return [Judgement(look(waits), "", 0.0, {}) for look, waits in zip(looks, patient, strict=True)]
+
+    def loops(is_steady) -> Loops:
+        def make(k, _) -> Any:
+            return [lambda waits: is_steady(k, waits)]
+
+        return Loops(make, start, most)
+
+    return largest({name: loops(is_steady) for name, is_steady in cells.items()}, judged, pace, **rivals)
+
+
+@pytest.mark.parametrize("pace", [*WIDE.values(), *NEAR.values()])
 @given(edge=st.floats(2.0, 9e4), start=st.floats(1.0, 9e4))
 def test_the_limit_is_found_from_wherever_the_search_starts(pace, edge, start):
     found = limit_of(lambda k: k < edge, start, pace)
-    assert found.stiffness_N_m < edge <= found.not_steady_N_m <= (1.0 + 1e-9 + pace.tolerance) * found.stiffness_N_m
+    assert found.stiffness_N_m < edge <= found.not_steady_N_m
+    assert found.is_within(pace.tolerance)
+
+
+@pytest.mark.parametrize("pace", WIDE.values())
+@given(edge=st.floats(10.0, 9e4), share=st.floats(0.05, 1.5), start=st.floats(1.0, 9e4))
+def test_what_fails_a_thorough_look_lowers_the_limit_to_where_nothing_does(pace, edge, share, start):
+    found = limits_of({"": lambda k, waits: k < (min(1.0, share) * edge if waits else edge)}, start, pace)[""]
+    true_edge = min(1.0, share) * edge
+    if true_edge > LEAST_N_M * (1.0 + pace.tolerance):
+        assert found.stiffness_N_m < true_edge <= found.not_steady_N_m
+    assert found.is_within(pace.tolerance)
+
+
+@pytest.mark.parametrize("pace", WIDE.values())
+@given(edges=st.lists(st.floats(2.0, 9e4), min_size=2, max_size=6), softest=st.booleans())
+def test_of_rivals_the_one_that_counts_is_found_as_if_it_were_alone(pace, edges, softest):
+    cells = {str(i): lambda k, _, edge=edge: k < edge for i, edge in enumerate(edges)}
+    found = limits_of(cells, 300.0, pace, rivals=lambda name: "all", softest=softest)
+    true = dict(zip(found, edges, strict=True))
+    pick = min if softest else max
+    counts = pick(found, key=lambda name: found[name].not_steady_N_m if softest else found[name].stiffness_N_m)
+    assert true[counts] == pytest.approx(pick(edges), rel=pace.tolerance)
+    assert found[counts].is_within(pace.tolerance)
+    for name, limit in found.items():
+        assert limit.stiffness_N_m < true[name] <= limit.not_steady_N_m
+
+
+def test_a_rival_that_fails_a_thorough_look_gives_way_to_the_next():
+    cells = {"promising": lambda k, waits: k < (100.0 if waits else 1000.0), "sound": lambda k, _: k < 400.0}
+    found = limits_of(cells, 300.0, QUICK, rivals=lambda name: "")
+    assert found["sound"].is_within(QUICK.tolerance)
+    assert found["sound"].stiffness_N_m == pytest.approx(400.0, rel=0.02)
+    assert found["promising"].not_steady_N_m <= found["sound"].stiffness_N_m
 
 
 def test_a_softer_wall_that_is_not_steady_lowers_the_limit_and_what_lies_above_is_told():
@@ -62,7 +106,9 @@ def test_where_the_loop_is_linear_the_limit_found_by_runs_is_that_of_the_exact_m
     asked = tasks(read, has_task=False)
     exact = OneTickMap.of({**read, "dissipation": elements}).stiffness_limit()
     with Judge(KINDS, workers=1) as judge:
-        found = largest({"": Loops(lambda k: asked.of(k, elements), 300.0, 1e5)}, judge.judged, QUICK)[""]
+        found = largest(
+            {"": Loops(lambda k, thorough: asked.of(k, elements, None, thorough), 300.0, 1e5)}, judge.judged, QUICK
+        )[""]
     assert found.stiffness_N_m <= exact * (1.0 + 1e-6)
     assert found.not_steady_N_m >= exact * (1.0 - QUICK.tolerance)
 
@@ -70,9 +116,10 @@ def test_where_the_loop_is_linear_the_limit_found_by_runs_is_that_of_the_exact_m
 def test_a_fifth_more_delay_takes_what_gil_et_al_2009_say():
     read = scene(**DEVICE, wall={"position": 0.0, "stiffness": 100.0})
     asked = tasks(read, has_task=False)
+    changes = {factor: Change("delay", factor) for factor in (1.0, 1.2)}
     cells = {
-        factor: Loops(lambda k, factor=factor: asked.of(k, [], Change("delay", factor).on), 500.0, 1e5)
-        for factor in (1.0, 1.2)
+        factor: Loops(lambda k, _, change=change: asked.of(k, [], change.on), 500.0, 1e5)
+        for factor, change in changes.items()
     }
     with Judge(KINDS, workers=1) as judge:
         found = largest(cells, judge.judged, QUICK)

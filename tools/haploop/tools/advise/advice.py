@@ -8,8 +8,9 @@ from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
 from haploop.tools.advise.buzz import STEPS_BEYOND, Buzz, Without, why
-from haploop.tools.advise.gains import Gains, Safe, Search
+from haploop.tools.advise.gains import Gains, Search
 from haploop.tools.advise.largest import Limit
+from haploop.tools.advise.margins import Margins, Safe
 from haploop.tools.advise.tasks import Tasks, tasks, with_wall
 from haploop.tools.advise.variations import DELAY, SHARE, delay_s, quantities
 from haploop.tools.advise.words import buzz_sentences, gain_sentences
@@ -77,8 +78,9 @@ def advice(
     scene = asked.first
     search = Search(asked, judge, stage)
     gains = search.families()
-    search.uncertain(gains)
-    safe = search.safe(gains)
+    margins = Margins(search)
+    margins.uncertain(gains)
+    safe = margins.safe(gains)
     placed = [_placed(scene, found) for found in gains]
     notes += _rounding(scene)
     return Advice(
@@ -192,12 +194,12 @@ def _gains_data(gains: Gains, exact_N_m: float | None, bounds: list[Bound]) -> d
         "bounds": [asdict(bound) for bound in bounds],
         "with_a_fifth_more_or_less": {
             "parameters": _parameters(gains, gains.safe_values),
-            "alone_N_m": {change.words: limit.stiffness_N_m for change, limit in gains.alone.items()},
+            "alone": {change.words: _ends_data(limit) for change, limit in gains.alone.items()},
             "worst_corner": gains.corner,
             "stiffness_N_m": gains.safe.stiffness_N_m,
         },
         "tried": [
-            {"parameters": _parameters(gains, values), "stiffness_N_m": limit.stiffness_N_m}
+            {"parameters": _parameters(gains, values), **_ends_data(limit)}
             for values, limit in sorted(gains.tried.items())
         ],
     }
@@ -208,11 +210,12 @@ def _parameters(gains: Gains, values: tuple[float, ...]) -> dict[str, float]:
 
 
 def _limit_data(limit: Limit) -> dict[str, Any]:
-    return {
-        "stiffness_N_m": limit.stiffness_N_m,
-        "not_steady_N_m": limit.not_steady_N_m,
-        "steady_above_N_m": list(limit.islands_N_m),
-    }
+    return {**_ends_data(limit), "steady_above_N_m": list(limit.islands_N_m)}
+
+
+def _ends_data(limit: Limit) -> dict[str, Any]:
+    """Of what was not the best, or not the worst, they are as far apart as it took to tell."""
+    return {"stiffness_N_m": limit.stiffness_N_m, "not_steady_N_m": limit.not_steady_N_m}
 
 
 def _buzz_data(buzz: Buzz) -> dict[str, Any]:

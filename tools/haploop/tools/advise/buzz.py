@@ -9,15 +9,13 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from haploop.tools.advise.effects_off import Cause, causes, freed
-from haploop.tools.advise.largest import LEAST_N_M, Limit, Loops, Pace, largest
-from haploop.tools.advise.steady import is_cheap
+from haploop.tools.advise.largest import LEAST_N_M, Limit, Loops, largest
+from haploop.tools.advise.pace import WIDE, way
 
 if TYPE_CHECKING:
     from haploop.tools.advise.steady import Judge
 
 Scene = dict[str, Any]
-# The stiffnesses tried, against that of the scene.
-_QUICK, _SLOW = Pace((1 / 8, 1 / 4, 1 / 2, 1.0, 2.0, 4.0, 8.0), 5, 0.02), Pace((1.0,), 1, 0.05)
 # A wall beyond the largest that is steady buzzes, or the next one does where this one stands on an island.
 STEPS_BEYOND = 1.1, 1.3, 1.6, 2.0
 _MOST_FACTOR = 1000.0
@@ -84,11 +82,11 @@ def why(scene: Scene, judge: Judge, stage: Callable[[str], object] = lambda name
     found = causes(scene)
     parts = [cause for cause in found if not cause.is_element]
     [itself] = judge.judged([scene], energy=True)
-    quick = is_cheap(scene)
+    pace = WIDE[way(scene)]
     sets: dict[tuple[Cause, ...], Scene] = {(cause,): freed(scene, [cause]) for cause in found}
     cells: dict[Any, Loops] = {names: _loops(made) for names, made in sets.items()}
     cells[()] = _loops(scene)
-    limits = largest(cells, judge.judged, _QUICK if quick else _SLOW)
+    limits = largest(cells, judge.judged, pace)
     judged = dict(zip(sets, judge.judged(list(sets.values())), strict=True))
     leaks = _leaks(itself.summary)
 
@@ -142,14 +140,16 @@ def _fewest(scene: Scene, parts: list[Cause], judge: Judge) -> list[tuple[tuple[
         ]
         if steady:
             cells = {some: _loops(free) for some, free, _ in steady}
-            limits = largest(cells, judge.judged, _QUICK if is_cheap(scene) else _SLOW)
+            limits = largest(cells, judge.judged, WIDE[way(scene)])
             return [(some, judgement, limits[some]) for some, _, judgement in steady]
     return []
 
 
 def _loops(scene: Scene) -> Loops:
     stiffness = max(LEAST_N_M, scene["wall"]["stiffness"])
-    return Loops(lambda k: [{**scene, "wall": {**scene["wall"], "stiffness": k}}], stiffness, _MOST_FACTOR * stiffness)
+    return Loops(
+        lambda k, _: [{**scene, "wall": {**scene["wall"], "stiffness": k}}], stiffness, _MOST_FACTOR * stiffness
+    )
 
 
 def _leaks(summary: dict[str, Any]) -> dict[str, tuple[float, float]]:

@@ -21,8 +21,9 @@ _WIDTH_IN, _ROW_IN, _BESIDE_IN = 12.5, 0.44, 1.6
 _BAR = 0.62
 # Colour and dashes of each bound, in the order in which they first apply.
 _BOUNDS = ("#D55E00", "#CC79A7", "#009E73", "#E69F00")
-# Letters of a sentence on a line.
-_LINE = 125
+_DASHES = ((), (2.0, 2.0), (1.0, 3.0))
+# Letters of a sentence on a line; as many times an end as words beside it may cover.
+_LINE, _CLOSE = 125, 2.2
 
 
 def draw(found: Advice, target: Path) -> Path:
@@ -62,14 +63,16 @@ def _gains(ax: Axes, found: Advice) -> None:
         if gains.family.parts and gains.limit.stiffness_N_m:
             words += f" with {gains.family.words(gains.values)}"
         if gains is found.safe.gains and found.safe.stiffness_N_m:
-            words += f"; use {stiff(found.safe.stiffness_N_m)}"
+            words += f"\nuse {stiff(found.safe.stiffness_N_m)}"
             words += f" with {gains.family.words(gains.safe_values)}" * (gains.safe_values != gains.values)
         lines = [found.exact_N_m[row], *(bound.stiffness_N_m for bound in found.bounds[row])]
         right = max([end, safe, *(value / 1e3 for value in lines if value)])
         _beside(ax, right, row, words, gains is found.safe.gains)
     _bounds(ax, found)
     _dress(ax, [gains.family.name for gains in found.gains], f"{found.name}: the largest steady wall")
-    _scale(ax, [gains.limit.stiffness_N_m for gains in found.gains] + [g.safe.stiffness_N_m for g in found.gains])
+    lines = [bound.stiffness_N_m for bounds in found.bounds for bound in bounds] + found.exact_N_m
+    ends = [end for gains in found.gains for end in (gains.limit.stiffness_N_m, gains.safe.stiffness_N_m)]
+    _scale(ax, ends + [value for value in lines if value])
     _below(ax, gain_sentences(found))
     _legend(ax)
 
@@ -99,7 +102,8 @@ def _bounds(ax: Axes, found: Advice) -> None:
                 continue
             new = name not in colours
             colours.setdefault(name, INK if name.startswith("exact") else _BOUNDS[len(colours) % len(_BOUNDS)])
-            dashes = (2, 1.2) if name.startswith("exact") else ()
+            # One that lies upon another leaves it to be seen.
+            dashes = (2, 1.2) if name.startswith("exact") else _DASHES[list(colours).index(name) % len(_DASHES)]
             [line] = ax.plot(
                 [stiffness / 1e3] * 2, [row - 0.46, row + 0.46], color=colours[name], linewidth=1.8, zorder=4
             )
@@ -114,13 +118,14 @@ def _causes(ax: Axes, buzz: Buzz) -> None:
     rows = _rows(buzz)
     names = ["as it is", *(" and ".join(f"without {name}" for name in without.names) for without in rows)]
     limits = [buzz.limit, *(without.limit for without in rows)]
+    wall = buzz.stiffness_N_m / 1e3
     for row, limit in enumerate(limits):
         assert limit
         cures = limit.stiffness_N_m >= buzz.stiffness_N_m
         end = limit.stiffness_N_m / 1e3
         ax.barh(row, end, _BAR, color=VERDICTS["steady"] if cures else "#D9B08C")
-        _beside(ax, end, row, largest(limit))
-    wall = buzz.stiffness_N_m / 1e3
+        # The words begin beyond the line of the wall where it would run through them.
+        _beside(ax, wall if end < wall < _CLOSE * end else end, row, largest(limit))
     ax.axvline(wall, color=VERDICTS["diverged"], linewidth=1.4, label=f"its wall, {stiff(buzz.stiffness_N_m)}")
     _dress(ax, names, _title(buzz))
     _scale(ax, [buzz.stiffness_N_m, *(limit.stiffness_N_m for limit in limits if limit)])

@@ -49,7 +49,7 @@ def advise(request: Request, as_json: bool) -> None:
     from haploop.launch.output import make_output
     from haploop.tools.advise.advice import advice
     from haploop.tools.advise.steady import Judge
-    from haploop.tools.advise.subject import NotFound, subject
+    from haploop.tools.advise.subject import WrongAsk, subject
 
     if request.workers is not None and request.workers < 1:
         leave(f"--workers must be at least 1, but {request.workers} was given.", WRONG_USE)
@@ -57,7 +57,7 @@ def advise(request: Request, as_json: bool) -> None:
         kinds = kinds_with(request.plugins)
         try:
             asked = subject(request.device, request.hand, request.delay, request.estimator, request.overrides, kinds)
-        except NotFound as error:
+        except WrongAsk as error:
             leave(str(error), WRONG_USE)
         try_out(elements_of(asked.scene), kinds)
         print_notes(asked.scene)
@@ -66,7 +66,9 @@ def advise(request: Request, as_json: bool) -> None:
             with _progress() as (stage, told), Judge(kinds, request.plugins, request.workers, told) as judge:
                 found = advice(asked, kinds, judge, stage)
         except KeyboardInterrupt:
-            leave(f"Interrupted; nothing was written to {out}.", FAILED)
+            if request.out is None:
+                out.rmdir()
+            leave(f"Interrupted; nothing was written{f' to {out}' if request.out else ''}.", FAILED)
     data = _written(found, out)
     if as_json:
         print_json(data)

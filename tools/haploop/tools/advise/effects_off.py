@@ -9,6 +9,7 @@ from typing import Any
 from haploop.plant.sensors import accelerometer_is_used
 
 Scene = dict[str, Any]
+SAMPLING = "sampling and hold"
 
 
 @dataclass(frozen=True)
@@ -33,15 +34,16 @@ class Cause:
 def causes(scene: Scene) -> list[Cause]:
     """All that a resolved scene has of them."""
     tables = scene.get("dissipation", [])
+    kinds = [table["kind"] for table in tables]
     elements = [
-        Cause(_element(i, table["kind"], len(tables)), "left out", _without_element(i), is_element=True)
+        Cause(_element(i, table["kind"], kinds.count(table["kind"])), "left out", _without_element(i), is_element=True)
         for i, table in enumerate(tables)
     ]
     return [cause for cause in (*_CAUSES, *elements) if cause.off(scene) is not None]
 
 
 def _element(index: int, kind: str, count: int) -> str:
-    """Its kind, with its number where there are several."""
+    """Its kind, with its number where there are several of it."""
     return kind.replace("-", " ") + (f" (element {index})" if count > 1 else "")
 
 
@@ -158,7 +160,7 @@ def _without(scene: Scene, name: str, key: str | None = None) -> Scene:
 
 
 _CAUSES = (
-    Cause("sampling and hold", "controlled at every plant step", _sampling, "sampling_and_hold_J"),
+    Cause(SAMPLING, "controlled at every plant step", _sampling, "sampling_and_hold_J"),
     Cause("quantisation", "positions that are not rounded", _quantisation, "quantisation_J"),
     Cause("delay", "no delay", _delay, "delay_J"),
     Cause("estimator lag", "plain differences, ideal accelerometer", _lag),

@@ -72,7 +72,10 @@ class Grid:
 
 
 FINE = Grid(damping=(8, 2.0), mass=(5, 2.0), both=(4, 2.0), refined=2, finalists=3)
+MIDDLE = Grid(damping=(6, 2.5), mass=(4, 2.5), both=(3, 2.5), refined=1, finalists=2)
 COARSE = Grid(damping=(5, 3.0), mass=(4, 3.0), both=(2, 3.0), refined=1, finalists=2)
+# By the way the scenes run.
+GRIDS = {"arrays": FINE, "friction": MIDDLE, "alone": COARSE}
 
 
 def first_choices(family: Family, scene: Scene, grid: Grid) -> list[tuple[float, ...]]:

@@ -18,20 +18,22 @@ if TYPE_CHECKING:
     from haploop.tools.advise.advice import Advice
     from haploop.tools.advise.buzz import Buzz
     from haploop.tools.advise.gains import Gains
+    from haploop.tools.advise.largest import Limit
     from haploop.tools.bounds import Bound
 
 _READING = (
-    "Steady: the verdict of every run of the task, at this stiffness and at softer ones; swings that die away are "
-    "followed longer, in a linear loop by the exact map. Alone: with the one quantity, 20 % off, that takes most. "
-    "Safe: with all of them off, in the corners that are likely the worst."
+    "Steady: every run of the task comes to rest, at this stiffness and at softer ones; swings that die away are "
+    "followed longer, in a linear loop by the exact map. One 20 % off: the one quantity that then takes most. All 20 % "
+    "off: the combinations that are likely the worst, with the gains that bear them best."
 )
 
 
 def report(found: Advice) -> RenderableType:
     """Everything."""
+    judged = f"Judged by {found.tasks.words}; limits to {100.0 * found.tolerance:.0f} %, {found.runs} runs."
     parts: list[RenderableType] = [
         Text(f"{found.name}: the largest steady wall", style="bold"),
-        Text(f"Judged by {found.tasks.words}; limits to {found.tolerance:.0%}, {found.runs} runs.", style="dim"),
+        Text(judged, style="dim"),
         *(Text(note, style="dim") for note in found.notes),
         gains_table(found),
         *_islands(found.gains),
@@ -46,36 +48,34 @@ def report(found: Advice) -> RenderableType:
 
 
 def gains_table(found: Advice) -> Table:
-    """A family a row."""
-    table = _table("element", "with")
-    for name in ("largest", "alone", "safe"):
-        table.add_column(name, justify="right", no_wrap=True)
-    table.add_column("safe with")
+    """A family a row: stiffnesses, and below each the gains, or the change, that it comes with."""
+    table = _table("element")
+    for name in ("largest steady", "one 20 % off", "all 20 % off"):
+        table.add_column(name, justify="right")
     for gains in found.gains:
         worst = gains.worst
-        alone = f"{largest(gains.alone[worst])}\n{worst.words}" if worst else "–"
         row = [
             gains.family.name,
-            gains.family.words(gains.values),
-            largest(gains.limit),
-            alone,
-            largest(gains.safe) if found.uncertain else "–",
-            gains.family.words(gains.safe_values),
+            _with(gains.limit, gains, gains.values),
+            f"{largest(gains.alone[worst])}\n{worst.words}" if worst else "–",
+            _with(gains.safe, gains, gains.safe_values) if found.uncertain else "–",
         ]
         table.add_row(*row, style="bold" if gains is found.safe.gains else "")
     return table
 
 
+def _with(limit: Limit, gains: Gains, values: tuple[float, ...]) -> str:
+    has_values = bool(values and limit.stiffness_N_m)
+    return largest(limit) + f"\n{gains.family.words(values)}" * has_values
+
+
 def _islands(found: list[Gains]) -> list[Text]:
-    return [
-        Text(
-            f"With {gains.family.phrase(gains.values)}, some stiffer walls are steady all the same, up to "
-            f"{stiff(max(gains.limit.islands_N_m))}.",
-            style="dim",
-        )
+    told = [
+        f"with {gains.family.name} up to {stiff(max(gains.limit.islands_N_m))}"
         for gains in found
         if gains.limit.islands_N_m
     ]
+    return [Text(f"Some stiffer walls are steady all the same: {', '.join(told)}.", style="dim")] if told else []
 
 
 def bounds_table(found: Advice) -> Table:
@@ -105,8 +105,9 @@ def why_table(buzz: Buzz) -> RenderableType:
     """A cause a row."""
     state = "is steady" if buzz.steady else "buzzes"
     head = f"{buzz.scene['title']}: a wall of {stiff(buzz.stiffness_N_m)} {state}"
-    table = _table("without", "instead", "verdict")
-    for name in ("swing", "largest steady", "its part of the leak"):
+    table = _table("without", "instead")
+    table.add_column("verdict", no_wrap=True)
+    for name in ("swing", "largest\nsteady", "its part\nof the leak"):
         table.add_column(name, justify="right", no_wrap=True)
     table.add_row(
         "as it is", "", _verdict(buzz.steady, buzz.verdict), _swing(buzz.oscillation_m), largest(buzz.limit), ""
@@ -137,5 +138,5 @@ def _swing(oscillation_m: float) -> str:
 def _table(*names: str) -> Table:
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 1, 0, 0))
     for name in names:
-        table.add_column(name)
+        table.add_column(name, overflow="fold", min_width=min(14, max(map(len, names))))
     return table

@@ -9,12 +9,13 @@ from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
 
-from haploop.launch.array_run import run_array
-from haploop.launch.array_scene import runs_in_arrays
-from haploop.logger.window import SMALLEST_SWING_M
+from haploop.launch.array_run import groups
+from haploop.logger.verdict import SMALLEST_SWING_M
+from haploop.tools.advise.pace import way
+from haploop.tools.advise.runs import Runs
+from haploop.tools.advise.tasks import is_held_by
 from haploop.tools.linearity import is_linear
 from haploop.tools.one_tick import OneTickMap
-from haploop.tools.sweep.pool import Pool
 
 if TYPE_CHECKING:
     from haploop.controller.dissipation import Element
@@ -22,12 +23,10 @@ if TYPE_CHECKING:
 Scene = dict[str, Any]
 # A run whose swings would die away within so many times its duration is run again, so long; alone the first only.
 LONGER = 2, 4, 8
-# Swings that die away by less than this a second may as well not.
-_DYING_1_S = 0.02
-# Processor seconds a tick of a loop in an array and alone, about; fewer seconds than this are not worth a worker.
-_ARRAY_S, _ALONE_S, _WORTH_S = 5e-7, 1.2e-4, 2.0
-# Without energy books, so many loops of one structure are already sooner run in an array.
-_FEWEST = 4
+# Swings that die away by less than this a second may as well not; by more than this, they may be soon gone.
+_DYING_1_S, _SURELY_DYING_1_S = 0.02, 1.0
+# Seconds after which loops with friction are looked at first, where so many are alike: their swings cost most.
+GLANCE_S, _WORTH_A_GLANCE = 0.25, 8
 
 
 @dataclass(frozen=True)
@@ -64,10 +63,8 @@ class Judge:
         workers: int | None = None,
         told: Callable[[int], object] = lambda runs: None,
     ) -> None:
-        self._kinds, self._plugins, self._workers, self._told = kinds, plugins, workers, told
-        self._pool: Pool | None = None
+        self._kinds, self._runs = kinds, Runs(plugins, workers, told)
         self._maps: dict[str, OneTickMap] = {}
-        self.runs = 0
 
     def __enter__(self) -> Self:
         return self
@@ -75,46 +72,53 @@ class Judge:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None:
-        if self._pool:
-            self._pool.__exit__(kind, error, traceback)
+        self._runs.__exit__(kind, error, traceback)
 
-    def judged(self, scenes: Sequence[Scene], energy: bool = False) -> list[Judgement]:
+    @property
+    def runs(self) -> int:
+        """How many were run so far."""
+        return self._runs.count
+
+    def judged(
+        self, scenes: Sequence[Scene], patient: Sequence[bool] | None = None, energy: bool = False
+    ) -> list[Judgement]:
         """What each loop comes to, in order.
 
-        A run whose swings die away too slowly for its duration is repeated as much longer as will do.
+        A run whose swings die away too slowly for its duration is repeated as much longer as will do; one about which
+        nobody is patient is taken as steady then, and ends early where it buzzes for good. All are patient where
+        nothing is said.
         """
-        found = self._results(scenes, energy)
-        needed = [self._needed(scene, result) for scene, result in zip(scenes, found, strict=True)]
+        hasty = {index for index, waits in enumerate(patient or ()) if not waits}
+        found = self._glanced(scenes, hasty)
+        left = [index for index in range(len(scenes)) if index not in found]
+        results = dict(zip(left, self._runs.results([scenes[i] for i in left], energy), strict=True))
+        needed = {index: self._needed(scenes[index], result) for index, result in results.items()}
         for factor in LONGER:
-            again = [index for index, needs in enumerate(needed) if needs == factor]
+            again = [index for index in left if needed[index] == factor and index not in hasty]
             longer = [{**scenes[i], "duration": scenes[i]["duration"] * factor} for i in again]
-            for index, result in zip(again, self._results(longer, energy), strict=True):
-                found[index] = result
-        return [self._judgement(scene, result) for scene, result in zip(scenes, found, strict=True)]
+            results |= zip(again, self._runs.results(longer, energy), strict=True)
+        for index, result in results.items():
+            presumed = index in hasty and needed[index] > 1
+            found[index] = self._judgement(scenes[index], result, presumed)
+        return [found[index] for index in range(len(scenes))]
 
-    def _results(self, scenes: Sequence[Scene], energy: bool) -> list[dict[str, Any]]:
-        if not scenes:
-            return []
-        if sum(map(_seconds, scenes)) < _WORTH_S:
-            found = run_array(scenes, self._kinds, energy=energy, fewest=_FEWEST)
-            self._count(len(scenes))
-            return found
-        self._pool = self._pool or Pool(self._workers)
-        placed: dict[int, dict[str, Any]] = {}
-        for index, result in self._pool.results(scenes, self._plugins, energy=energy):
-            placed[index] = result
-            self._count(1)
-        return [placed[index] for index in range(len(scenes))]
+    def _glanced(self, scenes: Sequence[Scene], hasty: set[int]) -> dict[int, Judgement]:
+        """Those of the hasty ones that buzz already and will not cease, where every start and stop takes its time."""
+        able = [i for i in sorted(hasty) if way(scenes[i]) == "friction" and _can_be_glanced_at(scenes[i])]
+        together = groups([scenes[index] for index in able])
+        looked = [able[place] for group in together if len(group) >= _WORTH_A_GLANCE for place in group]
+        results = self._runs.results([{**scenes[i], "duration": GLANCE_S} for i in looked], energy=False)
+        return {
+            index: Judgement(False, result["verdict"], result["window"]["oscillation_m"], result)
+            for index, result in zip(looked, results, strict=True)
+            if result["ended"] == "done" and _goes_on(result)
+        }
 
-    def _count(self, runs: int) -> None:
-        self.runs += runs
-        self._told(self.runs)
-
-    def _judgement(self, scene: Scene, result: dict[str, Any]) -> Judgement:
+    def _judgement(self, scene: Scene, result: dict[str, Any], presumed: bool) -> Judgement:
         if result["ended"] not in ("done", "diverged"):
             return Judgement(False, result["ended"], math.inf, result)
         verdict = result["verdict"]
-        steady = verdict == "steady" or (verdict == "limit-cycle" and self._will_be(scene, result))
+        steady = presumed or verdict == "steady" or (verdict == "limit-cycle" and self._will_be(scene, result))
         return Judgement(steady, verdict, result["window"]["oscillation_m"], result)
 
     def _needed(self, scene: Scene, result: dict[str, Any]) -> int:
@@ -125,7 +129,7 @@ class Judge:
         least_m = max(SMALLEST_SWING_M, scene.get("encoder", {}).get("resolution", 0.0))
         swing_m = result["window"]["oscillation_m"] / 2.0
         needs_s = result["duration_s"] + math.log(max(1.0, swing_m / least_m)) / rate
-        allowed = [factor for factor in LONGER if is_cheap(scene) or factor == LONGER[0]]
+        allowed = LONGER if way(scene) == "arrays" else LONGER[:1]
         return next((factor for factor in allowed if needs_s <= factor * scene["duration"]), 1)
 
     def _will_be(self, scene: Scene, result: dict[str, Any]) -> bool:
@@ -145,18 +149,17 @@ class Judge:
         return self._maps[key]
 
 
+def _can_be_glanced_at(scene: Scene) -> bool:
+    return scene["duration"] > 2.0 * GLANCE_S and is_held_by(scene, GLANCE_S / 2.0)
+
+
+def _goes_on(result: dict[str, Any]) -> bool:
+    """Whether a short run swings without dying away."""
+    growth = result["window"]["growth_1_s"]
+    return result["verdict"] == "limit-cycle" and growth is not None and growth > -_SURELY_DYING_1_S
+
+
 def _dying_1_s(result: dict[str, Any]) -> float:
     """The rate r of e^(-r t) by which the swings of a limit cycle die away; 0 where they do not."""
     rate = result["window"]["growth_1_s"] if result.get("verdict") == "limit-cycle" else None
     return -rate if rate is not None and rate < -_DYING_1_S else 0.0
-
-
-def _seconds(scene: Scene) -> float:
-    """Processor time a run takes, about."""
-    ticks = scene["duration"] * scene["clock"]["control_rate"]
-    return ticks * (_ARRAY_S if is_cheap(scene) else _ALONE_S)
-
-
-def is_cheap(scene: Scene) -> bool:
-    """Whether many such scenes cost little more than one: they run in arrays, and nothing sticks in between."""
-    return runs_in_arrays(scene) and "friction" not in scene

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from haploop.launch.layers import Layers, read_layers
 from haploop.launch.mistakes import nearest
 from haploop.launch.scene_file import resolved
+from haploop.tools.advise.tasks import MOST_DELAY_S
 from haploop.tools.cost_grid import scenes_folder
 
 if TYPE_CHECKING:
@@ -27,8 +28,8 @@ ESTIMATORS: dict[str, dict[str, dict[str, Any]]] = {
 }
 
 
-class NotFound(ValueError):
-    """No such device, hand or estimator; the message names the nearest."""
+class WrongAsk(ValueError):
+    """No such device, hand or estimator, or none that can be advised on; the message says what is allowed."""
 
 
 @dataclass(frozen=True)
@@ -59,7 +60,7 @@ def subject(
     """The scene that the arguments of the command name.
 
     Raises:
-        NotFound: a name that is none.
+        WrongAsk: a name that is none.
         SceneError: the scene cannot be run.
     """
     path, is_preset = _device(device)
@@ -74,8 +75,10 @@ def subject(
     if is_preset:
         task = {"title": path.stem, "duration": 1.0, "wall": {"position": 0.0, "stiffness": 1000.0}}
         layers.lay(task, str(path))
-    delays = [] if delay is None else [f"clock.round_trip_delay={delay}"]
-    scene = resolved(layers, [*delays, *overrides], kinds)
+    if delay is not None:
+        layers.lay({"clock": {"round_trip_delay": _number_or_text(delay)}}, "--delay")
+    scene = resolved(layers, overrides, kinds)
+    _refuse_too_late(scene["clock"]["round_trip_delay"])
     if scene.get("event"):
         scene = settled(scene)
         notes.append("What the scene's events change is taken as changed from the start.")
@@ -115,7 +118,7 @@ def _device(name: str) -> tuple[Path, bool]:
     devices, scenes = presets("devices"), presets("scenes")
     if name in devices or name in scenes:
         return (devices | scenes)[name], name in devices
-    raise NotFound(_unknown("DEVICE", name, list(devices | scenes), "the path of a scene file"))
+    raise WrongAsk(_unknown("DEVICE", name, list(devices | scenes), "the path of a scene file"))
 
 
 def _lay_hand(layers: Layers, name: str) -> None:
@@ -129,21 +132,36 @@ def _lay_hand(layers: Layers, name: str) -> None:
     path, hands = Path(name), presets("hands")
     if path.suffix != ".toml":
         if name not in hands:
-            raise NotFound(_unknown("--hand", name, [*hands, "none"], "the path of a file with a [hand]"))
+            raise WrongAsk(_unknown("--hand", name, [*hands, "none"], "the path of a file with a [hand]"))
         path = hands[name]
     tables = read_layers(path).data
     if not isinstance(tables.get("hand"), dict):
-        raise NotFound(f"--hand {name} holds no [hand] table.")
+        raise WrongAsk(f"--hand {name} holds no [hand] table.")
     layers.lay({"hand": {**tables["hand"], **kept}}, str(path))
 
 
 def _lay_estimator(layers: Layers, name: str) -> None:
     if name not in ESTIMATORS:
-        raise NotFound(_unknown("--estimator", name, list(ESTIMATORS), ""))
+        raise WrongAsk(_unknown("--estimator", name, list(ESTIMATORS), ""))
     for table in ("velocity", "acceleration"):
         if name != "accelerometer" or table == "acceleration":
             layers.data.pop(table, None)
     layers.lay(ESTIMATORS[name], "--estimator")
+
+
+def _number_or_text(given: str) -> float | str:
+    try:
+        return float(given)
+    except ValueError:
+        return given
+
+
+def _refuse_too_late(delay_s: float) -> None:
+    if delay_s > MOST_DELAY_S:
+        raise WrongAsk(
+            f"The round-trip delay is {delay_s:g} s; advice is given up to {MOST_DELAY_S:g} s. A number without a unit "
+            f'is in seconds: write "{delay_s:g} ms" for milliseconds.'
+        )
 
 
 def _unknown(what: str, name: str, allowed: list[str], other: str) -> str:

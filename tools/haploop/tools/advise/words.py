@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+from haploop.tools.advise.effects_off import SAMPLING
 from haploop.tools.amounts import amount, fixed
 
 if TYPE_CHECKING:
@@ -15,6 +16,8 @@ if TYPE_CHECKING:
 
 # A stiffness this much larger is worth a word.
 _MORE = 1.1
+# Every loop is sampled: that is named before a cause of this loop's own where it allows so many times as much.
+_STANDS_OUT = 2.0
 
 
 def stiff(stiffness_N_m: float) -> str:
@@ -65,9 +68,13 @@ def _others(found: Advice) -> list[str]:
     ]
     if tempting:
         most = max(tempting, key=lambda gains: gains.limit.stiffness_N_m)
+        hardly = most.safe.stiffness_N_m > safe.stiffness_N_m
+        doubt = (
+            f"with 20 % doubt {_at_most(most)}: hardly more" if hardly else f"but with 20 % doubt only {_at_most(most)}"
+        )
         said.append(
             f"With {most.family.phrase(most.values)}, {largest(most.limit)} would be steady in the loop as described, "
-            f"but with 20 % doubt only {_at_most(most)}."
+            f"{doubt}."
         )
     return said
 
@@ -92,6 +99,7 @@ def buzz_sentences(buzz: Buzz) -> list[str]:
     said = []
     if cures:
         first, *others = cures
+        others = [without for without in others if _stands_well(without, buzz)]
         said.append(f"It buzzes because of the {first.names[0]}: without it the wall is steady up to {_up_to(first)}.")
         if others:
             told = _listed([f"without the {w.names[0]} (up to {_up_to(w)})" for w in others])
@@ -157,9 +165,19 @@ def _steady(buzz: Buzz) -> list[str]:
     ]
 
 
+def _stands_well(without: Without, buzz: Buzz) -> bool:
+    """Whether the wall is steady without it by more than a hair."""
+    return bool(without.limit and without.limit.stiffness_N_m > _MORE * buzz.stiffness_N_m)
+
+
 def _ranked(some: list[Without]) -> list[Without]:
-    """Those first without which the stiffest wall is steady."""
-    return sorted(some, key=lambda without: -(without.limit.stiffness_N_m if without.limit else 0.0))
+    """Those first without which the stiffest wall is steady; what every loop has only where it stands out."""
+
+    def stands_out(without: Without) -> float:
+        limit = without.limit.stiffness_N_m if without.limit else 0.0
+        return limit / _STANDS_OUT if SAMPLING in without.names else limit
+
+    return sorted(some, key=stands_out, reverse=True)
 
 
 def _up_to(without: Without) -> str:
