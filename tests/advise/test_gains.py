@@ -70,6 +70,7 @@ def test_no_other_damping_allows_a_much_stiffer_wall_by_the_exact_map(found: Adv
 def test_the_advised_wall_is_steady_in_every_corner_and_not_beyond_the_nearest_instability(found: Advice):
     safe, [tap, press] = found.safe, found.tasks.scenes
     assert safe.nearest
+    assert safe.stiffness_N_m <= safe.gains.tried[safe.gains.safe_values].stiffness_N_m, "nor above its own limit"
     elements = safe.gains.family.elements(safe.gains.safe_values)
     assert safe.corners == 1 + 2 ** len(found.uncertain)
 

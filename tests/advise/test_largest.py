@@ -77,6 +77,20 @@ def test_a_rival_that_fails_a_thorough_look_gives_way_to_the_next():
     assert found["promising"].not_steady_N_m <= found["sound"].stiffness_N_m
 
 
+@pytest.mark.parametrize("are_few", [True, False])
+def test_what_one_run_tells_for_good_is_not_run_again(are_few):
+    tried: list[float] = []
+
+    def judged(looks, _):
+        tried.extend(looks)
+        return [Judgement(k < 700.0, "", 0.0, {}) for k in looks]
+
+    made: Any = lambda k, _: [k]  # noqa: E731
+    found = largest({"": Loops(made, 300.0, 1e5, are_few)}, judged, QUICK)[""]
+    assert found.stiffness_N_m == pytest.approx(700.0, rel=QUICK.tolerance)
+    assert (len(set(tried)) == len(tried)) == are_few
+
+
 def test_a_softer_wall_that_is_not_steady_lowers_the_limit_and_what_lies_above_is_told():
     found = limit_of(lambda k: k < 150.0 or 250.0 < k < 400.0, 300.0, SLOW)
     assert found.stiffness_N_m == pytest.approx(150.0, rel=0.05)

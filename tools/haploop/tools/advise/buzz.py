@@ -147,9 +147,11 @@ def _fewest(scene: Scene, parts: list[Cause], judge: Judge) -> list[tuple[tuple[
 
 def _loops(scene: Scene) -> Loops:
     stiffness = max(LEAST_N_M, scene["wall"]["stiffness"])
-    return Loops(
-        lambda k, _: [{**scene, "wall": {**scene["wall"], "stiffness": k}}], stiffness, _MOST_FACTOR * stiffness
-    )
+
+    def make(k: float, _: bool) -> list[Scene]:
+        return [{**scene, "wall": {**scene["wall"], "stiffness": k}}]
+
+    return Loops(make, stiffness, _MOST_FACTOR * stiffness, are_few=True)
 
 
 def _leaks(summary: dict[str, Any]) -> dict[str, tuple[float, float]]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from haploop.tools.advise.families import (
@@ -121,7 +122,8 @@ class Search:
 
         def loops(family: Family, values: Values) -> Loops:
             elements, start = family.elements(values), max(start_N_m, reached.get(family, 0.0))
-            return Loops(lambda k, thorough: self.tasks.of(k, elements, None, thorough), start, self.most_N_m)
+            make = partial(self.tasks.of, elements=elements)
+            return Loops(lambda k, thorough: make(k, thorough=thorough), start, self.most_N_m, self.tasks.is_one_run)
 
         cells = {choice: loops(*choice) for choice in choices}
         pace = self._beyond if reached else self._wide

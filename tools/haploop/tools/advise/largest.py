@@ -45,11 +45,13 @@ class Loops:
         make: from a stiffness in N/m and whether to be thorough to the runs that must be steady.
         start_N_m: where the limit may be, about.
         most_N_m: nothing stiffer is tried.
+        are_few: whether the runs are the same, thorough or not.
     """
 
     make: Callable[[float, bool], list[Scene]]
     start_N_m: float
     most_N_m: float
+    are_few: bool = False
 
 
 def largest(
@@ -93,11 +95,16 @@ def largest(
             for scene in cells[name].make(k, search.thorough)
         ]
         patient = [asking[name].thorough for name, _, _ in runs]
-        holds: dict[tuple[Any, float], bool] = {}
+        fails, presumed = set[tuple[Any, float]](), set[tuple[Any, float]]()
         for (name, k, _), judgement in zip(runs, judged([scene for *_, scene in runs], patient), strict=True):
-            holds[name, k] = holds.get((name, k), True) and judgement.steady
+            if not judgement.steady:
+                fails.add((name, k))
+            if judgement.presumed:
+                presumed.add((name, k))
         for name, search in asking.items():
-            search.take([holds[name, k] for k in search.wanted])
+            is_sure = search.thorough or cells[name].are_few
+            holds = [(name, k) not in fails for k in search.wanted]
+            search.take(holds, {k for k in search.wanted if is_sure and (name, k) not in presumed})
 
 
 def _best_ends(
@@ -138,11 +145,10 @@ class _Search:
         low, high = self.ends
         return low >= end if softest else high <= end
 
-    def take(self, holds: Iterable[bool]) -> None:
-        """What came of all that was wanted."""
+    def take(self, holds: Iterable[bool], sure: set[float]) -> None:
+        """What came of all that was wanted, and of which of it that is all there is to know."""
         self._tried.update(zip(self.wanted, holds, strict=True))
-        if self.thorough:
-            self._sure.update(self.wanted)
+        self._sure |= sure
         self.wanted = self._nearer() or self._softer()
         if not self.wanted:
             self.thorough = True

@@ -90,6 +90,7 @@ class Margins:
             lambda k, thorough: [run for change in changes for run in self._tasks.of(k, elements, change, thorough)],
             start_N_m=max(LEAST_N_M, gains.tried[values].stiffness_N_m),
             most_N_m=max(LEAST_N_M, min(self._search.most_N_m, most_N_m)),
+            are_few=self._tasks.is_one_run,
         )
 
     def _in_corners(self, gains: Gains, values: Values) -> Loops:
@@ -115,10 +116,10 @@ class Margins:
                     best = gains
             if id(best) in proved:
                 break
+            self._known_well(best)
             proved[id(best)] = holds = self._everywhere(best, every)
             if holds < rounded_down(best.safe.stiffness_N_m):
                 best.safe = Limit(holds, best.safe.stiffness_N_m)
-        self._known_well(best)
         changes = farther(self._tasks.first) if proved[id(best)] else []
         nearest = self._nearest(best, proved[id(best)], changes)
         return Safe(best, proved[id(best)], len(every), nearest, max(changes, key=lambda c: c.size, default=None))
@@ -128,7 +129,8 @@ class Margins:
 
         Corners in which one failed are asked first about the next.
         """
-        stiffness, suspects, times = rounded_down(gains.safe.stiffness_N_m), every, 0
+        most = min(gains.safe.stiffness_N_m, gains.tried[gains.safe_values].stiffness_N_m)
+        stiffness, suspects, times = rounded_down(most), every, 0
         while stiffness >= LEAST_N_M:
             failing = self._failing(gains, stiffness, suspects)
             if not failing and suspects is not every:

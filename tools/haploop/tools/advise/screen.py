@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from haploop.tools.advise.largest import Limit
     from haploop.tools.bounds import Bound
 
+_LONGEST_WORD = len("unidirectional")
 _READING = (
     "Steady: every run of the task comes to rest, at this stiffness and at softer ones; swings that die away are "
     "followed longer, in a linear loop by the exact map. One 20 % off: the one quantity that then takes most. All 20 % "
@@ -57,7 +58,7 @@ def gains_table(found: Advice) -> Table:
         row = [
             gains.family.name,
             _with(gains.limit, gains, gains.values),
-            f"{largest(gains.alone[worst])}\n{worst.words}" if worst else "–",
+            f"{largest(gains.alone[worst])}\n{worst.words}" if worst and gains.limit.stiffness_N_m else "–",
             _with(gains.safe, gains, gains.safe_values) if found.uncertain else "–",
         ]
         table.add_row(*row, style="bold" if gains is found.safe.gains else "")
@@ -107,8 +108,9 @@ def why_table(buzz: Buzz) -> RenderableType:
     head = f"{buzz.scene['title']}: a wall of {stiff(buzz.stiffness_N_m)} {state}"
     table = _table("without", "instead")
     table.add_column("verdict", no_wrap=True)
-    for name in ("swing", "largest\nsteady", "its part\nof the leak"):
+    for name in ("swing", "largest\nsteady"):
         table.add_column(name, justify="right", no_wrap=True)
+    table.add_column("its part\nof the leak", justify="right")
     table.add_row(
         "as it is", "", _verdict(buzz.steady, buzz.verdict), _swing(buzz.oscillation_m), largest(buzz.limit), ""
     )
@@ -138,5 +140,5 @@ def _swing(oscillation_m: float) -> str:
 def _table(*names: str) -> Table:
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 1, 0, 0))
     for name in names:
-        table.add_column(name, overflow="fold", min_width=min(14, max(map(len, names))))
+        table.add_column(name, min_width=_LONGEST_WORD if name == names[0] else None)
     return table

@@ -38,12 +38,14 @@ class Judgement:
         verdict: of the longest run.
         oscillation_m: peak to peak over its window.
         summary: its summary.
+        presumed: whether its swings have still to die away.
     """
 
     steady: bool
     verdict: str
     oscillation_m: float
     summary: dict[str, Any]
+    presumed: bool = False
 
 
 class Judge:
@@ -119,7 +121,7 @@ class Judge:
             return Judgement(False, result["ended"], math.inf, result)
         verdict = result["verdict"]
         steady = presumed or verdict == "steady" or (verdict == "limit-cycle" and self._will_be(scene, result))
-        return Judgement(steady, verdict, result["window"]["oscillation_m"], result)
+        return Judgement(steady, verdict, result["window"]["oscillation_m"], result, presumed)
 
     def _needed(self, scene: Scene, result: dict[str, Any]) -> int:
         """How many times as long a run must be for its swings to die away; 1 where the exact map knows sooner."""

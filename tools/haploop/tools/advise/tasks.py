@@ -50,6 +50,11 @@ class Tasks:
         return [{**scene, "seed": scene["seed"] + i} for scene in varied for i in range(self.seeds if thorough else 1)]
 
     @property
+    def is_one_run(self) -> bool:
+        """Whether one run is all there is to a loop."""
+        return len(self.scenes) == self.seeds == 1
+
+    @property
     def first(self) -> Scene:
         """The scene of the first task, the more demanding one."""
         return self.scenes[0]

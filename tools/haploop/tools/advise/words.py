@@ -47,7 +47,7 @@ def gain_sentences(found: Advice) -> list[str]:
     tried = best.tried[best.safe_values]
     said = [
         f"Render at most {stiff(safe.stiffness_N_m)} with {best.family.phrase(best.safe_values)}: steady{changed}; "
-        f"in the loop as described up to {largest(tried)}."
+        f"in the loop as described up to {_as_far_as(tried)}."
     ]
     return [*said, *_others(found), _nearest(found)]
 
@@ -181,7 +181,12 @@ def _ranked(some: list[Without]) -> list[Without]:
 
 
 def _up_to(without: Without) -> str:
-    return largest(without.limit) if without.limit else "this"
+    return _as_far_as(without.limit) if without.limit else "this"
+
+
+def _as_far_as(limit: Limit) -> str:
+    """As in "up to 1.4 N/mm"."""
+    return stiff(limit.stiffness_N_m) + ("" if math.isfinite(limit.not_steady_N_m) else " and beyond")
 
 
 def share(without: Without) -> str:
