@@ -157,14 +157,19 @@ class Block:
             jnp.maximum(most, x.over(jnp.maximum)),
             jnp.maximum(strongest, abs(held).over(jnp.maximum)),
         )
+        # Nothing is added to the books of a loop that has ended; of all else it keeps what was.
         books = {
-            name: _add(carry.books[name], added[name]) if name in added else carry.books[name] for name in carry.books
+            name: _add(book, jnp.where(carry.running, added[name], 0.0)) if name in added else book
+            for name, book in carry.books.items()
         }
-        changed = Carry(new, carry.running, carry.ticks + 1, extremes, books, told.row["x"], {})
+        changed = Carry(new, carry.running, carry.ticks + 1, extremes, {}, told.row["x"], {})
         stays = jax.tree.map(
-            lambda new, old: jnp.where(carry.running, new, old) if new.ndim else new, changed, carry._replace(past={})
+            lambda new, old: jnp.where(carry.running, new, old) if new.ndim else new,
+            changed,
+            carry._replace(books={}, past={}),
         )
-        return stays._replace(running=carry.running & (abs(x[-1]) <= given.limit_m), past=past), rings
+        running = carry.running & (abs(x[-1]) <= given.limit_m)
+        return stays._replace(running=running, books=books, past=past), rings
 
     def _report(
         self, told: Ticked, x_m_before: Any, before: list[Forces], go: Any

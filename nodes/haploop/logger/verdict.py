@@ -42,9 +42,8 @@ class Shown(NamedTuple):
     swing_m: float
 
     def is_finite(self) -> bool:
-        """Whether every number is."""
-        numbers = [*self.extremes, *self.seen.figures.values()]
-        return all(map(math.isfinite, [number for number in numbers if number is not None]))
+        """Whether every number is, and no sum of them is beyond what a float holds."""
+        return math.isfinite(sum(self.extremes) + sum(filter(None, self.seen.figures.values())))
 
     def verdict(self, diverged: str | None) -> Verdict:
         """Judge it; ``diverged`` is why the plant ended by itself, if it did."""
