@@ -43,6 +43,7 @@ paper: $(READY) ## make every figure of the paper and write docs/paper.md (withi
 	@$(BIN)/haploop paper --out runs/paper
 	@$(BIN)/python -m haploop.tools.paper.page runs/paper docs
 	@cp runs/paper/fig6?_nearest.toml launch/scenes/paper/
+	@cp runs/paper/premium_press.toml launch/scenes/
 
 notebook: $(READY) ## run docs/notebook.ipynb anew and keep its figures
 	@$(BIN)/python -m haploop.tools.notebook docs/notebook.ipynb

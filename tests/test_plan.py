@@ -176,11 +176,10 @@ GOLDEN = {
     "premium_tap": (["device", "hand"], 4, ["hand.grip", "friction", "encoder", "actuator.saturation"]),
     "premium_press": (
         ["motor", "tip", "hand"],
-        18,  # three positions, three velocities, accelerometer, its noise, ten steps of delay
+        11,  # three positions, three velocities, accelerometer, its noise, three steps of delay
         [
             "transmission",
             "hand.grip",
-            "friction",
             "accelerometer.bandwidth",
             "accelerometer.delay",
             "encoder",

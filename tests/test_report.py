@@ -177,6 +177,7 @@ def test_an_amount_means_the_number_it_was_made_of(value: float) -> None:
 def test_amounts_that_no_prefix_suits_or_that_are_none() -> None:
     assert amount(2.75e-18, "J") == "2.75e−18 J"
     assert amount(0.0, "J") == "0 J"
+    assert amount(9.997e-5, "J") == "100 µJ"  # three digits, as rounded
     assert amount(None, "J") == "–"
     assert amount(float("inf"), "J") == "inf J"
     assert [fixed(value) for value in (12345.6, 1.0, -0.5, 0.0)] == ["12346", "1.00", "−0.500", "0"]

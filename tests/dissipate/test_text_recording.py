@@ -81,7 +81,7 @@ def test_recorded_rates_have_the_units_of_the_lengths(tmp_path: Path) -> None:
     layout = Layout(velocity="v", acceleration="a")
     asked: dict[str, Any] = {"dampings": ["1.0"], "masses": ["0.01"]}
     expected = [element.true_J for element in outcome(si, layout=layout, **asked).elements]
-    in_mm = Layout(velocity="v", acceleration="a", length="mm")
+    in_mm = Layout(velocity="v", acceleration="a", length="mm", acceleration_unit="mm/s^2")
     found = outcome(mm, layout=in_mm, **asked)
     assert [element.true_J for element in found.elements] == pytest.approx(expected, rel=1e-9)
     assert found.recorded == ["acceleration", "velocity"]
@@ -161,6 +161,7 @@ def broken(tmp_path: Path, text: str | bytes, layout: Layout | None = None) -> s
         ("t,x\n0,0\n1,1\n", Layout(time="t", rate_Hz=100.0), ["not both"]),
         ("t,x\n0,0\n1,1\n", Layout(length="parsec2"), ["'parsec2' is no unit"]),
         ("t,x\n0,0\n1,1\n", Layout(length="s"), ["'s' is no unit for numbers in m"]),
+        ("t,x,a\n0,0,0\n1,1,0\n", Layout(acceleration="a", length="mm"), ["which unit", "--acceleration-unit"]),
         ("t,x,x\n0,0,0\n1,1,1\n", Layout("x"), ["2 columns 'x'", "by its number"]),
         ("t,x\n0,0\n1e-9,1\n2e-9,1\n", None, ["1e-09 s apart", "--time-unit"]),
         (b"\xff\xfet\x00,\x00x\x00\n\x00", None, ["UTF-8"]),

@@ -37,14 +37,16 @@ def test_the_page_tells_every_finding_by_section_and_what_was_not_made(tmp_path:
         made[number] = {
             "title": f"title {number}", "small": False, "caption": "seen", "notes": ["#### Note"],
             "files": [f"figure_{number}.png", f"figure_{number}.npz"], "findings": [claim.holds("a | b").as_dict()],
+            "answer": f"answer {number}", "seen": {f"figure_{number}.png": f"seen on {number}"},
         }  # fmt: skip
     text = page(made, "paper/")
     rows = [line for line in text.splitlines() if "of figure" in line]
     assert [row.split("of figure ")[1][0] for row in rows] == ["4", "5", "3"]
-    assert all(row.count("|") == 6 for row in rows)  # a stroke within a cell would make a column of its own
+    assert all(row.count("|") == 5 for row in rows)  # a stroke within a cell would make a column of its own
     assert "![title 3](paper/figure_3.png)" in text
     assert "`figure_3.npz`" in text
     assert "#### Note" in text
+    assert max(text.index(f"answer {number}") for number in made) < text.index("of figure 4") < text.index("seen on 3")
     assert "6 (" in next(line for line in text.splitlines() if line.startswith("Not made here"))
     assert "trial" not in text
     assert "trial" in page({3: made[3] | {"small": True}})

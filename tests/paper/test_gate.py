@@ -9,7 +9,7 @@ import pytest
 
 from haploop.controller.dissipation import Motion
 from haploop.controller.dissipation.unidirectional_inertia import UnidirectionalInertia
-from haploop.tools.paper.experiment.gate import always_open_Hz, bidirectional, unidirectional
+from haploop.tools.paper.experiment.gate import always_open_Hz, bidirectional, low_passed_s, unidirectional
 
 PERIOD_S, TICKS, MASS_KG = 1e-3, 40_000, 0.01
 
@@ -67,3 +67,10 @@ def test_a_late_bidirectional_inertia_damps_up_to_half_a_period_of_lag_and_drive
     around = np.array([0.98, 1.02]) * 0.5 / lag_s
     below, above = bidirectional(around, reading_s=0.0, delay_s=0.0016).damping
     assert below > 0.0 > above
+
+
+def test_a_low_pass_ages_what_it_passes_by_its_phase() -> None:
+    """At its cutoff by an eighth of a swing; slow signals by 1 / (2 pi cutoff)."""
+    assert low_passed_s(np.array(50.0), 50.0, 5e-4) == pytest.approx(5e-4 + 1.0 / 400.0)
+    assert low_passed_s(np.array(0.01), 50.0, 0.0) == pytest.approx(1.0 / (2.0 * np.pi * 50.0), rel=1e-4)
+    assert low_passed_s(np.array([3.0, 70.0]), None, 5e-4) == pytest.approx(5e-4)

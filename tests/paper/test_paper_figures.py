@@ -12,7 +12,7 @@ from haploop.tools.paper.command import make_figure
 from haploop.tools.paper.figures import figure
 from haploop.tools.paper.page import page
 from haploop.tools.paper.search import Size, search
-from haploop.tools.paper.work import silent
+from haploop.tools.stages import silent
 
 OURS = (3, 4, 5, 6)
 
@@ -50,7 +50,12 @@ def test_every_file_that_is_named_is_there_and_reads(made) -> None:
 def test_what_sections_ii_to_iv_prove_comes_out_as_proved(made) -> None:
     """The verdicts that closed forms demand; those of Fig. 6 are the search's."""
     verdicts = {entry["quote"]: entry["verdict"] for number in (3, 4, 5) for entry in made[1][number]["findings"]}
-    assert "does not hold here" not in verdicts.values()
+    failing = sorted(quote[:30] for quote, verdict in verdicts.items() if verdict == "does not hold here")
+    assert failing == [
+        "Based on the encoder resolutio",  # a difference is too old whatever the encoder
+        "it would be desirable to use a",  # some lag helps
+        "we use k − 1 step acceleration",  # the present one gives less back
+    ]
     by_start = {quote[:40]: verdict for quote, verdict in verdicts.items()}
     assert by_start["virtual inertia can be considered a pass"] == "holds under a stated assumption"
     assert by_start["the output energy [is] greater than the "] == "holds"
@@ -72,7 +77,6 @@ def test_a_search_is_a_function_of_its_size_and_fixed_seed_alone() -> None:
         "nearest",
         "random",
         "random",
-        "start",
         "refined",
         "neighbour",
     ]

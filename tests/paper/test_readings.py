@@ -15,7 +15,7 @@ from haploop.launch.check import resolve
 from haploop.launch.in_process import run_in_process
 from haploop.launch.layers import Layers
 from haploop.launch.scene_file import load
-from haploop.tools.paper.reading import BASE, BOUNDS, CHOICES, Reading, draw, scene_of
+from haploop.tools.paper.reading import BASE, BOUNDS, CHOICES, SPACE, Reading, draw, scene_of
 from haploop.tools.paper.reading_files import scene_text, write_table
 from haploop.tools.paper.reading_runs import CLAIMS, MOST, SMALL_M, extent, over, shortfalls
 from haploop.tools.paper.scenes import fig6
@@ -125,12 +125,13 @@ def test_readings_together_come_to_what_each_comes_to_alone() -> None:
 
 
 def row(**found: Any) -> dict[str, Any]:
-    return BASE.row() | dict.fromkeys(CLAIMS, 0.0) | found
+    row = BASE.row() | dict.fromkeys(CLAIMS, 0.0) | found
+    return row | {"all": float(any(row[name] for name in CLAIMS))}
 
 
 def test_what_decides_is_the_dimension_whose_options_differ_most() -> None:
     rows = [row(velocity="low-passed") for _ in range(30)] + [row(**{"b large": 1.0}) for _ in range(30)]
-    found = decider(options(rows), "b large")
+    found = decider(options(rows, SPACE), "b large")
     assert found
     assert (found.best.dimension, found.best.name, found.worst.name) == ("velocity", "low-passed", "difference")
     assert found.gap("b large") == 1.0
@@ -139,7 +140,7 @@ def test_what_decides_is_the_dimension_whose_options_differ_most() -> None:
 
 def test_claims_that_never_hold_together_are_found() -> None:
     rows = [row(**{"a small": 1.0}), row(**{"c passive": 1.0})]
-    assert never_together(rows) == [("c passive", "a small")]
+    assert never_together(rows, list(CLAIMS)) == [("c passive", "a small")]
 
 
 def test_the_table_of_readings_reads_back(tmp_path: Path) -> None:

@@ -34,7 +34,8 @@ def fixed(value: float, digits: int = 3) -> str:
     """``digits`` significant digits without powers of ten; digits before the point are never rounded away."""
     if value == 0.0 or not math.isfinite(value):
         return f"{value:g}".replace("-0", "0")
-    before_point = math.floor(math.log10(abs(value))) + 1
+    # Of the number as rounded: 99.97 has three digits before its point.
+    before_point = math.floor(math.log10(abs(float(f"{value:.{max(0, digits - 1)}e}")))) + 1
     text = f"{value:.{max(0, digits - before_point)}f}"
     return text.replace("-", "−")
 

@@ -69,9 +69,11 @@ def dissipate(
     velocity: Annotated[str | None, typer.Option(metavar="COLUMN", help="recorded, not estimated")] = None,
     acceleration: Annotated[str | None, typer.Option(metavar="COLUMN", help="recorded, not estimated")] = None,
     unit: Annotated[
-        str | None, typer.Option(help="of length, such as mm, or metres a count [the header's (unit), m]")
+        str | None, typer.Option(help="of the position, such as mm, or metres a count [the header's (unit), m]")
     ] = None,
     time_unit: Annotated[str | None, typer.Option(help="such as ms [the header's (unit), s]")] = None,
+    velocity_unit: Annotated[str | None, typer.Option(help="such as mm/s [the header's (unit), m/s]")] = None,
+    acceleration_unit: Annotated[str | None, typer.Option(help="such as g_0 [the header's (unit), m/s^2]")] = None,
     wall: Annotated[str | None, typer.Option(metavar="POSITION", help="elements act beyond it only, m or text")] = None,
     occupies: Annotated[str, typer.Option(metavar="below|above", help="which side of it the wall is")] = "below",
     delay: Annotated[str | None, typer.Option(metavar="TIME", help="age of a force as it acts [0; a run's]")] = None,
@@ -93,7 +95,7 @@ def dissipate(
     from haploop.tools.live import seconds
 
     asked = Asked(damping or [], mass or [], element or [], wall, occupies, set or [])
-    layout = Layout(position, time, rate, velocity, acceleration, unit, time_unit)
+    layout = Layout(position, time, rate, velocity, acceleration, unit, time_unit, velocity_unit, acceleration_unit)
     book(Request(recording, asked, layout, seconds(delay, "--delay"), plugin or [], out), json)
 
 

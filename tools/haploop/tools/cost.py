@@ -5,19 +5,18 @@ from __future__ import annotations
 import dataclasses
 import math
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from haploop.launch.mistakes import nearest
 from haploop.tools.ending import FAILED, WRONG_USE, leave, plain_errors, print_json
+from haploop.tools.stages import bars
 
 if TYPE_CHECKING:
     from haploop.tools.cost_data import Cost
     from haploop.tools.cost_grid import Grid
-    from haploop.tools.cost_measure import Measurement, Stage
+    from haploop.tools.cost_measure import Measurement
 
 
 @dataclass(frozen=True)
@@ -74,7 +73,8 @@ def _grids(scenes: list[Path], methods: list[str], rates: list[int]) -> list[Gri
 def _measured(measurement: Measurement, with_prices: bool) -> bool:
     """Measure with progress on a terminal; whether it was interrupted."""
     try:
-        with _progress() as stage:
+        # A thread that drew meanwhile would be measured too.
+        with bars(by_itself=False) as stage:
             measurement.errors(stage)
             measurement.times(stage)
             if with_prices:
@@ -82,41 +82,6 @@ def _measured(measurement: Measurement, with_prices: bool) -> bool:
     except KeyboardInterrupt:
         return True
     return False
-
-
-@contextmanager
-def _progress() -> Iterator[Stage]:
-    """Bars on a terminal, one a stage, with the time left; a line a stage elsewhere.
-
-    They are drawn between measurements only: a thread that did it meanwhile would be measured too.
-    """
-    from rich import progress
-
-    from haploop.tools.report import console
-
-    screen = console(stderr=True)
-    columns = (
-        "{task.description}",
-        progress.BarColumn(),
-        progress.MofNCompleteColumn(),
-        progress.TimeRemainingColumn(),
-    )
-    shown = screen.is_terminal
-    with progress.Progress(*columns, console=screen, disable=not shown, auto_refresh=False) as bars:
-
-        def stage(name: str, count: int) -> Callable[[], None]:
-            if not shown:
-                print(f"{name}: {count}", file=sys.stderr)
-            task = bars.add_task(name, total=count)
-            bars.refresh()
-
-            def advance() -> None:
-                bars.advance(task)
-                bars.refresh()
-
-            return advance
-
-        yield stage
 
 
 def _show(result: Cost, out: Path, as_json: bool) -> None:

@@ -19,6 +19,7 @@ from haploop.tools.cost_times import IN_PROCESS, PROCESSES, Job
 from haploop.tools.machine import commit, machine, source_digest, versions
 from haploop.tools.price_data import as_data
 from haploop.tools.prices import Prices
+from haploop.tools.stages import Stage
 
 if TYPE_CHECKING:
     from haploop.tools.reference import Reference
@@ -29,8 +30,6 @@ _PACKAGES = ("haploop.protocol", "haploop.plant", "haploop.controller", "haploop
 _FILES = ("cost_points.py", "cost_times.py", "operations.py", "trajectory.py", "reference.py")
 # From a scene file and its resolved scene to what its runs are compared with.
 ReferenceFor = Callable[[Path, dict[str, Any]], "Reference"]
-# Announces a stage of so many measurements; what it returns is called after each.
-Stage = Callable[[str, int], Callable[[], None]]
 
 
 class Measurement:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -19,10 +19,8 @@ from haploop.tools.machine import machine, source_digest, versions
 from haploop.tools.operations import operations
 from haploop.tools.price_data import Price, PriceGroup, price
 from haploop.tools.price_jobs import PriceJob, price_jobs
+from haploop.tools.stages import Stage
 from haploop.tools.stiffness_limit import StiffnessLimit, stiffness_limit
-
-# Announces a stage of so many measurements; what it returns is called after each.
-Stage = Callable[[str, int], Callable[[], None]]
 
 _PACKAGES = ("haploop.protocol", "haploop.plant", "haploop.controller", "haploop.logger", "haploop.launch")
 _FILES = ("ablation.py", "cost_times.py", "one_tick.py", "operations.py", "price_jobs.py", "stiffness_limit.py")

@@ -148,7 +148,7 @@ def in_words(outcome: Outcome) -> list[str]:
             "is not booked, and estimates begin anew after."
         )
     if notes.unusable_rows:
-        sentences.append(f"{notes.unusable_rows} rows were left out: a number in them is missing or not finite.")
+        sentences.append(f"Rows left out, since a number in them is missing or not finite: {notes.unusable_rows}.")
     if notes.uneven:
         sentences.append(
             f"{notes.uneven} periods are more than a tenth off the others; estimates take them for equal, as a "

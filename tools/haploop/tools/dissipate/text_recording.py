@@ -30,8 +30,8 @@ class Layout:
     Attributes:
         position, time, velocity, acceleration: names, or numbers from 1.
         rate_Hz: samples a second, where there is no time.
-        length: unit of the position, such as "mm", or metres a unit; also that of the others, a second and a second^2.
-        time_unit: unit of the time.
+        length: unit of the position, such as "mm", or metres a count.
+        time_unit, velocity_unit, acceleration_unit: units of the others.
     """
 
     position: str | None = None
@@ -41,6 +41,8 @@ class Layout:
     acceleration: str | None = None
     length: str | None = None
     time_unit: str | None = None
+    velocity_unit: str | None = None
+    acceleration_unit: str | None = None
 
 
 class TextRecording:
@@ -83,9 +85,12 @@ class TextRecording:
         units = {
             "time": (layout.time_unit, "s"),
             "position": (layout.length, "m"),
-            "velocity": (_per_second(layout.length, 1), "m/s"),
-            "acceleration": (_per_second(layout.length, 2), "m/s^2"),
+            "velocity": (layout.velocity_unit, "m/s"),
+            "acceleration": (layout.acceleration_unit, "m/s^2"),
         }
+        if layout.length:
+            for what in ("velocity", "acceleration"):
+                _refuse_unknown_unit(what, columns.get(what), units[what])
         return columns, {
             what: _scale(units[what][0] or column.unit, units[what][1]) for what, column in columns.items()
         }
@@ -173,11 +178,14 @@ class TextRecording:
                 self.notes.gap(float(before), float(t[at]))
 
 
-def _per_second(length: str | None, power: int) -> str | None:
-    """A unit of velocity (1) or acceleration (2) that goes with one of length."""
-    if length is None or _as_number(length) is not None:
-        return length
-    return f"{length}/s" if power == 1 else f"{length}/s^2"
+def _refuse_unknown_unit(what: str, column: Column | None, unit: tuple[str | None, str]) -> None:
+    """Where the position's unit was said, that of a column beside it is not guessed: an inertial unit has its own."""
+    given, si = unit
+    if column and not given and not column.unit:
+        raise RecordingError(
+            f"In which unit is the {what} in column {column.name}? --unit is that of the position alone; "
+            f"give --{what}-unit, such as {si}."
+        )
 
 
 def _scale(unit: str, si: str) -> float:

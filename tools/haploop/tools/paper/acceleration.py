@@ -20,7 +20,7 @@ IMU = {
     "mount": "tip",
 }  # fmt: skip
 # PHANToM Premium 1.5, one count.
-_COUNT_M = 28.7e-6
+COUNT_M = 28.7e-6
 
 
 def named(cutoff_Hz: float | None) -> str:
@@ -51,20 +51,30 @@ def largest_mass_kg(cutoff_Hz: float | None, stiffness_N_m: float) -> float:
     return low
 
 
+def largest_stiffness_N_m(cutoff_Hz: float | None, mass_kg: float) -> float:
+    """Up to which stiffness, from 0 on, the same loop in contact with a wall stays stable; 0 where it never is."""
+    ranges = OneTickMap.of(_scene(mass_kg, cutoff_Hz)).stable_ranges()
+    return ranges[0][1] if ranges and ranges[0][0] == 0.0 else 0.0
+
+
 def _growth(mass_kg: float, cutoff_Hz: float | None, stiffness_N_m: float) -> float:
+    return OneTickMap.of(_scene(mass_kg, cutoff_Hz)).growth(stiffness_N_m)
+
+
+def _scene(mass_kg: float, cutoff_Hz: float | None) -> dict[str, Any]:
     scene = copy.deepcopy(fig6("c"))
     scene.pop("encoder")
     scene["acceleration"] = {"source": "encoder"} | ({"cutoff": cutoff_Hz} if cutoff_Hz else {})
     scene["dissipation"] = [{"kind": "bidirectional-inertia", "acts": "always", "mass": mass_kg}]
-    return OneTickMap.of(scene).growth(stiffness_N_m)
+    return scene
 
 
-def errors_m_s2() -> dict[str, float]:
+def errors_m_s2(count_m: float = COUNT_M) -> dict[str, float]:
     """RMS error of what the controller takes for the acceleration in one contact, by how it comes to it.
 
     The contact is with the wall alone, so that the motion is the same whatever is made of it.
     """
-    encoder = {"encoder": {"resolution": _COUNT_M, "rounding": "nearest"}}
+    encoder = {"encoder": {"resolution": count_m, "rounding": "nearest"}}
     true = _accelerations(single_contact("true", acceleration={"source": "accelerometer"}, **encoder))
     found = {}
     for cutoff in CUTOFFS_HZ:

@@ -1,4 +1,4 @@
-"""Fig. 10: the stable range of each element, why those of the inertias differ, and what the unknown values change."""
+"""Fig. 10: the stable range of each element, and why those of the two inertias differ."""
 
 from __future__ import annotations
 
@@ -6,16 +6,18 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from haploop.tools.amounts import amount
 from haploop.tools.figure_file import empty_figure
-from haploop.tools.figure_style import ELEMENTS, dress, plain_numbers
+from haploop.tools.figure_style import FAINT, GREY, dress, legend, plain_numbers
 from haploop.tools.paper.claims import Claim, Finding
-from haploop.tools.paper.experiment.finding import under_the_reading
-from haploop.tools.paper.experiment.gate import always_open_Hz, bidirectional, unidirectional
-from haploop.tools.paper.experiment.gate_figure import DELAYS_S, FREQUENCIES_HZ, damps, gate_figure
-from haploop.tools.paper.experiment.influence import influence
+from haploop.tools.paper.colours import COLOURS, SHORT
+from haploop.tools.paper.experiment.gate import always_open_Hz
+from haploop.tools.paper.experiment.gate_figure import DELAYS_S, FREQUENCIES_HZ, OLD_S, damps, felt, gate_figure
+from haploop.tools.paper.experiment.judged import judged, nearest
 from haploop.tools.paper.experiment.limits import swings_at_Hz
-from haploop.tools.paper.experiment.ranges import FELT_M, STIFFNESSES, Range, ranges, with_friction
-from haploop.tools.paper.experiment.setup import KINDS, UNITS, Setup, elements_of
+from haploop.tools.paper.experiment.ranges import FELT_M, STIFFNESSES, Range, ranges
+from haploop.tools.paper.experiment.reading_rows import LOW_KG
+from haploop.tools.paper.experiment.setup import KINDS, Setup, elements_of
 from haploop.tools.paper.work import Work
 
 if TYPE_CHECKING:
@@ -47,127 +49,113 @@ CLAIMS = (WIDE, DAMPING, SIMILAR, LARGER, EXCLUSIVE)
 
 
 def make(work: Work) -> list[Finding]:
-    """Ranges, their limits with friction, the gate, and the readings."""
-    setup = Setup().cheap()
+    """Ranges, and the gate."""
+    setup = nearest(work)
     stiffnesses = STIFFNESSES[::4] if work.small else STIFFNESSES
     found = ranges(work, setup, stiffnesses)
-    limits, swings_m = with_friction(work, found, stiffnesses)
-    work.figure(_drawn(found, stiffnesses), "figure_10")
-    bandwidth, late = UNITS[setup.unit]
-    reading_s = late + (1.0 / (2.0 * np.pi * bandwidth) if bandwidth else 0.0)
-    work.figure(gate_figure(reading_s, setup.delay_s), "figure_10_gate")
+    work.figure(
+        _drawn(found, stiffnesses),
+        "figure_10",
+        "Every mark is a run: full where it ends without vibration, faint where it does not. Vibration is what swings "
+        "beyond one encoder step to either side within the last half second, and does not die down. "
+        "More sizes are tried here than in the search for readings and in Fig. 11, so that a wall may be steadied here "
+        "that is not there.",
+    )
+    work.figure(
+        gate_figure(setup),
+        "figure_10_gate",
+        "What a virtual inertia m comes to at one frequency, w = 2π times it: above in the nearest reading, with its "
+        "delay, unit and low-pass of the velocity; below which inertia damps, over frequency and delay, with "
+        "differences for the velocity.",
+    )
     columns = {"stiffness_N_m": stiffnesses}
     for kind, one in found.items():
         columns |= {f"{kind}_size_N_s_m_or_kg": one.sizes, f"{kind}_steady": one.steady}
     work.data("figure_10", columns)
-    work.scene("figure_10", Setup().scene(5500.0, elements_of(KINDS[3], 0.03)))
-    work.caption = (
-        "A dot is a run that ends without vibration: the verdict `steady`, so that what swings across the encoder's "
-        "step to either side within the last half second, without dying down, is vibration. Encoder of 28.7 um, noise "
-        "and limits of motor and unit are in, friction is not."
-    )
-    words = ", ".join(
-        f"{kind} {without / 1e3:.1f} and {having / 1e3:.1f}" for kind, (without, having) in limits.items()
-    )
-    work.notes.append(
-        "Largest steady stiffness in N/mm without and with the published friction of 48 mN (from the first upwards, "
-        f"at the best sizes): {words}. Friction adds to all of them; the order stays."
-        if _order_stays(limits)
-        else f"Largest steady stiffness in N/mm without and with the published friction of 48 mN: {words}."
-    )
-    work.notes += [_felt_words(found, swings_m), _gate_words(reading_s, setup), influence(work)]
-    return _findings(found, limits, stiffnesses)
-
-
-def _order_stays(limits: dict[str, tuple[float, float]]) -> bool:
-    def order(which: int) -> list[str]:
-        return sorted(KINDS[1:], key=lambda kind: limits[kind][which])
-
-    return order(0) == order(1) and all(having >= without for without, having in limits.values())
+    work.scene("figure_10", setup.scene(4500.0, elements_of(KINDS[3], 0.009)))
+    work.notes = [_why(setup), _felt(found)]
+    work.answer = _answer(found, stiffnesses)
+    return _findings(work, found, stiffnesses)
 
 
 def _drawn(found: dict[str, Range], stiffnesses: np.ndarray) -> Figure:
     figure = empty_figure(13.0, 4.6)
-    axes = figure.subplots(1, 3, sharey=True)
-    _dots(axes[0], "damping", "damping (N s/m)", stiffnesses, [(found[KINDS[1]], ELEMENTS[0], "o", "damping")], 1.0)
-    two = (found[KINDS[2]], "#0072B2", "o", "bidirectional"), (found[KINDS[3]], ELEMENTS[0], ".", "unidirectional")
-    _dots(axes[1], "inertia", "inertia (g)", stiffnesses, list(two), 1e3)
-    both = found[KINDS[2]].steady + 2 * found[KINDS[3]].steady
-    ax = axes[2]
-    for code, colour, label in (
-        (1, "#0072B2", "bidirectional only"),
-        (2, ELEMENTS[0], "unidirectional only"),
-        (3, "#999999", "both"),
-    ):
-        rows, columns = np.nonzero(both == code)
-        ax.plot(
-            1e3 * found[KINDS[2]].sizes[columns], stiffnesses[rows] / 1e3, "s", color=colour, markersize=5, label=label
-        )
-    dress(ax, "do the inertias' ranges exclude each other?", "inertia (g)", "")
-    ax.set_xscale("log")
-    plain_numbers(ax.xaxis)
-    ax.legend(fontsize=8, frameon=False, loc="upper left")
+    axes = figure.subplots(1, 4, sharey=True, width_ratios=(1.0, 1.0, 1.0, 1.0))
+    for ax, kind in zip(axes, KINDS[1:], strict=False):
+        _cells(ax, found[kind], stiffnesses, kind)
+    two, one = (found[kind].steady for kind in KINDS[2:])
+    _marks(axes[3], found[KINDS[2]].sizes * 1e3, stiffnesses, two & one, GREY, "both")
+    _marks(axes[3], found[KINDS[2]].sizes * 1e3, stiffnesses, two & ~one, COLOURS[KINDS[2]], "bidirectional only")
+    _marks(axes[3], found[KINDS[2]].sizes * 1e3, stiffnesses, one & ~two, COLOURS[KINDS[3]], "unidirectional only")
+    _dress(axes[3], "which inertia?", "inertia (g)", "")
+    legend(axes[3], loc="upper left", bbox_to_anchor=(0.0, 1.0), ncols=1, framealpha=0.8, edgecolor="none")
+    axes[3].set_xlim(axes[2].get_xlim())
     return figure
 
 
-def _dots(
-    ax: Axes, title: str, label: str, stiffnesses: np.ndarray, drawn: list[tuple[Range, str, str, str]], unit: float
-) -> None:
-    for one, colour, marker, name in drawn:
-        rows, columns = np.nonzero(one.steady)
-        x, y, filled = unit * one.sizes[columns], stiffnesses[rows] / 1e3, "none" if marker == "o" else colour
-        ax.plot(x, y, marker, color=colour, markersize=6, label=name, markerfacecolor=filled)
-    dress(ax, title, label, "wall stiffness (N/mm)")
+def _cells(ax: Axes, one: Range, stiffnesses: np.ndarray, kind: str) -> None:
+    """Full marks for what is steady, faint ones for what was tried besides."""
+    unit, label = (1.0, "damping (N s/m)") if kind == "damping" else (1e3, "inertia (g)")
+    ax.plot(*_points(unit * one.sizes, stiffnesses, ~one.steady), ".", color=FAINT, markersize=2.5)
+    _marks(ax, unit * one.sizes, stiffnesses, one.steady, COLOURS[kind], "")
+    most = one.largest(stiffnesses)
+    _dress(
+        ax, f"{SHORT[kind]}: up to {most / 1e3:.1f} N/mm", label, "wall stiffness (N/mm)" if kind == KINDS[1] else ""
+    )
+
+
+def _marks(ax: Axes, sizes: np.ndarray, stiffnesses: np.ndarray, there: np.ndarray, colour: str, label: str) -> None:
+    ax.plot(*_points(sizes, stiffnesses, there), "s", color=colour, markersize=4.5, label=label)
+
+
+def _points(sizes: np.ndarray, stiffnesses: np.ndarray, there: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    rows, columns = np.nonzero(there)
+    return sizes[columns], stiffnesses[rows] / 1e3
+
+
+def _dress(ax: Axes, title: str, x_label: str, y_label: str) -> None:
+    dress(ax, title, x_label, y_label)
     ax.set_xscale("log")
     plain_numbers(ax.xaxis)
-    ax.set_xlim(unit * drawn[0][0].sizes[0] / 1.3, unit * drawn[0][0].sizes[-1] * 1.3)
-    ax.set_ylim(stiffnesses[0] / 1e3 - 0.4, stiffnesses[-1] / 1e3 + 0.4)
-    ax.legend(fontsize=8, frameon=False, loc="upper left")
 
 
-def _felt_words(found: dict[str, Range], swings_m: np.ndarray) -> str:
+def _felt(found: dict[str, Range]) -> str:
     """How much still moves in what is called steady."""
-    without = np.concatenate([one.swings_m[one.steady] for one in found.values()])
-    words = [
-        f"{name} in {np.sum(of > FELT_M)} of {len(of)}, with {1e6 * np.median(of):.1f} um at the median"
-        for name, of in (("without friction", without), ("with friction", swings_m))
-        if len(of)
-    ]
+    left = np.concatenate([one.swings_m[one.steady] for one in found.values()])
+    if not len(left):
+        return ""
     return (
-        "What the encoder's step alone does: a swing within one step of 28.7 um to either side is steady by the "
-        f"verdict, but a hand feels {1e6 * FELT_M:g} um at 100 Hz (Israr, Choi and Tan 2006: 8.5 um at 20 Hz, 0.06 at "
-        "320 Hz). Of the runs called steady more than that is left over the last half second (drift included): "
-        f"{'; '.join(words)}."
+        "#### What is still felt\n\nA swing within one encoder step of 28.7 µm to either side counts as steady, but a "
+        f"hand feels {1e6 * FELT_M:g} µm at 100 Hz (Israr, Choi and Tan 2006: 8.5 µm at 20 Hz, 0.06 µm at 320 Hz). Of "
+        f"the {len(left)} steady runs {np.sum(left > FELT_M)} still move by more over the last half second, drift "
+        f"included; half of them by more than {amount(float(np.median(left)), 'm', 2)}."
     )
 
 
-def _gate_words(reading_s: float, setup: Setup) -> str:
+def _why(setup: Setup) -> str:
     delay_s = setup.delay_s
     here_Hz = [swings_at_Hz(setup, stiffness) for stiffness in (2500.0, 7000.0)]
-    two, one = (
-        float(of(np.array(np.mean(here_Hz)), reading_s=reading_s, delay_s=delay_s).damping)
-        for of in (bidirectional, unidirectional)
-    )
-    ideal, here = damps(0.0), damps(reading_s)
+    two, one = (float(of.damping) for of in felt(setup, np.array(np.mean(here_Hz))))
     row = int(np.argmin(abs(DELAYS_S - delay_s)))
+    ideal, old = damps(0.0)[row], damps(OLD_S)[row]
     return (
-        "Why the ranges of the two inertias need not overlap: a virtual inertia in a loop with lag damps, and it is "
-        "that damping that steadies. What arrives psi = w (reading's age + delay + T/2) late damps m w sin(psi) if "
-        "bidirectional; the gate of eq. 9 leaves 0.59 of the force and adds a lag of atan(2 / pi) = 32 degrees, both "
-        "where nothing else lags (`experiment/gate.py` has the formula for all else). Without lag only the "
-        "unidirectional inertia damps, m w / pi. With lag the bidirectional one damps, too, and more per kilogram, so "
-        "that it needs less inertia; and the unidirectional one, being later, turns from damping to driving at a lower "
-        "frequency, or at a higher one where the reading's age has turned the gate. Between the two turns the ranges "
-        f"exclude each other. With an ideal reading and {1e3 * delay_s:g} ms of delay bidirectional inertia alone "
-        f"damps at {_bands(ideal[row], 1)}, unidirectional alone at {_bands(ideal[row], 2)}; with a reading "
-        f"{1e3 * reading_s:.2f} ms old (the unit's filter taken as a delay) at {_bands(here[row], 1)}, and at "
-        f"{_bands(here[row], 2)}. The gate opens for longer the older the reading, until at "
-        f"{always_open_Hz(reading_s=reading_s):.0f} Hz it never closes: there "
-        "the two are one and the same. So they are where the velocity reads 0, within one step of the encoder, since "
-        "eq. 9 has >= 0: a swing of less than a count meets a bidirectional inertia. In this reading the walls of 2.5 "
-        f"to 7 N/mm swing at {here_Hz[0]:.0f} to {here_Hz[1]:.0f} Hz where nothing steadies them. There the "
-        f"bidirectional inertia damps {two:.2f} m w and the unidirectional {one:.2f} m w. Ranges that exclude each "
-        "other ask for swings nearer to where one of them drives: a stiffer contact or more lag than this reading has."
+        "#### Why the ranges of the two inertias can exclude each other\n\n"
+        "A virtual inertia that acts late damps, and that damping steadies. Late by ψ = w (age of the reading + delay "
+        "+ T/2), the bidirectional one damps m w sin ψ: nothing without lag, most at a quarter of a swing; from half a "
+        "swing on it drives. The gate of eq. 9 lets 0.59 of the force through and adds a lag of atan(2/π) = 32 degrees "
+        "(where nothing else lags; `experiment/gate.py` has the formula for all else). So without lag only the "
+        "unidirectional one damps, m w/π; with lag both do, the bidirectional more per kilogram; and they turn from "
+        "damping to driving at different frequencies. Between the two turns one damps and the other drives: there the "
+        "ranges exclude each other.\n\n"
+        f"With {1e3 * delay_s:g} ms of delay and an ideal reading bidirectional inertia alone damps at "
+        f"{_bands(ideal, 1)}, unidirectional alone at {_bands(ideal, 2)}; with a reading {1e3 * OLD_S:.2f} ms old, as "
+        f"of an MPU-9250 at 420 Hz, at {_bands(old, 1)}, and at {_bands(old, 2)}. The gate stays open longer the older "
+        f"the reading: with this one it never closes at {always_open_Hz(reading_s=OLD_S):.0f} Hz, where the two are "
+        "the same. They are the same, too, where the velocity reads 0, since eq. 9 has ≥ 0: a swing within one encoder "
+        "step meets a bidirectional inertia.\n\n"
+        f"In the nearest reading walls of 2.5 to 7 N/mm swing at {here_Hz[0]:.0f} to {here_Hz[1]:.0f} Hz where nothing "
+        f"steadies them. There the bidirectional inertia damps {two:.2f} m w and the unidirectional {one:.2f} m w. "
+        "Ranges that exclude each other ask for swings near a turn: a stiffer contact, or more lag."
     )
 
 
@@ -181,34 +169,44 @@ def _bands(codes: np.ndarray, code: int) -> str:
     return f"{' and '.join(bands)} Hz" if bands else "no frequency"
 
 
-def _findings(
-    found: dict[str, Range], limits: dict[str, tuple[float, float]], stiffnesses: np.ndarray
-) -> list[Finding]:
-    counts = {kind: one.steady.sum(axis=1) for kind, one in found.items()}
-    widths = ", ".join(f"{k / 1e3:g}: {n}" for k, n in zip(stiffnesses, counts[KINDS[1]], strict=True) if n)
-    most = {kind: having for kind, (_, having) in limits.items()}
-    said = ", ".join(f"{kind} {without / 1e3:.1f} ({having / 1e3:.1f})" for kind, (without, having) in limits.items())
-    numbers = f"largest steady stiffness in N/mm without (with) friction: {said}"
+def _largest(found: dict[str, Range], stiffnesses: np.ndarray) -> dict[str, float]:
+    return {kind: one.largest(stiffnesses) for kind, one in found.items()}
+
+
+def _answer(found: dict[str, Range], stiffnesses: np.ndarray) -> str:
+    most = _largest(found, stiffnesses)
+    said = ", ".join(f"{SHORT[kind]} {most[kind] / 1e3:.1f}" for kind in KINDS[1:])
+    return (
+        f"**Inertia needs the right size.** In the reading nearest to the paper the stiffest steady wall is, in N/mm: "
+        f"nothing {most['nothing'] / 1e3:.1f}, {said}. Which inertia is better hangs on the lag: late inertia damps, "
+        "and the gate of eq. 9 is a lag of its own"
+    )
+
+
+def _findings(work: Work, found: dict[str, Range], stiffnesses: np.ndarray) -> list[Finding]:
+    most, counts = _largest(found, stiffnesses), {kind: one.steady.sum(axis=1) for kind, one in found.items()}
     damping = counts[KINDS[1]]
+    widths = ", ".join(f"{n} at {k / 1e3:g}" for k, n in zip(stiffnesses, damping, strict=True) if n)
+    numbers = "largest steady stiffness in N/mm: " + ", ".join(f"{SHORT[k]} {of / 1e3:.1f}" for k, of in most.items())
     shrinks = bool(damping[0] > 0 and (np.diff(damping) <= 1).all() and damping[-1] < damping[0])
     two, one = found[KINDS[2]].steady, found[KINDS[3]].steady
-    low = found[KINDS[2]].sizes <= 0.01
+    low = found[KINDS[2]].sizes <= LOW_KG
     cells = np.array([two & ~one, one & ~two, two & one])
+    alone, shared = cells[:2, :, low].sum(axis=(1, 2)), cells[2][:, low].sum()
     exclusive = (
-        "steady with bidirectional only / unidirectional only / both: {} / {} / {} cells".format(
+        "steady with bidirectional inertia only, unidirectional only, both: {}, {}, {} runs".format(
             *cells.sum(axis=(1, 2))
         )
-        + ", up to 10 g {} / {} / {}".format(*cells[:, :, low].sum(axis=(1, 2)))
-        + "; where and why they can exclude each other is below"
+        + f", up to {1e3 * LOW_KG:g} g {alone[0]}, {alone[1]}, {shared}; why they can, below the figure"
     )
-    alone, shared = cells[:2, :, low].sum(axis=(1, 2)), cells[2][:, low].sum()
     is_exclusive = bool((alone > 0).all() and shared == 0)
     wider = counts[KINDS[3]].sum() > counts[KINDS[2]].sum() and most[KINDS[3]] > most[KINDS[2]]
-    cells_said = f"{numbers}; steady cells {counts[KINDS[3]].sum()} against {counts[KINDS[2]].sum()}"
+    cells_said = f"{numbers}; steady runs {counts[KINDS[3]].sum()} against {counts[KINDS[2]].sum()}"
+    sizes = len(found[KINDS[1]].sizes)
     return [
-        under_the_reading(WIDE, shrinks, f"steady sizes of {len(found[KINDS[1]].sizes)} by N/mm: {widths or 'none'}"),
-        under_the_reading(DAMPING, abs(most[KINDS[1]] - 4500.0) <= 500.0, numbers),
-        under_the_reading(SIMILAR, abs(most[KINDS[2]] - 4500.0) <= 500.0, numbers),
-        under_the_reading(LARGER, wider, cells_said),
-        under_the_reading(EXCLUSIVE, is_exclusive, exclusive),
+        judged(work, WIDE, shrinks, f"steady sizes of {sizes}, by N/mm: {widths or 'none'}", "10 narrows"),
+        judged(work, DAMPING, abs(most[KINDS[1]] - 4500.0) <= 500.0, numbers, "10 damping 4.5"),
+        judged(work, SIMILAR, abs(most[KINDS[2]] - 4500.0) <= 500.0, numbers, "10 bidirectional 4.5"),
+        judged(work, LARGER, wider, cells_said, "10 larger"),
+        judged(work, EXCLUSIVE, is_exclusive, exclusive, "10 exclusive"),
     ]

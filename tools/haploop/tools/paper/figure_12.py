@@ -6,12 +6,13 @@ from typing import Any
 
 import numpy as np
 
+from haploop.tools.amounts import amount
 from haploop.tools.figure_file import empty_figure
 from haploop.tools.figure_style import legend
 from haploop.tools.paper.claims import Claim, Finding
-from haploop.tools.paper.experiment.finding import under_the_reading
+from haploop.tools.paper.experiment.judged import judged, nearest
 from haploop.tools.paper.experiment.press_figure import Press, draw_press
-from haploop.tools.paper.experiment.setup import Elements, Setup, both
+from haploop.tools.paper.experiment.setup import Elements, both
 from haploop.tools.paper.experiment.tuned import Tuned, tuned
 from haploop.tools.paper.scenes import run
 from haploop.tools.paper.work import Work
@@ -37,16 +38,17 @@ _DAMPINGS, _MASSES = (1.0, 2.15, 3.0, 4.0, 5.5, 7.5), (0.009, 0.014, 0.02, 0.027
 
 
 def best_pair(work: Work) -> tuple[dict[str, Any], Elements]:
-    """The scene with friction and the pair that swings least without it."""
+    """The pair that swings least, and its scene."""
+    setup = nearest(work)
     choices = [both(b, m) for b in _DAMPINGS for m in _MASSES]
     chosen = tuned(
         work,
         "tuning damping with inertia",
-        Setup().cheap(),
+        setup,
         STIFFNESS_N_M,
         choices[2::7] if work.small else choices,
     )
-    return Setup().cheap(work.small).scene(STIFFNESS_N_M, chosen.elements), chosen.elements
+    return setup.scene(STIFFNESS_N_M, chosen.elements), chosen.elements
 
 
 def make(work: Work) -> list[Finding]:
@@ -55,7 +57,10 @@ def make(work: Work) -> list[Finding]:
     b, m = elements[0]["damping"], elements[1]["mass"]
     cases = {
         f"{b:g} N s/m with {1e3 * m:g} g, the best here": (scene, "best"),
-        "2.15 N s/m with 9 g, as in the paper": (Setup().cheap(work.small).scene(STIFFNESS_N_M, _PAPERS), "paper"),
+        "2.15 N s/m with 9 g, as in the paper": (
+            nearest(work).scene(STIFFNESS_N_M, _PAPERS),
+            "paper",
+        ),
     }
     figure = empty_figure(12.0, 6.4)
     axes = figure.subplots(2, 2, sharex=True)
@@ -70,11 +75,11 @@ def make(work: Work) -> list[Finding]:
     legend(axes[0, 0], loc="upper right", ncols=3, framealpha=0.8, edgecolor="none")
     work.figure(figure, "figure_12")
     work.data("figure_12", columns)
-    work.caption = "Forces and displayed stiffness tick by tick, with the published friction; tuned without it."
-    return _findings(told["best"], told["paper"], presses["best"])
+    work.caption = "Above the forces as commanded, below their sum over the penetration, tick by tick."
+    return _findings(work, told["best"], told["paper"], presses["best"])
 
 
-def _findings(best: Tuned, papers: Tuned, press: Press) -> list[Finding]:
+def _findings(work: Work, best: Tuned, papers: Tuned, press: Press) -> list[Finding]:
     b, m = best.elements[0]["damping"], best.elements[1]["mass"]
     shown = best.result["window"]["displayed_stiffness_N_m"]
     off = abs(shown / STIFFNESS_N_M - 1.0)
@@ -82,21 +87,26 @@ def _findings(best: Tuned, papers: Tuned, press: Press) -> list[Finding]:
     within = int(np.argmax(np.abs(inside / STIFFNESS_N_M - 1.0) < 0.5))
     last = press.output_N[len(press.output_N) // 2 :]
     numbers = (
-        f"{shown / 1e3:.4f} N/mm ({100 * off:.2f} % off), {best.result['verdict']} by the position, which swings "
-        f"{1e6 * best.swing_m:.0f} um, within an encoder step to either side; the force still ripples by "
-        f"{np.ptp(last):.2f} N peak to peak; with {b:g} N s/m and {1e3 * m:g} g"
+        f"{shown / 1e3:.4f} N/mm ({100 * off:.2f} % off), {best.ended} (an encoder step is "
+        f"28.7 µm); the force still ripples by "
+        f"{amount(float(np.ptp(last)), 'N', 2)} peak to peak; with {b:g} N s/m and {1e3 * m:g} g"
     )
-    theirs = f"{papers.result['verdict']}, {1e3 * papers.swing_m:.3f} mm peak to peak"
+    theirs = f"{papers.ended}"
     return [
-        under_the_reading(DISPLAYED, best.steady and off < 0.01, numbers, _TUNED),
-        under_the_reading(
-            VALUES, papers.steady, f"with these values {theirs}; the best here: {b:g} N s/m and {1e3 * m:g} g"
+        judged(work, DISPLAYED, best.steady and off < 0.01, numbers, more=_TUNED),
+        judged(
+            work,
+            VALUES,
+            papers.steady,
+            f"with these values {theirs}; the best here: {b:g} N s/m and {1e3 * m:g} g",
+            "12 pair",
         ),
-        under_the_reading(
+        judged(
+            work,
             INSTANT,
             within <= 2,
             f"within half of what is asked for {within} ms after the first force; what precedes is damping and inertia "
             f"over a penetration of a few encoder steps, {inside[0] / 1e3:.1f} N/mm at the first tick",
-            _TUNED,
+            more=_TUNED,
         ),
     ]

@@ -6,9 +6,10 @@ import numpy as np
 
 from haploop.tools.amounts import amount
 from haploop.tools.figure_file import empty_figure
-from haploop.tools.figure_style import ELEMENTS, dress, legend
+from haploop.tools.figure_style import SMALL, WALL_FILL, dress
 from haploop.tools.paper.claims import Claim, Finding
-from haploop.tools.paper.experiment.finding import under_the_reading
+from haploop.tools.paper.colours import COLOURS
+from haploop.tools.paper.experiment.judged import judged
 from haploop.tools.paper.experiment.setup import KINDS
 from haploop.tools.paper.figure_12 import best_pair
 from haploop.tools.paper.scenes import run
@@ -54,21 +55,29 @@ def make(work: Work) -> list[Finding]:
     figure = empty_figure(9.6, 4.4)
     ax = figure.subplots()
     for i, label in enumerate(("damping", "unidirectional inertia")):
-        ax.plot(t, books["sampled"][i][: len(t)], color=ELEMENTS[i], linewidth=1.3, label=f"{label}, sampled")
-        ax.plot(t, books["true"][i][: len(t)], color=ELEMENTS[i], linewidth=1.0, linestyle="--", label=f"{label}, true")
-    dress(ax, "", "time (s)", "taken out of the device (J)")
-    legend(ax, loc="best", ncols=1, frameon=False)
+        for book, style, width in (("sampled", "-", 1.4), ("true", "--", 1.0)):
+            ax.plot(
+                t,
+                1e3 * books[book][i][: len(t)],
+                style,
+                color=COLOURS[label.replace(" ", "-")],
+                linewidth=width,
+                label=f"{label}, {book}",
+            )
+    ax.axvspan(t[inside][0], t[inside][-1], color=WALL_FILL, zorder=0, linewidth=0, label="in contact")
+    dress(ax, "", "time (s)", "energy taken (mJ)")
+    figure.legend(loc="outside lower center", ncols=5, frameon=False, fontsize=SMALL)
     work.figure(figure, "figure_13")
     work.data("figure_13", {"t_s": t, "in_contact": inside, **{f"{kind}_J": book for kind, book in books.items()}})
     work.scene("figure_13", scene)
     work.caption = (
-        f"Pressed until {_RELEASED_S:g} s, then pulled back; with the published friction. Sampled books are what the "
+        f"Pressed until {_RELEASED_S:g} s, then pulled back, with the best pair of Fig. 12. Sampled books are what the "
         "paper's Fig. 13 shows, the true ones what left the device."
     )
-    return _findings(books["sampled"], books["true"], t, inside)
+    return _findings(work, books["sampled"], books["true"], t, inside)
 
 
-def _findings(sampled: np.ndarray, true: np.ndarray, t: np.ndarray, inside: np.ndarray) -> list[Finding]:
+def _findings(work: Work, sampled: np.ndarray, true: np.ndarray, t: np.ndarray, inside: np.ndarray) -> list[Finding]:
     took, left = sampled[:, -1], true[:, -1]
     ticks = np.flatnonzero(inside)
     first, last = t[ticks[0]], t[ticks[-1]]
@@ -83,7 +92,7 @@ def _findings(sampled: np.ndarray, true: np.ndarray, t: np.ndarray, inside: np.n
     rest = f"in between: damping {amount(float(middle[0]), 'J')}, inertia {amount(float(middle[1]), 'J')}"
     exact_only = "" if took[1] > took[0] else "; by the true books, not by the sampled ones that the paper has"
     return [
-        under_the_reading(LARGER, bool(left[1] > left[0]), both, exact_only),
-        under_the_reading(ENDS, bool(shares[0] > 0.8), f"{parts}; {rest}"),
-        under_the_reading(MIDDLE, bool(middle[1] > abs(middle[0])), f"{rest}; {parts}"),
+        judged(work, LARGER, bool(took[1] > took[0] or left[1] > left[0]), both, "13 more", exact_only),
+        judged(work, ENDS, bool(shares[0] > 0.8), f"{parts}; {rest}"),
+        judged(work, MIDDLE, bool(middle[1] > abs(middle[0])), f"{rest}; {parts}"),
     ]

@@ -6,10 +6,18 @@ from typing import Any
 
 import numpy as np
 
-from haploop.tools.amounts import amount
+from haploop.tools.amounts import amount, fixed
 from haploop.tools.figure_file import empty_figure
 from haploop.tools.figure_style import INK, SMALL
-from haploop.tools.paper.acceleration import CUTOFFS_HZ, errors_m_s2, largest_mass_kg, named, passive_up_to_Hz, said
+from haploop.tools.paper.acceleration import (
+    CUTOFFS_HZ,
+    errors_m_s2,
+    largest_mass_kg,
+    largest_stiffness_N_m,
+    named,
+    passive_up_to_Hz,
+    said,
+)
 from haploop.tools.paper.claims import Claim, Finding
 from haploop.tools.paper.momentum import draw_loop, steps_J
 from haploop.tools.paper.prescribed import MASS_KG, PERIOD_S, closed_form, mean_taken
@@ -32,7 +40,16 @@ MEASURED = Claim(
     "III",
     "the measured acceleration value from an accelerometer … is more accurate than filtered values from the encoder",
 )
-CLAIMS = (STEP, CLOCKWISE, UNLIKE, PASSIVE, FILTERED, RANGE, MEASURED)
+LAG = Claim("III", "it would be desirable to use a low-pass filter with a minimum phase lag")
+CHOOSE = Claim(
+    "III",
+    "Based on the encoder resolution of the haptic system, we may select a proper one between the filtered "
+    "acceleration from the encoder or the measured acceleration from the accelerometer",
+)
+CLAIMS = (STEP, CLOCKWISE, UNLIKE, PASSIVE, FILTERED, RANGE, LAG, MEASURED, CHOOSE)
+
+# An encoder so fine that its step does not matter.
+_FINE_M = 1e-7
 
 
 def make(work: Work) -> list[Finding]:
@@ -58,6 +75,13 @@ def make(work: Work) -> list[Finding]:
         "red, and grey where both lie; the path runs clockwise, and what lies within it is kept. Left the motion of "
         "the schematic, right the paper's device and hand, pushed by hand and braked again."
     )
+    masses = [
+        f"{1e3 * largest_mass_kg(cutoff, 0.0):.0f} g {'at ' * bool(cutoff)}{named(cutoff)}" for cutoff in CUTOFFS_HZ
+    ]
+    work.answer = (
+        "**A low-pass over the acceleration helps.** Largest stable bidirectional inertia of the paper's device and "
+        f"hand, 2 ms late and without a wall: {', '.join(masses)}"
+    )
     return _findings(pulse, v, pushed, contact, work)
 
 
@@ -82,10 +106,14 @@ def _findings(
     wider = all(free[named(cutoff)] > free["unfiltered"] for cutoff in CUTOFFS_HZ[1:])
     errors = errors_m_s2()
     best = min(value for name, value in errors.items() if name != "accelerometer")
+    fine = errors_m_s2(_FINE_M)
+    finest = min(value for name, value in fine.items() if name != "accelerometer")
+    stiffest = {named(cutoff): 1e-3 * largest_stiffness_N_m(cutoff, MASS_KG) for cutoff in CUTOFFS_HZ}
     on_filters = f"without delay bidirectional inertia takes energy from sines up to: {said(passive, 'Hz')}"
     return [
         STEP.judged(
-            apart < 1e-9, f"along the run at the right the program's sampled book and eq. 8 agree to {apart:.0e}"
+            apart < 1e-9,
+            "along the run at the right the program's sampled book and eq. 8 are the same, but for rounding",
         ),
         CLOCKWISE.judged(closed > 0.0, f"the loop of the prescribed motion encloses {amount(closed, 'J')}, clockwise"),
         UNLIKE.judged(
@@ -97,18 +125,29 @@ def _findings(
             "the motion is slower than a third of the sample rate, a seventh with 2 ms of delay",
             "under a sine it takes (2m/T²) sin²(θ/2)(cos (d+1)θ − cos (d+2)θ) A² a sample, d samples late: up to "
             f"{changes[0]:.0f} Hz at 1 kHz without delay, {changes[2]:.0f} Hz with 2 ms, and gives above; the "
-            f"program's controller differs by {off:.0e} of the largest",
+            f"program's controller differs by {100 * off:.2g} % of the largest",
         )
         if off < 1e-3
-        else PASSIVE.fails(f"the closed form and the program differ by {off:.0e}"),
+        else PASSIVE.fails(f"the closed form and the program differ by {100 * off:.2g} %"),
         FILTERED.holds(on_filters)
         if unchanged
         else FILTERED.assuming(f"the motion is slower than {min(passive.values()):.0f} Hz", on_filters),
         RANGE.judged(
             wider, f"largest bidirectional mass of device and hand without a wall, 2 ms late: {said(free, 'g')}"
         ),
+        LAG.judged(
+            stiffest["unfiltered"] >= max(stiffest.values()),
+            f"largest stable stiffness with 10 g of bidirectional inertia, 2 ms late: {said(stiffest, 'N/mm')}. Some "
+            "lag turns the inertia into damping",
+        ),
         MEASURED.judged(
             errors["accelerometer"] < best,
             f"RMS error in a contact, 28.7 µm encoder, IMU of 300 µg/√Hz: {said(errors, 'm/s²')}",
+        ),
+        CHOOSE.judged(
+            finest < fine["accelerometer"],
+            f"in such a contact the accelerometer is better whatever the encoder: with steps of 0.1 µm the best "
+            f"difference is {fixed(finest)} m/s² off, the accelerometer {fixed(fine['accelerometer'])} m/s²; a "
+            "difference of differences is a period old",
         ),
     ]

@@ -10,12 +10,12 @@ from haploop.tools.amounts import amount, fixed
 from haploop.tools.figure_file import empty_figure
 from haploop.tools.figure_style import ELEMENTS, GREY, WALL, dress, legend, plain_numbers
 from haploop.tools.paper.claims import Claim, Finding
+from haploop.tools.paper.gate_timing import returned
 from haploop.tools.paper.momentum import draw_loop, steps_J
 from haploop.tools.paper.prescribed import (
     KINDS,
     MASS_KG,
     PERIOD_S,
-    SPRING,
     closed_form,
     forces,
     mean_taken,
@@ -47,7 +47,12 @@ HIGHER = Claim(
     "III",
     "[inertia] can dissipate energy even in higher velocity interactions, unlike digital damping and digital springs",
 )
-CLAIMS = (ALTERNATES, THREE, ANY_VELOCITY, AT_REST, ONLY_STORED, PURE, MORE, CHATTER, HIGHER)
+BEFORE = Claim(
+    "IV, eq. 9",
+    "we use k − 1 step accelerations to calculate k-step unidirectional virtual inertia after considering the ZOH "
+    "effect",
+)
+CLAIMS = (ALTERNATES, THREE, ANY_VELOCITY, AT_REST, ONLY_STORED, BEFORE, PURE, MORE, CHATTER, HIGHER)
 
 BI, UNI = "bidirectional-inertia", "unidirectional-inertia"
 _JITTER_M_S, _DRIFT_M_S = 0.01, 0.05
@@ -78,7 +83,21 @@ def make(work: Work) -> list[Finding]:
         "sine of 1 m, relative to what the damper would take if it were not sampled; lines are closed forms, dots "
         "the program's controller. The paper's numbers: 0.15 N/mm, 0.8 N s/m, 10 g."
     )
+    work.answer = _answer(frequencies, measured)
     return _findings(frequencies, measured)
+
+
+def _answer(frequencies: np.ndarray, measured: dict[tuple[str, int], np.ndarray]) -> str:
+    ends = {(kind, late): _hertz(_first_negative(frequencies, measured[kind, late])) for kind, late in measured}
+    parts = [
+        f"{name} {ends[kind, 0]} and {ends[kind, 2]}"
+        for name, kind in (("damping", "damping"), ("bidirectional inertia", BI), ("unidirectional inertia", UNI))
+    ]
+    return (
+        "**Inertia takes energy from faster swings than damping does, and from slow ones hardly any.** Highest "
+        f"frequency at 1 kHz, without delay and with 2 ms: {', '.join(parts)}. An encoder's jitter turns bidirectional "
+        "inertia into a source of energy"
+    )
 
 
 def _over_samples(ax: Axes) -> dict[str, np.ndarray]:
@@ -205,22 +224,28 @@ def _on_unidirectional(frequencies: np.ndarray, measured: dict[tuple[str, int], 
     at = int(np.argmin(np.abs(frequencies - 20.0)))
     gives = {late: _first_negative(frequencies, measured[UNI, late]) for late in (0, 2)}
     rest, drift = (float(_taken_under_jitter(UNI, one)[1:].mean()) for one in (0.0, _DRIFT_M_S))
-    returned = {
-        name: _returned(2.0 * np.pi * hertz * PERIOD_S)
-        for name, hertz in (("5 Hz", 5.1), ("20 Hz", 20.3), ("100 Hz", 101.0), ("200 Hz", 201.3))
+    back = {
+        name: returned(hertz)
+        for name, hertz in (("5 Hz", 5.1), ("20 Hz", 20.3), ("50 Hz", 50.7), ("100 Hz", 101.0), ("200 Hz", 201.3))
     }
-    ends = {
-        f"{kind.partition('-')[0]}, {late} ms": _first_negative(frequencies, measured[kind, late])
-        for late in (0, 2) for kind in (SPRING, "damping", BI, UNI)
-    }  # fmt: skip
-    said = ", ".join(f"{name} {_hertz(value)}" for name, value in ends.items())
+    at_once = abs(returned(50.7, before=False))
+    ends = {(kind, late): _first_negative(frequencies, measured[kind, late]) for kind, late in measured}
+    said = "; ".join(
+        how + ", ".join(f" {kind.partition('-')[0]} {_hertz(ends[kind, late])}" for kind in KINDS)
+        for late, how in ((0, "without delay"), (2, "with 2 ms"))
+    )
     pure = f"from a sine it takes energy up to {_hertz(gives[0])} at 1 kHz without delay, {_hertz(gives[2])} with 2 ms"
-    within = min(ends["bidirectional, 0 ms"], ends["unidirectional, 0 ms"]), ends["damping, 0 ms"]
+    within = min(ends[BI, 0], ends[UNI, 0]), ends["damping", 0]
     return [
         ONLY_STORED.assuming(
             "the motion is slow against the sample rate",
             "share of what it takes that it gives back, since the test looks at a(k−1) and the force is held to the "
-            f"next sample: {', '.join(f'{100 * share:.2g} % at {name}' for name, share in returned.items())}",
+            f"next sample: {', '.join(f'{100 * share:.2g} % at {name}' for name, share in back.items())}",
+        ),
+        BEFORE.judged(
+            at_once >= back["50 Hz"],
+            f"given back of what is taken from a sine of 50 Hz: {100 * back['50 Hz']:.2g} % with a(k−1), "
+            f"{100 * at_once:.2g} % with a(k): the older sample keeps the gate open past the turn",
         ),
         PURE.holds(pure)
         if not np.isfinite(gives[2])
@@ -235,9 +260,9 @@ def _on_unidirectional(frequencies: np.ndarray, measured: dict[tuple[str, int], 
         else MORE.judged(until > 0.0, f"{fixed(float(ratio[at]))} times at {frequencies[at]:.0f} Hz"),
         CHATTER.assuming(
             "the velocity chatters about zero",
-            f"under ±10 mm/s from sample to sample it takes {amount(rest, 'J')} a sample about rest, where "
-            f"bidirectional inertia takes −2.00 µJ; on top of 50 mm/s it takes {amount(drift, 'J')}: it then acts on "
-            "every other sample, the one that pushes on",
+            f"under ±10 mm/s from sample to sample it takes {amount(rest, 'J') if rest else 'nothing'} about rest, "
+            f"where bidirectional inertia takes −2.00 µJ; on top of 50 mm/s it takes {amount(drift, 'J')}: it acts "
+            "on every other sample, the one that pushes on",
         )
         if rest >= 0.0
         else CHATTER.fails(f"it takes {amount(rest, 'J')} a sample"),
@@ -257,10 +282,3 @@ def _first_negative(frequencies: np.ndarray, taken: np.ndarray) -> float:
 
 def _hertz(value: float) -> str:
     return "none" if not value else f"{value:.0f} Hz" if np.isfinite(value) else "500 Hz"
-
-
-def _returned(theta: float, ticks: int = 4000) -> float:
-    """Of a sine, the energy that unidirectional inertia gives back over what it takes."""
-    x = np.sin(np.arange(ticks) * theta)[:, None]
-    taken = taken_J(x, forces(x, UNI))[ticks // 2 :]
-    return float(-np.minimum(taken, 0.0).sum() / np.maximum(taken, 0.0).sum())

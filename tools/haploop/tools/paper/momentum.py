@@ -12,6 +12,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 TAKEN, GIVEN = "#9FD3B0", "#E8A0A0"
+# Steps shorter than this share of all have no arrow.
+_ARROW = 0.04
 
 
 def steps_J(v_m_s: np.ndarray, mass_kg: float) -> np.ndarray:
@@ -34,7 +36,7 @@ def draw_loop(ax: Axes, v_m_s: np.ndarray, mass_kg: float, title: str) -> None:
     x, y = np.array(path).T
     ax.plot(x, y, color=INK, linewidth=1.2)
     for k in range(2, len(v)):
-        if v[k - 1] != v[k - 2]:
+        if abs(v[k - 1] - v[k - 2]) > _ARROW * np.ptp(v):
             middle = (v[k - 1] + v[k - 2]) / 2.0, momentum[k]
             ax.annotate(
                 "",

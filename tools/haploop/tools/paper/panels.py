@@ -57,11 +57,18 @@ def _position(ax: Axes, scene: dict[str, Any], log: Recording, title: str) -> No
 
 
 def _same_view(axes: np.ndarray, scenes: list[dict[str, Any]]) -> None:
-    """One scale for all three: from a quarter of the way above the wall down to the deepest of them."""
+    """One scale for all three, by where they swing in the second half: how they came there may run out of it."""
     surface = 1e3 * scenes[0]["wall"]["position"]
-    deepest = min(float(np.min(ax.lines[0].get_ydata())) for ax in axes)
+    ends = [_second_half(ax) for ax in axes]
+    deepest, highest = min(float(end.min()) for end in ends), max(float(end.max()) for end in ends)
+    room = max(3.0, 0.5 * (highest - deepest))
     for ax in axes:
-        ax.set_ylim(deepest - 2.0, surface + max(15.0, 1.3 * (surface - deepest)))
+        ax.set_ylim(min(deepest, surface) - room, max(highest, surface) + 2.0 * room)
+
+
+def _second_half(ax: Axes) -> np.ndarray:
+    t, mm = ax.lines[0].get_xdata(), np.asarray(ax.lines[0].get_ydata())
+    return mm[np.asarray(t) >= float(np.max(t)) / 2.0]
 
 
 def _force(ax: Axes, log: Recording) -> None:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from haploop.tools.paper.scenes import fig6
+from haploop.tools.paper.shares import Space
 
 # What the paper states is never touched: masses, damping and spring of device and hand, walls, elements, 1 kHz, 2 ms.
 # What it leaves open and how it is built; None of these is a matter of degree. The operator "firmly grasps" the device
@@ -51,6 +52,9 @@ ABOUT: dict[str, tuple[str, str]] = {
     "velocity_Hz": ("velocity, cutoff (Hz)", "from slower than the contact to what 1 ms can tell"),
     "acceleration_Hz": ("acceleration, cutoff (Hz)", "the same"),
 }
+SPACE = Space(CHOICES, BOUNDS, {"duration": "duration (s)"} | {key: label for key, (label, _) in ABOUT.items()})
+# What the page calls the two readings it shows, the second as an assumption.
+OURS, NEAREST = "our reading", "[the nearest reading](#figure-6)"
 _REACH_N = -0.6  # holds the hand's spring of 10 N/m at the wall, 60 mm away
 _STEP_AT_S = 0.1
 
@@ -106,15 +110,6 @@ BASE = Reading(
     },
     1,
 )  # fmt: skip
-
-# Where the search starts beside the random readings: found beforehand by trying some 10^5 readings, and varying the
-# best, choices included, on a bare model of the loop, which takes a hundredth of the time.
-START = replace(
-    BASE,
-    choices=BASE.choices | {"velocity": "low-passed", "acceleration": "low-passed accelerometer"},
-    numbers=BASE.numbers
-    | {"push_N": 0.0967, "rise_s": 2.0, "resolution_m": 5.51e-4, "velocity_Hz": 2.89, "acceleration_Hz": 13.1},
-)
 
 
 def draw(rng: np.random.Generator, structures: int, each: int) -> list[list[Reading]]:
@@ -177,5 +172,6 @@ def _force(kind: str, reach_N: float, number: dict[str, float]) -> dict[str, Any
 
 def words(reading: Reading) -> str:
     """The reading in one line: choices, then the numbers that matter."""
-    chosen = [f"{key} {value}" for key, value in reading.choices.items()]
-    return ", ".join(chosen + [f"{ABOUT[key][0]} {reading.numbers[key]:.3g}" for key in reading.used()])
+    chosen = [f"{SPACE.label(key)} {SPACE.value(key, value)}" for key, value in reading.choices.items()]
+    numbers = [f"{SPACE.label(key)} {SPACE.value(key, reading.numbers[key])}" for key in reading.used()]
+    return ", ".join(chosen + numbers)

@@ -155,9 +155,9 @@ def _row(
     }
     swings = {f"swing {name}_m": value for name, value in swing.items()}
     distance = sum(min(MOST, found[name]) for name in CLAIMS)
-    return (
-        reading.row() | swings | found | {"distance": distance, "holding": sum(found[name] == NONE for name in CLAIMS)}
-    )
+    holding = sum(found[name] == NONE for name in CLAIMS)
+    every = {"all": float(holding < len(CLAIMS)), "distance": distance, "holding": holding}
+    return reading.row() | swings | found | every
 
 
 def over(value: float, most: float) -> float:

@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 
 from haploop.tools.machine import cores
-from haploop.tools.paper.reading import BASE, START, Reading, draw
+from haploop.tools.paper.reading import BASE, Reading, draw
 from haploop.tools.paper.reading_runs import shortfalls
-from haploop.tools.paper.work import Stage
+from haploop.tools.stages import Stage
 from haploop.tools.sweep.workers import Here, Processes, Workers
 
 SEED = 2022
@@ -37,7 +37,7 @@ class Size:
     neighbours: int
 
 
-WHOLE = Size(structures=64, each=64, rounds=3, best=3, children=64, neighbours=64)
+WHOLE = Size(structures=64, each=64, rounds=4, best=3, children=64, neighbours=64)
 SMALL = Size(structures=2, each=4, rounds=1, best=1, children=2, neighbours=2)
 # How far the refinement strays in its first and last round, and the neighbours: standard deviations of ln.
 FAR, CLOSE, NEIGHBOURLY = 0.3, 0.05, 0.05
@@ -48,8 +48,7 @@ class Found:
     """What was found.
 
     Attributes:
-        rows: of every reading, with ``stage``: "base", "nearest", "random", "start", "refined" or
-            "neighbour".
+        rows: of every reading, with ``stage``: "base", "nearest", "random", "refined" or "neighbour".
         nearest: the reading nearest to the paper, its numbers rounded to three digits.
     """
 
@@ -69,9 +68,7 @@ def search(size: Size, workers: int | None, stage: Stage) -> Found:
     """
     rng = np.random.default_rng(SEED)
     with _crew(workers) as crew:
-        seen = _run(crew, draw(rng, size.structures, size.each), "random", stage) + _run(
-            crew, [[START]], "start", stage
-        )
+        seen = _run(crew, draw(rng, size.structures, size.each), "random", stage)
         for spread in np.geomspace(FAR, CLOSE, size.rounds):
             parents = _best(seen, size.best)
             groups = [[parent.near(rng, float(spread)) for _ in range(size.children)] for parent in parents]

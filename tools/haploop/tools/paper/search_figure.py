@@ -1,4 +1,4 @@
-"""The picture of the search: how often each claim of Fig. 6 holds, by what was chosen."""
+"""The picture of a search: how often each claim holds, by what was chosen."""
 
 from __future__ import annotations
 
@@ -9,31 +9,26 @@ import numpy as np
 
 from haploop.tools.figure_file import empty_figure
 from haploop.tools.figure_style import INK, SMALL, TEXT
-from haploop.tools.paper.reading_runs import CLAIMS
-from haploop.tools.paper.shares import Option, plain
+from haploop.tools.paper.shares import Option, percent
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-def share_map(found: Sequence[Option], readings: int) -> Figure:
+def share_map(found: Sequence[Option], claims: Sequence[str], readings: int) -> Figure:
     """A row an option, a column a claim, the share of readings as colour and number."""
-    claims = [*CLAIMS, "all"]
     table = np.array([[option.share(claim) for claim in claims] for option in found])
     figure = empty_figure(11.5, 2.0 + 0.2 * len(found))
     ax = figure.subplots()
     ax.pcolormesh(table, cmap="YlGnBu", vmin=0.0, vmax=1.0, edgecolors="white", linewidth=0.5)
     for row, column in np.ndindex(*table.shape):
         value = table[row, column]
-        words = f"{100 * value:.0f}" if value in (0.0, 1.0) or value >= 0.095 else f"{100 * value:.1f}"
+        words = percent(float(value)).removesuffix(" %")
         colour = "white" if value > 0.55 else INK
         ax.text(column + 0.5, row + 0.5, words, ha="center", va="center", fontsize=SMALL - 1, color=colour)
     ax.set_xticks(np.arange(len(claims)) + 0.5, claims, rotation=40, ha="left", fontsize=SMALL)
     ax.xaxis.tick_top()
-    names = [
-        option.name if _same(found, i) else f"{plain(option.dimension)}: {option.name}"
-        for i, option in enumerate(found)
-    ]
+    names = [option.name if _same(found, i) else f"{option.dimension}: {option.name}" for i, option in enumerate(found)]
     ax.set_yticks(np.arange(len(found)) + 0.5, names, fontsize=SMALL)
     ax.invert_yaxis()
     for i in range(1, len(found)):

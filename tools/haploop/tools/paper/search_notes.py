@@ -1,4 +1,4 @@
-"""What the search for readings found, in words and tables: the notes below Fig. 6."""
+"""What the search for readings of Fig. 6 found, in words and tables: the notes below the figure."""
 
 from __future__ import annotations
 
@@ -7,88 +7,83 @@ from collections import Counter
 import numpy as np
 
 from haploop.tools.amounts import amount
-from haploop.tools.paper.reading import ABOUT, BOUNDS, CHOICES, words
+from haploop.tools.paper.reading import ABOUT, BOUNDS, SPACE, words
 from haploop.tools.paper.reading_runs import ASIDE, CLAIMS
-from haploop.tools.paper.search import SEED, Found
-from haploop.tools.paper.shares import decider, holds, never_together, options, percent, plain, share, yes
+from haploop.tools.paper.search import CLOSE, FAR, SEED, Found
+from haploop.tools.paper.shares import decider, holds, never_together, options, percent, share, yes
 
 
 def notes(found: Found) -> list[str]:
     """What the search found, in words and tables."""
-    return [*_how(found), *_alone(found), *_together(found), *_nearest(found)]
+    return [*_together(found), *_alone(found), *_nearest(found), *_how(found)]
 
 
 def _how(found: Found) -> list[str]:
     count = Counter(row["stage"] for row in found.rows)
+    choices = [
+        f"- {SPACE.label(key)}: {', '.join(SPACE.value(key, option) for option in some)}"
+        for key, some in SPACE.choices.items()
+    ]
+    numbers = [
+        f"| {SPACE.label(key)} | {SPACE.value(key, low)} | {SPACE.value(key, high)} | {ABOUT[key][1]} |"
+        for key, (low, high) in BOUNDS.items()
+    ]
     return [
-        "#### The search",
+        "#### How was searched",
         f"A reading chooses what the paper leaves open, and keeps all numbers that it gives. {count['random']} "
-        f"readings were drawn with the seed {SEED}; one more was found beforehand, on a bare model of the loop. "
-        f"Around the best of these {count['refined']} more were drawn in rounds, and {count['neighbour']} around the "
-        "nearest, every number of it times e^(0.05 ξ), ξ normal. The 2 ms lie between sample and force; where in "
-        "the round trip they sit changes no motion, only which book is seen: *sampled* is what a controller in "
-        "front of them reads, *true* what acts on the device behind them. A low-pass over the position itself, as "
-        "the paper's words could also mean, is not among the choices.",
-        "\n".join(f"- {key}: {', '.join(map(str, names))}" for key, names in CHOICES.items()),
-        "\n".join(
-            ["| number, drawn evenly in its logarithm | from | to | why |", "|---|---:|---:|---|"]
-            + [f"| {plain(key)} | {low:g} | {high:g} | {ABOUT[key][1]} |" for key, (low, high) in BOUNDS.items()]
-        ),
+        f"readings were drawn with the seed {SEED}. The search was then tuned to the distance below: around the best "
+        f"of them, and in rounds around the best of all so far, {count['refined']} more were drawn, every number "
+        f"times e^(s ξ), ξ normal, s from {FAR:g} down to {CLOSE:g}; {count['neighbour']} neighbours of the nearest "
+        "show how much hangs on its numbers. Shares are of the random ones alone.",
+        "The 2 ms lie between sample and force. Where in the round trip they sit changes no motion, only which book is "
+        "seen: *sampled* is what a controller in front of them reads, *true* what acts on the device behind them. A "
+        "low-pass over the position itself, as the paper's words could also mean, is not among the choices.",
+        "\n".join(choices),
+        "\n".join(["| number, drawn evenly in its logarithm | from | to | why |", "|---|---:|---:|---|", *numbers]),
         "The distance of a reading is the sum over the claims of how far each is from holding: ln of the factor "
-        "that is missing (at most 3), 1 for a yes that is a no, 3 for a run that diverged. The claims, as they are "
-        "tested:",
-        "\n".join(f"- *{name}*: {about}" for name, about in CLAIMS.items()),
-        "Beside them, in no distance:",
-        "\n".join(f"- *{name}*: {about}" for name, about in ASIDE.items()),
+        "that is missing (at most 3), 1 for a yes that is a no, 3 for a run that diverged.",
     ]
 
 
 def _alone(found: Found) -> list[str]:
     """A table of claims: how often, and what decides."""
     rows, [base], [nearest] = found.of("random"), found.of("base"), found.of("nearest")
-    around = found.of("neighbour")
-    there = options(rows)
+    around, there = found.of("neighbour"), options(rows, SPACE)
     lines = [
-        "| claim | our reading | nearest | its neighbours | random readings | decided most by |",
-        "|---|---|---|---:|---:|---|",
+        "| claim | as tested | our reading | nearest | its neighbours | random readings | decided most by |",
+        "|---|---|---|---|---:|---:|---|",
     ]
-    for name in [*CLAIMS, "all", *ASIDE]:
+    for name, about in [*CLAIMS.items(), ("all", "all of the above"), *ASIDE.items()]:
         decides = decider(there, name)
-        by = ""
-        if decides and decides.gap(name) > 0.0:
-            best, worst = decides.best, decides.worst
-            by = (
-                f"{plain(best.dimension)}: {best.name} {percent(best.share(name))}, {worst.name} "
-                f"{percent(worst.share(name))}"
-            )
         cells = (
-            name,
+            f"*{name}*",
+            about,
             yes(base, name),
             yes(nearest, name),
             percent(share(around, name)),
             percent(share(rows, name)),
-            by,
+            decides.said(name) if decides else "",
         )
         lines.append(f"| {' | '.join(cells)} |")
-    return ["#### Each claim alone", "\n".join(lines)]
+    aside = ", ".join(f"*{name}*" for name in ASIDE)
+    return ["#### Each claim alone", "\n".join(lines), f"Not counted in a reading's distance: {aside}."]
 
 
 def _together(found: Found) -> list[str]:
     rows = found.of("random")
     holding = Counter(row["holding"] for row in rows)
     counted = ", ".join(f"{count} of {len(CLAIMS)}: {holding[count]}" for count in sorted(holding, reverse=True))
-    refined = [row for row in found.of("refined") if row["distance"] == 0.0]
+    refined = sum(holds(row, "all") for row in found.of("refined"))
     fullest = max(found.rows, key=lambda row: (row["holding"], -row["distance"]))
     lacks = ", ".join(f"*{name}*" for name in CLAIMS if not holds(fullest, name))
     most = f"No reading of any kind has more than {fullest['holding']}; that one lacks {lacks}. " if lacks else ""
-    never = never_together(rows)
+    never = never_together(rows, list(CLAIMS))
     pairs = "; ".join(f"*{first}* and *{second}*" for first, second in never)
     both = f"Never both at random: {pairs}." if never else "Every two of them hold together somewhere."
     return [
-        "#### Together",
-        f"Random readings by how many of the {len(CLAIMS)} claims hold: {counted}. All hold for "
-        f"{sum(holds(row, 'all') for row in rows)} of {len(rows)} random readings and for {len(refined)} of "
-        f"{len(found.of('refined'))} refined ones. {most}{both}",
+        "#### All claims together",
+        f"All hold for {sum(holds(row, 'all') for row in rows)} of {len(rows)} random readings and for {refined} of "
+        f"{len(found.of('refined'))} refined ones. {most}{both} Random readings by how many claims hold: {counted}.",
     ]
 
 

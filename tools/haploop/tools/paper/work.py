@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,19 +12,12 @@ import numpy as np
 from haploop.launch.resolved import to_toml
 from haploop.tools.figure_file import write_figure
 from haploop.tools.paper.claims import Finding
+from haploop.tools.stages import Stage, silent
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from haploop.controller.dissipation import Element
-
-# Names a stage of so many parts; what it returns is called after each of them.
-Stage = Callable[[str, int], Callable[[], None]]
-
-
-def silent(_name: str, _count: int) -> Callable[[], None]:
-    """A stage that shows nothing."""
-    return lambda: None
 
 
 class Work:
@@ -39,6 +32,7 @@ class Work:
 
     Attributes:
         kinds: elements at hand.
+        answer: what a builder of devices can take from it, in a sentence or two; empty for what has none.
         caption: what is to be seen, in a sentence or two.
         notes: whole sections in Markdown that go below the figure on the page.
     """
@@ -50,9 +44,10 @@ class Work:
 
         self.out, self.number, self.small, self.workers, self.stage = out, number, small, workers, stage
         self.kinds: dict[str, type[Element]] = registry()
-        self.caption = ""
+        self.answer = self.caption = ""
         self.notes: list[str] = []
         self._files: list[str] = []
+        self._seen: dict[str, str] = {}
 
     def path(self, name: str) -> Path:
         """A file of this figure, noted as one that belongs to it."""
@@ -60,9 +55,10 @@ class Work:
             self._files.append(name)
         return self.out / name
 
-    def figure(self, figure: Figure, name: str) -> None:
-        """Write a picture, ``name`` without its suffix."""
+    def figure(self, figure: Figure, name: str, seen: str = "") -> None:
+        """Write a picture, ``name`` without its suffix; what is seen on it goes below it."""
         write_figure(figure, self.path(f"{name}.png"))
+        self._seen[f"{name}.png"] = seen
 
     def data(self, name: str, columns: Mapping[str, Any]) -> None:
         """Write arrays by name; the unit stands at the end of each name."""
@@ -78,7 +74,9 @@ class Work:
         kept = {
             "number": self.number,
             "title": title,
+            "answer": self.answer,
             "caption": self.caption,
+            "seen": self._seen,
             "small": self.small,
             "files": self._files,
             "findings": [finding.as_dict() for finding in findings],

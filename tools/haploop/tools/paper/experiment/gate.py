@@ -38,7 +38,7 @@ def unidirectional(
     *,
     reading_s: float,
     delay_s: float | np.ndarray,
-    velocity_s: float = 5e-4,
+    velocity_s: float | np.ndarray = 5e-4,
     period_s: float = 1e-3,
 ) -> Felt:
     """f = -m a[k] while v[k] a[k-1] >= 0 (Choi et al. 2022, eq. 9): its describing function.
@@ -54,7 +54,7 @@ def unidirectional(
     Args:
         reading_s: age of the acceleration's reading.
         delay_s: extra delay of the loop.
-        velocity_s: age of the velocity.
+        velocity_s: age of the velocity; of one that is low-passed by frequency, ``low_passed_s``.
     """
     w = 2.0 * np.pi * np.asarray(frequency_Hz, float)
     p, q = np.pi / 2.0 + w * (velocity_s - reading_s), w * period_s
@@ -66,6 +66,12 @@ def unidirectional(
 def _felt(duty: np.ndarray, left: np.ndarray, lag: np.ndarray) -> Felt:
     arrives = left * np.exp(-1j * lag)
     return Felt(duty, np.real(arrives), -np.imag(arrives))
+
+
+def low_passed_s(frequency_Hz: np.ndarray, cutoff_Hz: float | None, age_s: float) -> np.ndarray:
+    """The age of what a first-order low-pass makes of a signal of this age: by atan(f / cutoff) / w more."""
+    f = np.asarray(frequency_Hz, float)
+    return age_s + (np.arctan(f / cutoff_Hz) / (2.0 * np.pi * f) if cutoff_Hz else np.zeros_like(f))
 
 
 def always_open_Hz(*, reading_s: float, velocity_s: float = 5e-4, period_s: float = 1e-3) -> float:

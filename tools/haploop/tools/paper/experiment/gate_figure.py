@@ -8,16 +8,20 @@ import numpy as np
 
 from haploop.tools.figure_file import empty_figure
 from haploop.tools.figure_style import ELEMENTS, GREY, dress, legend
-from haploop.tools.paper.experiment.gate import always_open_Hz, bidirectional, unidirectional
+from haploop.tools.paper.colours import COLOURS
+from haploop.tools.paper.experiment.gate import Felt, bidirectional, low_passed_s, unidirectional
+from haploop.tools.paper.experiment.setup import UNITS, VELOCITIES, Setup
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 FREQUENCIES_HZ = np.linspace(2.0, 498.0, 249)
+# Age of a reading of an MPU-9250 at its setting of 420 Hz.
+OLD_S = 1.38e-3
 DELAYS_S = np.linspace(0.0, 3e-3, 121)
 # What damps where: neither, bidirectional alone, unidirectional alone, both.
-_COLOURS = ("#F0F0F0", "#56B4E9", "#CC79A7", "#DDEEDD")
+_COLOURS = ("#F0F0F0", COLOURS["bidirectional-inertia"], COLOURS["unidirectional-inertia"], "#DDEBF5")
 _NAMES = (
     "both drive",
     "bidirectional damps, unidirectional drives",
@@ -34,18 +38,26 @@ def damps(reading_s: float) -> np.ndarray:
     return two + 2 * one
 
 
-def gate_figure(reading_s: float, delay_s: float) -> Figure:
-    """Felt damping and mass over frequency at the setup's reading and delay, and who damps over frequency and delay."""
+def felt(setup: Setup, frequency_Hz: np.ndarray) -> tuple[Felt, Felt]:
+    """What bi- and unidirectional inertia come to in a reading, with its delay, unit and low-pass of the velocity."""
+    bandwidth, late = UNITS[setup.unit]
+    reading_s = late + (1.0 / (2.0 * np.pi * bandwidth) if bandwidth else 0.0)
+    velocity_s = low_passed_s(frequency_Hz, VELOCITIES[setup.velocity], 5e-4)
+    two = bidirectional(frequency_Hz, reading_s=reading_s, delay_s=setup.delay_s)
+    return two, unidirectional(frequency_Hz, reading_s=reading_s, delay_s=setup.delay_s, velocity_s=velocity_s)
+
+
+def gate_figure(setup: Setup) -> Figure:
+    """Felt damping and mass over frequency under a reading, and who damps over frequency and delay."""
     figure = empty_figure(13.0, 7.0)
     axes = figure.subplots(2, 2)
-    two = bidirectional(FREQUENCIES_HZ, reading_s=reading_s, delay_s=delay_s)
-    one = unidirectional(FREQUENCIES_HZ, reading_s=reading_s, delay_s=delay_s)
+    two, one = felt(setup, FREQUENCIES_HZ)
     damping, mass = axes[0]
     for ax, name, label in ((damping, "damping", "felt damping / (m w)"), (mass, "mass", "felt mass / m")):
         ax.plot(FREQUENCIES_HZ, getattr(two, name), color=_COLOURS[1], label="bidirectional")
         ax.plot(FREQUENCIES_HZ, getattr(one, name), color=_COLOURS[2], label="unidirectional")
         ax.axhline(0.0, color=GREY, linewidth=0.6)
-        dress(ax, "", "frequency (Hz)", label)
+        dress(ax, f"felt {name}", "frequency (Hz)", label)
     mass.plot(
         FREQUENCIES_HZ,
         one.duty,
@@ -54,14 +66,10 @@ def gate_figure(reading_s: float, delay_s: float) -> Figure:
         linestyle=":",
         label="gate open, share",
     )
-    never = always_open_Hz(reading_s=reading_s)
-    for ax in (damping, mass):
-        ax.axvline(never, color=GREY, linewidth=0.8, linestyle="--")
-    damping.set_title(f"reading {1e3 * reading_s:.2f} ms old, {1e3 * delay_s:g} ms of delay", loc="left")
     legend(damping)
     legend(mass)
     _who(axes[1, 0], 0.0, "who damps: an ideal accelerometer")
-    _who(axes[1, 1], reading_s, f"who damps: a reading {1e3 * reading_s:.2f} ms old")
+    _who(axes[1, 1], OLD_S, f"who damps: a reading {1e3 * OLD_S:.2f} ms old")
     from matplotlib.patches import Patch
 
     patches = [

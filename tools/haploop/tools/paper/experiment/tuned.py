@@ -5,9 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
+from haploop.tools.amounts import amount
 from haploop.tools.paper.experiment.many import is_steady, runs
 from haploop.tools.paper.experiment.setup import Elements, Setup
 from haploop.tools.paper.work import Work
+
+# An encoder's step to either side; what is steady and swings wider is dying down.
+_STEPS_M = 2.0 * 28.7e-6
 
 
 class Tuned(NamedTuple):
@@ -19,6 +23,14 @@ class Tuned(NamedTuple):
     @property
     def steady(self) -> bool:
         return is_steady(self.result)
+
+    @property
+    def ended(self) -> str:
+        """The verdict, and how it swings at last."""
+        if not self.swing_m:
+            return f"{self.result['verdict']}, comes to rest"
+        dying = ", dying down" if self.steady and self.swing_m > _STEPS_M else ""
+        return f"{self.result['verdict']}, swings {amount(self.swing_m, 'm')} peak to peak{dying}"
 
     @property
     def swing_m(self) -> float:

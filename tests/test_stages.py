@@ -1,0 +1,37 @@
+"""Bars of stages: a line a stage without a terminal, a bar that moves with one."""
+
+from __future__ import annotations
+
+import io
+from typing import Any
+
+import pytest
+from rich.console import Console
+
+from haploop.tools import report
+from haploop.tools.stages import bars
+
+
+def test_without_a_terminal_a_stage_is_one_line(capsys: pytest.CaptureFixture[str]) -> None:
+    with bars() as stage:
+        advance = stage("runs", 2)
+        advance()
+        advance()
+    shown = capsys.readouterr()
+    assert (shown.out, shown.err) == ("", "runs: 2\n")
+
+
+@pytest.mark.parametrize("by_itself", [True, False])
+def test_on_a_terminal_a_bar_counts_the_parts(by_itself: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whether a thread draws it or every part does."""
+    screen = io.StringIO()
+
+    def terminal(**_: Any) -> Console:
+        return Console(file=screen, force_terminal=True, width=80)
+
+    monkeypatch.setattr(report, "console", terminal)
+    with bars(by_itself=by_itself) as stage:
+        advance = stage("runs", 3)
+        advance()
+    assert "runs" in screen.getvalue()
+    assert "1/3" in screen.getvalue()
