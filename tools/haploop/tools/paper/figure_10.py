@@ -176,10 +176,11 @@ def _largest(found: dict[str, Range], stiffnesses: np.ndarray) -> dict[str, floa
 def _answer(found: dict[str, Range], stiffnesses: np.ndarray) -> str:
     most = _largest(found, stiffnesses)
     said = ", ".join(f"{SHORT[kind]} {most[kind] / 1e3:.1f}" for kind in KINDS[1:])
+    sizes = len(found[KINDS[1]].sizes)
     return (
-        f"**Inertia needs the right size.** In the reading nearest to the paper the stiffest steady wall is, in N/mm: "
-        f"nothing {most['nothing'] / 1e3:.1f}, {said}. Which inertia is better hangs on the lag: late inertia damps, "
-        "and the gate of eq. 9 is a lag of its own"
+        f"**Inertia needs the right size.** In the reading nearest to the paper the stiffest steady wall is, in N/mm "
+        f"and with the best of {sizes} sizes of each: nothing {most['nothing'] / 1e3:.1f}, {said}. Which inertia is "
+        "better hangs on the lag: late inertia damps, and the gate of eq. 9 is a lag of its own"
     )
 
 

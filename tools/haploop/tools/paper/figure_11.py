@@ -81,7 +81,8 @@ def _answer(largest: np.ndarray, dampings: np.ndarray, masses: np.ndarray) -> st
     return (
         "**Damping and unidirectional inertia together bear more than either alone.** In the reading nearest to the "
         f"paper {largest[i, j] / 1e3:.1f} N/mm ({dampings[i]:g} N s/m with {1e3 * masses[j]:g} g) against "
-        f"{largest[:, 0].max() / 1e3:.1f} of damping and {largest[0].max() / 1e3:.1f} of inertia; tune the two together"
+        f"{largest[:, 0].max() / 1e3:.1f} of damping and {largest[0].max() / 1e3:.1f} of inertia, each the best of the "
+        "sizes drawn; tune the two together"
     )
 
 

@@ -53,7 +53,8 @@ def _answer(found: Found) -> str:
     return (
         "**The ranking of the paper's experiments is possible, and rare.** Unidirectional inertia steadies a stiffer "
         f"wall than damping and bidirectional inertia do in {percent(share(rows, '10 larger'))} of {len(rows)} random "
-        f"readings of the device. The nearest reading bears, in N/mm, {here} (the paper: {papers}); of its neighbours, "
+        f"readings of the device. The nearest reading bears, in N/mm and with the best of the few sizes that the "
+        f"search tries, {here} (the paper: {papers}); of its neighbours, "
         f"all numbers a few per cent off, {percent(share(found.of('neighbour'), '10 larger'))} keep that ranking"
     )
 
