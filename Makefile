@@ -28,11 +28,12 @@ check: $(READY) ## lint, format, types and the arrows between the packages
 	@$(BIN)/pyright
 	@$(BIN)/lint-imports
 
-bench: $(READY) ## measure speed, memory, what each effect and the live page cost on this machine (about six minutes)
+bench: $(READY) ## measure speed, memory, what each effect and the live page cost on this machine (about ten minutes)
 	@$(BIN)/python tests/bench/bench.py
 	@$(BIN)/python tests/bench/memory.py
 	@$(BIN)/python tests/bench/ablation.py
 	@$(BIN)/python tests/bench/view.py
+	@$(BIN)/python tests/bench/arrays.py
 	@$(BIN)/python tests/bench/sweep.py
 
 accuracy: $(READY) ## measure what accuracy costs and write docs/accuracy.md (an hour; stopped, it goes on where it was)
