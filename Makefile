@@ -28,7 +28,7 @@ check: $(READY) ## lint, format, types and the arrows between the packages
 	@$(BIN)/pyright
 	@$(BIN)/lint-imports
 
-bench: $(READY) ## measure speed, memory, what each effect and the live page cost on this machine (about ten minutes)
+bench: $(READY) ## measure speed, memory, what each effect and the live page cost on this machine (about twelve minutes)
 	@$(BIN)/python tests/bench/bench.py
 	@$(BIN)/python tests/bench/memory.py
 	@$(BIN)/python tests/bench/ablation.py

@@ -111,7 +111,7 @@ def peak_MB(path: Path, folder: Path) -> float:
 def main() -> None:
     """One worker process against two, in turn; then the peak of memory of a long sweep and of a longer one."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--cells", type=int, default=40_000)
+    parser.add_argument("--cells", type=int, default=90_000)
     parser.add_argument("--repeats", type=int, default=3)
     parser.add_argument("--memory", type=int, nargs=2, default=(20_000, 60_000), metavar="CELLS")
     options = parser.parse_args()
