@@ -63,6 +63,13 @@ def alive(pids: Sequence[int]) -> list[int]:
     return [pid for pid, _, state, _ in processes() if pid in pids and not state.startswith("Z")]
 
 
+def where(pid: int) -> str:
+    """What each thread of a process waits for, and which signals are pending or ignored (Linux)."""
+    status = Path(f"/proc/{pid}/status").read_text(encoding="utf-8").splitlines()
+    threads = [f"{task.name}: {(task / 'wchan').read_text()}" for task in Path(f"/proc/{pid}/task").iterdir()]
+    return "\n".join([*threads, *(line for line in status if line.startswith(("State", "Sig", "Shd")))])
+
+
 def command(*arguments: str) -> subprocess.CompletedProcess[str]:
     """A haploop command from another terminal, to its end."""
     return subprocess.run([*HAPLOOP, *arguments], capture_output=True, text=True, timeout=PATIENCE_S)
@@ -128,7 +135,7 @@ class Launched:
         try:
             stdout, _ = self._process.communicate(timeout=PATIENCE_S)
         except subprocess.TimeoutExpired:
-            raise AssertionError(f"haploop has not ended; it said: {self.stderr}") from None
+            raise AssertionError(f"haploop has not ended; it said: {self.stderr}\n{where(self.pid)}") from None
         self.took_s = time.monotonic() - self._since
         print(f"ended {self.took_s:.2f} s later: {self.stderr[-400:]}")
         assert self._process.returncode == status, self.stderr
