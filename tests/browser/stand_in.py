@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import json
 import threading
+import time
 from collections.abc import Callable
 from importlib.util import find_spec
 from pathlib import Path
@@ -67,6 +68,10 @@ WAITING: dict[str, Any] = {
 }  # fmt: skip
 
 
+# A test gives up after so long.
+_PATIENCE_S = 20.0
+
+
 class StandIn:
     """A server of the page in a thread of its own.
 
@@ -103,6 +108,14 @@ class StandIn:
     def watches(self) -> list[dict[str, Any]]:
         """Which stretches of time were asked for."""
         return [message for message in self.heard if message["type"] == "watch"]
+
+    def asked(self, is_so: Callable[[dict[str, Any]], bool]) -> dict[str, Any]:
+        """The stretch of time that was asked for last, once it is so: what a page asks for takes its time to arrive."""
+        give_up = time.monotonic() + _PATIENCE_S
+        while not (self.watches() and is_so(self.watches()[-1])):
+            assert time.monotonic() < give_up, f"asked for: {self.watches()}"
+            time.sleep(0.01)
+        return self.watches()[-1]
 
     # From the test's thread
 
