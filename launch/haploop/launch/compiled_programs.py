@@ -92,6 +92,4 @@ def most() -> int:
         os.environ[_FLAGS] = before
         if not before:
             del os.environ[_FLAGS]
-    if not on_cpu:
-        return 16384
-    return 1024
+    return 1024 if on_cpu else 16384
