@@ -171,6 +171,12 @@ def skipped(run: Any) -> list[int]:
     return [node["skipped_ticks"] for node in run.ask("status")[1]["nodes"] if node["role"] == "view"]
 
 
+def told(run: Any) -> bool:
+    """Whether the clock knows of skipped ticks; a gap shows when something follows it that is not lost, too."""
+    run.stands_at(run.ask("step", ticks=1)[1]["tick"])
+    return any(skipped(run))
+
+
 def stopped_for(launched, tmp_path, seconds: float, *overrides: str, **options: Any) -> None:
     """Stop a viewer while its run goes on; it costs the run nothing, and the viewer is told what it missed."""
     with going(tmp_path, "run.deadline=2", *overrides, pauses=(200,), **options) as run:
@@ -192,7 +198,7 @@ def stopped_for(launched, tmp_path, seconds: float, *overrides: str, **options: 
         assert end > 1000
         run.stands_at(end)
         viewer.signal(signal.SIGCONT)
-        run.stands_at(run.ask("step", ticks=10)[1]["tick"])  # a gap shows when something follows it
+        wait_for("word of a gap", lambda: told(run))
         state = browse(viewer, after)
         wait_for("the report", lambda: skipped(run) == [state["skipped_ticks"]])
         run.ask("resume")
@@ -206,10 +212,10 @@ def stopped_for(launched, tmp_path, seconds: float, *overrides: str, **options: 
 
 @pytest.mark.slow
 def test_a_stopped_viewer_costs_the_run_nothing_and_is_told_what_it_missed(launched, tmp_path):
-    """At free pace with blocks of 10 ticks, so that its queues are full in no time."""
+    """At free pace; blocks of 10 ticks fill its queues in no time."""
     stopped_for(launched, tmp_path, 2.5, "duration=40", "run.block_ticks=10", "run.log=ticks")
 
 
 @pytest.mark.slow
 def test_a_viewer_stopped_for_ten_seconds_in_real_time_costs_the_run_nothing(launched, tmp_path):
-    stopped_for(launched, tmp_path, 10.0, "duration=15", pace=1.0)
+    stopped_for(launched, tmp_path, 10.0, "duration=15", "run.block_ticks=10", pace=1.0)
