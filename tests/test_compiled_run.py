@@ -133,6 +133,21 @@ def test_a_program_serves_all_scenes_of_its_structure_and_jax_stays_as_it_was() 
     assert jax.numpy.zeros(1).dtype == np.float32
 
 
+@pytest.mark.parametrize(("duration", "diverged_beyond"), [(0.006, 1.0), (1.2, 1.0), (1.2, 0.0021)])
+def test_loops_show_nothing_of_those_whose_memory_they_take_over(duration: float, diverged_beyond: float) -> None:
+    """Few ticks, the last half second, a divergence; the memory comes full of what is no number."""
+    from haploop.launch.compiled_programs import PROGRAMS, in_double
+
+    scenes = many(16, duration=duration, diverged_beyond=diverged_beyond)
+    PROGRAMS.spare = None
+    expected = compiled(scenes)
+    assert PROGRAMS.spare
+    with in_double():
+        PROGRAMS.spare = left = jax.tree.map(lambda ring: ring * math.nan, PROGRAMS.spare)
+    assert compiled(scenes) == expected
+    assert left.x.is_deleted()
+
+
 def test_what_is_not_asked_for_is_left_out() -> None:
     scenes = many(16)
     for result, whole in zip(compiled(scenes, energy=False), compiled(scenes), strict=True):

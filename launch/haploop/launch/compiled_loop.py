@@ -79,6 +79,7 @@ class CompiledLoops(LoopArray):
             if self._end:
                 whole = self._end == self._time.ticks
                 self._finish(np.flatnonzero(~self._ended), "done" if whole else "stopped")
+            self._programs.spare = self._window.rings
 
     def _by_itself(self, tick: int, until: int) -> int:
         """Go on until a tick leaves the structure as it was and all forces still in effect are of elements at work."""
@@ -88,9 +89,11 @@ class CompiledLoops(LoopArray):
                 self._book()
             self._work(tick)
             self._look_for_ends(tick)
-            self._book()
             tick += 1
-            now = self._shapes(tick) if tick >= settled - 1 else None
+            if tick < min(settled - 1, until):
+                continue
+            self._book()
+            now = self._shapes(tick)
             if tick == until or (tick >= settled and now == before):
                 return tick
             before = now
@@ -109,7 +112,7 @@ class CompiledLoops(LoopArray):
 
     def _by_program(self, first: int, until: int) -> None:
         tick = self._tick(first)
-        given, carry, rings = self._given(tick, first, first), self._carry(tick), self._rings()
+        given, carry = self._given(tick, first, first), self._carry(tick)
         key = (
             *self._key,
             tuple(tick.leaves.whole),
@@ -122,7 +125,9 @@ class CompiledLoops(LoopArray):
         changing, constant = block.split(tick.leaves.data)
         carry = carry._replace(changing=changing)
         given = given._replace(constant=constant)
+        rings = self._rings()
         program = program or self._programs.compiled(key, block, (carry, rings, given))
+        rings = self._programs.begun(rings, first)
         done, data = first, tick.leaves.data
         before = deque[tuple[Carry, Given]](maxlen=-(-self._window.kept_ticks // BLOCK_TICKS) + 1)
         while done < until and not self._ended.all():
