@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any, NamedTuple
 
 import jax
@@ -178,24 +179,26 @@ class Block:
         command = {"command": told.row["total"]}
         if self._tick.books is None:
             return told, {}, command
-        books = self._tick.books
+        books, apart = self._tick.books, partial(_apart, go)
         now = {"wall": told.row["wall"]} | {str(book): force for book, force in told.forces.items()}
         acting = [before[0], before[1] if len(self._tick.commands) > 1 else now]
 
         def added() -> dict[str, Any]:
-            return added_in_tick(books, told, now, acting, before[2], x_m_before, self._has_wall)
+            return added_in_tick(books, told, now, acting, before[2], x_m_before, self._has_wall, apart)
 
-        return told, _apart(go, added) if jax.default_backend() == "cpu" else added(), now | command
+        return told, apart(added), now | command
 
 
 def _apart(go: Any, make: Callable[[], Any]) -> Any:
     """What ``make`` gives, made from numbers in memory and put into memory, so that no part of it is made twice.
 
-    A compiler that fuses by itself makes for each of many results anew what they have in common.
+    A compiler that fuses by itself makes for each of many results anew what they have in common; one for a GPU may.
 
     Args:
         go: true, which the compiler cannot know.
     """
+    if jax.default_backend() != "cpu":
+        return make()
     shapes = jax.eval_shape(make)
     return jax.lax.cond(go, make, lambda: jax.tree.map(lambda one: jnp.zeros(one.shape, one.dtype), shapes))
 

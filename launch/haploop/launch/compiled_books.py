@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import cache
 from itertools import accumulate
 from typing import Any
 
@@ -15,11 +16,13 @@ from haploop.logger.wall_books import CAUSES, ideal_and_undelayed
 
 # Force of the wall and of every element at one tick.
 Forces = dict[str, Any]
+# Gives what a function gives, made once for all that needs it.
+Apart = Callable[[Callable[[], Any]], Any]
 
 
 def added_in_tick(
     plant: PlantBooks, told: Ticked, now: Forces, acting: Sequence[Forces], before: Forces, x_m_before: Any,
-    has_wall: bool,
+    has_wall: bool, apart: Apart,
 ) -> dict[str, Any]:  # fmt: skip
     """What a tick adds to each book, J, by the names of ``Books``; shape (loops,).
 
@@ -31,29 +34,41 @@ def added_in_tick(
         before: those computed at the tick before.
         x_m_before: measured position at the tick before.
         has_wall: whether there is a wall.
+        apart: for what several books need; a compiler would make it for each of them anew.
     """
     x, low, n = told.x, told.x_low, len(told.x) - 1
     dx = (x[1:] - x[:-1]) + (low[1:] - low[:-1])
+    summed = _summing(apart)
     counts, applied = zip(*told.held, strict=True)
     in_effect = {account: [forces[account] for forces in acting[2 - len(counts) :]] for account in now}
     columns: Any = {"x": x, "v": told.v, "force": Rows([*_by_step(counts, applied), applied[-1]])}
     commanded = [Rows(_by_step(counts, forces)) for forces in in_effect.values()]
     flows: dict[str, Any] = dict(
-        zip(plant.names, plant.increments(told.first_step, columns, dx, commanded), strict=True)  # pyright: ignore[reportArgumentType]
+        zip(plant.names, plant.increments(told.first_step, columns, dx, commanded, summed), strict=True)  # pyright: ignore[reportArgumentType]
     )
     ends = list(accumulate(counts))
-    ways = [by_tick(dx, n, end - count, end) for count, end in zip(counts, ends, strict=True)]
+    ways = [summed(dx, n, end - count, end) for count, end in zip(counts, ends, strict=True)]
     for account, forces in in_effect.items():
         flows[f"{account}.true"] = sum_rows(-force * way for force, way in zip(forces, ways, strict=True))
     flows["moved"] = 0.5 * sum_rows(abs(flow) for flow in flows.values())
     if has_wall:
         *wall, into_wall = told.wall
-        springs = ideal_and_undelayed(x[::n], by_tick(dx, n), Rows([now["wall"]]), (wall[0], wall[1]), into_wall)
+        springs = ideal_and_undelayed(x[::n], summed(dx, n), Rows([now["wall"]]), (wall[0], wall[1]), into_wall)
         flows |= zip(CAUSES, springs, strict=True)
     x_m: Any = Rows([x_m_before, told.row["x"]])
     for account in now:
         flows[f"{account}.sampled"] = sampled_flow(x_m, before[account])
     return {name: flow[0] for name, flow in flows.items()}
+
+
+def _summing(apart: Apart) -> Callable[..., Any]:
+    """``by_tick`` of which every sum is worked out once."""
+
+    @cache
+    def once(flow: Rows, n: int, first: int, end: int) -> Any:
+        return apart(lambda: by_tick(flow, n, first, end)[0])
+
+    return lambda flow, n, first=0, end=None: Rows([once(flow, n, first, end or n)])
 
 
 def _by_step(counts: Sequence[int], forces: Sequence[Any]) -> list[Any]:

@@ -72,11 +72,11 @@ class Programs:
             self._kept.popitem(last=False)
         return program
 
-
     def begun(self, rings: Rings, ticks: int) -> Rings:
-        """These rings of NumPy, of which the first rows, so many, and the last are in use; in spare memory if it fits."""
+        """These rings of NumPy, in spare memory if it fits; the first rows, so many, and the last are in use."""
         spare, self.spare = self.spare, None
-        if spare is None or ticks >= len(rings.x) or jax.tree.map(np.shape, spare) != jax.tree.map(np.shape, rings):
+        fits = spare is not None and jax.tree.map(np.shape, spare) == jax.tree.map(np.shape, rings)
+        if not fits or ticks >= len(rings.x):
             return rings
         used = np.r_[:ticks, -1]
         return _put(spare, used, jax.tree.map(lambda ring: ring[used], rings))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -71,7 +71,12 @@ class PlantBooks:
         self.names += ["actuator"] * self._is_limited
 
     def increments(
-        self, first_step: int, columns: dict[str, np.ndarray], dx: np.ndarray, commanded: Iterable[np.ndarray]
+        self,
+        first_step: int,
+        columns: dict[str, np.ndarray],
+        dx: np.ndarray,
+        commanded: Iterable[np.ndarray],
+        summed: Callable[[Any, int], Any] = by_tick,
     ) -> Iterator[np.ndarray]:
         """What each interval adds to each book, J; of many loops at once where the arrays have a last axis for them.
 
@@ -80,6 +85,7 @@ class PlantBooks:
             columns: plant telemetry of whole intervals, the end state included; shape (ticks * n + 1,) each.
             dx: displacement over each step, shape (ticks * n,), with the digits that the difference of two x has lost.
             commanded: the force of the wall and of every element over each step, shape (ticks * n,) each.
+            summed: how steps are summed over their tick.
 
         Yields:
             Shape (ticks,) each, ordered as ``names``.
@@ -89,15 +95,15 @@ class PlantBooks:
         rise = tau[1:] - tau[:-1]
         net = force + tau[:-1] - m.damping * v[:-1] - m.stiffness * (x[:-1] - m.rest_m)
         rates = [v[:-1], net, rise] if self._rises(rise) else [v[:-1], net]
-        yield by_tick(self._hand_work(tau, rise, dx, rates), n)
-        square = by_tick(sum_squares(self._square, rates), n)
+        yield summed(self._hand_work(tau, rise, dx, rates), n)
+        square = summed(sum_squares(self._square, rates), n)
         for damping in m.dampers.values():
             yield damping * square
-        at_ticks, way = x[::n], by_tick(dx, n)
+        at_ticks, way = x[::n], summed(dx, n)
         yield self._kinetic(v[::n])
         yield m.stiffness * way * (at_ticks[:-1] - m.rest_m + way * 0.5)
         if self._is_limited:
-            yield by_tick(beyond_limits(commanded, force) * dx, n)
+            yield summed(beyond_limits(commanded, force) * dx, n)
 
     def _kinetic(self, v: np.ndarray) -> np.ndarray:
         start, change = v[:-1], v[1:] - v[:-1]
