@@ -148,6 +148,18 @@ def test_loops_show_nothing_of_those_whose_memory_they_take_over(duration: float
     assert left.x.is_deleted()
 
 
+def test_put_together_for_a_gpu_the_loops_are_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its program is another; where there is no GPU, the CPU runs it."""
+    from haploop.launch import compiled_programs
+
+    compiled_programs.most()  # what jax is told first, it is told of the device there is
+    monkeypatch.setattr(jax, "default_backend", lambda: "gpu")
+    monkeypatch.setattr(compiled_programs, "PROGRAMS", compiled_programs.Programs())
+    scenes = many(13)
+    assert agree(compiled(scenes), run_array(scenes, KINDS))
+    assert compiling()[0] == 1
+
+
 def test_what_is_not_asked_for_is_left_out() -> None:
     scenes = many(16)
     for result, whole in zip(compiled(scenes, energy=False), compiled(scenes), strict=True):
