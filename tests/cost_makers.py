@@ -1,6 +1,6 @@
 """A cost.json as it might be, made up from the theory of each method, for tests of what shows it."""
 
-from haploop.tools.cost_data import Cost, Errors, Load, Point, ReferenceNote, SceneCost, Spread
+from haploop.tools.cost.data import Cost, Errors, Load, Point, ReferenceNote, SceneCost, Spread
 
 RATES = (1_000, 2_000, 5_000, 10_000, 20_000, 50_000, 100_000)
 # method -> order, error at 1 kHz in m (0: at the rounding level), µs per tick, µs per plant step

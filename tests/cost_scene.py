@@ -4,9 +4,9 @@ from pathlib import Path
 from typing import Any
 
 from haploop.launch.scene_file import load as load_scene
-from haploop.tools.cost_grid import grid
-from haploop.tools.cost_points import outcome
-from haploop.tools.reference import Reference, statistics
+from haploop.tools.cost.grid import grid
+from haploop.tools.cost.points import outcome
+from haploop.tools.reference.nearest import Reference, statistics
 from haploop.tools.trajectory import trajectory
 
 SMOOTH = """

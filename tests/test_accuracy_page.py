@@ -13,13 +13,14 @@ from pathlib import Path
 import pytest
 from cost_makers import METHODS, RATES, fake_cost
 
-from haploop.tools import accuracy_findings, finding_words, price_findings
 from haploop.tools.ablation import AGAIN, NONE, WHOLE
-from haploop.tools.accuracy_findings import findings
-from haploop.tools.accuracy_page import page, write
-from haploop.tools.cost_data import Cost, CostFileError, Point, Spread, save
-from haploop.tools.price_data import PriceGroup, as_data, price
-from haploop.tools.stiffness_limit import StiffnessLimit
+from haploop.tools.cost import finding_words, price_findings
+from haploop.tools.cost import findings as accuracy_findings
+from haploop.tools.cost.data import Cost, CostFileError, Point, Spread, save
+from haploop.tools.cost.findings import findings
+from haploop.tools.cost.page import page, write
+from haploop.tools.cost.price_data import PriceGroup, as_data, price
+from haploop.tools.linear.stiffness_limit import StiffnessLimit
 
 HOUSE = Path(__file__).parents[1]
 
@@ -197,7 +198,7 @@ def test_page_and_figures_are_written_side_by_side(cost: Cost, tmp_path: Path) -
 def test_without_measurements_the_command_says_what_to_run(tmp_path: Path) -> None:
     with pytest.raises(CostFileError, match="Run haploop cost"):
         write(tmp_path, tmp_path / "docs")
-    command = [sys.executable, "-m", "haploop.tools.accuracy_page", str(tmp_path), str(tmp_path)]
+    command = [sys.executable, "-m", "haploop.tools.cost.page", str(tmp_path), str(tmp_path)]
     ended = subprocess.run(command, capture_output=True, text=True, check=False)
     assert ended.returncode == 2
     assert "Run haploop cost" in ended.stderr
@@ -207,4 +208,4 @@ def test_without_measurements_the_command_says_what_to_run(tmp_path: Path) -> No
 def test_the_readme_links_to_the_page_on_its_first_screen_once_make_accuracy_has_written_it() -> None:
     first_screen = (HOUSE / "README.md").read_text(encoding="utf-8").splitlines()[:20]
     assert sum("](docs/accuracy.md)" in line for line in first_screen) == (HOUSE / "docs/accuracy.md").exists()
-    assert "accuracy_page runs/accuracy docs" in (HOUSE / "Makefile").read_text(encoding="utf-8")
+    assert "cost.page runs/accuracy docs" in (HOUSE / "Makefile").read_text(encoding="utf-8")

@@ -10,8 +10,8 @@ import pytest
 from linear_scenes import linear_scene
 from scene_makers import scene
 
-from haploop.tools.bounds import Bound, bounds_of
-from haploop.tools.one_tick import NeverStable, OneTickMap
+from haploop.tools.linear.bounds import Bound, bounds_of
+from haploop.tools.linear.one_tick import NeverStable, OneTickMap
 
 COLGATE, GIL, EXACT, ABBOTT = "Colgate & Schenkel 1997", "Gil et al. 2009", "Exact, no delay", "Abbott & Okamura 2005"
 ENCODER = {"resolution": 1e-5}

@@ -10,9 +10,9 @@ from cost_scene import SMOOTH, exact_reference, outcomes
 from typer.testing import CliRunner
 
 from haploop.tools.cli import app
-from haploop.tools.cost_data import load
-from haploop.tools.cost_grid import METHODS, accuracy_scenes, grid
-from haploop.tools.cost_measure import Measurement
+from haploop.tools.cost.data import load
+from haploop.tools.cost.grid import METHODS, accuracy_scenes, grid
+from haploop.tools.cost.measure import Measurement
 
 
 @pytest.fixture

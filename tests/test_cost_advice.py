@@ -6,9 +6,9 @@ import pytest
 from cost_makers import fake_cost, fake_error
 from rich.console import Console
 
-from haploop.tools.cost_advice import advice, cheapest
-from haploop.tools.cost_data import Load, Point, ReferenceNote, SceneCost, Spread
-from haploop.tools.cost_report import report
+from haploop.tools.cost.advice import advice, cheapest
+from haploop.tools.cost.data import Load, Point, ReferenceNote, SceneCost, Spread
+from haploop.tools.cost.report import report
 
 
 def point(method, rate, size_m, us, right=True, pointwise=True):

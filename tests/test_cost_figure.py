@@ -13,12 +13,12 @@ import pytest
 from cost_makers import METHODS, RATES, SCENES, fake_cost, fake_point
 from test_figure import artists
 
-from haploop.tools.cost_data import Cost, Point, Spread
-from haploop.tools.cost_figure import draw as draw_cost
-from haploop.tools.cost_figure import figure_of
-from haploop.tools.cost_panel import LOOKS, drawn_m
-from haploop.tools.figure_data import FigureError
-from haploop.tools.figure_labels import Label, place_labels
+from haploop.tools.cost.data import Cost, Point, Spread
+from haploop.tools.cost.figure import draw as draw_cost
+from haploop.tools.cost.figure import figure_of
+from haploop.tools.cost.panel import LOOKS, drawn_m
+from haploop.tools.figure.data import FigureError
+from haploop.tools.figure.labels import Label, place_labels
 
 
 @pytest.fixture(scope="module")

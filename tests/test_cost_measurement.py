@@ -9,11 +9,11 @@ from cost_makers import fake_cost
 from cost_scene import SMOOTH, count_stages, exact_reference
 
 from haploop.launch.scene_file import load as load_scene
-from haploop.tools import cost_measure, cost_times
-from haploop.tools.cost_data import CostFileError, Spread, load, save
-from haploop.tools.cost_grid import grid
-from haploop.tools.cost_measure import Measurement
-from haploop.tools.cost_store import Store
+from haploop.tools.cost import measure, times
+from haploop.tools.cost.data import CostFileError, Spread, load, save
+from haploop.tools.cost.grid import grid
+from haploop.tools.cost.measure import Measurement
+from haploop.tools.cost.store import Store
 
 
 @pytest.fixture
@@ -32,8 +32,8 @@ def test_a_finished_measurement_is_not_made_again(smooth, tmp_path, monkeypatch)
             measurement.errors(count_stages(counts))
             measurement.times(count_stages(counts))
             costs = measurement.cost(1e-6)
-        monkeypatch.setattr(cost_measure, "outcome", None)
-        monkeypatch.setattr(cost_times, "in_process_us", None)
+        monkeypatch.setattr(measure, "outcome", None)
+        monkeypatch.setattr(times, "in_process_us", None)
     assert [stage["made"] for stage in first.values()] == [5, 10]
     assert again == {}
     assert len(costs.scenes[0].points) == 5
@@ -52,8 +52,8 @@ def test_what_was_stopped_goes_on_where_it_was_and_gives_a_cost_meanwhile(smooth
         return 1.0
 
     # Nothing is timed here, so that each call stands for one measurement.
-    monkeypatch.setattr(cost_times, "in_process_us", interrupted)
-    monkeypatch.setattr(cost_times, "_warm", lambda *_: None)
+    monkeypatch.setattr(times, "in_process_us", interrupted)
+    monkeypatch.setattr(times, "_warm", lambda *_: None)
     with Measurement(grids, tmp_path, 3, 0, exact_reference) as measurement:
         measurement.errors(count_stages({}))
         with pytest.raises(KeyboardInterrupt):
@@ -61,7 +61,7 @@ def test_what_was_stopped_goes_on_where_it_was_and_gives_a_cost_meanwhile(smooth
         partial = measurement.cost(1e-6)
     assert len(partial.scenes[0].points) == 3
     assert partial.scenes[0].advice == ""
-    monkeypatch.setattr(cost_times, "in_process_us", lambda job: timed.append(job.key) or 1.0)
+    monkeypatch.setattr(times, "in_process_us", lambda job: timed.append(job.key) or 1.0)
     with Measurement(grids, tmp_path, 3, 0, exact_reference) as measurement:
         measurement.times(count_stages({}))
         assert measurement.cost(1e-6).scenes[0].advice
@@ -71,8 +71,8 @@ def test_what_was_stopped_goes_on_where_it_was_and_gives_a_cost_meanwhile(smooth
 
 def test_every_round_times_every_candidate_once_in_an_order_of_its_own(smooth, tmp_path, monkeypatch):
     order = []
-    monkeypatch.setattr(cost_times, "in_process_us", lambda job: order.append(job.key) or 1.0)
-    monkeypatch.setattr(cost_times, "_warm", lambda *_: None)
+    monkeypatch.setattr(times, "in_process_us", lambda job: order.append(job.key) or 1.0)
+    monkeypatch.setattr(times, "_warm", lambda *_: None)
     with Measurement([grid(smooth, ["euler"], [1_000, 2_000, 5_000, 10_000])], tmp_path, 5, 0, exact_reference) as made:
         made.errors(count_stages({}))
         made.times(count_stages({}))
@@ -91,7 +91,7 @@ def test_another_scene_or_another_source_is_measured_anew(smooth, tmp_path, monk
     assert [made(), made()] == [1, 0]
     smooth.write_text(SMOOTH.replace("damping = 0.4", "damping = 0.5"))
     assert [made(), made()] == [1, 0]
-    monkeypatch.setattr(cost_measure, "_sources", lambda: "edited")
+    monkeypatch.setattr(measure, "_sources", lambda: "edited")
     assert [made(), made()] == [1, 0]
 
 
@@ -156,9 +156,9 @@ def test_the_first_block_of_a_longer_run_is_not_timed(smooth, ticks, beyond_m, t
 
     At rest under 50 N/s, 20 g are 0.4 um away after 1 ms and 3.3 um after 2 ms: a limit of 1 um leaves two ticks.
     """
-    monkeypatch.setattr(cost_times, "timed_s", lambda work: work() or 1.0)
+    monkeypatch.setattr(times, "timed_s", lambda work: work() or 1.0)
     scene = load_scene(smooth, [f"duration={ticks / 1000}", f"diverged_beyond={beyond_m}", "clock.integrator=exact"])
-    us: Any = cost_times.loop_us(scene)
+    us: Any = times.loop_us(scene)
     assert 1e6 / us == pytest.approx(timed)
 
 

@@ -14,9 +14,9 @@ import haploop.logger
 from haploop.launch.start import prepare, run
 from haploop.logger.motion_columns import motion_columns
 from haploop.tools.amounts import amount
-from haploop.tools.figure import figure_of
-from haploop.tools.figure_data import RunData
-from haploop.tools.figure_words import book_rows
+from haploop.tools.figure.data import RunData
+from haploop.tools.figure.run_figure import figure_of
+from haploop.tools.figure.words import book_rows
 from haploop.tools.report import summary_table
 
 SCENES = Path(__file__).parents[1] / "launch/scenes"

@@ -15,12 +15,12 @@ from hypothesis import strategies as st
 
 from haploop.launch.start import prepare, run
 from haploop.logger import read
-from haploop.tools.figure import FigureError, draw, figure_of
-from haploop.tools.figure_data import TOGETHER, RunData
-from haploop.tools.figure_envelope import extremes
-from haploop.tools.figure_history import History
-from haploop.tools.figure_loops import force_position_loop, momentum_loop
-from haploop.tools.figure_words import event_lines, key_numbers
+from haploop.tools.figure.data import TOGETHER, RunData
+from haploop.tools.figure.envelope import extremes
+from haploop.tools.figure.history import History
+from haploop.tools.figure.loops import force_position_loop, momentum_loop
+from haploop.tools.figure.run_figure import FigureError, draw, figure_of
+from haploop.tools.figure.words import event_lines, key_numbers
 
 SCENES = Path(__file__).parents[1] / "launch/scenes"
 PNG = b"\x89PNG"

@@ -10,10 +10,10 @@ import pytest
 from rich.console import Console
 
 from haploop.protocol.wire import Frame
-from haploop.tools.attach_print import Lines
+from haploop.tools.attach.live_table import ending, live_line, live_table
+from haploop.tools.attach.print import Lines
+from haploop.tools.attach.watched import Watched
 from haploop.tools.event_words import event_words
-from haploop.tools.live_table import ending, live_line, live_table
-from haploop.tools.watched import Watched
 
 WELCOME = {
     "scene": {"title": "a tap on a wall [of 0.15 N/mm]"},

@@ -14,9 +14,9 @@ from physics.one_tick_map import growth_of
 from scene_makers import KINDS, scene
 
 from haploop.controller.dissipation import Element, Motion, Quantity
-from haploop.tools.linearity import is_linear, left_out, why_not_linear
-from haploop.tools.one_tick import NeverStable, OneTickMap
-from haploop.tools.stiffness_limit import pressed_deep, smooth, stiffness_limit
+from haploop.tools.linear.linearity import is_linear, left_out, why_not_linear
+from haploop.tools.linear.one_tick import NeverStable, OneTickMap
+from haploop.tools.linear.stiffness_limit import pressed_deep, smooth, stiffness_limit
 
 SEEDS = range(24)
 

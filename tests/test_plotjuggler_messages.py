@@ -15,7 +15,7 @@ from plotjuggler_rules import Parser
 from haploop.logger.channels import Channels
 from haploop.logger.msgpack_table import TableLayout
 from haploop.protocol.ticks import Timebase
-from haploop.tools.plotjuggler import MOST_SAMPLES, Batches, Outlet, PortTaken, array_of_maps
+from haploop.tools.attach.plotjuggler import MOST_SAMPLES, Batches, Outlet, PortTaken, array_of_maps
 
 TIME = Timebase(plant_rate=10_000, control_rate=1_000, delay_steps=0, ticks=3000)
 

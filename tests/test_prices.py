@@ -19,15 +19,15 @@ from haploop.controller.controller import Controller
 from haploop.launch.in_process import run_in_process
 from haploop.launch.plan import effects_of
 from haploop.launch.scene_file import load
-from haploop.tools import price_jobs, prices, prices_figure
 from haploop.tools.ablation import AGAIN, NONE, WHOLE, ablations
-from haploop.tools.cost_store import Store
-from haploop.tools.cost_times import IN_PROCESS, PROCESSES
-from haploop.tools.figure_data import FigureError
-from haploop.tools.one_tick import OneTickMap
+from haploop.tools.cost import price_jobs, prices, prices_figure
+from haploop.tools.cost.price_data import PriceGroup, as_data, chance_in, price, price_groups
+from haploop.tools.cost.store import Store
+from haploop.tools.cost.times import IN_PROCESS, PROCESSES
+from haploop.tools.figure.data import FigureError
+from haploop.tools.linear.one_tick import OneTickMap
+from haploop.tools.linear.stiffness_limit import StiffnessLimit
 from haploop.tools.operations import Operations
-from haploop.tools.price_data import PriceGroup, as_data, chance_in, price, price_groups
-from haploop.tools.stiffness_limit import StiffnessLimit
 
 SCENES = Path(__file__).parents[1] / "launch/scenes"
 

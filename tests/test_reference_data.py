@@ -12,8 +12,9 @@ from physics.effects_reference import Bodies
 from scene_makers import scene
 
 from haploop.launch.scene_file import load
-from haploop.tools.make_reference import SCENES, in_digits
-from haploop.tools.reference import (
+from haploop.tools.reference.loop import close_loop, ticks_of
+from haploop.tools.reference.make import SCENES, in_digits
+from haploop.tools.reference.nearest import (
     MOST_GROWTH,
     REFERENCES,
     Reference,
@@ -24,8 +25,7 @@ from haploop.tools.reference import (
     reference_for,
     statistics,
 )
-from haploop.tools.reference_loop import close_loop, ticks_of
-from haploop.tools.reference_plant import ContinuousPlant
+from haploop.tools.reference.plant import ContinuousPlant
 from haploop.tools.trajectory import trajectory
 
 RATES = (1_000, 2_000, 5_000, 10_000, 20_000, 50_000, 100_000)
@@ -234,7 +234,7 @@ def test_what_does_not_swing_has_no_frequency():
 
 
 def test_reading_a_reference_needs_no_mpmath():
-    reads = "import sys, haploop.tools.reference; sys.exit('mpmath' in sys.modules)"
+    reads = "import sys, haploop.tools.reference.nearest; sys.exit('mpmath' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", reads], check=False).returncode == 0
 
 

@@ -12,8 +12,8 @@ from physics.one_tick_map import LinearLoop
 from scene_makers import KINDS, scene
 
 from haploop.launch.in_process import run_in_process
-from haploop.tools.one_tick import NeverStable, NotLinear, OneTickMap
-from haploop.tools.stiffness_limit import StiffnessLimit, pressed_deep, stiffness_limit
+from haploop.tools.linear.one_tick import NeverStable, NotLinear, OneTickMap
+from haploop.tools.linear.stiffness_limit import StiffnessLimit, pressed_deep, stiffness_limit
 
 CABLE = {"motor_mass": 0.01, "stiffness": 2e4, "damping": 0.5, "motor_damping": 0.05}
 HAND = {"mass": 0.05, "damping": 0.4, "stiffness": 20.0, "grip": {"stiffness": 800.0, "damping": 3.0}}

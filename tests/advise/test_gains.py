@@ -10,7 +10,7 @@ from haploop.tools.advise.advice import Advice, advice
 from haploop.tools.advise.steady import Judge
 from haploop.tools.advise.subject import Subject
 from haploop.tools.advise.variations import Change, corners, scaled
-from haploop.tools.one_tick import NeverStable, OneTickMap
+from haploop.tools.linear.one_tick import NeverStable, OneTickMap
 
 # No encoder and no friction: every family but those with unidirectional inertia is linear.
 LOOP = scene(

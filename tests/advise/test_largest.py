@@ -12,7 +12,7 @@ from haploop.tools.advise.pace import NEAR, WIDE, Pace
 from haploop.tools.advise.steady import Judge, Judgement
 from haploop.tools.advise.tasks import tasks
 from haploop.tools.advise.variations import Change
-from haploop.tools.one_tick import OneTickMap
+from haploop.tools.linear.one_tick import OneTickMap
 
 QUICK, SLOW = WIDE["arrays"], WIDE["alone"]
 

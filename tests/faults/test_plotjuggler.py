@@ -16,9 +16,9 @@ from plotjuggler_rules import Viewer
 import haploop.logger
 from haploop.launch.run_directory import LiveRun
 from haploop.logger.recording import Recording
-from haploop.tools import plotjuggler
-from haploop.tools.attach_plotjuggler import publish
-from haploop.tools.plotjuggler import Outlet
+from haploop.tools.attach import plotjuggler
+from haploop.tools.attach.plotjuggler import Outlet
+from haploop.tools.attach.plotjuggler_node import publish
 
 END = "/end"
 ROWS_A_TICK = {"/plant": 10, "/controller": 1, "/energy": 1}

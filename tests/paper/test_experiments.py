@@ -14,8 +14,9 @@ import pytest
 from haploop.controller.dissipation import registry
 from haploop.launch.in_process import run_in_process
 from haploop.launch.scene_file import load
-from haploop.tools.cost_grid import scenes_folder
-from haploop.tools.one_tick import OneTickMap
+from haploop.tools.cost.grid import scenes_folder
+from haploop.tools.linear.one_tick import OneTickMap
+from haploop.tools.linear.stiffness_limit import smooth
 from haploop.tools.paper.claims import Claim, Finding
 from haploop.tools.paper.command import make_figure
 from haploop.tools.paper.experiment.climb import NAMES, SIZES, climb, largest
@@ -32,7 +33,6 @@ from haploop.tools.paper.figure_11 import largest_steady
 from haploop.tools.paper.figures import figure
 from haploop.tools.paper.shares import options
 from haploop.tools.paper.work import Work
-from haploop.tools.stiffness_limit import smooth
 
 # A drive, a hand and a unit with all that a loop may have but friction.
 SETUP = Setup(

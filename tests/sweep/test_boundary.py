@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from scene_makers import KINDS, scene
 
 from haploop.launch.array_run import results_of
-from haploop.tools.one_tick import OneTickMap
+from haploop.tools.linear.one_tick import OneTickMap
 from haploop.tools.sweep.boundary import Boundary, Candidate, Tolerance, boundaries, holds_verdict, run_scenes
 
 POINTS = [0.0, 25.0, 50.0, 75.0, 100.0]

@@ -18,10 +18,10 @@ from sweep.map_makers import cells_of, ran, said, table
 from test_figure import artists
 
 from haploop.launch.resolved import inline
-from haploop.tools.figure_data import FigureError
-from haploop.tools.figure_file import write_figure
-from haploop.tools.one_tick import OneTickMap
-from haploop.tools.stiffness_limit import pressed_deep
+from haploop.tools.figure.data import FigureError
+from haploop.tools.figure.file import write_figure
+from haploop.tools.linear.one_tick import OneTickMap
+from haploop.tools.linear.stiffness_limit import pressed_deep
 from haploop.tools.sweep.map_answer import stiffest_steady
 from haploop.tools.sweep.map_axis import Ruler
 from haploop.tools.sweep.map_data import AMPLITUDE, NOT_RUN, VERDICTS, Axis, MapData, data_of

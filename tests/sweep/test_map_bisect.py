@@ -15,7 +15,7 @@ from test_figure import artists
 from typer.testing import CliRunner
 
 from haploop.tools.cli import app
-from haploop.tools.figure_data import FigureError
+from haploop.tools.figure.data import FigureError
 from haploop.tools.sweep.map_bisect import MOST_LINES, bisect_figure
 from haploop.tools.sweep.map_boundary import ALL_HOLD, FOUND, NONE_HOLDS, UNKNOWN, edges_of
 from haploop.tools.sweep.map_data import AMPLITUDE, MapData, data_of

@@ -12,8 +12,8 @@ from scene_makers import scene
 from sweep.map_makers import UNITS, cells_of, said, table
 from test_figure import artists
 
-from haploop.tools.bounds import bounds_of
-from haploop.tools.one_tick import NotLinear, OneTickMap
+from haploop.tools.linear.bounds import bounds_of
+from haploop.tools.linear.one_tick import NotLinear, OneTickMap
 from haploop.tools.sweep.map_axis import Ruler
 from haploop.tools.sweep.map_bounds import bound_boundaries
 from haploop.tools.sweep.map_contour import zero_lines

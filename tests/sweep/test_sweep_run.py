@@ -15,7 +15,7 @@ from sweep.sweep_files import GRID, PRESS, loaded, sweep_file, swept
 
 from haploop.launch.in_process import run_in_process
 from haploop.launch.scene_file import load as load_scene
-from haploop.tools.one_tick import OneTickMap
+from haploop.tools.linear.one_tick import OneTickMap
 from haploop.tools.sweep.boundary import Boundary
 from haploop.tools.sweep.columns import schema_of
 from haploop.tools.sweep.command import Request, sweep

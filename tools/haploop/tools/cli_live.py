@@ -94,7 +94,7 @@ def attach(
 
     The logger holds the loop up rather than miss anything; the others never do, and say what they skipped.
     """
-    from haploop.tools.attach import attach_to
+    from haploop.tools.attach.command import attach_to
 
     attach_to(what, out, run, port)
 

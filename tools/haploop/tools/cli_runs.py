@@ -38,6 +38,6 @@ def export(
     Any length of log takes the same memory. A number that is not there, an element's before it was swapped in, is NaN
     in npz and parquet, an empty cell in csv, and left out in json-mcap, as are numbers that are not finite.
     """
-    from haploop.tools.export import export_run
+    from haploop.tools.export.command import export_run
 
     export_run(directory, to, out, topics, force)

@@ -26,8 +26,8 @@ def cost(
 
     Can be stopped; the same command goes on.
     """
-    from haploop.tools.cost import Request
-    from haploop.tools.cost import cost as measure
+    from haploop.tools.cost.command import Request
+    from haploop.tools.cost.command import cost as measure
 
     measure(Request(scenes or [], methods, rates, out, tolerance, repeats, processes), json)
 

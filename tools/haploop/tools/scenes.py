@@ -74,13 +74,13 @@ def _parameters(element: type[Element]) -> dict[str, Any]:
 
 def plot_directory(directory: Path) -> None:
     """Draw the figure of a run, or the map of a sweep, and name its file."""
-    from haploop.tools.figure_data import FigureError
+    from haploop.tools.figure.data import FigureError
     from haploop.tools.sweep.table import is_sweep
 
     if is_sweep(directory):
         from haploop.tools.sweep.map_file import draw_map as draw
     else:
-        from haploop.tools.figure import draw
+        from haploop.tools.figure.run_figure import draw
 
     with plain_errors():
         try:

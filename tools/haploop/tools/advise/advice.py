@@ -14,9 +14,9 @@ from haploop.tools.advise.margins import Margins, Safe
 from haploop.tools.advise.tasks import Tasks, tasks, with_wall
 from haploop.tools.advise.variations import DELAY, SHARE, delay_s, quantities
 from haploop.tools.advise.words import buzz_sentences, gain_sentences
-from haploop.tools.bounds import Bound, bounds_of
-from haploop.tools.linearity import is_linear
-from haploop.tools.one_tick import NeverStable, OneTickMap
+from haploop.tools.linear.bounds import Bound, bounds_of
+from haploop.tools.linear.linearity import is_linear
+from haploop.tools.linear.one_tick import NeverStable, OneTickMap
 
 if TYPE_CHECKING:
     from haploop.controller.dissipation import Element

@@ -87,7 +87,7 @@ def _written(found: Advice, out: Path) -> dict:
     from haploop.logger.summary import finite
     from haploop.tools.advise.advice import as_data
     from haploop.tools.advise.chart import draw
-    from haploop.tools.figure_data import FigureError
+    from haploop.tools.figure.data import FigureError
 
     files = {}
     data = as_data(found)

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from haploop.tools.advise.buzz import Buzz
     from haploop.tools.advise.gains import Gains
     from haploop.tools.advise.largest import Limit
-    from haploop.tools.bounds import Bound
+    from haploop.tools.linear.bounds import Bound
 
 _LONGEST_WORD = len("unidirectional")
 _READING = (

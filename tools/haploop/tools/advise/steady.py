@@ -14,8 +14,8 @@ from haploop.logger.verdict import SMALLEST_SWING_M
 from haploop.tools.advise.pace import way
 from haploop.tools.advise.runs import Runs
 from haploop.tools.advise.tasks import is_held_by
-from haploop.tools.linearity import is_linear
-from haploop.tools.one_tick import OneTickMap
+from haploop.tools.linear.linearity import is_linear
+from haploop.tools.linear.one_tick import OneTickMap
 
 if TYPE_CHECKING:
     from haploop.controller.dissipation import Element

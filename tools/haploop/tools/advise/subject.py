@@ -11,7 +11,7 @@ from haploop.launch.layers import Layers, read_layers
 from haploop.launch.mistakes import nearest
 from haploop.launch.scene_file import resolved
 from haploop.tools.advise.tasks import MOST_DELAY_S
-from haploop.tools.cost_grid import scenes_folder
+from haploop.tools.cost.grid import scenes_folder
 
 if TYPE_CHECKING:
     from haploop.controller.dissipation import Element

@@ -11,8 +11,8 @@ from haploop.tools.amounts import prefix_for
 from haploop.tools.dissipate.outcome import Outcome, in_words
 from haploop.tools.dissipate.report import answer, row_of
 from haploop.tools.dissipate.samples import Floats
-from haploop.tools.figure_file import empty_figure
-from haploop.tools.figure_style import (
+from haploop.tools.figure.file import empty_figure
+from haploop.tools.figure.style import (
     CLOSE,
     ELEMENTS,
     FAINT,

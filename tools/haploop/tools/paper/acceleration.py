@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from haploop.tools.amounts import fixed
-from haploop.tools.one_tick import OneTickMap
+from haploop.tools.linear.one_tick import OneTickMap
 from haploop.tools.paper.prescribed import PERIOD_S, mean_taken
 from haploop.tools.paper.scenes import fig6, run, single_contact
 

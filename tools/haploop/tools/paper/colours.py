@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from haploop.tools.figure_style import ELEMENTS, FAINT, WALL
+from haploop.tools.figure.style import ELEMENTS, FAINT, WALL
 
 COLOURS = {
     "nothing": FAINT,

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from haploop.tools.ending import WRONG_USE, leave, plain_errors
-from haploop.tools.figure_data import FigureError
+from haploop.tools.figure.data import FigureError
 from haploop.tools.paper.figures import figure, numbers
 from haploop.tools.paper.page import PAGE, write_page
 from haploop.tools.paper.work import Work

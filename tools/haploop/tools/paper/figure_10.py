@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from haploop.tools.amounts import amount
-from haploop.tools.figure_file import empty_figure
-from haploop.tools.figure_style import FAINT, GREY, dress, legend, plain_numbers
+from haploop.tools.figure.file import empty_figure
+from haploop.tools.figure.style import FAINT, GREY, dress, legend, plain_numbers
 from haploop.tools.paper.claims import Claim, Finding
 from haploop.tools.paper.colours import COLOURS, SHORT
 from haploop.tools.paper.experiment.gate import always_open_Hz

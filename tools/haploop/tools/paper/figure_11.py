@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from haploop.tools.figure_file import empty_figure
-from haploop.tools.figure_style import INK, SMALL, dress
+from haploop.tools.figure.file import empty_figure
+from haploop.tools.figure.style import INK, SMALL, dress
 from haploop.tools.paper.claims import Claim, Finding
 from haploop.tools.paper.experiment.judged import judged, nearest
 from haploop.tools.paper.experiment.many import is_steady, runs

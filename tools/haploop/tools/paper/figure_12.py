@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from haploop.tools.amounts import amount
-from haploop.tools.figure_file import empty_figure
-from haploop.tools.figure_style import legend
+from haploop.tools.figure.file import empty_figure
+from haploop.tools.figure.style import legend
 from haploop.tools.paper.claims import Claim, Finding
 from haploop.tools.paper.experiment.judged import judged, nearest
 from haploop.tools.paper.experiment.press_figure import Press, draw_press

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from haploop.tools.amounts import amount
-from haploop.tools.figure_file import empty_figure
-from haploop.tools.figure_style import SMALL, WALL_FILL, dress
+from haploop.tools.figure.file import empty_figure
+from haploop.tools.figure.style import SMALL, WALL_FILL, dress
 from haploop.tools.paper.claims import Claim, Finding
 from haploop.tools.paper.colours import COLOURS
 from haploop.tools.paper.experiment.judged import judged

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from haploop.tools.figure_file import empty_figure
-from haploop.tools.figure_style import INK, SMALL, TEXT, dress
+from haploop.tools.figure.file import empty_figure
+from haploop.tools.figure.style import INK, SMALL, TEXT, dress
 from haploop.tools.paper.claims import Claim, Finding
 from haploop.tools.paper.colours import COLOURS, SHORT
 from haploop.tools.paper.experiment.limits import Best, limits

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from haploop.tools.amounts import amount
-from haploop.tools.figure_file import empty_figure
-from haploop.tools.figure_style import INK, PRESSING, RELEASING, SMALL, dress, legend
+from haploop.tools.figure.file import empty_figure
+from haploop.tools.figure.style import INK, PRESSING, RELEASING, SMALL, dress, legend
 from haploop.tools.paper.claims import Claim, Finding
 from haploop.tools.paper.prescribed import PERIOD_S, SPRING, STIFFNESS_N_M, forces, taken_J
 from haploop.tools.paper.scenes import run, single_contact

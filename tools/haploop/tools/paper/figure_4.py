@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from haploop.tools.amounts import amount, fixed
-from haploop.tools.figure_file import empty_figure
-from haploop.tools.figure_style import INK, SMALL
+from haploop.tools.figure.file import empty_figure
+from haploop.tools.figure.style import INK, SMALL
 from haploop.tools.paper.acceleration import (
     CUTOFFS_HZ,
     errors_m_s2,

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from haploop.tools.amounts import amount, fixed
-from haploop.tools.figure_file import empty_figure
-from haploop.tools.figure_style import ELEMENTS, GREY, WALL, dress, legend, plain_numbers
+from haploop.tools.figure.file import empty_figure
+from haploop.tools.figure.style import ELEMENTS, GREY, WALL, dress, legend, plain_numbers
 from haploop.tools.paper.claims import Claim, Finding
 from haploop.tools.paper.gate_timing import returned
 from haploop.tools.paper.momentum import draw_loop, steps_J

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from haploop.tools.one_tick import OneTickMap
+from haploop.tools.linear.one_tick import OneTickMap
 from haploop.tools.paper import contact_tests
 from haploop.tools.paper.claims import Claim, Finding
 from haploop.tools.paper.panels import Run, panels

@@ -11,8 +11,8 @@ from haploop.protocol.ticks import Timebase
 from haploop.tools.amounts import amount
 from haploop.tools.dissipate.booking import Booked, Booking
 from haploop.tools.dissipate.samples import Samples
-from haploop.tools.figure_file import empty_figure
-from haploop.tools.figure_style import GREY, dress, legend
+from haploop.tools.figure.file import empty_figure
+from haploop.tools.figure.style import GREY, dress, legend
 from haploop.tools.paper.claims import Claim, Finding
 from haploop.tools.paper.colours import COLOURS
 from haploop.tools.paper.experiment.booked_sines import bidirectional_J, damper_J, unidirectional_J

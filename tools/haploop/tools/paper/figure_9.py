@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from haploop.tools.figure_file import empty_figure
-from haploop.tools.figure_style import legend
+from haploop.tools.figure.file import empty_figure
+from haploop.tools.figure.style import legend
 from haploop.tools.paper.claims import Claim, Finding
 from haploop.tools.paper.experiment.judged import judged, nearest
 from haploop.tools.paper.experiment.press_figure import Press, draw_press

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from haploop.tools.figure_style import FAINT, INK, dress
+from haploop.tools.figure.style import FAINT, INK, dress
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -11,7 +11,7 @@ from haploop.launch.in_process import run_in_process
 from haploop.launch.scene_file import load
 from haploop.logger.memory_log import MemoryLog
 from haploop.logger.recording import Recording
-from haploop.tools.cost_grid import scenes_folder
+from haploop.tools.cost.grid import scenes_folder
 
 SPEED_M_S = 0.1
 

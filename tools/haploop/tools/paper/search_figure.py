@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from haploop.tools.figure_file import empty_figure
-from haploop.tools.figure_style import INK, SMALL, TEXT
+from haploop.tools.figure.file import empty_figure
+from haploop.tools.figure.style import INK, SMALL, TEXT
 from haploop.tools.paper.shares import Option, percent
 
 if TYPE_CHECKING:

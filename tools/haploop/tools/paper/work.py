@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from haploop.launch.resolved import to_toml
-from haploop.tools.figure_file import write_figure
+from haploop.tools.figure.file import write_figure
 from haploop.tools.paper.claims import Finding
 from haploop.tools.stages import Stage, silent
 

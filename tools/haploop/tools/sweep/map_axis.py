@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from haploop.tools.figure_style import FAINT, GREY, INK, SMALL, TEXT, plain_numbers
+from haploop.tools.figure.style import FAINT, GREY, INK, SMALL, TEXT, plain_numbers
 from haploop.tools.sweep.map_data import Axis, short, with_prefix
 
 if TYPE_CHECKING:

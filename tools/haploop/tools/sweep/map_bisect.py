@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from haploop.tools.figure_file import fix_layout
-from haploop.tools.figure_style import ELEMENTS, FAINT, INK, WALL
+from haploop.tools.figure.file import fix_layout
+from haploop.tools.figure.style import ELEMENTS, FAINT, INK, WALL
 from haploop.tools.sweep.map_axis import Ruler
 from haploop.tools.sweep.map_boundary import ALL_HOLD, FOUND, NONE_HOLDS, UNKNOWN, Edges, edges_of
 from haploop.tools.sweep.map_curves import draw_boundary, styles_of

@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from haploop.tools.bounds import Bound, bounds_of
+from haploop.tools.linear.bounds import Bound, bounds_of
 from haploop.tools.sweep.map_data import STIFFNESS
 from haploop.tools.sweep.map_limit import Boundary
 from haploop.tools.sweep.map_plane import Plane, value_at

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from haploop.tools.figure_style import INK
+from haploop.tools.figure.style import INK
 from haploop.tools.sweep.map_limit import EXACT, Boundary
 
 if TYPE_CHECKING:

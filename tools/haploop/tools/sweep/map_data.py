@@ -12,7 +12,7 @@ import numpy as np
 
 from haploop.launch.resolved import inline
 from haploop.tools.amounts import prefix_for
-from haploop.tools.figure_data import FigureError
+from haploop.tools.figure.data import FigureError
 
 AMPLITUDE, STIFFNESS = "window.oscillation_m", "wall.stiffness"
 # The worse later: of several seeds a cell shows the worst. A failed run says nothing, a swinging one that it swings.

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Literal
 
-from haploop.tools.figure_file import fix_layout
+from haploop.tools.figure.file import fix_layout
 from haploop.tools.sweep.map_answer import stiffest_steady
 from haploop.tools.sweep.map_axis import Ruler
 from haploop.tools.sweep.map_curves import draw_boundary, styles_of

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from haploop.tools.figure_data import FigureError
-from haploop.tools.figure_file import write_figure
+from haploop.tools.figure.data import FigureError
+from haploop.tools.figure.file import write_figure
 from haploop.tools.sweep.columns import NeedsPyarrow
 from haploop.tools.sweep.map_bisect import bisect_figure
 from haploop.tools.sweep.map_data import data_of

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from haploop.tools.figure_file import empty_figure
-from haploop.tools.figure_style import GREY, INK, LARGE, SMALL, TEXT
+from haploop.tools.figure.file import empty_figure
+from haploop.tools.figure.style import GREY, INK, LARGE, SMALL, TEXT
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from haploop.tools.figure_style import SMALL
+from haploop.tools.figure.style import SMALL
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from textwrap import wrap
 from typing import TYPE_CHECKING, Any
 
-from haploop.tools.figure_style import GREY, INK, SMALL, TEXT
+from haploop.tools.figure.style import GREY, INK, SMALL, TEXT
 from haploop.tools.sweep.map_data import LIMIT_CYCLE
 from haploop.tools.sweep.map_look import LOOKS, amplitude_colours, metres_along, words_of
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from haploop.tools.linearity import left_out, why_not_linear
-from haploop.tools.one_tick import NotLinear, OneTickMap
+from haploop.tools.linear.linearity import left_out, why_not_linear
+from haploop.tools.linear.one_tick import NotLinear, OneTickMap
 from haploop.tools.sweep.map_plane import Plane
 
 EXACT = "ρ(M) = 1"

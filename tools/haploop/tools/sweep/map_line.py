@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from haploop.tools.figure_style import FAINT, GREY, INK, SMALL, TEXT
+from haploop.tools.figure.style import FAINT, GREY, INK, SMALL, TEXT
 from haploop.tools.sweep.map_axis import Ruler
 from haploop.tools.sweep.map_data import NOT_RUN, STEADY, VERDICTS, Cells
 from haploop.tools.sweep.map_look import LOOKS, metres_along

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from haploop.tools.amounts import amount
-from haploop.tools.figure_style import VERDICTS as COLOURS
+from haploop.tools.figure.style import VERDICTS as COLOURS
 from haploop.tools.sweep.map_data import DIVERGED, FAILED, LIMIT_CYCLE, NO_CONTACT, STEADY, VERDICTS
 
 if TYPE_CHECKING:

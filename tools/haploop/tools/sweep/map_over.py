@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from haploop.tools.linearity import installed_kinds
-from haploop.tools.one_tick import NotLinear
+from haploop.tools.linear.linearity import installed_kinds
+from haploop.tools.linear.one_tick import NotLinear
 from haploop.tools.sweep.map_axis import Ruler
 from haploop.tools.sweep.map_bounds import bound_boundaries
 from haploop.tools.sweep.map_limit import Boundary, exact_boundary

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from haploop.tools.figure_style import INK
+from haploop.tools.figure.style import INK
 from haploop.tools.sweep.map_axis import Ruler
 from haploop.tools.sweep.map_data import LIMIT_CYCLE, NOT_RUN, STEADY, VERDICTS, Cells
 from haploop.tools.sweep.map_look import LOOKS, amplitude_colours

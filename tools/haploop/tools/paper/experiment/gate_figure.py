@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from haploop.tools.figure_file import empty_figure
-from haploop.tools.figure_style import ELEMENTS, GREY, dress, legend
+from haploop.tools.figure.file import empty_figure
+from haploop.tools.figure.style import ELEMENTS, GREY, dress, legend
 from haploop.tools.paper.colours import COLOURS
 from haploop.tools.paper.experiment.gate import Felt, bidirectional, low_passed_s, unidirectional
 from haploop.tools.paper.experiment.setup import UNITS, VELOCITIES, Setup

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from haploop.plant.chain import Chain
-from haploop.tools.one_tick import OneTickMap
+from haploop.tools.linear.one_tick import OneTickMap
 
 # A mass that adds nothing but keeps its place in the map, and one to take the map's slope from; kg.
 _NO_MASS, _SOME_MASS = 1e-15, 1e-3

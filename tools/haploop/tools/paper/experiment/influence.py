@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from haploop.tools.figure_file import empty_figure
-from haploop.tools.figure_style import GREY, INK, SMALL, dress
+from haploop.tools.figure.file import empty_figure
+from haploop.tools.figure.style import GREY, INK, SMALL, dress
 from haploop.tools.paper.experiment.climb import NAMES, climb, largest
 from haploop.tools.paper.experiment.many import many
 from haploop.tools.paper.experiment.readings import SPACE, structure

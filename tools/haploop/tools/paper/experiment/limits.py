@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from haploop.tools.one_tick import OneTickMap
+from haploop.tools.linear.one_tick import OneTickMap
 from haploop.tools.paper.experiment.gated_map import GatedMap
 from haploop.tools.paper.experiment.setup import KINDS, Setup, elements_of
 

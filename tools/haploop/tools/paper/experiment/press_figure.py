@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from haploop.tools.figure_style import ELEMENTS, INK, WALL, dress, legend
+from haploop.tools.figure.style import ELEMENTS, INK, WALL, dress, legend
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -9,7 +9,7 @@ from functools import cache
 from typing import Any, Self
 
 from haploop.launch.scene_file import load
-from haploop.tools.cost_grid import scenes_folder
+from haploop.tools.cost.grid import scenes_folder
 
 Elements = list[dict[str, Any]]
 KINDS = ("nothing", "damping", "bidirectional-inertia", "unidirectional-inertia")
@@ -121,7 +121,7 @@ class Setup:
 
     def linear_scene(self, elements: Elements) -> dict[str, Any]:
         """The scene without friction and encoder, whose loop in contact is one linear map where its elements are."""
-        from haploop.tools.stiffness_limit import smooth
+        from haploop.tools.linear.stiffness_limit import smooth
 
         scene = smooth(self.scene(1.0, elements))
         scene.pop("friction", None)

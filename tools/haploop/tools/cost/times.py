@@ -1,0 +1,212 @@
+"""How long a simulated tick takes: warm, interleaved in random order, repeated, the garbage collector still.
+
+A round times every candidate once, in an order drawn anew for each round from a fixed seed: what drifts or disturbs
+meets all of them alike. Each time is stored at once, so a round that was stopped goes on where it was.
+"""
+
+from __future__ import annotations
+
+import gc
+import random
+import tempfile
+import time
+import warnings
+from collections.abc import Callable, Hashable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Protocol, TypeVar
+
+import numpy as np
+
+from haploop.controller.dissipation import ElementError, registry
+from haploop.launch.failure import RunFailed
+from haploop.launch.in_process import Loop, scene_events
+from haploop.launch.start import prepare, run
+from haploop.logger.keeper import open_keeper
+from haploop.protocol.ticks import Timebase
+from haploop.tools.cost.data import Load
+from haploop.tools.cost.grid import Candidate
+from haploop.tools.cost.quiet import judged, look
+from haploop.tools.cost.store import Store
+
+IN_PROCESS, PROCESSES = "us in one process", "us as processes"
+_SEED = 20_220_711
+# Far enough for some ticks more, near enough for squares to stay finite.
+_FAR_M = 1e40
+# Shorter blocks cost more than what is in them.
+_LEAST_BLOCK = 20
+_QUIET = "quiet for "
+
+
+class Timed(Protocol):
+    """What can be timed, again and again.
+
+    Attributes:
+        key: its name in the store.
+        family: one of each family is run untimed beforehand, which warms up all of it.
+    """
+
+    @property
+    def key(self) -> str: ...
+
+    @property
+    def family(self) -> Hashable: ...
+
+
+TimedType = TypeVar("TimedType", bound=Timed)
+
+
+@dataclass(frozen=True)
+class Job:
+    """A candidate to be timed.
+
+    Attributes:
+        key: its name in the store.
+        ticks: that its run has.
+        diverges: whether it ends early because of that.
+    """
+
+    candidate: Candidate
+    key: str
+    ticks: int
+    diverges: bool = False
+
+    @property
+    def family(self) -> Hashable:
+        """The same scene with the same method."""
+        return self.candidate.path, self.candidate.method
+
+
+def in_process_us(job: Job) -> float | None:
+    """Time of a tick of a candidate in this process, µs.
+
+    One that diverges has but a few ticks: it is let go on far beyond where it is stopped otherwise, in blocks so short
+    that there is more than the first one where it can be.
+    """
+    scene = job.candidate.scene
+    assert scene is not None
+    if job.diverges:
+        short = {**scene["run"], "block_ticks": max(_LEAST_BLOCK, job.ticks // 2)}
+        scene = {**scene, "diverged_beyond": _FAR_M, "run": short}
+    return loop_us(scene)
+
+
+def loop_us(scene: dict[str, Any]) -> float | None:
+    """Time of a tick in this process, with the books and without a log, µs; None where the run could not go on.
+
+    Neither building plant and controller nor the first block is counted, which makes what later ones only use; a run of
+    a single block is counted whole. A method that blows up overflows: its warnings are kept back by the caller.
+    """
+    base = Timebase.of(scene["clock"], scene["duration"])
+    keeper = open_keeper(scene, base, None, {})
+    loop = Loop(scene, base, registry(), keeper)
+    loop.schedule(scene_events(scene, base))
+    going: list[bool] = []
+    try:
+        took_s = timed_s(lambda: going.append(loop.block()))
+        first = ticks = keeper.logger.tick
+        if going[0]:
+            took_s = timed_s(lambda: _finish(loop))
+            ticks = keeper.logger.tick - first
+    except (ElementError, ArithmeticError):
+        return None
+    return took_s / ticks * 1e6 if ticks else None
+
+
+def _finish(loop: Loop) -> None:
+    while loop.block():
+        pass
+
+
+def timed_s(work: Callable[[], object]) -> float:
+    """How long some work takes, s, the garbage collector still."""
+    gc.collect()
+    gc.disable()
+    try:
+        began = time.perf_counter()
+        work()
+        return time.perf_counter() - began
+    finally:
+        gc.enable()
+
+
+def processes_us(job: Job) -> float | None:
+    """Time of a tick of a candidate as processes, every plant step logged, µs; None where the run failed."""
+    return run_us(job.candidate.path, [*job.candidate.overrides, "run.log=steps"], job.ticks)
+
+
+def run_us(path: Path, overrides: Sequence[str], ticks: int) -> float | None:
+    """Time of a tick as processes, starting up not included, µs; None where the run failed.
+
+    Raises:
+        KeyboardInterrupt: a signal ended the run.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        try:
+            summary = run(prepare(path, overrides, out=Path(folder, "out")))
+        except RunFailed:
+            return None
+    if summary["ticks"] < ticks:
+        raise KeyboardInterrupt
+    return summary["wall_s"] / summary["ticks"] * 1e6
+
+
+def missing(store: Store, what: str, jobs: Sequence[Timed], repeats: int) -> int:
+    """How many measurements are still to be made."""
+    return sum(not store.has(what, job.key, repeat) for job in jobs for repeat in range(repeats))
+
+
+def measure(
+    store: Store,
+    what: str,
+    clock: Callable[[TimedType], float | None],
+    jobs: Sequence[TimedType],
+    repeats: int,
+    advance: Callable[[], None],
+) -> None:
+    """Make every measurement that is missing; ``advance`` is called after each.
+
+    With each goes into the store how quiet the machine was in its round.
+    """
+    if not missing(store, what, jobs, repeats):
+        return
+    with _still():
+        _warm(store, what, clock, jobs, repeats)
+        for repeat in range(repeats):
+            seen = look(alone=what == IN_PROCESS)
+            for job in random.Random(_SEED + repeat).sample(jobs, len(jobs)):
+                if not store.has(what, job.key, repeat):
+                    took = clock(job)
+                    store.add(_QUIET + what, job.key, seen, repeat)
+                    store.add(what, job.key, took, repeat)
+                    advance()
+
+
+@contextmanager
+def _still() -> Iterator[None]:
+    """What is alive now is left alone by the garbage collector, and what blows up does so in silence."""
+    gc.collect()
+    gc.freeze()
+    try:
+        with warnings.catch_warnings(), np.errstate(all="ignore"):
+            warnings.simplefilter("ignore", RuntimeWarning)
+            yield
+    finally:
+        gc.unfreeze()
+
+
+def _warm(
+    store: Store, what: str, clock: Callable[[TimedType], float | None], jobs: Sequence[TimedType], repeats: int
+) -> None:
+    """Run every method of this process once untimed: imports, first calls, the interpreter's adaptive code."""
+    if what == PROCESSES:
+        return
+    first = {j.family: j for j in jobs if missing(store, what, [j], repeats)}
+    for job in first.values():
+        clock(job)
+
+
+def quiet(store: Store, what: str, jobs: Sequence[Timed], repeats: int) -> Load | None:
+    """How quiet the machine was in the rounds of these jobs; None where nothing was measured."""
+    return judged(seen for job in jobs for seen in store.all(_QUIET + what, job.key, repeats))

@@ -1,0 +1,210 @@
+"""A run as its figure needs it: read from the run's directory, whatever is there of it."""
+
+from __future__ import annotations
+
+import json
+import tomllib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from haploop.logger import read
+from haploop.tools.figure.history import ElementSpan, History
+
+Floats = np.ndarray
+# The close view shows at most this much of the last contact.
+_CLOSE_S = 0.2
+# What the loops show of the beginning.
+_EARLY_S = 1.0
+TOGETHER = "together"
+
+
+class FigureError(Exception):
+    """The figure cannot be drawn; the message says why and what to do."""
+
+
+@dataclass
+class Book:
+    """One running energy: its name, its curves over time (sampled and true) and what they end with."""
+
+    name: str
+    t_s: Floats
+    true_J: Floats
+    sampled_J: Floats
+
+    @property
+    def ends_J(self) -> tuple[float, float]:
+        """True and sampled book at the end of the run."""
+        return float(self.true_J[-1]), float(self.sampled_J[-1])
+
+
+@dataclass
+class RunData:
+    """What a run left behind.
+
+    Attributes:
+        scene, summary: empty when they are not there.
+        events: as logged, each with its ``tick`` and its time ``timestamp``.
+        controller, energy: columns at every tick, with ``timestamp``.
+        t_s, x_m, v_m_s, force_N: the motion at every plant step and the force applied from there on; at every tick
+            what the controller measured and asked for, where the plant was not logged (``every_step`` is False).
+        bodies_m, plant_forces_N: positions of the bodies beyond x, and forces of the plant's own effects, by name, at
+            the same times.
+        cut: where the log ends if it was cut off, else "".
+    """
+
+    scene: dict[str, Any]
+    summary: dict[str, Any]
+    history: History
+    events: list[dict[str, Any]]
+    controller: dict[str, Floats]
+    energy: dict[str, Floats]
+    t_s: Floats
+    x_m: Floats
+    v_m_s: Floats
+    force_N: Floats
+    bodies_m: dict[str, Floats]
+    plant_forces_N: dict[str, Floats]
+    every_step: bool
+    cut: str
+
+    @classmethod
+    def of(cls, directory: Path) -> RunData:
+        """Read a run's directory.
+
+        Raises:
+            FigureError: there is nothing that could be drawn.
+            LogError: the log is no log.
+        """
+        scene_file, summary_file = directory / "scene.toml", directory / "summary.json"
+        scene_text = scene_file.read_text(encoding="utf-8") if scene_file.exists() else ""
+        if not (directory / "log.mcap").exists():
+            raise FigureError(_no_log(directory, tomllib.loads(scene_text)))
+        log = read(directory)
+        scene_text = scene_text or log.attachments.get("scene.toml", b"").decode()
+        scene = tomllib.loads(scene_text)
+        controller, energy = log.get("/controller", {}), log.get("/energy", {})
+        if not len(controller.get("timestamp", ())) or not len(energy.get("timestamp", ())):
+            raise FigureError(f"The log in {directory} holds no tick yet, so there is nothing to draw.")
+        plant = log.get("/plant")
+        motion = plant or {**controller, "t": controller["timestamp"], "force": controller["total"]}
+        forces = {name: motion[name] for name in ("actuator", "friction") if name in motion}
+        if plant and "actuator" in scene:
+            forces.setdefault("actuator", plant["force"])
+        events = log.get("/events", [])
+        return cls(
+            scene=scene,
+            summary=json.loads(summary_file.read_text(encoding="utf-8")) if summary_file.exists() else {},
+            history=History(scene, events),
+            events=events,
+            controller=controller,
+            energy=energy,
+            t_s=motion["t"],
+            x_m=motion["x"],
+            v_m_s=motion["v"],
+            force_N=motion.get("actuator", motion["force"]),
+            bodies_m={name: motion[f"{name}_x"] for name in ("tip", "hand") if f"{name}_x" in motion},
+            plant_forces_N=forces,
+            every_step=plant is not None,
+            cut=log.cut,
+        )
+
+    @property
+    def ticks_s(self) -> Floats:
+        """Time of every tick of the controller, s."""
+        return self.controller["timestamp"]
+
+    @property
+    def control_rate(self) -> int:
+        """Ticks per second, Hz."""
+        return self.scene.get("clock", {}).get("control_rate", 1000)
+
+    @property
+    def span_s(self) -> tuple[float, float]:
+        """Where the log begins and ends, s; its last tick lasts as long as the others."""
+        return float(self.t_s[0]), float(max(self.t_s[-1], self.ticks_s[-1] + 1 / self.control_rate))
+
+    def contact_s(self) -> Floats:
+        """Times of the ticks in contact, s."""
+        return self.ticks_s[self.controller["in_contact"] > 0]
+
+    def close_s(self) -> tuple[float, float]:
+        """The time of the close view: the last contact, or the end of a run without any."""
+        first, last = self.span_s
+        contact = self.contact_s()
+        if not len(contact):
+            return max(first, last - _CLOSE_S), last
+        recent = contact[contact > contact[-1] - _CLOSE_S]
+        margin = 0.05 * (recent[-1] - recent[0]) + 0.002
+        return max(first, float(recent[0]) - margin), min(last, float(recent[-1]) + margin)
+
+    def early_s(self, from_tick: int = 0) -> tuple[float, float]:
+        """The first second of contact from a tick on, or of a run without any."""
+        contact = self.contact_s()
+        contact = contact[contact >= from_tick / self.control_rate]
+        first = float(contact[0]) if len(contact) else self.span_s[0]
+        return first, first + _EARLY_S
+
+    def wall_at(self, t_s: Floats) -> tuple[Floats, Floats]:
+        """Position (m) and stiffness (N/m) of the wall at some times."""
+        walls = self.history.walls
+        index = np.searchsorted([wall.from_tick / self.control_rate for wall in walls], t_s, side="right") - 1
+        index = np.maximum(index, 0)
+        positions = np.array([wall.position_m for wall in walls])
+        return positions[index], np.array([wall.stiffness_N_m for wall in walls])[index]
+
+    def element_force(self, span: ElementSpan) -> tuple[Floats, Floats]:
+        """Times (s) and force (N) of an element at the ticks it covers."""
+        ticks = np.rint(self.ticks_s * self.control_rate)
+        times, forces = [], []
+        for slot, first, end in span.slots:
+            inside = (ticks >= first) & (ticks < end)
+            column = self.controller.get(f"dissipation.{slot}")
+            if column is not None and inside.any():
+                times.append(self.ticks_s[inside])
+                forces.append(column[inside])
+        return np.concatenate([*times, np.empty(0)]), np.concatenate([*forces, np.empty(0)])
+
+    def books(self) -> list[Book]:
+        """The book of the wall and of every element that has one, then their sum; each ends with the end state."""
+        ended = {} if self.cut else self.summary.get("energy", {})
+        accounts = [("wall", 0, ended.get("wall"))] if self.history.walls else []
+        ends = [*ended.get("elements", []), *[None] * len(self.history.elements)]
+        accounts += [(span.name, span.from_tick, end) for span, end in zip(self.history.elements, ends, strict=False)]
+        books = [self._book(*account) for account in accounts if f"{account[0]}.true" in self.energy]
+        books = [
+            book for book in books if len(book.t_s)
+        ]  # a log may end between an element's start and its first books
+        if len(books) < 2:
+            return books
+        longest = max(books, key=lambda book: len(book.t_s))
+        return [*books, _sum(TOGETHER, longest.t_s, books)]
+
+    def _book(self, name: str, from_tick: int, end: dict[str, Any] | None) -> Book:
+        t = self.energy["timestamp"]
+        curves = [t, self.energy[f"{name}.true"], self.energy[f"{name}.sampled"]]
+        kept = (t >= from_tick / self.control_rate) & ~np.isnan(curves[1])
+        curves = [curve[kept] for curve in curves]
+        if end:
+            last = [self.span_s[1], *(np.nan if end[side] is None else end[side] for side in ("true_J", "sampled_J"))]
+            curves = [np.append(curve, value) for curve, value in zip(curves, last, strict=True)]
+        return Book(name, *curves)
+
+
+def _sum(name: str, t_s: Floats, books: list[Book]) -> Book:
+    """The sum of books that end together, each counting from its first tick on."""
+    true, sampled = np.zeros(len(t_s)), np.zeros(len(t_s))
+    for book in books:
+        true[len(t_s) - len(book.t_s) :] += book.true_J
+        sampled[len(t_s) - len(book.t_s) :] += book.sampled_J
+    return Book(name, t_s, true, sampled)
+
+
+def _no_log(directory: Path, scene: dict[str, Any]) -> str:
+    if not directory.exists():
+        return f"There is no {directory}; give the directory of a run."
+    if scene.get("run", {}).get("log") == "none":
+        return f'The run in {directory} was made with run.log = "none" and kept no log; run it again with "steps".'
+    return f"The directory {directory} holds no log.mcap; it is not the directory of a logged run."

@@ -1,0 +1,131 @@
+"""The loops of Choi et al. 2022: force against position (Fig. 3) and momentum against velocity (Fig. 4)."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from haploop.tools.figure.data import Floats, RunData
+from haploop.tools.figure.history import ElementSpan
+from haploop.tools.figure.style import (
+    EARLY,
+    FAINT,
+    GREY,
+    INK,
+    PRESSING,
+    RELEASING,
+    SMALL,
+    corner_legend,
+    dress,
+    element_colour,
+    few_ticks,
+)
+from haploop.tools.figure.time import MM
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+GRAMS = 1e3
+
+
+def force_position_loop(run: RunData, span_s: tuple[float, float]) -> tuple[Floats, Floats]:
+    """Penetration (m, positive inside) and force out of the wall (N) at every plant step of a stretch of time.
+
+    The force is the one applied, total of wall and elements, held while the position moves on. Where it runs
+    counter-clockwise, the area within is energy given to the device (Choi et al. 2022, Fig. 3).
+    """
+    t, x, force = within(span_s, run.t_s, run.t_s, run.x_m, run.force_N)
+    position, _ = run.wall_at(t)
+    return (x - position) * run.history.into_wall, -force * run.history.into_wall
+
+
+def momentum_loop(run: RunData, span: ElementSpan) -> tuple[Floats, Floats, Floats]:
+    """Time, velocity v[k-1] and momentum m[k-1] v[k] of a virtual inertia at the ticks it covers.
+
+    m[k] is the mass while it is at work and 0 while it is not. The rectangles of width v[k-1] - v[k-2] and height
+    m v[k] are the energy it takes in a step (Choi et al. 2022, eq. 8 and Fig. 4), so clockwise is dissipation.
+    """
+    times, force = run.element_force(span)
+    at = np.searchsorted(run.ticks_s, times)
+    v = run.controller["v"][at]
+    mass = np.where(force != 0.0, span.parameters["mass"], 0.0)
+    return times[1:], v[:-1], mass[:-1] * v[1:]
+
+
+def is_inertia(span: ElementSpan) -> bool:
+    """Whether an element has a virtual momentum."""
+    return "inertia" in span.kind and "mass" in span.parameters
+
+
+def draw_force_position(ax: Axes, run: RunData, span_s: tuple[float, float]) -> None:
+    """The loop of Fig. 3, pressing and releasing told apart, beside the spring it should be."""
+    title = "Force against penetration"
+    if not run.history.walls:
+        dress(ax, title, "", "")
+        ax.set_axis_off()
+        text = "No wall in this scene, so there is no\nforce against penetration to show."
+        ax.text(0.5, 0.5, text, ha="center", va="center", fontsize=SMALL + 1, color=GREY, transform=ax.transAxes)
+        return
+    dress(ax, title, "penetration (mm)", "force out of the wall (N)")
+    early_depth, early_force = force_position_loop(run, run.early_s())
+    depth, force = force_position_loop(run, span_s)
+    ax.plot(early_depth * MM, early_force, color=EARLY, linewidth=0.8, label="first second of contact", gid="early")
+    pressing = np.diff(depth, append=depth[-1]) > 0
+    for part, colour, label in ((pressing, PRESSING, "pressing"), (~pressing, RELEASING, "releasing")):
+        ax.plot(*_stretches(depth * MM, force, part), color=colour, linewidth=1.1, label=label, gid=label)
+    _, stiffness = run.wall_at(np.array([span_s[1]]))
+    felt = np.concatenate([d[(f != 0.0) | (d > 0.0)] for d, f in ((early_depth, early_force), (depth, force))])
+    felt = felt[np.isfinite(felt)]
+    deepest = felt.max(initial=0.0)
+    line = np.array([0.0, deepest])
+    ax.plot(line * MM, stiffness[0] * line, color=INK, linewidth=1.0, dashes=(4, 2), label="ideal spring", gid="spring")
+    low, high = felt.min(initial=0.0) * MM, deepest * MM
+    margin = 0.06 * (high - low) or 0.01
+    ax.set_xlim(low - margin, high + margin)
+    corner_legend(ax)
+
+
+def _stretches(x: Floats, y: Floats, part: Floats) -> tuple[Floats, Floats]:
+    """The line through all points, broken where ``part`` is False: each stretch goes on to the point after it."""
+    drawn = part.copy()
+    drawn[1:] |= part[:-1]
+    return np.where(drawn, x, np.nan), np.where(drawn, y, np.nan)
+
+
+def draw_momentum(ax: Axes, run: RunData, span_s: tuple[float, float]) -> None:
+    """The loop of Fig. 4 for the virtual inertias at work in a stretch of time; the motion where there is none."""
+    spans = [(number, span) for number, span in enumerate(run.history.elements) if is_inertia(span)]
+    loops = [(number, span, within(span_s, *momentum_loop(run, span))) for number, span in spans]
+    loops = [loop for loop in loops if len(loop[2][0])]
+    if not loops:
+        _draw_motion(ax, run, span_s)
+        return
+    dress(ax, "Virtual momentum against velocity", "velocity v[k−1] (m/s)", "momentum m v[k] (g m/s)")
+    for number, span, (velocity, momentum) in loops:
+        early_velocity, early_momentum = within(run.early_s(span.from_tick), *momentum_loop(run, span))
+        dots = {"linestyle": "none", "marker": ".", "markersize": 5}
+        ax.plot(early_velocity, early_momentum * GRAMS, color=EARLY, **dots)
+        colour = element_colour(number)
+        ax.plot(velocity, momentum * GRAMS, color=colour, linewidth=0.8, alpha=0.4)
+        ax.plot(velocity, momentum * GRAMS, color=colour, label=span.name, gid=span.name, **dots)
+        ends = np.array([velocity.min(), velocity.max()])
+        ax.plot(ends, ends * span.parameters["mass"] * GRAMS, color=INK, linewidth=1.0, dashes=(4, 2))
+    ax.plot([], [], color=INK, linewidth=1.0, dashes=(4, 2), label="ideal inertia")
+    ax.axhline(0.0, color=FAINT, linewidth=0.8, zorder=0)
+    corner_legend(ax)
+
+
+def within(span_s: tuple[float, float], t_s: Floats, *series: Floats) -> list[Floats]:
+    """Those samples of some series that lie in a stretch of time."""
+    inside = (t_s >= span_s[0]) & (t_s <= span_s[1])
+    return [values[inside] for values in series]
+
+
+def _draw_motion(ax: Axes, run: RunData, span_s: tuple[float, float]) -> None:
+    about = "position (mm)\n(no virtual inertia, so no momentum loop)"
+    dress(ax, "Velocity against position", about, "velocity (m/s)")
+    for stretch, colour, name in ((run.early_s(), EARLY, "early"), (span_s, INK, "motion")):
+        x, v = within(stretch, run.t_s, run.x_m, run.v_m_s)
+        ax.plot(x * MM, v, color=colour, linewidth=0.9, gid=name)
+    few_ticks(ax)

@@ -1,0 +1,155 @@
+"""The panels over time: position against the wall, force by part, energy by element."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from haploop.tools.amounts import prefix_for
+from haploop.tools.figure.data import Book, Floats, RunData
+from haploop.tools.figure.envelope import extremes
+from haploop.tools.figure.style import (
+    FAINT,
+    GREY,
+    INK,
+    OF_THE_PLANT,
+    SMALL,
+    WALL,
+    WALL_FILL,
+    dress,
+    element_colour,
+    legend,
+)
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+MM = 1e3
+# The approach is left out of the view when it is this many times as long as the way in contact.
+_DWARFED = 3.0
+# Events closer together than this share of the axis have one label.
+_NEAR = 0.025
+
+
+def line(ax: Axes, t: Floats, y: Floats, label: str, colour: str, held: bool = False, **style: object) -> None:
+    """A line over time, reduced to what can be seen; ``held`` for a value that holds until the next."""
+    keep = extremes(y)
+    steps = "steps-post" if held else "default"
+    look = {"linewidth": 1.2, "label": label, "color": colour, "drawstyle": steps} | style
+    ax.plot(t[keep], y[keep], **look)  # pyright: ignore[reportArgumentType]
+
+
+def position_panel(ax: Axes, run: RunData, span_s: tuple[float, float], title: str) -> None:
+    """Position over time with the wall shaded; fitted to the motion in contact if the approach dwarfs it."""
+    inside = (run.t_s >= span_s[0]) & (run.t_s <= span_s[1])
+    t, x = run.t_s[inside], run.x_m[inside] * MM
+    name = ("motor" if "tip" in run.bodies_m else "device") + ("" if run.every_step else " as measured")
+    line(ax, t, x, name, INK, gid="position")
+    for body, position in run.bodies_m.items():
+        line(ax, t, position[inside] * MM, body, OF_THE_PLANT[body], linewidth=1.0, gid=body)
+    ax.set_xlim(*span_s)
+    low, high, left_out = view_mm(run, t, np.stack([x, *(all_of[inside] * MM for all_of in run.bodies_m.values())]))
+    if run.history.walls:
+        _shade_wall(ax, run, span_s, low, high)
+    ax.set_ylim(low, high)
+    dress(ax, title + left_out, "time (s)", "position (mm)")
+
+
+def view_mm(run: RunData, t: Floats, x_mm: Floats) -> tuple[float, float, str]:
+    """Lower and upper limit of the position axis, and a note in brackets on what lies outside of it.
+
+    Args:
+        t, x_mm: times in s, and positions of all bodies in mm, shape (bodies, times).
+    """
+    x_mm = np.where(np.isfinite(x_mm), x_mm, np.nan)
+    low, high, note = np.nanmin(x_mm), np.nanmax(x_mm), ""
+    contact = run.contact_s()
+    since = t >= contact[0] if len(contact) else np.zeros(0, bool)
+    if since.any():
+        walls = run.wall_at(t[since])[0] * MM
+        x_since = x_mm[:, since]
+        near = min(np.nanmin(x_since), walls.min()), max(np.nanmax(x_since), walls.max())
+        if high - low > _DWARFED * (near[1] - near[0]):
+            note = f" (approach from {x_mm[0, 0]:.3g} mm not shown)"
+            low, high = near
+    margin = 0.08 * (high - low) or 0.01
+    return float(low - margin), float(high + margin), note
+
+
+def _shade_wall(ax: Axes, run: RunData, span_s: tuple[float, float], low: float, high: float) -> None:
+    changes = [wall.from_tick / run.control_rate for wall in run.history.walls]
+    edges = np.array([span_s[0], *(t for t in changes if span_s[0] < t < span_s[1]), span_s[1]])
+    surface = run.wall_at(edges)[0] * MM
+    far = low - (high - low) if run.history.into_wall < 0 else high + (high - low)
+    ax.fill_between(edges, surface, far, step="post", color=WALL_FILL, zorder=0, linewidth=0, label="wall", gid="wall")
+    ax.plot(edges, surface, drawstyle="steps-post", color=WALL, linewidth=1.0, zorder=1)
+
+
+def force_panel(ax: Axes, run: RunData, span_s: tuple[float, float], title: str) -> None:
+    """What wall and elements ask for at every tick, and their sum; held from tick to tick."""
+    dress(ax, title, "time (s)", "force on the device (N)")
+    inside = (run.ticks_s >= span_s[0]) & (run.ticks_s <= span_s[1])
+    t = run.ticks_s[inside]
+    if run.history.elements:
+        line(ax, t, run.controller["total"][inside], "total", INK, held=True, linewidth=2.4, alpha=0.35, gid="total")
+    if run.history.walls:
+        line(ax, t, run.controller["wall"][inside], "wall", WALL, held=True, gid="wall")
+    for number, span in enumerate(run.history.elements):
+        times, force = run.element_force(span)
+        here = (times >= span_s[0]) & (times <= span_s[1])
+        if here.any():
+            colour = element_colour(number)
+            line(ax, times[here], force[here], span.name, colour, held=True, linewidth=1.0, gid=span.name)
+    at_steps = (run.t_s >= span_s[0]) & (run.t_s <= span_s[1])
+    for name, force in run.plant_forces_N.items():
+        line(ax, run.t_s[at_steps], force[at_steps], name, OF_THE_PLANT[name], linewidth=1.0, gid=name)
+    most = run.scene.get("actuator", {}).get("saturation")
+    if most is not None and np.abs(run.controller["total"][inside]).max(initial=0.0) > most:
+        for limit in (-most, most):
+            ax.axhline(limit, color=OF_THE_PLANT["actuator"], linewidth=0.8, dashes=(1, 2), zorder=0, gid="saturation")
+    ax.set_xlim(*span_s)
+    ax.axhline(0.0, color=FAINT, linewidth=0.8, zorder=0)
+
+
+def energy_panel(ax: Axes, run: RunData, books: list[Book], colours: dict[str, str]) -> None:
+    """Energy taken out of the device: true books drawn through, sampled ones dashed."""
+    factor, letter = prefix_for(value for book in books for value in (*_finite(book.true_J), *_finite(book.sampled_J)))
+    dress(ax, "Energy taken out of the device (given to it below 0)", "time (s)", f"energy ({letter}J)")
+    for book in books:
+        line(ax, book.t_s, book.true_J / factor, book.name, colours[book.name], linewidth=1.6, gid=f"{book.name}.true")
+        line(
+            ax, book.t_s, book.sampled_J / factor, "_", colours[book.name], linewidth=1.0, dashes=(4, 2),
+            gid=f"{book.name}.sampled",
+        )  # fmt: skip
+    for label, style in (("true", "-"), ("sampled", (0, (4, 2)))):
+        ax.plot([], [], color=GREY, linestyle=style, linewidth=1.3, label=label)
+    ax.axhline(0.0, color=GREY, linewidth=0.8, zorder=0)
+    ax.set_xlim(*run.span_s)
+    legend(ax, only=("true", "sampled"))
+
+
+def _finite(values: Floats) -> Floats:
+    kept = values[np.isfinite(values)]
+    return np.array([kept.min(), kept.max()]) if len(kept) else kept
+
+
+def mark_events(axes: list[Axes], run: RunData) -> None:
+    """A dotted line at each event, numbered from 1 at the top of the first panel."""
+    first, last = run.span_s
+    groups: list[tuple[float, list[int]]] = []
+    for number, event in enumerate(run.events, start=1):
+        t = float(event["timestamp"])
+        for ax in axes:
+            ax.axvline(t, color=GREY, linewidth=0.9, linestyle=(0, (1, 2)), gid="event")
+        if groups and t - groups[-1][0] < _NEAR * (last - first):
+            groups[-1][1].append(number)
+        else:
+            groups.append((t, [number]))
+    for t, numbers in groups:
+        label = f"{numbers[0]}" if len(numbers) == 1 else f"{numbers[0]}–{numbers[-1]}"
+        axes[0].annotate(
+            label, (t, 1.0), xycoords=("data", "axes fraction"), xytext=(0, -2), textcoords="offset points",
+            ha="center", va="top", fontsize=SMALL, color="white", gid="event-label", annotation_clip=True,
+            bbox={"boxstyle": "round,pad=0.25", "facecolor": GREY, "linewidth": 0},
+        )  # fmt: skip

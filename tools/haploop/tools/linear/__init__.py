@@ -1,0 +1,1 @@
+"""What linear theory says of a loop in contact."""

@@ -1,0 +1,211 @@
+"""Known analytic bounds of wall stiffness, each with its source, and whether it speaks of a given scene."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any, Literal
+
+from haploop.plant.mechanics import Mechanics
+from haploop.plant.sensors import accelerometer_is_used
+from haploop.tools.linear.linearity import Kinds, why_not_linear
+
+Scene = dict[str, Any]
+# Gil et al. leave out what grows with the square of this: the angle in rad by which the wall's swing turns in T/2 + td.
+_SMALL_ANGLE = 0.3
+
+
+@dataclass(frozen=True)
+class Bound:
+    """What an author's formula says of a scene's wall.
+
+    Attributes:
+        name: authors and year, short enough for a label.
+        source: where it is published.
+        formula: in the field's letters: K, B virtual and b physical; T the period, td the delay.
+        domain: for what it was derived.
+        kind: passive with whatever passive hand, or stable with the scene's own.
+        stiffness_N_m: the largest stiffness it allows, 0 where it allows none; None where it does not apply.
+        why_not: what takes the scene out of its domain, one sentence; empty where it applies.
+    """
+
+    name: str
+    source: str
+    formula: str
+    domain: str
+    kind: Literal["passivity", "stability"]
+    stiffness_N_m: float | None = None
+    why_not: str = ""
+
+    @property
+    def applies(self) -> bool:
+        """Whether the scene is within its domain."""
+        return self.stiffness_N_m is not None
+
+
+class _DoesNotApply(Exception):
+    """The scene is outside a bound's domain; the message says why."""
+
+
+def bounds_of(scene: Scene, kinds: Kinds | None = None) -> list[Bound]:
+    """All known bounds of a resolved scene's wall, those that do not apply among them.
+
+    Args:
+        kinds: element kinds at hand; the installed ones when None.
+    """
+    return [_bound(about, stiffness, scene, kinds) for about, stiffness in _KNOWN]
+
+
+def _bound(about: Bound, stiffness: Callable[[Scene, Kinds | None], float], scene: Scene, kinds: Kinds | None) -> Bound:
+    try:
+        return replace(about, stiffness_N_m=stiffness(scene, kinds))
+    except _DoesNotApply as error:
+        return replace(about, why_not=str(error))
+
+
+def _passive(scene: Scene, kinds: Kinds | None) -> float:
+    from haploop.tools.linear.passivity import largest_passive_stiffness
+
+    _refuse_nonlinear(scene, kinds, allowed=("[friction]",))
+    _refuse_lagging_force(scene)
+    if accelerometer_is_used(scene):
+        raise _DoesNotApply("The controller also reads an accelerometer, not the position alone.")
+    delay_s = scene["clock"]["round_trip_delay"]
+    ticks = delay_s * scene["clock"]["control_rate"]
+    if abs(ticks - round(ticks)) > 1e-6:
+        raise _DoesNotApply(f"The delay of {delay_s * 1e3:g} ms is no whole number of ticks.")
+    return largest_passive_stiffness(scene, round(ticks), kinds)
+
+
+def _soft(scene: Scene, kinds: Kinds | None) -> float:
+    _refuse_nonlinear(scene, kinds)
+    _refuse_lagging_force(scene)
+    _refuse_bodies_in_a_row(scene)
+    elements = scene.get("dissipation", [])
+    if others := sorted({table["kind"] for table in elements} - {"damping"}):
+        raise _DoesNotApply(f"It knows no element but damping; the scene has {', '.join(others)}.")
+    virtual = sum(table["damping"] for table in elements)
+    if virtual and scene.get("velocity"):
+        raise _DoesNotApply("The velocity is no plain backward difference.")
+    mechanics, late_s = Mechanics.of(scene), _half_period_s(scene) + scene["clock"]["round_trip_delay"]
+    bound = (mechanics.damping + virtual) / late_s
+    angle = math.sqrt((bound + mechanics.stiffness) / mechanics.mass_kg) * late_s
+    if angle > _SMALL_ANGLE:
+        raise _DoesNotApply(
+            f"It holds for soft walls; one of {bound:.4g} N/m turns the device's swing by {angle:.2g} rad in half a "
+            f"period and the delay, more than {_SMALL_ANGLE:g}."
+        )
+    return bound
+
+
+def _at_once(scene: Scene, kinds: Kinds | None) -> float:
+    _refuse_nonlinear(scene, kinds)
+    _refuse_lagging_force(scene)
+    _refuse_bodies_in_a_row(scene)
+    _refuse_more_than_a_wall(scene)
+    mechanics = Mechanics.of(scene)
+    if mechanics.stiffness:
+        raise _DoesNotApply("The hand has a spring.")
+    return _jury(mechanics.mass_kg, mechanics.damping, 2.0 * _half_period_s(scene))
+
+
+def _jury(mass_kg: float, damping: float, period_s: float) -> float:
+    """The exact limit without delay, g0 and g1 in units of T^2 / m: in r = b T / m, by series where floats cancel."""
+    r = damping * period_s / mass_kg
+    lost = -math.expm1(-r)  # 1 - E
+    if r > 1e-2:
+        g0, g1 = (lost - r * (1.0 - lost)) / r**2, (r - lost) / r**2
+    else:
+        g1 = sum((-r) ** i / math.factorial(i + 2) for i in range(8))
+        g0 = sum((-r) ** i * (i + 1) / math.factorial(i + 2) for i in range(8))
+    swings_wider, alternates = lost / g0, 2.0 * (2.0 - lost) / (g1 - g0) if g1 > g0 else math.inf
+    return mass_kg / period_s**2 * min(swings_wider, alternates)
+
+
+def _over_an_encoder(scene: Scene, kinds: Kinds | None) -> float:
+    _refuse_nonlinear(scene, kinds, allowed=("[friction]",))
+    _refuse_lagging_force(scene)
+    _refuse_more_than_a_wall(scene)
+    if "transmission" in scene:
+        raise _DoesNotApply("The device is not rigid: it has a [transmission].")
+    if "encoder" not in scene:
+        raise _DoesNotApply("The scene has no [encoder].")
+    if "noise" in scene:
+        raise _DoesNotApply("The position is noisy, not only rounded.")
+    friction_N = scene.get("friction", {}).get("kinetic", 0.0)
+    return min(scene["device"]["damping"] / _half_period_s(scene), 2.0 * friction_N / scene["encoder"]["resolution"])
+
+
+def _half_period_s(scene: Scene) -> float:
+    return 0.5 / scene["clock"]["control_rate"]
+
+
+def _refuse_nonlinear(scene: Scene, kinds: Kinds | None, allowed: tuple[str, ...] = ()) -> None:
+    if curved := [what for what in why_not_linear(scene, kinds) if what not in allowed]:
+        raise _DoesNotApply(f"The scene has {', '.join(curved)}.")
+
+
+def _refuse_lagging_force(scene: Scene) -> None:
+    if "bandwidth" in scene.get("actuator", {}):
+        raise _DoesNotApply("The actuator lags: its bandwidth is limited.")
+
+
+def _refuse_bodies_in_a_row(scene: Scene) -> None:
+    if "transmission" in scene or "grip" in scene.get("hand", {}):
+        raise _DoesNotApply("Device and hand are no single rigid mass.")
+
+
+def _refuse_more_than_a_wall(scene: Scene) -> None:
+    if scene.get("dissipation"):
+        raise _DoesNotApply("It is of a wall alone; the scene has dissipation elements.")
+    if scene["clock"]["round_trip_delay"]:
+        raise _DoesNotApply("It is of a loop without delay.")
+
+
+_KNOWN = (
+    (
+        Bound(
+            "Colgate & Schenkel 1997",
+            "J. E. Colgate, G. G. Schenkel: Passivity of a class of sampled-data systems: application to haptic "
+            "interfaces. J. Robotic Systems 14(1), 1997",
+            "b > (T/2) / (1 - cos wT) Re{(1 - e^-jwT) H(e^jwT)} at all w; b > K T/2 + |B| for a spring and a damper",
+            "a device with damping b, any passive hand, a linear H of the sampled position with whole ticks of delay",
+            "passivity",
+        ),
+        _passive,
+    ),
+    (
+        Bound(
+            "Gil et al. 2009",
+            "J. J. Gil, E. Sanchez, T. Hulin, C. Preusche, G. Hirzinger: Stability boundary for haptic rendering: "
+            "influence of damping and delay. J. Computing and Information Science in Engineering 9(1), 2009",
+            "K < (b + B) / (T/2 + td)",
+            "a rigid mass with damping b, virtual damping B of backward differences, and soft walls",
+            "stability",
+        ),
+        _soft,
+    ),
+    (
+        Bound(
+            "Exact, no delay",
+            "Jury's criterion on the exact flow of a mass under held forces",
+            "K < min((1 - E) / g0, 2 (1 + E) / (g1 - g0)), E = e^(-b T/m), g0 = ((m/b)(1 - E) - T E) / b, "
+            "g1 = (T - (m/b)(1 - E)) / b",
+            "a rigid mass with damping b, a wall alone, no delay, no spring in the hand",
+            "stability",
+        ),
+        _at_once,
+    ),
+    (
+        Bound(
+            "Abbott & Okamura 2005",
+            "J. J. Abbott, A. M. Okamura: Effects of position quantization and sampling rate on virtual-wall "
+            "passivity. IEEE Transactions on Robotics 21(5), 2005",
+            "K <= min(2 b / T, 2 fc / q)",
+            "a mass with damping b and Coulomb friction fc, an encoder of resolution q, a wall alone, no delay",
+            "passivity",
+        ),
+        _over_an_encoder,
+    ),
+)

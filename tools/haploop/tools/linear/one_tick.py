@@ -1,0 +1,173 @@
+"""The linear loop as one matrix: what a whole tick does to the plant, the controller's memory and the commands."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from haploop.plant.chain import Chain, sensor_body
+from haploop.plant.chain_flow import ChainFlow
+from haploop.plant.sensors import accelerometer_is_used
+from haploop.protocol.ticks import Timebase
+from haploop.tools.linear.controller import LinearController
+from haploop.tools.linear.linearity import Kinds, installed_kinds, why_not_linear
+from haploop.tools.linear.stable_ranges import crossings
+
+# No wall is softer than this, and none stiffer is looked at.
+_LEAST_N_M, _MOST_N_M = 1e-3, 1e12
+# So near to a crossing as computed the end of a range is looked for first.
+_NEAR = 1e-9
+
+
+class NotLinear(ValueError):
+    """A scene whose loop in contact is no linear map; the message names what makes it none."""
+
+
+class NeverStable(ValueError):
+    """A loop that grows however soft its wall is."""
+
+
+@dataclass(frozen=True)
+class OneTickMap:
+    """w -> M w for a wall that is never left, around the equilibrium; stable if and only if rho(M) < 1.
+
+    With w = (z, y, c, u[k-1], ..., u[k-L-1]): z the states of the chain of bodies, x = z[0] what is sampled, y the
+    accelerations felt at the last plant steps where they are read, c the controller's memory, u its commands:
+        u[k], c[k+1] = the program's controller with (x[k], y) and c[k], without the wall, and -K x[k] added to u
+        z[k+1] = Phi(n - r) (Phi(r) z[k] + Gamma(r) u[k-L-1]) + Gamma(n - r) u[k-L],    d = L n + r
+    Phi(i), Gamma(i) are the plant's own exact flow over i of its n steps in a tick (Franklin, Powell and Workman,
+    fractional delay). So M(K) = M(0) - K p q', p what a unit of u[k] adds, q' w = x. Any disturbance of the linear
+    loop grows or decays by rho(M) a tick in the end.
+
+    Attributes:
+        without_wall: M(0), shape (w, w).
+        pushed: p, shape (w,).
+    """
+
+    without_wall: np.ndarray
+    pushed: np.ndarray
+
+    @classmethod
+    def of(cls, scene: dict[str, Any], kinds: Kinds | None = None) -> OneTickMap:
+        """The map of a resolved scene in contact, which need not have a wall. ``left_out`` tells what it leaves out.
+
+        Args:
+            kinds: element kinds at hand; the installed ones when None.
+
+        Raises:
+            NotLinear: the loop is no linear map, as ``why_not_linear`` tells.
+        """
+        kinds = installed_kinds() if kinds is None else kinds
+        if curved := why_not_linear(scene, kinds):
+            raise NotLinear(
+                "The stiffness limit is that of a linear loop: held forces on masses, springs and dampers. "
+                f"{scene['title']!r} also has {', '.join(curved)}; take it out to ask for the limit."
+            )
+        after = _after_a_tick(scene, LinearController.of(scene, kinds))
+        return cls(after[:, :-1], after[:, -1])
+
+    def matrix(self, stiffness: float) -> np.ndarray:
+        """M for a wall of this stiffness in N/m, shape (w, w)."""
+        matrix = self.without_wall.copy()
+        matrix[:, 0] -= stiffness * self.pushed
+        return matrix
+
+    def growth(self, stiffness: float) -> float:
+        """rho(M): the factor by which the motion grows every tick, in the end."""
+        return float(np.abs(np.linalg.eigvals(self.matrix(stiffness))).max())
+
+    def stable_ranges(self) -> list[tuple[float, float]]:
+        """All stiffnesses with rho(M) < 1 in N/m, from soft to stiff, as ranges with ends bisected to the last bits.
+
+        The first begins at 0 unless the loop grows however soft its wall is. A virtual inertia or a structural mode
+        may leave others above it.
+        """
+        return list(self._ranges())
+
+    def _ranges(self) -> Iterator[tuple[float, float]]:
+        """The stable ranges, one after the other."""
+        inner = [k for k in crossings(self.without_wall, self.pushed) if _LEAST_N_M < k < _MOST_N_M]
+        edges = [_LEAST_N_M, *inner, _MOST_N_M]
+        probes = [(low * high) ** 0.5 for low, high in pairwise(edges)]
+        begin, before = 0.0, False
+        for at, probe in enumerate(probes):
+            stable = self.growth(probe) < 1.0
+            if at and stable != before:
+                end = self._end_near(edges[at], probes[at - 1], probe, low_is_stable=before)
+                if before:
+                    yield begin, end
+                begin = end
+            before = stable
+        if before:
+            yield begin, np.inf
+
+    def stiffness_limit(self) -> float:
+        """The smallest stiffness with rho(M) = 1 in N/m: the end of the first stable range.
+
+        Raises:
+            NeverStable: the loop grows even with the softest wall.
+        """
+        low, limit = next(self._ranges(), (np.inf, np.inf))
+        if not low:
+            return limit
+        above = f" It is stable from {low:.6g} to {limit:.6g} N/m." if low < limit else ""
+        raise NeverStable(f"The loop is unstable even with a wall of {_LEAST_N_M:g} N/m; it needs damping.{above}")
+
+    def _end_near(self, edge: float, low: float, high: float, low_is_stable: bool) -> float:
+        """The last stable stiffness between two of which one is stable; it should be next to ``edge``."""
+        for near in (edge * (1.0 - _NEAR), edge * (1.0 + _NEAR)):
+            if low < near < high:
+                low, high = (near, high) if (self.growth(near) < 1.0) == low_is_stable else (low, near)
+        while low < (middle := (low + high) / 2.0) < high:
+            if (self.growth(middle) < 1.0) == low_is_stable:
+                low = middle
+            else:
+                high = middle
+        return low if low_is_stable else high
+
+
+def _after_a_tick(scene: dict[str, Any], controller: LinearController) -> np.ndarray:
+    """w after a tick from w and a force added to u[k], shape (w, w + 1); every quantity is its row over these."""
+    time, chain = Timebase.of(scene["clock"], scene["duration"]), Chain.of(scene)
+    states, felt = len(chain.states), _felt_steps(scene, time)
+    sizes = states, felt, len(controller.moved), time.lookahead_ticks + 1, 1
+    z, y, c, in_flight, added = np.split(np.eye(sum(sizes)), np.cumsum(sizes)[:-1])
+    seen = np.vstack([c, z[:1], y[:1]])
+    commands = np.vstack([controller.force @ seen + added[0], in_flight])  # u[k], u[k-1], ..., u[k-L-1]
+    course, held = _course(chain, time, z, commands)
+    if felt:
+        y = np.vstack([y, _feel(scene, chain) @ np.concatenate([course[1:], held[:, None]], axis=1)])[-felt:]
+    return np.vstack([course[-1], y, controller.moved @ seen, commands[:-1]])
+
+
+def _course(chain: Chain, time: Timebase, z: np.ndarray, commands: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """z at every plant step of a tick and at its end, shape (n + 1, states, w + 1), and the command held over each."""
+    n, size = time.steps_per_tick, len(z)
+    lookahead, late = divmod(time.delay_steps, n)
+    flow = ChainFlow(chain, time.step_s, n, stuck=False)
+    course, held = [z], []
+    for steps, command in ((late, commands[lookahead + 1]), (n - late, commands[lookahead])):
+        begin = np.vstack([course[-1], command])
+        course += [begin[:size] + flow.held[: size + 1, i].T @ begin for i in range(steps)]
+        held += [command] * steps
+    return np.array(course), np.array(held)
+
+
+def _felt_steps(scene: dict[str, Any], time: Timebase) -> int:
+    """How many plant steps' accelerations are remembered: as many as a reading is late, and the present one."""
+    if not accelerometer_is_used(scene):
+        return 0
+    return 1 + round(scene.get("accelerometer", {}).get("delay", 0.0) * time.plant_rate)
+
+
+def _feel(scene: dict[str, Any], chain: Chain) -> np.ndarray:
+    """From the states and the command held over the step that ends there to what is felt, shape (states + 1,)."""
+    size = len(chain.states)
+    if chain.sensor:
+        return np.eye(size + 1)[chain.states.index("accelerometer")]
+    body = sensor_body(scene.get("accelerometer", {}), "transmission" in scene)
+    return chain.accelerations()[body, : size + 1].astype(float)

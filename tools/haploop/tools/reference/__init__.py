@@ -1,0 +1,1 @@
+"""What a scene's motion truly is, in as many digits as asked for."""
