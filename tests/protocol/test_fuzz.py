@@ -158,7 +158,8 @@ def test_the_clock_grants_after_a_turns_worth_of_messages_however_many_wait(
     resolved = scene()
     time = Timebase.of(resolved["clock"], resolved["duration"])
     with tempfile.TemporaryDirectory(prefix="hl", dir="/tmp") as sockets:
-        server = ClockServer(context, Path(sockets), "", Clock(resolved, time, KINDS), {}, lambda *_: (True, "", {}))
+        clock = Clock(resolved, time, KINDS)
+        server = ClockServer(context, Path(sockets), "", clock, {}, lambda *_: (True, "", {}), lambda _: False)
         with attacks.Stranger(context, Path(sockets) / "clock.sock") as stranger:
             for _ in range(900):
                 stranger.socket.send(b"junk")

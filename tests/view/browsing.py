@@ -129,17 +129,30 @@ class Site:
 
     def __init__(self, guard: Guard, session: aiohttp.ClientSession) -> None:
         self.guard, self.session = guard, session
+        self._streams: list[aiohttp.ClientWebSocketResponse] = []
 
     @property
     def address(self) -> str:
         return self.guard.address.rstrip("/")
 
-    async def tab(self, **headers: str) -> Tab:
+    async def stream(self, **headers: str) -> aiohttp.ClientWebSocketResponse:
         """Open the page's stream."""
-        socket = await self.session.ws_connect(
-            f"{self.address}/stream", headers={"Origin": self.address, **headers}, max_msg_size=0
-        )
-        return Tab(socket, self.guard.token)
+        self._streams.append(await stream(self.session, self.address, **headers))
+        return self._streams[-1]
+
+    async def tab(self, **headers: str) -> Tab:
+        """A page with its stream open."""
+        return Tab(await self.stream(**headers), self.guard.token)
+
+    def close(self) -> None:
+        """Close all that is open still."""
+        for stream in self._streams:
+            stream._response.close()
+
+
+def stream(session: aiohttp.ClientSession, address: str, **headers: str) -> Any:
+    """The stream of the page at an address, to be awaited or entered."""
+    return session.ws_connect(f"{address}/stream", headers={"Origin": address, **headers}, max_msg_size=0)
 
 
 @asynccontextmanager
@@ -151,8 +164,10 @@ async def site(runs: Runs | None = None, **options: Any) -> AsyncIterator[Site]:
     await asyncio.wait((ready, server), return_when=asyncio.FIRST_COMPLETED)
     assert ready.done(), server.result()
     async with aiohttp.ClientSession() as session:
+        here = Site(ready.result(), session)
         try:
-            yield Site(ready.result(), session)
+            yield here
         finally:
             end.set()
             await asyncio.wait_for(server, 20)
+            here.close()

@@ -315,7 +315,7 @@ def test_pages_that_come_go_and_say_nothing_leave_the_bits_of_the_run_alone(tmp_
 
     async def play(run, tab, here):
         await tab.phase("paused")
-        deaf = await here.session.ws_connect(f"{here.address}/stream", headers={"Origin": here.address})
+        deaf = await here.stream()
         deaf._response.connection.transport.pause_reading()
         rude = await here.tab()
         await rude.socket.send_json({"type": "watch", "span_s": None, "points": 8000})

@@ -16,7 +16,7 @@ import pytest
 from faults.conftest import launched as launched
 from faults.launched import SCENE, Launched, alive, command, processes, wait_for
 from live_run import going, undisturbed
-from view.browsing import Tab, to_its_end
+from view.browsing import Tab, stream, to_its_end
 
 LINK = re.compile(r"(http://127\.0\.0\.1:\d+)/#token=(\S+)")
 
@@ -32,9 +32,8 @@ def browse(viewer: Launched, play: Callable[[Tab], Any]) -> Any:
     address, token = link(viewer)
 
     async def scenario() -> Any:
-        async with aiohttp.ClientSession() as session:
-            ws = await session.ws_connect(f"{address}/stream", headers={"Origin": address}, max_msg_size=0)
-            return await play(Tab(ws, token))
+        async with aiohttp.ClientSession() as session, stream(session, address) as opened:
+            return await play(Tab(opened, token))
 
     return to_its_end(scenario())
 
@@ -114,6 +113,26 @@ def test_run_with_view_serves_the_run_and_stays_until_ctrl_c(launched, tmp_path,
     run.signal(signal.SIGINT)
     assert '"ended": "done"' in run.end(0)
     wait_for("the end of the viewer", lambda: not alive(viewers))
+
+
+def test_a_run_waits_for_its_viewer_and_is_shown_however_short_it_is(launched, tmp_path):
+    """Twenty ticks at free pace end long before a viewer that started with them."""
+    run = launched("run", str(SCENE), "--set", "duration=0.02", "--view", "--pace", "free", out=tmp_path / "out")
+    state = browse(run, lambda tab: tab.phase("ended"))
+    assert state["summary"]["ticks"] == 20
+    run.says("Ctrl-C ends it")
+    run.signal(signal.SIGINT)
+    run.end(0)
+
+
+@pytest.mark.slow
+def test_a_viewer_that_cannot_start_is_no_matter_to_its_run(tmp_path):
+    (tmp_path / "sitecustomize.py").write_text("import os, sys\nif '--led' in sys.orig_argv:\n    os._exit(3)\n")
+    answer = _run_with(
+        tmp_path, ["run", str(SCENE), "--set", "duration=0.02", "--view", "--out", str(tmp_path / "out")]
+    )
+    assert answer.returncode == 0
+    assert "The page is at" not in answer.stderr
 
 
 @pytest.mark.slow

@@ -30,6 +30,7 @@ class ClockServer:
         clock: decides how far and when.
         welcome: fields of WELCOME but for endpoints and granted: run, scene, timebase, context.
         command: carries out a command from a client.
+        held: whether the first tick waits still; it is given the pids of all that are ready.
 
     Attributes:
         address: where the clock listens.
@@ -46,6 +47,7 @@ class ClockServer:
         clock: Clock,
         welcome: dict[str, Any],
         command: Command,
+        held: Callable[[set[int]], bool],
     ) -> None:
         self._socket = open_socket(context, zmq.ROUTER)
         self.address = bind(self._socket, sockets, "clock")
@@ -53,7 +55,7 @@ class ClockServer:
         self.roster = Roster()
         self.results: dict[str, dict[str, Any]] = {}
         self.strangers = 0
-        self._greeted = False
+        self._greeted, self._held = False, held
         self._granted = -1
         self._last_sent = False
 
@@ -85,8 +87,12 @@ class ClockServer:
             self._greeted = True
             for node in list(self.roster.nodes.values()):
                 self._greet(node)
-        if self.roster.all_own("ready"):
+        if self.roster.all_own("ready") and not self._is_held():
             self.grant()
+
+    def _is_held(self) -> bool:
+        has_begun = self._granted >= 0 or self._clock.is_last
+        return not has_begun and self._held({node.pid for node in self.roster.nodes.values() if node.ready})
 
     def grant(self) -> None:
         """Tell everyone how far they may go, and what changes on the way, if that is news."""

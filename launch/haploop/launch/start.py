@@ -74,6 +74,7 @@ def run(
     transport: Transport | None = None,
     progress: Callable[[dict[str, Any]], None] = lambda status: None,
     announced: Callable[[str], None] = lambda run_id: None,
+    held: Callable[[set[int]], bool] = lambda ready: False,
 ) -> dict[str, Any]:
     """Run a prepared scene and return its summary.
 
@@ -111,5 +112,6 @@ def run(
         transport or Transport(),
         progress,
         announced,
+        held,
     )
     return run_processes(request)

@@ -53,6 +53,8 @@ class RunRequest:
         transport: how the sockets are reached.
         progress: called now and then with the logger's status.
         announced: called once with the run's id, and the clock's address where that is one of TCP.
+        held: whether the first tick waits still, for a process that is to be there from the start; it is given the
+            pids of all nodes that are ready.
     """
 
     scene: dict[str, Any]
@@ -65,6 +67,7 @@ class RunRequest:
     transport: Transport = field(default_factory=Transport)
     progress: Callable[[dict[str, Any]], None] = lambda status: None
     announced: Callable[[str], None] = lambda run_id: None
+    held: Callable[[set[int]], bool] = lambda ready: False
 
 
 def run_processes(request: RunRequest) -> dict[str, Any]:
@@ -107,7 +110,7 @@ class Supervisor:
             },
         }
         commands = Commands(self._clock, request, lambda: self._server.roster)
-        self._server = ClockServer(self._context, sockets, secret, self._clock, welcome, commands)
+        self._server = ClockServer(self._context, sockets, secret, self._clock, welcome, commands, request.held)
         keys = request.transport.as_dict()["keys"]
         run_directory.announce(sockets, self._server.address, scene["title"], str(request.out), keys)
         run_number = len(run_directory.live_runs()) - 1

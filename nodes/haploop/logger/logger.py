@@ -47,9 +47,13 @@ class Logger:
         self.booked: Callable[[int, dict[str, np.ndarray]], object] = lambda first, books: None
         self.tick = self._first_tick = 0
 
+    def count_wall_time(self) -> None:
+        """Count it from now on."""
+        self._began = wall_clock.perf_counter()
+
     def start(self, plant: dict[str, float], history: list[Block]) -> None:
         """Begin with the plant's state and, when joining a run, the controller's last blocks."""
-        self._began = wall_clock.perf_counter()
+        self.count_wall_time()
         known = history[-1]["from_tick"] + history[-1]["ticks"] if history else 0
         self.tick = self._first_tick = max(int(plant["tick"]), known)
         self._plant = PlantTape(self.time.steps_per_tick, int(plant["tick"]))

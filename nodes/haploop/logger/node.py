@@ -85,6 +85,8 @@ class LoggerNode:
         reported = -1
         while len(self._ended) < 2 or not self._member.last:  # the last grant brings the last events
             idle = not poller.poll(REPORT_MS)
+            if not self._member.until:  # the run has not begun
+                self.keeper.logger.count_wall_time()
             if idle:
                 self._member.waiting(self.keeper.logger.tick, "plant")
             self._drain()

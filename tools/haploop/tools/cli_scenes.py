@@ -29,8 +29,8 @@ def run(
     from haploop.tools.view import viewing
 
     rate = pace or ("1" if view else "free")
-    with viewing(view, in_process) as announced:
-        run_scene(scene, set or [], out, in_process, rate, plugin or [], tcp, keys, json, announced)
+    with viewing(view, in_process) as viewing_it:
+        run_scene(scene, set or [], out, in_process, rate, plugin or [], tcp, keys, json, viewing_it)
 
 
 def check(

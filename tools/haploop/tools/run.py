@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,6 +13,7 @@ from haploop.tools.scenes import print_notes
 
 if TYPE_CHECKING:
     from haploop.protocol.transport import Transport
+    from haploop.tools.view import Viewing
 
 
 def run_scene(
@@ -26,9 +26,9 @@ def run_scene(
     tcp: str | None,
     keys: Path | None,
     as_json: bool,
-    announced: Callable[[str], object] = lambda run_id: None,
+    viewing: Viewing,
 ) -> None:
-    """Run a scene, show how it goes and what came of it; ``announced`` is told the run's id."""
+    """Run a scene, show how it goes and what came of it."""
     from haploop.launch.start import prepare, run
     from haploop.tools.report import ProgressLine, print_summary
 
@@ -45,7 +45,7 @@ def run_scene(
 
                 def told(run_id: str) -> None:
                     line.announce(run_id)
-                    announced(run_id)
+                    viewing.announced(run_id)
 
                 summary = run(
                     prepared,
@@ -54,6 +54,7 @@ def run_scene(
                     transport=transport,
                     progress=line.update,
                     announced=told,
+                    held=viewing.held,
                 )
         except RunFailed as error:
             leave(f"{error}\nWhat was logged is in {prepared.out}.", FAILED)

@@ -7,6 +7,7 @@ import os
 import subprocess
 import sys
 import threading
+import time
 from collections.abc import Callable, Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -20,6 +21,8 @@ if TYPE_CHECKING:
 
 SINCE = ("start", "now")
 _AT = "The page is at {} (Ctrl-C ends it)"
+# A run waits so long for its viewer.
+_HELD_S = 10.0
 
 
 class LiveRuns:
@@ -110,31 +113,46 @@ def _at_eof(loop: asyncio.AbstractEventLoop, act: Callable[[], None]) -> None:
     threading.Thread(target=wait, daemon=True).start()
 
 
+class Viewing:
+    """What a run has to do with whoever shows it: nothing, where nobody does."""
+
+    def announced(self, run_id: str) -> None:
+        """The run can be found by this id."""
+
+    def held(self, ready: set[int]) -> bool:
+        """Whether the run is not to begin yet, given the pids of all nodes that are ready."""
+        return False
+
+    def stay(self) -> None:
+        """The run is over."""
+
+
 @contextlib.contextmanager
-def viewing(wanted: bool, in_process: bool) -> Iterator[Callable[[str], object]]:
-    """Beside what is run meanwhile, show the run whose id is given; when it is over, keep the page until Ctrl-C.
+def viewing(wanted: bool, in_process: bool) -> Iterator[Viewing]:
+    """Show what is run meanwhile from its first tick on; when it is over, keep the page until Ctrl-C.
 
     The viewer is a process of its own; what becomes of it is no matter to the run.
     """
-    if not wanted:
-        yield lambda run_id: None
-        return
-    if in_process:
+    if wanted and in_process:
         leave("--view needs the sockets of a run as processes; leave out --in-process.", WRONG_USE)
-    check_extra()
-    viewers: list[_Viewer] = []
+    if wanted:
+        check_extra()
+    shown = _Viewer() if wanted else Viewing()
     try:
-        yield lambda run_id: viewers.append(_Viewer(run_id))
+        yield shown
     finally:
-        for viewer in viewers:
-            viewer.stay()
+        shown.stay()
 
 
-class _Viewer:
-    """A viewer as a process of its own, which shows a run that has just been announced."""
+class _Viewer(Viewing):
+    """A viewer as a process of its own."""
 
-    def __init__(self, announced: str) -> None:
-        words = ["view", "--run", announced.partition(" ")[0], "--led"]
+    _process: subprocess.Popen[str] | None = None
+    _link = ""
+
+    def announced(self, run_id: str) -> None:
+        words = ["view", "--run", run_id.partition(" ")[0], "--led"]
+        self._since = time.monotonic()
         self._process = subprocess.Popen(
             [sys.executable, "-m", "haploop.tools.cli", *words],
             stdin=subprocess.PIPE,
@@ -142,10 +160,15 @@ class _Viewer:
             text=True,
             process_group=0,  # the first Ctrl-C is for the run alone; the page shows what came of it
         )
-        self._link = ""
         threading.Thread(target=self._tell, daemon=True).start()
 
+    def held(self, ready: set[int]) -> bool:
+        process = self._process
+        is_on_its_way = process is not None and process.pid not in ready and process.poll() is None
+        return is_on_its_way and time.monotonic() - self._since < _HELD_S
+
     def _tell(self) -> None:
+        assert self._process
         assert self._process.stdout
         self._link = self._process.stdout.readline().strip()
         if self._link:
@@ -153,9 +176,10 @@ class _Viewer:
 
     def stay(self) -> None:
         """Keep the page until Ctrl-C, or until it ends by itself; leave no process behind."""
-        process = self._process
+        if not (process := self._process):
+            return
         with contextlib.suppress(KeyboardInterrupt):
-            if process.poll() is None:
+            if self._link and process.poll() is None:
                 print(_AT.format(self._link), file=sys.stderr, flush=True)
             process.wait()
         assert process.stdin
