@@ -133,7 +133,14 @@ def test_a_program_serves_all_scenes_of_its_structure_and_jax_stays_as_it_was() 
     assert jax.numpy.zeros(1).dtype == np.float32
 
 
-@pytest.mark.parametrize(("duration", "diverged_beyond"), [(0.006, 1.0), (1.2, 1.0), (1.2, 0.0021)])
+@pytest.mark.parametrize(
+    ("duration", "diverged_beyond"),
+    [
+        (0.006, 1.0),
+        pytest.param(1.2, 1.0, marks=pytest.mark.slow),
+        pytest.param(1.2, 0.0021, marks=pytest.mark.slow),
+    ],
+)
 def test_loops_show_nothing_of_those_whose_memory_they_take_over(duration: float, diverged_beyond: float) -> None:
     """Few ticks, the last half second, a divergence; the memory comes full of what is no number."""
     from haploop.launch.compiled_programs import PROGRAMS, in_double
