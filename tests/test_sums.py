@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from haploop.logger.sums import RunningSums, by_tick, sum_in_order
+from haploop.logger.sums import RunningSums, by_tick, by_tick_of_loops, sum_in_order
 
 amounts = st.floats(-1e6, 1e6, allow_subnormal=False)
 
@@ -78,7 +78,7 @@ def test_sums_within_a_tick_run_from_first_to_last_whatever_the_memory_layout(n)
 def test_sums_and_running_sums_of_many_loops_have_every_bit_of_those_of_one(n, loops):
     rng = np.random.default_rng(n)
     flows = rng.normal(size=(3, 4 * n, loops)) * 10.0 ** rng.integers(-8, 8, (3, 4 * n, loops))
-    together, many = np.stack([by_tick(flow, n) for flow in flows]), RunningSums(loops)
+    together, many = np.stack([by_tick_of_loops(flow, n) for flow in flows]), RunningSums(loops)
     many.grow(3)
     many.add_of_loops(together)
     for loop in range(loops):

@@ -13,7 +13,11 @@ from haploop.plant.linear_motion import LinearMotion
 from haploop.plant.mechanics import Mechanics
 from haploop.protocol.ticks import Timebase
 
-BOOKS, FIGURES = 11, 9
+BOOKS: tuple[str, ...] = (
+    "hand_work", "device_heat", "hand_heat", "kinetic", "spring", "wall.true", "damping.true", "moved",
+    "ideal", "sampled_and_held", "quantised", "wall.sampled", "damping.sampled",
+)  # fmt: skip
+FIGURES = 9
 
 
 @numba.njit(cache=False, fastmath=False)
@@ -62,17 +66,20 @@ def _loops(  # pragma: no cover
     n = held.shape[0] - 1
     window, rows = trace.shape[0] - 1, len(measured_in)
     forces = np.zeros((lookahead + 1, 3))
-    books, errors, added = np.zeros(BOOKS), np.zeros(BOOKS), np.zeros(BOOKS)
+    books, errors, added = np.zeros(len(BOOKS)), np.zeros(len(BOOKS)), np.zeros(len(BOOKS))
     for cell in range(len(stiffness)):
         books[:], errors[:], forces[:] = 0.0, 0.0, 0.0
         x = v = x_low = v_low = 0.0
         measured_before, least, most, strongest = 0.0, 0.0, 0.0, 0.0
+        wall = damper = 0.0
         steps = 0
         trace[0] = x
         for tick in range(ticks):
             measured = resolution * np.rint(x / resolution)
-            speed = (measured - measured_before) / period
+            seen = measured - measured_before
+            speed = seen / period
             measured_before = measured
+            added[11], added[12] = -wall * seen, -damper * seen
             inside = position - measured
             wall = damper = 0.0
             if inside > 0.0:
@@ -127,7 +134,7 @@ def _loops(  # pragma: no cover
             x, v_before, v = to_x, v, to_v
             x_low, v_low = to_low, dv - (to_v - v_before)
             if with_books:
-                for book in range(BOOKS):
+                for book in range(len(BOOKS)):
                     before_sum = books[book]
                     after_sum = before_sum + added[book]
                     part = after_sum - before_sum
@@ -141,7 +148,7 @@ def _loops(  # pragma: no cover
 
 
 def run_kernel(scenes: list[dict[str, Any]], energy: bool) -> np.ndarray:
-    """Extremes, what the window shows and the books, as ``results_of`` tells them; shape (scenes, FIGURES + BOOKS)."""
+    """Extremes, what the window shows and ``BOOKS``, as ``results_of`` tells them; shape (scenes, FIGURES + books)."""
     first = scenes[0]
     time = Timebase.of(first["clock"], first["duration"])
     m, n = Mechanics.of(first), time.steps_per_tick
@@ -151,7 +158,7 @@ def run_kernel(scenes: list[dict[str, Any]], energy: bool) -> np.ndarray:
     square, lag = motion_integrals(m.mass_kg, m.damping, m.stiffness, time.step_s)
     push = 1.0 / (m.mass_kg * natural_rate(m.mass_kg, m.stiffness, time.step_s))
     scales = np.array([1.0, push, push])
-    out, kept = np.zeros((len(scenes), FIGURES + BOOKS)), min(time.control_rate // 2, time.ticks)
+    out, kept = np.zeros((len(scenes), FIGURES + len(BOOKS))), min(time.control_rate // 2, time.ticks)
     _loops(
         np.array([scene["wall"]["stiffness"] for scene in scenes]),
         np.array([scene["dissipation"][0]["damping"] for scene in scenes]),

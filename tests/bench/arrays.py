@@ -46,6 +46,22 @@ def measured_us(run: Callable[[], Any], ticks: int) -> float:
     return (time.process_time() - began) / ticks * 1e6
 
 
+def check_kernel(scenes: list[dict[str, Any]], kinds: dict[str, Any]) -> None:
+    """That the yardstick does the same work: its books are those of the arrays."""
+    from array_kernel import BOOKS, FIGURES, run_kernel
+
+    for result, row in zip(run_array(scenes, kinds), run_kernel(scenes, True)[:, FIGURES:], strict=True):
+        energy, found = result["energy"], dict(zip(BOOKS, row.tolist(), strict=True))
+        wall, (element,) = energy["wall"], energy["elements"]
+        expected = {name: energy[f"{name}_J"] for name in ("hand_work", "device_heat", "hand_heat", "moved")}
+        expected |= {f"wall.{kind}": wall[f"{kind}_J"] for kind in ("sampled", "true")} | {"ideal": wall["ideal_J"]}
+        expected |= {f"damping.{kind}": element[f"{kind}_J"] for kind in ("sampled", "true")}
+        expected |= {"kinetic": energy["stored_J"] - found["spring"]}
+        for name, value in expected.items():
+            if abs(found[name] - value) > 1e-12 * found["moved"]:
+                raise SystemExit(f"The kernel books {found[name]} J as {name}, the arrays {value} J.")
+
+
 def main() -> None:
     """Measure in turn, repeat, print medians and ratios."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -64,7 +80,7 @@ def main() -> None:
     if importlib.util.find_spec("numba"):
         from array_kernel import run_kernel
 
-        run_kernel(scenes[:1], True)
+        check_kernel(few, kinds)
         rows["numba kernel, with the books"] = (lambda: run_kernel(scenes, True), len(scenes))
         rows["numba kernel, without"] = (lambda: run_kernel(scenes, False), len(scenes))
     if importlib.util.find_spec("jax"):

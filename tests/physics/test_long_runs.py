@@ -9,7 +9,8 @@ import pytest
 from physics.captured import run
 from scene_makers import scene
 
-from haploop.logger.plant_books import PlantBooks
+from haploop.logger.plant_books import Displacement, PlantBooks
+from haploop.logger.sums import by_tick
 from haploop.plant.flow import StepFlow
 from haploop.plant.mechanics import Mechanics
 from haploop.protocol.ticks import Timebase
@@ -39,7 +40,8 @@ def relative_residual(resolved, x: np.ndarray, v: np.ndarray) -> float:
     """What the plant's books leave unexplained of a motion without commands, over the energy moved."""
     books = PlantBooks(resolved, Timebase.of(resolved["clock"], resolved["duration"]))
     columns = {"x": x, "v": v, "force": np.zeros(len(x))}
-    changes = np.stack(list(books.increments(0, columns, np.diff(x), [])))
+    moved = Displacement(dx := np.diff(x), by_tick(dx, books._n))
+    changes = np.stack(list(books.increments(0, columns, moved, [])))
     moved = books.stored_J(columns) + np.abs(changes).sum() / 2
     signs = np.array([1.0 if name == "hand_work" else -1.0 for name in books.names])
     return abs(math.fsum((changes * signs[:, None]).ravel())) / moved

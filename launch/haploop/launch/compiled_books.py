@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import cache
+from functools import partial
 from itertools import accumulate
 from typing import Any
 
 from haploop.launch.compiled_rows import Rows
 from haploop.launch.compiled_tick import Ticked
 from haploop.logger.books import sampled_flow
-from haploop.logger.plant_books import PlantBooks
+from haploop.logger.plant_books import Displacement, PlantBooks
 from haploop.logger.sums import by_tick, sum_rows
 from haploop.logger.wall_books import CAUSES, ideal_and_undelayed
 
@@ -38,22 +38,25 @@ def added_in_tick(
     """
     x, low, n = told.x, told.x_low, len(told.x) - 1
     dx = (x[1:] - x[:-1]) + (low[1:] - low[:-1])
-    summed = _summing(apart)
+    summed = partial(_by_tick, apart)
+    moved: Any = Displacement(dx, summed(dx, n))
     counts, applied = zip(*told.held, strict=True)
     in_effect = {account: [forces[account] for forces in acting[2 - len(counts) :]] for account in now}
     columns: Any = {"x": x, "v": told.v, "force": Rows([*_by_step(counts, applied), applied[-1]])}
     commanded = [Rows(_by_step(counts, forces)) for forces in in_effect.values()]
     flows: dict[str, Any] = dict(
-        zip(plant.names, plant.increments(told.first_step, columns, dx, commanded, summed), strict=True)  # pyright: ignore[reportArgumentType]
+        zip(plant.names, plant.increments(told.first_step, columns, moved, commanded, summed), strict=True)  # pyright: ignore[reportArgumentType]
     )
-    ends = list(accumulate(counts))
-    ways = [summed(dx, n, end - count, end) for count, end in zip(counts, ends, strict=True)]
+    ways = [moved.by_tick]
+    if len(counts) > 1:
+        ends = list(accumulate(counts))
+        ways = [summed(dx, n, end - count, end) for count, end in zip(counts, ends, strict=True)]
     for account, forces in in_effect.items():
         flows[f"{account}.true"] = sum_rows(-force * way for force, way in zip(forces, ways, strict=True))
     flows["moved"] = 0.5 * sum_rows(abs(flow) for flow in flows.values())
     if has_wall:
         *wall, into_wall = told.wall
-        springs = ideal_and_undelayed(x[::n], summed(dx, n), Rows([now["wall"]]), (wall[0], wall[1]), into_wall)
+        springs = ideal_and_undelayed(x[::n], moved.by_tick, Rows([now["wall"]]), (wall[0], wall[1]), into_wall)
         flows |= zip(CAUSES, springs, strict=True)
     x_m: Any = Rows([x_m_before, told.row["x"]])
     for account in now:
@@ -61,14 +64,9 @@ def added_in_tick(
     return {name: flow[0] for name, flow in flows.items()}
 
 
-def _summing(apart: Apart) -> Callable[..., Any]:
-    """``by_tick`` of which every sum is worked out once."""
-
-    @cache
-    def once(flow: Rows, n: int, first: int, end: int) -> Any:
-        return apart(lambda: by_tick(flow, n, first, end)[0])
-
-    return lambda flow, n, first=0, end=None: Rows([once(flow, n, first, end or n)])
+def _by_tick(apart: Apart, flow: Rows, n: int, first: int = 0, end: int | None = None) -> Rows:
+    """``by_tick`` of one tick, made once."""
+    return Rows([apart(lambda: by_tick(flow, n, first, end)[0])])
 
 
 def _by_step(counts: Sequence[int], forces: Sequence[Any]) -> list[Any]:

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from haploop.logger.plant_books import plant_books
-from haploop.logger.sums import RunningSums, by_tick, sum_in_order, sum_rows
+from haploop.logger.plant_books import Displacement, plant_books
+from haploop.logger.sums import RunningSums, by_tick, by_tick_of_loops, sum_in_order, sum_rows
 from haploop.logger.tapes import ControllerTape
 from haploop.logger.wall_books import CAUSES, held_J, ideal_and_undelayed
 from haploop.protocol.arrays import first_row
@@ -49,6 +49,7 @@ class Books:
         self._time = time
         self._plant = plant_books(scene, time)
         self._has_wall = "wall" in scene
+        self._by_tick = by_tick_of_loops if "loops" in scene else by_tick
         self._sums = RunningSums(*([scene["loops"]] if "loops" in scene else []))
         self._rows: dict[str, int] = {}
         self._balance: list[tuple[float, int]] = []
@@ -114,12 +115,16 @@ class Books:
         added = np.zeros((len(self._rows), ticks, *self._sums.sums.shape[1:]))
         moved = added[self._rows["moved"]]
         dx = _displacements(plant)
-        for name, flow in self._exchanged(tick, plant, dx, tape, forces):
+        displacement = Displacement(dx, self._by_tick(dx, self._time.steps_per_tick))
+        for name, flow in self._exchanged(tick, plant, displacement, tape.first, forces):
             added[self._rows[name]] = flow
             moved += np.abs(flow)
         moved *= 0.5
         if self._has_wall:
-            for name, flow in self._springs(tick, plant["x"], dx, tape, into_wall):
+            at_ticks, computed = plant["x"][:: self._time.steps_per_tick], forces["wall"][tick - tape.first :][:ticks]
+            self._note_wall(first_row(at_ticks), wall := _wall_at(tick, tape), into_wall)
+            springs = ideal_and_undelayed(at_ticks, displacement.by_tick, computed, wall, into_wall)
+            for name, flow in zip(CAUSES, springs, strict=True):
                 added[self._rows[name]] = flow
         sampled_rows = [self._rows[f"{account}.sampled"] for account in forces]
         added[sampled_rows] = self._sampled(tick, ticks, tape, list(forces.values()))
@@ -129,36 +134,30 @@ class Books:
         self,
         tick: int,
         plant: dict[str, np.ndarray],
-        dx: np.ndarray,
-        tape: ControllerTape | ControllerTapeArray,
+        moved: Displacement,
+        first_command: int,
         forces: dict[str, np.ndarray],
     ) -> Iterator[tuple[str, np.ndarray]]:
         """What every interval adds to each book of the balance, by name; shape (ticks,)."""
         n = self._time.steps_per_tick
         command = plant["command"][:-1].astype(np.intp)
-        commanded = (_in_effect(force, command, tape.first) for force in forces.values())
-        yield from zip(self._plant.names, self._plant.increments(tick * n, plant, dx, commanded), strict=True)
-        late = self._time.delay_steps % n
-        ways = [(first, by_tick(dx, n, first, end)) for first, end in ((0, late), (late, n)) if first < end]
+        commanded = (_in_effect(force, command, first_command) for force in forces.values())
+        of_plant = self._plant.increments(tick * n, plant, moved, commanded, self._by_tick)
+        yield from zip(self._plant.names, of_plant, strict=True)
+        ways, late = [(0, moved.by_tick)], self._time.delay_steps % n
+        if late:
+            ways = [(first, self._by_tick(moved.by_step, n, first, end)) for first, end in ((0, late), (late, n))]
         by_interval = command.reshape(-1, n)
-        uneven = np.any([(by_interval[:, i] != by_interval[:, i - 1]) for i in range(1, n) if i != late], axis=0)
+        changes = by_interval[:, 1:] != by_interval[:, :-1]
+        if late:
+            changes[:, late - 1] = False
+        uneven = changes.any(axis=1)
         for account, force in forces.items():
-            flow = sum_rows(-_in_effect(force, command[first::n], tape.first) * way for first, way in ways)
+            flow = sum_rows(-_in_effect(force, command[first::n], first_command) * way for first, way in ways)
             if uneven.any():
-                by_step = -_in_effect(force, command, tape.first) * dx
-                flow[uneven] = by_tick(by_step, n)[uneven]
+                by_step = -_in_effect(force, command, first_command) * moved.by_step
+                flow[uneven] = self._by_tick(by_step, n)[uneven]
             yield f"{account}.true", flow
-
-    def _springs(
-        self, tick: int, x: np.ndarray, dx: np.ndarray, tape: ControllerTape | ControllerTapeArray, into_wall: float
-    ) -> Iterator[tuple[str, np.ndarray]]:
-        """What every interval adds to the causes of the wall's leak, by name; shape (ticks,)."""
-        n = self._time.steps_per_tick
-        x, way = x[::n], by_tick(dx, n)
-        position, stiffness = (first_row(tape.rows(f"wall_{of}", tick, tick + 1)) for of in ("position", "stiffness"))
-        self._note_wall(first_row(x), (position, stiffness), into_wall)
-        force = tape.rows("wall", tick, tick + len(way))
-        yield from zip(CAUSES, ideal_and_undelayed(x, way, force, (position, stiffness), into_wall), strict=True)
 
     def _note_wall(self, x: Any, wall: tuple[Any, Any], into_wall: float) -> None:
         if self._wall and not np.array_equal(wall, self._wall):
@@ -224,6 +223,12 @@ class Books:
         if name == "hand_work":
             return 1.0
         return -1.0 if name in self._plant.names or name.endswith(".true") else 0.0
+
+
+def _wall_at(tick: int, tape: ControllerTape | ControllerTapeArray) -> tuple[Any, Any]:
+    """Where the wall is at a tick, m, and how stiff, N/m."""
+    position, stiffness = (first_row(tape.rows(f"wall_{of}", tick, tick + 1)) for of in ("position", "stiffness"))
+    return position, stiffness
 
 
 def _magnitude(parts: list[float]) -> float:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from functools import reduce
 from itertools import accumulate
@@ -13,7 +13,7 @@ import numpy as np
 
 from haploop.logger.chain_forms import ChainForms, ChainFormsArray
 from haploop.logger.chain_moves import Columns, Moves
-from haploop.logger.plant_books import beyond_limits
+from haploop.logger.plant_books import Displacement, beyond_limits
 from haploop.logger.sums import by_tick, sum_rows
 from haploop.plant.chain import Chain
 from haploop.plant.hand_force import hand_force
@@ -53,11 +53,16 @@ class ChainBooks:
         self.least_friction_J = 0.0
 
     def increments(
-        self, first_step: int, columns: Columns, dx: np.ndarray, commanded: Iterable[np.ndarray]
+        self,
+        first_step: int,
+        columns: Columns,
+        moved: Displacement,
+        commanded: Iterable[np.ndarray],
+        summed: Callable[[Any, int], Any] = by_tick,
     ) -> Iterator[np.ndarray]:
         """What each interval adds to each book, J; see ``PlantBooks.increments``."""
-        for book in self.by_step(first_step, columns, dx, commanded):
-            yield by_tick(book, self._n)
+        for book in self.by_step(first_step, columns, moved.by_step, commanded):
+            yield summed(book, self._n)
 
     def by_step(
         self, first_step: int, columns: Columns, dx: np.ndarray, commanded: Iterable[np.ndarray]

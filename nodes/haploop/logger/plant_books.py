@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -34,6 +34,18 @@ def plant_books(scene: dict[str, Any], time: Timebase) -> PlantBooks | ChainBook
 
         return ChainBooks(scene, time)
     return PlantBooks(scene, time)
+
+
+class Displacement(NamedTuple):
+    """How far the device goes, with the digits that the difference of two positions has lost, m.
+
+    Attributes:
+        by_step: over every plant step, shape (ticks * n,).
+        by_tick: over every interval, shape (ticks,).
+    """
+
+    by_step: Any
+    by_tick: Any
 
 
 class PlantBooks:
@@ -74,7 +86,7 @@ class PlantBooks:
         self,
         first_step: int,
         columns: dict[str, np.ndarray],
-        dx: np.ndarray,
+        moved: Displacement,
         commanded: Iterable[np.ndarray],
         summed: Callable[[Any, int], Any] = by_tick,
     ) -> Iterator[np.ndarray]:
@@ -83,7 +95,7 @@ class PlantBooks:
         Args:
             first_step: step of the first state.
             columns: plant telemetry of whole intervals, the end state included; shape (ticks * n + 1,) each.
-            dx: displacement over each step, shape (ticks * n,), with the digits that the difference of two x has lost.
+            moved: displacement over these steps and intervals.
             commanded: the force of the wall and of every element over each step, shape (ticks * n,) each.
             summed: how steps are summed over their tick.
 
@@ -95,15 +107,15 @@ class PlantBooks:
         rise = tau[1:] - tau[:-1]
         net = force + tau[:-1] - m.damping * v[:-1] - m.stiffness * (x[:-1] - m.rest_m)
         rates = [v[:-1], net, rise] if self._rises(rise) else [v[:-1], net]
-        yield summed(self._hand_work(tau, rise, dx, rates), n)
+        yield summed(self._hand_work(tau, rise, moved.by_step, rates), n)
         square = summed(sum_squares(self._square, rates), n)
         for damping in m.dampers.values():
             yield damping * square
-        at_ticks, way = x[::n], summed(dx, n)
+        at_ticks, way = x[::n], moved.by_tick
         yield self._kinetic(v[::n])
         yield m.stiffness * way * (at_ticks[:-1] - m.rest_m + way * 0.5)
         if self._is_limited:
-            yield summed(beyond_limits(commanded, force) * dx, n)
+            yield summed(beyond_limits(commanded, force) * moved.by_step, n)
 
     def _kinetic(self, v: np.ndarray) -> np.ndarray:
         start, change = v[:-1], v[1:] - v[:-1]

@@ -82,7 +82,7 @@ class LinearMotionArray(LinearMotion):
         return holds
 
     def _held_in(self, holds: list[Holds]) -> dict[str, np.ndarray]:
-        command = np.concatenate([np.tile(hold.command[:, None], len(hold.held)) for hold in holds], axis=1)
+        command = np.repeat([hold.command for hold in holds], [len(hold.held) for hold in holds], axis=0).T
         forces = np.concatenate([hold.force[:, 0] for hold in holds])
         return {"command": np.append(command, self.command), "held_N": forces}
 
