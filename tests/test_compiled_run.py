@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import math
+import os
 import sys
 from typing import Annotated, Any
 
@@ -156,15 +157,39 @@ def test_loops_show_nothing_of_those_whose_memory_they_take_over(duration: float
 
 
 def test_put_together_for_a_gpu_the_loops_are_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Its program is another; where there is no GPU, the CPU runs it."""
+    """Its program is another, and all of it has a form for CUDA; where there is no GPU, the CPU runs it."""
     from haploop.launch import compiled_programs
+
+    class Programs(compiled_programs.Programs):
+        def compiled(self, key: Any, block: Any, args: Any) -> Any:
+            lowered = jax.jit(block.run).trace(*args).lower(lowering_platforms=("cuda",))
+            assert "stablehlo.case" not in lowered.as_text()
+            return super().compiled(key, block, args)
 
     compiled_programs.most()  # what jax is told first, it is told of the device there is
     monkeypatch.setattr(jax, "default_backend", lambda: "gpu")
-    monkeypatch.setattr(compiled_programs, "PROGRAMS", compiled_programs.Programs())
+    monkeypatch.setattr(compiled_programs, "PROGRAMS", Programs())
     scenes = many(13)
     assert agree(compiled(scenes), run_array(scenes, KINDS))
     assert compiling()[0] == 1
+
+
+@pytest.mark.parametrize("of_the_user", [None, "true"])
+def test_workers_share_the_memory_of_a_gpu_unless_the_user_says_otherwise(
+    monkeypatch: pytest.MonkeyPatch, of_the_user: str | None
+) -> None:
+    """jax reads the variable when it first looks for a GPU; outside that moment the environment is the user's."""
+    from haploop.launch import compiled_programs
+
+    name, seen = "XLA_PYTHON_CLIENT_PREALLOCATE", []
+    monkeypatch.delenv(name, raising=False)
+    if of_the_user:
+        monkeypatch.setenv(name, of_the_user)
+    monkeypatch.setattr(jax, "default_backend", lambda: seen.append(os.environ[name]) or "gpu")
+    before = dict(os.environ)
+    assert compiled_programs.most.__wrapped__() == 16384
+    assert seen == [of_the_user or "false"]
+    assert dict(os.environ) == before
 
 
 def test_what_is_not_asked_for_is_left_out() -> None:

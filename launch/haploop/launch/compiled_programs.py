@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import os
 from collections import Counter, OrderedDict
-from collections.abc import Callable, Hashable
-from contextlib import AbstractContextManager
+from collections.abc import Callable, Hashable, Iterator
+from contextlib import AbstractContextManager, contextmanager
 from functools import lru_cache, partial
 from importlib import import_module
 from time import perf_counter
@@ -24,6 +24,8 @@ _ONE_FUNCTION = "xla_cpu_small_while_loop_byte_threshold"
 # Arrays of loops fill the widest registers there are.
 _WIDE: dict[str, Any] = {"xla_cpu_prefer_vector_width": 512}
 _FLAGS, _OPTIONS = "XLA_FLAGS", "--xla_backend_extra_options="
+# On a GPU jax takes three quarters of the memory for itself unless told otherwise; the next worker then finds none.
+_TAKES_ALL = "XLA_PYTHON_CLIENT_PREALLOCATE"
 
 
 class Program(NamedTuple):
@@ -100,14 +102,27 @@ def in_double() -> AbstractContextManager[object]:
 
 @lru_cache(maxsize=1)
 def most() -> int:
-    """How many loops suit the device: on a CPU so many that what a tick works on stays in the cache."""
-    before = os.environ.get(_FLAGS, "")
-    if _OPTIONS not in before:
-        os.environ[_FLAGS] = f"{before} {_OPTIONS}{_ONE_FUNCTION}=1000000000"
-    try:
+    """How many loops suit the device: on a CPU so many that what a tick works on stays in the cache.
+
+    Where nothing has used jax before, it is told here how to start; what the user has told it stands.
+    """
+    told = {_TAKES_ALL: os.environ.get(_TAKES_ALL, "false")}
+    if _OPTIONS not in (flags := os.environ.get(_FLAGS, "")):
+        told[_FLAGS] = f"{flags} {_OPTIONS}{_ONE_FUNCTION}=1000000000"
+    with _environment(told):
         on_cpu = jax.default_backend() == "cpu"
-    finally:
-        os.environ[_FLAGS] = before
-        if not before:
-            del os.environ[_FLAGS]
     return 1024 if on_cpu else 16384
+
+
+@contextmanager
+def _environment(variables: dict[str, str]) -> Iterator[None]:
+    """These variables for a while, then those of before."""
+    before = {name: os.environ.pop(name, None) for name in variables}
+    os.environ.update(variables)
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            del os.environ[name]
+            if value is not None:
+                os.environ[name] = value

@@ -28,7 +28,7 @@ def results_of_compiled(
     Sensor, estimators, wall, elements, line, motion and books are the objects of a single loop, run once on jax's
     placeholders; what comes out is compiled and kept for as long as the process lives. The first ticks and those after
     a change are done by ``LoopArray``. What is random comes from the same streams. It runs where jax does by default;
-    it has been tested on CPUs alone, never yet on a GPU.
+    on GPUs it has been compiled, but never yet run.
 
     **Tolerance.** Every operation is the same in float64, but for products and sums that the compiler makes in one
     rounding. Positions stay within 1e-11 of the largest excursion of the scene alone while no rounding of the encoder,
