@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from array_makers import alone, diverging, together
+from arrays.makers import alone, diverging, together
 from physics.effect_tables import EFFECTS, slowly, tap
 from physics.varied_scenes import drawn_chain, varied
 from scene_makers import scene

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 import numpy as np
 import pytest
-from array_makers import PUSH, Stiffening, alone, diverging, pressed, together
+from arrays.makers import PUSH, Stiffening, alone, diverging, pressed, together
 from physics.varied_scenes import drawn_base, varied
 from scene_makers import KINDS, WALL
 

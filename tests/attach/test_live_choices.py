@@ -3,7 +3,7 @@
 import math
 
 import pytest
-from clock_makers import clock, granted
+from clock.makers import clock, granted
 from live_run import going
 from scene_makers import KINDS, WALL, scene
 

@@ -7,10 +7,10 @@ import socket
 import msgpack
 import numpy as np
 import pytest
+from attach.plotjuggler_rules import Parser
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
-from plotjuggler_rules import Parser
 
 from haploop.logger.channels import Channels
 from haploop.logger.msgpack_table import TableLayout

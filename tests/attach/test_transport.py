@@ -15,7 +15,7 @@ from haploop.protocol.sockets import open_socket
 from haploop.protocol.transport import Transport, TransportError, Wires
 from haploop.protocol.wire import encode
 
-SCENE = Path(__file__).parents[1] / "launch" / "scenes" / "fig6c.toml"
+SCENE = Path(__file__).parents[2] / "launch" / "scenes" / "fig6c.toml"
 
 
 @pytest.mark.parametrize(

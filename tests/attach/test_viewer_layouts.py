@@ -16,7 +16,7 @@ from haploop.launch.in_process import run_in_process
 from haploop.launch.scene_file import load
 from haploop.logger.recording import Recording
 
-HOUSE = Path(__file__).parents[1]
+HOUSE = Path(__file__).parents[2]
 DOCS = HOUSE / "docs"
 PLOTJUGGLER, FOXGLOVE = DOCS / "plotjuggler_layout.xml", DOCS / "foxglove_layout.json"
 

@@ -3,7 +3,7 @@
 import math
 from typing import Any
 
-from clock_makers import DAMPING, SWAP, TICKS, WINDOW, clock, granted, sent
+from clock.makers import DAMPING, SWAP, TICKS, WINDOW, clock, granted, sent
 from hypothesis import given
 from hypothesis import strategies as st
 

@@ -4,7 +4,7 @@ import math
 from typing import Any
 
 import pytest
-from clock_makers import DAMPING, SWAP, clock, granted, sent
+from clock.makers import DAMPING, SWAP, clock, granted, sent
 
 from haploop.launch.clock import ClockError
 from haploop.launch.mistakes import SceneError

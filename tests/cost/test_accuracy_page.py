@@ -11,7 +11,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from cost_makers import METHODS, RATES, fake_cost
+from cost.makers import METHODS, RATES, fake_cost
 
 from haploop.tools.ablation import AGAIN, NONE, WHOLE
 from haploop.tools.cost import finding_words, price_findings
@@ -22,7 +22,7 @@ from haploop.tools.cost.page import page, write
 from haploop.tools.cost.price_data import PriceGroup, as_data, price
 from haploop.tools.linear.stiffness_limit import StiffnessLimit
 
-HOUSE = Path(__file__).parents[1]
+HOUSE = Path(__file__).parents[2]
 
 
 def group(

@@ -6,7 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from cost_scene import SMOOTH, exact_reference, outcomes
+from cost.cost_scene import SMOOTH, exact_reference, outcomes
 from typer.testing import CliRunner
 
 from haploop.tools.cli import app

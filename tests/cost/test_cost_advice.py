@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 import pytest
-from cost_makers import fake_cost, fake_error
+from cost.makers import fake_cost, fake_error
 from rich.console import Console
 
 from haploop.tools.cost.advice import advice, cheapest

@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from cost_makers import METHODS, RATES, SCENES, fake_cost, fake_point
-from test_figure import artists
+from cost.makers import METHODS, RATES, SCENES, fake_cost, fake_point
+from shown.test_figure import artists
 
 from haploop.tools.cost.data import Cost, Point, Spread
 from haploop.tools.cost.figure import draw as draw_cost

@@ -5,8 +5,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from cost_makers import fake_cost
-from cost_scene import SMOOTH, count_stages, exact_reference
+from cost.cost_scene import SMOOTH, count_stages, exact_reference
+from cost.makers import fake_cost
 
 from haploop.launch.scene_file import load as load_scene
 from haploop.tools.cost import measure, times

@@ -11,9 +11,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from cost_makers import fake_cost
+from cost.makers import fake_cost
 from scene_makers import KINDS, scene
-from test_figure import artists
+from shown.test_figure import artists
 
 from haploop.controller.controller import Controller
 from haploop.launch.in_process import run_in_process
@@ -29,7 +29,7 @@ from haploop.tools.linear.one_tick import OneTickMap
 from haploop.tools.linear.stiffness_limit import StiffnessLimit
 from haploop.tools.operations import Operations
 
-SCENES = Path(__file__).parents[1] / "launch/scenes"
+SCENES = Path(__file__).parents[2] / "launch/scenes"
 
 
 def test_an_ablation_leaves_out_each_effect_once_and_in_the_end_all() -> None:

@@ -7,14 +7,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-from estimates import COUNT, ENCODER, EVERYTHING, FUSED, KALMAN, SIGMA, T, estimates, floats
+from estimators.estimates import COUNT, ENCODER, EVERYTHING, FUSED, KALMAN, SIGMA, T, estimates, floats
 from hypothesis import given
 from hypothesis import strategies as st
 
 from haploop.launch.start import prepare, run
 from haploop.plant.sensors import accelerometer_is_used
 
-SCENE = Path(__file__).parents[1] / "launch/scenes/fig6c.toml"
+SCENE = Path(__file__).parents[2] / "launch/scenes/fig6c.toml"
 
 
 def low_pass_gain(cutoff: float) -> float:

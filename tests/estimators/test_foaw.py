@@ -5,7 +5,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from estimates import COUNT, ENCODER, T, estimates, floats, measured
+from estimators.estimates import COUNT, ENCODER, T, estimates, floats, measured
 from hypothesis import given
 from hypothesis import strategies as st
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from estimates import CORNER, COUNT, ENCODER, FUSED, JERK, KALMAN, SIGMA, T, estimates, floats
+from estimators.estimates import CORNER, COUNT, ENCODER, FUSED, JERK, KALMAN, SIGMA, T, estimates, floats
 
 from haploop.controller.kalman import jerk_density_limits, steady_state
 

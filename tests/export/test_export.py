@@ -11,7 +11,7 @@ from typing import Any
 import jsonschema
 import numpy as np
 import pytest
-from log_makers import AFTER, PLANT, SCENE, same_bits, swapped_run
+from log.makers import AFTER, PLANT, SCENE, same_bits, swapped_run
 from mcap.reader import make_reader
 from typer.testing import CliRunner
 
@@ -151,7 +151,7 @@ def test_json_mcap_holds_no_word_that_json_does_not_know(messages: list[Any]) ->
 
 
 def test_what_a_real_run_leaves_is_exported_beside_it(tmp_path: Path) -> None:
-    scene = Path(__file__).parents[1] / "launch/scenes/swap.toml"
+    scene = Path(__file__).parents[2] / "launch/scenes/swap.toml"
     out = tmp_path / "out"
     arguments = ["run", str(scene), "--set", "duration=1.6", "--in-process", "--out", str(out)]
     assert CliRunner().invoke(app, arguments).exit_code == 0

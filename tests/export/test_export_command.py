@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 from faults.launched import on_a_disk_of
-from log_makers import cut, swapped_run
+from log.makers import cut, swapped_run
 from mcap.writer import Writer
 from typer.testing import CliRunner, Result
 

@@ -9,9 +9,9 @@ from typing import Self
 
 import numpy as np
 import pytest
+from attach.plotjuggler_rules import Viewer
 from faults.launched import command, wait_for
 from live_run import Going, going, undisturbed
-from plotjuggler_rules import Viewer
 
 import haploop.logger
 from haploop.launch.run_directory import LiveRun

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from linear_scenes import linear_scene
+from linear.linear_scenes import linear_scene
 from scene_makers import scene
 
 from haploop.tools.linear.bounds import Bound, bounds_of

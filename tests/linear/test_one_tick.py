@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 import numpy as np
 import pytest
-from linear_scenes import linear_scene
+from linear.linear_scenes import linear_scene
 from physics.captured import run
 from physics.one_tick_map import growth_of
 from scene_makers import KINDS, scene

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from log_makers import AFTER, BEFORE, PLANT, SCENE, cut, same_bits, swapped_run
+from log.makers import AFTER, BEFORE, PLANT, SCENE, cut, same_bits, swapped_run
 
 from haploop.logger import read, stream
 from haploop.logger.log_error import LogError

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from physics.captured import run, summarise
 from physics.effect_tables import EFFECTS, tap
+from scene.test_plan import EVERYTHING, METHODS
 from scene_makers import mistakes, scene
-from test_plan import EVERYTHING, METHODS
 from typer.testing import CliRunner
 
 import haploop.launch.start as start

@@ -9,7 +9,8 @@ import pytest
 from physics.captured import run
 from scene_makers import scene
 
-from haploop.logger.plant_books import Displacement, PlantBooks
+from haploop.logger.flows import Displacement
+from haploop.logger.plant_books import PlantBooks
 from haploop.logger.sums import by_tick
 from haploop.plant.flow import StepFlow
 from haploop.plant.mechanics import Mechanics

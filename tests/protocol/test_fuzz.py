@@ -9,11 +9,11 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import attacks
 import numpy as np
 import pytest
 import zmq
 from live_run import Going, going, undisturbed
+from protocol import attacks
 from scene_makers import KINDS, scene
 
 import haploop.logger

@@ -6,7 +6,7 @@ import pytest
 
 from haploop.launch.scene_file import load
 
-SCENES = Path(__file__).parents[1] / "launch/scenes"
+SCENES = Path(__file__).parents[2] / "launch/scenes"
 
 
 @pytest.mark.parametrize(

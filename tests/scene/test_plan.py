@@ -16,7 +16,7 @@ from haploop.launch.plan import effects_of, plan
 from haploop.launch.scene_file import load
 from haploop.protocol.effects import EFFECTS, Effect
 
-SCENES = Path(__file__).parents[1] / "launch/scenes"
+SCENES = Path(__file__).parents[2] / "launch/scenes"
 ENCODER = {"resolution": 1e-5}
 READ = {"acceleration": {"source": "accelerometer"}}
 FILTER = {"estimator": "kalman", "jerk_density": 10.0}

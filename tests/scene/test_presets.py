@@ -13,7 +13,7 @@ from haploop.launch.check import resolve
 from haploop.launch.layers import read_layers
 from haploop.launch.scene_file import load
 
-LAUNCH = Path(__file__).parents[1] / "launch"
+LAUNCH = Path(__file__).parents[2] / "launch"
 DEVICES = sorted((LAUNCH / "devices").glob("*.toml"))
 HANDS = sorted((LAUNCH / "hands").glob("*.toml"))
 KEY = re.compile(r"^(\w+) = ")

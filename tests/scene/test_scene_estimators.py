@@ -3,14 +3,14 @@
 from pathlib import Path
 
 import pytest
-from estimates import ENCODER, KALMAN
+from estimators.estimates import ENCODER, KALMAN
 from scene_makers import KINDS, LEAST, mistakes, scene
 
 from haploop.launch.check import resolve
 from haploop.launch.layers import Layers
 from haploop.launch.scene_file import load
 
-SCENE = Path(__file__).parents[1] / "launch/scenes/fig6c.toml"
+SCENE = Path(__file__).parents[2] / "launch/scenes/fig6c.toml"
 
 
 def test_a_scene_that_names_no_estimator_resolves_as_it_did():

@@ -11,7 +11,7 @@ from haploop.controller.dissipation import Element
 from haploop.launch.scene_file import load
 from haploop.launch.schema import json_schema
 
-SCENES = sorted((Path(__file__).parents[1] / "launch/scenes").glob("*.toml"))
+SCENES = sorted((Path(__file__).parents[2] / "launch/scenes").glob("*.toml"))
 SCHEMA = json_schema(KINDS)
 VALIDATOR = jsonschema.Draft202012Validator(SCHEMA)
 

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from test_figure import artists
-from test_report import row, shown
+from shown.test_figure import artists
+from shown.test_report import row, shown
 
 import haploop.logger
 from haploop.launch.start import prepare, run
@@ -19,7 +19,7 @@ from haploop.tools.figure.run_figure import figure_of
 from haploop.tools.figure.words import book_rows
 from haploop.tools.report import summary_table
 
-SCENES = Path(__file__).parents[1] / "launch/scenes"
+SCENES = Path(__file__).parents[2] / "launch/scenes"
 OF_THE_MACHINE = ("wall_s", "real_time_factor", "versions")
 POOR_LOOP = """
 duration = 0.5

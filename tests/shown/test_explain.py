@@ -5,8 +5,8 @@ import sys
 from pathlib import Path
 
 import pytest
+from scene.test_plan import BESIDE, EVERYTHING, NAMING
 from scene_makers import KINDS, scene
-from test_plan import BESIDE, EVERYTHING, NAMING
 from typer.testing import CliRunner
 
 from haploop.controller.dissipation.damping import Damping
@@ -16,7 +16,7 @@ from haploop.protocol.effects import EFFECTS, Effect
 from haploop.tools.cli import app
 from haploop.tools.operations import bill, operations, without
 
-SCENES = Path(__file__).parents[1] / "launch/scenes"
+SCENES = Path(__file__).parents[2] / "launch/scenes"
 MINOR = f"{sys.version_info.major}.{sys.version_info.minor}"
 RECORDED = json.loads((Path(__file__).parent / "bytecode.json").read_text())
 

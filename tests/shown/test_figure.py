@@ -22,7 +22,7 @@ from haploop.tools.figure.loops import force_position_loop, momentum_loop
 from haploop.tools.figure.run_figure import FigureError, draw, figure_of
 from haploop.tools.figure.words import event_lines, key_numbers
 
-SCENES = Path(__file__).parents[1] / "launch/scenes"
+SCENES = Path(__file__).parents[2] / "launch/scenes"
 PNG = b"\x89PNG"
 NO_WALL = """
 title = "no wall"

@@ -17,7 +17,7 @@ from haploop.protocol.quantity import Quantity
 from haploop.tools.amounts import amount, fixed
 from haploop.tools.report import ProgressLine, plugins_table, status_table, summary_table
 
-SCENES = Path(__file__).parents[1] / "launch/scenes"
+SCENES = Path(__file__).parents[2] / "launch/scenes"
 STATUS = {"t_s": 1.25, "verdict": "limit-cycle", "oscillation_m": 1.23e-3, "residual_J": 3e-18}
 
 

@@ -14,8 +14,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from scene_makers import scene
+from shown.test_figure import artists
 from sweep.map_makers import cells_of, ran, said, table
-from test_figure import artists
 
 from haploop.launch.resolved import inline
 from haploop.tools.figure.data import FigureError

@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from shown.test_figure import artists
 from sweep.map_makers import UNITS, said
-from test_figure import artists
 from typer.testing import CliRunner
 
 from haploop.tools.cli import app

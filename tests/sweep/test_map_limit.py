@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 from scene_makers import scene
+from shown.test_figure import artists
 from sweep.map_makers import UNITS, cells_of, said, table
-from test_figure import artists
 
 from haploop.tools.linear.bounds import bounds_of
 from haploop.tools.linear.one_tick import NotLinear, OneTickMap

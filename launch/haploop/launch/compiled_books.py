@@ -9,8 +9,8 @@ from typing import Any
 
 from haploop.launch.compiled_rows import Rows
 from haploop.launch.compiled_tick import Ticked
-from haploop.logger.books import sampled_flow
-from haploop.logger.plant_books import Displacement, PlantBooks
+from haploop.logger.flows import Displacement, sampled_flow
+from haploop.logger.plant_books import PlantBooks
 from haploop.logger.sums import by_tick, sum_rows
 from haploop.logger.wall_books import CAUSES, ideal_and_undelayed
 
@@ -36,10 +36,8 @@ def added_in_tick(
         has_wall: whether there is a wall.
         apart: for what several books need; a compiler would make it for each of them anew.
     """
-    x, low, n = told.x, told.x_low, len(told.x) - 1
-    dx = (x[1:] - x[:-1]) + (low[1:] - low[:-1])
-    summed = partial(_by_tick, apart)
-    moved: Any = Displacement(dx, summed(dx, n))
+    x, n, summed = told.x, len(told.x) - 1, partial(_by_tick, apart)
+    moved: Any = Displacement.of({"x": x, "x_low": told.x_low}, n, summed)  # pyright: ignore[reportArgumentType]
     counts, applied = zip(*told.held, strict=True)
     in_effect = {account: [forces[account] for forces in acting[2 - len(counts) :]] for account in now}
     columns: Any = {"x": x, "v": told.v, "force": Rows([*_by_step(counts, applied), applied[-1]])}
@@ -50,7 +48,7 @@ def added_in_tick(
     ways = [moved.by_tick]
     if len(counts) > 1:
         ends = list(accumulate(counts))
-        ways = [summed(dx, n, end - count, end) for count, end in zip(counts, ends, strict=True)]
+        ways = [summed(moved.by_step, n, end - count, end) for count, end in zip(counts, ends, strict=True)]
     for account, forces in in_effect.items():
         flows[f"{account}.true"] = sum_rows(-force * way for force, way in zip(forces, ways, strict=True))
     flows["moved"] = 0.5 * sum_rows(abs(flow) for flow in flows.values())

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from haploop.logger.plant_books import Displacement, plant_books
+from haploop.logger.flows import Displacement, in_effect, sampled_flows, wall_at
+from haploop.logger.plant_books import plant_books
 from haploop.logger.sums import RunningSums, by_tick, by_tick_of_loops, sum_in_order, sum_rows
 from haploop.logger.tapes import ControllerTape
 from haploop.logger.wall_books import CAUSES, held_J, ideal_and_undelayed
@@ -18,16 +19,6 @@ from haploop.protocol.ticks import Timebase
 
 if TYPE_CHECKING:
     from haploop.logger.tape_array import ControllerTapeArray
-
-
-def sampled_flow(x_m: np.ndarray, force: np.ndarray) -> np.ndarray:
-    """-f[k-1] (x_m[k] - x_m[k-1]), J (Choi et al. 2022, eq. 4).
-
-    Args:
-        x_m: positions as measured at consecutive ticks, m, shape (ticks + 1,).
-        force: commanded at all of them but the last, N, shape (ticks,) or (forces, ticks).
-    """
-    return force * -(x_m[1:] - x_m[:-1])
 
 
 class Books:
@@ -114,20 +105,19 @@ class Books:
 
         added = np.zeros((len(self._rows), ticks, *self._sums.sums.shape[1:]))
         moved = added[self._rows["moved"]]
-        dx = _displacements(plant)
-        displacement = Displacement(dx, self._by_tick(dx, self._time.steps_per_tick))
+        displacement = Displacement.of(plant, self._time.steps_per_tick, self._by_tick)
         for name, flow in self._exchanged(tick, plant, displacement, tape.first, forces):
             added[self._rows[name]] = flow
             moved += np.abs(flow)
         moved *= 0.5
         if self._has_wall:
             at_ticks, computed = plant["x"][:: self._time.steps_per_tick], forces["wall"][tick - tape.first :][:ticks]
-            self._note_wall(first_row(at_ticks), wall := _wall_at(tick, tape), into_wall)
+            self._note_wall(first_row(at_ticks), wall := wall_at(tick, tape), into_wall)
             springs = ideal_and_undelayed(at_ticks, displacement.by_tick, computed, wall, into_wall)
             for name, flow in zip(CAUSES, springs, strict=True):
                 added[self._rows[name]] = flow
         sampled_rows = [self._rows[f"{account}.sampled"] for account in forces]
-        added[sampled_rows] = self._sampled(tick, ticks, tape, list(forces.values()))
+        added[sampled_rows] = sampled_flows(tick, ticks, tape, list(forces.values()))
         return added, sampled_rows
 
     def _exchanged(
@@ -141,7 +131,7 @@ class Books:
         """What every interval adds to each book of the balance, by name; shape (ticks,)."""
         n = self._time.steps_per_tick
         command = plant["command"][:-1].astype(np.intp)
-        commanded = (_in_effect(force, command, first_command) for force in forces.values())
+        commanded = (in_effect(force, command, first_command) for force in forces.values())
         of_plant = self._plant.increments(tick * n, plant, moved, commanded, self._by_tick)
         yield from zip(self._plant.names, of_plant, strict=True)
         ways, late = [(0, moved.by_tick)], self._time.delay_steps % n
@@ -153,9 +143,9 @@ class Books:
             changes[:, late - 1] = False
         uneven = changes.any(axis=1)
         for account, force in forces.items():
-            flow = sum_rows(-_in_effect(force, command[first::n], first_command) * way for first, way in ways)
+            flow = sum_rows(-in_effect(force, command[first::n], first_command) * way for first, way in ways)
             if uneven.any():
-                by_step = -_in_effect(force, command, first_command) * moved.by_step
+                by_step = -in_effect(force, command, first_command) * moved.by_step
                 flow[uneven] = self._by_tick(by_step, n)[uneven]
             yield f"{account}.true", flow
 
@@ -164,19 +154,6 @@ class Books:
             change_J = held_J(x, wall, into_wall) - held_J(x, self._wall, into_wall)
             self.wall_changes_J = self.wall_changes_J + change_J
         self._wall = wall
-
-    @staticmethod
-    def _sampled(
-        tick: int, ticks: int, tape: ControllerTape | ControllerTapeArray, forces: list[np.ndarray]
-    ) -> np.ndarray:
-        """-f[k-1] (x_m[k] - x_m[k-1]) for every tick; nothing at the first tick there is."""
-        first, end = max(tick - 1, tape.first), tick + ticks
-        x_m = tape.rows("x", first, end)
-        known = slice(first - tape.first, end - 1 - tape.first)
-        added = np.zeros((len(forces), ticks, *x_m.shape[1:]))
-        for row, force in zip(added, forces, strict=True):
-            row[ticks + 1 - len(x_m) :] = sampled_flow(x_m, force[known])
-        return added
 
     def of_loops(self, loops: np.ndarray) -> Books:
         """The books of some loops, whose places are ``loops``, out of those of many."""
@@ -225,28 +202,5 @@ class Books:
         return -1.0 if name in self._plant.names or name.endswith(".true") else 0.0
 
 
-def _wall_at(tick: int, tape: ControllerTape | ControllerTapeArray) -> tuple[Any, Any]:
-    """Where the wall is at a tick, m, and how stiff, N/m."""
-    position, stiffness = (first_row(tape.rows(f"wall_{of}", tick, tick + 1)) for of in ("position", "stiffness"))
-    return position, stiffness
-
-
 def _magnitude(parts: list[float]) -> float:
     return abs(math.fsum(parts)) if all(map(math.isfinite, parts)) else math.inf
-
-
-def _displacements(plant: dict[str, np.ndarray]) -> np.ndarray:
-    """How far the device goes in each plant step, with the digits that the difference of two positions has lost, m."""
-    x, low = plant["x"], plant["x_low"]
-    return (x[1:] - x[:-1]) + (low[1:] - low[:-1])
-
-
-def _in_effect(force: np.ndarray, command: np.ndarray, first: int) -> np.ndarray:
-    """What an account commanded where each of these commands is in effect, N; 0 before the first command.
-
-    Args:
-        force: of the commands from ``first`` on.
-    """
-    found = force.take(np.maximum(command - first, 0), axis=0)
-    found[command < 0] = 0.0
-    return found

@@ -13,7 +13,8 @@ import numpy as np
 
 from haploop.logger.chain_forms import ChainForms, ChainFormsArray
 from haploop.logger.chain_moves import Columns, Moves
-from haploop.logger.plant_books import Displacement, beyond_limits
+from haploop.logger.flows import Displacement
+from haploop.logger.plant_books import beyond_limits
 from haploop.logger.sums import by_tick, sum_rows
 from haploop.plant.chain import Chain
 from haploop.plant.hand_force import hand_force

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from haploop.logger.flows import Displacement
 from haploop.logger.sums import by_tick, sum_rows
 from haploop.plant.flow import motion_integrals, natural_rate
 from haploop.plant.hand_force import hand_force
@@ -34,18 +35,6 @@ def plant_books(scene: dict[str, Any], time: Timebase) -> PlantBooks | ChainBook
 
         return ChainBooks(scene, time)
     return PlantBooks(scene, time)
-
-
-class Displacement(NamedTuple):
-    """How far the device goes, with the digits that the difference of two positions has lost, m.
-
-    Attributes:
-        by_step: over every plant step, shape (ticks * n,).
-        by_tick: over every interval, shape (ticks,).
-    """
-
-    by_step: Any
-    by_tick: Any
 
 
 class PlantBooks:

@@ -12,7 +12,7 @@ import numpy as np
 from haploop.controller.controller import Controller
 from haploop.controller.dissipation import ElementError
 from haploop.controller.estimators import Estimator, Sample
-from haploop.logger.books import sampled_flow
+from haploop.logger.flows import sampled_flow
 from haploop.logger.sums import RunningSums
 from haploop.logger.tapes import as_float64
 from haploop.protocol.ticks import Timebase

@@ -1,0 +1,36 @@
+"""Loops run compiled, for the tests of the compiled way; without jax these are skipped."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import pytest
+from arrays.makers import pressed
+from scene_makers import KINDS
+
+from haploop.controller.dissipation import Element
+from haploop.launch.compiled_run import results_of_compiled
+
+jax = pytest.importorskip("jax")
+
+
+def compiled(scenes: list[dict[str, Any]], kinds: dict[str, type[Element]] = KINDS, **options: Any) -> list[Any]:
+    results = dict(results_of_compiled(scenes, kinds, fewest=1, least=0, most=16, **options))
+    return [results[index] for index in range(len(scenes))]
+
+
+def many(count: int, **tables: Any) -> list[dict[str, Any]]:
+    """Loops that differ in their walls alone; one program serves all of this structure."""
+    return [pressed(wall={"position": -0.002, "stiffness": 200.0 + i}, **tables) for i in range(count)]
+
+
+def agree(found: Any, expected: Any, within: float = 1e-9) -> bool:
+    """Whether two results say the same, numbers to within a relative error, or what is nothing beside 1."""
+    if isinstance(expected, dict):
+        return found.keys() == expected.keys() and all(agree(found[key], expected[key], within) for key in expected)
+    if isinstance(expected, list):
+        return len(found) == len(expected) and all(map(agree, found, expected))
+    if isinstance(expected, float):
+        return math.isclose(found, expected, rel_tol=within, abs_tol=1e-11)
+    return found == expected
