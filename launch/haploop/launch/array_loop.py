@@ -68,7 +68,7 @@ class LoopArray:
         self._logger = LoggerArray(scene, time, energy=energy, trajectories=trajectories)
         self._take = self._motion.take_record if energy or trajectories else self._motion.take_positions
         self._in_flight: deque[Any] = deque(maxlen=time.lookahead_ticks + 1)
-        self._limit_m = scene["diverged_beyond"]
+        self._limit_m, self._usual_buffer = scene["diverged_beyond"], np.getbufsize()
         self._scene_of = np.arange(len(scenes))
         self._ended = np.zeros(len(scenes), bool)
         self._unheeded = 0.0 if "friction" in scene else _UNHEEDED
@@ -154,7 +154,7 @@ class LoopArray:
         counted = dict.fromkeys(self._line.tallies, getattr(self._line, "saturated", 0))
         if self._sensor:
             counted |= dict.fromkeys(self._sensor.tallies, getattr(self._sensor, "clipped", 0))
-        with _collector_at_rest():
+        with _collector_at_rest(), _buffers_of(self._usual_buffer):
             outcomes = self._logger.outcomes(list(ends.values()), ended, counted)
             for index, outcome in zip(ends, outcomes, strict=True):
                 self.results[index] = outcome
@@ -177,6 +177,14 @@ def _collector_at_rest() -> Iterator[None]:
     finally:
         if was_at_work:
             gc.enable()
+
+
+@contextmanager
+def _buffers_of(size: int) -> Iterator[None]:
+    """NumPy before 2.3 adds so many numbers at a time as its buffers hold: sums are those of a loop alone with its."""
+    with np.errstate():  # which gives back the buffers as well
+        np.setbufsize(size)
+        yield
 
 
 def _keep_freed_memory() -> None:
