@@ -11,10 +11,10 @@ from typing import Any
 
 import pytest
 
-from haploop.launch import control, run_directory
-from haploop.launch.in_process import run_in_process
-from haploop.launch.run_directory import LiveRun
-from haploop.launch.start import Prepared, prepare, run
+from haploop.launch.processes import control, run_directory
+from haploop.launch.processes.run_directory import LiveRun
+from haploop.launch.runs.in_process import run_in_process
+from haploop.launch.runs.start import Prepared, prepare, run
 
 SCENE = Path(__file__).parents[1] / "launch" / "scenes" / "fig6c.toml"
 

@@ -4,10 +4,10 @@ from pathlib import Path
 from typing import Any
 
 from haploop.controller.dissipation import registry
-from haploop.launch.check import resolve
-from haploop.launch.layers import Layers
-from haploop.launch.mistakes import SceneError
-from haploop.launch.scene_file import load
+from haploop.launch.scene.check import resolve
+from haploop.launch.scene.file import load
+from haploop.launch.scene.layers import Layers
+from haploop.launch.scene.mistakes import SceneError
 
 KINDS = registry()
 LEAST: dict[str, Any] = {"title": "least", "duration": 1.0, "device": {"mass": 0.01, "damping": 0.1}}

@@ -12,10 +12,10 @@ import pytest
 
 from haploop.controller.dissipation import Element, ElementError, Motion, PluginError, Quantity, where
 from haploop.launch import Scene, load, run
-from haploop.launch.mistakes import SceneError
 from haploop.launch.output import OutputError
+from haploop.launch.scene.mistakes import SceneError
 from haploop.logger import read
-from haploop.logger.recording import Recording
+from haploop.logger.log.recording import Recording
 
 SCENES = Path(__file__).parents[1] / "launch/scenes"
 FIG6C = SCENES / "fig6c.toml"

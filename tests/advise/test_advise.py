@@ -9,14 +9,14 @@ from hypothesis import strategies as st
 from scene_makers import KINDS, scene
 from typer.testing import CliRunner
 
-from haploop.launch.in_process import run_in_process
-from haploop.launch.scene_file import load
-from haploop.tools.advise.families import COARSE, DAMPING, beside, first_choices
-from haploop.tools.advise.margins import rounded_down
+from haploop.launch.runs.in_process import run_in_process
+from haploop.launch.scene.file import load
+from haploop.tools.advise.limits.families import COARSE, DAMPING, beside, first_choices
+from haploop.tools.advise.limits.margins import rounded_down
+from haploop.tools.advise.limits.tasks import SEEDS, tasks
+from haploop.tools.advise.limits.variations import Change, corners, scaled, singles
 from haploop.tools.advise.subject import DEFAULT_HAND, WrongAsk, settled, subject
-from haploop.tools.advise.tasks import SEEDS, tasks
-from haploop.tools.advise.variations import Change, corners, scaled, singles
-from haploop.tools.cli import app
+from haploop.tools.cli.main import app
 
 SCENES = Path(__file__).parents[2] / "launch" / "scenes"
 

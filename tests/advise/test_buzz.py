@@ -7,9 +7,9 @@ from scene_makers import KINDS, scene
 
 from haploop.tools.advise.buzz import Buzz, Without, why
 from haploop.tools.advise.effects_off import causes, freed
-from haploop.tools.advise.largest import Limit
-from haploop.tools.advise.steady import Judge
-from haploop.tools.advise.words import buzz_sentences
+from haploop.tools.advise.limits.largest import Limit
+from haploop.tools.advise.limits.steady import Judge
+from haploop.tools.advise.sentences import buzz_sentences
 
 HAND = {"force": {"kind": "minimum-jerk", "value": -1.0, "rise_time": 0.2}, "stiffness": 20.0, "damping": 0.3}
 BASE: dict[str, Any] = {"device": {"mass": 0.05, "damping": 0.2, "position": 1e-3}, "hand": HAND}

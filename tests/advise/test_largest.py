@@ -7,11 +7,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scene_makers import KINDS, scene
 
-from haploop.tools.advise.largest import LEAST_N_M, Limit, Loops, largest
-from haploop.tools.advise.pace import NEAR, WIDE, Pace
-from haploop.tools.advise.steady import Judge, Judgement
-from haploop.tools.advise.tasks import tasks
-from haploop.tools.advise.variations import Change
+from haploop.tools.advise.limits.largest import LEAST_N_M, Limit, Loops, largest
+from haploop.tools.advise.limits.pace import NEAR, WIDE, Pace
+from haploop.tools.advise.limits.steady import Judge, Judgement
+from haploop.tools.advise.limits.tasks import tasks
+from haploop.tools.advise.limits.variations import Change
 from haploop.tools.linear.one_tick import OneTickMap
 
 QUICK, SLOW = WIDE["arrays"], WIDE["alone"]

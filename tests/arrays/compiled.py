@@ -10,7 +10,7 @@ from arrays.makers import pressed
 from scene_makers import KINDS
 
 from haploop.controller.dissipation import Element
-from haploop.launch.compiled_run import results_of_compiled
+from haploop.launch.batch.jax.run import results_of_compiled
 
 jax = pytest.importorskip("jax")
 

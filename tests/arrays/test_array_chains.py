@@ -9,8 +9,8 @@ from physics.effect_tables import EFFECTS, slowly, tap
 from physics.varied_scenes import drawn_chain, varied
 from scene_makers import scene
 
-from haploop.launch import array_loop
-from haploop.launch.array_scene import runs_in_arrays, structure
+from haploop.launch.batch import batch
+from haploop.launch.batch.stacking import runs_in_arrays, structure
 
 LINES = {"friction", "jitter", "loss"}
 
@@ -66,7 +66,7 @@ def test_loops_with_friction_that_diverge_disturb_no_other(monkeypatch: pytest.M
     expected = [alone(each) for each in scenes]
     assert {"diverged", "done"} == {result["ended"] for result in expected}
     for block in (1, 10**4):
-        monkeypatch.setattr(array_loop, "BLOCK", block)
+        monkeypatch.setattr(batch, "BLOCK", block)
         assert together(scenes) == expected
 
 

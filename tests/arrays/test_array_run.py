@@ -13,14 +13,15 @@ from physics.varied_scenes import drawn_base, varied
 from scene_makers import KINDS, WALL
 
 from haploop.controller.dissipation import Element, Motion, Quantity, where
-from haploop.launch import array_loop, array_run
-from haploop.launch.array_loop import LoopArray
-from haploop.launch.array_run import run_array
-from haploop.launch.array_scene import runs_in_arrays, stacked, structure, structures
-from haploop.logger.logger_array import LoggerArray
-from haploop.logger.window_array import WindowArray
-from haploop.plant import motion_array
-from haploop.plant.linear_motion_array import LinearMotionArray
+from haploop.launch.batch import batch
+from haploop.launch.batch import run as array_run
+from haploop.launch.batch.batch import LoopArray
+from haploop.launch.batch.run import run_array
+from haploop.launch.batch.stacking import runs_in_arrays, stacked, structure, structures
+from haploop.logger.batch import LoggerArray
+from haploop.logger.verdict.window_batch import WindowArray
+from haploop.plant import choose_batch
+from haploop.plant.motion.one_mass_batch import LinearMotionArray
 
 
 @pytest.mark.parametrize("seed", range(40))
@@ -35,7 +36,7 @@ def test_a_scene_out_of_an_array_has_every_bit_of_the_scene_alone(seed: int) -> 
 
 @pytest.mark.parametrize("seed", [3, 10])
 def test_so_has_one_of_many_in_blocks_of_few_ticks(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(array_loop, "BLOCK", 3_000)
+    monkeypatch.setattr(batch, "BLOCK", 3_000)
     rng = np.random.default_rng(seed)
     base = drawn_base(seed)
     scenes = [varied(base, rng) for _ in range(77)]
@@ -62,7 +63,7 @@ def test_how_the_loops_are_cut_into_blocks_changes_nothing(monkeypatch: pytest.M
     scenes = [base, varied(base, np.random.default_rng(1))]
     results = []
     for block in (1, 2_000, 10**9):
-        monkeypatch.setattr(array_loop, "BLOCK", block)
+        monkeypatch.setattr(batch, "BLOCK", block)
         results.append(together(scenes))
     assert results[0] == results[1] == results[2]
 
@@ -106,7 +107,7 @@ def test_loops_that_have_ended_are_dropped_from_the_arrays(monkeypatch: pytest.M
             super().advance(tick, holds)
             sizes.append(len(self.x))
 
-    monkeypatch.setattr(motion_array, "LinearMotionArray", Spy)
+    monkeypatch.setattr(choose_batch, "LinearMotionArray", Spy)
     scenes = diverging()
     together(scenes)
     assert sizes[0] == len(scenes)

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from haploop.controller.dissipation import Motion
-from haploop.controller.estimators import estimators
-from haploop.launch.array_state import keep
-from haploop.plant.noise import position_noise
-from haploop.plant.random_stream_array import RandomStreamArray
+from haploop.controller.estimators.choose import estimators
+from haploop.launch.batch.object_state import keep
+from haploop.plant.random.streams_batch import RandomStreamArray
+from haploop.plant.sensing.noise import position_noise
 
 KEPT = np.array([True, False, True, True, False])
 FIVE = np.arange(5.0)
@@ -114,7 +114,7 @@ def test_each_loop_draws_what_it_draws_alone_also_after_others_have_left(before:
 
 
 def test_draws_cross_the_pieces_of_a_stream_as_those_of_one_loop_do() -> None:
-    from haploop.plant.random_stream import RandomStream
+    from haploop.plant.random.streams import RandomStream
 
     many, one = RandomStreamArray(np.array([7, 8]), "noise").normal(), RandomStream(8, "noise").normal()
     assert [many()[1] for _ in range(9000)] == [one() for _ in range(9000)]

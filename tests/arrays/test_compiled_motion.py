@@ -12,8 +12,8 @@ from arrays.makers import pressed
 from physics.varied_scenes import drawn_base, varied
 from scene_makers import KINDS
 
-from haploop.launch.array_loop import LoopArray
-from haploop.launch.array_run import run_array
+from haploop.launch.batch.batch import LoopArray
+from haploop.launch.batch.run import run_array
 
 # Of the largest excursion of each loop.
 TOLERANCE = 1e-11
@@ -26,8 +26,8 @@ def loops_of(scenes: list[dict[str, Any]], by_program: bool) -> LoopArray:
         loops._drop_ended = lambda: None
         loops.run()
         return loops
-    from haploop.launch import compiled_programs
-    from haploop.launch.compiled_loop import CompiledLoops
+    from haploop.launch.batch.jax import programs as compiled_programs
+    from haploop.launch.batch.jax.batch import CompiledLoops
 
     compiled_programs.most()
     with compiled_programs.in_double():

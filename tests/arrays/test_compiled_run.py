@@ -14,8 +14,8 @@ from arrays.makers import PUSH, Stiffening, alone, pressed
 from scene_makers import KINDS
 
 from haploop.controller.dissipation import Element, Motion, Quantity, where
-from haploop.launch.array_run import run_array
-from haploop.launch.compiled_run import compiling, results_of_compiled
+from haploop.launch.batch.jax.run import compiling, results_of_compiled
+from haploop.launch.batch.run import run_array
 
 
 def test_results_are_those_of_arrays_but_for_the_last_digits() -> None:
@@ -43,7 +43,7 @@ def test_a_program_serves_all_scenes_of_its_structure_and_jax_stays_as_it_was() 
 )
 def test_loops_show_nothing_of_those_whose_memory_they_take_over(duration: float, diverged_beyond: float) -> None:
     """Few ticks, the last half second, a divergence; the memory comes full of what is no number."""
-    from haploop.launch.compiled_programs import PROGRAMS, in_double
+    from haploop.launch.batch.jax.programs import PROGRAMS, in_double
 
     scenes = many(16, duration=duration, diverged_beyond=diverged_beyond)
     PROGRAMS.spare = None
@@ -57,17 +57,17 @@ def test_loops_show_nothing_of_those_whose_memory_they_take_over(duration: float
 
 def test_put_together_for_a_gpu_the_loops_are_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
     """Its program is another, and all of it has a form for CUDA; where there is no GPU, the CPU runs it."""
-    from haploop.launch import compiled_programs
+    from haploop.launch.batch.jax import programs
 
-    class Programs(compiled_programs.Programs):
+    class Programs(programs.Programs):
         def compiled(self, key: Any, block: Any, args: Any) -> Any:
             lowered = jax.jit(block.run).trace(*args).lower(lowering_platforms=("cuda",))
             assert "stablehlo.case" not in lowered.as_text()
             return super().compiled(key, block, args)
 
-    compiled_programs.most()  # what jax is told first, it is told of the device there is
+    programs.most()  # what jax is told first, it is told of the device there is
     monkeypatch.setattr(jax, "default_backend", lambda: "gpu")
-    monkeypatch.setattr(compiled_programs, "PROGRAMS", Programs())
+    monkeypatch.setattr(programs, "PROGRAMS", Programs())
     scenes = many(13)
     assert agree(compiled(scenes), run_array(scenes, KINDS))
     assert compiling()[0] == 1
@@ -78,7 +78,7 @@ def test_workers_share_the_memory_of_a_gpu_unless_the_user_says_otherwise(
     monkeypatch: pytest.MonkeyPatch, of_the_user: str | None
 ) -> None:
     """jax reads the variable when it first looks for a GPU; outside that moment the environment is the user's."""
-    from haploop.launch import compiled_programs
+    from haploop.launch.batch.jax import programs
 
     name, seen = "XLA_PYTHON_CLIENT_PREALLOCATE", []
     monkeypatch.delenv(name, raising=False)
@@ -86,7 +86,7 @@ def test_workers_share_the_memory_of_a_gpu_unless_the_user_says_otherwise(
         monkeypatch.setenv(name, of_the_user)
     monkeypatch.setattr(jax, "default_backend", lambda: seen.append(os.environ[name]) or "gpu")
     before = dict(os.environ)
-    assert compiled_programs.most.__wrapped__() == 16384
+    assert programs.most.__wrapped__() == 16384
     assert seen == [of_the_user or "false"]
     assert dict(os.environ) == before
 
@@ -150,6 +150,6 @@ def test_bodies_in_a_row_go_their_own_way_to_the_same_bits() -> None:
 
 
 def test_without_jax_the_error_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "haploop.launch.compiled_programs", None)
+    monkeypatch.setitem(sys.modules, "haploop.launch.batch.jax.programs", None)
     with pytest.raises(ImportError, match=r"pip install 'haploop\[jax\]'"):
         list(results_of_compiled(many(16), KINDS))

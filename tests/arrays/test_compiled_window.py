@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 from arrays.compiled import agree
 
-from haploop.controller.controller_array import Row
+from haploop.controller.controller_batch import Row
 from haploop.protocol.ticks import Timebase
 
 
 def test_windows_read_by_a_program_show_what_they_show_by_themselves() -> None:
     """Of signals that drift, rest and swing, in and out of contact, whatever the place in the rings where they end."""
-    from haploop.launch.compiled_block import Rings
-    from haploop.launch.compiled_programs import in_double
-    from haploop.launch.compiled_window import CompiledWindow
+    from haploop.launch.batch.jax.block import Rings
+    from haploop.launch.batch.jax.programs import in_double
+    from haploop.launch.batch.jax.window import CompiledWindow
 
     time = Timebase.of({"control_rate": 200, "plant_rate": 800, "round_trip_delay": 0.0}, 10.0)
     rng = np.random.default_rng(5)

@@ -7,10 +7,10 @@ from clock.makers import clock, granted
 from live_run import going
 from scene_makers import KINDS, WALL, scene
 
-from haploop.launch.clock import ClockError
-from haploop.launch.control import CommandRefused
-from haploop.launch.options import options
-from haploop.launch.replay import replay
+from haploop.launch.clock.capabilities import options
+from haploop.launch.clock.clock import ClockError
+from haploop.launch.processes.control import CommandRefused
+from haploop.launch.runs.replay import replay
 from haploop.logger import read
 
 DAMPING = {"kind": "damping", "damping": 0.5}

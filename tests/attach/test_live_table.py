@@ -13,7 +13,7 @@ from haploop.protocol.wire import Frame
 from haploop.tools.attach.live_table import ending, live_line, live_table
 from haploop.tools.attach.print import Lines
 from haploop.tools.attach.watched import Watched
-from haploop.tools.event_words import event_words
+from haploop.tools.render.event_words import event_words
 
 WELCOME = {
     "scene": {"title": "a tap on a wall [of 0.15 N/mm]"},

@@ -12,8 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
-from haploop.logger.channels import Channels
-from haploop.logger.msgpack_table import TableLayout
+from haploop.logger.log.channels import Channels
+from haploop.logger.log.table import TableLayout
 from haploop.protocol.ticks import Timebase
 from haploop.tools.attach.plotjuggler import MOST_SAMPLES, Batches, Outlet, PortTaken, array_of_maps
 

@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 import zmq
 
-from haploop.launch import run_directory
-from haploop.launch.control import ask
-from haploop.launch.start import prepare, run
+from haploop.launch.processes import run_directory
+from haploop.launch.processes.control import ask
+from haploop.launch.runs.start import prepare, run
 from haploop.protocol.sockets import open_socket
 from haploop.protocol.transport import Transport, TransportError, Wires
 from haploop.protocol.wire import encode

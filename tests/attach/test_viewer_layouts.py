@@ -12,9 +12,9 @@ import pytest
 
 import haploop.logger
 from haploop.controller.dissipation import registry
-from haploop.launch.in_process import run_in_process
-from haploop.launch.scene_file import load
-from haploop.logger.recording import Recording
+from haploop.launch.runs.in_process import run_in_process
+from haploop.launch.scene.file import load
+from haploop.logger.log.recording import Recording
 
 HOUSE = Path(__file__).parents[2]
 DOCS = HOUSE / "docs"

@@ -16,8 +16,8 @@ from rich.console import Console
 from rich.table import Table
 
 from haploop.controller.dissipation import registry
-from haploop.launch.in_process import run_in_process
-from haploop.launch.scene_file import load
+from haploop.launch.runs.in_process import run_in_process
+from haploop.launch.scene.file import load
 from haploop.tools.ablation import AGAIN, NONE, WHOLE, ablations
 from haploop.tools.machine import machine
 

@@ -7,10 +7,10 @@ from typing import Any
 import numba  # pyright: ignore[reportMissingImports]
 import numpy as np
 
-from haploop.logger.plant_books import as_squares
-from haploop.plant.flow import HeldFlow, motion_integrals, natural_rate
-from haploop.plant.linear_motion import LinearMotion
-from haploop.plant.mechanics import Mechanics
+from haploop.logger.books.one_mass import as_squares
+from haploop.plant.motion.mechanics import Mechanics
+from haploop.plant.motion.one_mass import LinearMotion
+from haploop.plant.motion.transition import HeldFlow, motion_integrals, natural_rate
 from haploop.protocol.ticks import Timebase
 
 BOOKS: tuple[str, ...] = (

@@ -16,9 +16,9 @@ from rich.console import Console
 from rich.table import Table
 
 from haploop.controller.dissipation import registry
-from haploop.launch.array_run import run_array
-from haploop.launch.in_process import run_in_process
-from haploop.launch.scene_file import load
+from haploop.launch.batch.run import run_array
+from haploop.launch.runs.in_process import run_in_process
+from haploop.launch.scene.file import load
 from haploop.tools.machine import machine
 
 SCENE = Path(__file__).parents[2] / "launch" / "scenes" / "fig6b.toml"
@@ -84,7 +84,7 @@ def main() -> None:
         rows["numba kernel, with the books"] = (lambda: run_kernel(scenes, True), len(scenes))
         rows["numba kernel, without"] = (lambda: run_kernel(scenes, False), len(scenes))
     if importlib.util.find_spec("jax"):
-        from haploop.launch.compiled_run import compiling, results_of_compiled
+        from haploop.launch.batch.jax.run import compiling, results_of_compiled
 
         for name, energy in {"compiled, with the books": True, "compiled, without": False}.items():
             run = partial(lambda energy: list(results_of_compiled(scenes, kinds, energy=energy, least=0)), energy)

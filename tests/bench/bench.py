@@ -17,9 +17,9 @@ from rich.table import Table
 from yardsticks import ping_pong_us, plain_loop_us
 
 from haploop.controller.dissipation import registry
-from haploop.launch.in_process import run_in_process
-from haploop.launch.scene_file import load
-from haploop.launch.start import prepare, run
+from haploop.launch.runs.in_process import run_in_process
+from haploop.launch.runs.start import prepare, run
+from haploop.launch.scene.file import load
 from haploop.logger.summary import versions
 from haploop.tools.machine import machine
 

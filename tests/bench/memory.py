@@ -7,7 +7,7 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
-from haploop.launch.start import prepare, run
+from haploop.launch.runs.start import prepare, run
 
 SCENE = Path(__file__).parents[2] / "launch" / "scenes" / "fig6b.toml"
 FIRST_TICK, LAST_TICK = 60_000, 600_000

@@ -11,8 +11,8 @@ from pathlib import Path
 import msgpack
 import zmq
 
-from haploop.launch.children import share_cores
-from haploop.plant.flow import StepFlow
+from haploop.launch.processes.children import share_cores
+from haploop.plant.motion.transition import StepFlow
 
 _pack = msgpack.Packer(autoreset=True).pack
 

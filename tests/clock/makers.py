@@ -5,7 +5,7 @@ from typing import Any
 
 from scene_makers import KINDS, WALL, scene
 
-from haploop.launch.clock import Clock
+from haploop.launch.clock.clock import Clock
 from haploop.protocol.ticks import Timebase
 
 DAMPING = {"kind": "damping", "damping": 0.5}

@@ -7,8 +7,8 @@ from clock.makers import DAMPING, SWAP, TICKS, WINDOW, clock, granted, sent
 from hypothesis import given
 from hypothesis import strategies as st
 
-from haploop.launch.clock import AHEAD_S, ClockError
-from haploop.launch.mistakes import SceneError
+from haploop.launch.clock.clock import AHEAD_S, ClockError
+from haploop.launch.scene.mistakes import SceneError
 
 # How far
 

@@ -8,7 +8,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from haploop.plant.command_line import CommandLine
+from haploop.plant.line.delay import CommandLine
 from haploop.protocol.ticks import Timebase
 
 RATE, CONTROL = 10_000, 1_000

@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Any
 
-from haploop.launch.scene_file import load as load_scene
+from haploop.launch.scene.file import load as load_scene
 from haploop.tools.cost.grid import grid
 from haploop.tools.cost.points import outcome
 from haploop.tools.reference.nearest import Reference, statistics

@@ -14,12 +14,13 @@ import pytest
 from cost.makers import METHODS, RATES, fake_cost
 
 from haploop.tools.ablation import AGAIN, NONE, WHOLE
-from haploop.tools.cost import finding_words, price_findings
+from haploop.tools.cost import finding_words
 from haploop.tools.cost import findings as accuracy_findings
 from haploop.tools.cost.data import Cost, CostFileError, Point, Spread, save
+from haploop.tools.cost.draw.page import page, write
 from haploop.tools.cost.findings import findings
-from haploop.tools.cost.page import page, write
-from haploop.tools.cost.price_data import PriceGroup, as_data, price
+from haploop.tools.cost.prices import findings as price_findings
+from haploop.tools.cost.prices.data import PriceGroup, as_data, price
 from haploop.tools.linear.stiffness_limit import StiffnessLimit
 
 HOUSE = Path(__file__).parents[2]
@@ -198,7 +199,7 @@ def test_page_and_figures_are_written_side_by_side(cost: Cost, tmp_path: Path) -
 def test_without_measurements_the_command_says_what_to_run(tmp_path: Path) -> None:
     with pytest.raises(CostFileError, match="Run haploop cost"):
         write(tmp_path, tmp_path / "docs")
-    command = [sys.executable, "-m", "haploop.tools.cost.page", str(tmp_path), str(tmp_path)]
+    command = [sys.executable, "-m", "haploop.tools.cost.draw.page", str(tmp_path), str(tmp_path)]
     ended = subprocess.run(command, capture_output=True, text=True, check=False)
     assert ended.returncode == 2
     assert "Run haploop cost" in ended.stderr

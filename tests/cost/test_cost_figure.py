@@ -14,9 +14,9 @@ from cost.makers import METHODS, RATES, SCENES, fake_cost, fake_point
 from shown.test_figure import artists
 
 from haploop.tools.cost.data import Cost, Point, Spread
-from haploop.tools.cost.figure import draw as draw_cost
-from haploop.tools.cost.figure import figure_of
-from haploop.tools.cost.panel import LOOKS, drawn_m
+from haploop.tools.cost.draw.figure import draw as draw_cost
+from haploop.tools.cost.draw.figure import figure_of
+from haploop.tools.cost.draw.panel import LOOKS, drawn_m
 from haploop.tools.figure.data import FigureError
 from haploop.tools.figure.labels import Label, place_labels
 

@@ -8,7 +8,7 @@ import pytest
 from cost.cost_scene import SMOOTH, count_stages, exact_reference
 from cost.makers import fake_cost
 
-from haploop.launch.scene_file import load as load_scene
+from haploop.launch.scene.file import load as load_scene
 from haploop.tools.cost import measure, times
 from haploop.tools.cost.data import CostFileError, Spread, load, save
 from haploop.tools.cost.grid import grid

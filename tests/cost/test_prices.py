@@ -16,12 +16,14 @@ from scene_makers import KINDS, scene
 from shown.test_figure import artists
 
 from haploop.controller.controller import Controller
-from haploop.launch.in_process import run_in_process
-from haploop.launch.plan import effects_of
-from haploop.launch.scene_file import load
+from haploop.launch.plan.plan import effects_of
+from haploop.launch.runs.in_process import run_in_process
+from haploop.launch.scene.file import load
 from haploop.tools.ablation import AGAIN, NONE, WHOLE, ablations
-from haploop.tools.cost import price_jobs, prices, prices_figure
-from haploop.tools.cost.price_data import PriceGroup, as_data, chance_in, price, price_groups
+from haploop.tools.cost.prices import figure as prices_figure
+from haploop.tools.cost.prices import jobs as price_jobs
+from haploop.tools.cost.prices import prices
+from haploop.tools.cost.prices.data import PriceGroup, as_data, chance_in, price, price_groups
 from haploop.tools.cost.store import Store
 from haploop.tools.cost.times import IN_PROCESS, PROCESSES
 from haploop.tools.figure.data import FigureError
@@ -122,7 +124,7 @@ def test_without_books_plant_and_controller_do_just_what_they_do_in_a_run(monkey
         return Spy
 
     monkeypatch.setattr(price_jobs, "Controller", spy("bare"))
-    monkeypatch.setattr("haploop.launch.in_process.Controller", spy("run"))
+    monkeypatch.setattr("haploop.launch.runs.in_process.Controller", spy("run"))
     price_jobs.bare_us(made)
     run_in_process(made, KINDS)
     assert answered["bare"] == answered["run"]

@@ -11,7 +11,7 @@ from mpmath import mpf
 from physics.effects_reference import Bodies
 from scene_makers import scene
 
-from haploop.launch.scene_file import load
+from haploop.launch.scene.file import load
 from haploop.tools.reference.loop import close_loop, ticks_of
 from haploop.tools.reference.make import SCENES, in_digits
 from haploop.tools.reference.nearest import (

@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 from scene_makers import KINDS, scene
 
 from haploop.controller.dissipation import ElementError
-from haploop.launch.in_process import run_in_process
-from haploop.launch.resolved import to_toml
+from haploop.launch.runs.in_process import run_in_process
+from haploop.launch.scene.toml_writer import to_toml
 from haploop.logger import read
 from haploop.tools.dissipate.booking import Booking
 from haploop.tools.dissipate.samples import RecordingError

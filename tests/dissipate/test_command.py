@@ -11,9 +11,9 @@ from dissipate.recordings import outcome, write
 from scene_makers import KINDS, scene
 from typer.testing import CliRunner, Result
 
-from haploop.launch.in_process import run_in_process
-from haploop.launch.resolved import to_toml
-from haploop.tools.cli import app
+from haploop.launch.runs.in_process import run_in_process
+from haploop.launch.scene.toml_writer import to_toml
+from haploop.tools.cli.main import app
 from haploop.tools.dissipate.figure import figure_of
 from haploop.tools.dissipate.report import answer
 

@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from haploop.controller.estimators import estimators
-from haploop.plant.sensors import encoder
+from haploop.controller.estimators.choose import estimators
+from haploop.plant.sensing.encoder import encoder
 
 T = 1e-3
 COUNT = 1e-5

@@ -11,8 +11,8 @@ from estimators.estimates import COUNT, ENCODER, EVERYTHING, FUSED, KALMAN, SIGM
 from hypothesis import given
 from hypothesis import strategies as st
 
-from haploop.launch.start import prepare, run
-from haploop.plant.sensors import accelerometer_is_used
+from haploop.launch.runs.start import prepare, run
+from haploop.plant.sensing.encoder import accelerometer_is_used
 
 SCENE = Path(__file__).parents[2] / "launch/scenes/fig6c.toml"
 

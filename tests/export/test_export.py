@@ -16,8 +16,8 @@ from mcap.reader import make_reader
 from typer.testing import CliRunner
 
 from haploop.logger import read
-from haploop.logger.recording import Recording
-from haploop.tools.cli import app
+from haploop.logger.log.recording import Recording
+from haploop.tools.cli.main import app
 
 TABLES = {"/plant": PLANT, "/controller": AFTER}
 

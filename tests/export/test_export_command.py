@@ -14,8 +14,8 @@ from mcap.writer import Writer
 from typer.testing import CliRunner, Result
 
 from haploop.logger import read
-from haploop.logger.mcap_log import Log
-from haploop.tools.cli import app
+from haploop.logger.log.writer import Log
+from haploop.tools.cli.main import app
 
 FORMATS = ("csv", "npz", "parquet", "json-mcap")
 
@@ -137,7 +137,7 @@ def test_channels_of_any_name_get_files_of_their_own(tmp_path: Path) -> None:
 PEAK = Path("/proc/self/status")
 MEASURED = """
 import sys
-from haploop.tools.cli import app
+from haploop.tools.cli.main import app
 try:
     app(["export", sys.argv[1], "--to", sys.argv[2], "--out", sys.argv[3]])
 except SystemExit as end:

@@ -11,10 +11,10 @@ import pytest
 from faults.launched import SCENE, Launched, Run
 
 from haploop.controller.dissipation import registry
-from haploop.launch.in_process import run_in_process
-from haploop.launch.scene_file import load
+from haploop.launch.runs.in_process import run_in_process
+from haploop.launch.scene.file import load
 from haploop.logger import read
-from haploop.logger.recording import Recording
+from haploop.logger.log.recording import Recording
 
 
 @pytest.fixture(scope="session")

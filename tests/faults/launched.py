@@ -15,9 +15,9 @@ from typing import Any
 
 import pytest
 
-from haploop.launch import control, run_directory
+from haploop.launch.processes import control, run_directory
 from haploop.logger import read
-from haploop.logger.recording import Recording
+from haploop.logger.log.recording import Recording
 from haploop.protocol.processes import PROCESSES
 
 SCENES = Path(__file__).parents[2] / "launch/scenes"

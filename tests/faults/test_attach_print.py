@@ -8,8 +8,8 @@ import pytest
 from faults.launched import SCENE, wait_for
 
 from haploop.controller.dissipation import registry
-from haploop.launch.in_process import run_in_process
-from haploop.launch.scene_file import load
+from haploop.launch.runs.in_process import run_in_process
+from haploop.launch.scene.file import load
 
 KINDS = registry()
 # It stands still at tick 500, so that it is surely still there when something joins it.

@@ -8,10 +8,10 @@ import pytest
 from faults.launched import SCENE, command, same_bits
 
 from haploop.controller.dissipation import registry
-from haploop.launch import control
-from haploop.launch.in_process import run_in_process
-from haploop.launch.replay import replay
-from haploop.launch.scene_file import load
+from haploop.launch.processes import control
+from haploop.launch.runs.in_process import run_in_process
+from haploop.launch.runs.replay import replay
+from haploop.launch.scene.file import load
 
 KINDS = registry()
 

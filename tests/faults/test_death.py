@@ -7,8 +7,8 @@ import pytest
 from faults.launched import LONG, ROLES, alive, first_and_slowly, same_bits, wait_for
 
 import haploop.logger
-from haploop.launch import run_directory
-from haploop.launch.replay import replay
+from haploop.launch.processes import run_directory
+from haploop.launch.runs.replay import replay
 
 NAMED = r"The {} was killed by SIGKILL; the last tick all nodes had done is (\d+) "
 

@@ -9,7 +9,7 @@ import pytest
 from faults.launched import LONG, SCENE, command, processes, same_bits, wait_for
 
 import haploop.logger
-from haploop.launch import run_directory
+from haploop.launch.processes import run_directory
 
 LIMIT_BYTES = 4_000_000
 

@@ -7,7 +7,7 @@ import pytest
 from faults.launched import SCENE, first_and_slowly, same_bits, wait_for
 
 import haploop.logger
-from haploop.launch.replay import replay
+from haploop.launch.runs.replay import replay
 
 SIGNALS = first_and_slowly(signal.SIGINT, signal.SIGTERM)
 

@@ -14,8 +14,8 @@ from faults.launched import command, wait_for
 from live_run import Going, going, undisturbed
 
 import haploop.logger
-from haploop.launch.run_directory import LiveRun
-from haploop.logger.recording import Recording
+from haploop.launch.processes.run_directory import LiveRun
+from haploop.logger.log.recording import Recording
 from haploop.tools.attach import plotjuggler
 from haploop.tools.attach.plotjuggler import Outlet
 from haploop.tools.attach.plotjuggler_node import publish

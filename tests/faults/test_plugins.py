@@ -7,8 +7,8 @@ import pytest
 from faults.launched import ROLES, SCENES, command, first_and_slowly, wait_for
 
 import haploop.logger
-from haploop.launch import control
-from haploop.launch.replay import replay
+from haploop.launch.processes import control
+from haploop.launch.runs.replay import replay
 
 HEAD = """
 import math, os, sys

@@ -11,7 +11,7 @@ from physics.chain_map import ChainLoop
 from physics.one_tick_map import LinearLoop
 from scene_makers import KINDS, scene
 
-from haploop.launch.in_process import run_in_process
+from haploop.launch.runs.in_process import run_in_process
 from haploop.tools.linear.one_tick import NeverStable, NotLinear, OneTickMap
 from haploop.tools.linear.stiffness_limit import StiffnessLimit, pressed_deep, stiffness_limit
 

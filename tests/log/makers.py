@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from haploop.logger.mcap_log import Log
+from haploop.logger.log.writer import Log
 
 PLANT = {"timestamp": "s", "t": "s", "x": "m", "v": "m/s", "force": "N"}
 BEFORE = {"timestamp": "s", "x": "m", "wall": "N", "dissipation.0": "N", "in_contact": ""}

@@ -14,8 +14,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from haploop.logger import read
-from haploop.logger.log_error import LogError
-from haploop.logger.mcap_log import Compression, Log
+from haploop.logger.log.error import LogError
+from haploop.logger.log.writer import Compression, Log
 
 PLANT = {"timestamp": "s", "t": "s", "x": "m", "v": "m/s", "force": "N"}
 

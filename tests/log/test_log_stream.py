@@ -13,10 +13,10 @@ from hypothesis import strategies as st
 from log.makers import AFTER, BEFORE, PLANT, SCENE, cut, same_bits, swapped_run
 
 from haploop.logger import read, stream
-from haploop.logger.log_error import LogError
-from haploop.logger.log_stream import LogStream, survey
-from haploop.logger.mcap_log import Log
-from haploop.logger.recording import Table, merge_columns
+from haploop.logger.log.error import LogError
+from haploop.logger.log.recording import Table, merge_columns
+from haploop.logger.log.stream import LogStream, survey
+from haploop.logger.log.writer import Log
 
 
 @pytest.fixture(scope="module")

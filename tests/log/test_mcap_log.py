@@ -15,7 +15,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from mcap.reader import make_reader
 
-from haploop.logger.mcap_log import Compression, Log
+from haploop.logger.log.writer import Compression, Log
 
 PLANT = {"timestamp": "s", "t": "s", "x": "m", "v": "m/s", "force": "N"}
 CONTROLLER = {"timestamp": "s", "x": "m", "in_contact": ""}

@@ -20,8 +20,8 @@ from mcap.reader import make_reader
 from mcap.records import Message
 from mcap.stream_reader import StreamReader
 
-from haploop.logger.log_error import LogError
-from haploop.logger.mcap_log import Compression, Log
+from haploop.logger.log.error import LogError
+from haploop.logger.log.writer import Compression, Log
 
 PLANT = {"timestamp": "s", "t": "s", "x": "m", "v": "m/s", "force": "N"}
 CONTROLLER = {"timestamp": "s", "x": "m", "in_contact": ""}

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from haploop.logger.sums import RunningSums, by_tick, by_tick_of_loops, sum_in_order
+from haploop.logger.books.sums import RunningSums, by_tick, by_tick_of_loops, sum_in_order
 
 amounts = st.floats(-1e6, 1e6, allow_subnormal=False)
 

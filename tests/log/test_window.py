@@ -8,8 +8,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from haploop.logger.window import Window
-from haploop.logger.window_look import swings
+from haploop.logger.verdict.measures import swings
+from haploop.logger.verdict.window import Window
 
 RATE, N = 10_000, 10
 WALL = -0.06

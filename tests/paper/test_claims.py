@@ -6,11 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from haploop.tools.paper.claims import VERDICTS, Claim, Finding
-from haploop.tools.paper.command import paper
-from haploop.tools.paper.figures import figure, numbers
-from haploop.tools.paper.page import page
-from haploop.tools.paper.work import Work
+from haploop.tools.studies.choi2022.claims import VERDICTS, Claim, Finding
+from haploop.tools.studies.choi2022.command import paper
+from haploop.tools.studies.choi2022.figures.registry import figure, numbers
+from haploop.tools.studies.choi2022.page import page
+from haploop.tools.studies.choi2022.work import Work
 
 DOCS = Path(__file__).parents[2] / "docs"
 CLAIM = Claim("III, Fig. 4", "inertia dissipates | stores")

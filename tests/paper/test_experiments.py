@@ -12,27 +12,27 @@ import numpy as np
 import pytest
 
 from haploop.controller.dissipation import registry
-from haploop.launch.in_process import run_in_process
-from haploop.launch.scene_file import load
+from haploop.launch.runs.in_process import run_in_process
+from haploop.launch.scene.file import load
 from haploop.tools.cost.grid import scenes_folder
 from haploop.tools.linear.one_tick import OneTickMap
 from haploop.tools.linear.stiffness_limit import smooth
-from haploop.tools.paper.claims import Claim, Finding
-from haploop.tools.paper.command import make_figure
-from haploop.tools.paper.experiment.climb import NAMES, SIZES, climb, largest
-from haploop.tools.paper.experiment.gated_map import GatedMap
-from haploop.tools.paper.experiment.judged import READING, holding, judged, keep_shares
-from haploop.tools.paper.experiment.judged import nearest as nearest_in
-from haploop.tools.paper.experiment.limits import first_end, gated_ends
-from haploop.tools.paper.experiment.reading_file import file_text
-from haploop.tools.paper.experiment.reading_rows import CLAIMS, rows
-from haploop.tools.paper.experiment.readings import CHOICES, SPACE, around, draw, structure
-from haploop.tools.paper.experiment.setup import KINDS, SCENE_FILE, Setup, elements_of, nearest
-from haploop.tools.paper.figure_8 import contacts as figure_8_contacts
-from haploop.tools.paper.figure_11 import largest_steady
-from haploop.tools.paper.figures import figure
-from haploop.tools.paper.shares import options
-from haploop.tools.paper.work import Work
+from haploop.tools.studies.choi2022.claims import Claim, Finding
+from haploop.tools.studies.choi2022.command import make_figure
+from haploop.tools.studies.choi2022.experiment.limits import first_end, gated_ends
+from haploop.tools.studies.choi2022.experiment.reading_file import file_text
+from haploop.tools.studies.choi2022.experiment.reading_rows import CLAIMS, rows
+from haploop.tools.studies.choi2022.experiment.readings import CHOICES, SPACE, around, draw, structure
+from haploop.tools.studies.choi2022.experiment.setup import KINDS, SCENE_FILE, Setup, elements_of, nearest
+from haploop.tools.studies.choi2022.experiment.stiffness_ladder import NAMES, SIZES, climb, largest
+from haploop.tools.studies.choi2022.experiment.verdict_under_assumptions import READING, holding, judged, keep_shares
+from haploop.tools.studies.choi2022.experiment.verdict_under_assumptions import nearest as nearest_in
+from haploop.tools.studies.choi2022.figures.figure_8 import contacts as figure_8_contacts
+from haploop.tools.studies.choi2022.figures.figure_11 import largest_steady
+from haploop.tools.studies.choi2022.figures.registry import figure
+from haploop.tools.studies.choi2022.gate.gated_map import GatedMap
+from haploop.tools.studies.choi2022.simulation.shares import options
+from haploop.tools.studies.choi2022.work import Work
 
 # A drive, a hand and a unit with all that a loop may have but friction.
 SETUP = Setup(

@@ -6,13 +6,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from haploop.launch.scene_file import load
-from haploop.tools.paper.claims import Finding
-from haploop.tools.paper.command import make_figure
-from haploop.tools.paper.figures import figure
-from haploop.tools.paper.page import page
-from haploop.tools.paper.search import Size, search
-from haploop.tools.stages import silent
+from haploop.launch.scene.file import load
+from haploop.tools.render.stages import silent
+from haploop.tools.studies.choi2022.claims import Finding
+from haploop.tools.studies.choi2022.command import make_figure
+from haploop.tools.studies.choi2022.figures.registry import figure
+from haploop.tools.studies.choi2022.page import page
+from haploop.tools.studies.choi2022.simulation.search import Size, search
 
 OURS = (3, 4, 5, 6)
 

@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from haploop.tools.paper.acceleration import largest_mass_kg, passive_up_to_Hz
-from haploop.tools.paper.momentum import steps_J
-from haploop.tools.paper.prescribed import (
+from haploop.tools.studies.choi2022.motion.acceleration import largest_mass_kg, passive_up_to_Hz
+from haploop.tools.studies.choi2022.motion.momentum import steps_J
+from haploop.tools.studies.choi2022.motion.prescribed import (
     DAMPING_N_S_M,
     KINDS,
     MASS_KG,

@@ -11,15 +11,15 @@ import numpy as np
 import pytest
 from scene_makers import KINDS
 
-from haploop.launch.check import resolve
-from haploop.launch.in_process import run_in_process
-from haploop.launch.layers import Layers
-from haploop.launch.scene_file import load
-from haploop.tools.paper.reading import BASE, BOUNDS, CHOICES, SPACE, Reading, draw, scene_of
-from haploop.tools.paper.reading_files import scene_text, write_table
-from haploop.tools.paper.reading_runs import CLAIMS, MOST, SMALL_M, extent, over, shortfalls
-from haploop.tools.paper.scenes import fig6
-from haploop.tools.paper.shares import decider, never_together, options, share
+from haploop.launch.runs.in_process import run_in_process
+from haploop.launch.scene.check import resolve
+from haploop.launch.scene.file import load
+from haploop.launch.scene.layers import Layers
+from haploop.tools.studies.choi2022.simulation.reading import BASE, BOUNDS, CHOICES, SPACE, Reading, draw, scene_of
+from haploop.tools.studies.choi2022.simulation.reading_files import scene_text, write_table
+from haploop.tools.studies.choi2022.simulation.reading_runs import CLAIMS, MOST, SMALL_M, extent, over, shortfalls
+from haploop.tools.studies.choi2022.simulation.scenes import fig6
+from haploop.tools.studies.choi2022.simulation.shares import decider, never_together, options, share
 
 SCENES = Path(__file__).parents[2] / "launch/scenes"
 # What the paper states (section V.A), by table; nothing else of these tables is left but what is listed.

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from scene_makers import KINDS
 
-from haploop.launch.in_process import Loop, scene_events
-from haploop.logger.keeper import Keeper
+from haploop.launch.runs.in_process import Loop, scene_events
 from haploop.logger.logger import Block, Logger
+from haploop.logger.session import Keeper
 from haploop.protocol.ticks import Timebase
 
 

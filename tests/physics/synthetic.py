@@ -10,7 +10,7 @@ from scene_makers import KINDS
 from haploop.controller.controller import Controller
 from haploop.logger.logger import Logger
 from haploop.logger.summary import energy
-from haploop.plant.sensors import encoder
+from haploop.plant.sensing.encoder import encoder
 from haploop.protocol.ticks import Timebase
 
 

@@ -14,8 +14,8 @@ from physics.test_blocks import in_blocks, of_the_scene
 from scene_makers import WALL, scene
 from scipy import integrate
 
-from haploop.plant.accelerometer import Accelerometer
-from haploop.plant.tally import CLIPPED
+from haploop.plant.counters import CLIPPED
+from haploop.plant.sensing.accelerometer import Accelerometer
 from haploop.protocol.ticks import Timebase
 
 TIME = Timebase(plant_rate=10_000, control_rate=1000, delay_steps=0, ticks=10**6)

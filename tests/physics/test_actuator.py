@@ -12,10 +12,10 @@ from physics.captured import run
 from physics.test_blocks import in_blocks, of_the_scene
 from scene_makers import WALL, scene
 
-from haploop.plant.actuator import Actuator
-from haploop.plant.command_line import CommandLine, line_of
+from haploop.plant.counters import SATURATED
+from haploop.plant.line.actuator import Actuator
+from haploop.plant.line.delay import CommandLine, line_of
 from haploop.plant.plant import Plant
-from haploop.plant.tally import SATURATED
 from haploop.protocol.ticks import Timebase
 
 FORCES = st.floats(-1e3, 1e3)

@@ -9,9 +9,9 @@ import pytest
 from physics.captured import summarise
 from physics.random_scenes import drawn
 
-from haploop.launch.scene_file import load
-from haploop.launch.start import prepare
-from haploop.launch.start import run as run_prepared
+from haploop.launch.runs.start import prepare
+from haploop.launch.runs.start import run as run_prepared
+from haploop.launch.scene.file import load
 
 SCENES = sorted((Path(__file__).parents[2] / "launch/scenes").glob("*.toml"))
 OF_THE_MACHINE = ("wall_s", "real_time_factor", "versions")

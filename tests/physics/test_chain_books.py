@@ -15,9 +15,9 @@ from physics.effect_tables import slowly
 from scene_makers import KINDS, scene
 
 from haploop.controller.controller import Controller
-from haploop.logger.chain_books import ChainBooks
+from haploop.logger.books.buffers import PIECES
+from haploop.logger.books.chain import ChainBooks
 from haploop.logger.logger import Logger
-from haploop.logger.tapes import PIECES
 from haploop.plant.plant import Plant
 from haploop.protocol.ticks import Timebase
 

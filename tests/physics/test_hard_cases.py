@@ -9,7 +9,7 @@ import pytest
 from physics.captured import run
 from scene_makers import scene
 
-from haploop.logger import plant_books
+from haploop.logger.books import one_mass
 
 STIFF_WALL = {"position": -1e-3, "stiffness": 5e4}
 ALWAYS_INERTIA = {"kind": "unidirectional-inertia", "mass": 0.05, "acts": "always"}
@@ -109,5 +109,5 @@ def test_a_damper_that_stops_the_device_within_a_ten_millionth_of_a_step_is_book
 
     stopped = scene(duration=0.1, device={"mass": 1e-4, "damping": damping, "velocity": 0.5})
     assert run(stopped).relative_residual < 1e-12
-    monkeypatch.setattr(plant_books, "sum_squares", term_by_term)
+    monkeypatch.setattr(one_mass, "sum_squares", term_by_term)
     assert (run(stopped).relative_residual < 1e-12) == (damping < 1e4)

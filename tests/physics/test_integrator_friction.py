@@ -13,10 +13,10 @@ from scene.test_plan import EVERYTHING, METHODS
 from scene_makers import mistakes, scene
 from typer.testing import CliRunner
 
-import haploop.launch.start as start
-from haploop.launch.combinations import notes
+import haploop.launch.runs.start as start
+from haploop.launch.scene.combinations import notes
 from haploop.plant.integrators.one_step import growth
-from haploop.tools.cli import app
+from haploop.tools.cli.main import app
 
 SCENES = Path(__file__).parents[2] / "launch/scenes"
 ONE_STEP = METHODS[:-1]

@@ -11,7 +11,7 @@ from physics.captured import Captured, run
 from physics.effects_run import follow
 from scene_makers import scene
 
-from haploop.logger.motion_columns import motion_columns
+from haploop.logger.log.columns import motion_columns
 
 ORDERS = {"euler": 1, "semi-implicit-euler": 1, "implicit-midpoint": 2, "rk4": 4}
 ONE_STEP = tuple(ORDERS)

@@ -15,11 +15,11 @@ from physics.test_blocks import in_blocks
 from scene_makers import WALL, scene
 from scipy import stats
 
-from haploop.plant.command_line import CommandLine, Line, line_of
-from haploop.plant.jitter import additional_delays
-from haploop.plant.loss import losses
-from haploop.plant.tally import DROPPED, LOST
-from haploop.plant.uncertain_line import UncertainLine
+from haploop.plant.counters import DROPPED, LOST
+from haploop.plant.line.delay import CommandLine, Line, line_of
+from haploop.plant.line.jitter import additional_delays
+from haploop.plant.line.loss import losses
+from haploop.plant.line.lossy import UncertainLine
 from haploop.protocol.ticks import Timebase
 
 MANY = 100_000

@@ -9,11 +9,11 @@ import pytest
 from physics.captured import run
 from scene_makers import scene
 
-from haploop.logger.flows import Displacement
-from haploop.logger.plant_books import PlantBooks
-from haploop.logger.sums import by_tick
-from haploop.plant.flow import StepFlow
-from haploop.plant.mechanics import Mechanics
+from haploop.logger.books.one_mass import PlantBooks
+from haploop.logger.books.sums import by_tick
+from haploop.logger.books.work import Displacement
+from haploop.plant.motion.mechanics import Mechanics
+from haploop.plant.motion.transition import StepFlow
 from haploop.protocol.ticks import Timebase
 
 # So light that v loses a few ten thousand units of its last place a step, and always the same broken number of them.

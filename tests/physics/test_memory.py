@@ -10,7 +10,7 @@ import pytest
 
 from haploop.controller.controller import Controller
 from haploop.controller.dissipation import registry
-from haploop.launch.scene_file import load
+from haploop.launch.scene.file import load
 from haploop.plant.plant import Plant
 from haploop.protocol.ticks import Timebase
 

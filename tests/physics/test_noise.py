@@ -11,10 +11,10 @@ from physics.test_blocks import in_blocks, of_the_scene
 from scene_makers import WALL, scene
 from scipy import signal, stats
 
-from haploop.launch.replay import replay
-from haploop.launch.start import prepare
-from haploop.launch.start import run as run_prepared
-from haploop.plant.noise import position_noise
+from haploop.launch.runs.replay import replay
+from haploop.launch.runs.start import prepare
+from haploop.launch.runs.start import run as run_prepared
+from haploop.plant.sensing.noise import position_noise
 
 PERIOD_S = 1e-3
 MANY = 200_000

@@ -15,8 +15,8 @@ from physics.captured import Captured, run
 from physics.random_scenes import drawn, is_comparable
 from physics.reference_run import Truth, simulate
 
-from haploop.launch.plan import effects_of
-from haploop.launch.scene_file import load
+from haploop.launch.plan.plan import effects_of
+from haploop.launch.scene.file import load
 
 AGREEMENT = 1e-11
 SEEDS = range(30)

@@ -10,7 +10,7 @@ from physics.decimal_flow import flow_minus_identity
 from scipy.integrate import quad_vec
 from scipy.linalg import expm
 
-from haploop.plant.flow import StepFlow, gramian, motion_integrals, natural_rate
+from haploop.plant.motion.transition import StepFlow, gramian, motion_integrals, natural_rate
 
 H = 1e-4
 CRITICAL = 2 * np.sqrt(0.02 * 10.0)

@@ -12,9 +12,9 @@ from physics.random_scenes import is_comparable
 from physics.reference_run import simulate
 from scene_makers import scene
 
-from haploop.logger import plant_books
-from haploop.logger.books import Books
-from haploop.plant.flow import HeldFlow, StepFlow
+from haploop.logger.books import one_mass
+from haploop.logger.books.books import Books
+from haploop.plant.motion.transition import HeldFlow, StepFlow
 
 
 def busy() -> dict:
@@ -65,21 +65,21 @@ def test_heat_by_a_rule_instead_of_the_exact_integral_does_not_close_the_books(r
     def by_rule(mass, damping, stiffness, step_s):
         _, lag = exact(mass, damping, stiffness, step_s)
         start = np.array([1.0, 0.0, 0.0])
-        rates = np.array([[0, c := plant_books.natural_rate(mass, stiffness, step_s), 0]] + [[0.0] * 3] * 2)
+        rates = np.array([[0, c := one_mass.natural_rate(mass, stiffness, step_s), 0]] + [[0.0] * 3] * 2)
         rates[1] = -stiffness / mass / c, -damping / mass, 1 / step_s
         end = np.linalg.matrix_power(np.eye(3) + rates * step_s / 4096, 4096)[0]
         weight = {"left": (1.0, 0.0), "trapezoid": (0.5, 0.5)}[rule]
         return step_s * (weight[0] * np.outer(start, start) + weight[1] * np.outer(end, end)), lag
 
-    exact = plant_books.motion_integrals
-    monkeypatch.setattr(plant_books, "motion_integrals", by_rule)
+    exact = one_mass.motion_integrals
+    monkeypatch.setattr(one_mass, "motion_integrals", by_rule)
     assert run(busy()).relative_residual > residual
 
 
 def test_the_work_of_a_straight_line_force_is_not_its_mean_times_the_way(monkeypatch):
     """The hand pulls harder at one end of the step, where the device is faster or slower."""
-    exact = plant_books.motion_integrals
-    monkeypatch.setattr(plant_books, "motion_integrals", lambda *of: (exact(*of)[0], 0.0 * exact(*of)[1]))
+    exact = one_mass.motion_integrals
+    monkeypatch.setattr(one_mass, "motion_integrals", lambda *of: (exact(*of)[0], 0.0 * exact(*of)[1]))
     assert run(busy()).relative_residual > 1e-12
 
 

@@ -17,8 +17,8 @@ from protocol import attacks
 from scene_makers import KINDS, scene
 
 import haploop.logger
-from haploop.launch.clock import Clock
-from haploop.launch.clock_server import ClockServer
+from haploop.launch.clock.clock import Clock
+from haploop.launch.clock.server import ClockServer
 from haploop.protocol.ticks import Timebase
 
 REFUSED, WELCOME, REPLY = 3, 2, 14

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from haploop.launch.scene_file import load
+from haploop.launch.scene.file import load
 
 SCENES = Path(__file__).parents[2] / "launch/scenes"
 

@@ -11,10 +11,10 @@ import pytest
 from scene_makers import KINDS, scene
 
 import haploop.logger
-from haploop.launch.in_process import run_in_process
-from haploop.launch.plan import effects_of, plan
-from haploop.launch.scene_file import load
-from haploop.protocol.effects import EFFECTS, Effect
+from haploop.launch.plan.effects import EFFECTS, Effect
+from haploop.launch.plan.plan import effects_of, plan
+from haploop.launch.runs.in_process import run_in_process
+from haploop.launch.scene.file import load
 
 SCENES = Path(__file__).parents[2] / "launch/scenes"
 ENCODER = {"resolution": 1e-5}
@@ -90,7 +90,8 @@ for scene in json.load(sys.stdin):
         assert os.waitpid(child, 0)[1] == 0
         continue
     Core(scene, Timebase.of(scene["clock"], scene["duration"]), *rest)
-    print(*(name for name in sys.modules if name.startswith("haploop.")), flush=True)
+    loaded = [module for name, module in sys.modules.items() if name.startswith("haploop.")]
+    print(*(module.__name__ for module in loaded if not hasattr(module, "__path__")), flush=True)
     os._exit(0)
 """
 READ_BY_NOTHING = {"accelerometer": {"bandwidth": 400, "range": 20}}

@@ -9,9 +9,9 @@ from typing import Any
 import pytest
 from scene_makers import KINDS
 
-from haploop.launch.check import resolve
-from haploop.launch.layers import read_layers
-from haploop.launch.scene_file import load
+from haploop.launch.scene.check import resolve
+from haploop.launch.scene.file import load
+from haploop.launch.scene.layers import read_layers
 
 LAUNCH = Path(__file__).parents[2] / "launch"
 DEVICES = sorted((LAUNCH / "devices").glob("*.toml"))

@@ -8,10 +8,10 @@ from hypothesis import strategies as st
 from scene_makers import KINDS, LEAST, WALL, mistakes, scene
 
 from haploop.controller.dissipation import Element, Quantity
-from haploop.launch.check import resolve
-from haploop.launch.layers import Layers
-from haploop.launch.mistakes import SceneError
-from haploop.launch.scene import SceneTable
+from haploop.launch.scene.check import resolve
+from haploop.launch.scene.layers import Layers
+from haploop.launch.scene.mistakes import SceneError
+from haploop.launch.scene.tables.scene import SceneTable
 
 
 def test_defaults_are_filled_in_and_absent_tables_stay_absent():

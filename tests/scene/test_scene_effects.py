@@ -8,12 +8,12 @@ import pytest
 from scene_makers import KINDS, LEAST, mistakes, scene
 from typer.testing import CliRunner
 
-from haploop.launch.combinations import notes
-from haploop.launch.layers import Layers
-from haploop.launch.resolved import to_toml
-from haploop.launch.scene_file import load
-from haploop.launch.schema import json_schema
-from haploop.tools.cli import app
+from haploop.launch.scene.combinations import notes
+from haploop.launch.scene.file import load
+from haploop.launch.scene.layers import Layers
+from haploop.launch.scene.schema import json_schema
+from haploop.launch.scene.toml_writer import to_toml
+from haploop.tools.cli.main import app
 
 LEAST_OF_EACH: dict[str, Any] = {
     "transmission": {"motor_mass": 0.003, "stiffness": 4000},

@@ -6,9 +6,9 @@ import pytest
 from estimators.estimates import ENCODER, KALMAN
 from scene_makers import KINDS, LEAST, mistakes, scene
 
-from haploop.launch.check import resolve
-from haploop.launch.layers import Layers
-from haploop.launch.scene_file import load
+from haploop.launch.scene.check import resolve
+from haploop.launch.scene.file import load
+from haploop.launch.scene.layers import Layers
 
 SCENE = Path(__file__).parents[2] / "launch/scenes/fig6c.toml"
 

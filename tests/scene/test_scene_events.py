@@ -3,8 +3,8 @@
 import pytest
 from scene_makers import KINDS, WALL, mistakes, scene
 
-from haploop.launch.check import resolve_event
-from haploop.launch.mistakes import SceneError
+from haploop.launch.scene.check import resolve_event
+from haploop.launch.scene.mistakes import SceneError
 
 DAMPING = {"kind": "damping", "damping": 0.8}
 INERTIA = {"kind": "unidirectional-inertia", "mass": "10 g"}

@@ -3,8 +3,8 @@
 import pytest
 from scene_makers import LEAST_TOML, file_mistakes
 
-from haploop.launch.mistakes import SceneError
-from haploop.launch.scene_file import load
+from haploop.launch.scene.file import load
+from haploop.launch.scene.mistakes import SceneError
 
 
 @pytest.fixture

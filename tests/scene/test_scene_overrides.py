@@ -5,10 +5,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scene_makers import LEAST_TOML, file_mistakes
 
-from haploop.launch.layers import Layers
-from haploop.launch.mistakes import SceneError
-from haploop.launch.overrides import lay_overrides
-from haploop.launch.scene_file import load
+from haploop.launch.scene.file import load
+from haploop.launch.scene.layers import Layers
+from haploop.launch.scene.mistakes import SceneError
+from haploop.launch.scene.overrides import lay_overrides
 
 SCENE = (
     LEAST_TOML

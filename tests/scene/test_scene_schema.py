@@ -8,8 +8,8 @@ import pytest
 from scene_makers import KINDS, LEAST, WALL
 
 from haploop.controller.dissipation import Element
-from haploop.launch.scene_file import load
-from haploop.launch.schema import json_schema
+from haploop.launch.scene.file import load
+from haploop.launch.scene.schema import json_schema
 
 SCENES = sorted((Path(__file__).parents[2] / "launch/scenes").glob("*.toml"))
 SCHEMA = json_schema(KINDS)

@@ -11,13 +11,13 @@ from shown.test_figure import artists
 from shown.test_report import row, shown
 
 import haploop.logger
-from haploop.launch.start import prepare, run
-from haploop.logger.motion_columns import motion_columns
-from haploop.tools.amounts import amount
+from haploop.launch.runs.start import prepare, run
+from haploop.logger.log.columns import motion_columns
 from haploop.tools.figure.data import RunData
 from haploop.tools.figure.run_figure import figure_of
 from haploop.tools.figure.words import book_rows
-from haploop.tools.report import summary_table
+from haploop.tools.render.amounts import amount
+from haploop.tools.render.report import summary_table
 
 SCENES = Path(__file__).parents[2] / "launch/scenes"
 OF_THE_MACHINE = ("wall_s", "real_time_factor", "versions")

@@ -10,10 +10,10 @@ from scene_makers import KINDS, scene
 from typer.testing import CliRunner
 
 from haploop.controller.dissipation.damping import Damping
-from haploop.launch.plan import effects_of
-from haploop.launch.scene_file import load
-from haploop.protocol.effects import EFFECTS, Effect
-from haploop.tools.cli import app
+from haploop.launch.plan.effects import EFFECTS, Effect
+from haploop.launch.plan.plan import effects_of
+from haploop.launch.scene.file import load
+from haploop.tools.cli.main import app
 from haploop.tools.operations import bill, operations, without
 
 SCENES = Path(__file__).parents[2] / "launch/scenes"

@@ -13,7 +13,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from haploop.launch.start import prepare, run
+from haploop.launch.runs.start import prepare, run
 from haploop.logger import read
 from haploop.tools.figure.data import TOGETHER, RunData
 from haploop.tools.figure.envelope import extremes

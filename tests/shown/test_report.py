@@ -12,10 +12,10 @@ from hypothesis import strategies as st
 from rich.console import Console
 
 from haploop.controller.dissipation import Element, Motion, registry
-from haploop.launch.start import prepare, run
+from haploop.launch.runs.start import prepare, run
 from haploop.protocol.quantity import Quantity
-from haploop.tools.amounts import amount, fixed
-from haploop.tools.report import ProgressLine, plugins_table, status_table, summary_table
+from haploop.tools.render.amounts import amount, fixed
+from haploop.tools.render.report import ProgressLine, plugins_table, status_table, summary_table
 
 SCENES = Path(__file__).parents[2] / "launch/scenes"
 STATUS = {"t_s": 1.25, "verdict": "limit-cycle", "oscillation_m": 1.23e-3, "residual_J": 3e-18}

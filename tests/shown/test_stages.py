@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 from rich.console import Console
 
-from haploop.tools import report
-from haploop.tools.stages import bars
+from haploop.tools.render import report
+from haploop.tools.render.stages import bars
 
 
 def test_without_a_terminal_a_stage_is_one_line(capsys: pytest.CaptureFixture[str]) -> None:

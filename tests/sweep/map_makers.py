@@ -8,9 +8,9 @@ from typing import Any
 
 from scene_makers import KINDS
 
-from haploop.launch.array_run import run_array
-from haploop.launch.resolved import to_toml
-from haploop.tools.sweep.map_data import AMPLITUDE, MapData, data_of
+from haploop.launch.batch.run import run_array
+from haploop.launch.scene.toml_writer import to_toml
+from haploop.tools.sweep.map.data import AMPLITUDE, MapData, data_of
 
 UNITS = {
     "wall.stiffness": "N/m",

@@ -12,9 +12,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scene_makers import KINDS, scene
 
-from haploop.launch.array_run import results_of
+from haploop.launch.batch.run import results_of
 from haploop.tools.linear.one_tick import OneTickMap
-from haploop.tools.sweep.boundary import Boundary, Candidate, Tolerance, boundaries, holds_verdict, run_scenes
+from haploop.tools.sweep.run.boundary import Boundary, Candidate, Tolerance, boundaries, holds_verdict, run_scenes
 
 POINTS = [0.0, 25.0, 50.0, 75.0, 100.0]
 

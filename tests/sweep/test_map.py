@@ -17,16 +17,16 @@ from scene_makers import scene
 from shown.test_figure import artists
 from sweep.map_makers import cells_of, ran, said, table
 
-from haploop.launch.resolved import inline
+from haploop.launch.scene.toml_writer import inline
 from haploop.tools.figure.data import FigureError
 from haploop.tools.figure.file import write_figure
 from haploop.tools.linear.one_tick import OneTickMap
 from haploop.tools.linear.stiffness_limit import pressed_deep
-from haploop.tools.sweep.map_answer import stiffest_steady
-from haploop.tools.sweep.map_axis import Ruler
-from haploop.tools.sweep.map_data import AMPLITUDE, NOT_RUN, VERDICTS, Axis, MapData, data_of
-from haploop.tools.sweep.map_figure import figure_of
-from haploop.tools.sweep.map_look import LOOKS
+from haploop.tools.sweep.map.answer import stiffest_steady
+from haploop.tools.sweep.map.axis import Ruler
+from haploop.tools.sweep.map.data import AMPLITUDE, NOT_RUN, VERDICTS, Axis, MapData, data_of
+from haploop.tools.sweep.map.draw.figure import figure_of
+from haploop.tools.sweep.map.draw.look import LOOKS
 
 K, B = "wall.stiffness", "dissipation.0.damping"
 STIFFNESSES, DAMPINGS = [100.0, 200.0, 300.0, 400.0], [0.1, 0.2, 0.5, 1.0, 2.0]

@@ -14,12 +14,12 @@ from shown.test_figure import artists
 from sweep.map_makers import UNITS, said
 from typer.testing import CliRunner
 
-from haploop.tools.cli import app
+from haploop.tools.cli.main import app
 from haploop.tools.figure.data import FigureError
-from haploop.tools.sweep.map_bisect import MOST_LINES, bisect_figure
-from haploop.tools.sweep.map_boundary import ALL_HOLD, FOUND, NONE_HOLDS, UNKNOWN, edges_of
-from haploop.tools.sweep.map_data import AMPLITUDE, MapData, data_of
-from haploop.tools.sweep.map_file import draw_map
+from haploop.tools.sweep.map.boundary import ALL_HOLD, FOUND, NONE_HOLDS, UNKNOWN, edges_of
+from haploop.tools.sweep.map.data import AMPLITUDE, MapData, data_of
+from haploop.tools.sweep.map.draw.bisect import MOST_LINES, bisect_figure
+from haploop.tools.sweep.map.file import draw_map
 from haploop.tools.sweep.table import read
 
 K, B, KIND = "wall.stiffness", "dissipation.0.damping", "dissipation.0.kind"

@@ -14,13 +14,13 @@ from sweep.map_makers import UNITS, cells_of, said, table
 
 from haploop.tools.linear.bounds import bounds_of
 from haploop.tools.linear.one_tick import NotLinear, OneTickMap
-from haploop.tools.sweep.map_axis import Ruler
-from haploop.tools.sweep.map_bounds import bound_boundaries
-from haploop.tools.sweep.map_contour import zero_lines
-from haploop.tools.sweep.map_data import Axis
-from haploop.tools.sweep.map_figure import figure_of
-from haploop.tools.sweep.map_limit import EXACT, exact_boundary
-from haploop.tools.sweep.map_plane import Plane, set_key
+from haploop.tools.sweep.map.axis import Ruler
+from haploop.tools.sweep.map.data import Axis
+from haploop.tools.sweep.map.draw.figure import figure_of
+from haploop.tools.sweep.map.lines.bounds import bound_boundaries
+from haploop.tools.sweep.map.lines.contour import zero_lines
+from haploop.tools.sweep.map.lines.limit import EXACT, exact_boundary
+from haploop.tools.sweep.map.plane import Plane, set_key
 
 K, B, M, DELAY = "wall.stiffness", "dissipation.0.damping", "dissipation.0.mass", "clock.round_trip_delay"
 WALL = {"position": -0.001, "stiffness": 100.0}

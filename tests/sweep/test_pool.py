@@ -12,10 +12,10 @@ from scene_makers import KINDS
 from sweep.makers import of_stiffness, pressed, threads
 
 from haploop.controller.dissipation import PluginError
-from haploop.launch.array_run import run_array
-from haploop.tools.sweep.parts import Group, Sizes, cut, grouped
-from haploop.tools.sweep.pool import DIED, Pool, results
-from haploop.tools.sweep.work import Work, kinds_of
+from haploop.launch.batch.run import run_array
+from haploop.tools.executor.parts import Group, Sizes, cut, grouped
+from haploop.tools.executor.pool import DIED, Pool, results
+from haploop.tools.sweep.run.work import Work, kinds_of
 
 DEADLY = """
 import os

@@ -13,16 +13,16 @@ import pytest
 from scene_makers import KINDS
 from sweep.sweep_files import GRID, PRESS, loaded, sweep_file, swept
 
-from haploop.launch.in_process import run_in_process
-from haploop.launch.scene_file import load as load_scene
+from haploop.launch.runs.in_process import run_in_process
+from haploop.launch.scene.file import load as load_scene
+from haploop.tools.executor.pool import Pool
 from haploop.tools.linear.one_tick import OneTickMap
-from haploop.tools.sweep.boundary import Boundary
-from haploop.tools.sweep.columns import schema_of
-from haploop.tools.sweep.command import Request, sweep
-from haploop.tools.sweep.engine import Engine, Stopped
-from haploop.tools.sweep.pool import Pool
-from haploop.tools.sweep.shown import SweepProgress
-from haploop.tools.sweep.store import Store
+from haploop.tools.sweep.run.boundary import Boundary
+from haploop.tools.sweep.run.columns import schema_of
+from haploop.tools.sweep.run.command import Request, sweep
+from haploop.tools.sweep.run.engine import Engine, Stopped
+from haploop.tools.sweep.run.shown import SweepProgress
+from haploop.tools.sweep.run.store import Store
 from haploop.tools.sweep.table import TableError, read
 
 RECORD = 'record = ["trajectory_sha256", "energy.residual_J", "window.oscillation_m", "ticks", "final.x_m"]\n'

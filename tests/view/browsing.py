@@ -12,10 +12,10 @@ from typing import Any
 import aiohttp
 import numpy as np
 
-from haploop.tools.view import LiveRuns
-from haploop.view.guard import Guard
-from haploop.view.runs import Runs
-from haploop.view.serve import listen, serve
+from haploop.tools.cli.view import LiveRuns
+from haploop.view.receive.runs import Runs
+from haploop.view.serve.guard import Guard
+from haploop.view.serve.program import listen, serve
 
 # A test gives up after so long. It says nothing about how long anything may take.
 PATIENCE_S = 40.0

@@ -7,10 +7,10 @@ import aiohttp
 import pytest
 from view.browsing import site, to_its_end
 
-from haploop.view import assets
-from haploop.view.guard import Guard
-from haploop.view.runs import CommandFailed
-from haploop.view.serve import PortTaken, listen
+from haploop.view.receive.runs import CommandFailed
+from haploop.view.serve import assets
+from haploop.view.serve.guard import Guard
+from haploop.view.serve.program import PortTaken, listen
 
 
 class NoRuns:

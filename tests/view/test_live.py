@@ -10,7 +10,7 @@ import pytest
 from live_run import going, undisturbed
 from view.browsing import site, to_its_end
 
-from haploop.launch.failure import RunFailed
+from haploop.launch.errors import RunFailed
 from haploop.logger import read
 
 TOUCHING = ("wall.position=-0.001", "duration=600", "run.deadline=30")

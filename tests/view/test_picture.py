@@ -7,11 +7,11 @@ import pytest
 from view.browsing import decode
 
 from haploop.protocol.ticks import Timebase
-from haploop.view.at_work import at_work
-from haploop.view.event_lines import event_lines
-from haploop.view.history import History
-from haploop.view.picture import picture
-from haploop.view.watch import Watch
+from haploop.view.draw.snapshot import picture
+from haploop.view.receive.at_work import at_work
+from haploop.view.receive.event_lines import event_lines
+from haploop.view.serve.watch import Watch
+from haploop.view.store.history import History
 
 TIME = Timebase(10_000, 1_000, 0, 100_000)
 WALL = {"position": 0.0, "stiffness": 100.0, "into_wall": -1.0}

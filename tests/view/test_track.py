@@ -6,10 +6,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from haploop.protocol.ticks import Timebase
-from haploop.view.extremes import extremes
-from haploop.view.history import History
-from haploop.view.ring import Ring
-from haploop.view.track import MOST_COLUMNS, Track
+from haploop.view.store.extremes import extremes
+from haploop.view.store.history import History
+from haploop.view.store.lod_series import MOST_COLUMNS, Track
+from haploop.view.store.ring import Ring
 
 VALUES = st.one_of(st.floats(-10, 10, width=32), st.just(float("nan")))
 

@@ -10,8 +10,8 @@ From Python::
     result["/plant"]["x"], result["/plant"].units["x"]     # an array, and its unit
     run(scene.swap("damping", at="1.5 s", damping=0.8), out="runs/swapped")
 
-See :func:`haploop.launch.loaded_scene.load`, :class:`haploop.launch.loaded_scene.Scene` and
-:func:`haploop.launch.run_result.run`, which are imported when first used.
+See :func:`haploop.launch.runs.loaded_scene.load`, :class:`haploop.launch.runs.loaded_scene.Scene` and
+:func:`haploop.launch.runs.result.run`, which are imported when first used.
 """
 
 from __future__ import annotations
@@ -20,15 +20,15 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from haploop.launch.loaded_scene import Scene, load
-    from haploop.launch.run_result import Result, run
+    from haploop.launch.runs.loaded_scene import Scene, load
+    from haploop.launch.runs.result import Result, run
 
 __all__ = ["Result", "Scene", "load", "run"]
 
-_HOMES = {"Scene": "loaded_scene", "load": "loaded_scene", "Result": "run_result", "run": "run_result"}
+_HOMES = {"Scene": "loaded_scene", "load": "loaded_scene", "Result": "result", "run": "result"}
 
 
 def __getattr__(name: str) -> Any:
     if name not in _HOMES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)
+    return getattr(import_module(f"{__name__}.runs.{_HOMES[name]}"), name)

@@ -7,7 +7,7 @@ import time
 from pathlib import Path
 from typing import Any
 
-from haploop.launch.resolved import to_toml
+from haploop.launch.scene.toml_writer import to_toml
 
 SCENE, PLUGINS = "scene.toml", "plugins"
 

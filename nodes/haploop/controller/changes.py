@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from haploop.controller.active_elements import Slots
 from haploop.controller.dissipation import Element, load_plugin
-from haploop.controller.slots import Slots
 from haploop.controller.wall import Wall
 
 Change = dict[str, Any]

@@ -6,11 +6,11 @@ import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
+from haploop.controller.active_elements import Slots
 from haploop.controller.changes import Change, apply_change
 from haploop.controller.dissipation import Element, ElementError, Motion
-from haploop.controller.estimators import Sample, estimators
+from haploop.controller.estimators.choose import Sample, estimators
 from haploop.controller.recorder import MOTION_COLUMNS, Recorder
-from haploop.controller.slots import Slots
 from haploop.controller.wall import NoWall, Wall
 from haploop.protocol.ticks import DELAY, Timebase
 

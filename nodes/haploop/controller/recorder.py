@@ -6,7 +6,7 @@ import math
 from array import array
 from typing import Any
 
-from haploop.controller.slots import Slots
+from haploop.controller.active_elements import Slots
 from haploop.controller.wall import Wall
 
 Block = dict[str, Any]

@@ -11,15 +11,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from haploop.logger.log_stream import LogStream
-    from haploop.logger.recording import Recording
+    from haploop.logger.log.recording import Recording
+    from haploop.logger.log.stream import LogStream
 
 
 def read(path: str | Path, topics: Collection[str] | None = None, columns: Collection[str] | None = None) -> Recording:
-    """Read the log of a run: see :func:`haploop.logger.log_reader.read`, imported when first used."""
-    from haploop.logger import log_reader
+    """Read the log of a run: see :func:`haploop.logger.log.reader.read`, imported when first used."""
+    from haploop.logger.log import reader
 
-    return log_reader.read(path, topics, columns)
+    return reader.read(path, topics, columns)
 
 
 def stream(
@@ -27,8 +27,8 @@ def stream(
 ) -> LogStream:
     """Go through the log of a run, ``for topic, log_times_ns, columns in stream(run)``.
 
-    See :class:`haploop.logger.log_stream.LogStream`, imported when first used.
+    See :class:`haploop.logger.log.stream.LogStream`, imported when first used.
     """
-    from haploop.logger.log_stream import LogStream
+    from haploop.logger.log.stream import LogStream
 
     return LogStream(path, topics, columns)

@@ -9,13 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from haploop.logger.books import Books
-from haploop.logger.channels import Channels
-from haploop.logger.motion_columns import motion_columns
+from haploop.logger.books.books import Books
+from haploop.logger.books.buffers import ControllerTape, PlantTape
+from haploop.logger.log.channels import Channels
+from haploop.logger.log.columns import motion_columns
 from haploop.logger.summary import summary
-from haploop.logger.tapes import ControllerTape, PlantTape
-from haploop.logger.window import Window
-from haploop.plant.tally import TALLIES
+from haploop.logger.verdict.window import Window
+from haploop.plant.counters import TALLIES
 from haploop.protocol.ticks import Timebase
 
 Block = dict[str, Any]

@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 import zmq
 
-from haploop.logger.keeper import Keeper, open_keeper
-from haploop.logger.log_error import LogError
-from haploop.logger.tapes import TelemetryGap
+from haploop.logger.books.buffers import TelemetryGap
+from haploop.logger.log.error import LogError
+from haploop.logger.session import Keeper, open_keeper
 from haploop.protocol.member import REPORT_MS, Aborted, Member
 from haploop.protocol.node import NodeError, run_node
 from haploop.protocol.processes import PROCESSES

@@ -10,8 +10,8 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from haploop.logger.books import Books
-from haploop.logger.verdict import Shown
+from haploop.logger.books.books import Books
+from haploop.logger.verdict.verdict import Shown
 
 # Entries that differ between two runs of the same scene.
 OF_THE_MACHINE = ("wall_s", "real_time_factor", "versions")

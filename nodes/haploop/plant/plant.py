@@ -6,11 +6,11 @@ import math
 from collections.abc import Callable
 from typing import Any
 
-from haploop.plant.command_line import Hold, line_of
-from haploop.plant.linear_motion import LinearMotion
-from haploop.plant.motion import motion_of
-from haploop.plant.retimed_line import RetimedLine
-from haploop.plant.sensors import accelerometer, accelerometer_is_used, position_sensor
+from haploop.plant.choose import motion_of
+from haploop.plant.line.delay import Hold, line_of
+from haploop.plant.line.retimed import RetimedLine
+from haploop.plant.motion.one_mass import LinearMotion
+from haploop.plant.sensing.encoder import accelerometer, accelerometer_is_used, position_sensor
 from haploop.protocol.ticks import DELAY, Timebase
 
 # From the first tick and its samples to the commands that answer them.

@@ -6,14 +6,14 @@ import asyncio
 import time as wall_clock
 from typing import Any
 
-from haploop.logger.log_error import LogError
+from haploop.logger.log.error import LogError
 from haploop.protocol.member import Aborted, Refused
-from haploop.view.clock_answers import ClockAnswers
-from haploop.view.event_lines import event_lines
-from haploop.view.followed import Followed
-from haploop.view.past import Past
-from haploop.view.runs import Run, Runs
-from haploop.view.state import WAITING, state
+from haploop.view.draw.state import WAITING, state
+from haploop.view.receive.backfill import Past
+from haploop.view.receive.clock_answers import ClockAnswers
+from haploop.view.receive.event_lines import event_lines
+from haploop.view.receive.run_session import Followed
+from haploop.view.receive.runs import Run, Runs
 
 # Turns a second: so often is telemetry taken in and shown.
 TURNS_HZ = 31.5

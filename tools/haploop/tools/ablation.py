@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from haploop.launch.plan import effects_of
+from haploop.launch.plan.plan import effects_of
 from haploop.tools.operations import without
 
 WHOLE, AGAIN, NONE = "all effects", "all effects again", "no effect"

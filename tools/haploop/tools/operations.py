@@ -15,9 +15,9 @@ from types import FrameType
 from typing import TYPE_CHECKING, Any
 
 from haploop.controller.controller import Controller
-from haploop.launch.plan import multiplications
+from haploop.launch.plan.effects import Effect
+from haploop.launch.plan.plan import multiplications
 from haploop.plant.plant import Plant
-from haploop.protocol.effects import Effect
 from haploop.protocol.ticks import Timebase
 
 if TYPE_CHECKING:

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from haploop.plant.chain import Chain
-from haploop.plant.chain_history import ChainHistory, Interval
-from haploop.plant.command_line import Hold
+from haploop.plant.chain.chain import Chain
+from haploop.plant.chain.history import ChainHistory, Interval
+from haploop.plant.line.delay import Hold
 from haploop.protocol.ticks import Timebase
 
 Rates = Callable[[float, np.ndarray], np.ndarray]

@@ -8,9 +8,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from haploop.plant.chain_history import HELD, Interval
-from haploop.plant.friction import Friction
-from haploop.plant.friction_mode import Mode
+from haploop.plant.chain.history import HELD, Interval
+from haploop.plant.friction.law import Friction
+from haploop.plant.friction.stick_slip import Mode
 from haploop.plant.integrators.dop853 import Dop853Motion, Rates, System
 from haploop.protocol.ticks import Timebase
 

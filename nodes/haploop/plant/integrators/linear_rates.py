@@ -6,7 +6,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from haploop.plant.chain import Chain
+from haploop.plant.chain.chain import Chain
 
 # One row for every state: a number, or an array of numbers.
 Rows = list[Any]

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from haploop.plant.chain import Chain
+from haploop.plant.chain.chain import Chain
 from haploop.plant.integrators.linear_rates import LinearRates, OneStep, one_step_matrix, response_to
 
 

@@ -8,19 +8,19 @@ from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
 from haploop.tools.advise.buzz import STEPS_BEYOND, Buzz, Without, why
-from haploop.tools.advise.gains import Gains, Search
-from haploop.tools.advise.largest import Limit
-from haploop.tools.advise.margins import Margins, Safe
-from haploop.tools.advise.tasks import Tasks, tasks, with_wall
-from haploop.tools.advise.variations import DELAY, SHARE, delay_s, quantities
-from haploop.tools.advise.words import buzz_sentences, gain_sentences
+from haploop.tools.advise.limits.gains import Gains, Search
+from haploop.tools.advise.limits.largest import Limit
+from haploop.tools.advise.limits.margins import Margins, Safe
+from haploop.tools.advise.limits.tasks import Tasks, tasks, with_wall
+from haploop.tools.advise.limits.variations import DELAY, SHARE, delay_s, quantities
+from haploop.tools.advise.sentences import buzz_sentences, gain_sentences
 from haploop.tools.linear.bounds import Bound, bounds_of
 from haploop.tools.linear.linearity import is_linear
 from haploop.tools.linear.one_tick import NeverStable, OneTickMap
 
 if TYPE_CHECKING:
     from haploop.controller.dissipation import Element
-    from haploop.tools.advise.steady import Judge
+    from haploop.tools.advise.limits.steady import Judge
     from haploop.tools.advise.subject import Subject
 
 Scene = dict[str, Any]

@@ -9,11 +9,11 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from haploop.tools.advise.effects_off import Cause, causes, freed
-from haploop.tools.advise.largest import LEAST_N_M, Limit, Loops, largest
-from haploop.tools.advise.pace import WIDE, way
+from haploop.tools.advise.limits.largest import LEAST_N_M, Limit, Loops, largest
+from haploop.tools.advise.limits.pace import WIDE, way
 
 if TYPE_CHECKING:
-    from haploop.tools.advise.steady import Judge
+    from haploop.tools.advise.limits.steady import Judge
 
 Scene = dict[str, Any]
 # A wall beyond the largest that is steady buzzes, or the next one does where this one stands on an island.

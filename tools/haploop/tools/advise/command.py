@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from haploop.tools.ending import FAILED, WRONG_USE, leave, plain_errors, print_json
-from haploop.tools.scenes import kinds_with, print_notes
+from haploop.tools.cli.exit_codes import FAILED, WRONG_USE, leave, plain_errors, print_json
+from haploop.tools.cli.scenes import kinds_with, print_notes
 
 if TYPE_CHECKING:
     from haploop.tools.advise.advice import Advice
@@ -45,10 +45,10 @@ class Request:
 
 def advise(request: Request, as_json: bool) -> None:
     """Search, write what was found into the directory, print it."""
-    from haploop.launch.elements import elements_of, try_out
     from haploop.launch.output import make_output
+    from haploop.launch.scene.elements import elements_of, try_out
     from haploop.tools.advise.advice import advice
-    from haploop.tools.advise.steady import Judge
+    from haploop.tools.advise.limits.steady import Judge
     from haploop.tools.advise.subject import WrongAsk, subject
 
     if request.workers is not None and request.workers < 1:
@@ -74,7 +74,7 @@ def advise(request: Request, as_json: bool) -> None:
         print_json(data)
     else:
         from haploop.tools.advise.screen import report
-        from haploop.tools.report import console
+        from haploop.tools.render.report import console
 
         console().print(report(found))
     for path in data["files"].values():
@@ -83,7 +83,7 @@ def advise(request: Request, as_json: bool) -> None:
 
 def _written(found: Advice, out: Path) -> dict:
     """Write scene, figure and data; returns the data with the files in it."""
-    from haploop.launch.resolved import to_toml
+    from haploop.launch.scene.toml_writer import to_toml
     from haploop.logger.summary import finite
     from haploop.tools.advise.advice import as_data
     from haploop.tools.advise.chart import draw
@@ -110,7 +110,7 @@ def _progress() -> Iterator[tuple[Callable[[str], None], Callable[[int], None]]]
     """A bar of the stages on a terminal, with the runs so far; a line a stage elsewhere."""
     from rich import progress
 
-    from haploop.tools.report import console
+    from haploop.tools.render.report import console
 
     screen = console(stderr=True)
     columns = (

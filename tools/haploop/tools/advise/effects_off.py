@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any
 
-from haploop.plant.sensors import accelerometer_is_used
+from haploop.plant.sensing.encoder import accelerometer_is_used
 
 Scene = dict[str, Any]
 SAMPLING = "sampling and hold"

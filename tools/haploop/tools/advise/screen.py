@@ -9,16 +9,16 @@ from rich.console import Group
 from rich.table import Table
 from rich.text import Text
 
-from haploop.tools.advise.words import buzz_sentences, gain_sentences, largest, share, stiff
-from haploop.tools.amounts import amount
+from haploop.tools.advise.sentences import buzz_sentences, gain_sentences, largest, share, stiff
+from haploop.tools.render.amounts import amount
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
     from haploop.tools.advise.advice import Advice
     from haploop.tools.advise.buzz import Buzz
-    from haploop.tools.advise.gains import Gains
-    from haploop.tools.advise.largest import Limit
+    from haploop.tools.advise.limits.gains import Gains
+    from haploop.tools.advise.limits.largest import Limit
     from haploop.tools.linear.bounds import Bound
 
 _LONGEST_WORD = len("unidirectional")
@@ -126,7 +126,7 @@ def why_table(buzz: Buzz) -> RenderableType:
 
 
 def _verdict(steady: bool, verdict: str) -> Text:
-    from haploop.tools.report import VERDICT_STYLES
+    from haploop.tools.render.report import VERDICT_STYLES
 
     word = "dies away" if steady and verdict != "steady" else verdict
     return Text(word, style=VERDICT_STYLES.get("steady" if steady else verdict, "bold"))

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from haploop.launch.layers import Layers, read_layers
-from haploop.launch.mistakes import nearest
-from haploop.launch.scene_file import resolved
-from haploop.tools.advise.tasks import MOST_DELAY_S
+from haploop.launch.scene.file import resolved
+from haploop.launch.scene.layers import Layers, read_layers
+from haploop.launch.scene.mistakes import nearest
+from haploop.tools.advise.limits.tasks import MOST_DELAY_S
 from haploop.tools.cost.grid import scenes_folder
 
 if TYPE_CHECKING:
@@ -87,9 +87,9 @@ def subject(
 
 def settled(scene: dict[str, Any]) -> dict[str, Any]:
     """The scene with its swaps and sets done from the start, and without events."""
-    from haploop.launch.layers import Layers
-    from haploop.launch.overrides import lay_overrides
-    from haploop.launch.resolved import inline
+    from haploop.launch.scene.layers import Layers
+    from haploop.launch.scene.overrides import lay_overrides
+    from haploop.launch.scene.toml_writer import inline
 
     layers = Layers(Path(scene["title"]), {key: value for key, value in scene.items() if key != "event"})
     elements = list(scene.get("dissipation", []))

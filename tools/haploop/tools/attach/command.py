@@ -5,7 +5,7 @@ from __future__ import annotations
 import signal
 from pathlib import Path
 
-from haploop.tools.ending import WRONG_USE, leave, plain_errors
+from haploop.tools.cli.exit_codes import WRONG_USE, leave, plain_errors
 
 TARGETS = ("logger", "print", "plotjuggler")
 

@@ -8,8 +8,8 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, Self
 
-from haploop.launch import run_directory
-from haploop.launch.run_directory import LiveRun, RunNotFound
+from haploop.launch.processes import run_directory
+from haploop.launch.processes.run_directory import LiveRun, RunNotFound
 from haploop.protocol.member import Aborted, Refused
 from haploop.protocol.observer import Observer
 from haploop.protocol.processes import PROCESSES

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from haploop.tools.amounts import amount, fixed
 from haploop.tools.attach.watched import Watched
-from haploop.tools.event_words import event_words
-from haploop.tools.report import VERDICT_STYLES
+from haploop.tools.render.amounts import amount, fixed
+from haploop.tools.render.event_words import event_words
+from haploop.tools.render.report import VERDICT_STYLES
 
 if TYPE_CHECKING:
     from rich.console import RenderableType

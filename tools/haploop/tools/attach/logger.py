@@ -6,17 +6,17 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from haploop.launch import run_directory
-from haploop.launch.interrupts import interrupts
 from haploop.launch.output import make_output, write_scene
-from haploop.launch.run_directory import LiveRun
+from haploop.launch.processes import run_directory
+from haploop.launch.processes.interrupts import interrupts
+from haploop.launch.processes.run_directory import LiveRun
+from haploop.logger.books.buffers import TelemetryGap
 from haploop.logger.node import LoggerNode
-from haploop.logger.tapes import TelemetryGap
 from haploop.protocol.member import Aborted, Member, Refused
 from haploop.protocol.processes import OBSERVER
 from haploop.protocol.transport import Wires
-from haploop.tools.ending import FAILED, WRONG_USE, leave
-from haploop.tools.report import print_summary
+from haploop.tools.cli.exit_codes import FAILED, WRONG_USE, leave
+from haploop.tools.render.report import print_summary
 
 
 def attach_logger(run_id: str | None, out: Path | None) -> None:

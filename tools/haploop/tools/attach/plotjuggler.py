@@ -19,7 +19,7 @@ import numpy as np
 import zmq
 from numpy.typing import NDArray
 
-from haploop.logger.msgpack_table import Floats, TableLayout
+from haploop.logger.log.table import Floats, TableLayout
 from haploop.protocol.sockets import has_message, open_socket
 
 # Where PlotJuggler looks unless told otherwise.

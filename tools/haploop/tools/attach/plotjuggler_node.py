@@ -5,16 +5,16 @@ from __future__ import annotations
 import sys
 from typing import Any
 
-from haploop.launch.run_directory import LiveRun, RunNotFound
-from haploop.logger.channels import Channels
-from haploop.logger.motion_columns import motion_columns
-from haploop.logger.tapes import as_float64
+from haploop.launch.processes.run_directory import LiveRun, RunNotFound
+from haploop.logger.books.buffers import as_float64
+from haploop.logger.log.channels import Channels
+from haploop.logger.log.columns import motion_columns
 from haploop.protocol.member import Refused
 from haploop.protocol.ticks import Timebase
 from haploop.protocol.wire import Frame
 from haploop.tools.attach.following import Following, runs_to_come
 from haploop.tools.attach.plotjuggler import Batches, Outlet, PortTaken
-from haploop.tools.ending import WRONG_USE, leave
+from haploop.tools.cli.exit_codes import WRONG_USE, leave
 
 ROLE = "plotjuggler"
 # How much wall time goes into one message of each topic.

@@ -7,14 +7,14 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 
-from haploop.launch import run_directory
+from haploop.launch.processes import run_directory
 from haploop.protocol.member import Refused
 from haploop.tools.attach.following import Following, summary_of
 from haploop.tools.attach.live_table import ending, live_line, live_table
 from haploop.tools.attach.watched import Watched
-from haploop.tools.ending import FAILED, WRONG_USE, leave
-from haploop.tools.event_words import event_words
-from haploop.tools.report import console
+from haploop.tools.cli.exit_codes import FAILED, WRONG_USE, leave
+from haploop.tools.render.event_words import event_words
+from haploop.tools.render.report import console
 
 ROLE = "print"
 # How often the table is drawn anew, and a line printed into a pipe, in wall time.

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from haploop.tools.amounts import amount, fixed
 from haploop.tools.cost.data import Point, SceneCost, Spread
+from haploop.tools.render.amounts import amount, fixed
 
 
 def cheapest(scene: SceneCost, tolerance_m: float) -> Point | None:

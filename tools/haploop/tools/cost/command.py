@@ -9,9 +9,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from haploop.launch.mistakes import nearest
-from haploop.tools.ending import FAILED, WRONG_USE, leave, plain_errors, print_json
-from haploop.tools.stages import bars
+from haploop.launch.scene.mistakes import nearest
+from haploop.tools.cli.exit_codes import FAILED, WRONG_USE, leave, plain_errors, print_json
+from haploop.tools.render.stages import bars
 
 if TYPE_CHECKING:
     from haploop.tools.cost.data import Cost
@@ -87,8 +87,8 @@ def _measured(measurement: Measurement, with_prices: bool) -> bool:
 def _show(result: Cost, out: Path, as_json: bool) -> None:
     """Tables and advice, or JSON, on stdout; the files on stderr."""
     from haploop.tools.cost.data import COST_FILE
-    from haploop.tools.cost.report import report
-    from haploop.tools.report import console
+    from haploop.tools.cost.draw.report import report
+    from haploop.tools.render.report import console
 
     if as_json:
         print_json(dataclasses.asdict(result))
@@ -100,7 +100,8 @@ def _show(result: Cost, out: Path, as_json: bool) -> None:
 
 def _drawn(result: Cost, out: Path) -> list[Path]:
     """Draw the figures and return their files; where that cannot be done, say so."""
-    from haploop.tools.cost import figure, prices_figure
+    from haploop.tools.cost.draw import figure
+    from haploop.tools.cost.prices import figure as prices_figure
     from haploop.tools.figure.data import FigureError
 
     try:

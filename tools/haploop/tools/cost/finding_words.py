@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from haploop.tools.amounts import amount, fixed
 from haploop.tools.cost.advice import rate
 from haploop.tools.cost.data import Point, SceneCost
+from haploop.tools.render.amounts import amount, fixed
 
 
 @dataclass(frozen=True)

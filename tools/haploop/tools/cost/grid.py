@@ -9,9 +9,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, get_args
 
-from haploop.launch.mistakes import COMMAND_LINE, SceneError
-from haploop.launch.scene import Integrator
-from haploop.launch.scene_file import load
+from haploop.launch.scene.file import load
+from haploop.launch.scene.mistakes import COMMAND_LINE, SceneError
+from haploop.launch.scene.tables.scene import Integrator
 
 METHODS: tuple[str, ...] = get_args(Integrator)
 RATES = (1_000, 2_000, 5_000, 10_000, 20_000, 50_000, 100_000)

@@ -14,12 +14,12 @@ from haploop.tools.cost.advice import advice
 from haploop.tools.cost.data import Cost, Errors, Load, Point, ReferenceNote, SceneCost, Spread
 from haploop.tools.cost.grid import Candidate, Grid, digest, scenes_folder
 from haploop.tools.cost.points import Outcome, outcome
-from haploop.tools.cost.price_data import as_data
-from haploop.tools.cost.prices import Prices
+from haploop.tools.cost.prices.data import as_data
+from haploop.tools.cost.prices.prices import Prices
 from haploop.tools.cost.store import Store
 from haploop.tools.cost.times import IN_PROCESS, PROCESSES, Job
 from haploop.tools.machine import commit, machine, source_digest, versions
-from haploop.tools.stages import Stage
+from haploop.tools.render.stages import Stage
 
 if TYPE_CHECKING:
     from haploop.tools.reference.nearest import Reference

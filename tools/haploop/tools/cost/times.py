@@ -20,10 +20,10 @@ from typing import Any, Protocol, TypeVar
 import numpy as np
 
 from haploop.controller.dissipation import ElementError, registry
-from haploop.launch.failure import RunFailed
-from haploop.launch.in_process import Loop, scene_events
-from haploop.launch.start import prepare, run
-from haploop.logger.keeper import open_keeper
+from haploop.launch.errors import RunFailed
+from haploop.launch.runs.in_process import Loop, scene_events
+from haploop.launch.runs.start import prepare, run
+from haploop.logger.session import open_keeper
 from haploop.protocol.ticks import Timebase
 from haploop.tools.cost.data import Load
 from haploop.tools.cost.grid import Candidate

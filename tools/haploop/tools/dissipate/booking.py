@@ -11,10 +11,10 @@ import numpy as np
 
 from haploop.controller.controller import Controller
 from haploop.controller.dissipation import ElementError
-from haploop.controller.estimators import Estimator, Sample
-from haploop.logger.flows import sampled_flow
-from haploop.logger.sums import RunningSums
-from haploop.logger.tapes import as_float64
+from haploop.controller.estimators.choose import Estimator, Sample
+from haploop.logger.books.buffers import as_float64
+from haploop.logger.books.sums import RunningSums
+from haploop.logger.books.work import sampled_flow
 from haploop.protocol.ticks import Timebase
 from haploop.tools.dissipate.samples import Floats, Samples
 

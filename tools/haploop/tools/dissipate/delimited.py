@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from haploop.launch.mistakes import nearest
+from haploop.launch.scene.mistakes import nearest
 from haploop.tools.dissipate.samples import Floats, RecordingError
 
 _BLOCK_ROWS = 16_384

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from haploop.tools.amounts import prefix_for
 from haploop.tools.dissipate.outcome import Outcome, in_words
 from haploop.tools.dissipate.report import answer, row_of
 from haploop.tools.dissipate.samples import Floats
@@ -28,6 +27,7 @@ from haploop.tools.figure.style import (
     few_ticks,
     legend,
 )
+from haploop.tools.render.amounts import prefix_for
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

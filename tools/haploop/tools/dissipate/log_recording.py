@@ -9,8 +9,8 @@ from typing import Any, cast
 
 import numpy as np
 
-from haploop.logger.log_stream import Batch, LogStream
-from haploop.logger.recording import Table
+from haploop.logger.log.recording import Table
+from haploop.logger.log.stream import Batch, LogStream
 from haploop.protocol.ticks import DELAY, Timebase, TimebaseError
 from haploop.tools.dissipate.samples import Floats, Notes, RecordingError, Samples
 

@@ -6,10 +6,10 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
-from haploop.tools.amounts import amount
 from haploop.tools.dissipate.booking import Booking
 from haploop.tools.dissipate.course import Course
 from haploop.tools.dissipate.samples import Notes, Recording
+from haploop.tools.render.amounts import amount
 
 if TYPE_CHECKING:
     from haploop.controller.dissipation import Element

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from haploop.tools.amounts import amount, fixed
 from haploop.tools.dissipate.outcome import ElementOutcome, Outcome, in_words
+from haploop.tools.render.amounts import amount, fixed
 
 if TYPE_CHECKING:
     from rich.console import RenderableType

@@ -8,12 +8,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from haploop.launch.layers import Layers
-from haploop.launch.overrides import key_path
-from haploop.launch.scene_file import resolved
-from haploop.plant.sensors import accelerometer_is_used
+from haploop.launch.scene.file import resolved
+from haploop.launch.scene.layers import Layers
+from haploop.launch.scene.overrides import key_path
+from haploop.plant.sensing.encoder import accelerometer_is_used
+from haploop.tools.cli.live import assignments
 from haploop.tools.dissipate.samples import RecordingError
-from haploop.tools.live import assignments
 
 if TYPE_CHECKING:
     from haploop.controller.dissipation import Element

@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 from urllib.parse import quote
 
-from haploop.tools.ending import FAILED, WRONG_USE, leave, plain_errors
+from haploop.tools.cli.exit_codes import FAILED, WRONG_USE, leave, plain_errors
 
 if TYPE_CHECKING:
-    from haploop.logger.log_stream import LogStream
+    from haploop.logger.log.stream import LogStream
     from haploop.tools.export.writer import ExportWriter
 
 FORMATS = ("csv", "npz", "parquet", "json-mcap")
@@ -20,7 +20,7 @@ FORMATS = ("csv", "npz", "parquet", "json-mcap")
 
 def export_run(path: Path, to: str, out: Path | None, topics: str | None, force: bool) -> None:
     """Write a run's log in another format and name the files."""
-    from haploop.logger.log_stream import survey
+    from haploop.logger.log.stream import survey
     from haploop.tools.export.files import ExportFailed
 
     with plain_errors():
@@ -87,7 +87,7 @@ def _export(
     force: bool,
 ) -> None:
     """Go through the log a second time, now that all its columns are known, and write it."""
-    from haploop.logger.log_stream import LogStream
+    from haploop.logger.log.stream import LogStream
     from haploop.tools.export.files import new_files
 
     log = LogStream(contents.path, units.keys(), until=contents.read_bytes)
@@ -107,7 +107,7 @@ def _progress(total_bytes: int) -> Iterator[Callable[[int], None]]:
     """A bar on a terminal, fed with how much of the log is done; nothing elsewhere."""
     from rich.progress import Progress
 
-    from haploop.tools.report import console
+    from haploop.tools.render.report import console
 
     shown = console(stderr=True)
     with Progress(console=shown, transient=True, disable=not shown.is_terminal) as bar:

@@ -14,8 +14,8 @@ from typing import IO
 
 import numpy as np
 
-from haploop.logger.log_stream import Batch
-from haploop.logger.msgpack_table import Floats
+from haploop.logger.log.stream import Batch
+from haploop.logger.log.table import Floats
 from haploop.tools.export.writer import MAP_UNITS, ExportWriter, Units, column, map_rows
 
 

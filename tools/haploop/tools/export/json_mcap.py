@@ -14,8 +14,8 @@ from typing import IO, Any
 import numpy as np
 from mcap.writer import CompressionType, Writer
 
-from haploop.logger.log_stream import Batch
-from haploop.logger.recording import TIMESTAMP, Table
+from haploop.logger.log.recording import TIMESTAMP, Table
+from haploop.logger.log.stream import Batch
 from haploop.tools.export.writer import ExportWriter, Units, to_json
 
 # What every event has; a schema without any properties would not be read.

@@ -17,7 +17,7 @@ from typing import IO
 
 from numpy.lib import format as npy
 
-from haploop.logger.log_stream import Batch
+from haploop.logger.log.stream import Batch
 from haploop.tools.export.writer import ExportWriter, Units, column, to_json
 
 

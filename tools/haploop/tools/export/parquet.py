@@ -13,7 +13,7 @@ from typing import IO, Any
 
 import numpy as np
 
-from haploop.logger.log_stream import Batch
+from haploop.logger.log.stream import Batch
 from haploop.tools.export.writer import MAP_UNITS, MESSAGE, ExportWriter, Units, column, map_rows
 
 try:

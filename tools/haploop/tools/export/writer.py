@@ -9,9 +9,9 @@ from typing import IO, Any, ClassVar, Self
 
 import numpy as np
 
-from haploop.logger.log_stream import Batch
-from haploop.logger.msgpack_table import Floats
-from haploop.logger.recording import TIMESTAMP, Table
+from haploop.logger.log.recording import TIMESTAMP, Table
+from haploop.logger.log.stream import Batch
+from haploop.logger.log.table import Floats
 from haploop.logger.summary import finite
 
 Units = Mapping[str, Mapping[str, str]]

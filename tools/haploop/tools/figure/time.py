@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from haploop.tools.amounts import prefix_for
 from haploop.tools.figure.data import Book, Floats, RunData
 from haploop.tools.figure.envelope import extremes
 from haploop.tools.figure.style import (
@@ -21,6 +20,7 @@ from haploop.tools.figure.style import (
     element_colour,
     legend,
 )
+from haploop.tools.render.amounts import prefix_for
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

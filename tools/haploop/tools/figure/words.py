@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from haploop.tools.amounts import amount, parameters, spring
-from haploop.tools.event_words import event_words
 from haploop.tools.figure.data import Book, RunData
 from haploop.tools.figure.style import GREY, INK, LARGE, SMALL, TEXT, VERDICTS
-from haploop.tools.plant_words import counts, plant_books
+from haploop.tools.render.amounts import amount, parameters, spring
+from haploop.tools.render.event_words import event_words
+from haploop.tools.render.plant_words import counts, plant_books
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -7,8 +7,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
-from haploop.plant.mechanics import Mechanics
-from haploop.plant.sensors import accelerometer_is_used
+from haploop.plant.motion.mechanics import Mechanics
+from haploop.plant.sensing.encoder import accelerometer_is_used
 from haploop.tools.linear.linearity import Kinds, why_not_linear
 
 Scene = dict[str, Any]

@@ -6,9 +6,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from haploop.controller.controller_array import ControllerArray
-from haploop.launch.array_state import replace_arrays
-from haploop.plant.sensors import accelerometer_is_used
+from haploop.controller.controller_batch import ControllerArray
+from haploop.launch.batch.object_state import replace_arrays
+from haploop.plant.sensing.encoder import accelerometer_is_used
 from haploop.protocol.ticks import Timebase
 from haploop.tools.linear.linearity import Kinds
 

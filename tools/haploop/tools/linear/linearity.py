@@ -7,7 +7,7 @@ from functools import cache
 from typing import TYPE_CHECKING, Any
 
 from haploop.controller.dissipation import registry
-from haploop.plant.motion import integrator_of
+from haploop.plant.choose import integrator_of
 
 if TYPE_CHECKING:
     from haploop.controller.dissipation import Element

@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from haploop.plant.chain import Chain, sensor_body
-from haploop.plant.chain_flow import ChainFlow
-from haploop.plant.sensors import accelerometer_is_used
+from haploop.plant.chain.chain import Chain, sensor_body
+from haploop.plant.chain.transition import ChainFlow
+from haploop.plant.sensing.encoder import accelerometer_is_used
 from haploop.protocol.ticks import Timebase
 from haploop.tools.linear.controller import LinearController
 from haploop.tools.linear.linearity import Kinds, installed_kinds, why_not_linear

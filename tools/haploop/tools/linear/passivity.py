@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from haploop.plant.chain import Chain
+from haploop.plant.chain.chain import Chain
 from haploop.tools.linear.controller import LinearController
 from haploop.tools.linear.linearity import Kinds, installed_kinds
 

@@ -7,10 +7,10 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from haploop.controller.kalman import assumed_noises
-from haploop.launch.in_process import run_in_process
-from haploop.logger.window_look import WINDOW_S
-from haploop.plant.chain import Chain
+from haploop.controller.estimators.kalman import assumed_noises
+from haploop.launch.runs.in_process import run_in_process
+from haploop.logger.verdict.measures import WINDOW_S
+from haploop.plant.chain.chain import Chain
 from haploop.tools.linear.one_tick import OneTickMap
 
 if TYPE_CHECKING:

@@ -13,9 +13,9 @@ import numpy as np
 
 from haploop.controller.controller import Controller
 from haploop.controller.dissipation import registry
-from haploop.logger.window import CONTROLLER_COLUMNS, Window
-from haploop.plant.command_line import line_of
-from haploop.plant.sensors import accelerometer, accelerometer_is_used, position_sensor
+from haploop.logger.verdict.window import CONTROLLER_COLUMNS, Window
+from haploop.plant.line.delay import line_of
+from haploop.plant.sensing.encoder import accelerometer, accelerometer_is_used, position_sensor
 from haploop.protocol.ticks import Timebase
 
 

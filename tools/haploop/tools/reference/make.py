@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from mpmath import mp, mpf
 
-from haploop.launch.scene_file import load
+from haploop.launch.scene.file import load
 from haploop.tools.reference.check import IntegratedPlant
 from haploop.tools.reference.loop import Closed, close_loop
 from haploop.tools.reference.nearest import (
@@ -94,7 +94,7 @@ def main(names: list[str]) -> None:
     """Make some references, or all, and show how far it is."""
     from rich.progress import Progress
 
-    from haploop.tools.report import console
+    from haploop.tools.render.report import console
 
     paths = [SCENES / f"{name}.toml" for name in names] or sorted(SCENES.glob("*.toml"))
     REFERENCES.mkdir(exist_ok=True)

@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from haploop.logger.verdict import SMALLEST_SWING_M
-from haploop.logger.window_look import WINDOW_S
+from haploop.logger.verdict.measures import WINDOW_S
+from haploop.logger.verdict.verdict import SMALLEST_SWING_M
 from haploop.tools.trajectory import trajectory
 
 REFERENCES = Path(__file__).parent / "stored"

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from haploop.tools.sweep.columns import CELL, SCENE, pyarrow
+from haploop.tools.sweep.run.columns import CELL, SCENE, pyarrow
 
 SWEEP, TABLE, BOUNDARY, PARTS = "sweep.toml", "table.parquet", "boundary.parquet", "parts"
 

@@ -1,0 +1,195 @@
+"""Many loops of one structure, tick by tick together."""
+
+from __future__ import annotations
+
+import gc
+from collections import deque
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from haploop.controller.controller_batch import ControllerArray
+from haploop.launch.batch.object_state import keep
+from haploop.launch.batch.stacking import stacked
+from haploop.launch.runs.in_process import scene_events
+from haploop.logger.batch import End, LoggerArray
+from haploop.plant.choose_batch import motion_of
+from haploop.plant.line.delay import line_of
+from haploop.plant.plant import beyond
+from haploop.plant.sensing.encoder import accelerometer, accelerometer_is_used, position_sensor
+from haploop.protocol.ticks import Timebase
+
+if TYPE_CHECKING:
+    from haploop.controller.dissipation import Element
+
+# A column of a block holds about so many numbers: what is worked on at a time then stays in the cache.
+BLOCK = 32_768
+# An operand that is the same for all loops, or for all steps of a tick, is copied into buffers of NumPy's unless these
+# are shorter than a row of loops; that triples the time such an operation takes.
+_BUFFER = 512
+# Loops that have ended are computed on, unheeded, until they are more than this share; not with friction, which might
+# switch in them for ever.
+_UNHEEDED = 0.25
+
+
+class LoopArray:
+    """The loops of scenes of one structure, each a place in arrays: sensor, line, motion, controller and books.
+
+    The code that computes is that of a single loop, on arrays. What decides for a single loop when it ends is written
+    here for many. A loop that diverged has its results and leaves the arrays; one whose numbers cease to be finite
+    leaves them without.
+
+    Args:
+        scenes: resolved scenes for which ``runs_in_arrays`` holds and ``structure`` is the same.
+        kinds: element kinds at hand.
+        energy: whether to keep energy books.
+        trajectories: whether to hash the trajectories.
+
+    Attributes:
+        results: what came of each scene, in their order; None while it runs, or where it has to be run alone.
+    """
+
+    def __init__(
+        self,
+        scenes: Sequence[dict[str, Any]],
+        kinds: dict[str, type[Element]],
+        *,
+        energy: bool = True,
+        trajectories: bool = False,
+    ) -> None:
+        self._scenes, scene = scenes, stacked(scenes)
+        self._time = time = Timebase.of(scene["clock"], scene["duration"])
+        self._motion, self._line = motion_of(scene, time), line_of(scene, time)
+        self._quantise, self._sensor = position_sensor(scene, time), accelerometer(scene, time)
+        self._feels = accelerometer_is_used(scene)
+        self._controller = ControllerArray(scene, time, kinds)
+        self._logger = LoggerArray(scene, time, energy=energy, trajectories=trajectories)
+        self._take = self._motion.take_record if energy or trajectories else self._motion.take_positions
+        self._in_flight: deque[Any] = deque(maxlen=time.lookahead_ticks + 1)
+        self._limit_m, self._usual_buffer = scene["diverged_beyond"], np.getbufsize()
+        self._scene_of = np.arange(len(scenes))
+        self._ended = np.zeros(len(scenes), bool)
+        self._unheeded = 0.0 if "friction" in scene else _UNHEEDED
+        self._schedule(scene)
+        self.results: list[dict[str, Any] | None] = [None] * len(scenes)
+
+    def _schedule(self, scene: dict[str, Any]) -> None:
+        self._end, self._changes = self._time.ticks, set[int]()
+        for tick, event in scene_events(scene, self._time):
+            if "swap" in event or "set" in event:
+                self._controller.schedule(tick, event)
+                self._changes.add(tick)
+            elif event.get("stop"):
+                self._end = min(self._end, tick)
+
+    def run(self) -> None:
+        """Run all loops to their ends."""
+        _keep_freed_memory()
+        with np.errstate(all="ignore"):  # loops that have ended may come to anything
+            np.setbufsize(_BUFFER)
+            for tick in range(self._end):
+                if tick in self._changes:
+                    self._book()
+                self._work(tick)
+                self._look_for_ends(tick)
+                if self._ended.all() or self._was_refused():
+                    return
+            self._book()
+            if self._end:
+                whole = self._end == self._time.ticks
+                self._finish(np.flatnonzero(~self._ended), "done" if whole else "stopped")
+
+    def _was_refused(self) -> bool:
+        """Whether a change could not be made; for all it cannot be known that it could be for some."""
+        if self._controller.recorder.refused:
+            self.results = [None] * len(self.results)
+            return True
+        return False
+
+    def _work(self, tick: int) -> None:
+        motion, x_m = self._motion, self._quantise(self._motion.x)
+        sample = (x_m, self._felt(tick)) if self._feels else (x_m,)
+        forces = self._controller.answer([sample])
+        self._line.receive(forces)
+        self._in_flight += forces
+        motion.advance(tick, self._line.holds(tick))
+        waiting = tick + 1 - self._logger.tick
+        if waiting * self._time.steps_per_tick * len(self._ended) >= BLOCK:
+            self._book()
+
+    def _felt(self, tick: int) -> Any:
+        acceleration = self._motion.acceleration(tick)
+        return self._sensor.reading(acceleration) if self._sensor else acceleration
+
+    def _book(self) -> None:
+        rows = self._controller.recorder.take_rows()
+        if rows:
+            self._logger.book(self._take(self._logger.tick), rows, self._controller.into_wall)
+
+    def _look_for_ends(self, tick: int) -> None:
+        inside = np.abs(self._motion.x) <= self._limit_m
+        if (inside | self._ended).all():
+            return
+        self._book()
+        ends = np.flatnonzero(~inside & ~self._ended)
+        x, limit_m = self._motion.x[ends].tolist(), np.broadcast_to(self._limit_m, inside.shape)[ends].tolist()
+        reasons = [f"{beyond(*where)}, at tick {tick + 1}" for where in zip(x, limit_m, strict=True)]
+        self._finish(ends, "diverged", reasons)
+        self._ended[ends] = True
+        if np.count_nonzero(self._ended) > self._unheeded * len(self._ended):
+            self._drop_ended()
+
+    def _finish(self, places: np.ndarray, ended: str, reasons: list[str] | None = None) -> None:
+        """Take the results of loops that end here; one whose numbers are not all finite has none."""
+        x, v, sound = self._motion.x, self._motion.v, np.isfinite(self._motion.x)
+        for force in self._in_flight:
+            sound = sound & np.isfinite(force)
+        ends: dict[int, End] = {}
+        for place, reason in zip(places.tolist(), reasons or [None] * len(places), strict=True):
+            if sound[place]:
+                index = int(self._scene_of[place])
+                ends[index] = End(place, self._scenes[index], float(x[place]), float(v[place]), reason)
+        counted = dict.fromkeys(self._line.tallies, getattr(self._line, "saturated", 0))
+        if self._sensor:
+            counted |= dict.fromkeys(self._sensor.tallies, getattr(self._sensor, "clipped", 0))
+        with _collector_at_rest(), _buffers_of(self._usual_buffer):
+            outcomes = self._logger.outcomes(list(ends.values()), ended, counted)
+            for index, outcome in zip(ends, outcomes, strict=True):
+                self.results[index] = outcome
+
+    def _drop_ended(self) -> None:
+        on = ~self._ended
+        parts = [self._motion, self._line, self._quantise, self._sensor, self._controller, self._logger]
+        keep([*parts, self._in_flight], on)
+        self._limit_m = self._limit_m[on] if isinstance(self._limit_m, np.ndarray) else self._limit_m
+        self._scene_of, self._ended = self._scene_of[on], self._ended[on]
+
+
+@contextmanager
+def _collector_at_rest() -> Iterator[None]:
+    """No search for cycles among thousands of dictionaries without any: it would take as long as making them."""
+    was_at_work = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if was_at_work:
+            gc.enable()
+
+
+@contextmanager
+def _buffers_of(size: int) -> Iterator[None]:
+    """NumPy before 2.3 adds so many numbers at a time as its buffers hold: sums are those of a loop alone with its."""
+    with np.errstate():  # which gives back the buffers as well
+        np.setbufsize(size)
+        yield
+
+
+def _keep_freed_memory() -> None:
+    """Have glibc's malloc keep what is freed: it raises its thresholds to the largest block that it saw freed.
+
+    Else it gives the columns of every block back and has their pages zeroed anew, which takes a third of the time.
+    """
+    np.empty(31 << 17)  # 31 MiB; it learns from no more than 32

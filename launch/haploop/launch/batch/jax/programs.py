@@ -1,0 +1,128 @@
+"""Compiled blocks, kept for all groups of loops of the same structure, and how jax is asked for them."""
+
+from __future__ import annotations
+
+import os
+from collections import Counter, OrderedDict
+from collections.abc import Callable, Hashable, Iterator
+from contextlib import AbstractContextManager, contextmanager
+from functools import lru_cache, partial
+from importlib import import_module
+from time import perf_counter
+from typing import Any, NamedTuple
+
+import jax
+import numpy as np
+
+from haploop.launch.batch.jax.block import Block, Carry, Given, Rings
+
+# How many are kept.
+_MOST = 64
+# On a CPU a loop over ticks is one function of machine code if XLA takes its arrays for small; else every operation is
+# a call of its own, which takes longer than what it does. There is no other way to say so than before jax first runs.
+_ONE_FUNCTION = "xla_cpu_small_while_loop_byte_threshold"
+# Arrays of loops fill the widest registers there are.
+_WIDE: dict[str, Any] = {"xla_cpu_prefer_vector_width": 512}
+_FLAGS, _OPTIONS = "XLA_FLAGS", "--xla_backend_extra_options="
+# On a GPU jax takes three quarters of the memory for itself unless told otherwise; the next worker then finds none.
+_TAKES_ALL = "XLA_PYTHON_CLIENT_PREALLOCATE"
+
+
+class Program(NamedTuple):
+    """A compiled block.
+
+    Attributes:
+        block: what was compiled; what it knows of the leaves holds for all groups of loops.
+        call: the machine code.
+    """
+
+    block: Block
+    call: Callable[[Carry, Rings, Given], tuple[Carry, Rings]]
+
+
+class Programs:
+    """Programs by what they depend on; the one not used for longest goes first.
+
+    Attributes:
+        seconds: spent on compiling so far.
+        count: how many were compiled so far.
+        asked: how many ticks of loops of a structure were asked for so far.
+        spare: rings that loops are done with. Their memory serves the next loops: getting it anew, and putting zeros
+            into it, takes a third as long as the loops without books do.
+    """
+
+    def __init__(self) -> None:
+        self._kept: OrderedDict[Hashable, Program] = OrderedDict()
+        self.seconds, self.count = 0.0, 0
+        self.asked = Counter[Hashable]()
+        self.spare: Rings | None = None
+
+    def known(self, key: Hashable) -> Program | None:
+        """The program of a key, if it was compiled before."""
+        if key in self._kept:
+            self._kept.move_to_end(key)
+        return self._kept.get(key)
+
+    def compiled(self, key: Hashable, block: Block, args: tuple[Carry, Rings, Given]) -> Program:
+        """Compile a block for arguments of these shapes."""
+        began = perf_counter()
+        lowered = jax.jit(block.run, donate_argnums=1).lower(*args)
+        program = Program(block, lowered.compile(_WIDE if jax.default_backend() == "cpu" else None))
+        self.seconds, self.count = self.seconds + perf_counter() - began, self.count + 1
+        self._kept[key] = program
+        if len(self._kept) > _MOST:
+            self._kept.popitem(last=False)
+        return program
+
+    def begun(self, rings: Rings, ticks: int) -> Rings:
+        """These rings of NumPy, in spare memory if it fits; the first rows, so many, and the last are in use."""
+        spare, self.spare = self.spare, None
+        fits = spare is not None and jax.tree.map(np.shape, spare) == jax.tree.map(np.shape, rings)
+        if not fits or ticks >= len(rings.x):
+            return rings
+        used = np.r_[:ticks, -1]
+        return _put(spare, used, jax.tree.map(lambda ring: ring[used], rings))
+
+
+@partial(jax.jit, donate_argnums=0)
+def _put(rings: Rings, places: Any, rows: Rings) -> Rings:
+    return jax.tree.map(lambda ring, row: ring.at[places].set(row), rings, rows)
+
+
+PROGRAMS = Programs()
+
+
+def in_double() -> AbstractContextManager[object]:
+    """Within it jax computes in float64; outside it is as it was."""
+    enable_x64: Any = getattr(jax, "enable_x64", None)
+    if enable_x64 is None:  # jax before 0.8
+        enable_x64 = import_module("jax.experimental").enable_x64
+    return enable_x64(True)
+
+
+@lru_cache(maxsize=1)
+def most() -> int:
+    """How many loops suit the device: on a CPU so many that what a tick works on stays in the cache.
+
+    Where nothing has used jax before, it is told here how to start; what the user has told it stands.
+    """
+    told = {_TAKES_ALL: os.environ.get(_TAKES_ALL, "false")}
+    if _OPTIONS not in (flags := os.environ.get(_FLAGS, "")):
+        told[_FLAGS] = f"{flags} {_OPTIONS}{_ONE_FUNCTION}=1000000000"
+    with _environment(told):
+        on_cpu = jax.default_backend() == "cpu"
+    return 1024 if on_cpu else 16384
+
+
+@contextmanager
+def _environment(variables: dict[str, str]) -> Iterator[None]:
+    """These variables for a while, then those of before."""
+    before = {name: os.environ.pop(name, None) for name in variables}
+    os.environ.update(variables)
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            del os.environ[name]
+            if value is not None:
+                os.environ[name] = value

@@ -1,0 +1,118 @@
+"""What the windows of many loops show, worked out by a program that goes through their rings step by step."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from functools import partial
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from haploop.launch.batch.jax.block import Rings
+from haploop.logger.verdict.measures import ROUNDING, Measured, Span, seen_of
+from haploop.logger.verdict.verdict import SMALLEST_SWING_M, Shown
+from haploop.logger.verdict.window import keep_steps
+from haploop.logger.verdict.window_batch import WindowArray
+
+
+class CompiledWindow(WindowArray):
+    """``WindowArray`` whose rings are filled by compiled programs, and read by one.
+
+    Attributes:
+        rings: what the programs have left; None where the loops went on by themselves since.
+    """
+
+    rings: Rings | None = None
+
+    def take(self, rings: Rings, *, writable: bool) -> None:
+        """Have the rings of a program; ``writable`` where the loops are to go on by themselves."""
+        held = np.array if writable else np.asarray
+        self._x = held(rings.x).reshape(-1, len(self._resolutions))
+        self._ticks |= {name: held(ring) for name, ring in rings.rows.items()}
+        self.rings = None if writable else rings
+
+    def shown(self, loops: Iterable[int]) -> Iterator[Shown]:
+        """As there; window figures to the last digits, and a crossing by less than these may count or not."""
+        rate, n, steps = self._time.plant_rate, self._time.steps_per_tick, self._steps
+        span = Span.of(steps, keep_steps(rate), n)
+        if self.rings is None or steps < span.steps + n:
+            yield from super().shown(loops)
+            return
+        wanted = np.fromiter(loops, np.intp)
+        swing_m = np.maximum(self._resolutions, SMALLEST_SWING_M)
+        rows = {**self.rings.rows, "wall_position": self._ticks["wall_position"]}
+        found = _look(self.rings.x, rows, np.int64(steps), swing_m, steps=span.steps + 1, ticks=span.ticks)
+        columns = [np.asarray(column)[wanted].tolist() for column in found]
+        measured = Measured(*columns[:4], *(_where_any(*columns[at : at + 2]) for at in (4, 6)))
+        yield from map(Shown, seen_of(measured, span, rate), self._extremes_of(wanted), swing_m[wanted].tolist())
+
+
+def _where_any(counts: list[int], means: list[float]) -> list[float | None]:
+    return [mean if count else None for count, mean in zip(counts, means, strict=True)]
+
+
+class _Swings(NamedTuple):
+    """On which side of its trend line each loop was last, how often it crossed it, and how far it went."""
+
+    side: Any
+    crossings: Any
+    low: Any
+    high: Any
+
+
+@partial(jax.jit, static_argnames=("steps", "ticks"))
+def _look(x: Any, rows: dict[str, Any], ran: Any, swing_m: Any, *, steps: int, ticks: int) -> list[Any]:
+    """The columns of ``Measured``, as ``look`` and ``swings`` define them, with the counts before each mean.
+
+    Args:
+        x: positions, shape (ticks kept, n, loops); rows: ``CONTROLLER_COLUMNS``, shape (ticks kept, loops).
+        ran: steps that the loops have run.
+        swing_m: what does not count as a swing, shape (loops,).
+        steps, ticks: of the window.
+    """
+    n, loops = x.shape[1], len(swing_m)
+    x = x.reshape(-1, loops)
+
+    def at(i: Any) -> Any:
+        return x[(ran - steps + i) % len(x)]
+
+    def sums(i: Any, so_far: tuple[Any, ...]) -> tuple[Any, ...]:
+        total, weighted, low, high = so_far
+        away = at(i) - pivot
+        middle = i - (steps - 1) / 2.0
+        return total + away, weighted + middle * away, jnp.minimum(low, away), jnp.maximum(high, away)
+
+    pivot, none, far = at(0), jnp.zeros(loops), jnp.full(loops, jnp.inf)
+    total, weighted, low, high = jax.lax.fori_loop(0, steps, sums, (none, none, far, -far))
+    slope, mean = weighted / (steps * (steps**2 - 1) / 12.0), total / steps
+
+    def swing(i: Any, so_far: _Swings) -> _Swings:
+        offset = at(i) - pivot - mean - slope * (i - (steps - 1) / 2.0)
+        side = jnp.where(offset > swing_m, 1.0, jnp.where(offset < -swing_m, -1.0, so_far.side))
+        crossings = so_far.crossings + (side * so_far.side < 0.0)
+        return _Swings(side, crossings, jnp.minimum(so_far.low, offset), jnp.maximum(so_far.high, offset))
+
+    first = jax.lax.fori_loop(0, steps // 2, swing, _Swings(none, jnp.zeros(loops, np.int64), far, -far))
+    second = jax.lax.fori_loop(steps // 2, steps, swing, first._replace(low=far, high=-far))
+    before = first.high - first.low
+    growth = jnp.where(before > 0.0, (second.high - second.low) / before, 0.0)
+    return [second.crossings, growth, high - low, *_in_contact(rows, ran // n, ticks)]
+
+
+def _in_contact(rows: dict[str, Any], ran: Any, ticks: int) -> list[Any]:
+    """Of the last ticks of so many: those in contact; how many show a stiffness, its mean; and the mean depth."""
+    length, loops = rows["x"].shape
+
+    def add(i: Any, so_far: list[Any]) -> list[Any]:
+        place = (ran - ticks + i) % length
+        position, inside = rows["wall_position"][place], rows["in_contact"][place] > 0.0
+        depth = position - rows["x"][place]
+        real = inside & (abs(depth) > ROUNDING * abs(position))
+        stiffness = jnp.where(real, rows["total"][place] / jnp.where(real, depth, 1.0), 0.0)
+        added = [1.0 * inside, 1.0 * real, stiffness, jnp.where(inside, abs(depth), 0.0)]
+        return [total + more for total, more in zip(so_far, added, strict=True)]
+
+    inside, real, stiffness, depth = jax.lax.fori_loop(0, ticks, add, [jnp.zeros(loops)] * 4)
+    return [inside, real, stiffness / real, inside, depth / inside]

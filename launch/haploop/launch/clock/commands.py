@@ -1,0 +1,148 @@
+"""What other terminals may ask of a running loop, and the answers."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from haploop.controller.dissipation import ElementError, PluginError, load_plugin
+from haploop.launch.clock.capabilities import options
+from haploop.launch.clock.clock import Clock, ClockError
+from haploop.launch.clock.roster import Roster
+from haploop.launch.output import OutputError, keep_plugin
+from haploop.launch.scene.mistakes import SceneError
+
+if TYPE_CHECKING:
+    from haploop.launch.processes.supervisor import RunRequest
+
+Answer = tuple[bool, str, dict[str, Any]]
+
+
+def in_words(pace: float) -> float | str:
+    """A pace as people write it."""
+    return "free" if math.isinf(pace) else pace
+
+
+class Commands:
+    """Carries out COMMAND messages: each a verb and its arguments, answered with a sentence and data.
+
+    Whatever is refused leaves the run as it was.
+    """
+
+    def __init__(self, clock: Clock, request: RunRequest, roster: Callable[[], Roster]) -> None:
+        self._clock, self._request, self._roster = clock, request, roster
+        self._rate = request.scene["clock"]["control_rate"]
+        self._verbs = {
+            "status": self._status,
+            "options": self._options,
+            "pause": self._pause,
+            "resume": self._resume,
+            "step": self._step,
+            "pace": self._pace,
+            "stop": self._stop,
+            "swap": self._swap,
+            "set": self._set,
+        }
+
+    def __call__(self, verb: str, arguments: dict[str, Any]) -> Answer:
+        """Carry out one command."""
+        act = self._verbs.get(verb)
+        if act is None:
+            return False, f"{verb[:40]!r} is no command; these are: {', '.join(self._verbs)}.", {}
+        try:
+            text, data = act(**arguments)
+            return True, text, data
+        except (ClockError, SceneError, PluginError, ElementError, OutputError) as error:
+            return False, str(error), {}
+        except Exception as error:  # whatever a terminal sends, the run goes on
+            return False, f"The arguments of {verb} cannot be used: {type(error).__name__}: {error}.", {}
+
+    def _at(self, tick: int) -> str:
+        return f"tick {tick} ({tick / self._rate:g} s)"
+
+    def _status(self) -> tuple[str, dict[str, Any]]:
+        clock, roster = self._clock, self._roster()
+        logger = roster.own("logger")
+        data = {
+            "title": self._request.scene["title"],
+            "out": str(self._request.out),
+            "tick": logger.tick if logger else 0,
+            "granted": clock.until,
+            "end": clock.end,
+            "control_rate": self._rate,
+            "paused": clock.paused,
+            "pace": in_words(clock.pace),
+            "nodes": roster.table(),
+            "telemetry": {role: addresses["telemetry"] for role, addresses in roster.endpoints().items()},
+            **({"status": logger.status} if logger else {}),
+        }
+        state = "paused" if clock.paused else "running"
+        return f"{state} at {self._at(data['tick'])} of {clock.end}", data
+
+    def _options(self) -> tuple[str, dict[str, Any]]:
+        """What can be set and swapped in now: units, bounds, present values."""
+        data = options(self._clock.present(), self._request.kinds)
+        return f"{len(data['settable'])} keys can be set, {len(data['kinds'])} kinds swapped in", data
+
+    def _pause(self) -> tuple[str, dict[str, Any]]:
+        tick = self._clock.pause()
+        self._clock.note({"pause": True})
+        return f"paused at {self._at(tick)}", {"tick": tick}
+
+    def _resume(self) -> tuple[str, dict[str, Any]]:
+        tick = self._clock.resume(time.monotonic())
+        self._clock.note({"resume": True})
+        return f"resumed at {self._at(tick)}", {"tick": tick}
+
+    def _step(self, ticks: int = 1) -> tuple[str, dict[str, Any]]:
+        if not isinstance(ticks, int) or ticks < 1:
+            raise ClockError(f"A step goes on for at least one tick, but {ticks} was asked for.")
+        self._clock.note({"step": ticks})
+        tick = self._clock.step(ticks, time.monotonic())
+        return f"stepping to {self._at(tick)}", {"tick": tick}
+
+    def _pace(self, pace: float | str) -> tuple[str, dict[str, Any]]:
+        rate = math.inf if pace == "free" else pace
+        if isinstance(rate, bool) or not isinstance(rate, int | float):
+            raise ClockError(f"A pace is a number above 0, or free, but {pace!r} was asked for.")
+        tick = self._clock.run_at(rate, time.monotonic())
+        self._clock.note({"pace": in_words(rate)})
+        return f"pace {in_words(rate)} from {self._at(tick)} on", {"tick": tick}
+
+    def _stop(self) -> tuple[str, dict[str, Any]]:
+        tick = self._clock.stop()
+        self._clock.note({"stop": True})
+        return f"stopping at {self._at(tick)}", {"tick": tick}
+
+    def _swap(
+        self, swap: dict[str, Any], element: int = 0, at: float | None = None, reload: bool = False
+    ) -> tuple[str, dict[str, Any]]:
+        kinds = dict(self._request.kinds)
+        extra = self._reload(str(swap.get("kind"))) if reload else {}
+        try:
+            tick = self._clock.change({"swap": swap, "element": element}, at, **extra)
+        except Exception:
+            self._request.kinds.update(kinds)
+            raise
+        return f"element {element} becomes {swap['kind']} at {self._at(tick)}", {"tick": tick}
+
+    def _set(self, set: dict[str, Any], at: float | None = None) -> tuple[str, dict[str, Any]]:
+        tick = self._clock.change({"set": set}, at)
+        what = ", ".join(f"{key} = {value}" for key, value in set.items())
+        return f"{what} from {self._at(tick)} on", {"tick": tick}
+
+    def _reload(self, kind: str) -> dict[str, Any]:
+        """Take up the edited file of a kind named at launch; a file that does not load changes nothing."""
+        source: Path | None = self._request.plugin_sources.get(kind)
+        if source is None:
+            known = ", ".join(sorted(self._request.plugin_sources)) or "none"
+            raise ClockError(f"Only kinds from --plugin files can be reloaded ({known}), but {kind} was asked for.")
+        loaded = load_plugin(source)
+        if kind not in loaded:
+            raise ClockError(f"{source} no longer defines {kind}, but {', '.join(loaded)}; the old element stays.")
+        kept = keep_plugin(source, self._request.out)
+        self._request.kinds.update(loaded)
+        return {"plugin": str(kept.resolve())}

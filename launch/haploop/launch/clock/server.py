@@ -1,0 +1,235 @@
+"""The clock on its socket: nodes join and report, grants go out, commands from other terminals are answered."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import zmq
+
+from haploop.launch.clock.clock import Clock
+from haploop.launch.clock.roster import Node, Roster
+from haploop.launch.errors import RunFailed
+from haploop.protocol.processes import PROCESSES
+from haploop.protocol.sockets import bind, has_message, open_socket
+from haploop.protocol.wire import Frame, WireError, decode, encode
+
+Command = Callable[[str, dict[str, Any]], tuple[bool, str, dict[str, Any]]]
+
+# Messages taken before grants go out, so that nobody who floods the clock can hold time up.
+_AT_ONCE = 200
+_LONGEST_ROLE = 40
+
+
+class ClockServer:
+    """Speaks the clock's part of the protocol.
+
+    Args:
+        clock: decides how far and when.
+        welcome: fields of WELCOME but for endpoints and granted: run, scene, timebase, context.
+        command: carries out a command from a client.
+        held: whether the first tick waits still; it is given the pids of all that are ready.
+
+    Attributes:
+        address: where the clock listens.
+        roster: who takes part.
+        results: role -> result of each own process that is done.
+        strangers: frames that were no messages, or from nobody who joined.
+    """
+
+    def __init__(
+        self,
+        context: zmq.Context[zmq.Socket[bytes]],
+        sockets: Path,
+        secret: str,
+        clock: Clock,
+        welcome: dict[str, Any],
+        command: Command,
+        held: Callable[[set[int]], bool],
+    ) -> None:
+        self._socket = open_socket(context, zmq.ROUTER)
+        self.address = bind(self._socket, sockets, "clock")
+        self._secret, self._clock, self._welcome, self._command = secret, clock, welcome, command
+        self.roster = Roster()
+        self.results: dict[str, dict[str, Any]] = {}
+        self.strangers = 0
+        self._greeted, self._held = False, held
+        self._granted = -1
+        self._last_sent = False
+
+    @property
+    def socket(self) -> zmq.Socket[bytes]:
+        """For pollers."""
+        return self._socket
+
+    def close(self) -> None:
+        """Stop listening; what was sent still goes out."""
+        self._socket.close(linger=200)
+
+    def serve(self) -> None:
+        """Take the messages that are there, though no more than a turn's worth, then grant what can be granted.
+
+        Raises:
+            RunFailed: one of the run's own processes said that it cannot go on.
+        """
+        for _ in range(_AT_ONCE):
+            if not has_message(self._socket):
+                break
+            sender, *frames = self._socket.recv_multipart()
+            try:
+                self._take(sender, decode(frames[-1] if frames else b""))
+            except WireError as error:
+                self.strangers += 1
+                self._send(sender, "REFUSED", str(error))
+        if not self._greeted and self.roster.joined():
+            self._greeted = True
+            for node in list(self.roster.nodes.values()):
+                self._greet(node)
+        if self.roster.all_own("ready") and not self._is_held():
+            self.grant()
+
+    def _is_held(self) -> bool:
+        has_begun = self._granted >= 0 or self._clock.is_last
+        return not has_begun and self._held({node.pid for node in self.roster.nodes.values() if node.ready})
+
+    def grant(self) -> None:
+        """Tell everyone how far they may go, and what changes on the way, if that is news."""
+        clock = self._clock
+        until = clock.grant(self.roster.slowest(), time.monotonic())
+        events = clock.take_events()
+        if until == self._granted and clock.is_last == self._last_sent and not events:
+            return
+        self._granted, self._last_sent = until, clock.is_last
+        for node in list(self.roster.nodes.values()):
+            if node.ready and not node.done:
+                self._send(node.identity, "GRANT", until, clock.is_last, events)
+
+    def probe(self, nodes: list[Node]) -> None:
+        """Repeat the grant to those attached: what cannot be sent shows that a node is gone, and takes it off."""
+        for node in nodes:
+            if not node.is_own:
+                self._send(node.identity, "GRANT", self._clock.until, self._clock.is_last, [])
+
+    def _send(self, identity: bytes, name: str, *fields: Any) -> None:
+        try:
+            self._socket.send_multipart([identity, encode(name, *fields)], flags=zmq.DONTWAIT)
+        except zmq.ZMQError:  # gone, or so far behind that its queue is full
+            node = self.roster.nodes.get(identity)
+            if node and not node.is_own:
+                del self.roster.nodes[identity]
+
+    def _take(self, sender: bytes, frame: Frame) -> None:
+        if frame.name == "JOIN":
+            self._join(sender, frame.as_dict())
+            return
+        if frame.name == "COMMAND":
+            self._send(sender, "REPLY", *self._command(*frame.fields))
+            return
+        node = self.roster.nodes.get(sender)
+        if node is None:
+            self.strangers += 1
+            self._send(sender, "REFUSED", f"{frame.name} came from somebody who has not joined; send JOIN first.")
+            return
+        if frame.name in ("READY", "PROGRESS") and not 0 <= frame.fields[0] <= self._clock.until:
+            self.strangers += 1
+            self._send(
+                sender, "REFUSED", f"{frame.name} must name a tick from 0 to {self._clock.until}, which is granted."
+            )
+            return
+        node.heard = time.monotonic()
+        node.waits_for = ""
+        handler = getattr(self, f"_on_{frame.name.lower()}", None)
+        if handler is None:
+            self.strangers += 1
+            self._send(sender, "REFUSED", f"{frame.name} is not for the clock.")
+            return
+        handler(node, *frame.fields)
+
+    def _join(self, sender: bytes, request: dict[str, Any]) -> None:
+        role = request["role"]
+        known = role in PROCESSES
+        reason = ""
+        if known and request["secret"] != self._secret:
+            reason = f"The role {role} belongs to the run's own process; join as an observer."
+        elif known and self.roster.own(role):
+            reason = f"The role {role} is taken."
+        elif not known and not self._greeted:
+            reason = "The run has not begun; try again in a moment."
+        elif sender in self.roster.nodes:
+            reason = "You have joined already."
+        elif not (role.isprintable() and 0 < len(role) <= _LONGEST_ROLE):
+            reason = f"JOIN.role must be a printable name of at most {_LONGEST_ROLE} characters."
+        elif not all(isinstance(v, str) for pair in request["endpoints"].items() for v in pair):
+            reason = "JOIN.endpoints must be a map from channel to address."
+        if reason:
+            self._send(sender, "REFUSED", reason)
+            return
+        lossless = request["lossless"] and role not in ("plant", "controller")
+        node = Node(sender, role, request["pid"], lossless, request["endpoints"], time.monotonic())
+        node.tick = 0 if known else self._clock.until
+        self.roster.add(node)
+        if not known:
+            self._greet(node)
+
+    def _greet(self, node: Node) -> None:
+        context = self._welcome["context"]
+        if not node.is_own:
+            context = {key: value for key, value in context.items() if key != "secret"}
+        fields = {
+            **self._welcome,
+            "endpoints": self.roster.endpoints(),
+            "granted": self._clock.until,
+            "context": context,
+        }
+        order = ("run", "scene", "timebase", "endpoints", "granted", "context")
+        self._send(node.identity, "WELCOME", *(fields[name] for name in order))
+
+    # What nodes say
+
+    def _on_ready(self, node: Node, tick: int) -> None:
+        node.ready, node.tick = True, tick
+        if not node.is_own:
+            self._send(node.identity, "GRANT", self._clock.until, self._clock.is_last, self._clock.events_from(tick))
+
+    def _on_progress(self, node: Node, tick: int, status: dict[str, Any]) -> None:
+        node.tick = max(node.tick, tick)
+        node.status = status or node.status
+        if node.role == "controller":
+            for refusal in status.get("refused", []):
+                self._clock.note({"refused": refusal})
+
+    def _on_waiting(self, node: Node, tick: int, on: str) -> None:
+        node.waits_for = on
+
+    def _on_ended(self, node: Node, tick: int, reason: str) -> None:
+        if node.role == "plant":
+            self._clock.end_at(tick)
+
+    def _on_done(self, node: Node, tick: int, result: dict[str, Any]) -> None:
+        node.done, node.tick = True, tick
+        if node.is_own:
+            self.results[node.role] = result
+        else:
+            del self.roster.nodes[node.identity]
+
+    def _on_leave(self, node: Node, tick: int) -> None:
+        if not node.is_own:
+            del self.roster.nodes[node.identity]
+
+    def _on_failed(self, node: Node, tick: int, reason: str) -> None:
+        if node.is_own:
+            raise RunFailed(f"The {node.role} failed: {reason}")
+        del self.roster.nodes[node.identity]
+
+    def drop(self, node: Node, reason: str) -> None:
+        """Go on without an attached node."""
+        self._send(node.identity, "ABORT", reason)
+        self.roster.nodes.pop(node.identity, None)
+
+    def abort(self, reason: str) -> None:
+        """Tell every node to save what it has and leave."""
+        for node in list(self.roster.nodes.values()):
+            if not node.done:
+                self._send(node.identity, "ABORT", reason)

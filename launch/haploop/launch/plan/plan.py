@@ -1,0 +1,173 @@
+"""What a resolved scene comes to: bodies, states, what happens in a tick and in a plant step, and what is not there."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+from haploop.controller.recorder import MOTION_COLUMNS
+from haploop.launch.plan.effects import EFFECTS, Effect, Stage, at
+from haploop.plant.chain.chain import Chain
+from haploop.plant.choose import integrator_of, needs_chain
+from haploop.plant.sensing.encoder import accelerometer_is_used
+from haploop.protocol.ticks import Timebase
+
+
+@dataclass(frozen=True)
+class Step:
+    """One thing that happens.
+
+    Attributes:
+        node: the process in which it does.
+        what: in one phrase.
+        effect: the name of the effect that brings it, "" for what every scene has.
+    """
+
+    node: str
+    what: str
+    effect: str = ""
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A scene, decided.
+
+    Attributes:
+        bodies: name -> mass in kg, from the actuator to the hand.
+        states: what is integrated from plant step to plant step.
+        memory: numbers that effects remember beside it from tick to tick, by the effect's name.
+        plant_step: what happens in a plant step, in order.
+        tick: what happens in a tick, in order.
+        modules: node -> what its effects import beside its core.
+        columns: channel of the log -> its columns, time stamps aside.
+        counts: what the summary counts, as entry and key.
+        named, absent: the effects of the scene, and the others.
+    """
+
+    bodies: dict[str, float]
+    states: tuple[str, ...]
+    memory: dict[str, int]
+    plant_step: tuple[Step, ...]
+    tick: tuple[Step, ...]
+    modules: dict[str, tuple[str, ...]]
+    columns: dict[str, tuple[str, ...]]
+    counts: tuple[str, ...]
+    named: tuple[Effect, ...]
+    absent: tuple[Effect, ...]
+
+
+def plan(scene: dict[str, Any]) -> Plan:
+    """The plan of a resolved scene."""
+    named = effects_of(scene)
+    chain = Chain.of(scene)
+    return Plan(
+        bodies=dict(zip(chain.bodies, chain.masses_kg, strict=True)),
+        states=chain.states,
+        memory=_memory(scene, named),
+        plant_step=_plant_step(chain, named, scene),
+        tick=_tick(scene, chain, named),
+        modules={
+            node: _once(module for effect in named if effect.node == node for module in effect.modules_in(scene))
+            for node in ("plant", "controller")
+        },
+        columns={
+            "/plant": ("x", "v", "force", *_once(column for effect in named for column in effect.columns)),
+            "/controller": (*MOTION_COLUMNS, *_element_columns(scene), "total", "in_contact"),
+        },
+        counts=_once(count for effect in named for count in effect.counts),
+        named=named,
+        absent=tuple(effect for effect in EFFECTS if effect not in named),
+    )
+
+
+def multiplications(scene: dict[str, Any]) -> int:
+    """Multiplications that move the bodies through one tick: every state by every state, command and friction.
+
+    One mass is moved once a hold and filled in at the plant steps; bodies in a row are moved to every plant step. The
+    classical Runge-Kutta method moves them four times; of DOP853 twelve times a tick are counted, the least there is.
+    """
+    time, size = Timebase.of(scene["clock"], scene["duration"]), len(Chain.of(scene).states)
+    if needs_chain(scene):
+        moves = {"rk4": 4 * time.steps_per_tick, "dop853": 12}.get(integrator_of(scene), time.steps_per_tick)
+        return moves * size * (size + 2)
+    return (time.steps_per_tick + (2 if time.delay_steps % time.steps_per_tick else 1)) * size * (size + 1)
+
+
+def effects_of(scene: dict[str, Any]) -> tuple[Effect, ...]:
+    """The effects a resolved scene names; an accelerometer that nothing reads is none."""
+    is_read = accelerometer_is_used(scene)
+    return tuple(
+        effect
+        for effect in EFFECTS
+        if effect.is_named(scene) and (is_read or effect.key.partition(".")[0] != "accelerometer")
+    )
+
+
+def _memory(scene: dict[str, Any], named: tuple[Effect, ...]) -> dict[str, int]:
+    """The states of effects in the motion are integrated; those of all others are remembered."""
+    counts = {effect.name: effect.states_in(scene) for effect in named if effect.stage != "motion"}
+    return {name: count for name, count in counts.items() if count}
+
+
+def _plant_step(chain: Chain, named: tuple[Effect, ...], scene: dict[str, Any]) -> tuple[Step, ...]:
+    bodies = " - ".join(chain.bodies)
+    method = "exact flow" if integrator_of(scene) == "exact" else integrator_of(scene)
+    what = f"{method} of {len(chain.states)} states ({bodies}), the command held, the force of the hand linear"
+    return Step("plant", what), *_stage("motion", named, scene)
+
+
+def _tick(scene: dict[str, Any], chain: Chain, named: tuple[Effect, ...]) -> tuple[Step, ...]:
+    late = f"{Timebase.of(scene['clock'], scene['duration']).delay_steps} plant steps"
+    return (
+        Step("plant", f"the position of the {chain.bodies[0]} is sampled"),
+        *_stage("measurement", named, scene),
+        *_estimates(scene, named),
+        *_forces(scene),
+        Step("controller", "their sum is the command"),
+        *_stage("line", named, scene),
+        Step("plant", f"the command takes effect {late} after its sample and is held until the next does"),
+        *_stage("actuation", named, scene),
+    )
+
+
+def _estimates(scene: dict[str, Any], named: tuple[Effect, ...]) -> Iterable[Step]:
+    """A backward difference where no effect stands in its place, then its low-pass."""
+    for table, letter, of in (("velocity", "v", "the position"), ("acceleration", "a", "v")):
+        effects = [e for e in named if e.stage == "estimate" and e.key.startswith(f"{table}.")]
+        if all(effect.key.endswith(".cutoff") for effect in effects):
+            yield Step("controller", f"{letter} is the backward difference of {of}")
+        yield from _stage("estimate", effects, scene)
+
+
+def _forces(scene: dict[str, Any]) -> Iterable[Step]:
+    if wall := scene.get("wall"):
+        sign = "<" if wall["occupies"] == "below" else ">"
+        yield Step("controller", f"wall: {wall['stiffness']:g} N/m where x {sign} {wall['position']:g} m")
+    for table in scene.get("dissipation", []):
+        yield Step("controller", f"{table['kind']}{_values(table)}, {table['acts']}")
+
+
+def _stage(stage: Stage, named: Iterable[Effect], scene: dict[str, Any]) -> tuple[Step, ...]:
+    """What the named effects of a stage do, with their values."""
+    return tuple(
+        Step(effect.node, effect.does + _values(at(scene, effect.key), effect.key), effect.name)
+        for effect in named
+        if effect.stage == stage
+    )
+
+
+def _values(found: Any, key: str = "") -> str:
+    """The numbers of an effect, or of an element, in parentheses."""
+    name = key.rpartition(".")[2]
+    table = found if isinstance(found, dict) else {name: found}
+    words = [f"{k} = {v:g}" for k, v in table.items() if isinstance(v, (int, float)) and not isinstance(v, bool)]
+    return f" ({', '.join(words)})" if words else ""
+
+
+def _once(entries: Iterable[str]) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(entries))
+
+
+def _element_columns(scene: dict[str, Any]) -> tuple[str, ...]:
+    return tuple(f"dissipation.{index}" for index in range(len(scene.get("dissipation", []))))

@@ -1,0 +1,226 @@
+"""A run as processes: start them, lead them by the clock, watch them, end them, leave nothing behind."""
+
+from __future__ import annotations
+
+import math
+import secrets
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import zmq
+
+from haploop.launch.clock.clock import Clock
+from haploop.launch.clock.commands import Commands
+from haploop.launch.clock.server import ClockServer
+from haploop.launch.errors import RunFailed
+from haploop.launch.processes import run_directory
+from haploop.launch.processes.children import Child, start_children
+from haploop.launch.processes.interrupts import interrupts
+from haploop.protocol.ticks import Timebase
+from haploop.protocol.transport import Transport, Wires
+
+if TYPE_CHECKING:
+    from haploop.controller.dissipation import Element
+
+_START_DEADLINE_S = 20.0
+# What the logger is given to save its files after another node has failed.
+_SAVING_S = 0.7
+# How long the last message of a process that has exited may still be on its way.
+_LAST_WORDS_S = 1.0
+# Between looks at nodes that say nothing; commands, reports and deaths are noticed at once.
+_LOOK_MS = 100
+# Attached nodes that say nothing are asked this often whether they are still there.
+_PROBE_S = 0.2
+# When the launcher itself was held up for longer (stopped, swapped out, loading a plugin), nobody is blamed for it.
+_HELD_UP_S = 1.0
+
+
+@dataclass
+class RunRequest:
+    """All that is needed to run a scene as processes.
+
+    Attributes:
+        scene: the resolved scene.
+        kinds: element kinds by name.
+        out: the run's directory, made.
+        attachments: text files for the log, by name.
+        plugins: plugin files within ``out`` that the controller loads.
+        plugin_sources: kind -> the user's file it came from, for reloading.
+        pace: simulated seconds per wall second; infinite for as fast as it goes.
+        transport: how the sockets are reached.
+        progress: called now and then with the logger's status.
+        announced: called once with the run's id, and the clock's address where that is one of TCP.
+        held: whether the first tick waits still, for a process that is to be there from the start; it is given the
+            pids of all nodes that are ready.
+    """
+
+    scene: dict[str, Any]
+    kinds: dict[str, type[Element]]
+    out: Path
+    attachments: dict[str, str] = field(default_factory=dict)
+    plugins: list[Path] = field(default_factory=list)
+    plugin_sources: dict[str, Path] = field(default_factory=dict)
+    pace: float = math.inf
+    transport: Transport = field(default_factory=Transport)
+    progress: Callable[[dict[str, Any]], None] = lambda status: None
+    announced: Callable[[str], None] = lambda run_id: None
+    held: Callable[[set[int]], bool] = lambda ready: False
+
+
+def run_processes(request: RunRequest) -> dict[str, Any]:
+    """Run to the end and return the summary.
+
+    The first SIGINT or SIGTERM ends the run in order, with a summary of what ran; the second at once.
+
+    Raises:
+        RunFailed: a process was killed, hung or could not go on; nothing of the run is left but its files.
+        KeyboardInterrupt: the second signal came.
+    """
+    sockets = run_directory.create()
+    try:
+        with interrupts(usual_from=3) as received:
+            return Supervisor(request, sockets, received).run()
+    finally:
+        run_directory.remove(sockets)
+
+
+class Supervisor:
+    """One run's processes and its clock."""
+
+    def __init__(self, request: RunRequest, sockets: Path, received: list[int]) -> None:
+        self._request, self._sockets, self._interrupts = request, sockets, received
+        scene = request.scene
+        timebase = Timebase.of(scene["clock"], scene["duration"])
+        self._clock = Clock(scene, timebase, request.kinds, request.pace)
+        self._deadline_s = scene["run"]["deadline"]
+        self._context = Wires.over(request.transport)
+        secret = secrets.token_hex(16)
+        welcome = {
+            "run": sockets.name,
+            "scene": scene,
+            "timebase": timebase.as_dict(),
+            "context": {
+                "secret": secret,
+                "out": str(request.out.resolve()),
+                "plugins": [str(path.resolve()) for path in request.plugins],
+                "attachments": request.attachments,
+            },
+        }
+        commands = Commands(self._clock, request, lambda: self._server.roster)
+        self._server = ClockServer(self._context, sockets, secret, self._clock, welcome, commands, request.held)
+        keys = request.transport.as_dict()["keys"]
+        run_directory.announce(sockets, self._server.address, scene["title"], str(request.out), keys)
+        run_number = len(run_directory.live_runs()) - 1
+        start = {"address": self._server.address, "secret": secret, "transport": request.transport.as_dict()}
+        self._children = start_children(sockets, start, scene["run"]["pin"], run_number)
+        self._started = self._looked = time.monotonic()
+        self._probe_due = 0.0
+        self._stopping = False
+
+    def run(self) -> dict[str, Any]:
+        """Lead the run to its end."""
+        try:
+            address = f" at {self._server.address}" if self._request.transport.host else ""
+            self._request.announced(self._sockets.name + address)
+            self._lead()
+            return self._server.results["logger"]
+        except RunFailed as error:
+            self._save(str(error))
+            raise
+        finally:
+            for child in self._children.values():
+                child.kill()
+            self._server.close()
+            self._context.destroy(linger=0)
+
+    def _lead(self) -> None:
+        poller = zmq.Poller()
+        poller.register(self._server.socket, zmq.POLLIN)
+        for child in self._children.values():
+            poller.register(child.died, zmq.POLLIN)
+        while not self._server.roster.all_own("done"):
+            wait_s = self._clock.wait_s(time.monotonic())
+            ready = dict(poller.poll(_LOOK_MS if wait_s is None else max(1, int(wait_s * 1000))))
+            self._server.serve()
+            self._heed_signals()
+            for child in self._children.values():
+                if child.died in ready:
+                    self._look_at(child)
+                    poller.unregister(child.died)
+            self._check_deadlines()
+            logger = self._server.roster.own("logger")
+            if logger:
+                self._request.progress(logger.status)
+        for child in self._children.values():
+            child.wait(2.0)
+
+    def _look_at(self, child: Child) -> None:
+        """A process has ended: in order after DONE, otherwise the run fails."""
+        fate = child.fate()
+        given_up = time.monotonic() + (_LAST_WORDS_S if child.exited() else 0.0)
+        self._server.serve()
+        while not self._is_done(child.role):
+            if time.monotonic() > given_up:
+                raise RunFailed(f"The {child.role} {fate}; {self._where()}")
+            self._server.socket.poll(20)
+            self._server.serve()
+
+    def _is_done(self, role: str) -> bool:
+        node = self._server.roster.own(role)
+        return node is not None and node.done
+
+    def _forgive(self, now: float) -> None:
+        """Time in which the launcher itself did not listen is nobody's silence."""
+        held_up_s = now - self._looked
+        self._looked = now
+        if held_up_s > _HELD_UP_S:
+            self._started += held_up_s
+            self._server.roster.forgive(held_up_s)
+
+    def _check_deadlines(self) -> None:
+        now = time.monotonic()
+        self._forgive(now)
+        if not self._server.roster.joined():
+            if now - self._started > _START_DEADLINE_S:
+                missing = [role for role in self._children if not self._server.roster.own(role)]
+                raise RunFailed(f"The {' and the '.join(missing)} did not join within {_START_DEADLINE_S:g} s.")
+            return
+        for node in self._server.roster.silent(now, self._deadline_s):
+            if node.is_own:
+                raise RunFailed(
+                    f"The {node.role} has not answered for {self._deadline_s:g} s and was ended; {self._where()} "
+                    "A longer wait can be set with run.deadline."
+                )
+            if node.lossless and node.tick <= self._server.roster.slowest():
+                self._server.drop(
+                    node, f"Nothing was heard of you for {self._deadline_s:g} s; the run goes on without you."
+                )
+        if now >= self._probe_due:
+            self._probe_due = now + _PROBE_S
+            self._server.probe(self._server.roster.silent(now, _PROBE_S))
+
+    def _where(self) -> str:
+        tick = self._server.roster.common_tick()
+        rate = self._request.scene["clock"]["control_rate"]
+        return f"the last tick all nodes had done is {tick} ({tick / rate:g} s)."
+
+    def _heed_signals(self) -> None:
+        if len(self._interrupts) > 1:
+            raise KeyboardInterrupt
+        if self._interrupts and not self._stopping:
+            self._stopping = True
+            self._clock.note({"stop": True, "by": "signal"})
+            self._clock.stop()
+            self._server.serve()
+
+    def _save(self, reason: str) -> None:
+        """Let the logger write down what it has; the others have nothing to lose."""
+        for role, child in self._children.items():
+            if role != "logger":
+                child.kill()
+        if self._server.roster.own("logger"):
+            self._server.abort(reason)
+            self._children["logger"].wait(_SAVING_S)

@@ -1,0 +1,130 @@
+"""The whole loop in one process: the same plant, controller and logger, without sockets."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NoReturn
+
+from haploop.controller.controller import Controller
+from haploop.controller.dissipation import ElementError
+from haploop.launch.errors import RunFailed
+from haploop.logger.session import Keeper, open_keeper
+from haploop.plant.plant import Plant
+from haploop.protocol.block_length import BlockLength
+from haploop.protocol.ticks import Timebase
+
+if TYPE_CHECKING:
+    from haploop.controller.dissipation import Element
+    from haploop.logger.log.memory import MemoryLog
+
+Event = dict[str, Any]
+Progress = Callable[[dict[str, Any]], None]
+
+
+def run_in_process(
+    scene: dict[str, Any],
+    kinds: dict[str, type[Element]],
+    *,
+    out: Path | None = None,
+    attachments: dict[str, str] | None = None,
+    events: list[tuple[int, Event]] | None = None,
+    progress: Progress | None = None,
+    memory: MemoryLog | None = None,
+    stop: Callable[[], bool] = lambda: False,
+) -> dict[str, Any]:
+    """Run a resolved scene to its end and return the summary.
+
+    Args:
+        scene: the resolved scene.
+        kinds: element kinds at hand.
+        out: directory for log and summary; no file is written when None.
+        attachments: text files for the log, by name.
+        events: (tick, event) in order; the scene's own when None. Pauses are of the wall clock and change nothing.
+        progress: called now and then with the logger's status.
+        memory: where to log without a directory.
+        stop: asked after every block; True ends the run there.
+
+    Raises:
+        RunFailed: an element raised, or gave something that is no number.
+        LogError: the log could not be written.
+    """
+    time = Timebase.of(scene["clock"], scene["duration"])
+    keeper = open_keeper(scene, time, out, attachments or {}, memory)
+    loop = Loop(scene, time, kinds, keeper)
+    loop.schedule(scene_events(scene, time) if events is None else events)
+    try:
+        while loop.block():
+            keeper.flush_when_due()
+            if progress:
+                progress(keeper.logger.status())
+            if stop():
+                loop.end_here()
+    except ElementError as error:
+        loop.fail(f"The controller failed: {error}")
+    except ArithmeticError as error:
+        loop.fail(f"The plant failed: {error}")
+    return loop.finish()
+
+
+def scene_events(scene: dict[str, Any], time: Timebase) -> list[tuple[int, Event]]:
+    """The events of a scene with their ticks, in order."""
+    return [(time.first_tick_at(event["at"]), event) for event in scene.get("event", [])]
+
+
+class Loop:
+    """Plant, controller and keeper of one scene, advanced block by block."""
+
+    def __init__(self, scene: dict[str, Any], time: Timebase, kinds: dict[str, type[Element]], keeper: Keeper) -> None:
+        self._plant, self._controller = Plant(scene, time), Controller(scene, time, kinds)
+        self._keeper = keeper
+        self._end = time.ticks
+        self._block = BlockLength(scene["run"]["block_ticks"])
+        keeper.logger.start(self._plant.state(), [])
+
+    def schedule(self, events: list[tuple[int, Event]]) -> None:
+        """Have events take effect at their ticks."""
+        for tick, event in events:
+            self._keeper.logger.event(tick, event)
+            if "swap" in event or "set" in event:
+                self._controller.schedule(tick, event)
+                self._plant.schedule(tick, event)
+            elif event.get("stop"):
+                self._end = min(self._end, tick)
+
+    def block(self) -> bool:
+        """Work through one block; False when the run has ended."""
+        plant, controller = self._plant, self._controller
+        until = min(plant.tick + self._block.ticks, self._end)
+        plant.run_until(until, lambda _, samples: [float(force) for force in controller.answer(samples)])
+        self._hand_over()
+        self._block.next()
+        return plant.tick < self._end and plant.stop_reason is None
+
+    def _hand_over(self) -> None:
+        first, ticks, columns = self._plant.take_block()
+        logger = self._keeper.logger
+        if ticks:
+            logger.plant_block({"from_tick": first, "ticks": ticks, "columns": columns})
+        for block in self._controller.recorder.take():
+            logger.controller_block(block)
+        for refusal in self._controller.recorder.refused:
+            logger.event(self._controller.tick, {"refused": refusal})
+        self._controller.recorder.refused = []
+
+    def end_here(self) -> None:
+        """End the run at the ticks worked on so far."""
+        self.schedule([(self._plant.tick, {"stop": True})])
+
+    def fail(self, reason: str) -> NoReturn:
+        """Save what there is and raise RunFailed."""
+        self._hand_over()
+        self._close(reason)
+        raise RunFailed(reason)
+
+    def finish(self) -> dict[str, Any]:
+        """Close the books and return the summary."""
+        return self._close("")
+
+    def _close(self, failed: str) -> dict[str, Any]:
+        return self._keeper.close(failed, self._plant.stop_reason, self._controller.recorder.trouble, 0)

@@ -1,0 +1,168 @@
+"""A scene in Python's hands: read from its file, changed without being changed, ready to run."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from copy import deepcopy
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from haploop.controller.dissipation import Element, load_plugin, registry
+from haploop.controller.dissipation.registry import checked
+from haploop.launch.scene import file as scene_file
+from haploop.launch.scene.check import resolve
+from haploop.launch.scene.elements import elements_of, try_out
+from haploop.launch.scene.layers import Layers
+from haploop.launch.scene.overrides import lay_overrides
+from haploop.launch.scene.toml_writer import inline, to_toml
+
+Values = Mapping[str, Any] | Iterable[str]
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """A scene that can be run; every change gives a new one, which can be run too, and leaves this one as it is.
+
+    A value is a number in SI units, text with its unit (``"0.2 N/mm"``) or a quantity of pint. ``scene["wall"]`` is a
+    table of it in SI units; ``print(scene)`` shows all of them.
+
+    Attributes:
+        path: the file it was read from.
+        kinds: the elements at hand, by kind.
+        plugin_files: the file of each kind that came from one.
+    """
+
+    _tables: dict[str, Any]
+    path: Path
+    kinds: Mapping[str, type[Element]] = field(default_factory=dict)
+    plugin_files: Mapping[str, Path] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        try_out(elements_of(self._tables), self.kinds)
+
+    @property
+    def tables(self) -> dict[str, Any]:
+        """A copy of all tables: plain dicts, all numbers SI, defaults filled in, absent tables absent."""
+        return deepcopy(self._tables)
+
+    def __getitem__(self, key: str) -> Any:
+        if key not in self._tables:
+            raise KeyError(f"There is no {key} in this scene; it holds {', '.join(self._tables)}.")
+        return deepcopy(self._tables[key])
+
+    def __contains__(self, key: str) -> bool:
+        return key in self._tables
+
+    def __str__(self) -> str:
+        return to_toml(self._tables)
+
+    def __repr__(self) -> str:
+        return f"<Scene {self['title']!r}, {self['duration']:g} s, from {self.path}>"
+
+    def set(self, values: Values, at: Any = None) -> Scene:
+        """The scene with other values, from its start or from a moment on.
+
+        Args:
+            values: by dotted key, ``{"wall.stiffness": 200, "dissipation.0.mass": "20 g"}``, or as on the command line,
+                ``["wall.stiffness=200"]``.
+            at: when they change in mid-run, in s or text with its unit; None for the start. In mid-run only wall,
+                delay and the elements' parameters can be set.
+
+        Raises:
+            SceneError: such a scene could not be run; it holds every mistake.
+            ElementError: an element's own code does not take its parameters.
+        """
+        if at is None:
+            layers = Layers(self.path, self.tables)
+            lay_overrides(layers, texts(values))
+            return self._resolved(layers)
+        if not isinstance(values, Mapping):
+            raise TypeError('What is set in mid-run must be given by key, such as {"wall.stiffness": 200}.')
+        return self._with_event({"at": plain(at), "set": plain(values)}, "set")
+
+    def swap(self, kind: str | type[Element], *, at: Any, element: int = 0, **parameters: Any) -> Scene:
+        """The scene with an element that is swapped in in mid-run.
+
+        Args:
+            kind: of the new element, or its class; "none" removes the one there is.
+            at: when, in s or text with its unit; the first tick then or later sees it.
+            element: which element is replaced, counted from 0; one past the end adds one.
+            parameters: of the new element, ``acts`` included.
+
+        Raises:
+            SceneError, ElementError: as for :meth:`set`.
+            PluginError: the class is no usable element.
+        """
+        scene, name = self, kind
+        if not isinstance(kind, str):
+            name = checked(kind, kind.__name__).kind
+            files = {other: file for other, file in self.plugin_files.items() if other != name}
+            scene = replace(self, kinds={**self.kinds, name: kind}, plugin_files=files)
+        table = {"kind": name, **plain(parameters)}
+        return scene._with_event({"at": plain(at), "swap": table, "element": element}, "swap")
+
+    def _with_event(self, event: dict[str, Any], by: str) -> Scene:
+        """The scene with one event more; its mistakes are those of the method ``by``, not of the file."""
+        layers = Layers(self.path, self.tables)
+        events = layers.data.setdefault("event", [])
+        layers.origins["event", len(events)] = by
+        events.append(event)
+        return self._resolved(layers)
+
+    def _resolved(self, layers: Layers) -> Scene:
+        tables = resolve(layers, self.kinds)
+        tables.get("event", []).sort(key=lambda event: event["at"])
+        return replace(self, _tables=tables)
+
+
+def load(
+    path: str | Path,
+    values: Values = (),
+    *,
+    elements: Iterable[type[Element]] = (),
+    plugins: Iterable[str | Path] = (),
+) -> Scene:
+    """Read a scene file.
+
+    Args:
+        path: the scene file (TOML).
+        values: laid over what it says, as in :meth:`Scene.set`.
+        elements: element classes that may be named by their kind, in this scene and in those made of it.
+        plugins: files that define elements.
+
+    Raises:
+        SceneError: the scene cannot be run; it holds every mistake.
+        PluginError: a file or a class is no usable element.
+        ElementError: an element's own code does not take its parameters.
+    """
+    kinds, files = registry(), {}
+    for plugin in map(Path, plugins):
+        found = load_plugin(plugin)
+        kinds |= found
+        files |= dict.fromkeys(found, plugin)
+    kinds |= (given := {checked(element, element.__name__).kind: element for element in elements})
+    files = {kind: file for kind, file in files.items() if kind not in given}
+    return Scene(scene_file.load(path, texts(values), kinds), Path(path), kinds, files)
+
+
+def texts(values: Values) -> list[str]:
+    """Values as the command line takes them: ``KEY=VALUE``.
+
+    Raises:
+        TypeError: a value is of a kind that no scene holds.
+    """
+    if isinstance(values, Mapping):
+        return [f"{key}={inline(plain(value))}" for key, value in values.items()]
+    return list(values)
+
+
+def plain(value: Any) -> Any:
+    """A value as a scene file holds it: a quantity of pint as text with its unit, NumPy's numbers as Python's."""
+    if isinstance(value, Mapping):
+        return {str(key): plain(inner) for key, inner in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(inner) for inner in value]
+    if hasattr(value, "units") and hasattr(value, "magnitude"):
+        return f"{float(value.magnitude)!r} {value.units:~C}"
+    return value.item() if hasattr(value, "item") else value

@@ -1,0 +1,136 @@
+"""Repeating a run from its own log: the scene, the plugins and every event, live ones included."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import haploop.logger
+from haploop.controller.dissipation import load_plugin, registry
+from haploop.launch.errors import RunFailed
+from haploop.launch.runs.in_process import run_in_process
+from haploop.launch.output import PLUGINS, SCENE
+from haploop.launch.scene.file import load
+from haploop.logger.session import SUMMARY
+from haploop.logger.log.recording import Recording
+from haploop.logger.summary import finite
+
+
+class ReplayError(Exception):
+    """The run cannot be repeated; the message says what is missing."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Replay:
+    """What came of repeating a run.
+
+    Attributes:
+        summary: of the repetition.
+        differences: where recorded and repeated run disagree, as sentences; empty when every bit agreed.
+    """
+
+    summary: dict[str, Any]
+    differences: list[str]
+
+
+def replay(directory: Path) -> Replay:
+    """Run again what the log says, in one process, and compare bit by bit.
+
+    The whole trajectory is compared where the summary holds its digest, and every logged step, tick and book.
+
+    Raises:
+        ReplayError, LogError, SceneError: the directory does not hold a run that can be repeated.
+    """
+    if not (directory / SCENE).is_file():
+        raise ReplayError(f"{directory} holds no {SCENE}; a directory that haploop run has written was expected.")
+    recorded = _recorded(directory)
+    kinds = registry([Path(directory) / PLUGINS / name for name in _launch_plugins(directory, recorded)])
+    scene = load(directory / SCENE, (), kinds)
+    events = [_event(dict(event), directory) for event in recorded["/events"]] if "/events" in recorded else []
+    logged = len(recorded["/controller"]["x"]) if "/controller" in recorded else 0
+    events.append((logged, {"stop": True}))  # a run that was cut off is repeated as far as its log goes
+    with tempfile.TemporaryDirectory(prefix="haploop-replay-") as scratch:
+        try:
+            summary = run_in_process(scene, kinds, out=Path(scratch), events=events)
+        except RunFailed:  # then ticks are missing, and the comparison says so
+            summary = _summary(Path(scratch)) or {}
+        repeated = haploop.logger.read(scratch)
+    before = _summary(directory)
+    failed = before is not None and before["ended"] == "failed"
+    differences = _compare(recorded, repeated, failed)
+    if before and not failed:
+        differences += _compare_summaries(before, finite(summary))
+    return Replay(summary, differences)
+
+
+def _recorded(directory: Path) -> Recording:
+    """The log of a run from its first tick on."""
+    try:
+        recorded = haploop.logger.read(directory)
+    except FileNotFoundError as error:
+        raise ReplayError(str(error)) from error
+    seen = recorded["/controller"]["timestamp"][:1] if "/controller" in recorded else []
+    if any(t > 0.0 for t in seen):
+        raise ReplayError(f"{directory} was logged from {seen[0]:g} s on; replay the directory of the run itself.")
+    return recorded
+
+
+def _summary(directory: Path) -> dict[str, Any] | None:
+    file = directory / SUMMARY
+    return json.loads(file.read_text(encoding="utf-8")) if file.is_file() else None
+
+
+def _launch_plugins(directory: Path, recorded: Recording) -> list[str]:
+    """Names of the plugin files the run began with; those taken up later stand in its events."""
+    names = [name.removeprefix(f"{PLUGINS}/") for name in recorded.attachments if name.startswith(f"{PLUGINS}/")]
+    for name in names:
+        if not (directory / PLUGINS / name).is_file():
+            raise ReplayError(
+                f"{directory / PLUGINS / name} is missing; the run cannot be repeated without its plugin."
+            )
+    return names
+
+
+def _event(event: dict[str, Any], directory: Path) -> tuple[int, dict[str, Any]]:
+    """A logged event as it was given, its plugin looked for in the run's directory."""
+    del event["timestamp"]
+    tick = event.pop("tick")
+    if "plugin" in event:
+        event["plugin"] = str(directory / PLUGINS / Path(event["plugin"]).name)
+        load_plugin(Path(event["plugin"]))
+    return tick, event
+
+
+def _compare(recorded: Recording, repeated: Recording, failed: bool) -> list[str]:
+    """Differences between two logs as far as the recorded one goes, one sentence a column.
+
+    Where a failed run broke off, the force of its end state is the one held before, not the one that would follow.
+    """
+    differences = []
+    for topic in ("/plant", "/controller", "/energy"):
+        if topic not in recorded:
+            continue
+        for name, whole in recorded[topic].items():
+            before = whole[:-1] if failed and (topic, name) == ("/plant", "force") else whole
+            after = repeated[topic].get(name, np.zeros(0))[: len(before)]
+            differs = np.ones(len(before), bool)
+            differs[: len(after)] = before[: len(after)].view(np.uint64) != after.view(np.uint64)
+            if differs.any():
+                first = int(np.argmax(differs))
+                t = float(recorded[topic]["timestamp"][first])
+                differences.append(
+                    f"{topic} {name} differs in {int(differs.sum())} of {len(before)} rows, first at {t:g} s."
+                )
+    return differences
+
+
+def _compare_summaries(before: dict[str, Any], after: dict[str, Any]) -> list[str]:
+    """Differences between the summary of a run that ended in order and the repeated one's."""
+    keys = ("ticks", "verdict", "trajectory_sha256", "final", "extremes", "window", "energy", "lost")
+    of_effects = ("actuator", "accelerometer")
+    return [f"{key} of the summary differs." for key in (*keys, *of_effects) if before.get(key) != after.get(key)]

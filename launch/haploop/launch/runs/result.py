@@ -1,0 +1,153 @@
+"""Running a scene from Python, and what comes of it: the summary, and every channel with its units."""
+
+from __future__ import annotations
+
+import math
+import tempfile
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import haploop.logger
+from haploop.controller.dissipation import PluginError, registry
+from haploop.launch.runs import start
+from haploop.launch.scene.elements import elements_of
+from haploop.launch.runs.in_process import run_in_process
+from haploop.launch.runs.loaded_scene import Scene, load
+from haploop.launch.output import SCENE, make_output
+from haploop.logger.session import LOG
+from haploop.logger.log.memory import MemoryLog
+from haploop.logger.log.recording import Recording, Table
+
+if TYPE_CHECKING:
+    import pint
+
+
+# What the end of a summary's key says of its unit; the first that fits counts.
+_UNITS = {"_N_m": "N/m", "_m_s": "m/s", "_1_s": "1/s", "_m": "m", "_s": "s", "_N": "N", "_J": "J"}
+
+
+def unit_of(key: str) -> str:
+    """The unit of a number of a summary, by its key; "" for none."""
+    return next((unit for end, unit in _UNITS.items() if key.endswith(end)), "")
+
+
+@dataclass(frozen=True, eq=False)
+class Result:
+    """A finished run.
+
+    ``result["/plant"]["x"]`` is an array of float64, ``result["/plant"].quantity("x")`` the same with its unit,
+    ``result["/plant"].frame()`` a data frame; ``result["/events"]`` is a list of maps.
+
+    Attributes:
+        scene: what was run.
+        summary: as in ``summary.json``; the unit of a number stands at the end of its key.
+        directory: where the run left its files, None when it left none.
+    """
+
+    scene: Scene
+    summary: dict[str, Any]
+    directory: Path | None
+    _kept: Recording | None = None
+
+    @cached_property
+    def log(self) -> Recording:
+        """Every channel by topic, read from the directory when first asked for."""
+        return haploop.logger.read(self.directory or "") if self._kept is None else self._kept
+
+    def __getitem__(self, topic: str) -> Table | Any:
+        return self.log[topic]
+
+    @property
+    def verdict(self) -> str:
+        """``steady``, ``limit-cycle``, ``diverged`` or ``no-contact``."""
+        return self.summary["verdict"]
+
+    def quantity(self, key: str) -> pint.Quantity[float]:
+        """A number of the summary with its unit, by dotted key: ``"window.oscillation_m"``, ``"energy.moved_J"``.
+
+        A number that the run did not come to, None in the summary, is NaN.
+
+        Raises:
+            KeyError: there is no such entry.
+        """
+        import pint
+
+        value: Any = self.summary
+        for part in key.split("."):
+            value = value[int(part) if isinstance(value, list) else part]
+        return pint.get_application_registry().Quantity(math.nan if value is None else value, unit_of(key))
+
+    def __repr__(self) -> str:
+        swing_mm = 1e3 * (self.summary["window"]["oscillation_m"] or 0.0)
+        title, duration_s = self.summary["title"], self.summary["duration_s"]
+        return f"<{self.verdict}: {title!r}, {duration_s:g} s, oscillation {swing_mm:.3g} mm peak to peak>"
+
+
+def run(
+    scene: Scene | str | Path,
+    out: str | Path | None = None,
+    *,
+    processes: bool = False,
+    pace: float = math.inf,
+) -> Result:
+    """Run a scene to its end.
+
+    Args:
+        scene: a loaded scene, or the path of one.
+        out: directory for log, summary and scene, new or empty; when None, everything stays in memory.
+        processes: run plant, controller and logger as processes, which other terminals can watch and steer; else all
+            in this one. The bits are the same.
+        pace: simulated seconds per second, for processes; infinite for as fast as it goes.
+
+    Raises:
+        SceneError, ElementError: the scene cannot be run.
+        OutputError: the directory cannot be used.
+        PluginError: the processes could not find an element that was given as a class.
+        RunFailed: a process was killed, hung or could not go on, or an element raised.
+        LogError: the log could not be written.
+    """
+    scene = scene if isinstance(scene, Scene) else load(scene)
+    if math.isfinite(pace) and not processes:
+        raise ValueError(f"A pace of {pace:g} needs the clock of a run as processes; give processes=True too.")
+    if out is None and not processes:
+        return _in_memory(scene)
+    if processes:
+        _check_files(scene)
+    with _directory(out) as directory:
+        target = make_output(Path(directory), scene.path)
+        files = dict.fromkeys(scene.plugin_files.values())
+        prepared = start.lay_out(scene.tables, dict(scene.kinds), target, list(files), dict(scene.plugin_files))
+        summary = start.run(prepared, in_process=not processes, pace=pace)
+        kept = _read(target) if out is None else None
+    return Result(scene, summary, None if out is None else target, kept)
+
+
+def _in_memory(scene: Scene) -> Result:
+    memory = MemoryLog()
+    summary = run_in_process(scene.tables, dict(scene.kinds), attachments={SCENE: str(scene)}, memory=memory)
+    return Result(scene, summary, None, memory.recording())
+
+
+def _directory(out: str | Path | None) -> AbstractContextManager[str | Path]:
+    """The directory asked for, or one that goes when it has been read."""
+    return tempfile.TemporaryDirectory(prefix="haploop-") if out is None else nullcontext(out)
+
+
+def _read(directory: Path) -> Recording:
+    """The log of a run, empty where the scene asks for none."""
+    return haploop.logger.read(directory) if (directory / LOG).exists() else Recording({}, "", {})
+
+
+def _check_files(scene: Scene) -> None:
+    """Processes load their elements themselves: every one must be installed, or have a file."""
+    installed = registry()
+    for table in elements_of(scene.tables):
+        kind = table["kind"]
+        if kind not in scene.plugin_files and installed.get(kind) is not scene.kinds[kind]:
+            raise PluginError(
+                f"The element {kind} was given as a class, which other processes cannot load; "
+                f'put it into a file and give that: load(..., plugins=["{kind}.py"]).'
+            )

@@ -1,0 +1,137 @@
+"""From merged tables to a resolved scene, or to everything that is wrong with them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from pydantic import ValidationError
+from pydantic_core import PydanticCustomError
+
+from haploop.launch.scene.combinations import check_combinations, check_rate
+from haploop.launch.scene.events import check_events
+from haploop.launch.scene.layers import KeyPath, Layers
+from haploop.launch.scene.mistakes import SceneError, nearest
+from haploop.launch.scene.schema import Schema, alternatives, schema_at, whole_schema
+from haploop.launch.scene.tables.estimator_keys import check_estimators, check_filter
+from haploop.launch.scene.tables.scene import Clock, SceneTable, number_of, scene_model
+from haploop.launch.scene.toml_writer import inline
+from haploop.protocol.ticks import Timebase, TimebaseError
+
+if TYPE_CHECKING:
+    from haploop.controller.dissipation import Element
+
+# Where the key ``kind`` says what else is in a table; a number stands for any.
+_TAGGED = {("hand", "force"), ("jitter",), ("dissipation", 0), ("event", 0, "swap")}
+_FORMS = {
+    "bool_type": "It must be true or false.",
+    "string_type": "It must be text in quotes.",
+    "list_type": "It must be a list.",
+    "dict_type": "It must be a table.",
+    "model_type": "It must be a table.",
+    "model_attributes_type": "It must be a table.",
+}
+
+
+def resolve(layers: Layers, kinds: Mapping[str, type[Element]]) -> dict[str, Any]:
+    """The resolved scene: defaults filled in, SI numbers, empty lists left out.
+
+    Raises:
+        SceneError: all mistakes, those already known to ``layers`` included.
+    """
+    scene: SceneTable | None = None
+    try:
+        scene = scene_model(kinds).model_validate(layers.data)
+    except ValidationError as error:
+        schema = whole_schema(kinds)
+        tagged = _TAGGED if len(kinds) > 1 else _TAGGED - {("dissipation", 0)}  # one kind alone is no choice
+        for detail in error.errors(include_url=False):
+            complain(layers, detail["type"], detail["msg"], _plain(detail["loc"], tagged), schema)
+    check_combinations(layers)
+    check_estimators(layers)
+    if scene:
+        check_filter(layers, scene)
+        check_rate(layers, scene)
+    settings = check_events(layers, _timebase(layers), kinds)
+    if layers.mistakes or scene is None:
+        raise SceneError(layers.mistakes)
+    resolved = scene.model_dump(exclude_none=True)
+    for index, event in enumerate(resolved.get("event", [])):
+        if "swap" in event:
+            event.setdefault("element", 0)
+        if "set" in event:
+            event["set"] = settings[index]
+    return {key: value for key, value in resolved.items() if value != []}
+
+
+def resolve_event(event: dict[str, Any], scene: dict[str, Any], kinds: Mapping[str, type[Element]]) -> dict[str, Any]:
+    """An event that comes in during a run, resolved, after the events of the resolved ``scene``.
+
+    Raises:
+        SceneError: it does not fit the scene, or an event that is still to come no longer would.
+    """
+    layers = Layers(Path("live event"), {**scene, "event": [*scene.get("event", []), event]})
+    return resolve(layers, kinds)["event"][-1]
+
+
+def _timebase(layers: Layers) -> Timebase | None:
+    """The integers of the run; None when there are none, which is a mistake here unless it is one already."""
+    try:
+        clock = Clock.model_validate(layers.data.get("clock", {})).model_dump()
+        duration = number_of(SceneTable, "duration").read(layers.data.get("duration"))
+    except (ValidationError, PydanticCustomError):
+        return None
+    try:
+        return Timebase.of(clock, duration)
+    except TimebaseError as error:
+        for sentence in str(error).splitlines():
+            name = sentence.split()[0]
+            key, value = (("clock", name), clock[name]) if name in clock else ((name,), duration)
+            layers.complain(key, f"The {sentence}", f"is {inline(value)}")
+        return None
+
+
+def complain(layers: Layers, what: str, message: str, key: KeyPath, schema: Schema) -> None:
+    """Add a mistake that pydantic found, as a sentence; ``schema`` is that of the whole file."""
+    rule = schema_at(schema, key, layers.data)
+    match what:
+        case "extra_forbidden":
+            *table, name = key
+            keys = list(schema_at(schema, tuple(table), layers.data).get("properties", {}))
+            where = f"[{'.'.join(map(str, table))}]" if table else f"a {schema['title'].lower()}"
+            layers.complain(key, f"Allowed: {', '.join(keys)}.", f"is not a key of {where}", nearest(name, keys))
+        case "missing":
+            layers.complain(key, f"It must be {_form(rule)}.", "is missing")
+        case "union_tag_not_found":
+            allowed = alternatives(schema, rule)
+            layers.complain((*key, "kind"), f"Allowed: {', '.join(allowed)}.", "is missing")
+        case "union_tag_invalid" | "literal_error":
+            key = (*key, "kind") if what == "union_tag_invalid" else key
+            allowed = alternatives(schema, rule)
+            layers.complain(key, f"Allowed: {', '.join(allowed)}.", None, nearest(layers.value(key), allowed))
+        case "sentence":
+            given = "does not fit together" if isinstance(layers.value(key), dict) else None
+            layers.complain(key, message, given)
+        case _:
+            layers.complain(key, _FORMS.get(what, f"{message}."))
+
+
+def _form(rule: Schema) -> str:
+    """What a value has to be, from its schema."""
+    if "properties" in rule:
+        return f"a table with {', '.join(rule.get('required', rule['properties']))}"
+    return rule["description"].rpartition(": ")[2] if "description" in rule else rule.get("type", "given")
+
+
+def _plain(location: tuple[str | int, ...], tagged: set[KeyPath]) -> KeyPath:
+    """A location of pydantic's as a key of the scene: without the kind it puts after a table that has kinds."""
+    key: KeyPath = ()
+    skip = False
+    for part in location:
+        if skip:
+            skip = False
+            continue
+        key = (*key, part)
+        skip = tuple(0 if isinstance(p, int) else p for p in key) in tagged
+    return key

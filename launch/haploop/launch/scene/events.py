@@ -1,0 +1,148 @@
+"""The ``[[event]]`` tables: what a single table cannot show, namely whether each change fits the run it comes into."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING, Any
+
+from pydantic_core import PydanticCustomError
+
+from haploop.launch.scene.layers import KeyPath, Layers
+from haploop.launch.scene.mistakes import counted, nearest
+from haploop.launch.scene.tables.number import Number
+from haploop.launch.scene.tables.scene import Clock, EventTable, Wall, number_of
+from haploop.protocol.ticks import DELAY, Timebase, whole_count
+
+if TYPE_CHECKING:
+    from haploop.controller.dissipation import Element
+
+VERBS = ("swap", "set", "pause", "stop")
+SETTABLE_OF_WALL = ("stiffness", "position")
+NO_ELEMENT = "none"
+
+
+def check_events(
+    layers: Layers, time: Timebase | None, kinds: Mapping[str, type[Element]]
+) -> dict[int, dict[str, float]]:
+    """Walk the events in order of time, keeping book of which element is in which slot.
+
+    Removing an element, by kind "none", moves those after it up by one.
+
+    Returns:
+        Index of each event that sets something -> settable key -> SI value. Mistakes are added to ``layers``.
+    """
+    events = [(i, e) for i, e in enumerate(_tables(layers.data.get("event"))) if isinstance(e, dict)]
+    slots = [e.get("kind") if isinstance(e, dict) else None for e in _tables(layers.data.get("dissipation"))]
+    has_wall = isinstance(layers.data.get("wall"), dict)
+    settings: dict[int, dict[str, float]] = {}
+    for index, event in sorted(events, key=lambda item: _read(item[1], "at")):
+        key = ("event", index)
+        _check_shape(layers, key, event, time)
+        if isinstance(event.get("swap"), dict):
+            _swap(layers, key, event, slots)
+        if isinstance(event.get("set"), dict):
+            settable = settable_keys(slots, has_wall, kinds)
+            settings[index] = {
+                name: value
+                for name, given in event["set"].items()
+                if (value := _setting(layers, (*key, "set", name), given, settable, time)) is not None
+            }
+    return settings
+
+
+def _check_shape(layers: Layers, key: KeyPath, event: dict[str, Any], time: Timebase | None) -> None:
+    verbs = [verb for verb in VERBS if event.get(verb) is not None]
+    if len(verbs) != 1:
+        given = f"has {' and '.join(verbs)}" if verbs else "changes nothing"
+        layers.complain(key, "An event has exactly one of swap, set, pause and stop.", given)
+    if "element" in event and "swap" not in event:
+        layers.complain((*key, "element"), "It goes with swap alone.")
+    at = _read(event, "at")
+    if time and time.first_tick_at(at) >= time.ticks:
+        last = (time.ticks - 1) / time.control_rate
+        layers.complain((*key, "at"), f"It must be at most {last:g} s, when the last tick of the run is.")
+
+
+def _swap(layers: Layers, key: KeyPath, event: dict[str, Any], slots: list[Any]) -> None:
+    """Put the new kind into its slot."""
+    element = _read(event, "element")
+    kind = event["swap"].get("kind")
+    if element < len(slots) + (kind != NO_ELEMENT):
+        slots[element : element + 1] = [] if kind == NO_ELEMENT else [kind]
+    else:
+        expected = f"The scene has {counted(len(slots), 'element')} then, counted from 0; one past the end adds one."
+        layers.complain((*key, "element"), expected, f"is {element}")
+
+
+def settable_keys(slots: list[Any], has_wall: bool, kinds: Mapping[str, type[Element]]) -> dict[str, Number]:
+    """Every key that can be set at a moment of the run when these kinds are at work, and how its value is read."""
+    wall = {f"wall.{name}": number_of(Wall, name) for name in SETTABLE_OF_WALL if has_wall}
+    elements = {
+        f"dissipation.{slot}.{name}": Number(quantity)
+        for slot, kind in enumerate(slots)
+        if isinstance(kind, str) and kind in kinds
+        for name, (quantity, _) in kinds[kind].parameters().items()
+    }
+    return wall | {DELAY: number_of(Clock, "round_trip_delay")} | elements
+
+
+def _setting(
+    layers: Layers, key: KeyPath, given: Any, settable: dict[str, Number], time: Timebase | None
+) -> float | None:
+    name = str(key[-1])
+    if isinstance(given, dict):
+        layers.complain(
+            key,
+            f'Write the whole key in quotes, such as "{name}.{next(iter(given), "stiffness")}" = 1.0.',
+            "is a table",
+        )
+    elif name not in settable:
+        expected = f"Allowed at that time: {', '.join(settable)}."
+        layers.complain(key, expected, "cannot be set", _nearest_key(name, settable))
+    else:
+        try:
+            value = settable[name].read(given)
+        except PydanticCustomError as error:
+            layers.complain(key, error.message())
+            return None
+        if name == DELAY and time:
+            complaints: list[str] = []
+            whole_count(value, time.plant_rate, "It", "plant steps", complaints)
+            for sentence in complaints:
+                layers.complain(key, sentence)
+        return value
+    return None
+
+
+def changed(scene: dict[str, Any], events: Iterable[dict[str, Any]]) -> dict[str, Any]:
+    """A resolved scene after these resolved events, in order: elements swapped, values set."""
+    now = {**scene, "clock": dict(scene["clock"]), "dissipation": [dict(e) for e in scene.get("dissipation", [])]}
+    now |= {"wall": dict(scene["wall"])} if "wall" in scene else {}
+    for event in events:
+        if "swap" in event:
+            index, table = event["element"], event["swap"]
+            now["dissipation"][index : index + 1] = [] if table["kind"] == NO_ELEMENT else [dict(table)]
+        for key, value in event.get("set", {}).items():
+            table, _, name = key.rpartition(".")
+            place, _, index = table.partition(".")
+            (now[place][int(index)] if index else now[place])[name] = value
+    return now
+
+
+def _nearest_key(name: str, settable: dict[str, Number]) -> str | None:
+    """The key closest to ``name``, by its last part where the table is right: long names are alike in their front."""
+    table, _, last = name.rpartition(".")
+    names = {key.rpartition(".")[2]: key for key in settable if key.startswith(f"{table}.")}
+    return names.get(nearest(last, names) or "") if names else nearest(name, settable)
+
+
+def _read(event: dict[str, Any], key: str) -> Any:
+    """A number of an event; 0 where it is missing, or wrong, which is a mistake reported elsewhere."""
+    try:
+        return number_of(EventTable, key).read(event.get(key))
+    except PydanticCustomError:
+        return 0
+
+
+def _tables(value: Any) -> list[Any]:
+    return value if isinstance(value, list) else []

@@ -1,0 +1,77 @@
+"""Reading a scene file: everything it says, resolved, or everything that is wrong with it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from haploop.launch.scene.check import resolve
+from haploop.launch.scene.force_csv import TraceError, read_trace
+from haploop.launch.scene.layers import Layers, read_layers
+from haploop.launch.scene.mistakes import COMMAND_LINE
+from haploop.launch.scene.overrides import lay_overrides
+
+if TYPE_CHECKING:
+    from haploop.controller.dissipation import Element
+
+
+def load(
+    path: Path | str, overrides: Sequence[str] = (), kinds: Mapping[str, type[Element]] | None = None
+) -> dict[str, Any]:
+    """The resolved scene of a TOML file: a plain dict, all numbers SI, defaults filled in, absent tables absent.
+
+    Its events are in order of time.
+
+    Args:
+        path: the scene file.
+        overrides: ``KEY=VALUE`` with dotted keys, laid over what the file says.
+        kinds: the dissipation elements at hand, by kind; the installed ones when None.
+
+    Raises:
+        SceneError: the scene cannot be run; it holds every mistake.
+    """
+    return resolved(read_layers(Path(path)), overrides, kinds)
+
+
+def resolved(
+    layers: Layers, overrides: Sequence[str] = (), kinds: Mapping[str, type[Element]] | None = None
+) -> dict[str, Any]:
+    """As ``load``, of layers that were read already.
+
+    Raises:
+        SceneError: the scene cannot be run; it holds every mistake.
+    """
+    lay_overrides(layers, overrides)
+    layers.data.setdefault("title", layers.path.stem)
+    _read_recording(layers)
+    if kinds is None:
+        from haploop.controller.dissipation import registry
+
+        kinds = registry()
+    scene = resolve(layers, kinds)
+    scene.get("event", []).sort(key=lambda event: event["at"])
+    return scene
+
+
+def _read_recording(layers: Layers) -> None:
+    """Put the samples of a recorded hand force in place of its file, so that the scene runs by itself."""
+    hand = layers.data.get("hand")
+    force = hand.get("force") if isinstance(hand, dict) else None
+    if not isinstance(force, dict) or force.get("kind") != "trace" or "file" not in force:
+        return
+    key = ("hand", "force", "file")
+    times, forces = [0.0], [0.0]
+    if "time" in force or "force" in force:
+        layers.complain(key, "A trace has either a file or the lists time and force.")
+    elif not isinstance(force["file"], str):
+        layers.complain(key, "It must be the path of a CSV file of time and force.")
+    else:
+        origin = layers.origin(key)
+        folder = Path() if origin == COMMAND_LINE else Path(origin).parent
+        try:
+            times, forces = read_trace(folder / force["file"])
+        except TraceError as error:
+            layers.complain(key, str(error))
+    del force["file"]
+    force |= {"time": times, "force": forces}

@@ -1,0 +1,154 @@
+"""Scene files laid over one another: what ``extends`` names, the file itself, then ``--set``."""
+
+from __future__ import annotations
+
+import tomllib
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from haploop.launch.scene.mistakes import COMMAND_LINE, Mistake, SceneError, shown
+from haploop.launch.scene.toml_writer import inline
+
+KeyPath = tuple[str | int, ...]
+# Keys that say what else is in their table, each with the keys that are there whatever it says.
+_SORTS = {"kind": (), "estimator": ("source", "cutoff")}
+
+
+@dataclass
+class Layers:
+    """What the layers say together, and who said it.
+
+    Attributes:
+        path: the scene file on top.
+        data: the merged tables.
+        origins: the file, or ``"--set"``, that gave each value, and the last file that wrote into each table.
+        mistakes: what was found wrong so far.
+    """
+
+    path: Path
+    data: dict[str, Any] = field(default_factory=dict)
+    origins: dict[KeyPath, str] = field(default_factory=dict)
+    mistakes: list[Mistake] = field(default_factory=list)
+
+    def origin(self, key: KeyPath) -> str:
+        """Who gave the value at ``key``, or the table nearest to it."""
+        while key and key not in self.origins:
+            key = key[:-1]
+        return self.origins.get(key, str(self.path))
+
+    def complain(self, key: KeyPath, expected: str, given: str | None = None, nearest: str | None = None) -> None:
+        """Add a mistake about ``key``, whose value is quoted unless ``given`` says what was found."""
+        if given is None:
+            given = f"is {_quoted(self.value(key))}"
+        origin = self.origin(key)
+        file = origin if origin == COMMAND_LINE else shown(origin)
+        self.mistakes.append(Mistake(file, ".".join(map(str, key)), given, expected, nearest))
+
+    def value(self, key: KeyPath) -> Any:
+        """The value at ``key``."""
+        value: Any = self.data
+        for part in key:
+            value = value[part]
+        return value
+
+    def lay(self, over: dict[str, Any], origin: str, key: KeyPath = ()) -> None:
+        """Lay a table over the one at ``key``: tables merge key by key, all else is replaced.
+
+        The keys of a ramp mean nothing to a sine: a table that names another kind drops what lay below it.
+        """
+        under = self.value(key)
+        for sort, common in _SORTS.items():
+            if sort in over and under.get(sort, over[sort]) != over[sort]:
+                for name in [n for n in under if n not in common and self.origins.get((*key, n)) != origin]:
+                    self._forget((*key, name))
+                    del under[name]
+        if origin != COMMAND_LINE or key not in self.origins:
+            self.origins[key] = origin
+        for name, value in over.items():
+            inner = (*key, name)
+            if isinstance(value, dict) and isinstance(under.get(name), dict):
+                self.lay(value, origin, inner)
+            else:
+                self._forget(inner)
+                under[name] = value
+                self._remember(inner, value, origin)
+
+    def _forget(self, key: KeyPath) -> None:
+        for old in [old for old in self.origins if old[: len(key)] == key]:
+            del self.origins[old]
+
+    def _remember(self, key: KeyPath, value: Any, origin: str) -> None:
+        self.origins[key] = origin
+        if isinstance(value, dict):
+            for name, inner in value.items():
+                self._remember((*key, name), inner, origin)
+
+
+def read_layers(path: Path) -> Layers:
+    """The scene file at ``path`` over all that it extends; of several the later wins.
+
+    Raises:
+        SceneError: a file that cannot be read, or that extends itself.
+    """
+    layers = Layers(path)
+    _read(layers, path, ())
+    if layers.mistakes:
+        raise SceneError(layers.mistakes)
+    return layers
+
+
+def _read(layers: Layers, path: Path, chain: tuple[Path, ...]) -> None:
+    """Lay the file at ``path`` on, after what it extends."""
+    here = path.resolve()
+    if here in chain:
+        circle = " extends ".join(shown(p) for p in (*chain[chain.index(here) :], here))
+        layers.mistakes.append(Mistake(shown(chain[-1]), "", "", f"A scene cannot extend itself: {circle}."))
+        return
+    try:
+        table = parse(path)
+    except SceneError as error:
+        layers.mistakes += error.mistakes
+        return
+    below = table.pop("extends", [])
+    names = [below] if isinstance(below, str) else below
+    if not isinstance(names, list) or not all(isinstance(name, str) and name for name in names):
+        expected = "It must be the path of a scene file, or a list of them."
+        layers.mistakes.append(Mistake(shown(path), "extends", f"is {_quoted(below)}", expected))
+        return
+    for name in names:
+        _read(layers, path.parent / name, (*chain, here))
+    layers.lay(table, str(path))
+
+
+def parse(path: Path, what: str = "scene", needs: str = "a duration and a [device]") -> dict[str, Any]:
+    """The tables of one TOML file, which is a ``what`` and needs some keys at least.
+
+    Raises:
+        SceneError: it is missing, empty, no file, no text or no TOML (with line and column).
+    """
+    try:
+        if table := tomllib.loads(path.read_bytes().decode("utf-8-sig")):
+            return table
+        problem = f"The file is empty; a {what} needs at least {needs}."
+    except FileNotFoundError:
+        problem = "There is no such file."
+    except IsADirectoryError:
+        problem = f"This is a directory; a {what} is a TOML file."
+    except OSError as error:
+        problem = f"The file cannot be read: {error.strerror}."
+    except UnicodeDecodeError as error:
+        problem = f"A {what} must be UTF-8 text, but byte {error.start} is not."
+    except ValueError as error:
+        problem = f"This is not TOML: {error}."
+    except RecursionError:
+        problem = "The tables are nested too deeply."
+    raise SceneError([Mistake(shown(path), "", "", problem)])
+
+
+def _quoted(value: Any) -> str:
+    try:
+        text = inline(value)
+    except TypeError:
+        text = str(value)
+    return text if len(text) <= 60 else f"{text[:57]}..."

@@ -1,0 +1,92 @@
+"""The JSON Schema of a scene file, for editors and for saying what a key may be."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from pydantic.json_schema import GenerateJsonSchema
+from pydantic_core import core_schema
+
+from haploop.launch.scene.tables.scene import scene_model
+
+if TYPE_CHECKING:
+    from haploop.controller.dissipation import Element
+
+Schema = dict[str, Any]
+
+
+class TomlSchema(GenerateJsonSchema):
+    """TOML has no null, and a key left out may come from the scene that this one extends."""
+
+    def nullable_schema(self, schema: core_schema.NullableSchema) -> Schema:
+        return self.generate_inner(schema["schema"])
+
+    def default_schema(self, schema: core_schema.WithDefaultSchema) -> Schema:
+        if schema.get("default", ...) is None:
+            return self.generate_inner(schema["schema"])
+        return super().default_schema(schema)
+
+    def tagged_union_schema(self, schema: core_schema.TaggedUnionSchema) -> Schema:
+        return {"anyOf": [self.generate_inner(choice) for choice in schema["choices"].values()]}  # pyright: ignore[reportArgumentType]
+
+
+def json_schema(kinds: Mapping[str, type[Element]]) -> Schema:
+    """The JSON Schema (draft 2020-12) of a scene file, with the parameters of every kind of element.
+
+    A file that extends another may leave out what the other gives, so keys are required only in arrays of tables,
+    which are replaced whole.
+    """
+    schema = whole_schema(kinds)
+    whole = {"Event", "none", *kinds}
+    for name, table in [("Scene", schema), *schema["$defs"].items()]:
+        if name not in whole:
+            table.pop("required", None)
+    path = {"type": "string", "description": "a scene file whose keys this one overrides"}
+    schema["properties"]["extends"] = {"anyOf": [path, {"type": "array", "items": path}]}
+    schema["anyOf"] = [{"required": ["extends"]}, {"required": ["duration", "device"]}]
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}
+
+
+def whole_schema(kinds: Mapping[str, type[Element]]) -> Schema:
+    """The JSON Schema of a scene after everything it extends has been merged into it."""
+    schema = scene_model(kinds).model_json_schema(schema_generator=TomlSchema)
+    recording = {"type": "string", "description": "a CSV of time in s and force in N, in place of time and force"}
+    schema["$defs"]["Trace"]["properties"]["file"] = recording
+    return schema
+
+
+def schema_at(schema: Schema, path: tuple[str | int, ...], data: Any) -> Schema:
+    """The part of ``schema`` that rules the value at ``path`` of ``data``; empty where nothing does."""
+    node = _chosen(schema, schema, data)
+    for key in path:
+        inner = node.get("items", {}) if isinstance(key, int) else node.get("properties", {}).get(key, {})
+        try:
+            data = data[key]
+        except (KeyError, IndexError, TypeError):
+            data = None
+        node = _chosen(schema, inner, data)
+    return node
+
+
+def alternatives(schema: Schema, rule: Schema) -> list[str]:
+    """The names that may stand where ``rule`` rules: the values of a choice, or the kinds of a table."""
+    if "anyOf" in rule:
+        return [_chosen(schema, choice, None)["properties"]["kind"]["const"] for choice in rule["anyOf"]]
+    names = rule.get("enum", [rule.get("const")])
+    return [name if isinstance(name, str) else str(name).lower() for name in names]
+
+
+def _chosen(schema: Schema, node: Schema, data: Any) -> Schema:
+    """Follow a reference; of alternatives take the one whose kind ``data`` names."""
+    if "$ref" in node:
+        return _chosen(schema, schema["$defs"][_name(node)], data)
+    for choice in node.get("anyOf", []):
+        table = _chosen(schema, choice, data)
+        if isinstance(data, dict) and table.get("properties", {}).get("kind", {}).get("const") == data.get("kind"):
+            return table
+    return node
+
+
+def _name(reference: Schema) -> str:
+    return reference["$ref"].rpartition("/")[2]

@@ -1,0 +1,1 @@
+"""The tables of a scene, each key with unit, bounds and default."""

@@ -1,0 +1,89 @@
+"""The tables of the effects a real device has. Each is simulated only where the scene holds its table."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from haploop.launch.scene.tables.base import Table
+from haploop.launch.scene.tables.number import si
+
+Bandwidth = Annotated[float, si("Hz", "corner of a first-order low-pass", above=0)]
+
+
+class Noise(Table):
+    """Noise on the measured position, before the encoder rounds it: white, band-limited by a first-order low-pass."""
+
+    deviation: Annotated[float, si("m", "standard deviation", at_least=0)]
+    cutoff: Annotated[float, si("Hz", "where its spectrum has fallen to half", above=0)]
+
+
+class Accelerometer(Table):
+    """A real accelerometer in place of the ideal one: what is left out of it is ideal."""
+
+    range: Annotated[float | None, si("m/s^2", "largest reading to either side", above=0)] = None
+    resolution: Annotated[float | None, si("m/s^2", "one count", above=0)] = None
+    noise_density: Annotated[float, si("m/s^2/Hz^0.5", "density of its white noise", at_least=0)] = 0.0
+    bandwidth: Bandwidth | None = None
+    delay: Annotated[float, si("s", "age of a reading, whole plant steps", at_least=0)] = 0.0
+    bias: Annotated[float, si("m/s^2", "reading at rest")] = 0.0
+    mount: Literal["tip", "motor"] = "tip"
+
+
+class Friction(Table):
+    """Dry friction, at the motor where there is a transmission; it holds what does not move, exactly."""
+
+    kinetic: Annotated[float, si("N", "force against the motion", at_least=0)]
+    breakaway: Annotated[float | None, si("N", "force that sets it in motion, at least kinetic", at_least=0)] = None
+    stribeck_velocity: Annotated[
+        float | None, si("m/s", "speed over which breakaway falls towards kinetic", above=0)
+    ] = None
+
+
+class Transmission(Table):
+    """A cable between motor and tip. ``[device]`` is then the tip; actuator, encoder and friction are at the motor."""
+
+    motor_mass: Annotated[float, si("kg", "inertia of the motor, as a mass at the tip", above=0)]
+    stiffness: Annotated[float, si("N/m", "stiffness", above=0)]
+    damping: Annotated[float, si("N s/m", "damping within the transmission", at_least=0)] = 0.0
+    motor_damping: Annotated[float, si("N s/m", "viscous damping of the motor", at_least=0)] = 0.0
+
+
+class Grip(Table):
+    """The grip between the tip and the hand's mass, on which the force of the muscles then acts."""
+
+    stiffness: Annotated[float, si("N/m", "stiffness", above=0)]
+    damping: Annotated[float, si("N s/m", "viscous damping", at_least=0)] = 0.0
+
+
+class Actuator(Table):
+    """The limits of the motor and its amplifier."""
+
+    saturation: Annotated[float | None, si("N", "largest force to either side", above=0)] = None
+    bandwidth: Bandwidth | None = None
+    resolution: Annotated[float | None, si("N", "one step of force", above=0)] = None
+
+
+class UniformJitter(Table):
+    """Every whole number of plant steps from 0 to most is equally likely."""
+
+    kind: Literal["uniform"]
+    most: Annotated[float, si("s", "longest additional delay, whole plant steps", at_least=0)]
+
+
+class GammaJitter(Table):
+    """Gamma-distributed, rounded to the nearest plant step."""
+
+    kind: Literal["gamma"]
+    mean: Annotated[float, si("s", "mean additional delay", above=0)]
+    deviation: Annotated[float, si("s", "standard deviation of the additional delay", above=0)]
+
+
+class Loss(Table):
+    """Commands are lost, each by itself; the device holds the last one it got."""
+
+    probability: Annotated[float, si("", "share of the commands that are lost", at_least=0, at_most=1)]
+
+
+Jitter = Annotated[UniformJitter | GammaJitter, Field(discriminator="kind")]

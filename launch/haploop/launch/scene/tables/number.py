@@ -1,0 +1,82 @@
+"""Numbers in a scene: a declared quantity becomes a key that reads, bounds and documents itself."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, NoReturn
+
+from pydantic import GetJsonSchemaHandler
+from pydantic_core import CoreSchema, PydanticCustomError, core_schema
+
+from haploop.launch.scene.tables.units import from_text
+from haploop.protocol.quantity import Quantity
+
+
+@dataclass(frozen=True)
+class Number:
+    """Metadata that makes ``Annotated[float, Number(Quantity(...))]`` take SI numbers and text with a unit.
+
+    Attributes:
+        quantity: SI unit and bounds.
+        about: what the number is, for editors.
+        whole: only whole numbers, read as int.
+    """
+
+    quantity: Quantity
+    about: str = ""
+    whole: bool = False
+
+    def read(self, value: Any) -> float:
+        """The number in SI units.
+
+        Raises:
+            PydanticCustomError: not a number, not finite, out of bounds, or of another dimension; its message is
+                a full sentence.
+        """
+        if isinstance(value, bool) or not isinstance(value, (int, float, str)):
+            _refuse(f"It must be {self.form}.")
+        try:
+            number = float(from_text(value, self.quantity.unit)) if isinstance(value, str) else value
+            complaint = self.quantity.complaint(number)
+        except OverflowError:
+            _refuse("It must be a number that a float can hold.")
+        except ValueError as error:
+            _refuse(str(error))
+        if complaint:
+            _refuse(f"It {complaint}.")
+        if not self.whole:
+            return float(number)
+        if number != int(number):
+            _refuse(f"It must be {self.form}.")
+        return int(number)
+
+    @property
+    def form(self) -> str:
+        """What to write: 'a number in kg, above 0, or text with its unit'."""
+        q = self.quantity
+        bounds = {"at least": q.at_least, "above": q.above, "at most": q.at_most, "below": q.below}
+        words = " and ".join(f"{word} {bound:g}" for word, bound in bounds.items() if bound is not None)
+        unit = f" in {q.unit}" if q.unit else ""
+        text = f', or text with its unit such as "1 {q.unit}"' if q.unit else ""
+        return ("a whole number" if self.whole else "a number") + unit + (words and f", {words}") + text
+
+    def __get_pydantic_core_schema__(self, _source: Any, _handler: Any) -> CoreSchema:
+        return core_schema.no_info_plain_validator_function(self.read)
+
+    def __get_pydantic_json_schema__(self, _schema: CoreSchema, _handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        q = self.quantity
+        bounds = {"minimum": q.at_least, "exclusiveMinimum": q.above, "maximum": q.at_most, "exclusiveMaximum": q.below}
+        return {
+            "type": ["integer" if self.whole else "number", "string"],
+            "description": ": ".join(filter(None, [self.about, self.form])),
+            **{name: bound for name, bound in bounds.items() if bound is not None},
+        }
+
+
+def si(unit: str, about: str = "", *, whole: bool = False, **bounds: float) -> Number:
+    """A ``Number`` in one line: ``mass: Annotated[float, si("kg", "mass of the device", above=0)]``."""
+    return Number(Quantity(unit, **bounds), about, whole)
+
+
+def _refuse(sentence: str) -> NoReturn:
+    raise PydanticCustomError("sentence", "{sentence}", {"sentence": sentence})

@@ -1,0 +1,1 @@
+"""Velocity and acceleration estimators; ``choose`` makes those that a scene names."""

@@ -1,0 +1,168 @@
+"""Velocity and acceleration by a Kalman filter of a mass whose jerk is white noise, in its steady state.
+
+Between ticks the model is x''' = w, E[w(t) w(s)] = S delta(t - s), S = ``jerk_density`` squared, so that
+
+    | x |        | 1  T  T^2/2 | | x |                     | T^5/20  T^4/8  T^3/6 |
+    | v | [k+1] =| 0  1  T     | | v | [k] + noise, Q = S  | T^4/8   T^3/3  T^2/2 |
+    | a |        | 0  0  1     | | a |                     | T^3/6   T^2/2  T     |
+
+Measured are x with white noise of standard deviation sigma and, where the accelerometer is asked, a with its own
+(Bar-Shalom, Li, Kirubarajan 2001, section 6.2; Belanger et al. 1998 for encoders).
+
+With w0 = (S / (sigma^2 T))^(1/6) and w0 T << 1 the filter of positions alone has the poles of a third-order Butterworth
+low-pass of corner w0 rad/s, and errors, jerk and noise together, of sqrt(3 w0^3 T) sigma in v and sqrt(2 w0^5 T) sigma
+in a. So a wanted corner is had by ``jerk_density`` = w0^3 sigma sqrt(T). Constant acceleration is followed without
+error or delay; at a constant jerk a comes late by g_v / g_a - T / 2, g the gains: by 2 / w0 when w0 T << 1.
+Rounding is not white where the device hardly moves, nor is band-limited noise: the filter is then no longer the best,
+but as stable. An accelerometer's bias, delay and bandwidth are not in the model.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import partial
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from haploop.controller.estimators.choose import Sample
+from haploop.protocol.arrays import each
+
+Array = npt.NDArray[np.float64]
+# Decimals of a gain times the least surprise it meets: LAPACK's last bits, which differ between machines, lie beyond.
+_DECIMALS = 12
+
+
+class Kalman:
+    """Estimates from positions alone; called with x_m[k] it gives v[k], and ``acceleration`` then gives a[k].
+
+    The first sample is where the prediction starts, at rest, so that v[0] = a[0] = 0.
+
+    Args:
+        gain: g_x (1), g_v (1/s) and g_a (1/s^2) of the position, shape (3, 1): from prediction to estimate.
+        period_s: the control period T.
+        first: the first sample.
+    """
+
+    def __init__(self, gain: Any, period_s: float, first: Sample) -> None:
+        self._gain = gain
+        self._period_s, self._half_s2 = period_s, period_s * period_s / 2.0
+        self._x, self._v, self.a = first[0], 0.0 * first[0], 0.0 * first[0]
+
+    def __call__(self, x: Any, _sample: Sample) -> Any:
+        (g_x,), (g_v,), (g_a,) = self._gain
+        surprise = x - self._x
+        return self._predict(self._x + g_x * surprise, self._v + g_v * surprise, self.a + g_a * surprise)
+
+    def _predict(self, x: Any, v: Any, a: Any) -> Any:
+        """Remember what the model makes of this tick's estimate by the next tick; returns the velocity of this one."""
+        self._x = x + self._period_s * v + self._half_s2 * a
+        self._v = v + self._period_s * a
+        self.a = a
+        return v
+
+    def acceleration(self, _v: Any, _sample: Sample) -> Any:
+        """a[k] of the tick whose velocity was asked last; the model holds it until the next."""
+        return self.a
+
+
+class FusedKalman(Kalman):
+    """Estimates from positions and the accelerometer's readings; a starts at the first reading.
+
+    Args:
+        gain: of the position, and of the reading in s^2, s and 1, shape (3, 2).
+        period_s: the control period T.
+        first: the first sample.
+    """
+
+    def __init__(self, gain: Any, period_s: float, first: Sample) -> None:
+        super().__init__(gain, period_s, first)
+        self.a = first[1]
+
+    def __call__(self, x: Any, sample: Sample) -> Any:
+        (g_x, h_x), (g_v, h_v), (g_a, h_a) = self._gain
+        surprise, surprise_a = x - self._x, sample[1] - self.a
+        return self._predict(
+            self._x + g_x * surprise + h_x * surprise_a,
+            self._v + g_v * surprise + h_v * surprise_a,
+            self.a + g_a * surprise + h_a * surprise_a,
+        )
+
+
+def kalman_of(scene: dict[str, Any], period_s: float) -> partial[Kalman]:
+    """The filter of a scene's ``[velocity]`` table, to be started with the first sample."""
+    table, noises = scene["velocity"], assumed_noises(scene, period_s).values()
+    gain = each(lambda jerk, *noises: steady_state(jerk, list(noises), period_s)[0], table["jerk_density"], *noises)
+    rows = gain.tolist() if gain.ndim == 2 else [list(row) for row in gain]
+    return partial(FusedKalman if len(noises) > 1 else Kalman, rows, period_s)
+
+
+def assumed_noises(scene: dict[str, Any], period_s: float) -> dict[str, float]:
+    """The standard deviations that the filter of a scene counts on, by their keys in ``[velocity]``."""
+    table = scene["velocity"]
+    noises = {"measurement_noise": position_noise_m(scene)}
+    if table.get("accelerometer"):
+        noise = table.get("accelerometer_noise", _accelerometer_noise_m_s2(scene, period_s))
+        noises["accelerometer_noise"] = noise
+    return noises
+
+
+def jerk_density_limits(noise_m: float, period_s: float) -> tuple[float, float]:
+    """Least and greatest ``jerk_density`` that the gain can be computed for: w0 T from 1e-5 to 1e4."""
+    unit = noise_m * period_s**-2.5
+    return 1e-15 * unit, 1e12 * unit
+
+
+def steady_state(jerk_density: float, noises: list[float], period_s: float) -> tuple[Array, Array]:
+    """Gain, shape (3, m), and covariance of the estimate's error, shape (3, 3), both SI.
+
+    P = A (P - P H' (H P H' + R)^-1 H P) A' + Q, gain = P H' (H P H' + R)^-1, solved with sigma as the unit of length
+    and 1 / w0 or T, whichever is longer, as that of time: then no number is far from 1, however slow the filter.
+
+    Args:
+        jerk_density: root of the jerk's density S, m/s^3/Hz^0.5, within ``jerk_density_limits``.
+        noises: standard deviation of the position, m, above 0, and where it is measured of the acceleration, m/s^2.
+        period_s: the control period T.
+    """
+    from scipy.linalg import solve_discrete_are
+
+    density = (jerk_density / noises[0]) ** 2
+    unit_s = max(period_s, (density / period_s) ** (-1 / 6))
+    units = np.array([1.0, 1.0 / unit_s, 1.0 / unit_s**2])
+    step, process = _model(period_s / unit_s, density * unit_s**5)
+    measured = [0, 2][: len(noises)]
+    reads, deviation = np.eye(3)[measured], np.array(noises) / noises[0] / units[measured]
+    noise = np.diag(deviation**2)
+    predicted = solve_discrete_are(step.T, reads.T, process, noise)
+    gain = np.linalg.solve(reads @ predicted @ reads.T + noise, reads @ predicted).T
+    estimated = (np.eye(3) - gain @ reads) @ predicted
+    surprise = np.maximum(deviation, 1.0)
+    gain = np.round(gain * surprise, _DECIMALS) / surprise
+    return gain * units[:, None] / units[measured], estimated * np.outer(units, units) * noises[0] ** 2
+
+
+def _model(T: float, S: float) -> tuple[Array, Array]:
+    """A and Q of x''' = w over the time T."""
+    step = np.array([[1.0, T, T**2 / 2], [0.0, 1.0, T], [0.0, 0.0, 1.0]])
+    noise = [[T**5 / 20, T**4 / 8, T**3 / 6], [T**4 / 8, T**3 / 3, T**2 / 2], [T**3 / 6, T**2 / 2, T]]
+    return step, S * np.array(noise)
+
+
+def position_noise_m(scene: dict[str, Any]) -> float:
+    """Standard deviation sigma: what ``[velocity]`` says, or that of rounding (q / sqrt(12)) and noise together."""
+    if "measurement_noise" in scene["velocity"]:
+        return scene["velocity"]["measurement_noise"]
+    rounding = scene.get("encoder", {}).get("resolution", 0.0) / math.sqrt(12.0)
+    return each(math.hypot, rounding, scene.get("noise", {}).get("deviation", 0.0))
+
+
+def _accelerometer_noise_m_s2(scene: dict[str, Any], period_s: float) -> float:
+    """Standard deviation of the accelerometer's white noise through its first-order bandwidth, and of its rounding.
+
+    The noise of density n is n sqrt(pi B / 2) behind a corner at B Hz, n sqrt(1 / (2 T)) when sampled as it is.
+    """
+    table = scene.get("accelerometer", {})
+    band_Hz = math.pi / 2.0 * table["bandwidth"] if "bandwidth" in table else 0.5 / period_s
+    rounding = table.get("resolution", 0.0) / math.sqrt(12.0)
+    return math.hypot(table.get("noise_density", 0.0) * math.sqrt(band_Hz), rounding)

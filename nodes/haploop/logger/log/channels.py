@@ -1,0 +1,86 @@
+"""The channels of a run's log: which columns they have, in which units, and how blocks become messages."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from haploop.logger.books.buffers import as_float64
+from haploop.logger.log.columns import UNITS
+from haploop.logger.log.table import Floats
+from haploop.protocol.ticks import Timebase
+
+CONTROLLER_UNITS = {"x": "m", "v": "m/s", "a": "m/s^2", "wall": "N", "total": "N", "in_contact": ""}
+
+
+class Sink(Protocol):
+    """Where channels are written to: :class:`haploop.logger.log.writer.Log`, or what takes the same without a file."""
+
+    def channel(
+        self, topic: str, columns: Mapping[str, str], *, samples_per_message: int | None = None, title: str
+    ) -> int: ...
+
+    def write(self, channel: int, log_times_ns: NDArray[np.int64], values: Floats) -> None: ...
+
+    def message(self, channel: int, log_time_ns: int, obj: dict[str, Any]) -> None: ...
+
+
+class Channels:
+    """Writes telemetry to a log: /plant (unless only ticks are wanted), /controller, /energy and /events."""
+
+    def __init__(self, log: Sink, time: Timebase, every_step: bool) -> None:
+        self._log, self._time, self._every_step = log, time, every_step
+        self._events = log.channel("/events", {}, title="what changed the run, at its tick")
+
+    def _tick_times(self, first: int, ticks: int) -> tuple[np.ndarray, np.ndarray]:
+        """Log times in ns and time stamps in s of some ticks."""
+        numbers = np.arange(first, first + ticks, dtype=np.int64)
+        return numbers * 1_000_000_000 // self._time.control_rate, numbers / self._time.control_rate
+
+    def plant(self, first: int, ticks: int, columns: dict[str, np.ndarray]) -> None:
+        """One message a tick, an array of its steps; ``columns`` of ``motion_columns`` have ``ticks * n + 1`` rows."""
+        if self._every_step and ticks:
+            steps = self._time.steps_per_tick
+            self._plant_messages(first, ticks, steps, {name: column[:-1] for name, column in columns.items()})
+
+    def plant_end(self, tick: int, state: dict[str, np.ndarray]) -> None:
+        """The end state of the run, a message of one sample; its force is the last one held."""
+        if self._every_step:
+            self._plant_messages(tick, 1, 1, state)
+
+    def _plant_messages(self, first: int, ticks: int, samples: int, columns: dict[str, np.ndarray]) -> None:
+        units = {"timestamp": "s", "t": "s"} | {name: UNITS[name] for name in columns}
+        channel = self._log.channel(
+            "/plant", units, samples_per_message=samples, title="the plant at every step; force acts from it on"
+        )
+        start = first * self._time.steps_per_tick
+        t = np.arange(start, start + ticks * samples) / self._time.plant_rate
+        values = np.stack([t, t, *columns.values()], axis=1)
+        times, _ = self._tick_times(first, ticks)
+        self._log.write(channel, times, values.reshape(ticks, samples, len(units)))
+
+    def controller(self, block: dict[str, Any]) -> None:
+        """One message a tick: estimates, the force of wall and elements, their total."""
+        names = list(block["columns"])
+        kinds = ", ".join(f"dissipation.{i} is {e['kind']}" for i, e in enumerate(block["elements"])) or "no element"
+        units = {"timestamp": "s"} | {name: CONTROLLER_UNITS.get(name, "N") for name in names}
+        channel = self._log.channel("/controller", units, title=f"the controller at every tick; {kinds}")
+        times, stamps = self._tick_times(block["from_tick"], block["ticks"])
+        values = np.stack([stamps, *map(as_float64, block["columns"].values())], axis=1)
+        self._log.write(channel, times, values)
+
+    def energy(self, first: int, columns: dict[str, np.ndarray]) -> None:
+        """One message a tick: the books as they stand."""
+        units = {"timestamp": "s"} | dict.fromkeys(columns, "J")
+        channel = self._log.channel("/energy", units, title="the energy books at every tick")
+        times, stamps = self._tick_times(first, len(next(iter(columns.values()))))
+        self._log.write(channel, times, np.stack([stamps, *columns.values()], axis=1))
+
+    def event(self, tick: int, event: dict[str, Any]) -> None:
+        """One message: the tick, its time in s, and the event as it was given."""
+        self._log.message(
+            self._events, self._time.tick_ns(tick), {"timestamp": tick / self._time.control_rate, "tick": tick, **event}
+        )

@@ -1,0 +1,128 @@
+"""What was read from a log: arrays by channel and column."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from functools import reduce
+from typing import TYPE_CHECKING, Any, NoReturn
+
+import numpy as np
+from numpy.typing import NDArray
+
+from haploop.logger.log.table import Floats
+
+if TYPE_CHECKING:
+    import pandas
+    import pint
+
+TIMESTAMP = "timestamp"
+
+
+class Table(dict[str, Floats]):
+    """The columns of a topic: float64 arrays of shape (rows,) by name, rows in order of log time.
+
+    A topic whose columns changed during the run has all of them, NaN in the rows from before or after.
+
+    Attributes:
+        units: unit by column name, "" for a pure number.
+    """
+
+    def __init__(self, columns: Iterable[tuple[str, Floats]], units: Mapping[str, str]) -> None:
+        super().__init__(columns)
+        self.units = {name: units[name] for name in self}
+
+    def __missing__(self, name: str) -> NoReturn:
+        raise KeyError(f"There is no column {name}; the columns are {', '.join(self)}.")
+
+    def quantity(self, name: str) -> pint.Quantity[Floats]:
+        """A column with its unit, as a quantity of pint's application registry."""
+        import pint
+
+        return pint.get_application_registry().Quantity(self[name], self.units[name])
+
+    def frame(self) -> pandas.DataFrame:
+        """The columns as a data frame indexed by ``timestamp`` (s), with ``frame.attrs["units"]`` by name.
+
+        Raises:
+            ImportError: pandas is missing.
+        """
+        try:
+            import pandas
+        except ImportError as error:
+            raise ImportError("Data frames need pandas; install it with: pip install 'haploop[pandas]'") from error
+        frame = pandas.DataFrame(dict(self))
+        frame = frame.set_index(TIMESTAMP) if TIMESTAMP in self else frame
+        frame.attrs["units"] = dict(self.units)
+        return frame
+
+
+class Recording(dict[str, Any]):
+    """What a log holds, by topic: a :class:`Table`, or a list of maps for a topic without columns (``/events``).
+
+    Attributes:
+        truncated: whether the file ends before its closing summary, as that of a killed run or of one still going.
+        cut: a sentence on where it ends, "" for a whole file.
+        attachments: content of each attached file by name.
+    """
+
+    def __init__(self, topics: dict[str, Any], cut: str, attachments: dict[str, bytes]) -> None:
+        super().__init__(topics)
+        self.truncated = bool(cut)
+        self.cut = cut
+        self.attachments = attachments
+
+    def __missing__(self, topic: str) -> NoReturn:
+        raise KeyError(f"There is no channel {topic} in this log; its channels are {', '.join(self) or 'none'}.")
+
+
+Rows = Table | list[Any]
+
+
+def join(pieces: Sequence[tuple[NDArray[np.uint64], Rows]], units: Mapping[str, str] | None = None) -> tuple[Any, Any]:
+    """Pieces of one topic as one, rows in the order of log time and, at the same time, of the pieces.
+
+    The tables are used up on the way, so that hardly more than one column is held twice.
+
+    Args:
+        pieces: log time of every row in ns, and the rows: all tables or all lists of maps.
+        units: the columns there shall be, by unit; those of the pieces when None. A piece without one has NaN there.
+
+    Returns:
+        Log times in ns, shape (rows,), and the rows.
+    """
+    times = np.concatenate([times for times, _ in pieces] or [np.empty(0, np.uint64)])
+    order = None if (times[1:] >= times[:-1]).all() else np.argsort(times, kind="stable")
+    times_in_order = times if order is None else times[order]
+    tables = [rows for _, rows in pieces if isinstance(rows, Table)]
+    if not tables and not units:
+        maps = [one for _, rows in pieces for one in rows]
+        return times_in_order, maps if order is None else [maps[row] for row in order]
+    if units is None:
+        units = reduce(merge_columns, [table.units for table in tables])
+    columns = _joined_columns(tables, [len(times) for times, _ in pieces], units, order)
+    return times_in_order, Table(columns, units)
+
+
+def _joined_columns(
+    tables: Sequence[Table], rows: Sequence[int], units: Mapping[str, str], order: NDArray[Any] | None
+) -> Iterable[tuple[str, Floats]]:
+    for name in units:
+        parts = [
+            table.pop(name) if name in table else np.full(count, np.nan)
+            for table, count in zip(tables, rows, strict=True)
+        ]
+        column = parts[0] if len(parts) == 1 else np.concatenate([*parts, np.empty(0)])
+        yield name, column if order is None else column[order]
+
+
+def merge_columns(known: Mapping[str, str], new: Mapping[str, str]) -> dict[str, str]:
+    """The columns of both, by unit, each in its own order: a new one comes after the one it follows."""
+    names, at = list(known), 0
+    for name in new:
+        if name in known:
+            at = names.index(name) + 1
+        else:
+            names.insert(at, name)
+            at += 1
+    units = {**new, **known}
+    return {name: units[name] for name in names}

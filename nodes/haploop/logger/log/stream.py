@@ -1,0 +1,203 @@
+"""A log read chunk by chunk: of any length in the memory of one chunk, whole, cut off or still being written."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Collection, Iterator
+from io import BytesIO
+from pathlib import Path
+from typing import IO, Any, NamedTuple
+
+import numpy as np
+from mcap.data_stream import ReadDataStream
+from mcap.exceptions import McapError
+from mcap.opcode import Opcode
+from mcap.records import Attachment, Channel, Schema
+from numpy.typing import NDArray
+
+from haploop.logger.log.channel import LogChannel
+from haploop.logger.log.closing import MAGIC
+from haploop.logger.log.error import LogError
+from haploop.logger.log.recording import Table, join, merge_columns
+from haploop.logger.log.records import MessageRun, chunk_body, lone_message, parts, records
+from haploop.logger.log.table import TableLayout
+
+_DAMAGE = (ValueError, OverflowError, RuntimeError, struct.error, McapError)
+
+
+class Batch(NamedTuple):
+    """What one chunk holds of a topic, in order of log time.
+
+    Attributes:
+        topic: such as ``/plant``.
+        log_times_ns: simulated time in ns of the message each row came with, shape (rows,).
+        rows: float64 arrays of shape (rows,) by column, with their units; for a topic without columns the maps.
+    """
+
+    topic: str
+    log_times_ns: NDArray[np.uint64]
+    rows: Table | list[Any]
+
+
+class LogStream:
+    """The batches of a log, to be iterated over.
+
+    Batches come in the order of the file, which for this project's logs is the order of time on each topic. Once all
+    have come, iterating again goes on with what was written to the file since.
+
+    Attributes:
+        path: the file.
+        units: by topic, unit by column, of every channel met so far, chosen or not; empty for a topic without columns.
+        attachments: content of each attached file met so far, by name.
+        read_bytes: how much of the file has been gone through.
+        until: no byte from here on is gone through.
+    """
+
+    def __init__(
+        self,
+        path: str | Path,
+        topics: Collection[str] | None = None,
+        columns: Collection[str] | None = None,
+        until: int | None = None,
+    ) -> None:
+        """Look at how the file begins.
+
+        Args:
+            path: a run's directory, or an MCAP file of msgpack maps.
+            topics: only these topics, the others are not even unpacked; all when None.
+            columns: only these columns, of every topic that has them; a batch has those of them that its channels have,
+                which may be none. A topic without columns at all, like ``/events``, is not concerned.
+            until: end of what is read, in bytes; the end of the file when None.
+
+        Raises:
+            FileNotFoundError: there is no such directory or file, or the directory holds no log.
+            LogError: the file is empty, or no MCAP file.
+        """
+        self.path = _log_file(Path(path))
+        self._topics = {topics} if isinstance(topics, str) else topics
+        self._columns = {columns} if isinstance(columns, str) else columns
+        self.until = until
+        self.units: dict[str, dict[str, str]] = {}
+        self.attachments: dict[str, bytes] = {}
+        self.read_bytes = len(MAGIC)
+        self._open_end = "it has no closing summary"
+        self._schemas: dict[int, Schema] = {}
+        self._channels: dict[int, LogChannel] = {}
+        with self.path.open("rb") as file:
+            start = file.read(len(MAGIC))
+        if not start:
+            raise LogError(f"The log {self.path} is empty: the run ended before anything was written to it.")
+        if start != MAGIC:
+            raise LogError(f"{self.path} is no MCAP file: it begins with {start!r}, not with {MAGIC!r}.")
+
+    @property
+    def cut(self) -> str:
+        """A sentence on where the file ends, "" once it was read to the end it should have."""
+        if not self._open_end:
+            return ""
+        where = f"it was read up to byte {self.read_bytes} ({self._open_end})"
+        return f"The log {self.path} was cut off or is still being written; {where}."
+
+    def chosen(self, topic: str) -> bool:
+        """Whether a topic is one of those asked for."""
+        return self._topics is None or topic in self._topics
+
+    def chosen_units(self, topic: str) -> dict[str, str]:
+        """Unit by column of a topic, of the columns asked for."""
+        units = self.units[topic]
+        return {name: units[name] for name in units if self._columns is None or name in self._columns}
+
+    def __iter__(self) -> Iterator[Batch]:
+        """All batches that have not come yet.
+
+        Raises:
+            LogError: there are messages other than the msgpack maps their schema tells of.
+        """
+        with self.path.open("rb") as file:
+            file.seek(self.read_bytes)
+            try:
+                for opcode, content in records(file):
+                    if self.until is not None and file.tell() > self.until:
+                        return
+                    batches = self._take(opcode, content)
+                    if opcode == Opcode.FOOTER and not self._close(file):
+                        return
+                    self.read_bytes = file.tell()
+                    yield from batches
+            except _DAMAGE as damage:
+                self._open_end = f"what follows is damaged: {damage or type(damage).__name__}"
+
+    def _close(self, file: IO[bytes]) -> bool:
+        """Whether the file ends as it should after its footer."""
+        if file.read(len(MAGIC)) != MAGIC:
+            return False
+        self._open_end = ""
+        return True
+
+    def _take(self, opcode: int, content: bytes) -> list[Batch]:
+        """What one record of the file holds; indexes and the summary tell nothing new and are passed over."""
+        if opcode == Opcode.CHUNK:
+            return self._batches(chunk_body(content))
+        if opcode == Opcode.MESSAGE:
+            return self._batches(lone_message(content))
+        if opcode == Opcode.ATTACHMENT:
+            attachment = Attachment.read(ReadDataStream(BytesIO(content)))
+            self.attachments[attachment.name] = attachment.data
+        else:
+            self._register(opcode, content)
+        return []
+
+    def _batches(self, body: bytes) -> list[Batch]:
+        """The messages of a chunk, topic by topic."""
+        found: dict[str, dict[int, list[MessageRun]]] = {}
+        for part in parts(body):
+            if not isinstance(part, MessageRun):
+                self._register(*part)
+            elif part.channel not in self._channels:
+                raise ValueError(f"a message of channel {part.channel} came before the channel")
+            elif self.chosen(topic := self._channels[part.channel].topic):
+                found.setdefault(topic, {}).setdefault(part.channel, []).append(part)
+        return [self._batch(topic, runs) for topic, runs in found.items()]
+
+    def _batch(self, topic: str, runs: dict[int, list[MessageRun]]) -> Batch:
+        pieces = [self._channels[number].decode(of_channel, self._columns) for number, of_channel in runs.items()]
+        return Batch(topic, *join(pieces))
+
+    def _register(self, opcode: int, content: bytes) -> None:
+        if opcode == Opcode.SCHEMA:
+            schema = Schema.read(ReadDataStream(BytesIO(content)))
+            self._schemas[schema.id] = schema
+        elif opcode == Opcode.CHANNEL:
+            channel = Channel.read(ReadDataStream(BytesIO(content)))
+            if channel.message_encoding != "msgpack":
+                raise LogError(f"The channel {channel.topic} is {channel.message_encoding}; a run's log is msgpack.")
+            schema = self._schemas.get(channel.schema_id)
+            layout = TableLayout.of_json_schema(schema.data if schema else b"")
+            known = self.units.setdefault(channel.topic, dict(layout.columns))
+            if bool(known) != bool(layout.columns):
+                raise LogError(f"The topic {channel.topic} mixes messages with and without columns; read them apart.")
+            self.units[channel.topic] = merge_columns(known, layout.columns)
+            self._channels.setdefault(channel.id, LogChannel(channel.topic, layout))
+
+
+def survey(path: str | Path) -> LogStream:
+    """A stream that has gone through a whole log without unpacking a message.
+
+    Its ``units`` are those of every channel there is, and its ``read_bytes`` is where the log ended.
+
+    Raises:
+        FileNotFoundError, LogError: as for :class:`LogStream`.
+    """
+    log = LogStream(path, topics=())
+    for _ in log:
+        pass
+    return log
+
+
+def _log_file(path: Path) -> Path:
+    if not path.exists():
+        raise FileNotFoundError(f"There is no {path}; give the directory of a run or its log.mcap.")
+    log = path / "log.mcap" if path.is_dir() else path
+    if not log.exists():
+        raise FileNotFoundError(f"The directory {path} holds no log.mcap; it is not the directory of a logged run.")
+    return log

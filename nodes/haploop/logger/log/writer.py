@@ -1,0 +1,190 @@
+"""The log file of a run: MCAP, written a block of ticks at a time, readable up to its last chunk whatever happens.
+
+The frame of the file is made of the ``mcap`` library's own records. What is written a thousand times a second, the
+message records inside a chunk and their index, is composed by NumPy (:mod:`haploop.logger.log.rows`), since the
+library's writer takes a Python call, and some microseconds, for every message.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+from mcap.data_stream import RecordBuilder
+from mcap.records import Attachment, AttachmentIndex, Channel, Header, McapRecord, Schema
+from numpy.typing import NDArray
+
+from haploop.logger.log.append_file import AppendFile
+from haploop.logger.log.chunk import Compression, chunk, compressor
+from haploop.logger.log.closing import MAGIC, Summary
+from haploop.logger.log.rows import FreeRows, TableRows
+from haploop.logger.log.table import Floats, TableLayout, pack
+
+# Bytes of messages after which a chunk is closed: what a reader must at least unpack to reach one message.
+_CHUNK_BYTES = 1 << 20
+
+
+class Log:
+    """One MCAP file.
+
+    Messages gather in a chunk, which reaches the operating system when it passes 1 MB or at :meth:`flush`; from then
+    on the end of this process takes nothing of it away. Inside a chunk messages stand channel by channel; readers
+    bring them into the order of log time. Log time and publish time are the simulated time in ns.
+    """
+
+    def __init__(self, path: str | Path, *, compression: Compression = "lz4") -> None:
+        """Begin the file, over any file of that name.
+
+        Raises:
+            LogError: the file cannot be made.
+        """
+        self._compression: Compression = compression
+        self._compress = compressor(compression)
+        self._summary = Summary()
+        self._tables: dict[int, TableLayout] = {}
+        self._known: dict[tuple[Any, ...], int] = {}
+        self._rows: dict[int, TableRows | FreeRows] = {}
+        self._file = AppendFile(path)
+        self._file.append(MAGIC + _bytes_of(Header(profile="", library="haploop")))
+
+    def channel(
+        self, topic: str, columns: Mapping[str, str], *, samples_per_message: int | None = None, title: str
+    ) -> int:
+        """Register a channel; for what is registered already, the number it has.
+
+        The same topic may be registered again with other columns: it then has several channels, which
+        :func:`haploop.logger.read` joins.
+
+        Args:
+            topic: such as ``/plant``.
+            columns: unit by column name ("" for a pure number); empty for free maps, see :meth:`message`.
+            samples_per_message: None for messages that are one map; else a message is an array of so many maps.
+            title: what the channel holds, for people; also the name of its schema.
+
+        Returns:
+            The channel's number, for :meth:`write` and :meth:`message`.
+
+        Raises:
+            LogError: the file cannot be written.
+            ValueError: ``samples_per_message`` is less than 1.
+        """
+        key = (topic, tuple(columns.items()), samples_per_message, title)
+        if key in self._known:
+            return self._known[key]
+        layout = TableLayout(columns, samples_per_message)
+        number = len(self._known) + 1
+        schema = Schema(id=number, data=layout.json_schema(title), encoding="jsonschema", name=title)
+        channel = Channel(id=number, topic=topic, message_encoding="msgpack", metadata={}, schema_id=number)
+        self._file.append(_bytes_of(schema, channel))
+        self._summary.schemas.append(schema)
+        self._summary.channels.append(channel)
+        self._summary.message_counts[number] = 0
+        if columns:
+            self._tables[number] = layout
+        self._known[key] = number
+        return number
+
+    def write(self, channel: int, log_times_ns: NDArray[np.int64], values: Floats) -> None:
+        """Add messages to a channel with columns.
+
+        Args:
+            channel: the channel's number.
+            log_times_ns: simulated time in ns, from 0 up, shape (messages,).
+            values: shape (messages, columns), or (messages, samples, columns) where the channel has samples.
+
+        Raises:
+            LogError: the file cannot be written.
+            ValueError: a wrong shape, or a time before 0.
+        """
+        layout, messages = self._tables.get(channel), len(log_times_ns)
+        if layout is None:
+            raise ValueError(f"Channel {channel} has no columns: its messages come through message().")
+        shape = (messages, *(() if layout.samples is None else (layout.samples,)), len(layout.columns))
+        if values.shape != shape:
+            raise ValueError(f"Values of shape {shape} were expected on channel {channel}, but came as {values.shape}.")
+        if not messages:
+            return
+        if log_times_ns.min() < 0:
+            raise ValueError(f"A log time must be 0 or later, but {log_times_ns.min()} ns came on channel {channel}.")
+        rows = self._rows.get(channel)
+        if not isinstance(rows, TableRows):
+            rows = self._rows[channel] = TableRows(channel, layout)
+        rows.append(self._summary.message_counts[channel] + rows.count, log_times_ns, values)
+        self._close_full_chunk()
+
+    def message(self, channel: int, log_time_ns: int, obj: dict[str, Any]) -> None:
+        """Add one map to a channel without columns; ``obj`` holds what msgpack can carry.
+
+        Raises:
+            LogError: the file cannot be written.
+            ValueError: the channel has columns; its messages come through :meth:`write`.
+        """
+        if channel in self._tables:
+            raise ValueError(f"Channel {channel} has columns: its messages come through write().")
+        rows = self._rows.get(channel)
+        if not isinstance(rows, FreeRows):
+            rows = self._rows[channel] = FreeRows(channel)
+        rows.append(self._summary.message_counts[channel] + rows.count, log_time_ns, pack(obj))
+        self._close_full_chunk()
+
+    def attach(self, name: str, media_type: str, data: bytes) -> None:
+        """Put a whole file, such as the scene, into the log.
+
+        Raises:
+            LogError: the file cannot be written.
+        """
+        start = self._file.size
+        self._file.append(_bytes_of(Attachment(create_time=0, log_time=0, name=name, media_type=media_type, data=data)))
+        self._summary.attachments.append(
+            AttachmentIndex(start, self._file.size - start, 0, 0, len(data), name=name, media_type=media_type)
+        )
+
+    def _close_full_chunk(self) -> None:
+        if sum(rows.size for rows in self._rows.values()) >= _CHUNK_BYTES:
+            self.flush()
+
+    def flush(self) -> None:
+        """Close the chunk and hand it to the operating system: every message up to now can be read from the file.
+
+        Raises:
+            LogError: the file cannot be written.
+        """
+        held = [rows for rows in self._rows.values() if rows.count]
+        if not held:
+            return
+        piece, index = chunk(held, self._file.size, self._compression, self._compress)
+        self._file.append(piece)
+        self._summary.chunks.append(index)
+        # A channel that was silent in this chunk (replaced at a swap, say) gives its memory back.
+        self._rows = {rows.channel: rows for rows in held}
+        for rows in held:
+            self._summary.message_counts[rows.channel] += rows.count
+            rows.clear()
+
+    def close(self) -> None:
+        """Close the chunk, add the summary and close the file; nothing is left to do after a LogError or a close.
+
+        Raises:
+            LogError: the file cannot be written.
+        """
+        try:
+            if self._file.writable:
+                self.flush()
+                self._file.append(self._summary.closing(self._file.size))
+        finally:
+            self._file.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
+def _bytes_of(*records: McapRecord) -> bytes:
+    builder = RecordBuilder()
+    for record in records:
+        record.write(builder)
+    return builder.end()

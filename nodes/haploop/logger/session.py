@@ -1,0 +1,85 @@
+"""A logger and the files it keeps: log.mcap and summary.json in the run's directory."""
+
+from __future__ import annotations
+
+import time as wall_clock
+from pathlib import Path
+from typing import Any
+
+from haploop.logger import summary as summaries
+from haploop.logger.log.channels import Channels
+from haploop.logger.log.error import LogError
+from haploop.logger.log.memory import MemoryLog
+from haploop.logger.log.writer import Log
+from haploop.logger.logger import Logger
+from haploop.protocol.ticks import Timebase
+
+LOG, SUMMARY = "log.mcap", "summary.json"
+# The log is at most this far behind on disk, in wall time.
+_FLUSH_S = 0.4
+
+
+class Keeper:
+    """Keeps a logger's log flushed and closes everything in order."""
+
+    def __init__(self, logger: Logger, log: Log | MemoryLog | None, out: Path | None) -> None:
+        self.logger = logger
+        self._log, self._out = log, out
+        self._flush_due = wall_clock.monotonic() + _FLUSH_S
+
+    def flush_when_due(self) -> None:
+        """Hand the log to the operating system if the last time is too long ago."""
+        now = wall_clock.monotonic()
+        if self._log and now >= self._flush_due:
+            self._log.flush()
+            self._flush_due = now + _FLUSH_S
+
+    def close(self, failed: str, reason: str | None, trouble: str | None, telemetry_gaps: int) -> dict[str, Any]:
+        """Write the end state, close the log and write the summary; returns the summary.
+
+        Args:
+            failed: why the run failed, "" if it did not.
+            reason: why the plant ended the run by itself, or None.
+            trouble: which element gave a force that is no finite number, or None.
+            telemetry_gaps: ticks whose telemetry did not come.
+        """
+        logger = self.logger
+        diverged = "; ".join(part for part in (trouble, reason) if part) or None
+        complete = logger.tick >= logger.time.ticks
+        ended = "failed" if failed or trouble else "diverged" if reason else "done" if complete else "stopped"
+        logger.end()
+        if self._log:
+            self._log.close()
+        result = logger.summary(ended, failed or diverged or "", diverged, telemetry_gaps)
+        if self._out:
+            try:
+                summaries.write(result, self._out / SUMMARY)
+            except OSError as error:
+                raise LogError(f"The summary {self._out / SUMMARY} could not be written: {error.strerror}.") from error
+        return summaries.finite(result)
+
+
+def open_keeper(
+    scene: dict[str, Any],
+    time: Timebase,
+    out: Path | None,
+    attachments: dict[str, str],
+    memory: MemoryLog | None = None,
+) -> Keeper:
+    """A logger with its files in directory ``out``, or without any when None.
+
+    Args:
+        scene: the resolved scene; ``run.log`` decides what is logged.
+        attachments: text files to put into the log, by name (the scene as TOML, plugins).
+        memory: where to log without a directory; when None, only the books are kept then.
+
+    Raises:
+        LogError: the log cannot be made.
+    """
+    detail = scene["run"]["log"]
+    log = None if detail == "none" else Log(out / LOG) if out else memory
+    if log is None:
+        return Keeper(Logger(scene, time, None), None, out)
+    for name, text in attachments.items():
+        log.attach(name, "text/plain", text.encode())
+    return Keeper(Logger(scene, time, Channels(log, time, every_step=detail == "steps")), log, out)

@@ -1,0 +1,1 @@
+"""The window at the end of a run, what is measured in it, and the verdict that follows."""

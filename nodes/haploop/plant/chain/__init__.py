@@ -1,0 +1,1 @@
+"""The motion of several bodies in a row (transmission, grip, actuator lag), by the exact transition."""

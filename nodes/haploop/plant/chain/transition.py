@@ -1,0 +1,146 @@
+"""Exact flow of a chain of bodies over plant steps, and over a plant step halved again and again."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from haploop.plant.chain.chain import Chain, Matrix
+from haploop.plant.motion.transition import flow_minus_identity, gramian
+
+_wide = np.longdouble
+# Responses to the load are made for this many intervals at a time, on a fixed grid.
+_PIECE_TICKS = 64
+
+
+class ChainFlow:
+    """e^{A t} - I of z' = A z + B (command, friction, load), command and friction held, load linear in a plant step.
+
+    The augmented state is (z, command, friction, load, rise), load' = rise / h: one exponential gives the response to
+    all inputs. All tables are transposed, (what acts, what is moved), so that sums over the first axis run in order.
+
+    Args:
+        stuck: body 0 is held where it is.
+        steps: the longest hold, in plant steps.
+
+    Attributes:
+        step: over one plant step; shape (states + 4, states).
+        held: over 1 ... steps plant steps, from (z, command, friction) alone; shape (states + 2, steps, states).
+    """
+
+    def __init__(self, chain: Chain, step_s: float, steps: int, stuck: bool) -> None:
+        self._size = len(chain.states)
+        self._scales = np.append(chain.scales(step_s), chain.scales(step_s)[-1])
+        self._rates = scaled_rates(chain, step_s, stuck)
+        self._step_s = _wide(step_s)
+        one = flow_minus_identity(self._rates, self._step_s)
+        self.step = self._unscaled(one)
+        flow, held = one, []
+        for _ in range(steps):
+            held.append(self._unscaled(flow)[: self._size + 2])
+            flow = flow + one + one @ flow
+        self.held = np.stack(held, axis=1)
+
+    def halves(self, levels: int) -> list[Matrix]:
+        """Over h, h/2, ... h/2^levels, each of shape (states + 4, states); the rise is that of a whole step."""
+        flow = flow_minus_identity(self._rates, self._step_s / _wide(2) ** levels)
+        table = [self._unscaled(flow)]
+        for _ in range(levels):
+            flow = 2.0 * flow + flow @ flow
+            table.append(self._unscaled(flow))
+        return table[::-1]
+
+    def _unscaled(self, flow: Matrix) -> Matrix:
+        """What is added to the states by (z, command, friction, load, rise), transposed."""
+        rows = flow[: self._size] * self._scales / self._scales[: self._size, None]
+        return np.ascontiguousarray(rows.T).astype(float)
+
+
+def scaled_rates(chain: Chain, step_s: float, stuck: bool) -> Matrix:
+    """A of the augmented state in the coordinates of ``Chain.scales``, shape (states + 4, states + 4), 1/s."""
+    size = len(chain.states)
+    scales = np.append(chain.scales(step_s), chain.scales(step_s)[-1])
+    rates = np.zeros((size + 4, size + 4), _wide)
+    rates[:size, : size + 3] = chain.rates(stuck)
+    rates[size + 2, size + 3] = 1.0 / _wide(step_s)
+    return scales[:, None] * rates / scales
+
+
+class Responses:
+    """A flow, and D: what the load alone does from zero within each interval.
+
+    Args:
+        flow: of many loops, too: its tables then have a last axis for them.
+        loads: load in N at the steps first ... last - 1.
+        steps: plant steps an interval has.
+        piece_ticks: D is made for so many intervals at a time, on a fixed grid.
+    """
+
+    def __init__(
+        self,
+        flow: ChainFlow,
+        loads: Callable[[int, int], np.ndarray],
+        steps: int,
+        piece_ticks: int = _PIECE_TICKS,
+    ) -> None:
+        self.flow = flow
+        self._loads, self._n, self._piece_ticks = loads, steps, piece_ticks
+        self._pieces: dict[int, np.ndarray] = {}
+
+    def of_interval(self, tick: int) -> np.ndarray:
+        """D at the steps of interval ``tick`` and at its end, shape (n + 1, states)."""
+        piece, at = divmod(tick, self._piece_ticks)
+        if piece not in self._pieces:
+            self._pieces = {piece: self._made(piece)}
+        return self._pieces[piece][at]
+
+    def _made(self, piece: int) -> np.ndarray:
+        n, table = self._n, self.flow.step
+        size = table.shape[1]
+        ticks, loads = self._piece_ticks, self._loads
+        first = piece * ticks * n
+        load = loads(first, first + ticks * n + 1)
+        start, rise = (rows.reshape(ticks, n, *load.shape[1:]) for rows in (load[:-1], np.diff(load, axis=0)))
+        shape = np.broadcast_shapes((size, ticks, *load.shape[1:]), table[0, :, None].shape)
+        response = np.zeros((n + 1, *shape))
+        acting = np.zeros((size + 4, *shape[1:]))
+        for i in range(n):
+            acting[:size], acting[-2], acting[-1] = response[i], start[:, i], rise[:, i]
+            response[i + 1] = response[i] + np.add.reduce(table[:, :, None] * acting[:, None])
+        return np.ascontiguousarray(np.moveaxis(response, 2, 0))
+
+
+class ChainIntegrals:
+    """Exact integrals over h/2^level from the rates w = (z', rise) at its start, for the energy books.
+
+    Differentiating z' = A z + B u once gives w its own linear system, w' = R w: command and friction are constant and
+    load' = rise / h. In rates nothing cancels when large forces hold the bodies at rest. For a velocity r . w
+        integral (r.w)^2 dt = w' square w            integral (t - t_mid)/t_end r.w dt = lag . w
+    """
+
+    def __init__(self, chain: Chain, step_s: float, stuck: bool) -> None:
+        self._size, self._step_s = len(chain.states), _wide(step_s)
+        scales = np.append(chain.scales(step_s)[: self._size], chain.scales(step_s)[-1])
+        full = scaled_rates(chain, step_s, stuck)
+        keep = [*range(self._size), self._size + 3]
+        self._rates = full[np.ix_(keep, keep)]
+        self._rates[: self._size, -1] = full[: self._size, self._size + 2] / self._step_s
+        self._scales = scales
+
+    def product(self, left: np.ndarray, right: np.ndarray, level: int = 0) -> Matrix:
+        """Symmetric Q with integral (left.w)(right.w) dt = w' Q w over h/2^level; rows and result unscaled."""
+        a, b = (np.append(row, 0.0) / self._scales for row in (left, right))
+        weight = (np.outer(a, b) + np.outer(b, a)) / 2.0
+        form = gramian(self._rates, weight, self._step_s / _wide(2) ** level)
+        return form * np.outer(self._scales, self._scales)
+
+    def lag(self, velocity: np.ndarray, level: int = 0) -> np.ndarray:
+        """l with integral (t - t_end/2)/t_end velocity.w dt = l . w over h/2^level."""
+        n, end = len(self._rates), self._step_s / _wide(2) ** level
+        extended = np.zeros((n + 2, n + 2), _wide)
+        extended[:n, :n] = self._rates
+        extended[n, :n] = np.append(velocity, 0.0) / self._scales
+        extended[n + 1, n] = 1.0 / end
+        increment = flow_minus_identity(extended, end)
+        return (increment[n, :n] / 2.0 - increment[n + 1, :n]) * self._scales

@@ -1,0 +1,1 @@
+"""Coulomb friction: the law, stick-slip states, and the motion across their switches."""

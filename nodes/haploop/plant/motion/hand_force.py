@@ -1,0 +1,102 @@
+"""tau(t), the force of the hand's muscles: its value at every plant step, straight lines between steps."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+# The force is made in pieces on a fixed grid, so that how a run is cut into messages cannot change a bit of it.
+_PIECE_STEPS = 4096
+
+Profile = Callable[[np.ndarray], np.ndarray]
+
+
+class HandForce:
+    """The hand force of a scene at plant steps, in N.
+
+    Args:
+        table: the resolved ``[hand.force]`` table, or None for no force.
+        plant_rate: plant steps per second; step s is at ``s / plant_rate``.
+    """
+
+    def __init__(self, table: dict[str, Any] | None, plant_rate: int) -> None:
+        self._profile = PROFILES[table["kind"]](table) if table else np.zeros_like
+        self._plant_rate, self._piece_steps = plant_rate, _PIECE_STEPS
+        self._pieces: dict[int, np.ndarray] = {}
+
+    def at_steps(self, first: int, last: int) -> np.ndarray:
+        """tau at the steps first ... last - 1, shape (last - first,)."""
+        size = self._piece_steps
+        pieces = range(first // size, (last - 1) // size + 1)
+        joined = np.concatenate([self._piece(index) for index in pieces])
+        start = first - pieces.start * size
+        return joined[start : start + last - first]
+
+    def _piece(self, index: int) -> np.ndarray:
+        if index not in self._pieces:
+            if len(self._pieces) > 2:
+                self._pieces.clear()
+            self._pieces[index] = self._profile(self._times(index))
+        return self._pieces[index]
+
+    def _times(self, index: int) -> np.ndarray:
+        """The times of the steps of a piece, s."""
+        return np.arange(index * self._piece_steps, (index + 1) * self._piece_steps) / self._plant_rate
+
+
+def hand_force(scene: dict[str, Any], plant_rate: int) -> HandForce:
+    """The hand force of a resolved scene, or of many in a stacked one."""
+    table = scene.get("hand", {}).get("force")
+    if "loops" in scene:
+        from haploop.plant.motion.hand_force_batch import HandForceArray
+
+        return HandForceArray(table, plant_rate)
+    return HandForce(table, plant_rate)
+
+
+def _constant(table: dict[str, Any]) -> Profile:
+    """tau = value."""
+    return lambda t: np.zeros_like(t) + table["value"]
+
+
+def _ramp(table: dict[str, Any]) -> Profile:
+    """tau rises in a straight line from 0 at t = 0 to value at rise_time, then holds."""
+    return lambda t: table["value"] * np.minimum(t / table["rise_time"], 1.0)
+
+
+def _step(table: dict[str, Any]) -> Profile:
+    """tau = value from t = at on."""
+    return lambda t: np.where(t >= table["at"], table["value"], 0.0)
+
+
+def _sine(table: dict[str, Any]) -> Profile:
+    """tau = offset + amplitude sin(2 pi frequency t + phase)."""
+    return lambda t: table["offset"] + table["amplitude"] * np.sin(2 * np.pi * table["frequency"] * t + table["phase"])
+
+
+def _minimum_jerk(table: dict[str, Any]) -> Profile:
+    """tau = value (10 s^3 - 15 s^4 + 6 s^5), s = t / rise_time up to 1 (Flash and Hogan 1985)."""
+
+    def profile(t: np.ndarray) -> np.ndarray:
+        s = np.minimum(t / table["rise_time"], 1.0)
+        return table["value"] * (s * s * s * (10.0 + s * (6.0 * s - 15.0)))
+
+    return profile
+
+
+def _trace(table: dict[str, Any]) -> Profile:
+    """tau through recorded points, straight between them, held before the first and after the last."""
+    times, forces = np.asarray(table["time"], float), np.asarray(table["force"], float)
+    return lambda t: np.interp(t, times, forces)
+
+
+PROFILES: dict[str, Callable[[dict[str, Any]], Profile]] = {
+    "constant": _constant,
+    "ramp": _ramp,
+    "step": _step,
+    "sine": _sine,
+    "minimum-jerk": _minimum_jerk,
+    "trace": _trace,
+}

@@ -1,0 +1,1 @@
+"""Random streams: a function of the seed and a name alone."""

@@ -1,0 +1,1 @@
+"""Snapshots for the page: tables of what to draw, packed into frames of bytes."""

@@ -1,0 +1,93 @@
+"""From the frames of telemetry to a history: blocks that follow each other are taken in at once."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import numpy as np
+
+from haploop.protocol.wire import Frame
+from haploop.view.store.history import TRUE, History
+
+# Of the plant, what positions and forces are made of; of the controller, what is shown of it.
+_OF_PLANT = ("x", "v", "force", "actuator", "cable.stretch", "cable.rate", "grip.stretch", "grip.rate")
+_OF_CONTROLLER = ("x", "v", "wall", "total")
+_STATE_BYTES = 8
+
+
+def hear(history: History, frames: Sequence[tuple[str, Frame]]) -> dict[str, Any]:
+    """Take in what has come; returns the newest status of the logger, {} for none."""
+    blocks: dict[str, list[dict[str, Any]]] = {}
+    status: dict[str, Any] = {}
+    ends = [frame.fields[0] for role, frame in frames if (role, frame.name) == ("plant", "END")]
+    for role, frame in frames:
+        if frame.name == "STATE":
+            history.begin(role, frame.fields[0])
+            status = _stands(history, role, frame.fields[1]) or status
+        elif frame.name.endswith("_BLOCK"):
+            blocks.setdefault(frame.name, []).append(block := frame.as_dict())
+            status = block.get("status") or status
+    for name, take in _TAKERS.items():
+        for run in _runs(blocks.get(name, [])):
+            take(history, run)
+    for tick in ends:
+        history.ended(tick)
+    return status
+
+
+def _stands(history: History, role: str, state: dict[str, Any]) -> dict[str, Any]:
+    """Take note of what is at work in a run that may stand still; returns the status of the logger."""
+    if role == "controller" and state["history"]:
+        block = state["history"][-1]
+        history.works(block["elements"], block["wall"])
+    return state if role == "logger" else {}
+
+
+def _runs(blocks: list[dict[str, Any]]) -> list[list[dict[str, Any]]]:
+    """Blocks in groups of such as follow each other without a gap and have the same columns, elements and wall."""
+    runs: list[list[dict[str, Any]]] = []
+    for block in blocks:
+        if runs and _follows(runs[-1][-1], block):
+            runs[-1].append(block)
+        else:
+            runs.append([block])
+    return runs
+
+
+def _follows(one: dict[str, Any], other: dict[str, Any]) -> bool:
+    return (
+        other["from_tick"] == one["from_tick"] + one["ticks"]
+        and other["columns"].keys() == one["columns"].keys()
+        and other.get("elements") == one.get("elements")
+        and other.get("wall") == one.get("wall")
+    )
+
+
+def _joined(run: list[dict[str, Any]], names: Iterable[str]) -> dict[str, np.ndarray]:
+    return {name: np.frombuffer(b"".join([block["columns"][name] for block in run]), "<f8") for name in names}
+
+
+def _plant(history: History, run: list[dict[str, Any]]) -> None:
+    """Blocks of the plant share the state between them: it is left out of all but the last."""
+    columns = {}
+    for name in _OF_PLANT:
+        if name in run[0]["columns"]:
+            parts = [block["columns"][name] for block in run]
+            parts[:-1] = [part[:-_STATE_BYTES] for part in parts[:-1]]
+            columns[name] = np.frombuffer(b"".join(parts), "<f8")
+    history.plant(run[0]["from_tick"], columns)
+
+
+def _controller(history: History, run: list[dict[str, Any]]) -> None:
+    elements = run[0]["elements"]
+    names = [*_OF_CONTROLLER, *(f"dissipation.{place}" for place in range(len(elements)))]
+    history.controlled(run[0]["from_tick"], _joined(run, names), elements, run[0]["wall"])
+
+
+def _energy(history: History, run: list[dict[str, Any]]) -> None:
+    names = [name for name in run[0]["columns"] if name == "residual" or name.endswith(TRUE)]
+    history.booked(run[0]["from_tick"], _joined(run, names))
+
+
+_TAKERS = {"PLANT_BLOCK": _plant, "CONTROLLER_BLOCK": _controller, "ENERGY_BLOCK": _energy}

@@ -1,0 +1,1 @@
+"""Bounded memory of a run: series at several levels of detail."""

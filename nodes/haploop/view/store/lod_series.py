@@ -1,0 +1,210 @@
+"""Columns of numbers at a fixed rate, of a run of any length: the newest in full, all of them ever coarser."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+
+import numpy as np
+
+from haploop.view.store.extremes import extremes
+from haploop.view.store.lod_level import Level
+from haploop.view.store.ring import Ring
+
+# Buckets that make one of the next level.
+FOLD = 2
+# A bucket of the first coarse level has at least so many rows.
+_LEAST_ROWS = 4
+# Buckets that a coarse level surely holds, each two values.
+_BUCKETS = 2048
+# Buckets are made for so many ticks at once: fewer are not worth the calls.
+_AT_ONCE_TICKS = 128
+# Elements come and go; more columns than these are never kept.
+MOST_COLUMNS = 48
+
+
+class Track:
+    """Rows of named columns, a whole number of them a tick, from tick ``origin`` on.
+
+    Level 0 holds the newest rows. Every other level holds the least and the greatest of buckets of some ticks, twice as
+    many as on the level before it; before a level would forget its oldest buckets there is a next one, so that some
+    level always reaches back to the origin.
+    Memory grows with the logarithm of the run's length alone.
+
+    Args:
+        rows_per_tick: rows of one tick.
+        recent_ticks: ticks that are surely held in full.
+        origin: the first tick.
+
+    Attributes:
+        names: columns, in the order in which they came.
+        first_tick: where what is known begins; None before anything is.
+    """
+
+    def __init__(self, rows_per_tick: int, recent_ticks: int, origin: int) -> None:
+        self.rows_per_tick, self.origin = rows_per_tick, origin
+        self.first_tick: int | None = None
+        self._columns: dict[str, int] = {}
+        self._levels = [Level(Ring(recent_ticks * rows_per_tick, 0), 1, rows_per_tick)]
+        self._add_level()
+        # No level is given more at once than half of what it surely holds, so that nothing is lost on the way up.
+        self._at_once = min(recent_ticks, _BUCKETS * self._levels[1].ticks) * rows_per_tick // 2
+
+    @property
+    def names(self) -> list[str]:
+        return list(self._columns)
+
+    @property
+    def end_tick(self) -> int:
+        """Every tick before it is known, or will never be."""
+        return self.origin + self._levels[0].end
+
+    @property
+    def full_from_tick(self) -> int:
+        """From here on rows are held in full."""
+        return self.origin + self._levels[0].start
+
+    def _add_level(self) -> None:
+        first = max(1, _LEAST_ROWS // self.rows_per_tick)
+        ticks = self._levels[-1].ticks * FOLD if len(self._levels) > 1 else first
+        self._levels.append(Level(Ring(2 * _BUCKETS, len(self._columns)), ticks, 2))
+
+    # What comes
+
+    def begin(self, tick: int) -> None:
+        """Rows from ``tick`` on are to come; what was said first counts."""
+        if self.first_tick is None:
+            self.first_tick = max(tick, self.origin)
+
+    def append(self, tick: int, columns: Mapping[str, np.ndarray]) -> None:
+        """Take the rows of some ticks from ``tick`` on.
+
+        Ticks that are known already are passed over; those missing in between stay unknown, NaN, as does a column
+        that has no rows here.
+
+        Args:
+            tick: the first of them.
+            columns: name -> array of shape (ticks * rows_per_tick,).
+        """
+        rows = len(next(iter(columns.values())))
+        known = max(0, self.end_tick - tick) * self.rows_per_tick
+        if known >= rows:
+            return
+        self.begin(tick)
+        self._skip_to(tick)
+        for name in columns:
+            if name not in self._columns:
+                self._open(name, columns.keys())
+        values = np.full((len(self._columns), rows - known), np.nan)
+        for name in self._columns.keys() & columns.keys():
+            values[self._columns[name]] = columns[name][known:]
+        self._take(values)
+
+    def _skip_to(self, tick: int) -> None:
+        missing = (tick - self.end_tick) * self.rows_per_tick
+        while missing > 0:
+            self._take(np.full((len(self._columns), min(missing, self._at_once)), np.nan))
+            missing -= self._at_once
+
+    def _open(self, name: str, present: Collection[str]) -> None:
+        """Have a column of this name; where there are too many, in place of the oldest that is not present any more."""
+        if len(self._columns) < MOST_COLUMNS:
+            self._columns[name] = len(self._columns)
+            for level in self._levels:
+                level.ring.grow(len(self._columns))
+        elif oldest := next((old for old in self._columns if old not in present), None):
+            self._columns[name] = place = self._columns.pop(oldest)
+            for level in self._levels:
+                level.ring.forget(place)
+
+    def _take(self, values: np.ndarray) -> None:
+        for start in range(0, values.shape[1], self._at_once):
+            self._levels[0].ring.append(values[:, start : start + self._at_once])
+            self._hand_up(0)
+
+    def _hand_up(self, depth: int) -> None:
+        """Tell the next coarser level what has come to this one, if there is enough of it."""
+        below = self._levels[depth]
+        if depth + 1 == len(self._levels):
+            if below.ring.end < below.ring.capacity // 4:
+                return  # far from forgetting anything, and short enough to be looked at as it is
+            self._add_level()
+        above = self._levels[depth + 1]
+        buckets = (below.end - above.end) // above.ticks
+        if buckets * above.ticks >= (_AT_ONCE_TICKS if depth == 0 else 1):
+            group = above.ticks // below.ticks * below.values
+            above.ring.append(extremes(below.between(above.end, above.end + buckets * above.ticks), group))
+            self._hand_up(depth + 1)
+
+    def continue_with(self, other: Track) -> None:
+        """Take from another track what it holds in full and this one has not reached."""
+        first, end = max(self.end_tick, other.full_from_tick), other.end_tick
+        if first < end:
+            rows = other.rows(other.names, first, end)
+            self.append(first, dict(zip(other.names, rows, strict=True)))
+
+    # What is asked for
+
+    def rows(self, names: Sequence[str], from_tick: int, to_tick: int) -> np.ndarray:
+        """Rows in full between two ticks, shape (names, rows); NaN where there is nothing."""
+        level, n = self._levels[0], self.rows_per_tick
+        found = np.full((len(names), (to_tick - from_tick) * n), np.nan)
+        first, end = max(from_tick, self.full_from_tick), min(to_tick, self.end_tick)
+        if first < end:
+            values = level.between(first - self.origin, end - self.origin)
+            self._pick(values, names, found[:, (first - from_tick) * n : (end - from_tick) * n])
+        return found
+
+    def _pick(self, values: np.ndarray, names: Sequence[str], into: np.ndarray, group: int = 0) -> None:
+        """Columns by name, thinned out to the extremes of every ``group`` values unless it is 0."""
+        known = [row for row, name in enumerate(names) if name in self._columns]
+        if known:
+            chosen = values[[self._columns[names[row]] for row in known]]
+            into[known] = extremes(chosen, group) if group else chosen
+
+    def bucket_from(self, from_tick: int, bucket_ticks: int) -> int:
+        """Ticks of a bucket for :meth:`envelope` from ``from_tick`` on: so many, or more where the past is coarser."""
+        while not self._reaches_back(self.aligned(from_tick, bucket_ticks), bucket_ticks):
+            bucket_ticks *= 2
+        return bucket_ticks
+
+    def _reaches_back(self, tick: int, bucket_ticks: int) -> bool:
+        at = tick - self.origin
+        return any(level.ticks <= bucket_ticks and level.start <= at for level in self._levels)
+
+    def aligned(self, tick: int, bucket_ticks: int) -> int:
+        """Where the bucket that holds a tick begins."""
+        return tick - (tick - self.origin) % bucket_ticks
+
+    def envelope(self, names: Sequence[str], from_tick: int, to_tick: int, bucket_ticks: int) -> np.ndarray:
+        """The extremes of consecutive buckets, in the order in which they came; NaN where there is nothing.
+
+        Args:
+            names: columns.
+            from_tick, to_tick: where the first bucket begins and the last one ends, ``aligned``.
+            bucket_ticks: a power of two, from :meth:`bucket_from`.
+
+        Returns:
+            Shape (names, 2 * buckets).
+        """
+        found = np.full((len(names), (to_tick - from_tick) // bucket_ticks * 2), np.nan)
+        at, end, filled = from_tick - self.origin, min(to_tick, self.end_tick) - self.origin, 0
+        # From the coarsest level that is fine enough on: what has not been handed up to it comes from the finer ones.
+        levels = [level for level in reversed(self._levels) if level.ticks <= bucket_ticks]
+        for level in levels:
+            buckets = max(0, min(level.end, end) - at) // bucket_ticks
+            if buckets:
+                values = level.between(at, at + buckets * bucket_ticks)
+                group = bucket_ticks // level.ticks * level.values
+                done = level is not self._levels[0] and group == 2
+                self._pick(values, names, found[:, filled : filled + 2 * buckets], 0 if done else group)
+                at, filled = at + buckets * bucket_ticks, filled + 2 * buckets
+        rest = []
+        for level in levels:
+            until = min(level.end, end // level.ticks * level.ticks)
+            if until > at:
+                rest.append(level.between(at, until))
+                at = until
+        if rest:
+            values = np.concatenate(rest, axis=1)
+            self._pick(values, names, found[:, filled : filled + 2], values.shape[1])
+        return found

@@ -1,0 +1,1 @@
+"""The command line. ``main`` names every command; the work is imported when it is used."""

@@ -1,0 +1,45 @@
+"""How a command ends: errors a person can mend become one message on stderr and an exit status."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import sys
+from collections.abc import Iterator
+from typing import Any, NoReturn
+
+FAILED, WRONG_USE = 1, 2
+
+
+def leave(message: str, status: int) -> NoReturn:
+    """Print a message for people and exit."""
+    print(message, file=sys.stderr)
+    raise SystemExit(status)
+
+
+def print_json(data: Any) -> None:
+    """One JSON object on stdout; numbers that are not finite become null."""
+    from haploop.logger.summary import finite
+
+    print(json.dumps(finite(data)), flush=True)
+
+
+@contextlib.contextmanager
+def plain_errors() -> Iterator[None]:
+    """Turn the errors of the packages below into messages: 2 for wrong use, 1 for a run that failed."""
+    from haploop.controller.dissipation import ElementError, PluginError
+    from haploop.launch.output import OutputError
+    from haploop.launch.processes.control import CommandRefused
+    from haploop.launch.processes.run_directory import RunNotFound
+    from haploop.launch.scene.mistakes import SceneError
+    from haploop.logger.log.error import LogError
+
+    try:
+        yield
+    except SceneError as error:
+        count = len(error.mistakes)
+        leave(f"{error}\n{count} mistake{'s' * (count != 1)}; nothing was started.", WRONG_USE)
+    except (PluginError, ElementError, OutputError, CommandRefused, RunNotFound) as error:
+        leave(str(error), WRONG_USE)
+    except LogError as error:
+        leave(str(error), FAILED)

@@ -1,0 +1,164 @@
+"""``haploop explain``: what a scene comes to, in which order things happen, and what every effect costs."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from haploop.tools.cli.exit_codes import plain_errors, print_json
+from haploop.tools.cli.scenes import kinds_with, print_notes
+
+if TYPE_CHECKING:
+    from rich.console import RenderableType
+    from rich.table import Table
+
+    from haploop.launch.plan.plan import Plan, Step
+    from haploop.tools.operations import Bill
+
+_READING = (
+    "A call into NumPy counts as one instruction. An entry's are those that the loop would save without it alone; "
+    "they are negative where something dearer takes its place."
+)
+
+
+def explain_scene(scene_path: Path, overrides: list[str], plugins: list[Path], as_json: bool) -> None:
+    """Print the plan of a scene and count what it costs; no process is started."""
+    from haploop.launch.plan.plan import plan
+    from haploop.launch.scene.elements import elements_of, try_out
+    from haploop.launch.scene.file import load
+    from haploop.tools.operations import bill
+
+    with plain_errors():
+        kinds = kinds_with(plugins)
+        scene = load(scene_path, overrides, kinds)
+        try_out(elements_of(scene), kinds)
+        print_notes(scene)
+        planned = plan(scene)
+        costs = bill(scene, planned.named, kinds)
+    if as_json:
+        print_json(as_data(scene, planned, costs))
+        return
+    from haploop.tools.render.report import console
+
+    console().print(explanation(scene, planned, costs))
+
+
+def as_data(scene: dict[str, Any], planned: Plan, costs: Bill) -> dict[str, Any]:
+    """The plan and its costs as one JSON object."""
+    whole = costs.whole
+    return {
+        "title": scene["title"],
+        "bodies_kg": planned.bodies,
+        "states": planned.states,
+        "memory": planned.memory,
+        "plant_step": [dataclasses.asdict(step) for step in planned.plant_step],
+        "tick": [dataclasses.asdict(step) for step in planned.tick],
+        "modules": planned.modules,
+        "columns": planned.columns,
+        "counts": planned.counts,
+        "effects": [
+            {
+                "name": effect.name,
+                "node": effect.node,
+                "modules": effect.modules_in(scene),
+                "acts": effect.acts,
+                "does": effect.does,
+                "columns": effect.columns,
+                "counts": effect.counts,
+                "states": effect.states_in(scene),
+                "instructions_per_tick": costs.effects[effect.name],
+                "multiplications_per_tick": costs.multiplications[1][effect.name],
+            }
+            for effect in planned.named
+        ],
+        "elements": [
+            {"kind": table["kind"], "instructions_per_tick": cost}
+            for table, cost in zip(scene.get("dissipation", []), costs.elements, strict=True)
+        ],
+        "absent": [effect.name for effect in planned.absent],
+        "instructions_per_tick": {
+            "plant": whole.plant / whole.ticks,
+            "controller": whole.controller / whole.ticks,
+        },
+        "multiplications_per_tick": costs.multiplications[0],
+    }
+
+
+def explanation(scene: dict[str, Any], planned: Plan, costs: Bill) -> RenderableType:
+    """The same for people."""
+    from rich.console import Group
+    from rich.text import Text
+
+    whole = costs.whole
+    moving = costs.multiplications[0]
+    loop = f"plant {whole.plant / whole.ticks:.0f}, controller {whole.controller / whole.ticks:.0f}"
+    return Group(
+        Text(scene["title"], style="bold"),
+        _facts(planned),
+        _order("in every plant step", planned.plant_step),
+        _order("in every tick", planned.tick),
+        _costs(scene, planned, costs),
+        Text(
+            f"Per tick: {moving} multiplications move the bodies; bytecode instructions: {loop}. {_READING}",
+            style="dim",
+        ),
+    )
+
+
+def _facts(planned: Plan) -> Table:
+    from rich.table import Table
+
+    facts = {
+        "bodies": ", ".join(f"{name} {mass * 1e3:g} g" for name, mass in planned.bodies.items()),
+        "states": f"{len(planned.states)}: {', '.join(planned.states)}",
+        "remembered": ", ".join(f"{count} by {name}" for name, count in planned.memory.items()) or "nothing",
+    }
+    for node, modules in planned.modules.items():
+        facts[f"{node} also loads"] = ", ".join(map(_short, modules)) or "nothing"
+    for channel, columns in planned.columns.items():
+        facts[f"log {channel}"] = ", ".join(columns)
+    facts["counts"] = ", ".join(planned.counts) or "nothing"
+    facts["absent"] = ", ".join(effect.name for effect in planned.absent)
+    grid = Table.grid(padding=(0, 2))
+    grid.add_column(style="dim", no_wrap=True)
+    grid.add_column()
+    for row in facts.items():
+        grid.add_row(*row)
+    return grid
+
+
+def _short(module: str) -> str:
+    return module.removeprefix("haploop.")
+
+
+def _order(title: str, steps: tuple[Step, ...]) -> Table:
+    table = _table(title, "node", "named by")
+    for step in steps:
+        table.add_row(step.what, step.node, step.effect or "–")
+    return table
+
+
+def _costs(scene: dict[str, Any], planned: Plan, costs: Bill) -> Table:
+    """What each effect and each element adds."""
+    table = _table("what is named", "written in", "every")
+    for name in ("states", "multiplications", "instructions"):
+        table.add_column(name, justify="right", no_wrap=True)
+    for effect in planned.named:
+        modules = effect.modules_in(scene)
+        module = _short(modules[0]) if modules else effect.node
+        numbers = f"{costs.multiplications[1][effect.name]:+d}", f"{costs.effects[effect.name]:+.0f}"
+        table.add_row(effect.name, module, effect.acts.removeprefix("every "), str(effect.states_in(scene)), *numbers)
+    for element, cost in zip(scene.get("dissipation", []), costs.elements, strict=True):
+        table.add_row(element["kind"], "controller.dissipation", "tick", "–", "–", f"{cost:+.0f}")
+    return table
+
+
+def _table(*names: str) -> Table:
+    from rich import box
+    from rich.table import Table
+
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 1))
+    for name in names:
+        table.add_column(name, overflow="fold")
+    return table

@@ -1,0 +1,112 @@
+"""The commands that watch and steer a running loop."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from haploop.tools.cli.options import At, Json, Run
+
+
+def status(run: Run = None, json: Json = False) -> None:
+    """Show the live runs: every node, its tick, its lag, whom it waits for, what it skipped."""
+    from haploop.tools.cli.live import show_status
+
+    show_status(run, json)
+
+
+def _ask(run_id: str | None, json: bool, verb: str, **arguments: Any) -> None:
+    from haploop.tools.cli.live import command
+
+    command(run_id, json, verb, arguments)
+
+
+def pause(run: Run = None, json: Json = False) -> None:
+    """Stand still at the next tick that can."""
+    _ask(run, json, "pause")
+
+
+def resume(run: Run = None, json: Json = False) -> None:
+    """Go on after a pause."""
+    _ask(run, json, "resume")
+
+
+def step(ticks: Annotated[int, typer.Argument(help="control ticks")] = 1, run: Run = None, json: Json = False) -> None:
+    """Go on for some ticks, then stand still."""
+    _ask(run, json, "step", ticks=ticks)
+
+
+def pace(
+    rate: Annotated[str, typer.Argument(help="free, or simulated seconds per second", show_default=False)],
+    run: Run = None,
+    json: Json = False,
+) -> None:
+    """Go on at another pace."""
+    from haploop.tools.cli.live import pace_of
+
+    _ask(run, json, "pace", pace=pace_of(rate))
+
+
+def stop(run: Run = None, json: Json = False) -> None:
+    """End the run in order, with a summary of what ran."""
+    _ask(run, json, "stop")
+
+
+def swap(
+    kind: Annotated[str, typer.Argument(help='kind of element, or "none" to remove', show_default=False)],
+    parameters: Annotated[list[str] | None, typer.Argument(metavar="[KEY=VALUE]...", show_default=False)] = None,
+    element: Annotated[int, typer.Option(help="which element; one past the end adds one")] = 0,
+    at: At = None,
+    reload: Annotated[bool, typer.Option("--reload", help="load the kind's --plugin file anew first")] = False,
+    run: Run = None,
+    json: Json = False,
+) -> None:
+    """Replace a dissipation element of a running loop."""
+    from haploop.tools.cli.live import assignments, seconds
+
+    table = {"kind": kind, **assignments(parameters or [])}
+    _ask(run, json, "swap", swap=table, element=element, at=seconds(at), reload=reload)
+
+
+def set_(
+    parameters: Annotated[list[str], typer.Argument(metavar="KEY=VALUE...", show_default=False)],
+    at: At = None,
+    run: Run = None,
+    json: Json = False,
+) -> None:
+    """Change numbers of a running loop: wall.stiffness, wall.position, dissipation.0.mass ..."""
+    from haploop.tools.cli.live import assignments, seconds
+
+    _ask(run, json, "set", set=assignments(parameters), at=seconds(at))
+
+
+def attach(
+    what: Annotated[str, typer.Argument(help="logger, print or plotjuggler", show_default=False)],
+    out: Annotated[Path | None, typer.Option(help="directory of the attached logger [runs/RUN-TIME]")] = None,
+    port: Annotated[
+        int | None, typer.Option(min=0, max=65535, help="of this machine, for PlotJuggler; 0: any free one [9872]")
+    ] = None,
+    run: Run = None,
+) -> None:
+    """Join a running loop: with a second logger, to show it as a live table, or to pass it on to PlotJuggler.
+
+    The logger holds the loop up rather than miss anything; the others never do, and say what they skipped.
+    """
+    from haploop.tools.attach.command import attach_to
+
+    attach_to(what, out, run, port)
+
+
+def view(
+    run: Annotated[str | None, typer.Option("--run", metavar="ID", help="which run to show first [the newest]")] = None,
+    port: Annotated[int, typer.Option(min=0, max=65535, metavar="PORT", help="of this machine; 0: any free one")] = 0,
+    since: Annotated[str, typer.Option(metavar="start|now", help="with what was logged before, or without")] = "start",
+    browser: Annotated[bool, typer.Option("--browser/--no-browser", help="open the page")] = True,
+    led: Annotated[bool, typer.Option("--led", hidden=True)] = False,
+) -> None:
+    """Look at runs of this machine in the browser as they go, and steer them; until Ctrl-C."""
+    from haploop.tools.cli.view import view as show
+
+    show(run, port, since, browser, led)

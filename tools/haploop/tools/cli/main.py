@@ -1,0 +1,29 @@
+"""The command line: every command, its arguments and its help; the work is done elsewhere and imported when needed."""
+
+from __future__ import annotations
+
+import typer
+
+from haploop.tools.cli.live_commands import attach, pace, pause, resume, set_, status, step, stop, swap, view
+from haploop.tools.cli.run_commands import export, plot, replay
+from haploop.tools.cli.scene_commands import check, explain, plugins, run
+from haploop.tools.cli.study_commands import advise, cost, dissipate, paper, sweep
+
+app = typer.Typer(
+    help="Simulate a haptic loop: a device in a hand, a sampled controller with a virtual wall, a line with delay.",
+    no_args_is_help=True,
+    add_completion=False,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+)
+# In the order in which the help lists them.
+for command in (
+    run, check, explain, plugins, status, pause, resume, step, pace, stop, swap, set_, attach, view,
+    plot, replay, export, cost, sweep, dissipate, paper, advise,
+):  # fmt: skip
+    app.command(command.__name__.rstrip("_"))(command)
+
+
+def main() -> None:
+    """Entry point. Exit status: 0 done, 1 the run failed, 2 wrong usage or scene."""
+    app()

@@ -1,0 +1,138 @@
+"""The commands that run many scenes, or study motion."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from haploop.tools.cli.options import Json, Plugin, Set
+
+
+def cost(
+    scenes: Annotated[
+        list[Path] | None, typer.Argument(metavar="[SCENE]...", help="scene files [the accuracy scenes]")
+    ] = None,
+    rates: Annotated[str, typer.Option(help="plant rates, Hz")] = "1k,2k,5k,10k,20k,50k,100k",
+    methods: Annotated[str | None, typer.Option(help="integrators, comma-separated [all]")] = None,
+    out: Annotated[Path, typer.Option(help="directory; what it holds is not measured again")] = Path("runs/cost"),
+    tolerance: Annotated[float, typer.Option(help="RMS error the advice is for, m")] = 1e-6,
+    repeats: Annotated[int, typer.Option(help="of each time")] = 20,
+    processes: Annotated[bool, typer.Option("--processes/--no-processes", help="time runs as processes too")] = True,
+    json: Json = False,
+) -> None:
+    """Measure what accuracy costs in time: error and time of every method at every plant rate, and advice.
+
+    Can be stopped; the same command goes on.
+    """
+    from haploop.tools.cost.command import Request
+    from haploop.tools.cost.command import cost as measure
+
+    measure(Request(scenes or [], methods, rates, out, tolerance, repeats, processes), json)
+
+
+def sweep(
+    sweep: Annotated[Path, typer.Argument(help="sweep file (TOML)", show_default=False)],
+    set: Set = None,
+    out: Annotated[
+        Path | None, typer.Option(help="directory; one that holds this sweep goes on [runs/SWEEP-TIME]")
+    ] = None,
+    workers: Annotated[int | None, typer.Option(help="processes [one a core]", show_default=False)] = None,
+    dask: Annotated[str | None, typer.Option(metavar="ADDRESS", help="scheduler of a Dask cluster to run on")] = None,
+    jax: Annotated[bool, typer.Option("--jax", help="run compiled, on CPU or GPU, within a tolerance")] = False,
+    plugin: Plugin = None,
+    json: Json = False,
+) -> None:
+    """Run a scene over one to three axes into a table (Parquet); with [bisect], find where its verdict changes.
+
+    Can be stopped or killed; the same command with the same --out goes on. `haploop plot DIR` draws the map.
+    """
+    from haploop.tools.sweep.run.command import Request
+    from haploop.tools.sweep.run.command import sweep as run_sweep
+
+    run_sweep(Request(sweep, set or [], out, workers, dask, jax, plugin or []), json)
+
+
+def dissipate(
+    recording: Annotated[Path, typer.Argument(help="CSV, TSV, directory of a run or its log", show_default=False)],
+    damping: Annotated[list[str] | None, typer.Option(metavar="B", help='damping, N s/m or "0.0027 N s/mm"')] = None,
+    mass: Annotated[list[str] | None, typer.Option(metavar="M", help="bi- and unidirectional inertia, kg")] = None,
+    element: Annotated[
+        list[str] | None, typer.Option(metavar="ELEMENT", help='any other: "KIND KEY=VALUE ..."')
+    ] = None,
+    position: Annotated[
+        str | None, typer.Option(metavar="COLUMN", help="name or number from 1 [x or position]")
+    ] = None,
+    time: Annotated[str | None, typer.Option(metavar="COLUMN", help="of the time [t, time or timestamp]")] = None,
+    rate: Annotated[float | None, typer.Option(min=1e-6, max=1e9, help="samples a second, in place of times")] = None,
+    velocity: Annotated[str | None, typer.Option(metavar="COLUMN", help="recorded, not estimated")] = None,
+    acceleration: Annotated[str | None, typer.Option(metavar="COLUMN", help="recorded, not estimated")] = None,
+    unit: Annotated[
+        str | None, typer.Option(help="of the position, such as mm, or metres a count [the header's (unit), m]")
+    ] = None,
+    time_unit: Annotated[str | None, typer.Option(help="such as ms [the header's (unit), s]")] = None,
+    velocity_unit: Annotated[str | None, typer.Option(help="such as mm/s [the header's (unit), m/s]")] = None,
+    acceleration_unit: Annotated[str | None, typer.Option(help="such as g_0 [the header's (unit), m/s^2]")] = None,
+    wall: Annotated[str | None, typer.Option(metavar="POSITION", help="elements act beyond it only, m or text")] = None,
+    occupies: Annotated[str, typer.Option(metavar="below|above", help="which side of it the wall is")] = "below",
+    delay: Annotated[str | None, typer.Option(metavar="TIME", help="age of a force as it acts [0; a run's]")] = None,
+    set: Annotated[
+        list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="velocity.cutoff, acceleration.estimator ...")
+    ] = None,
+    plugin: Plugin = None,
+    out: Annotated[Path | None, typer.Option(help="the figure's file [beside the recording]")] = None,
+    json: Json = False,
+) -> None:
+    """Tell what elements would have dissipated on a motion that was recorded, which they do not change.
+
+    One pass in flat memory. The last line names the figure's file.
+    """
+    from haploop.tools.cli.live import seconds
+    from haploop.tools.dissipate.command import Request
+    from haploop.tools.dissipate.command import dissipate as book
+    from haploop.tools.dissipate.setting import Asked
+    from haploop.tools.dissipate.text_recording import Layout
+
+    asked = Asked(damping or [], mass or [], element or [], wall, occupies, set or [])
+    layout = Layout(position, time, rate, velocity, acceleration, unit, time_unit, velocity_unit, acceleration_unit)
+    book(Request(recording, asked, layout, seconds(delay, "--delay"), plugin or [], out), json)
+
+
+def paper(
+    figure: Annotated[list[int] | None, typer.Option(help="number of a figure; may be repeated [all]")] = None,
+    out: Annotated[Path, typer.Option(help="directory for pictures, data, scenes and the page")] = Path("runs/paper"),
+    small: Annotated[bool, typer.Option("--small", help="few runs, in seconds, to see that it works")] = False,
+    workers: Annotated[int | None, typer.Option(min=1, help="processes [one a core]")] = None,
+) -> None:
+    """Make the figures of the paper and the table of its claims, with what holds here.
+
+    Each figure is a PNG with its data and scenes beside it. The last line names the page.
+    """
+    from haploop.tools.studies.choi2022.command import paper as make
+
+    make(figure or [], out, small, workers)
+
+
+def advise(
+    device: Annotated[str, typer.Argument(help="a device that comes with haploop, or a scene", show_default=False)],
+    hand: Annotated[
+        str | None, typer.Option(metavar="HAND", help="a hand that comes with haploop, a file with one, or none")
+    ] = None,
+    delay: Annotated[str | None, typer.Option(metavar="TIME", help='round trip, s or "2 ms"')] = None,
+    estimator: Annotated[
+        str | None, typer.Option(metavar="NAME", help="difference, window, foaw, kalman or accelerometer")
+    ] = None,
+    set: Set = None,
+    plugin: Plugin = None,
+    workers: Annotated[int | None, typer.Option(help="processes [as many as cores]", show_default=False)] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="directory to write to, new or empty [runs/advice-DEVICE-TIME]")
+    ] = None,
+    json: Json = False,
+) -> None:
+    """Say which wall a device can render safely, with which element, and why it buzzes beyond."""
+    from haploop.tools.advise.command import Request
+    from haploop.tools.advise.command import advise as give
+
+    give(Request(device, hand, delay, estimator, set or [], plugin or [], workers, out), json)

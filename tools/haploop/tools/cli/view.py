@@ -1,0 +1,192 @@
+"""``haploop view``: the live page in a browser, for runs of this machine, one after the other."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator, Sequence
+from typing import TYPE_CHECKING, Any
+
+from haploop.tools.cli.exit_codes import WRONG_USE, leave, plain_errors
+
+if TYPE_CHECKING:
+    import asyncio
+
+    from haploop.launch.processes.run_directory import LiveRun
+    from haploop.view.serve.guard import Guard
+
+SINCE = ("start", "now")
+_AT = "The page is at {} (Ctrl-C ends it)"
+# A run waits so long for its viewer.
+_HELD_S = 10.0
+
+
+class LiveRuns:
+    """The live runs of this user, as a viewer finds and steers them."""
+
+    def live(self) -> Sequence[LiveRun]:
+        """Those that live now, the oldest first."""
+        from haploop.launch.processes import run_directory
+
+        return run_directory.live_runs()
+
+    def ask(self, run: LiveRun, verb: str, arguments: dict[str, Any]) -> tuple[str, dict[str, Any]]:
+        """Have a run carry out a command."""
+        from haploop.launch.processes.control import CommandRefused, ask
+        from haploop.launch.processes.run_directory import RunNotFound
+        from haploop.view.receive.runs import CommandFailed
+
+        try:
+            return ask(run, verb, **arguments)
+        except (CommandRefused, RunNotFound) as error:
+            raise CommandFailed(str(error)) from error
+        except (TypeError, ValueError, OverflowError) as error:  # names of its own, numbers no message can carry
+            raise CommandFailed(f"The arguments of {verb} cannot be used: {error}.") from error
+
+
+def view(run_id: str | None, port: int, since: str, browser: bool, led: bool) -> None:
+    """Serve the page until Ctrl-C; one led by another process gives it the link on stdout and ends with stdin."""
+    if since not in SINCE:
+        leave(f"--since must be {' or '.join(SINCE)}, but {since!r} was given.", WRONG_USE)
+    check_extra()
+    import asyncio
+
+    from haploop.launch.processes import run_directory
+    from haploop.view.serve.program import PortTaken, listen, serve
+
+    with plain_errors():
+        first = run_directory.find(run_id).id if run_id else None
+    try:
+        listening = listen(port)
+    except PortTaken as error:
+        leave(str(error), WRONG_USE)
+
+    def serving(guard: Guard) -> None:
+        if led:
+            print(guard.link, flush=True)
+        else:
+            print(_AT.format(guard.link), file=sys.stderr, flush=True)
+        if browser:
+            threading.Thread(target=_open, args=(guard.entrance,), daemon=True).start()
+
+    async def main() -> None:
+        end = asyncio.Event()
+        if led:
+            _at_eof(asyncio.get_running_loop(), end.set)
+        await serve(LiveRuns(), listening, first=first, from_start=since == "start", serving=serving, end=end)
+
+    with contextlib.suppress(KeyboardInterrupt):
+        asyncio.run(main())
+
+
+def check_extra() -> None:
+    """Leave with a sentence where something the page needs is not installed."""
+    from haploop.view.serve.assets import MissingExtra, check_installed
+
+    try:
+        check_installed()
+    except MissingExtra as error:
+        leave(str(error), WRONG_USE)
+
+
+def _open(address: str) -> None:
+    """Open the page where there is a screen to open it on; a browser in the terminal could not draw it."""
+    import webbrowser
+
+    screen = sys.platform == "darwin" or any(name in os.environ for name in ("DISPLAY", "WAYLAND_DISPLAY", "BROWSER"))
+    if not (screen and webbrowser.open(address)):
+        print("No browser could be opened here; open the page by its address.", file=sys.stderr, flush=True)
+
+
+def _at_eof(loop: asyncio.AbstractEventLoop, act: Callable[[], None]) -> None:
+    """Act once nothing can come from stdin any more: whoever started this process has ended."""
+
+    def wait() -> None:
+        sys.stdin.buffer.read()
+        with contextlib.suppress(RuntimeError):  # the loop has ended by itself
+            loop.call_soon_threadsafe(act)
+
+    threading.Thread(target=wait, daemon=True).start()
+
+
+class Viewing:
+    """What a run has to do with whoever shows it: nothing, where nobody does."""
+
+    def announced(self, run_id: str) -> None:
+        """The run can be found by this id."""
+
+    def held(self, ready: set[int]) -> bool:
+        """Whether the run is not to begin yet, given the pids of all nodes that are ready."""
+        return False
+
+    def stay(self) -> None:
+        """The run is over."""
+
+
+@contextlib.contextmanager
+def viewing(wanted: bool, in_process: bool) -> Iterator[Viewing]:
+    """Show what is run meanwhile from its first tick on; when it is over, keep the page until Ctrl-C.
+
+    The viewer is a process of its own; what becomes of it is no matter to the run.
+    """
+    if wanted and in_process:
+        leave("--view needs the sockets of a run as processes; leave out --in-process.", WRONG_USE)
+    if wanted:
+        check_extra()
+    shown = _Viewer() if wanted else Viewing()
+    try:
+        yield shown
+    finally:
+        shown.stay()
+
+
+class _Viewer(Viewing):
+    """A viewer as a process of its own."""
+
+    _process: subprocess.Popen[str] | None = None
+    _link = ""
+
+    def announced(self, run_id: str) -> None:
+        words = ["view", "--run", run_id.partition(" ")[0], "--led"]
+        self._since = time.monotonic()
+        self._process = subprocess.Popen(
+            [sys.executable, "-m", "haploop.tools.cli", *words],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+            process_group=0,  # the first Ctrl-C is for the run alone; the page shows what came of it
+        )
+        threading.Thread(target=self._tell, daemon=True).start()
+
+    def held(self, ready: set[int]) -> bool:
+        process = self._process
+        is_on_its_way = process is not None and process.pid not in ready and process.poll() is None
+        return is_on_its_way and time.monotonic() - self._since < _HELD_S
+
+    def _tell(self) -> None:
+        assert self._process
+        assert self._process.stdout
+        self._link = self._process.stdout.readline().strip()
+        if self._link:
+            print(f"The page is at {self._link}", file=sys.stderr, flush=True)
+
+    def stay(self) -> None:
+        """Keep the page until Ctrl-C, or until it ends by itself; leave no process behind."""
+        if not (process := self._process):
+            return
+        with contextlib.suppress(KeyboardInterrupt):
+            if self._link and process.poll() is None:
+                print(_AT.format(self._link), file=sys.stderr, flush=True)
+            process.wait()
+        assert process.stdin
+        with contextlib.suppress(OSError):
+            process.stdin.close()
+        try:
+            process.wait(timeout=3.0)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.wait()

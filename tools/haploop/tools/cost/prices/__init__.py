@@ -1,0 +1,1 @@
+"""The prices of books, log, effects, processes, delay and control rate."""

@@ -1,0 +1,183 @@
+"""Many scenes on many cores: ``results_of`` in parts that workers share, in bounded memory and without a lost scene."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator, Hashable, Iterable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, wait
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+from haploop.controller.dissipation import load_plugin
+from haploop.launch.batch.stacking import runs_in_arrays, structure
+from haploop.tools.executor.parts import Group, Sizes, cut, grouped
+from haploop.tools.executor.workers import Cluster, Here, Processes, Workers
+from haploop.tools.machine import cores
+from haploop.tools.sweep.run.work import Result, Scene, Work
+
+_LOOK_S = 0.3
+DIED = "The process that ran it died: it was killed, ran out of memory or crashed in compiled code."
+
+
+def results(
+    scenes: Iterable[Scene],
+    plugins: Sequence[Path] = (),
+    *,
+    workers: int | None = None,
+    energy: bool = True,
+    trajectories: bool = False,
+) -> Iterator[tuple[int, Result]]:
+    """The results of ``haploop.launch.batch.run.results_of``, from as many processes, in the order they come in.
+
+    Args:
+        scenes: resolved; taken a few thousand at a time.
+        plugins: files that define elements.
+        workers: processes; as many as there are cores when None; 1 runs in this process.
+        energy, trajectories: as for ``results_of``.
+
+    Yields:
+        The index of a scene and its result. A scene that fails, or kills its worker, is a result with its reason.
+
+    Raises:
+        PluginError: a plugin cannot be used.
+        WorkersError: no worker can be started.
+    """
+    with Pool(workers) as pool:
+        yield from pool.results(scenes, plugins, energy=energy, trajectories=trajectories)
+
+
+class Pool:
+    """Workers that stay for several calls; a context manager.
+
+    Args:
+        workers: processes; as many as there are cores when None; 1 runs in this process.
+        dask: address of a Dask scheduler, whose workers are used instead.
+
+    Raises:
+        WorkersError: there is no such cluster.
+    """
+
+    def __init__(self, workers: int | None = None, dask: str | None = None) -> None:
+        count = workers or cores()
+        self._workers: Workers = Cluster(dask) if dask else Here() if count == 1 else Processes(count)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        self._workers.close(at_once=kind is not None)
+
+    @property
+    def count(self) -> int:
+        """Workers at once."""
+        return self._workers.count
+
+    def results(
+        self, scenes: Iterable[Scene], plugins: Sequence[Path] = (), *, energy: bool = True, trajectories: bool = False
+    ) -> Iterator[tuple[int, Result]]:
+        """As the function ``results``."""
+        work = Work(make=_second, sources=sources_of(plugins), energy=energy, trajectories=trajectories)
+        count = len(scenes) if isinstance(scenes, Sequence) else None
+        by_structure = grouped(enumerate(scenes), _structure)
+        groups = (Group(items, together=shape is not None) for shape, items in by_structure)
+        for part in self.parts(work, groups, count):
+            for (index, _), result in part:
+                yield index, result
+
+    def parts(
+        self, work: Work, groups: Iterable[Group], count: int | None = None, stop: Callable[[], bool] = lambda: False
+    ) -> Generator[list[tuple[Any, Any]]]:
+        """Do some work on items, part by part; no more than two parts a worker are under way.
+
+        When a worker dies, nobody knows which of the parts under way killed it. So each of them is then run by
+        itself, and one that kills its worker again is halved until the culprit stands alone.
+
+        Args:
+            work: to do.
+            groups: of items that belong together; taken when there is room for them.
+            count: of all items, where it is known.
+            stop: asked before each part; True ends the work after those under way.
+
+        Yields:
+            Each item of a part that is done with what is kept of it.
+
+        Raises:
+            PluginError: a plugin does not load in a worker.
+            WorkersError: no worker can be started.
+        """
+        sizes = Sizes(self.count, count)
+        source = cut(groups, sizes)
+        flying: dict[Future[Any], Group] = {}
+        try:
+            while True:
+                while not stop() and len(flying) < self._workers.room and (part := next(source, None)):
+                    flying[self._submitted(work, part.items)] = part
+                if not flying:
+                    return
+                done = wait(flying, _LOOK_S, FIRST_COMPLETED).done  # now and then to ask whether to stop
+                if not all(map(self._outcome, done)):
+                    done = wait(flying).done  # what else is under way has died with it, or will soon be done
+                suspects: list[Group] = []
+                for future in done:
+                    part = flying.pop(future)
+                    if outcome := self._outcome(future):
+                        sizes.took(part, outcome[0])
+                        yield list(zip(part.items, outcome[1], strict=True))
+                    else:
+                        suspects.append(part)
+                for part in suspects:
+                    yield from self._by_itself(work, part.items, stop)
+        finally:
+            for future in flying:
+                future.cancel()
+
+    def _by_itself(self, work: Work, items: Sequence[Any], stop: Callable[[], bool]) -> Iterator[list[tuple[Any, Any]]]:
+        """Items that were under way when a worker died, with nothing beside it."""
+        self._workers.renew()
+        if stop():
+            return
+        if outcome := self._outcome(self._submitted(work, items)):
+            yield list(zip(items, outcome[1], strict=True))
+        elif len(items) == 1:
+            yield [(items[0], work.lost(items[0], DIED))]
+        else:
+            middle = len(items) // 2
+            for half in (items[:middle], items[middle:]):
+                yield from self._by_itself(work, half, stop)
+
+    def _submitted(self, work: Work, items: Sequence[Any]) -> Future[Any]:
+        try:
+            return self._workers.submit(work.run, items)
+        except self._workers.deaths as error:
+            future: Future[Any] = Future()
+            future.set_exception(error)
+            return future
+
+    def _outcome(self, future: Future[Any]) -> tuple[float, list[Any]] | None:
+        """What a part came to, None if its worker died; waits for it."""
+        try:
+            return future.result()
+        except self._workers.deaths:
+            return None
+
+
+def sources_of(plugins: Iterable[Path]) -> tuple[tuple[str, str], ...]:
+    """Plugin files as workers take them.
+
+    Raises:
+        PluginError: one cannot be read, or does not load.
+    """
+    for path in plugins:
+        load_plugin(path)
+    return tuple((str(path), path.read_text(encoding="utf-8")) for path in map(Path, plugins))
+
+
+def _second(item: tuple[int, Scene]) -> Scene:
+    return item[1]
+
+
+def _structure(item: tuple[int, Scene]) -> Hashable:
+    """What scenes in one array share; all that run alone are alike."""
+    return structure(item[1]) if runs_in_arrays(item[1]) else None

@@ -1,0 +1,92 @@
+"""The line that tells how far a run is, kept up to date on a terminal."""
+
+from __future__ import annotations
+
+import time
+from types import TracebackType
+from typing import TYPE_CHECKING, Any, Self
+
+from haploop.tools.render.amounts import amount, fixed
+
+if TYPE_CHECKING:
+    from rich.console import Console
+    from rich.live import Live
+    from rich.text import Text
+
+_REFRESH_S = 0.1
+# Columns that all but the bar need, and the bar's bounds.
+_WORDS, _LEAST_BAR, _MOST_BAR = 70, 4, 24
+
+
+class ProgressLine:
+    """A context manager: one live line while a run goes on, gone when it ends; nothing where there is no terminal.
+
+    Args:
+        title: of the run.
+        duration_s: simulated time of the run.
+        console: where to show it; stderr when None.
+    """
+
+    def __init__(self, title: str, duration_s: float, console: Console | None = None) -> None:
+        self._title, self._duration_s = title, duration_s
+        self._console = console
+        self._live: Live | None = None
+        self._run_id = ""
+        self._due = 0.0
+        self._began: tuple[float, float] | None = None
+
+    def __enter__(self) -> Self:
+        from haploop.tools.render.report import console
+
+        self._console = self._console or console(stderr=True)
+        if self._console.is_terminal:
+            from rich.live import Live
+
+            self._live = Live(console=self._console, auto_refresh=False, transient=True)
+            self._live.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        if self._live:
+            self._live.stop()
+
+    def announce(self, run_id: str) -> None:
+        """Name the run, as other terminals may call it."""
+        self._run_id = run_id
+
+    def update(self, status: dict[str, Any]) -> None:
+        """Take the logger's status; cheap, and shown a few times a second at most."""
+        now = time.monotonic()
+        if not status or now < self._due:
+            return
+        self._due = now + _REFRESH_S
+        # Real time counts from the first status on: starting up is not running.
+        self._began = self._began or (now, status["t_s"])
+        elapsed_s, done_s = now - self._began[0], status["t_s"] - self._began[1]
+        if self._live:
+            factor = done_s / elapsed_s if elapsed_s > 0 else 0.0
+            self._live.update(self.line(status, factor, self._live.console.width), refresh=True)
+
+    def line(self, status: dict[str, Any], factor: float, width: int) -> Text:
+        """The line for a status, cut to ``width`` columns; ``factor`` is simulated over real time, 0 if unknown."""
+        from rich.text import Text
+
+        from haploop.tools.render.report import VERDICT_STYLES
+
+        bar = max(_LEAST_BAR, min(_MOST_BAR, width - _WORDS))
+        done = round(min(1.0, status["t_s"] / self._duration_s) * bar)
+        verdict = status["verdict"]
+        text = Text.assemble(
+            (f"{self._run_id} " if self._run_id else "", "bold"),
+            ("━" * done, "green"), ("─" * (bar - done), "dim"),
+            f" {status['t_s']:.2f}/{self._duration_s:g} s",
+            f" {fixed(factor)}×" if factor else "",
+            "  ", (verdict, VERDICT_STYLES.get(verdict, "bold")),
+            f"  {amount(status['oscillation_m'], 'm')} p-p",
+            f"  residual {status['residual_J']:.0e} J",
+            (f"  {self._title}", "dim"),
+        )  # fmt: skip
+        text.truncate(width, overflow="ellipsis")
+        return text

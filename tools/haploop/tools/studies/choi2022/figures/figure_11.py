@@ -1,0 +1,113 @@
+"""Fig. 11: damping swept with unidirectional inertia fixed, and the largest steady stiffness."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from haploop.tools.figure.file import empty_figure
+from haploop.tools.figure.style import INK, SMALL, dress
+from haploop.tools.studies.choi2022.claims import Claim, Finding
+from haploop.tools.studies.choi2022.experiment.map_parallel import is_steady, runs
+from haploop.tools.studies.choi2022.experiment.setup import both
+from haploop.tools.studies.choi2022.experiment.verdict_under_assumptions import judged, nearest
+from haploop.tools.studies.choi2022.work import Work
+
+TITLE = "Largest steady stiffness of damping with unidirectional inertia"
+MOST = Claim(
+    "V.B.4, Fig. 11",
+    "The maximum stiffness that could be rendered using our setup was 6.3 N/mm [at] 0.00215 Ns/mm and 0.0090 kg",
+)
+MORE = Claim(
+    "VI",
+    "applying two dissipative elements (virtual damping and unidirectional virtual inertia) simultaneously would … "
+    "enable a larger stiffness interaction",
+)
+STEP = Claim(
+    "V.B.4, Fig. 11",
+    "The stable boundary points of the experiment with the unidirectional virtual inertia were used to render the 0.5 "
+    "N/mm increased stiffness of the VW, which was unstable without virtual damping",
+)
+CLAIMS = (MOST, MORE, STEP)
+STIFFNESSES = np.arange(2500.0, 10001.0, 500.0)
+_DAMPINGS = (0.0, 0.5, 1.0, 1.5, 2.15, 3.0, 4.0, 5.5, 7.5, 10.0)
+_MASSES = (0.0, 0.003, 0.006, 0.009, 0.014, 0.02, 0.027, 0.035, 0.045)
+PAPER_N_M, PAPER_DAMPING, PAPER_MASS_KG = 6300.0, 2.15, 0.009
+
+
+def make(work: Work) -> list[Finding]:
+    """A run for every pair and stiffness."""
+    dampings = np.array(_DAMPINGS[::3] if work.small else _DAMPINGS)
+    masses = np.array(_MASSES[::4] if work.small else _MASSES)
+    stiffnesses = STIFFNESSES[::3] if work.small else STIFFNESSES
+    setup = nearest(work)
+    cells = [(b, m, k) for b in dampings for m in masses for k in stiffnesses]
+    results = runs(work, "damping with inertia", [setup.scene(k, both(float(b), float(m))) for b, m, k in cells])
+    steady = np.array([is_steady(result) for result in results]).reshape(len(dampings), len(masses), -1)
+    largest = largest_steady(steady, stiffnesses)
+    figure = empty_figure(8.6, 5.2)
+    ax = figure.subplots()
+    image = ax.imshow(largest / 1e3, origin="lower", aspect="auto", cmap="cividis")
+    for (row, column), value in np.ndenumerate(largest):
+        tone = "white" if value < 0.6 * largest.max() else INK
+        ax.text(
+            column, row, f"{value / 1e3:.1f}" if value else "–", ha="center", va="center", fontsize=SMALL, color=tone
+        )
+    dress(ax, "largest steady stiffness (N/mm)", "unidirectional inertia (g)", "damping (N s/m)")
+    ax.grid(visible=False)
+    ax.set_xticks(range(len(masses)), [f"{1e3 * mass:g}" for mass in masses])
+    ax.set_yticks(range(len(dampings)), [f"{damping:g}" for damping in dampings])
+    figure.colorbar(image, ax=ax, label="N/mm")
+    work.figure(figure, "figure_11")
+    work.data(
+        "figure_11", {"damping_N_s_m": dampings, "mass_kg": masses, "stiffness_N_m": stiffnesses, "steady": steady}
+    )
+    work.scene("figure_11", setup.scene(PAPER_N_M, both(PAPER_DAMPING, PAPER_MASS_KG)))
+    work.caption = (
+        "The largest of the stiffnesses 2.5, 3.0, … N/mm up to which every one is steady; a dash where 2.5 is not, "
+        "though a stiffer one may be (large inertias need a stiff wall)."
+    )
+    work.answer = _answer(largest, dampings, masses)
+    return _findings(work, largest, dampings, masses)
+
+
+def largest_steady(steady: np.ndarray, stiffnesses: np.ndarray) -> np.ndarray:
+    """The last of a row of stiffnesses, along the last axis, before the first that is not steady; 0 if none is."""
+    count = np.where(steady.all(axis=-1), steady.shape[-1], (~steady).argmax(axis=-1))
+    return np.where(count > 0, stiffnesses[np.maximum(count - 1, 0)], 0.0)
+
+
+def _answer(largest: np.ndarray, dampings: np.ndarray, masses: np.ndarray) -> str:
+    i, j = np.unravel_index(largest.argmax(), largest.shape)
+    return (
+        "**Damping and unidirectional inertia together bear more than either alone.** In the reading nearest to the "
+        f"paper {largest[i, j] / 1e3:.1f} N/mm ({dampings[i]:g} N s/m with {1e3 * masses[j]:g} g) against "
+        f"{largest[:, 0].max() / 1e3:.1f} of damping and {largest[0].max() / 1e3:.1f} of inertia, each the best of the "
+        "sizes drawn; tune the two together"
+    )
+
+
+def _findings(work: Work, largest: np.ndarray, dampings: np.ndarray, masses: np.ndarray) -> list[Finding]:
+    i, j = np.unravel_index(largest.argmax(), largest.shape)
+    most, alone = float(largest[i, j]), float(largest[0].max())
+    damped = float(largest[:, 0].max())
+    numbers = (
+        f"{most / 1e3:.1f} N/mm with {dampings[i]:g} N s/m and {1e3 * masses[j]:g} g; damping alone "
+        f"{damped / 1e3:.1f}, unidirectional inertia alone {alone / 1e3:.1f} N/mm"
+    )
+    bears = np.flatnonzero(largest[0, 1:]) + 1
+    helped = int((largest[1:, bears].max(axis=0) >= largest[0, bears] + 500.0).sum())
+    near = (
+        abs(most - PAPER_N_M) <= 500.0
+        and 0.5 <= dampings[i] / PAPER_DAMPING <= 2.0
+        and 0.5 <= masses[j] / PAPER_MASS_KG <= 2.0
+    )
+    return [
+        judged(work, MOST, near, numbers, "11 up to 6.3"),
+        judged(work, MORE, most > max(alone, damped), numbers, "11 more"),
+        judged(
+            work,
+            STEP,
+            helped == len(bears),
+            f"for {helped} of {len(bears)} inertias that steady a wall alone, some damping adds 0.5 N/mm or more",
+        ),
+    ]

@@ -1,0 +1,98 @@
+"""Fig. 13: what damping and unidirectional inertia take out, over one contact."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from haploop.tools.figure.file import empty_figure
+from haploop.tools.figure.style import SMALL, WALL_FILL, dress
+from haploop.tools.render.amounts import amount
+from haploop.tools.studies.choi2022.claims import Claim, Finding
+from haploop.tools.studies.choi2022.colours import COLOURS
+from haploop.tools.studies.choi2022.experiment.setup import KINDS
+from haploop.tools.studies.choi2022.experiment.verdict_under_assumptions import judged
+from haploop.tools.studies.choi2022.figures.figure_12 import best_pair
+from haploop.tools.studies.choi2022.simulation.scenes import run
+from haploop.tools.studies.choi2022.work import Work
+
+TITLE = "What damping and unidirectional inertia take out of a contact with 6.3 N/mm"
+LARGER = Claim(
+    "V.B.4, Fig. 13",
+    "The unidirectional virtual inertia could dissipate a larger amount of energy than virtual damping over the entire "
+    "interaction",
+)
+ENDS = Claim(
+    "V.B.4, Fig. 13",
+    "the energy dissipation of the virtual damping was concentrated at the start and end of the contact",
+)
+MIDDLE = Claim(
+    "V.B.4, Fig. 13",
+    "the sufficiently large acceleration contribution, even during the extreme low-velocity interaction in the middle "
+    "of the contact",
+)
+CLAIMS = (LARGER, ENDS, MIDDLE)
+# The person lets go at this time, so that the contact has an end.
+_RELEASED_S, _PULL_N = 0.6, 4.0
+_EDGE_S = 0.06
+
+
+def make(work: Work) -> list[Finding]:
+    """A press of half a second with the best pair, then the hand pulls back."""
+    scene, _ = best_pair(work)
+    push = scene["hand"]["force"]["value"]
+    scene["hand"]["force"] = {
+        "kind": "trace",
+        "time": [0.0, _RELEASED_S, _RELEASED_S + 0.05],
+        "force": [push, push, _PULL_N],
+    }
+    _, log = run(scene)
+    energy = log["/energy"]
+    t = np.asarray(log["/controller"]["timestamp"])
+    inside = np.asarray(log["/controller"]["in_contact"]) > 0
+    books = {
+        kind: np.asarray([energy[f"{name}.{kind}"] for name in ("damping", KINDS[3])]) for kind in ("sampled", "true")
+    }
+    figure = empty_figure(9.6, 4.4)
+    ax = figure.subplots()
+    for i, label in enumerate(("damping", "unidirectional inertia")):
+        for book, style, width in (("sampled", "-", 1.4), ("true", "--", 1.0)):
+            ax.plot(
+                t,
+                1e3 * books[book][i][: len(t)],
+                style,
+                color=COLOURS[label.replace(" ", "-")],
+                linewidth=width,
+                label=f"{label}, {book}",
+            )
+    ax.axvspan(t[inside][0], t[inside][-1], color=WALL_FILL, zorder=0, linewidth=0, label="in contact")
+    dress(ax, "", "time (s)", "energy taken (mJ)")
+    figure.legend(loc="outside lower center", ncols=5, frameon=False, fontsize=SMALL)
+    work.figure(figure, "figure_13")
+    work.data("figure_13", {"t_s": t, "in_contact": inside, **{f"{kind}_J": book for kind, book in books.items()}})
+    work.scene("figure_13", scene)
+    work.caption = (
+        f"Pressed until {_RELEASED_S:g} s, then pulled back, with the best pair of Fig. 12. Sampled books are what the "
+        "paper's Fig. 13 shows, the true ones what left the device."
+    )
+    return _findings(work, books["sampled"], books["true"], t, inside)
+
+
+def _findings(work: Work, sampled: np.ndarray, true: np.ndarray, t: np.ndarray, inside: np.ndarray) -> list[Finding]:
+    took, left = sampled[:, -1], true[:, -1]
+    ticks = np.flatnonzero(inside)
+    first, last = t[ticks[0]], t[ticks[-1]]
+    edge = (t < first + _EDGE_S) | (t > last - _EDGE_S)
+    flows = np.diff(sampled[:, : len(t)], axis=1, prepend=0.0)
+    shares = flows[:, edge].sum(axis=1) / np.where(took == 0.0, 1.0, took)
+    middle = flows[:, ~edge].sum(axis=1)
+    true_ones = f"true: {amount(left[0], 'J')}, {amount(left[1], 'J')}"
+    both = f"damping {amount(took[0], 'J')}, inertia {amount(took[1], 'J')} ({true_ones})"
+    percent = f"damping {100 * shares[0]:.0f} %, inertia {100 * shares[1]:.0f} %"
+    parts = f"share within {1e3 * _EDGE_S:.0f} ms of either end: {percent}"
+    rest = f"in between: damping {amount(float(middle[0]), 'J')}, inertia {amount(float(middle[1]), 'J')}"
+    exact_only = "" if took[1] > took[0] else "; by the true books, not by the sampled ones that the paper has"
+    return [
+        judged(work, LARGER, bool(took[1] > took[0] or left[1] > left[0]), both, "13 more", exact_only),
+        judged(work, ENDS, bool(shares[0] > 0.8), f"{parts}; {rest}"),
+        judged(work, MIDDLE, bool(middle[1] > abs(middle[0])), f"{rest}; {parts}"),
+    ]

@@ -1,0 +1,284 @@
+"""Fig. 5: where the sign of the acceleration alternates, inertia generates; and what unidirectional inertia does."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from haploop.tools.figure.file import empty_figure
+from haploop.tools.figure.style import ELEMENTS, GREY, WALL, dress, legend, plain_numbers
+from haploop.tools.render.amounts import amount, fixed
+from haploop.tools.studies.choi2022.claims import Claim, Finding
+from haploop.tools.studies.choi2022.gate.gate_timing import returned
+from haploop.tools.studies.choi2022.motion.momentum import draw_loop, steps_J
+from haploop.tools.studies.choi2022.motion.prescribed import (
+    KINDS,
+    MASS_KG,
+    PERIOD_S,
+    closed_form,
+    forces,
+    mean_taken,
+    positions,
+    taken_J,
+)
+from haploop.tools.studies.choi2022.work import Work
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+TITLE = "The acceleration's sign alternates: inertia generates, and unidirectional inertia may not"
+ALTERNATES = Claim("III, Fig. 5", "if … the acceleration sign changes in every sample time, the energy begins to leak")
+THREE = Claim(
+    "III, Fig. 5",
+    "If the velocity maintains its … tendency for at least three steps …, this behavior may not cause any energy leak",
+)
+ANY_VELOCITY = Claim(
+    "III, Fig. 5", "this active behavior … can occur … irrespective of whether the velocity is positive or negative"
+)
+AT_REST = Claim(
+    "III, Fig. 5", "at the equilibrium point owing to the velocity jittering near zero, which causes energy generation"
+)
+ONLY_STORED = Claim("IV, eq. 9", "the virtual inertia is only activated when the energy is stored")
+PURE = Claim("IV", "the unidirectional virtual inertia can be used as a pure energy dissipation element")
+MORE = Claim("IV", "the amount of dissipated energy can be significantly larger than that of the conventional one")
+CHATTER = Claim("IV", "to properly dissipate the generated energy (even during high-frequency chattering scenarios)")
+HIGHER = Claim(
+    "III",
+    "[inertia] can dissipate energy even in higher velocity interactions, unlike digital damping and digital springs",
+)
+BEFORE = Claim(
+    "IV, eq. 9",
+    "we use k − 1 step accelerations to calculate k-step unidirectional virtual inertia after considering the ZOH "
+    "effect",
+)
+CLAIMS = (ALTERNATES, THREE, ANY_VELOCITY, AT_REST, ONLY_STORED, BEFORE, PURE, MORE, CHATTER, HIGHER)
+
+BI, UNI = "bidirectional-inertia", "unidirectional-inertia"
+_JITTER_M_S, _DRIFT_M_S = 0.01, 0.05
+_COLOURS = dict(zip(KINDS, (WALL, *ELEMENTS), strict=False))
+
+
+def make(work: Work) -> list[Finding]:
+    """The alternating loop, its energy sample by sample, and all kinds over frequency."""
+    frequencies = np.concatenate([np.geomspace(2.03, 60.7, 20), np.linspace(63.1, 497.3, 60)])
+    if work.small:
+        frequencies = frequencies[::8]
+    theta = 2.0 * np.pi * frequencies * PERIOD_S
+    measured = {(kind, late): mean_taken(kind, theta, late) for kind in KINDS for late in (0, 2)}
+    figure = empty_figure(14.0, 8.2)
+    (loop, over_samples), over_frequency = figure.subplots(2, 2)
+    velocity = _DRIFT_M_S + _JITTER_M_S * np.array([-1.0, 1.0, -1.0, 1.0, -1.0, 1.0])
+    draw_loop(loop, velocity, MASS_KG, "The sign alternates every sample")
+    loop.set_ylim(350.0, 650.0)
+    books = _over_samples(over_samples)
+    for ax, late in zip(over_frequency, (0, 2), strict=True):
+        _over_frequency(ax, frequencies, measured, late)
+    work.figure(figure, "figure_5")
+    named = {f"{kind}_{late}_ticks_late_J_m2".replace("-", "_"): value for (kind, late), value in measured.items()}
+    work.data("figure_5", {"frequency_Hz": frequencies, **named, **books})
+    work.caption = (
+        "Top: a velocity that jitters by ±10 mm/s from sample to sample, its loop (counter-clockwise: more is given "
+        "than taken) and its energy, about rest and on top of 50 mm/s. Bottom: mean energy taken a sample from a "
+        "sine of 1 m, relative to what the damper would take if it were not sampled; lines are closed forms, dots "
+        "the program's controller. The paper's numbers: 0.15 N/mm, 0.8 N s/m, 10 g."
+    )
+    work.answer = _answer(frequencies, measured)
+    return _findings(frequencies, measured)
+
+
+def _answer(frequencies: np.ndarray, measured: dict[tuple[str, int], np.ndarray]) -> str:
+    ends = {(kind, late): _hertz(_first_negative(frequencies, measured[kind, late])) for kind, late in measured}
+    parts = [
+        f"{name} {ends[kind, 0]} and {ends[kind, 2]}"
+        for name, kind in (("damping", "damping"), ("bidirectional inertia", BI), ("unidirectional inertia", UNI))
+    ]
+    return (
+        "**Inertia takes energy from faster swings than damping does, and from slow ones hardly any.** Highest "
+        f"frequency at 1 kHz, without delay and with 2 ms: {', '.join(parts)}. An encoder's jitter turns bidirectional "
+        "inertia into a source of energy"
+    )
+
+
+def _over_samples(ax: Axes) -> dict[str, np.ndarray]:
+    """Energy over samples of both inertias under jitter; returns what was drawn."""
+    drawn: dict[str, np.ndarray] = {}
+    for kind, colour in ((BI, _COLOURS[BI]), (UNI, _COLOURS[UNI])):
+        for drift, style, where in ((0.0, "-", "about rest"), (_DRIFT_M_S, (0, (4, 2)), "on 50 mm/s")):
+            book = np.cumsum(_taken_under_jitter(kind, drift))
+            ax.plot(
+                1e6 * book,
+                color=colour,
+                linestyle=style,
+                linewidth=1.5,
+                marker=".",
+                markersize=4,
+                label=f"{kind.partition('-')[0]}, {where}",
+            )
+            drawn[f"{kind}_{where}_J".replace("-", "_").replace(" ", "_").replace("/", "_per_")] = book
+    ax.axhline(0.0, color=GREY, linewidth=0.8, zorder=0)
+    dress(ax, "Energy taken by 10 g of inertia under that jitter", "sample", "energy (µJ)")
+    legend(ax, loc="lower left", bbox_to_anchor=(0.0, 0.0), ncols=1, framealpha=0.8, edgecolor="none")
+    return drawn
+
+
+def _jitter(drift_m_s: float, ticks: int) -> np.ndarray:
+    """Samples of a velocity drift +- jitter, the sign new every sample, shape (ticks, 1)."""
+    return positions(drift_m_s + _JITTER_M_S * (-1.0) ** np.arange(ticks))[:, None]
+
+
+def _taken_under_jitter(kind: str, drift_m_s: float, ticks: int = 24) -> np.ndarray:
+    """Energy of each sample after the first few, when the jitter is what it is from then on."""
+    x = _jitter(drift_m_s, ticks + 4)
+    taken = taken_J(x, forces(x, kind))[:, 0]
+    return np.concatenate([[0.0], taken[4:]])
+
+
+def _over_frequency(ax: Axes, frequencies: np.ndarray, measured: dict[tuple[str, int], np.ndarray], late: int) -> None:
+    fine = np.geomspace(2.0, 500.0, 800)
+    scale = _unsampled_damper(frequencies)
+    for kind in KINDS:
+        colour = _COLOURS[kind]
+        if kind != UNI:
+            curve = closed_form(kind, 2.0 * np.pi * fine * PERIOD_S, late) / _unsampled_damper(fine)
+            ax.plot(fine, curve, color=colour, linewidth=1.2)
+        look = {"linestyle": "-" if kind == UNI else "none", "linewidth": 0.8, "marker": ".", "markersize": 5}
+        ax.plot(frequencies, measured[kind, late] / scale, color=colour, label=kind.replace("-inertia", ""), **look)
+    ax.axhline(0.0, color=GREY, linewidth=0.8, zorder=0)
+    dress(ax, f"From a sine, {late} ms of delay", "frequency (Hz)", "energy taken / that of the damper")
+    ax.set_xscale("log")
+    plain_numbers(ax.xaxis)
+    ax.set_yscale("symlog", linthresh=0.1, linscale=0.7)
+    legend(ax)
+
+
+def _unsampled_damper(frequencies: np.ndarray) -> np.ndarray:
+    """Energy that 0.8 N s/m take in 1 ms from a sine of 1 m, b omega^2 T / 2."""
+    return 0.8 * (2.0 * np.pi * frequencies) ** 2 * PERIOD_S / 2.0
+
+
+def _findings(frequencies: np.ndarray, measured: dict[tuple[str, int], np.ndarray]) -> list[Finding]:
+    return [*_on_alternation(), *_on_unidirectional(frequencies, measured)]
+
+
+def _on_alternation() -> list[Finding]:
+    rng = np.random.default_rng(5)
+    level = _taken_under_jitter(BI, 0.0)[1:].mean()
+    formula = -2.0 * MASS_KG * _JITTER_M_S**2
+    kept = [_closed(rng, shortest=2) for _ in range(2000)]
+    broken = [_closed(rng, shortest=1) for _ in range(2000)]
+    least, leaking = min(map(_loop_J, kept)), float(np.mean([_loop_J(v) < 0.0 for v in broken]))
+    shifts = [
+        _taken_under_jitter(BI, drift)[1:].reshape(-1, 2).sum(axis=1).mean() for drift in (-_DRIFT_M_S, 0.0, _DRIFT_M_S)
+    ]
+    same = max(shifts) - min(shifts) < 1e-9 * abs(shifts[1])
+    return [
+        ALTERNATES.judged(
+            abs(level / formula - 1.0) < 1e-9,
+            f"a velocity of ±V loses 2 m V² a sample: {amount(level, 'J')} for 10 g and 10 mm/s, closed form "
+            f"{amount(formula, 'J')}. Of 2000 random loops whose acceleration alternates {100 * leaking:.0f} % leak",
+        ),
+        THREE.judged(
+            least >= -1e-15,
+            "over a closed loop of velocity E/m = ½ΣΔ² + ΣΔ(k)Δ(k−1), Δ the changes; where each tendency lasts two "
+            "changes or more, no Δ is at two turns and E ≥ 0. The least of 2000 random ones took "
+            f"{amount(least, 'J')}",
+        ),
+        ANY_VELOCITY.judged(
+            same,
+            f"two samples of jitter take {', '.join(amount(one, 'J') for one in shifts)} on top of −50, 0 and 50 mm/s",
+        ),
+        AT_REST.judged(
+            level < 0.0,
+            f"jitter of ±10 mm/s about rest (one 10 µm count back and forth) takes {amount(level / PERIOD_S, 'W')}",
+        ),
+    ]
+
+
+def _closed(rng: np.random.Generator, shortest: int) -> np.ndarray:
+    """A random velocity that ends as it began, m/s: tendencies of ``shortest`` changes each, or one or two more if 2.
+
+    It is returned with its first three values again, so that every step of the loop has its past.
+    """
+    tendencies = 2 * int(rng.integers(1, 5))
+    changes = []
+    for number in range(tendencies):
+        length = shortest + (int(rng.integers(0, 3)) if shortest > 1 else 0)
+        changes.append((-1) ** number * rng.uniform(0.1, 1.0, length))
+    up, down = sum(part.sum() for part in changes[::2]), -sum(part.sum() for part in changes[1::2])
+    changes = [part if number % 2 == 0 else part * (up / down) for number, part in enumerate(changes)]
+    v = np.concatenate([[0.0], np.cumsum(np.concatenate(changes))])[:-1]
+    return 0.01 * np.concatenate([v, v[:3]])
+
+
+def _loop_J(v: np.ndarray) -> float:
+    """Energy taken once around a closed loop of velocity."""
+    period = len(v) - 3
+    around = np.concatenate([v[:period], v[:period]])
+    return float(steps_J(around, MASS_KG)[period:].sum())
+
+
+def _on_unidirectional(frequencies: np.ndarray, measured: dict[tuple[str, int], np.ndarray]) -> list[Finding]:
+    ratio = measured[UNI, 0] / measured[BI, 0]
+    until = _first_negative(frequencies, ratio - 1.0)
+    at = int(np.argmin(np.abs(frequencies - 20.0)))
+    gives = {late: _first_negative(frequencies, measured[UNI, late]) for late in (0, 2)}
+    rest, drift = (float(_taken_under_jitter(UNI, one)[1:].mean()) for one in (0.0, _DRIFT_M_S))
+    back = {
+        name: returned(hertz)
+        for name, hertz in (("5 Hz", 5.1), ("20 Hz", 20.3), ("50 Hz", 50.7), ("100 Hz", 101.0), ("200 Hz", 201.3))
+    }
+    at_once = abs(returned(50.7, before=False))
+    ends = {(kind, late): _first_negative(frequencies, measured[kind, late]) for kind, late in measured}
+    said = "; ".join(
+        how + ", ".join(f" {kind.partition('-')[0]} {_hertz(ends[kind, late])}" for kind in KINDS)
+        for late, how in ((0, "without delay"), (2, "with 2 ms"))
+    )
+    pure = f"from a sine it takes energy up to {_hertz(gives[0])} at 1 kHz without delay, {_hertz(gives[2])} with 2 ms"
+    within = min(ends[BI, 0], ends[UNI, 0]), ends["damping", 0]
+    return [
+        ONLY_STORED.assuming(
+            "the motion is slow against the sample rate",
+            "share of what it takes that it gives back, since the test looks at a(k−1) and the force is held to the "
+            f"next sample: {', '.join(f'{100 * share:.2g} % at {name}' for name, share in back.items())}",
+        ),
+        BEFORE.judged(
+            at_once >= back["50 Hz"],
+            f"given back of what is taken from a sine of 50 Hz: {100 * back['50 Hz']:.2g} % with a(k−1), "
+            f"{100 * at_once:.2g} % with a(k): the older sample keeps the gate open past the turn",
+        ),
+        PURE.holds(pure)
+        if not np.isfinite(gives[2])
+        else PURE.assuming(f"the motion is slower than {_hertz(gives[2])}", pure),
+        MORE.assuming(
+            f"the motion is slower than {_hertz(until)}",
+            f"under a sine of {frequencies[at]:.0f} Hz, without delay, it takes {fixed(float(ratio[at]))} times what "
+            f"the bidirectional one takes, at {frequencies[4]:.1f} Hz {fixed(float(ratio[4]))} times; from "
+            f"{_hertz(until)} on it takes less",
+        )
+        if 0.0 < until < np.inf
+        else MORE.judged(until > 0.0, f"{fixed(float(ratio[at]))} times at {frequencies[at]:.0f} Hz"),
+        CHATTER.assuming(
+            "the velocity chatters about zero",
+            f"under ±10 mm/s from sample to sample it takes {amount(rest, 'J') if rest else 'nothing'} about rest, "
+            f"where bidirectional inertia takes −2.00 µJ; on top of 50 mm/s it takes {amount(drift, 'J')}: it acts "
+            "on every other sample, the one that pushes on",
+        )
+        if rest >= 0.0
+        else CHATTER.fails(f"it takes {amount(rest, 'J')} a sample"),
+        HIGHER.judged(within[0] > within[1], f"each takes energy from a sine up to: {said}"),
+    ]
+
+
+def _first_negative(frequencies: np.ndarray, taken: np.ndarray) -> float:
+    """The frequency from which on it gives, between two that were tried; 0 if at all, infinite at none of them."""
+    negative = taken < -1e-9 * np.abs(taken).max()
+    if not negative.any() or negative[0]:
+        return 0.0 if negative[0] else np.inf
+    after = int(np.argmax(negative))
+    last, first = taken[after - 1], taken[after]
+    return float(np.interp(0.0, [first, last], [frequencies[after], frequencies[after - 1]]))
+
+
+def _hertz(value: float) -> str:
+    return "none" if not value else f"{value:.0f} Hz" if np.isfinite(value) else "500 Hz"

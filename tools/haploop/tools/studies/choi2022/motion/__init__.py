@@ -1,0 +1,1 @@
+"""Prescribed motions: momentum loops, acceleration, spectra."""

@@ -1,0 +1,1 @@
+"""The sweep file: axes, cells and what is recorded, resolved and checked."""

@@ -1,0 +1,113 @@
+"""What a sweep records: dotted keys of a run's summary, checked on a run of two ticks."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING, Any
+
+from haploop.launch.errors import RunFailed
+from haploop.launch.runs.in_process import run_in_process
+from haploop.launch.runs.result import unit_of
+from haploop.launch.scene.mistakes import nearest
+from haploop.logger.summary import OF_THE_MACHINE
+from haploop.tools.sweep.run.columns import ENDED, NUMBER, TEXT, TRUTH, WHY, Column
+
+if TYPE_CHECKING:
+    from haploop.controller.dissipation import Element
+    from haploop.tools.sweep.file.cells import Sweep
+
+VERDICT = "verdict"
+# Without the books, which take most of the time of a run.
+USUAL = (VERDICT, "window.oscillation_m", "window.displayed_stiffness_N_m", "extremes.force_max_N")
+TICKS = 2
+
+
+class RecordError(ValueError):
+    """Keys that no summary of these scenes has.
+
+    Attributes:
+        wrong: place in the list, what is wrong in a sentence, and the nearest key.
+    """
+
+    def __init__(self, wrong: Sequence[tuple[int, str, str | None]]) -> None:
+        super().__init__("; ".join(sentence for _, sentence, _ in wrong))
+        self.wrong = list(wrong)
+
+
+def columns_of(names: Sequence[str], sweep: Sweep, kinds: dict[str, type[Element]]) -> list[Column]:
+    """A column each; the verdict is always among them.
+
+    Args:
+        names: dotted keys.
+        sweep: what will be run; the first and the last of its cells that can be run are sampled.
+        kinds: element kinds at hand.
+
+    Raises:
+        RecordError: some keys are those of no number, word or truth value.
+    """
+    known: dict[str, Any] = {}
+    for cell in _samples(sweep):
+        known |= _leaves(_short_run(cell, kinds))
+    wrong = []
+    for place, name in enumerate(names):
+        if _without_places(name) in {_without_places(key) for key in known} or not known:
+            continue
+        inner = [key for key in known if key.startswith(f"{name}.")]
+        if inner:
+            wrong.append((place, f"It is a table; name one of {', '.join(inner[:8])}.", None))
+        else:
+            wrong.append((place, "It must be a dotted key of a run's summary.", nearest(name, known)))
+    if wrong:
+        raise RecordError(wrong)
+    wanted = dict.fromkeys([VERDICT, *names])
+    return [Column(name, _kind(known.get(name)), unit_of(name)) for name in wanted if name not in (ENDED, WHY)]
+
+
+def wants_energy(columns: Sequence[Column]) -> bool:
+    """Whether the books must be kept."""
+    return any(column.name.split(".")[0] == "energy" for column in columns)
+
+
+def wants_trajectories(columns: Sequence[Column]) -> bool:
+    """Whether every trajectory must be hashed."""
+    return any(column.name == "trajectory_sha256" for column in columns)
+
+
+def _samples(sweep: Sweep) -> Iterator[dict[str, Any]]:
+    """Scenes of the corners of the grid; the base where none of them can be run."""
+    found = []
+    for cell in (0, sweep.count - 1):
+        try:
+            found.append(sweep.scene(cell))
+        except Exception:  # it will be a row with its reason
+            continue
+    return iter(found or [sweep.base])
+
+
+def _short_run(scene: dict[str, Any], kinds: dict[str, type[Element]]) -> dict[str, Any]:
+    short = {**scene, "duration": TICKS / scene["clock"]["control_rate"]}
+    try:
+        summary = run_in_process(short, kinds)
+    except RunFailed:
+        return {}
+    return {key: value for key, value in summary.items() if key not in OF_THE_MACHINE}
+
+
+def _leaves(value: Any, key: str = "") -> dict[str, Any]:
+    """The values that are no tables, by dotted key."""
+    inner = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else None
+    if inner is None:
+        return {key: value}
+    found: dict[str, Any] = {}
+    for name, entry in inner:
+        found |= _leaves(entry, f"{key}.{name}".lstrip("."))
+    return found
+
+
+def _without_places(name: str) -> str:
+    """An element may be swapped in later, so that the list of elements is longer than it is at first."""
+    return ".".join("0" if part.isdecimal() else part for part in name.split("."))
+
+
+def _kind(value: Any) -> str:
+    return TRUTH if isinstance(value, bool) else TEXT if isinstance(value, str) else NUMBER

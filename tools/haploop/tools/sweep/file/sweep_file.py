@@ -1,0 +1,273 @@
+"""Reading a sweep file: everything it says, resolved, or everything that is wrong with it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from copy import deepcopy
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, ValidationError
+from pydantic_core import PydanticCustomError
+
+from haploop.launch.runs.loaded_scene import texts
+from haploop.launch.scene import file as scene_file
+from haploop.launch.scene.check import complain, resolve
+from haploop.launch.scene.layers import KeyPath, Layers, parse
+from haploop.launch.scene.mistakes import COMMAND_LINE, Mistake, SceneError, nearest, shown
+from haploop.launch.scene.overrides import key_path, lay_overrides
+from haploop.launch.scene.schema import TomlSchema
+from haploop.launch.scene.tables.base import Table
+from haploop.launch.scene.tables.number import Number, si
+from haploop.protocol.quantity import Quantity
+from haploop.tools.sweep.file.cells import Axis, Bisect, Refused, Sweep, resolved
+from haploop.tools.sweep.file.keys import NoSuchKey, number_at
+from haploop.tools.sweep.file.points import PointsError, Span, listed, points_of
+from haploop.tools.sweep.file.record import USUAL, RecordError, columns_of
+from haploop.tools.sweep.run.work import Sources, kinds_of
+
+MOST_AXES = 3
+Verdict = Literal["steady", "limit-cycle", "diverged", "no-contact"]
+
+
+class BisectTable(Table):
+    """Where on an axis the verdict changes."""
+
+    axis: Annotated[str, Field(description="key of the axis")]
+    tolerance: Any = None
+    relative: Annotated[float | None, si("", "tolerance as a fraction", above=0, below=1)] = None
+    holds: Verdict = "steady"
+
+
+class SweepFile(Table):
+    """A sweep: a scene, and what is varied in it."""
+
+    title: str | None = None
+    scene: str | None = None
+    base: dict[str, Any] | None = None
+    repeat: Annotated[int, si("", "seeds of every combination", whole=True, at_least=1, at_most=1_000_000)] = 1
+    record: list[str] | None = None
+    set: dict[str, Any] = Field(default_factory=dict)
+    axes: dict[str, Any]
+    bisect: BisectTable | None = None
+
+
+def load(path: Path, overrides: Sequence[str] = (), sources: Sources = ()) -> Sweep:
+    """The resolved sweep of a TOML file.
+
+    Args:
+        path: the sweep file.
+        overrides: ``KEY=VALUE`` with dotted keys of the scene, laid over what the file says.
+        sources: plugin files, by name and text.
+
+    Raises:
+        SceneError: the sweep cannot be run; it holds every mistake.
+        PluginError: a plugin does not load.
+    """
+    data = parse(path, "sweep", "a scene and [axes]")
+    return _Reader(path, data, kinds_of(sources), sources).sweep(overrides)
+
+
+class _Reader:
+    """Collects the parts of a sweep, and all that is wrong with them."""
+
+    def __init__(self, path: Path, data: dict[str, Any], kinds: dict[str, Any], sources: Sources) -> None:
+        self._kinds, self._sources = kinds, sources
+        self._layers = Layers(path)
+        self._layers.lay(data, str(path))
+        self._data = data
+
+    def sweep(self, overrides: Sequence[str]) -> Sweep:
+        """The sweep, or every mistake."""
+        table = self._table()
+        base = self._base(overrides)
+        shape = base or self._unchanged()
+        axes = self._axes(shape)
+        record = self._record(shape, axes)
+        bisect = self._bisect(table, axes)
+        if self._layers.mistakes or table is None or base is None:
+            raise SceneError(self._layers.mistakes)
+        title = table.title or f"{self._layers.path.stem}"
+        return Sweep(title, base, tuple(axes), table.repeat, tuple(record), bisect, self._sources)
+
+    def _table(self) -> SweepFile | None:
+        """The shape of the file."""
+        table = None
+        try:
+            table = SweepFile.model_validate(self._data)
+        except ValidationError as error:
+            schema = {**SweepFile.model_json_schema(schema_generator=TomlSchema), "title": "Sweep"}
+            for detail in error.errors(include_url=False):
+                complain(self._layers, detail["type"], detail["msg"], detail["loc"], schema)
+        if ("scene" in self._data) == ("base" in self._data):
+            given = "is given beside [base]" if "scene" in self._data else "is missing"
+            expected = "A sweep has the path of a scene file, relative to its own, or the scene itself in [base]."
+            self._layers.complain(("scene",), expected, given)
+        return table
+
+    def _base(self, overrides: Sequence[str]) -> dict[str, Any] | None:
+        """The scene that is varied; its mistakes are added."""
+        changes = self._data.get("set")
+        changes = changes if isinstance(changes, dict) else {}
+        try:
+            laid = [*texts(changes), *overrides]
+            if isinstance(name := self._data.get("scene"), str):
+                return scene_file.load(self._layers.path.parent / name, laid, self._kinds)
+            if isinstance(table := self._data.get("base"), dict):
+                layers = Layers(self._layers.path, table)
+                lay_overrides(layers, laid)
+                layers.data.setdefault("title", layers.path.stem)
+                scene = resolve(layers, self._kinds)
+                scene.get("event", []).sort(key=lambda event: event["at"])
+                return scene
+        except SceneError as error:
+            self._layers.mistakes += [self._placed(mistake, changes) for mistake in error.mistakes]
+        except TypeError as error:  # a value that no scene holds, such as a date
+            self._layers.complain(("set",), str(error), "cannot be used")
+        return None
+
+    def _unchanged(self) -> dict[str, Any] | None:
+        """The scene without what is laid over it, where that is all that is wrong with it."""
+        try:
+            return scene_file.load(self._layers.path.parent / self._data["scene"], (), self._kinds)
+        except (SceneError, LookupError, TypeError):
+            return None
+
+    def _placed(self, mistake: Mistake, changes: Mapping[str, Any]) -> Mistake:
+        """A mistake in what ``[set]`` laid over the scene is one of this file."""
+        if mistake.file == COMMAND_LINE and mistake.key in changes:
+            return replace(mistake, file=shown(self._layers.path), key=f"set.{mistake.key}")
+        return mistake
+
+    def _axes(self, base: dict[str, Any] | None) -> list[Axis]:
+        """The axes that can be used; of the others the mistakes are added."""
+        given = self._data.get("axes")
+        if not isinstance(given, dict):
+            return []
+        if not 1 <= len(given) <= MOST_AXES:
+            self._layers.complain(("axes",), f"A sweep has one to {MOST_AXES} axes.", f"has {len(given)}")
+        whole = base and self._with_first_names(base, given)
+        return [axis for key, values in given.items() if whole and (axis := self._axis(key, values, whole))]
+
+    def _with_first_names(self, base: dict[str, Any], given: Mapping[str, Any]) -> dict[str, Any]:
+        """The base with the first name, or table, of each axis of such, which may bring the keys of another axis."""
+        firsts = {key: values[0] for key, values in given.items() if isinstance(values, list) and values}
+        names = {key: value for key, value in firsts.items() if not isinstance(value, int | float) and key_path(key)}
+        layers = Layers(self._layers.path)
+        layers.data = deepcopy(base)
+        try:
+            lay_overrides(layers, texts(names))
+        except TypeError:
+            return base
+        return layers.data
+
+    def _axis(self, key: str, values: Any, scene: dict[str, Any]) -> Axis | None:
+        at: KeyPath = ("axes", key)
+        path = key_path(key)
+        if isinstance(values, dict) and not {"from", "to", "step", "count", "scale"} & values.keys():
+            inner = next(iter(values), "key")
+            self._layers.complain(
+                at, f'Write the whole key in quotes, such as "{key}.{inner}" = [1.0, 2.0].', "is a table"
+            )
+            return None
+        try:
+            if not path:
+                raise NoSuchKey("cannot be read", "It must be a dotted key, such as wall.stiffness.")
+            number = number_at(path, scene, self._kinds)
+            points = self._points(at, values, number)
+        except NoSuchKey as error:
+            self._layers.complain(at, error.expected, error.given, error.nearest)
+        except PointsError as error:
+            place = at if error.key == "" else (*at, error.key)
+            self._layers.complain(place, str(error))
+        else:
+            if points is None or (number is None and not self._names_fit(at, key, points, scene)):
+                return None
+            return Axis(key, tuple(points), number and number.quantity.unit, bool(number and number.whole))
+        return None
+
+    def _points(self, at: KeyPath, values: Any, number: Number | None) -> list[Any] | None:
+        if isinstance(values, list):
+            return listed(values, number)
+        if number is None:
+            self._layers.complain(at, "It holds no number, so its values must be a list.")
+            return None
+        if not isinstance(values, dict):
+            self._layers.complain(at, "It must be a list, or a table with from, to, and step or count.")
+            return None
+        try:
+            span = Span.model_validate(values)
+        except ValidationError as error:
+            schema = {**Span.model_json_schema(schema_generator=TomlSchema), "title": "span"}
+            for detail in error.errors(include_url=False):
+                self._complain_of_span(at, detail["type"], detail["msg"], detail["loc"], schema)
+            return None
+        return points_of(span, number)
+
+    def _complain_of_span(self, at: KeyPath, what: str, message: str, key: KeyPath, schema: dict[str, Any]) -> None:
+        """Its keys are those of the span; they are told as those of the file."""
+        layers = Layers(self._layers.path, self._layers.value(at))
+        complain(layers, what, message, key, schema)
+        name = ".".join(map(str, at))
+        self._layers.mistakes += [
+            replace(
+                mistake, key=f"{name}.{mistake.key}".rstrip("."), given=mistake.given.replace("of a span", f"of {name}")
+            )
+            for mistake in layers.mistakes
+        ]
+
+    def _names_fit(self, at: KeyPath, key: str, values: Sequence[Any], scene: dict[str, Any]) -> bool:
+        """Whether the key takes each value; what the rest of a scene says to it is known cell by cell."""
+        count = len(self._layers.mistakes)
+        for place, value in enumerate(values):
+            try:
+                resolved({key: value}, scene, self._kinds)
+            except Refused as error:
+                for mistake in error.mistakes:
+                    if mistake.key == key:
+                        self._layers.complain((*at, place), mistake.expected, None, mistake.nearest)
+            except TypeError:
+                self._layers.complain((*at, place), "A scene holds text, numbers, true or false, lists and tables.")
+        return len(self._layers.mistakes) == count
+
+    def _record(self, base: dict[str, Any] | None, axes: Sequence[Axis]) -> list[Any]:
+        given = self._data.get("record")
+        names = given if isinstance(given, list) and all(isinstance(name, str) for name in given) else list(USUAL)
+        if base is None:
+            return []  # what can be recorded depends on what runs
+        sample = Sweep("", base, tuple(axes), sources=self._sources)
+        try:
+            return columns_of(names, sample, self._kinds)
+        except RecordError as error:
+            for place, sentence, hint in error.wrong:
+                self._layers.complain(("record", place), sentence, None, hint)
+        return []
+
+    def _bisect(self, table: SweepFile | None, axes: Sequence[Axis]) -> Bisect | None:
+        if table is None or table.bisect is None:
+            return None
+        given, by_key = table.bisect, {axis.key: axis for axis in axes}
+        axis = by_key.get(given.axis)
+        if axis is None or axis.unit is None or axis.whole or len(axis.values) < 2:
+            if given.axis not in (keys := list(self._data["axes"])):
+                sentence = f"It must be an axis: {', '.join(keys)}."
+                self._layers.complain(("bisect", "axis"), sentence, None, nearest(given.axis, keys))
+            elif axis:
+                self._layers.complain(
+                    ("bisect", "axis"), "It must be an axis of two or more numbers that need not be whole."
+                )
+            return None
+        steps = {b > a for a, b in zip(axis.values, axis.values[1:], strict=False)}
+        if len(steps) > 1:
+            self._layers.complain(("axes", axis.key), "The values of the axis that is bisected must go one way.")
+        if (given.tolerance is None) == (given.relative is None):
+            self._layers.complain(("bisect",), "It must have exactly one of tolerance and relative.")
+            return None
+        tolerance = 0.0
+        if given.tolerance is not None:
+            try:
+                tolerance = Number(Quantity(axis.unit, above=0.0)).read(given.tolerance)
+            except PydanticCustomError as error:
+                self._layers.complain(("bisect", "tolerance"), error.message())
+        return Bisect(axis.key, given.holds, tolerance, given.relative or 0.0)

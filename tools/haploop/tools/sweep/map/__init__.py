@@ -1,0 +1,1 @@
+"""The map of a sweep: its data, its lines and its drawing."""

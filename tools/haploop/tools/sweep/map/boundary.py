@@ -1,0 +1,91 @@
+"""What a bisecting sweep found, in the order of its other axes, the seeds taken together."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from haploop.tools.sweep.map.data import FAILED, Axis, MapData, verdict_number
+
+# What is known of a combination of the other axes' values.
+FOUND, ALL_HOLD, NONE_HOLDS, UNKNOWN = range(4)
+
+
+@dataclass(frozen=True)
+class Edges:
+    """The boundaries along ``along``; all arrays have an axis of their own for each of the ``others``.
+
+    Attributes:
+        along: the axis that was bisected, with its planned points.
+        others: the other axes, along x first; none where there is none.
+        holds: the verdict on the near side.
+        rising: whether the search went towards greater values.
+        state: FOUND, ALL_HOLD at every point, NONE_HOLDS where the search begins, or UNKNOWN; of seeds that differ,
+            what holds least far.
+        nearest, low, high: the boundary of the seed that holds least far; the brackets of all seeds together.
+        more: how often a seed changed more than once at the planned points.
+    """
+
+    along: Axis
+    others: tuple[Axis, ...]
+    holds: str
+    rising: bool
+    state: np.ndarray
+    nearest: np.ndarray
+    low: np.ndarray
+    high: np.ndarray
+    more: int
+
+
+def edges_of(data: MapData) -> Edges:
+    """The boundaries of a bisecting sweep that is finished."""
+    key, holds = data.sweep["bisect"]["axis"], data.sweep["bisect"].get("holds", "steady")
+    along = next(axis for axis in data.axes if axis.key == key).as_planned()
+    others = [axis for axis in data.axes if axis.key != key]
+    others.sort(key=lambda axis: (bool(axis.names), -len(axis.values)))
+    planned = data.sweep["axes"][key]
+    rising = planned[-1] >= planned[0]
+    shape = tuple(len(axis.values) for axis in others)
+    # What holds least far: none, unknown, found, all.
+    rank = np.full(shape, np.inf)
+    state, nearest = np.full(shape, UNKNOWN), np.full(shape, math.nan)
+    low, high = np.full(shape, math.nan), np.full(shape, math.nan)
+    table, starts = data.boundary, _starts(data, key, planned[0], others)
+    places = zip(*(axis.indices(table[axis.key]) for axis in others), strict=True) if others else None
+    for row in range(len(table["low"])):
+        at = tuple(int(index) for index in next(places)) if places else ()
+        value = float(table["boundary"][row])
+        seen = _state(data, row, starts.get((*at, _seed(table, row))), holds)
+        distance = {NONE_HOLDS: -math.inf, UNKNOWN: -1e300, FOUND: value if rising else -value, ALL_HOLD: 1e300}[seen]
+        if distance < rank[at]:
+            rank[at], state[at], nearest[at] = distance, seen, value if seen == FOUND else math.nan
+        if seen == FOUND:
+            low[at] = np.fmin(low[at], table["low"][row])
+            high[at] = np.fmax(high[at], table["high"][row])
+    more = int(np.sum(np.asarray(table["changes"]) > 1))
+    return Edges(along, tuple(others), holds, rising, state, nearest, low, high, more)
+
+
+def _state(data: MapData, row: int, first: str | None, holds: str) -> int:
+    if math.isfinite(float(data.boundary["low"][row])):
+        return FOUND
+    if verdict_number(first) == FAILED:
+        return UNKNOWN
+    if first != holds:
+        return NONE_HOLDS
+    return ALL_HOLD if data.boundary["changes"][row] == 0 else UNKNOWN
+
+
+def _starts(data: MapData, key: str, first: float, others: list[Axis]) -> dict[tuple[int, ...], str | None]:
+    """The verdict where the search begins, by the indices of the other axes and the seed."""
+    columns = data.columns
+    indices = [axis.indices(columns[axis.key]) for axis in others]
+    begin = np.flatnonzero(np.asarray(columns[key], dtype=float) == first).tolist()
+    return {(*(int(index[row]) for index in indices), _seed(columns, row)): columns["verdict"][row] for row in begin}
+
+
+def _seed(table: Any, row: int) -> int:
+    return int(table["seed"][row]) if "seed" in table else 0

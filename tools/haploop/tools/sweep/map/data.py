@@ -1,0 +1,233 @@
+"""A sweep as its map needs it: its axes, and what came of every cell over all seeds."""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from haploop.launch.scene.toml_writer import inline
+from haploop.tools.figure.data import FigureError
+from haploop.tools.render.amounts import prefix_for
+
+AMPLITUDE, STIFFNESS = "window.oscillation_m", "wall.stiffness"
+# The worse later: of several seeds a cell shows the worst. A failed run says nothing, a swinging one that it swings.
+VERDICTS = ("steady", "no-contact", "failed", "limit-cycle", "diverged")
+STEADY, NO_CONTACT, FAILED, LIMIT_CYCLE, DIVERGED = range(len(VERDICTS))
+NOT_RUN = -1
+# By name, equally long: lists or NumPy arrays.
+Columns = Mapping[str, Any]
+# Units that take a prefix; stiffness, damping and mass stay as scene files have them.
+_WITH_PREFIX = ("m", "s", "N", "Hz")
+
+
+def with_prefix(values: Iterable[float], unit: str) -> tuple[float, str]:
+    """The factor that suits some values, and the unit of what is left of them."""
+    factor, letter = prefix_for(values) if unit in _WITH_PREFIX else (1.0, "")
+    return factor, f"{letter}{unit}"
+
+
+@dataclass(frozen=True)
+class Axis:
+    """What was varied.
+
+    Attributes:
+        key: dotted key of the scene.
+        unit: of its values; "" for none.
+        values: ascending; the numbers 0, 1, ... where they stand for ``names``.
+        names: of the values where they are no numbers, in the order of the sweep; else empty.
+        planned: the values that the sweep asks for, ascending; a search runs others in between.
+    """
+
+    key: str
+    unit: str
+    values: np.ndarray
+    names: tuple[str, ...] = ()
+    planned: np.ndarray = field(default_factory=lambda: np.empty(0))
+
+    @classmethod
+    def of(cls, key: str, unit: str, column: Sequence[Any], planned: Sequence[Any] = ()) -> Axis:
+        """The axis of a column of the table; ``planned`` are values the sweep has, run or not."""
+        given = [*planned, *column]
+        if any(isinstance(value, str | bool | np.bool_ | list | dict) for value in given):
+            names = tuple(dict.fromkeys(_name(value) for value in given))
+            return cls(key, "", np.arange(len(names), dtype=float), names)
+        values = np.unique(np.asarray(given, dtype=float))
+        return cls(key, unit, values, (), np.unique(np.asarray(planned, dtype=float)) if len(planned) else values)
+
+    def as_planned(self) -> Axis:
+        """The axis without what a search ran in between."""
+        return replace(self, values=self.planned)
+
+    def indices(self, column: Sequence[Any]) -> np.ndarray:
+        """Which of the values each entry of a column is."""
+        if self.names:
+            return np.array([self.names.index(_name(value)) for value in column], dtype=int)
+        return np.searchsorted(self.values, np.asarray(column, dtype=float))
+
+    def word(self, index: int) -> str:
+        """One value with its unit."""
+        if self.names:
+            return short_name(self.names[index])
+        factor, unit = with_prefix([self.values[index]], self.unit)
+        return f"{short(self.values[index] / factor)} {unit}".strip()
+
+
+@dataclass(frozen=True)
+class Cells:
+    """What came of every combination of the axes' values; all arrays have an axis of their own for each axis.
+
+    Attributes:
+        verdict: number of the worst verdict in ``VERDICTS``; NOT_RUN where there is none yet.
+        amplitude_m: the widest oscillation among the seeds with that verdict; NaN where unknown.
+        least_m: the least oscillation among all seeds.
+        agree, seeds: how many seeds came to that verdict, and how many ran.
+        row: a row of the table with that verdict; -1 for none.
+    """
+
+    verdict: np.ndarray
+    amplitude_m: np.ndarray
+    least_m: np.ndarray
+    agree: np.ndarray
+    seeds: np.ndarray
+    row: np.ndarray
+
+
+@dataclass(frozen=True)
+class MapData:
+    """A sweep's table, in the order of its axes.
+
+    Attributes:
+        title, base: of the sweep, and of the scene that it starts from.
+        axes: one to three.
+        columns: of the table, by name.
+        sweep: the resolved sweep.
+        boundary: columns of the boundaries of a bisecting sweep; empty without.
+    """
+
+    title: str
+    base: str
+    axes: tuple[Axis, ...]
+    columns: Columns
+    sweep: dict[str, Any]
+    boundary: Columns
+
+    @property
+    def seeds(self) -> list[int]:
+        """All seeds that ran."""
+        return sorted({int(seed) for seed in self.columns.get("seed", [])})
+
+    @property
+    def verdicts(self) -> np.ndarray:
+        """The verdict's number of every row."""
+        return np.array([verdict_number(word) for word in self.columns["verdict"]], dtype=int)
+
+    @property
+    def has_edges(self) -> bool:
+        """Whether this is a bisecting sweep that is finished, over more than the axis of the search."""
+        return bool(self.boundary) and len(self.axes) > 1
+
+    @property
+    def has_amplitudes(self) -> bool:
+        """Whether the sweep recorded how far everything swings."""
+        return AMPLITUDE in self.columns
+
+    def cells(self) -> Cells:
+        """All cells, the seeds of each taken together."""
+        shape = tuple(len(axis.values) for axis in self.axes)
+        worst = np.full(shape, NOT_RUN)
+        amplitude, least = np.full(shape, math.nan), np.full(shape, math.inf)
+        agree, seeds, first = np.zeros(shape, int), np.zeros(shape, int), np.full(shape, -1)
+        verdicts, oscillations = self.verdicts, self.amplitudes_m()
+        at = tuple(axis.indices(self.columns[axis.key]) for axis in self.axes)
+        np.maximum.at(worst, at, verdicts)
+        np.add.at(seeds, at, 1)
+        shown = np.flatnonzero(verdicts == worst[at])
+        at_shown = tuple(index[shown] for index in at)
+        np.add.at(agree, at_shown, 1)
+        first[at_shown] = shown
+        np.fmax.at(amplitude, at_shown, oscillations[shown])
+        np.fmin.at(least, at, oscillations)
+        return Cells(worst, amplitude, np.where(np.isinf(least), math.nan, least), agree, seeds, first)
+
+    def amplitudes_m(self) -> np.ndarray:
+        """The oscillation of every row; NaN where it is not known."""
+        if not self.has_amplitudes:
+            return np.full(len(self.columns["verdict"]), math.nan)
+        return np.array([math.nan if value is None else value for value in self.columns[AMPLITUDE]], dtype=float)
+
+
+def short(value: float) -> str:
+    """Four digits or more, as many as a number has before its point."""
+    return f"{value:.4g}" if abs(value) < 1e4 else f"{value:.7g}"
+
+
+def _name(value: Any) -> str:
+    """A value that is no number as the table has it: text as it is, all else as TOML writes it."""
+    if isinstance(value, str):
+        return value
+    return inline(bool(value) if isinstance(value, np.bool_) else value)
+
+
+def short_name(name: str) -> str:
+    """A name as people read it: a list of elements without its punctuation, ``"damping 0.8 + brake 0.1"``."""
+    if not name.startswith("["):
+        return name
+    try:
+        elements = tomllib.loads(f"list = {name}")["list"]
+        words = [" ".join([table["kind"], *(f"{v:g}" for v in table.values() if is_number(v))]) for table in elements]
+    except (ValueError, TypeError, KeyError):
+        return name
+    return " + ".join(words) or "none"
+
+
+def is_number(value: Any) -> bool:
+    """Whether a value of a scene is a number."""
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def verdict_number(word: str | None) -> int:
+    """Its place in ``VERDICTS``; a run without a verdict failed."""
+    return VERDICTS.index(word) if word in VERDICTS else FAILED
+
+
+def data_of(
+    columns: Columns,
+    units: Mapping[str, str],
+    sweep: dict[str, Any],
+    boundary: Columns | None = None,
+) -> MapData:
+    """A sweep's table as data of a map.
+
+    Args:
+        columns: of the table, equally long; axes by their dotted keys.
+        units: of the axes.
+        sweep: the resolved sweep.
+        boundary: columns of the boundary's table.
+
+    Raises:
+        FigureError: there is no row, or no verdict was recorded.
+    """
+    if "verdict" not in columns:
+        raise FigureError('A map shows verdicts, and this sweep recorded none; add "verdict" to its record.')
+    if not len(columns["verdict"]):
+        raise FigureError("The sweep has no finished cell yet, so there is nothing to draw.")
+    if "bisect" in sweep and not boundary and len(sweep["axes"]) > 1:
+        columns = _planned_alone(columns, sweep)
+    axes = tuple(
+        Axis.of(key, units.get(key, ""), columns[key], given if isinstance(given, list) else [])
+        for key, given in sweep["axes"].items()
+    )
+    base = sweep.get("base", {}).get("title", "untitled scene")
+    return MapData(sweep.get("title", base), base, axes, columns, sweep, boundary or {})
+
+
+def _planned_alone(columns: Columns, sweep: dict[str, Any]) -> Columns:
+    """The rows at the planned points of the axis of a search that goes on; those in between are no cells of a map."""
+    key = sweep["bisect"]["axis"]
+    rows = np.flatnonzero(np.isin(np.asarray(columns[key], dtype=float), sweep["axes"][key])).tolist()
+    return {name: [column[row] for row in rows] for name, column in columns.items()}

@@ -1,0 +1,153 @@
+"""The figure of a bisecting sweep: how far the near side reaches, a line for every value of the second axis."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from haploop.tools.figure.file import fix_layout
+from haploop.tools.figure.style import ELEMENTS, FAINT, INK, WALL
+from haploop.tools.sweep.map.axis import Ruler
+from haploop.tools.sweep.map.boundary import ALL_HOLD, FOUND, NONE_HOLDS, UNKNOWN, Edges, edges_of
+from haploop.tools.sweep.map.data import Axis, MapData
+from haploop.tools.sweep.map.draw.edge_words import edge_description, edge_notes, furthest
+from haploop.tools.sweep.map.draw.header import Sheet
+from haploop.tools.sweep.map.draw.labels import LabelRoom
+from haploop.tools.sweep.map.draw.legend import Legend
+from haploop.tools.sweep.map.draw.look import LOOKS
+from haploop.tools.sweep.map.lines.curves import draw_boundary, styles_of
+from haploop.tools.sweep.map.lines.over import Over, over_scene
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+MOST_LINES = 8
+_COLOURS = (WALL, *ELEMENTS, "#332288")
+_MARKERS = "osD^vP*X"
+_STAR = "#C00000"
+# Signs of several lines at an edge stand above one another.
+_STACK_PT = 9.0
+# Of the height of a panel, what one of them takes.
+_STRIP = 0.024
+
+
+def bisect_figure(data: MapData) -> Figure:
+    """The boundaries of a finished bisecting sweep with two or three axes.
+
+    Raises:
+        FigureError: matplotlib is missing.
+    """
+    edges = edges_of(data)
+    x, y = Ruler.of(edges.others[0]), Ruler.of(edges.along)
+    second = edges.others[1] if len(edges.others) > 1 else None
+    count = min(MOST_LINES, len(second.values)) if second else 1
+    overs = [_over(data, (x, y), second, number) for number in range(count)]
+    sheet = Sheet(1, data.title, edge_description(data, edges))
+    [ax] = sheet.axes
+    styles = _draw_over(ax, overs, (x, y))
+    x.dress(ax, "x")
+    y.dress(ax, "y")
+    _make_room(ax, y, edges, count)
+    signs = []
+    for number in range(count):
+        part = (slice(None), number) if second else (slice(None),)
+        look = {"color": _COLOURS[number] if second else INK, "marker": _MARKERS[number]}
+        if not second:
+            _fill(ax, x, y, edges)
+        _line(ax, x, y, edges, part, number, look)
+        signs.append((second.word(number) if second else "boundary", look))
+    legend = Legend(sheet.side, *sheet.side_in)
+    legend.lines(f"{second.key}" if second else "", signs)
+    legend.boundaries(styles, {b.name: b.words for over in overs for b in over.boundaries})
+    legend.notes(edge_notes(data, edges, overs, count))
+    fix_layout(sheet.figure)
+    _names(ax, x, y, edges, overs, styles)
+    return sheet.figure
+
+
+def _over(data: MapData, rulers: Sequence[Ruler], second: Axis | None, number: int) -> Over:
+    """What needs no run, for one line."""
+    rows: Any = range(len(data.columns["verdict"]))
+    if second:
+        rows = np.flatnonzero(second.indices(data.columns[second.key]) == number).tolist()
+    return over_scene((data.columns["scene"][row] for row in rows), rulers, bounds=second is None)
+
+
+def _draw_over(ax: Axes, overs: Sequence[Over], rulers: Sequence[Ruler]) -> dict[str, dict[str, Any]]:
+    """The exact limit of every line in its colour, and the bounds where there is one line."""
+    names = [boundary.name for over in overs for boundary in over.boundaries if boundary.lines]
+    styles = styles_of(list(dict.fromkeys(names)))
+    for number, over in enumerate(overs):
+        for boundary in over.boundaries:
+            if boundary.lines:
+                own = {"color": _COLOURS[number], "linewidth": 1.5} if len(overs) > 1 else {}
+                over.drawn[boundary.name] = draw_boundary(ax, boundary, rulers, styles[boundary.name] | own)
+    return styles
+
+
+def _line(ax: Axes, x: Ruler, y: Ruler, edges: Edges, part: tuple[Any, ...], number: int, look: dict[str, Any]) -> None:
+    """The boundaries of one line with their brackets; arrows at the edge where there is none."""
+    from matplotlib.transforms import offset_copy
+
+    state, at = edges.state[part], x.coordinates
+    found = state == FOUND
+    places = np.where(found, y.place(edges.nearest[part]), np.nan)
+    joined = "none" if x.axis.names else "-"
+    white = {"markeredgecolor": "white", "markeredgewidth": 0.6}
+    ax.plot(at, places, linestyle=joined, linewidth=0.8, markersize=5.5, zorder=4.5, gid="boundary", **look, **white)
+    ends = y.place(edges.low[part][found]), y.place(edges.high[part][found])
+    ax.vlines(at[found], *ends, color=look["color"], linewidth=2.4, alpha=0.5, zorder=4.4, gid="brackets")
+    bottom, top = ax.get_ylim()
+    far, near = (top, bottom) if edges.rising else (bottom, top)
+    arrow = "^" if edges.rising else "v"
+    for kind, where, marker in ((ALL_HOLD, far, arrow), (NONE_HOLDS, near, "x"), (UNKNOWN, near, "$?$")):
+        here = at[state == kind]
+        sign = {"color": look["color"], "marker": marker, "markersize": 6, "linestyle": "none", "zorder": 6}
+        inwards = (1.0 if where == bottom else -1.0) * (_STACK_PT * (number + 0.6))
+        shifted = offset_copy(ax.transData, ax.get_figure(root=True), y=inwards, units="points")
+        ax.plot(here, np.full(len(here), where), gid=f"state {kind}", transform=shifted, **sign)
+
+
+def _make_room(ax: Axes, y: Ruler, edges: Edges, lines: int) -> None:
+    """A strip at either end for the signs of combinations without a boundary, one line's above the other's."""
+    none, throughout = np.isin(edges.state, (NONE_HOLDS, UNKNOWN)).any(), (edges.state == ALL_HOLD).any()
+    below, above = (none, throughout) if edges.rising else (throughout, none)
+    bottom, top = y.edges[0], y.edges[-1]
+    low, high = np.log((bottom, top)) if y.scale == "log" else (bottom, top)
+    strip = (high - low) * _STRIP * (lines + 0.5)
+    low, high = low - strip * below, high + strip * above
+    ax.set_ylim(*(np.exp((low, high)) if y.scale == "log" else (low, high)))
+    for drawn, at in ((below, bottom), (above, top)):
+        if drawn:
+            ax.axhline(at, color=FAINT, linewidth=0.8, zorder=0.8, gid="strip")
+
+
+def _fill(ax: Axes, x: Ruler, y: Ruler, edges: Edges) -> None:
+    """The side on which it holds, column by column."""
+    bottom, top = y.edges[0], y.edges[-1]
+    near, far = (bottom, top) if edges.rising else (top, bottom)
+    borders = x.edges
+    for i, state in enumerate(edges.state):
+        if state in (FOUND, ALL_HOLD):
+            end = float(y.place([edges.nearest[i]])[0]) if state == FOUND else far
+            corners = [borders[i], borders[i + 1]]
+            ax.fill_between(corners, [near] * 2, [end] * 2, color=LOOKS[0].fill, linewidth=0, zorder=0.5, gid="holds")
+
+
+def _names(
+    ax: Axes, x: Ruler, y: Ruler, edges: Edges, overs: Sequence[Over], styles: dict[str, dict[str, Any]]
+) -> None:
+    """The furthest boundary, and the names of the lines where there is one line of cells."""
+    room = LabelRoom(ax)
+    room.keep_off_markers()
+    room.keep_off_lines(line for over in overs for lines in over.drawn.values() for line in lines)
+    if best := furthest(edges):
+        at = x.coordinates[best.index[0]], float(y.place([best.value])[0])
+        ax.plot(*at, "*", color=_STAR, markersize=13, markeredgecolor="white", zorder=6, gid="star")
+        room.beside(*at, [best.words], _STAR, "star words")
+    for over in overs if len(overs) == 1 else ():
+        for name, lines in over.drawn.items():
+            room.on_line(max(lines, key=len), name, styles[name]["color"], "name of a line")

@@ -1,0 +1,125 @@
+"""The map of a sweep: what stays steady over its axes, in one look."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Literal
+
+from haploop.tools.figure.file import fix_layout
+from haploop.tools.sweep.map.answer import stiffest_steady
+from haploop.tools.sweep.map.axis import Ruler
+from haploop.tools.sweep.map.data import LIMIT_CYCLE, Axis, Cells, MapData
+from haploop.tools.sweep.map.draw.header import Sheet, fit_title, panel_title
+from haploop.tools.sweep.map.draw.labels import LabelRoom
+from haploop.tools.sweep.map.draw.legend import Legend
+from haploop.tools.sweep.map.draw.line import SwingScale, count_disagreement, draw_swings, label_swings
+from haploop.tools.sweep.map.draw.look import amplitude_scale
+from haploop.tools.sweep.map.draw.panel import draw_cells, mark_disagreement
+from haploop.tools.sweep.map.draw.words import answer, counted, description, failures, star_words, unknown_amplitudes
+from haploop.tools.sweep.map.layout import MOST_PANELS, Layout, Panel
+from haploop.tools.sweep.map.lines.curves import draw_boundary, styles_of
+from haploop.tools.sweep.map.lines.over import Over, over_scene
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.colors import LogNorm
+    from matplotlib.figure import Figure
+
+_STAR = "#C00000"
+_SIDES: tuple[Literal["x", "y"], ...] = ("x", "y")
+
+
+def figure_of(data: MapData) -> Figure:
+    """The map of a sweep's cells, a panel for each combination of the axes that do not lie along it.
+
+    Raises:
+        FigureError: matplotlib is missing.
+    """
+    cells, layout = data.cells(), Layout.of(data.axes)
+    along = [data.axes[layout.x]] + ([] if layout.y is None else [data.axes[layout.y]])
+    rulers = [Ruler.of(axis) for axis in along]
+    panels = list(layout.panels(data, cells))
+    scenes = data.columns["scene"]
+    overs = [over_scene((scenes[row] for row in panel.cells.row.flat if row >= 0), rulers) for panel in panels]
+    words = {boundary.name: boundary.words for over in overs for boundary in over.boundaries if boundary.lines}
+    styles = styles_of(list(words))
+    swings, scale = SwingScale(cells), _limit_cycles(cells) if layout.y is not None else None
+    sheet = Sheet(len(panels), data.title, description(data, cells))
+    for number, (ax, panel, over) in enumerate(zip(sheet.axes, panels, overs, strict=True)):
+        if layout.y is None:
+            draw_swings(ax, rulers[0], panel.cells, swings)
+            label_swings(ax, sheet.is_left(number))
+        else:
+            draw_cells(ax, rulers[0], rulers[1], panel.cells, scale)
+        for ruler, which in zip(rulers, _SIDES, strict=False):
+            ruler.dress(ax, which, sheet.is_low(number) if which == "x" else sheet.is_left(number))
+        panel_title(ax, panel.titles[0])
+        over.drawn = {b.name: draw_boundary(ax, b, rulers, styles[b.name]) for b in over.boundaries if b.lines}
+    legend = Legend(sheet.side, *sheet.side_in)
+    legend.verdicts(counted(cells), as_points=layout.y is None)
+    if scale:
+        legend.amplitudes(scale)
+    legend.boundaries(styles, words)
+    legend.notes(_notes(data, cells, layout, overs))
+    fix_layout(sheet.figure)
+    for ax, panel, over in zip(sheet.axes, panels, overs, strict=True):
+        fit_title(ax, panel.titles)
+        if layout.y is None:
+            count_disagreement(ax, rulers[0], panel.cells, swings)
+        else:
+            mark_disagreement(ax, rulers[0], rulers[1], panel.cells)
+        _label(ax, along, rulers, panel, over, swings, {name: style["color"] for name, style in styles.items()})
+    return sheet.figure
+
+
+def _limit_cycles(cells: Cells) -> LogNorm | None:
+    return amplitude_scale(cells.amplitude_m[cells.verdict == LIMIT_CYCLE])
+
+
+def _label(
+    ax: Axes,
+    along: Sequence[Axis],
+    rulers: Sequence[Ruler],
+    panel: Panel,
+    over: Over,
+    swings: SwingScale,
+    colours: dict[str, str],
+) -> None:
+    """Star and names, once the panel has its place."""
+    room = LabelRoom(ax)
+    found = stiffest_steady(tuple(along), panel.cells)
+    room.keep_off(ax.texts)
+    room.keep_off_lines(line for lines in over.drawn.values() for line in lines)
+    if len(rulers) == 1:
+        room.keep_off_markers()
+    if found:
+        x, *rest = (ruler.coordinates[index] for ruler, index in zip(rulers, found.index, strict=True))
+        y = rest[0] if rest else float(swings.place(panel.cells.amplitude_m)[found.index])
+        ax.plot(x, y, "*", color=_STAR, markersize=13, markeredgecolor="white", zorder=5, gid="star")
+        room.beside(x, y, star_words(along, found), _STAR, "star words")
+    for name, lines in over.drawn.items():
+        for line in sorted(lines, key=len, reverse=True)[:1]:
+            room.on_line(line, name, colours[name], "name of a line")
+
+
+def _notes(data: MapData, cells: Cells, layout: Layout, overs: Sequence[Over]) -> list[str]:
+    """What else there is to say; the answer first."""
+    notes = [answer(data.axes, stiffest_steady(data.axes, cells))]
+    if (count := layout.count(data.axes)) > MOST_PANELS:
+        notes.append(f"The first {MOST_PANELS} of {count} panels are drawn.")
+    reasons = list(dict.fromkeys(over.why_none for over in overs if over.why_none))
+    everywhere = " in some panels" if any(not over.why_none for over in overs) else ""
+    notes += [f"No exact limit{everywhere}, since the loop is not linear: {', '.join(reasons)}."] if reasons else []
+    outside = [boundary.name for over in overs for boundary in over.boundaries if not boundary.lines]
+    if outside:
+        panels = "panel" if len(overs) == 1 else "panels that do not show them"
+        notes.append(f"Outside the {panels}: {', '.join(dict.fromkeys(outside))}.")
+    if (cells.agree < cells.seeds).any():
+        notes.append(
+            "The worst verdict of the seeds is shown; a number such as 2/5 (a dot in small cells): so many of them "
+            "came to it, the others to milder ones."
+        )
+    if layout.y is None and len(data.seeds) > 1:
+        notes.append("Upright lines reach down to the seed that swings least.")
+    notes += [unknown_amplitudes(data, cells), failures(data)]
+    return [note for note in notes if note]

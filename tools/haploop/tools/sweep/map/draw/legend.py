@@ -1,0 +1,108 @@
+"""What the signs of a map mean, in a column beside it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from textwrap import wrap
+from typing import TYPE_CHECKING, Any
+
+from haploop.tools.figure.style import GREY, INK, SMALL, TEXT
+from haploop.tools.sweep.map.data import LIMIT_CYCLE
+from haploop.tools.sweep.map.draw.look import LOOKS, amplitude_colours, metres_along, words_of
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.colors import LogNorm
+    from matplotlib.figure import SubFigure
+
+_ROW_IN, _LINE_IN, _GAP_IN = 0.27, 0.155, 0.16
+_SIGN_IN, _LETTERS = 0.34, 42
+
+
+class Legend:
+    """Writes from the top down; lengths in inches.
+
+    Args:
+        side: the column.
+        width, height: its size.
+    """
+
+    def __init__(self, side: SubFigure, width: float, height: float) -> None:
+        self._side, self._width, self._height = side, width, height
+        self._ax: Axes = side.add_axes((0.0, 0.0, 1.0, 1.0))
+        self._ax.set(xlim=(0.0, width), ylim=(height, 0.0))
+        self._ax.set_axis_off()
+        self._y = 0.36
+
+    def verdicts(self, counts: Mapping[int, int], as_points: bool) -> None:
+        """A sign for every verdict, as in the map, and how many cells came to it."""
+        from matplotlib.patches import Rectangle
+
+        for number, count in counts.items():
+            look, middle = LOOKS[number], self._y + _ROW_IN / 2
+            if as_points:
+                self._ax.plot(_SIGN_IN / 2, middle, look.marker, color=look.colour, markersize=6)
+            else:
+                box = Rectangle((0.0, middle - 0.09), _SIGN_IN, 0.18)
+                box.set(facecolor=look.fill, edgecolor=look.hatch_colour or GREY, hatch=look.hatch, linewidth=0.6)
+                self._ax.add_patch(box)
+            unit = "cell" if count == 1 else "cells"
+            self._write(f"{words_of(number)}: {count} {unit}", middle)
+            self._y += _ROW_IN
+        self._y += _GAP_IN
+
+    def amplitudes(self, scale: LogNorm) -> None:
+        """The colours of the limit cycles."""
+        from matplotlib.cm import ScalarMappable
+
+        self._heading(f"{words_of(LIMIT_CYCLE)}: oscillation, peak to peak")
+        bottom = self._height - self._y - 0.14
+        bar = self._side.add_axes((0.05, bottom / self._height, 0.86, 0.14 / self._height))
+        shown = ScalarMappable(scale, amplitude_colours())
+        self._side.figure.colorbar(shown, cax=bar, orientation="horizontal")
+        metres_along(bar.xaxis, float(scale.vmax or 1.0) / float(scale.vmin or 1.0))
+        bar.tick_params(labelsize=SMALL, colors=GREY, labelcolor=INK)
+        bar.set_gid("amplitude scale")
+        self._y += 0.14 + 0.28 + _GAP_IN
+
+    def boundaries(self, styles: Mapping[str, dict[str, Any]], words: Mapping[str, str]) -> None:
+        """What the lines over the map are."""
+        for name, style in styles.items():
+            middle = self._y + _LINE_IN / 2
+            self._ax.plot([0.0, _SIGN_IN], [middle, middle], **style)
+            self._write(name, middle, fontweight="bold")
+            self._y += _LINE_IN + 0.02
+            self._lines(words.get(name, ""), _SIGN_IN + 0.1, GREY)
+            self._y += 0.07
+        self._y += _GAP_IN if styles else 0.0
+
+    def lines(self, heading: str, signs: Sequence[tuple[str, dict[str, Any]]]) -> None:
+        """What the lines through cells stand for."""
+        if heading:
+            self._heading(heading)
+        for words, look in signs:
+            middle = self._y + _LINE_IN / 2
+            self._ax.plot([0.0, _SIGN_IN / 2, _SIGN_IN], [middle] * 3, markevery=[1], markersize=6, **look)
+            self._write(words, middle)
+            self._y += _LINE_IN + 0.06
+        self._y += _GAP_IN
+
+    def notes(self, sentences: Sequence[str]) -> None:
+        """What else there is to say, a paragraph each."""
+        for number, sentence in enumerate(sentences):
+            self._lines(sentence, 0.0, INK if number == 0 else GREY)
+            self._y += 0.1
+
+    def _heading(self, text: str) -> None:
+        self._write(text, self._y + _LINE_IN / 2, left=0.0)
+        self._y += _LINE_IN + 0.06
+
+    def _lines(self, text: str, left: float, colour: str) -> None:
+        letters = int(_LETTERS * (self._width - left) / self._width)
+        for line in wrap(text, letters, break_on_hyphens=False):
+            self._write(line, self._y + _LINE_IN / 2, left, size=SMALL, color=colour)
+            self._y += _LINE_IN
+
+    def _write(self, text: str, y: float, left: float = _SIGN_IN + 0.1, size: float = TEXT, **look: Any) -> None:
+        look = {"color": INK} | look
+        self._ax.text(left, y, text, va="center", ha="left", fontsize=size, gid="legend", **look)

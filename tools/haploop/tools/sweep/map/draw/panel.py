@@ -1,0 +1,112 @@
+"""One map: a cell for every pair of values, coloured and hatched by what came of it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from haploop.tools.figure.style import INK
+from haploop.tools.sweep.map.axis import Ruler
+from haploop.tools.sweep.map.data import LIMIT_CYCLE, NOT_RUN, STEADY, VERDICTS, Cells
+from haploop.tools.sweep.map.draw.look import LOOKS, amplitude_colours
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.colors import LogNorm
+
+# Cells smaller than this have no room for a count, those smaller than the other not even for a dot.
+_COUNT_PX, _DOT_PX = (26.0, 15.0), 4.0
+
+
+def draw_cells(ax: Axes, x: Ruler, y: Ruler, cells: Cells, scale: LogNorm | None) -> None:
+    """Fill the panel; ``cells`` have the shape (values of x, values of y)."""
+    from matplotlib.colors import BoundaryNorm, ListedColormap
+
+    verdict = cells.verdict.T
+    edges = x.edges, y.edges
+    fills = ListedColormap([LOOKS[number].fill for number in range(len(VERDICTS))])
+    norm = BoundaryNorm(np.arange(len(VERDICTS) + 1) - 0.5, len(VERDICTS))
+    ran = np.ma.masked_equal(verdict, NOT_RUN)
+    ax.pcolormesh(*edges, ran, cmap=fills, norm=norm, zorder=1, rasterized=True, gid="verdicts")
+    swinging = (verdict == LIMIT_CYCLE) & np.isfinite(cells.amplitude_m.T) & (cells.amplitude_m.T > 0.0)
+    if scale and swinging.any():
+        shown = np.ma.array(cells.amplitude_m.T, mask=~swinging)
+        colours = amplitude_colours()
+        ax.pcolormesh(*edges, shown, cmap=colours, norm=scale, zorder=1.1, rasterized=True, gid="amplitudes")
+    for number, look in LOOKS.items():
+        if look.hatch and (verdict == number).any():
+            _hatch(ax, edges, verdict == number, look.hatch, look.hatch_colour, VERDICTS[number])
+    _outline(ax, edges, verdict)
+
+
+def _hatch(
+    ax: Axes, edges: tuple[np.ndarray, np.ndarray], where: np.ndarray, hatch: str, colour: str, name: str
+) -> None:
+    """One hatched patch of all cells of a verdict, row by row, so that the hatching runs through."""
+    from matplotlib.patches import PathPatch
+    from matplotlib.path import Path
+
+    boxes = [_box(edges, row, first, last) for row, first, last in _runs(where)]
+    path = Path.make_compound_path(*(Path(box, closed=True) for box in boxes))
+    ax.add_patch(
+        PathPatch(path, facecolor="none", edgecolor=colour, hatch=hatch, linewidth=0, zorder=1.2, gid=f"hatch {name}")
+    )
+
+
+def _runs(where: np.ndarray) -> Iterator[tuple[int, int, int]]:
+    """Row, first and one past the last cell of every unbroken run."""
+    for row, marked in enumerate(where):
+        ends = np.flatnonzero(np.diff(np.concatenate([[0], marked.astype(int), [0]])))
+        for first, last in zip(ends[::2], ends[1::2], strict=True):
+            yield row, int(first), int(last)
+
+
+def _box(edges: tuple[np.ndarray, np.ndarray], row: int, first: int, last: int) -> np.ndarray:
+    x0, x1, y0, y1 = edges[0][first], edges[0][last], edges[1][row], edges[1][row + 1]
+    return np.array([(x0, y0), (x1, y0), (x1, y1), (x0, y1), (x0, y0)])
+
+
+def _outline(ax: Axes, edges: tuple[np.ndarray, np.ndarray], verdict: np.ndarray) -> None:
+    """The border between steady cells and others that ran, as the runs have it."""
+    from matplotlib.collections import LineCollection
+
+    steady, ran = verdict == STEADY, verdict != NOT_RUN
+    xs, ys = edges
+    lines = []
+    for row, column in np.argwhere((steady[:, 1:] != steady[:, :-1]) & ran[:, 1:] & ran[:, :-1]):
+        lines.append([(xs[column + 1], ys[row]), (xs[column + 1], ys[row + 1])])
+    for row, column in np.argwhere((steady[1:] != steady[:-1]) & ran[1:] & ran[:-1]):
+        lines.append([(xs[column], ys[row + 1]), (xs[column + 1], ys[row + 1])])
+    ax.add_collection(
+        LineCollection(lines, colors=INK, linewidths=1.1, zorder=2, capstyle="projecting", gid="edge of steady")
+    )
+
+
+def mark_disagreement(ax: Axes, x: Ruler, y: Ruler, cells: Cells) -> None:
+    """How many of the seeds came to the verdict shown, where not all did: a count, or a dot in a small cell.
+
+    Call when the panel has its place and limits.
+    """
+    from matplotlib.patheffects import withStroke
+
+    frame = ax.get_window_extent()
+    width, height = frame.width / len(x.axis.values), frame.height / len(y.axis.values)
+    split = np.argwhere((cells.agree < cells.seeds) & (cells.verdict != NOT_RUN))
+    if not len(split) or min(width, height) < _DOT_PX:
+        return
+    xs, ys = x.coordinates, y.coordinates
+    if width < _COUNT_PX[0] or height < _COUNT_PX[1]:
+        size = min(3.5, 0.3 * min(width, height))
+        ax.plot(
+            xs[split[:, 0]], ys[split[:, 1]], "o", color=INK, markeredgecolor="white", markeredgewidth=0.5,
+            markersize=size, zorder=3, linestyle="none", gid="seeds disagree",
+        )  # fmt: skip
+        return
+    halo = [withStroke(linewidth=1.8, foreground="white")]
+    for i, j in split.tolist():
+        ax.text(
+            xs[i], ys[j], f"{cells.agree[i, j]}/{cells.seeds[i, j]}", ha="center", va="center", fontsize=6.5, color=INK,
+            zorder=5.5, path_effects=halo, gid="seeds disagree",
+        )  # fmt: skip

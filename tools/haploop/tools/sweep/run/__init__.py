@@ -1,0 +1,1 @@
+"""Running a sweep: cells, boundaries, store and table."""

@@ -1,0 +1,204 @@
+"""``haploop sweep``: a sweep file from reading to table; a sweep that was stopped goes on where it was."""
+
+from __future__ import annotations
+
+import json
+import sys
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from haploop.launch.output import PLUGINS, OutputError, keep_plugin, kept_name, make_output
+from haploop.launch.processes.interrupts import interrupts
+from haploop.logger.summary import write
+from haploop.tools.cli.exit_codes import FAILED, WRONG_USE, leave, plain_errors, print_json
+from haploop.tools.executor.pool import Pool, sources_of
+from haploop.tools.executor.workers import WorkersError
+from haploop.tools.machine import machine, versions
+from haploop.tools.sweep.file.record import wants_trajectories
+from haploop.tools.sweep.file.sweep_file import load
+from haploop.tools.sweep.run.columns import NeedsPyarrow, pyarrow, schema_of
+from haploop.tools.sweep.run.engine import Engine, Stopped
+from haploop.tools.sweep.run.shown import SweepProgress, counted
+from haploop.tools.sweep.run.store import Store, StoreError
+from haploop.tools.sweep.table import SWEEP
+
+if TYPE_CHECKING:
+    from haploop.tools.sweep.file.cells import Sweep
+    from haploop.tools.sweep.run.boundary import Boundary
+
+SUMMARY = "summary.json"
+
+
+@dataclass(frozen=True)
+class Request:
+    """What was asked for on the command line.
+
+    Attributes:
+        path: the sweep file.
+        overrides: of the scene, ``KEY=VALUE``.
+        out: directory; one below ``runs/`` when None.
+        workers: processes; as many as there are cores when None.
+        dask: address of a scheduler, or None.
+        compiled: whether to run compiled by JAX.
+        plugins: files that define elements.
+    """
+
+    path: Path
+    overrides: Sequence[str] = ()
+    out: Path | None = None
+    workers: int | None = None
+    dask: str | None = None
+    compiled: bool = False
+    plugins: Sequence[Path] = ()
+
+
+def sweep(request: Request, as_json: bool) -> None:
+    """Run what is missing of a sweep and say what came of it."""
+    if request.workers is not None and request.workers < 1:
+        leave(f"--workers must be at least 1, but {request.workers} was given.", WRONG_USE)
+    with plain_errors():
+        try:
+            pyarrow()
+            made = load(request.path, request.overrides, sources_of(request.plugins))
+            if request.compiled:
+                _demand_compiler(made)
+            directory = _directory(request, made)
+            summary = _run(request, made, directory)
+        except (NeedsPyarrow, WorkersError) as error:
+            leave(str(error), WRONG_USE)
+        except StoreError as error:
+            leave(str(error), FAILED)
+        except KeyboardInterrupt:
+            leave(
+                "Interrupted at once; what was stored is kept, and the same command with the same --out goes on.",
+                FAILED,
+            )
+    if as_json:
+        print_json({**summary, "directory": str(directory)})
+    else:
+        print(_said(summary))
+    print(directory, file=sys.stderr)
+    if summary["ended"] != "done":
+        leave(f"Stopped; to go on: haploop sweep {directory / SWEEP} --out {directory}", FAILED)
+
+
+def _run(request: Request, made: Sweep, directory: Path) -> dict[str, Any]:
+    """Run with progress; returns the summary, which is written too."""
+    began, before_s = time.monotonic(), _earlier_s(directory)
+    schema = schema_of(made.columns(), made.toml())
+    with interrupts(usual_from=2) as received, Store(directory, schema) as store:
+        if store.finished:
+            print("Every cell of this sweep is there already; nothing was run.", file=sys.stderr)
+            return json.loads((directory / SUMMARY).read_text(encoding="utf-8"))
+        with SweepProgress(made.title) as progress:
+            ended, found = "done", None
+            with Pool(request.workers, request.dask) as pool:
+                engine = Engine(
+                    made, store, pool, progress, lambda: progress.stopping(bool(received)), request.compiled
+                )
+                try:
+                    found = engine.run()
+                except Stopped:
+                    ended = "stopped"
+            summary = {
+                "title": made.title,
+                "base": made.base["title"],
+                "axes": {
+                    axis.key: [axis.entry(axis.values[0]), axis.entry(axis.values[-1]), len(axis.values)]
+                    for axis in made.axes
+                },
+                "repeat": made.repeat,
+                "ended": ended,
+                "cells": sum(progress.counts.values()),
+                "counts": dict(progress.counts),
+                "first_reason": progress.reason,
+                **({"boundaries": _boundaries(found)} if found else {}),
+                "wall_s": before_s + time.monotonic() - began,
+                "rate_1_s": progress.ran / (time.monotonic() - began),
+                "workers": pool.count,
+                "machine": machine(),
+                "versions": versions(),
+            }
+        try:
+            write(summary, directory / SUMMARY)
+        except OSError as error:
+            raise StoreError(f"{directory / SUMMARY} could not be written: {error.strerror}.") from error
+    return summary
+
+
+def _directory(request: Request, made: Sweep) -> Path:
+    """The directory: a new one, or that of this very sweep, which then goes on.
+
+    Raises:
+        OutputError: it holds something else.
+    """
+    out, text = request.out, made.toml()
+    if out is not None and (out / SWEEP).is_file():
+        there = (out / SWEEP).read_text(encoding="utf-8")
+        if there != text:
+            changed = _first_difference(there, text)
+            raise OutputError(f"{out} holds another sweep ({changed}); name another directory with --out.")
+        kept = {path.name for path in (out / PLUGINS).glob("*.py")}
+        if kept != {kept_name(plugin) for plugin in request.plugins}:
+            raise OutputError(f"{out} holds a sweep with other --plugin files, kept in {out / PLUGINS}; use those.")
+        return out
+    directory = make_output(out, request.path)
+    for plugin in request.plugins:
+        keep_plugin(plugin, directory)
+    try:
+        (directory / f"{SWEEP}.part").write_text(text, encoding="utf-8")
+        (directory / f"{SWEEP}.part").replace(directory / SWEEP)
+    except OSError as error:
+        raise OutputError(f"{directory / SWEEP} cannot be written: {error.strerror}.") from error
+    return directory
+
+
+def _first_difference(there: str, here: str) -> str:
+    for old, new in zip(there.splitlines(), here.splitlines(), strict=False):
+        if old != new:
+            return f"there {old[:60]!r}, here {new[:60]!r}"
+    return "one of the two is longer"
+
+
+def _earlier_s(directory: Path) -> float:
+    """Wall time of earlier calls that ended in order."""
+    try:
+        return float(json.loads((directory / SUMMARY).read_text(encoding="utf-8"))["wall_s"])
+    except (OSError, ValueError, LookupError):
+        return 0.0
+
+
+def _boundaries(found: Sequence[Boundary]) -> dict[str, int]:
+    known = sum(not boundary.why for boundary in found)
+    return {"found": known, "missing": len(found) - known}
+
+
+def _said(summary: dict[str, Any]) -> str:
+    """What came of it, in a line or two."""
+    rate = summary["rate_1_s"]
+    lines = [f"{summary['title']}: {summary['cells']} cells, {counted(summary['counts'])}, {rate:.3g} cells/s"]
+    if bounds := summary.get("boundaries"):
+        lines.append(f"boundaries: {bounds['found']} found, {bounds['missing']} missing")
+    if summary["first_reason"]:
+        lines.append(f"first cell without a verdict: {summary['first_reason']}")
+    return "\n".join(lines)
+
+
+def _demand_compiler(made: Sweep) -> None:
+    """Before anything is started.
+
+    Raises:
+        WorkersError: JAX is not there, or bits are asked for.
+    """
+    if wants_trajectories(made.record):
+        raise WorkersError(
+            "--jax keeps to a tolerance, so that trajectory_sha256 means nothing; leave it out of record."
+        )
+
+    try:
+        import jax  # noqa: F401
+    except ImportError as error:
+        raise WorkersError("--jax needs JAX; install it with: pip install 'haploop[jax]'") from error

@@ -1,0 +1,180 @@
+"""Running a sweep: every cell that is not stored yet, then the boundaries, then one table of all."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from itertools import product
+from typing import Any, Protocol
+
+from haploop.tools.executor.parts import Group
+from haploop.tools.executor.pool import Pool
+from haploop.tools.sweep.file.cells import Axis, Bisect, Extra, Item, Sweep
+from haploop.tools.sweep.file.record import VERDICT, wants_energy, wants_trajectories
+from haploop.tools.sweep.run.boundary import Boundary, Candidate, Tolerance, boundaries, holds_verdict
+from haploop.tools.sweep.run.columns import CELL, ENDED, NUMBER, SEED, TEXT, WHOLE, WHY, Column, schema_of, table_of
+from haploop.tools.sweep.run.store import Store
+from haploop.tools.sweep.run.work import Work
+
+Row = dict[str, Any]
+
+
+class Watcher(Protocol):
+    """Who is told how a sweep goes."""
+
+    def expect(self, cells: int) -> None:
+        """So many cells more are to be run."""
+        ...
+
+    def came(self, rows: Sequence[Row], stored: bool = False) -> None:
+        """Cells are done; ``stored`` are those of an earlier call."""
+        ...
+
+
+class Stopped(Exception):
+    """A sweep was asked to stop; what is done is stored."""
+
+
+class Engine:
+    """One sweep on its way.
+
+    Args:
+        sweep: to run.
+        store: where its rows go, and where those of an earlier call are.
+        pool: of workers.
+        watcher: told of every part.
+        stop: asked between parts; True ends the sweep after those under way.
+        compiled: whether to run compiled by JAX.
+    """
+
+    def __init__(
+        self, sweep: Sweep, store: Store, pool: Pool, watcher: Watcher, stop: Callable[[], bool], compiled: bool = False
+    ) -> None:
+        self._sweep, self._store, self._pool, self._watcher, self._stop = sweep, store, pool, watcher, stop
+        self._work = Work(
+            make=sweep.scene,
+            keep=sweep.row,
+            sources=sweep.sources,
+            energy=wants_energy(sweep.record),
+            trajectories=wants_trajectories(sweep.record),
+            compiled=compiled,
+        )
+
+    def run(self) -> list[Boundary]:
+        """Run what is missing and write the table; the boundaries, where they are sought.
+
+        Raises:
+            Stopped: before all was done.
+            StoreError: a file could not be written.
+            WorkersError: no worker can be had.
+            PluginError: a plugin does not load in a worker.
+        """
+        if self._sweep.bisect is None:
+            stored = self._store.done((CELL, ENDED, VERDICT))
+            self._watcher.came(stored, stored=True)
+            done = {row[CELL] for row in stored}
+            self._watcher.expect(self._sweep.count - len(done))
+            for _ in self._rows(_without(self._sweep.groups(), done), self._sweep.count - len(done)):
+                pass
+            self._store.finish()
+            return []
+        found = self._bisected(self._sweep.bisect)
+        self._store.finish(_boundary_table(self._sweep, self._sweep.bisect, found))
+        return found
+
+    def _rows(self, groups: Iterable[Group], count: int) -> Iterator[tuple[Item, Row]]:
+        """Cells that are run and stored."""
+        done = 0
+        for part in self._pool.parts(self._work, groups, count, self._stop):
+            rows = [row for _, row in part]
+            self._store.add(rows)
+            self._watcher.came(rows)
+            done += len(rows)
+            yield from part
+        if done < count:
+            raise Stopped
+
+    def _bisected(self, bisect: Bisect) -> list[Boundary]:
+        """The boundary of every combination of the other axes and the seed, in that order."""
+        axis = next(axis for axis in self._sweep.axes if axis.key == bisect.axis)
+        stored = {row[CELL]: row for row in self._store.done((CELL, ENDED, WHY, VERDICT))}
+        self._watcher.came(list(stored.values()), stored=True)
+        rows, next_cell = list(_rows_of(self._sweep, axis)), 0
+
+        def run(candidates: Sequence[Candidate]) -> Iterator[tuple[int, Row]]:
+            """A round: the grid at first, then one cell between its values in some of the rows."""
+            nonlocal next_cell
+            at_points = next_cell == 0
+            items = [
+                _item(self._sweep, axis, rows[row], value, at_points, next_cell + row) for row, value in candidates
+            ]
+            next_cell += self._sweep.count if at_points else len(rows)
+            places = {_cell(item): place for place, item in enumerate(items)}
+            missing = sorted((item for item in items if _cell(item) not in stored), key=_cell)
+            together = bool(missing) and self._sweep.together(missing[0])
+            self._watcher.expect(len(missing))
+            for item in items:
+                if _cell(item) in stored:
+                    yield places[_cell(item)], stored[_cell(item)]
+            for item, row in self._rows([Group(missing, together)], len(missing)):
+                yield places[_cell(item)], row
+
+        return boundaries(
+            len(rows),
+            axis.values,
+            Tolerance(bisect.tolerance, bisect.relative),
+            run,
+            holds_verdict(bisect.holds),
+            bisect.holds,
+        )
+
+
+def _without(groups: Iterable[Group], done: set[int]) -> Iterator[Group]:
+    """What is left of the groups, in stretches without a gap."""
+    for group in groups:
+        first = group.items[0]
+        for cell in group.items if done else ():
+            if cell in done:
+                if first < cell:
+                    yield Group(range(first, cell), group.together)
+                first = cell + 1
+        if first <= group.items[-1]:
+            yield Group(range(first, group.items[-1] + 1), group.together)
+
+
+def _rows_of(sweep: Sweep, axis: Axis) -> Iterator[tuple[dict[str, int], int]]:
+    """A place on each other axis and a repeat for every row that is bisected."""
+    others = [other for other in sweep.axes if other is not axis]
+    for *places, repeat in product(*(range(len(other.values)) for other in others), range(sweep.repeat)):
+        yield {other.key: place for other, place in zip(others, places, strict=True)}, repeat
+
+
+def _item(sweep: Sweep, axis: Axis, row: tuple[dict[str, int], int], value: float, at_points: bool, cell: int) -> Item:
+    places, repeat = row
+    if at_points:
+        return sweep.number({**places, axis.key: axis.values.index(value)}, repeat)
+    return Extra(cell, sweep.number({**places, axis.key: 0}, repeat), value)
+
+
+def _cell(item: Item) -> int:
+    return item.cell if isinstance(item, Extra) else item
+
+
+def _boundary_table(sweep: Sweep, bisect: Bisect, found: Sequence[Boundary]) -> Any:
+    """One row a combination: the other axes, the seed, and what is known of the boundary."""
+    axis = next(axis for axis in sweep.axes if axis.key == bisect.axis)
+    others = [column for column in sweep.axis_columns() if column.name != axis.key]
+    numbers = [Column(name, NUMBER, axis.unit or "") for name in ("low", "high", "boundary")]
+    seeds = [Column(SEED, WHOLE)] if SEED not in {other.name for other in others} else []
+    columns = [*others, *seeds, *numbers, Column("changes", WHOLE), Column(WHY, TEXT)]
+    tolerance = Tolerance(bisect.tolerance, bisect.relative)
+    rows = []
+    for (places, repeat), one in zip(_rows_of(sweep, axis), found, strict=True):
+        by_key = {other.key: other for other in sweep.axes}
+        values = {key: by_key[key].entry(by_key[key].values[place]) for key, place in places.items()}
+        known = {} if math.isnan(one.near) else {
+            "low": one.low, "high": one.high, "boundary": tolerance.middle(one.near, one.far)
+        }  # fmt: skip
+        seed = {SEED: sweep.base["seed"] + repeat} if seeds else {}
+        rows.append({**values, **seed, **known, "changes": one.changes, WHY: one.why})
+    return table_of(rows, schema_of(columns, sweep.toml()))

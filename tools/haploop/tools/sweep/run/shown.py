@@ -1,0 +1,95 @@
+"""How a sweep shows itself while it goes, and in the end."""
+
+from __future__ import annotations
+
+import time
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from types import TracebackType
+from typing import TYPE_CHECKING, Any, Self
+
+from haploop.tools.sweep.file.record import VERDICT
+from haploop.tools.sweep.run.columns import ENDED, WHY
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+_REFRESH_PER_S = 4
+
+
+class SweepProgress:
+    """Cells done, cells per second, time left and what came of them, on a terminal; nothing elsewhere.
+
+    A context manager.
+
+    Attributes:
+        counts: of all rows, those of earlier calls too, by verdict, or by how a run ended that has none.
+        ran: cells of this call.
+        reason: of the first cell that failed.
+    """
+
+    def __init__(self, title: str, screen: Console | None = None) -> None:
+        from rich import progress
+
+        from haploop.tools.render.report import console
+
+        self.counts: Counter[str] = Counter()
+        self.ran, self.reason = 0, ""
+        self._total, self._stopping = 0, False
+        self._began = time.monotonic()
+        screen = screen or console(stderr=True)
+        columns = (
+            progress.TextColumn("{task.description}"),
+            progress.BarColumn(bar_width=20),
+            progress.MofNCompleteColumn(),
+            progress.TextColumn("{task.fields[rate]}"),
+            progress.TimeRemainingColumn(compact=True),
+            progress.TextColumn("{task.fields[counts]}"),
+        )
+        self._bars = progress.Progress(
+            *columns, console=screen, disable=not screen.is_terminal, transient=True, refresh_per_second=_REFRESH_PER_S
+        )
+        self._task = self._bars.add_task(title, total=None, rate="", counts="")
+
+    def __enter__(self) -> Self:
+        self._bars.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        self._bars.stop()
+
+    def expect(self, cells: int) -> None:
+        """So many cells more are to be run."""
+        self._total += cells
+        self._bars.update(self._task, total=self._total)
+
+    def came(self, rows: Sequence[Mapping[str, Any]], stored: bool = False) -> None:
+        """Cells are done; ``stored`` are those of an earlier call."""
+        self.counts.update(outcome(row) for row in rows)
+        if not stored:
+            self.ran += len(rows)
+            self.reason = self.reason or next((row[WHY] for row in rows if not row.get(VERDICT)), "")
+        else:
+            self._total += len(rows)
+        elapsed_s = time.monotonic() - self._began
+        rate = f"{self.ran / elapsed_s:.3g} cells/s" if self.ran else ""
+        self._bars.update(self._task, completed=sum(self.counts.values()), rate=rate, counts=counted(self.counts))
+
+    def stopping(self, asked: bool) -> bool:
+        """Whether the sweep has been asked to stop; says so once, on a terminal or not."""
+        if asked and not self._stopping:
+            self._stopping = True
+            self._bars.console.print("Stopping after the cells under way; once more ends at once.", highlight=False)
+        return asked
+
+
+def outcome(row: Mapping[str, Any]) -> str:
+    """A row in one word."""
+    return row.get(VERDICT) or row[ENDED]
+
+
+def counted(counts: Mapping[str, int]) -> str:
+    """``12 steady, 3 limit-cycle``: the most frequent first."""
+    return ", ".join(f"{count} {word}" for word, count in sorted(counts.items(), key=lambda pair: (-pair[1], pair[0])))

@@ -1,0 +1,163 @@
+"""The directory of a sweep: what is finished stays finished, however the program ends."""
+
+from __future__ import annotations
+
+import contextlib
+import fcntl
+import io
+import os
+import shutil
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+from haploop.launch.output import OutputError
+from haploop.tools.sweep.run.columns import CELL, pyarrow, table_of
+from haploop.tools.sweep.table import BOUNDARY, PARTS, TABLE
+
+LOCK = ".lock"
+# Rows that are merged into a group of the table, which a reader can read by itself.
+_GROUP_ROWS = 8192
+
+
+class StoreError(Exception):
+    """Something could not be written; the message says what, why, and what is safe."""
+
+
+class Store:
+    """DIR while a sweep writes to it; a context manager that keeps others out.
+
+    Every part of the sweep that is done becomes a file of its own, complete or not there at all. At the end they are
+    merged into one table.
+
+    Args:
+        directory: exists already.
+        schema: of the table.
+    """
+
+    def __init__(self, directory: Path, schema: Any) -> None:
+        self.directory, self._schema = directory, schema
+        self._parts = directory / PARTS
+        self.rows = 0
+
+    def __enter__(self) -> Self:
+        self._lock = lock(self.directory)
+        try:
+            self._parts.mkdir(exist_ok=True)
+            for left in self.directory.rglob("*.part"):
+                left.unlink()
+        except OSError as error:
+            os.close(self._lock)
+            raise OutputError(f"The directory {self.directory} cannot be used: {error.strerror}.") from error
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        with contextlib.suppress(OSError):
+            self._parts.rmdir()  # where nothing came of it
+        os.close(self._lock)
+
+    @property
+    def finished(self) -> bool:
+        """Whether the table is there."""
+        return (self.directory / TABLE).exists()
+
+    def done(self, columns: Sequence[str] = (CELL,)) -> list[dict[str, Any]]:
+        """Some columns of all rows that are stored; a part that cannot be read is given up, to be run again."""
+        arrow, rows = pyarrow(), []
+        for file in self._files():
+            try:
+                rows += arrow.parquet.read_table(file, columns=list(columns)).to_pylist()
+            except (OSError, ValueError):
+                file.unlink()
+        self.rows = len(rows)
+        return rows
+
+    def add(self, rows: Sequence[Mapping[str, Any]]) -> None:
+        """Keep the rows of a part that is done.
+
+        Raises:
+            StoreError: they cannot be written; what was written before is safe.
+        """
+        path = self._parts / f"{rows[0][CELL]:012d}.parquet"
+        self._write(path, lambda file: pyarrow().parquet.write_table(table_of(rows, self._schema), file))
+        self.rows += len(rows)
+
+    def finish(self, boundaries: Any = None) -> None:
+        """Merge all parts into the table, in the order of the cells; write the table of the boundaries, if any.
+
+        Raises:
+            StoreError: as for ``add``.
+        """
+        if boundaries is not None:
+            self._write(self.directory / BOUNDARY, lambda file: pyarrow().parquet.write_table(boundaries, file))
+        temporary = self.directory / f"{TABLE}.part"
+        with self._safely(temporary):
+            with pyarrow().parquet.ParquetWriter(temporary, self._schema) as writer:
+                for table in self._in_order():
+                    writer.write_table(table)
+            temporary.replace(self.directory / TABLE)
+        shutil.rmtree(self._parts, ignore_errors=True)
+
+    def _in_order(self) -> Iterator[Any]:
+        """All rows in groups in the order of their cells, with no more parts in memory than overlap."""
+        arrow = pyarrow()
+        held, last = [], -1
+        for first, file in sorted((self._first(file), file) for file in self._files()):
+            if first > last and sum(map(len, held)) >= _GROUP_ROWS:
+                yield arrow.concat_tables(held).sort_by(CELL)
+                held = []
+            # Threads and read-ahead would keep memory of their own for every file.
+            held.append(arrow.parquet.ParquetFile(file).read(use_threads=False))
+            last = max(last, held[-1][CELL][-1].as_py())
+        if held:
+            yield arrow.concat_tables(held).sort_by(CELL)
+
+    def _first(self, file: Path) -> int:
+        return int(file.stem)
+
+    def _files(self) -> list[Path]:
+        return sorted(self._parts.glob("*.parquet"))
+
+    def _write(self, path: Path, write: Callable[[io.BytesIO], object]) -> None:
+        data = io.BytesIO()
+        write(data)
+        temporary = path.with_name(f"{path.name}.part")
+        with self._safely(temporary):
+            temporary.write_bytes(data.getbuffer())
+            temporary.replace(path)
+
+    @contextlib.contextmanager
+    def _safely(self, temporary: Path) -> Iterator[None]:
+        try:
+            yield
+        except OSError as error:
+            with contextlib.suppress(OSError):
+                temporary.unlink()
+            reason = error.strerror or str(error)
+            raise StoreError(
+                f"Writing {temporary.with_suffix('')} failed: {reason}. The {self.rows} cells written before are safe; "
+                "once there is room, the same command goes on."
+            ) from error
+
+
+def lock(directory: Path) -> int:
+    """Keep other sweeps out of a directory as long as the file descriptor is open; a killed program leaves no trace.
+
+    Raises:
+        OutputError: another one is at work there.
+    """
+    descriptor = os.open(directory / LOCK, os.O_RDWR | os.O_CREAT, 0o644)
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError as error:
+        holder = os.pread(descriptor, 20, 0).decode(errors="replace").strip()
+        os.close(descriptor)
+        raise OutputError(
+            f"Another sweep (process {holder}) is writing to {directory}; name another with --out."
+        ) from error
+    os.ftruncate(descriptor, 0)
+    os.pwrite(descriptor, str(os.getpid()).encode(), 0)
+    return descriptor

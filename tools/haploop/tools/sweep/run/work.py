@@ -1,0 +1,125 @@
+"""What a worker does with a part of a sweep: make its scenes, run them together, keep what is asked for."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import lru_cache, partial
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from haploop.controller.dissipation import Element
+
+Scene = dict[str, Any]
+Result = dict[str, Any]
+Sources = tuple[tuple[str, str], ...]
+Results = Callable[[list[Scene]], Iterator[tuple[int, Result]]]
+
+
+def itself(item: Any) -> Any:
+    """The item, which is a scene already."""
+    return item
+
+
+def whole(_item: Any, _scene: Scene | None, result: Result) -> Result:
+    """The whole result."""
+    return result
+
+
+@dataclass(frozen=True)
+class Work:
+    """A job that travels to workers with every part: nothing but values and functions that can be imported.
+
+    Attributes:
+        make: from an item to its resolved scene. What it raises is the reason why the item is refused.
+        keep: from an item, its scene (None where it was refused) and its result to what travels back.
+        sources: plugin files as (name, text); a worker on another machine has no files of this one.
+        energy, trajectories: as for ``results_of``.
+        compiled: whether to run compiled by JAX, which hashes no trajectories.
+    """
+
+    make: Callable[[Any], Scene] = itself
+    keep: Callable[[Any, Scene | None, Result], Any] = whole
+    sources: Sources = ()
+    energy: bool = True
+    trajectories: bool = False
+    compiled: bool = False
+
+    def run(self, items: Sequence[Any]) -> tuple[float, list[Any]]:
+        """What is kept of every item, and the seconds all of it took.
+
+        Raises:
+            PluginError: a plugin does not load here.
+            ImportError: JAX is asked for and not installed here.
+        """
+        began = time.perf_counter()
+        results = self._results()
+        scenes, kept = self._made(items)
+        for index, result in _safely(results, scenes, list(scenes)):
+            kept[index] = self.keep(items[index], scenes[index], result)
+        return time.perf_counter() - began, [kept[index] for index in range(len(items))]
+
+    def lost(self, item: Any, why: str) -> Any:
+        """What is kept of an item that cannot be run."""
+        scenes, kept = self._made([item])
+        return self.keep(item, scenes[0], _failed(scenes[0], why)) if scenes else kept[0]
+
+    def _made(self, items: Sequence[Any]) -> tuple[dict[int, Scene], dict[int, Any]]:
+        """Scenes by index, and what is kept of the items that have none."""
+        scenes, kept = {}, {}
+        for index, item in enumerate(items):
+            try:
+                scenes[index] = self.make(item)
+            except Exception as error:
+                kept[index] = self.keep(item, None, {"ended": "refused", "why": str(error)})
+        return scenes, kept
+
+    def _results(self) -> Results:
+        """What runs scenes."""
+        kinds = kinds_of(self.sources)
+        if self.compiled:
+            import jax  # noqa: F401 (what raises here is no fault of a scene)
+
+            from haploop.launch.batch.jax.run import results_of_compiled
+
+            return partial(results_of_compiled, kinds=kinds, energy=self.energy)
+        from haploop.launch.batch.run import results_of
+
+        return partial(results_of, kinds=kinds, energy=self.energy, trajectories=self.trajectories)
+
+
+def _safely(results: Results, scenes: dict[int, Scene], left: list[int]) -> Iterator[tuple[int, Result]]:
+    """Every result; where a scene raises, those without a result are run in halves until it stands alone."""
+    done: set[int] = set()
+    try:
+        for place, result in results([scenes[index] for index in left]):
+            done.add(place)
+            yield left[place], result
+    except Exception as error:
+        rest = [index for place, index in enumerate(left) if place not in done]
+        if len(rest) == 1:
+            yield rest[0], _failed(scenes[rest[0]], f"{type(error).__name__}: {error}")
+        else:
+            yield from _safely(results, scenes, rest[: len(rest) // 2])
+            yield from _safely(results, scenes, rest[len(rest) // 2 :])
+
+
+@lru_cache(maxsize=8)
+def kinds_of(sources: Sources) -> dict[str, type[Element]]:
+    """The element kinds at hand: the installed ones, and those of these sources, loaded once in this process.
+
+    Raises:
+        PluginError: one does not load.
+    """
+    from haploop.controller.dissipation import registry
+    from haploop.controller.dissipation.registry import load_source
+
+    kinds = registry()
+    for name, source in sources:
+        kinds |= load_source(source, name)
+    return kinds
+
+
+def _failed(scene: Scene, why: str) -> Result:
+    return {"title": scene["title"], "seed": scene["seed"], "ended": "failed", "why": why}
