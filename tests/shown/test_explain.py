@@ -82,7 +82,7 @@ def test_every_effect_of_a_tick_costs_instructions_and_is_billed():
 def test_explain_shows_bodies_states_order_and_costs():
     result = CliRunner().invoke(app, ["explain", str(SCENES / "premium_tap.toml"), "--set", "accelerometer.bias=1"])
     assert result.exit_code == 0
-    for words in ("device 52.5 g, hand 269 g", "4: x, grip.stretch, v, grip.rate", "friction_motion", "in every tick"):
+    for words in ("device 52.5 g, hand 269 g", "4: x, grip.stretch, v, grip.rate", "friction.motion", "in every tick"):
         assert words in result.stdout, words
     assert "Note: [accelerometer] is not simulated" in result.stderr
 
