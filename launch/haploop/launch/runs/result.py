@@ -12,14 +12,14 @@ from typing import TYPE_CHECKING, Any
 
 import haploop.logger
 from haploop.controller.dissipation import PluginError, registry
+from haploop.launch.output import SCENE, make_output
 from haploop.launch.runs import start
-from haploop.launch.scene.elements import elements_of
 from haploop.launch.runs.in_process import run_in_process
 from haploop.launch.runs.loaded_scene import Scene, load
-from haploop.launch.output import SCENE, make_output
-from haploop.logger.session import LOG
+from haploop.launch.scene.elements import elements_of
 from haploop.logger.log.memory import MemoryLog
 from haploop.logger.log.recording import Recording, Table
+from haploop.logger.session import LOG
 
 if TYPE_CHECKING:
     import pint

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from haploop.controller.dissipation import Element, load_plugin, registry
-from haploop.launch.scene.elements import elements_of, try_out
 from haploop.launch.output import keep_plugin, make_output, write_scene
+from haploop.launch.scene.elements import elements_of, try_out
 from haploop.launch.scene.file import load
 from haploop.protocol.transport import Transport
 
@@ -87,8 +87,8 @@ def run(
     """
     p = prepared
     if in_process:
-        from haploop.launch.runs.in_process import run_in_process
         from haploop.launch.processes.interrupts import interrupts
+        from haploop.launch.runs.in_process import run_in_process
 
         with interrupts(usual_from=2) as received:
             return run_in_process(
