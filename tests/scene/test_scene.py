@@ -11,7 +11,7 @@ from haploop.controller.dissipation import Element, Quantity
 from haploop.launch.scene.check import resolve
 from haploop.launch.scene.layers import Layers
 from haploop.launch.scene.mistakes import SceneError
-from haploop.launch.scene.tables.scene import SceneTable
+from haploop.protocol.scene.scene import Scene
 
 
 def test_defaults_are_filled_in_and_absent_tables_stay_absent():
@@ -138,7 +138,7 @@ def test_a_plugin_brings_its_own_parameters_units_and_defaults():
 
 # Any value at all, with the names of a scene made likely so that the inner checks are reached.
 _NAMES = st.sampled_from(
-    [*SceneTable.model_fields, "dissipation", "event", "kind", "at", "swap", "set", "force", "time", "element"]
+    [*(field.name for field in Scene.fields()), "kind", "at", "swap", "set", "force", "time", "element"]
 ) | st.text(max_size=3)
 _VALUES = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats() | st.sampled_from([*KINDS, "none", "trace", "1 mm"]),

@@ -16,6 +16,8 @@ class Quantity:
     Attributes:
         unit: SI unit in the spelling of pint (``"N s/m"``), ``""`` for a bare number.
         at_least, above, at_most, below: bounds, each optional.
+        about: the meaning of the number in a few words, for editors.
+        whole: only whole numbers, held as int.
     """
 
     unit: str
@@ -23,6 +25,8 @@ class Quantity:
     above: float | None = None
     at_most: float | None = None
     below: float | None = None
+    about: str = ""
+    whole: bool = False
 
     def complaint(self, value: float) -> str | None:
         """What is wrong with ``value`` ("must be above 0 kg"), or None when it may be used."""
@@ -37,3 +41,8 @@ class Quantity:
             if not holds:
                 return f"must be {words} {bound:g} {self.unit}".rstrip()
         return None
+
+
+def si(unit: str, about: str = "", *, whole: bool = False, **bounds: float) -> Quantity:
+    """Makes a ``Quantity`` in one line: ``mass: Annotated[float, si("kg", "mass of the device", above=0)]``."""
+    return Quantity(unit, about=about, whole=whole, **bounds)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,8 +16,9 @@ from haploop.launch.scene.layers import KeyPath, Layers
 from haploop.launch.scene.mistakes import SceneError, nearest
 from haploop.launch.scene.schema import Schema, alternatives, schema_at, whole_schema
 from haploop.launch.scene.tables.estimator_keys import check_estimators, check_filter
-from haploop.launch.scene.tables.scene import Clock, SceneTable, number_of, scene_model
+from haploop.launch.scene.tables.models import number_of, read_table, scene_model
 from haploop.launch.scene.toml_writer import inline
+from haploop.protocol.scene.scene import Clock, Scene
 from haploop.protocol.ticks import Timebase, TimebaseError
 
 if TYPE_CHECKING:
@@ -40,9 +42,10 @@ def resolve(layers: Layers, kinds: Mapping[str, type[Element]]) -> dict[str, Any
     Raises:
         SceneError: all mistakes, those already known to ``layers`` included.
     """
-    scene: SceneTable | None = None
+    scene: Scene | None = None
     try:
-        scene = scene_model(kinds).model_validate(layers.data)
+        resolved = scene_model(kinds).model_validate(layers.data).model_dump(exclude_none=True)
+        scene = Scene.from_dict(resolved)
     except ValidationError as error:
         schema = whole_schema(kinds)
         tagged = _TAGGED if len(kinds) > 1 else _TAGGED - {("dissipation", 0)}  # one kind alone is no choice
@@ -56,13 +59,13 @@ def resolve(layers: Layers, kinds: Mapping[str, type[Element]]) -> dict[str, Any
     settings = check_events(layers, _timebase(layers), kinds)
     if layers.mistakes or scene is None:
         raise SceneError(layers.mistakes)
-    resolved = scene.model_dump(exclude_none=True)
-    for index, event in enumerate(resolved.get("event", [])):
+    events = [dict(event) for event in scene.event]
+    for index, event in enumerate(events):
         if "swap" in event:
             event.setdefault("element", 0)
         if "set" in event:
             event["set"] = settings[index]
-    return {key: value for key, value in resolved.items() if value != []}
+    return replace(scene, event=tuple(events)).as_dict()
 
 
 def resolve_event(event: dict[str, Any], scene: dict[str, Any], kinds: Mapping[str, type[Element]]) -> dict[str, Any]:
@@ -78,10 +81,12 @@ def resolve_event(event: dict[str, Any], scene: dict[str, Any], kinds: Mapping[s
 def _timebase(layers: Layers) -> Timebase | None:
     """The integers of the run; None when there are none, which is a mistake here unless it is one already."""
     try:
-        clock = Clock.model_validate(layers.data.get("clock", {})).model_dump()
-        duration = number_of(SceneTable, "duration").read(layers.data.get("duration"))
-    except (ValidationError, PydanticCustomError):
+        duration = number_of(Scene, "duration").read(layers.data.get("duration"))
+    except PydanticCustomError:
         return None
+    if (table := read_table(Clock, layers.data.get("clock", {}))) is None:
+        return None
+    clock = table.as_dict()
     try:
         return Timebase.of(clock, duration)
     except TimebaseError as error:

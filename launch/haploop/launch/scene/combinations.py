@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from typing import Any, TypeVar
 
-from pydantic import ValidationError
-
 from haploop.launch.scene.layers import KeyPath, Layers
-from haploop.launch.scene.tables.base import Table
-from haploop.launch.scene.tables.effects import Accelerometer, Actuator, Friction, UniformJitter
-from haploop.launch.scene.tables.scene import Clock, Hand, SceneTable
+from haploop.launch.scene.tables.models import read_table
+from haploop.protocol.scene.effects import Accelerometer, Actuator, Friction, UniformJitter
+from haploop.protocol.scene.scene import Clock, Hand, Scene
+from haploop.protocol.scene.table import Table
 from haploop.protocol.ticks import whole_count
 
 TableType = TypeVar("TableType", bound=Table)
@@ -34,11 +33,11 @@ def check_combinations(layers: Layers) -> None:
             _whole_steps(layers, ("jitter", "most"), "longest additional delay", jitter.most, clock)
 
 
-def check_rate(layers: Layers, scene: SceneTable) -> None:
+def check_rate(layers: Layers, scene: Scene) -> None:
     """Refuse a plant rate too low for friction: thousands of swings a step to be followed, or steps it cannot brake."""
     if scene.friction is None or scene.clock.integrator == "dop853":
         return
-    rate, resolved = scene.clock.plant_rate, scene.model_dump(exclude_none=True)
+    rate, resolved = scene.clock.plant_rate, scene.as_dict()
     if scene.clock.integrator == "exact":
         from haploop.plant.chain.chain import Chain
         from haploop.plant.friction.substeps import MOST_PARTS, parts_of_a_step
@@ -99,7 +98,7 @@ def _grip(layers: Layers, hand: Any) -> None:
     """Looks at the mass alone, so that another mistake in ``[hand]`` hides nothing."""
     if not isinstance(hand, dict) or "grip" not in hand:
         return
-    alone = _valid(Hand, {"mass": hand.get("mass", 0.0)})
+    alone = read_table(Hand, {"mass": hand.get("mass", 0.0)})
     if alone and not alone.mass:
         expected = "The grip lies between the device and the hand's mass, so hand.mass must be above 0 kg."
         layers.complain(("hand", "grip"), expected, "holds no mass")
@@ -126,11 +125,4 @@ def _whole_steps(layers: Layers, key: KeyPath, name: str, seconds: float, clock:
 
 def _read(layers: Layers, name: str, table: type[TableType]) -> TableType | None:
     """A table by itself; None where it is absent, or wrong, which is a mistake reported elsewhere."""
-    return _valid(table, layers.data.get(name))
-
-
-def _valid(table: type[TableType], data: Any) -> TableType | None:
-    try:
-        return table.model_validate(data)
-    except ValidationError:
-        return None
+    return read_table(table, layers.data.get(name))

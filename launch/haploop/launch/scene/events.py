@@ -9,8 +9,9 @@ from pydantic_core import PydanticCustomError
 
 from haploop.launch.scene.layers import KeyPath, Layers
 from haploop.launch.scene.mistakes import counted, nearest
+from haploop.launch.scene.tables.models import EventModel, number_in, number_of
 from haploop.launch.scene.tables.number import Number
-from haploop.launch.scene.tables.scene import Clock, EventTable, Wall, number_of
+from haploop.protocol.scene.scene import Clock, Wall
 from haploop.protocol.ticks import DELAY, Timebase, whole_count
 
 if TYPE_CHECKING:
@@ -139,7 +140,7 @@ def _nearest_key(name: str, settable: dict[str, Number]) -> str | None:
 def _read(event: dict[str, Any], key: str) -> Any:
     """A number of an event; 0 where it is missing, or wrong, which is a mistake reported elsewhere."""
     try:
-        return number_of(EventTable, key).read(event.get(key))
+        return number_in(EventModel, key).read(event.get(key))
     except PydanticCustomError:
         return 0
 

@@ -11,7 +11,7 @@ from typing import Any, get_args
 
 from haploop.launch.scene.file import load
 from haploop.launch.scene.mistakes import COMMAND_LINE, SceneError
-from haploop.launch.scene.tables.scene import Integrator
+from haploop.protocol.scene.scene import Integrator
 
 METHODS: tuple[str, ...] = get_args(Integrator)
 RATES = (1_000, 2_000, 5_000, 10_000, 20_000, 50_000, 100_000)

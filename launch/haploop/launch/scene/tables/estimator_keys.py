@@ -7,10 +7,11 @@ from typing import Any
 from pydantic_core import PydanticCustomError
 
 from haploop.launch.scene.layers import Layers
-from haploop.launch.scene.tables.base import Table
-from haploop.launch.scene.tables.effects import Noise
-from haploop.launch.scene.tables.estimators import Acceleration, Velocity
-from haploop.launch.scene.tables.scene import SceneTable, number_of
+from haploop.launch.scene.tables.models import keys_of, number_of
+from haploop.protocol.scene.effects import Noise
+from haploop.protocol.scene.estimators import Acceleration, Velocity
+from haploop.protocol.scene.scene import Scene
+from haploop.protocol.scene.table import Table
 
 # The keys an estimator must have, and those it may have beside what all take.
 _NEEDS = {"difference": (), "window": ("ticks",), "foaw": ("ticks",), "kalman": ("jerk_density",)}
@@ -27,13 +28,13 @@ def check_estimators(layers: Layers) -> None:
     _acceleration(layers, acceleration, velocity)
 
 
-def check_filter(layers: Layers, scene: SceneTable) -> None:
+def check_filter(layers: Layers, scene: Scene) -> None:
     """Add a jerk density for which no filter can be computed to the mistakes of a scene that is else in order."""
     if scene.velocity is None or scene.velocity.jerk_density is None:
         return
     from haploop.controller.estimators.kalman import jerk_density_limits, position_noise_m
 
-    noise_m, rate = position_noise_m(scene.model_dump(exclude_none=True)), scene.clock.control_rate
+    noise_m, rate = position_noise_m(scene.as_dict()), scene.clock.control_rate
     least, most = jerk_density_limits(noise_m, 1.0 / rate)
     if noise_m and not least <= scene.velocity.jerk_density <= most:
         expected = (
@@ -47,10 +48,10 @@ def _keys(layers: Layers, name: str, model: type[Table], table: dict[str, Any]) 
     if not isinstance(estimator, str) or estimator not in _ALL:
         return
     for key in _NEEDS[estimator]:
-        if key in model.model_fields and key not in table:
+        if key in keys_of(model) and key not in table:
             _missing(layers, name, model, key, f"The {estimator} estimator needs")
     for key in table:
-        takers = [other for other, keys in _ALL.items() if key in keys and key in model.model_fields]
+        takers = [other for other, keys in _ALL.items() if key in keys and key in keys_of(model)]
         if takers and estimator not in takers:
             layers.complain((name, key), f"It goes with the estimator {' or '.join(takers)} alone.")
 

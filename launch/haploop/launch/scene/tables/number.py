@@ -10,6 +10,7 @@ from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 from haploop.launch.scene.tables.units import from_text
 from haploop.protocol.quantity import Quantity
+from haploop.protocol.quantity import si as quantity
 
 
 @dataclass(frozen=True)
@@ -17,14 +18,15 @@ class Number:
     """Metadata that makes ``Annotated[float, Number(Quantity(...))]`` take SI numbers and text with a unit.
 
     Attributes:
-        quantity: SI unit and bounds.
-        about: what the number is, for editors.
-        whole: only whole numbers, read as int.
+        quantity: SI unit, bounds, meaning, and whether it is whole.
     """
 
     quantity: Quantity
-    about: str = ""
-    whole: bool = False
+
+    @property
+    def whole(self) -> bool:
+        """True where only whole numbers are taken, read as int."""
+        return self.quantity.whole
 
     def read(self, value: Any) -> float:
         """The number in SI units.
@@ -68,14 +70,14 @@ class Number:
         bounds = {"minimum": q.at_least, "exclusiveMinimum": q.above, "maximum": q.at_most, "exclusiveMaximum": q.below}
         return {
             "type": ["integer" if self.whole else "number", "string"],
-            "description": ": ".join(filter(None, [self.about, self.form])),
+            "description": ": ".join(filter(None, [q.about, self.form])),
             **{name: bound for name, bound in bounds.items() if bound is not None},
         }
 
 
 def si(unit: str, about: str = "", *, whole: bool = False, **bounds: float) -> Number:
     """A ``Number`` in one line: ``mass: Annotated[float, si("kg", "mass of the device", above=0)]``."""
-    return Number(Quantity(unit, **bounds), about, whole)
+    return Number(quantity(unit, about, whole=whole, **bounds))
 
 
 def _refuse(sentence: str) -> NoReturn:

@@ -8,9 +8,9 @@ from types import UnionType
 from typing import TYPE_CHECKING, Annotated, Any, Union, get_args, get_origin
 
 from haploop.launch.scene.mistakes import nearest
-from haploop.launch.scene.tables.base import Table
+from haploop.launch.scene.tables.base import Model
+from haploop.launch.scene.tables.models import scene_model
 from haploop.launch.scene.tables.number import Number
-from haploop.launch.scene.tables.scene import scene_model
 
 if TYPE_CHECKING:
     from haploop.controller.dissipation import Element
@@ -43,7 +43,7 @@ def number_at(path: Sequence[str], scene: dict[str, Any], kinds: Mapping[str, ty
     value: Any = scene
     for depth, part in enumerate(path):
         place = ".".join(path[:depth])
-        if tables := [choice for choice in choices if inspect.isclass(choice) and issubclass(choice, Table)]:
+        if tables := [choice for choice in choices if inspect.isclass(choice) and issubclass(choice, Model)]:
             choices = _field(_chosen(tables, value, place), part, place)
             value = value.get(part) if isinstance(value, dict) else None
         elif lists := [choice for choice in choices if get_origin(choice) is list]:
@@ -59,7 +59,7 @@ def number_at(path: Sequence[str], scene: dict[str, Any], kinds: Mapping[str, ty
     return next((choice for choice in choices if isinstance(choice, Number)), None)
 
 
-def _field(table: type[Table], name: str, place: str) -> list[Any]:
+def _field(table: type[Model], name: str, place: str) -> list[Any]:
     """What may stand at a key of a table."""
     if name not in table.model_fields:
         names = list(table.model_fields)
@@ -69,7 +69,7 @@ def _field(table: type[Table], name: str, place: str) -> list[Any]:
     return [*field.metadata, *_alternatives(field.annotation)]
 
 
-def _chosen(tables: Sequence[type[Table]], value: Any, place: str) -> type[Table]:
+def _chosen(tables: Sequence[type[Model]], value: Any, place: str) -> type[Model]:
     """Of tables of several kinds the one that the scene names."""
     kinds = {get_args(table.model_fields["kind"].annotation)[0]: table for table in tables if len(tables) > 1}
     if not kinds:

@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 from pydantic import ConfigDict, Field, model_validator
 from pydantic_core import PydanticCustomError
 
-from haploop.launch.scene.tables.base import Table
+from haploop.launch.scene.tables.base import Model
 from haploop.launch.scene.tables.number import Number, si
 from haploop.protocol.quantity import Quantity
 
@@ -19,7 +19,7 @@ MOST_POINTS = 1_000_000
 _ROUNDING = Decimal("1e-9")
 
 
-class Span(Table):
+class Span(Model):
     """From one value to another, both ends included."""
 
     model_config = ConfigDict(title="span")

@@ -18,7 +18,7 @@ from haploop.launch.scene.layers import KeyPath, Layers, parse
 from haploop.launch.scene.mistakes import COMMAND_LINE, Mistake, SceneError, nearest, shown
 from haploop.launch.scene.overrides import key_path, lay_overrides
 from haploop.launch.scene.schema import TomlSchema
-from haploop.launch.scene.tables.base import Table
+from haploop.launch.scene.tables.base import Model
 from haploop.launch.scene.tables.number import Number, si
 from haploop.protocol.quantity import Quantity
 from haploop.tools.sweep.file.cells import Axis, Bisect, Refused, Sweep, resolved
@@ -31,7 +31,7 @@ MOST_AXES = 3
 Verdict = Literal["steady", "limit-cycle", "diverged", "no-contact"]
 
 
-class BisectTable(Table):
+class BisectTable(Model):
     """Where on an axis the verdict changes."""
 
     axis: Annotated[str, Field(description="key of the axis")]
@@ -40,7 +40,7 @@ class BisectTable(Table):
     holds: Verdict = "steady"
 
 
-class SweepFile(Table):
+class SweepFile(Model):
     """A sweep: a scene, and what is varied in it."""
 
     title: str | None = None

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import Field
-
-from haploop.launch.scene.tables.base import Table
-from haploop.launch.scene.tables.number import si
+from haploop.protocol.quantity import si
+from haploop.protocol.scene.table import Table
 
 Bandwidth = Annotated[float, si("Hz", "corner of a first-order low-pass", above=0)]
 
@@ -68,14 +66,14 @@ class Actuator(Table):
 class UniformJitter(Table):
     """Every whole number of plant steps from 0 to most is equally likely."""
 
-    kind: Literal["uniform"]
+    kind = "uniform"
     most: Annotated[float, si("s", "longest additional delay, whole plant steps", at_least=0)]
 
 
 class GammaJitter(Table):
     """Gamma-distributed, rounded to the nearest plant step."""
 
-    kind: Literal["gamma"]
+    kind = "gamma"
     mean: Annotated[float, si("s", "mean additional delay", above=0)]
     deviation: Annotated[float, si("s", "standard deviation of the additional delay", above=0)]
 
@@ -86,4 +84,4 @@ class Loss(Table):
     probability: Annotated[float, si("", "share of the commands that are lost", at_least=0, at_most=1)]
 
 
-Jitter = Annotated[UniformJitter | GammaJitter, Field(discriminator="kind")]
+Jitter = UniformJitter | GammaJitter

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from haploop.launch.scene.tables.base import Table
-from haploop.launch.scene.tables.number import si
+from haploop.protocol.quantity import si
+from haploop.protocol.scene.table import Table
 
 Cutoff = Annotated[float, si("Hz", "cutoff of a first-order low-pass", above=0)]
 Ticks = Annotated[int | None, si("", "ticks of the window, the longest one for foaw", whole=True, at_least=1)]

@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated
 
-from pydantic import Field, model_validator
-from pydantic_core import PydanticCustomError
-
-from haploop.launch.scene.force_csv import fault
-from haploop.launch.scene.tables.base import Table
-from haploop.launch.scene.tables.number import si
+from haploop.protocol.quantity import si
+from haploop.protocol.scene.table import Table
 
 Force = Annotated[float, si("N", "force that is reached")]
 RiseTime = Annotated[float, si("s", "time from 0 until the force is reached", above=0)]
@@ -18,14 +14,14 @@ RiseTime = Annotated[float, si("s", "time from 0 until the force is reached", ab
 class Constant(Table):
     """The same force throughout."""
 
-    kind: Literal["constant"]
+    kind = "constant"
     value: Annotated[float, si("N", "the force")]
 
 
 class Ramp(Table):
     """In a straight line from 0 at t = 0 to value at rise_time, then held."""
 
-    kind: Literal["ramp"]
+    kind = "ramp"
     value: Force
     rise_time: RiseTime
 
@@ -33,7 +29,7 @@ class Ramp(Table):
 class Step(Table):
     """0 before, value from the time at on."""
 
-    kind: Literal["step"]
+    kind = "step"
     value: Force
     at: Annotated[float, si("s", "time of the step", at_least=0)]
 
@@ -41,7 +37,7 @@ class Step(Table):
 class Sine(Table):
     """offset + amplitude sin(2 pi frequency t + phase)."""
 
-    kind: Literal["sine"]
+    kind = "sine"
     amplitude: Annotated[float, si("N", "amplitude of the sine")]
     frequency: Annotated[float, si("Hz", "frequency of the sine", above=0)]
     offset: Annotated[float, si("N", "constant force added")] = 0.0
@@ -51,7 +47,7 @@ class Sine(Table):
 class MinimumJerk(Table):
     """value (10 s^3 - 15 s^4 + 6 s^5) with s = t / rise_time, then held (Flash and Hogan 1985)."""
 
-    kind: Literal["minimum-jerk"]
+    kind = "minimum-jerk"
     value: Force
     rise_time: RiseTime
 
@@ -59,24 +55,9 @@ class MinimumJerk(Table):
 class Trace(Table):
     """Recorded samples, joined by straight lines, held before the first and after the last."""
 
-    kind: Literal["trace"]
-    time: list[Annotated[float, si("s", "time of the sample, later than the one before")]]
-    force: list[Annotated[float, si("N", "force at that time")]]
-
-    @model_validator(mode="after")
-    def _is_a_function_of_time(self) -> Trace:
-        if found := fault(self.time, self.force):
-            sentence = f"Sample {found[0]}: {found[1]}"
-            raise PydanticCustomError("sentence", "{sentence}", {"sentence": sentence})
-        return self
+    kind = "trace"
+    time: tuple[Annotated[float, si("s", "time of the sample, later than the one before")], ...]
+    force: tuple[Annotated[float, si("N", "force at that time")], ...]
 
 
-FORCES: dict[str, type[Table]] = {
-    "constant": Constant,
-    "ramp": Ramp,
-    "step": Step,
-    "sine": Sine,
-    "minimum-jerk": MinimumJerk,
-    "trace": Trace,
-}
-HandForce = Annotated[Constant | Ramp | Step | Sine | MinimumJerk | Trace, Field(discriminator="kind")]
+HandForce = Constant | Ramp | Step | Sine | MinimumJerk | Trace

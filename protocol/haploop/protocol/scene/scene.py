@@ -1,17 +1,13 @@
-"""The tables of a scene file, with units, bounds and defaults. A table that is absent is not simulated."""
+"""The scene: one sampled haptic loop. A table that is absent is not simulated."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import MISSING
-from functools import cache, reduce
-from operator import or_
-from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar
+from dataclasses import field
+from typing import Annotated, Any, Literal
 
-from pydantic import Field, create_model
-
-from haploop.launch.scene.tables.base import Table
-from haploop.launch.scene.tables.effects import (
+from haploop.protocol.quantity import si
+from haploop.protocol.scene.effects import (
     Accelerometer,
     Actuator,
     Friction,
@@ -21,14 +17,10 @@ from haploop.launch.scene.tables.effects import (
     Noise,
     Transmission,
 )
-from haploop.launch.scene.tables.estimators import Acceleration, Velocity
-from haploop.launch.scene.tables.hand_force import HandForce
-from haploop.launch.scene.tables.number import Number, si
+from haploop.protocol.scene.estimators import Acceleration, Velocity
+from haploop.protocol.scene.hand_force import HandForce
+from haploop.protocol.scene.table import Table
 
-if TYPE_CHECKING:
-    from haploop.controller.dissipation import Element
-
-TableType = TypeVar("TableType", bound=Table)
 Integrator = Literal["exact", "semi-implicit-euler", "euler", "rk4", "implicit-midpoint", "dop853"]
 
 
@@ -86,24 +78,32 @@ class Run(Table):
     deadline: Annotated[float, si("s", "wall time a node may stay silent", above=0)] = 5.0
 
 
-class EventTable(Table):
-    """What changes during the run; exactly one of swap, set, pause and stop."""
+class ElementTable(Table):
+    """A dissipation element: its kind, when it acts, and the values of the parameters that the kind declares."""
 
-    at: Annotated[float, si("s", "time; the first tick at or after it sees the change", at_least=0)]
-    element: Annotated[int | None, si("", "which element a swap replaces", whole=True, at_least=0)] = None
-    set: dict[str, Any] | None = Field(None, description='new values: { "wall.stiffness" = 200.0 }')
-    pause: Literal[True] | None = None
-    stop: Literal[True] | None = None
+    name: str
+    acts: Literal["in-contact", "always"] = "in-contact"
+    parameters: dict[str, float] = field(default_factory=dict)
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> ElementTable:
+        """Makes it from ``{"kind": ..., "acts": ..., parameter: value, ...}``."""
+        parameters = {key: value for key, value in data.items() if key not in ("kind", "acts")}
+        return cls(name=data["kind"], acts=data.get("acts", "in-contact"), parameters=parameters)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Returns what ``from_dict`` takes."""
+        return {"kind": self.name, "acts": self.acts, **self.parameters}
 
 
-class SceneTable(Table):
+class Scene(Table):
     """A scene: one sampled haptic loop."""
 
     title: str
     duration: Annotated[float, si("s", "simulated time", above=0)]
     seed: Annotated[int, si("", "seed of everything random", whole=True, at_least=0, below=2**63)] = 0
     diverged_beyond: Annotated[float, si("m", "the run ends when the device is farther from 0", above=0)] = 1.0
-    clock: Clock = Field(default_factory=Clock)
+    clock: Clock = Clock()
     device: Device
     transmission: Transmission | None = None
     friction: Friction | None = None
@@ -117,45 +117,10 @@ class SceneTable(Table):
     actuator: Actuator | None = None
     jitter: Jitter | None = None
     loss: Loss | None = None
+    dissipation: tuple[ElementTable, ...] = ()
+    event: tuple[dict[str, Any], ...] = ()
+    run: Run = Run()
 
-
-def number_of(table: type[Table], key: str) -> Number:
-    """How the number at ``key`` of a table is read."""
-    return next(mark for mark in table.model_fields[key].metadata if isinstance(mark, Number))
-
-
-def scene_model(kinds: Mapping[str, type[Element]]) -> type[SceneTable]:
-    """The whole scene, with the kinds of dissipation element that are at hand."""
-    return _scene_model(tuple(kinds.items()))
-
-
-@cache
-def _scene_model(kinds: tuple[tuple[str, type[Element]], ...]) -> type[SceneTable]:
-    nothing = _table("none", Table, "Removes the element.", {"kind": (Literal["none"], ...)})
-    elements = [_element_table(kind, element) for kind, element in kinds]
-    event = _table("Event", EventTable, EventTable.__doc__, {"swap": (_one_of([*elements, nothing]) | None, None)})
-    keys = {
-        "dissipation": (list[_one_of(elements or [nothing])] | None, None),
-        "event": (list[event] | None, None),
-        "run": (Run, Field(default_factory=Run)),
-    }
-    return _table("Scene", SceneTable, SceneTable.__doc__, keys)
-
-
-def _element_table(kind: str, element: type[Element]) -> type[Table]:
-    keys: dict[str, Any] = {
-        "kind": (Literal[kind], ...),  # pyright: ignore[reportInvalidTypeForm]
-        "acts": (Literal["in-contact", "always"], "in-contact"),
-    }
-    for name, (quantity, default) in element.parameters().items():
-        keys[name] = (Annotated[float, Number(quantity)], ... if default is MISSING else default)
-    return _table(kind, Table, element.__doc__, keys)
-
-
-def _table(name: str, base: type[TableType], about: str | None, keys: dict[str, Any]) -> type[TableType]:
-    return create_model(name, __base__=base, __doc__=about, **keys)
-
-
-def _one_of(tables: list[type[Table]]) -> Any:
-    """A table of one of these kinds."""
-    return Annotated[reduce(or_, tables), Field(discriminator="kind")] if len(tables) > 1 else tables[0]
+    def as_dict(self) -> dict[str, Any]:
+        """Returns the scene as nested dicts and lists, absent tables and empty lists left out."""
+        return {key: value for key, value in super().as_dict().items() if value != []}

@@ -1,0 +1,85 @@
+"""The base of every table of a scene: a frozen dataclass that reads and writes plain dicts."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from functools import cache
+from types import UnionType
+from typing import Annotated, Any, ClassVar, Self, Union, dataclass_transform, get_args, get_origin, get_type_hints
+
+
+@dataclass_transform(kw_only_default=True, frozen_default=True)
+class Table:
+    """Base of every table; a subclass is a frozen dataclass with keyword arguments by itself.
+
+    A key declared ``X | None`` with default None is absent unless it is given: the effect is then not simulated.
+    A number that differs from member to member of a batch is an array of shape (batch,).
+
+    Attributes:
+        kind: name by which a scene file chooses between tables in one place; "" where there is no choice.
+    """
+
+    kind: ClassVar[str] = ""
+
+    def __init_subclass__(cls, **kwargs: Any) -> None:
+        super().__init_subclass__(**kwargs)
+        dataclasses.dataclass(kw_only=True, frozen=True)(cls)
+
+    @classmethod
+    def fields(cls) -> tuple[dataclasses.Field[Any], ...]:
+        """Returns the declared keys, in order."""
+        return dataclasses.fields(cls)  # pyright: ignore[reportArgumentType]  every subclass is a dataclass
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> Self:
+        """Makes the table from a resolved dict: every value already checked and in SI units.
+
+        Raises:
+            TypeError: a key is unknown or missing.
+        """
+        tables = _tables_of(cls)
+        given = {key: _read(tables[key], value) if key in tables else value for key, value in data.items()}
+        if cls.kind:
+            given.pop("kind", None)
+        return cls(**given)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Returns the table as nested dicts and lists, absent keys left out, in the order of declaration."""
+        written = {"kind": self.kind} if self.kind else {}
+        for field in self.fields():
+            if (value := getattr(self, field.name)) is not None:
+                written[field.name] = _written(value)
+        return written
+
+
+@cache
+def _tables_of(cls: type[Table]) -> dict[str, tuple[type[Table], ...]]:
+    """The table classes that may stand at each key that holds tables."""
+    hints = get_type_hints(cls)
+    return {name: found for name, hint in hints.items() if (found := tuple(_tables_in(hint)))}
+
+
+def _tables_in(hint: Any) -> list[type[Table]]:
+    if isinstance(hint, type) and issubclass(hint, Table):
+        return [hint]
+    if get_origin(hint) in (Union, UnionType, Annotated, tuple):
+        return [table for part in get_args(hint) for table in _tables_in(part)]
+    return []
+
+
+def _read(tables: tuple[type[Table], ...], value: Any) -> Any:
+    if isinstance(value, list | tuple):
+        return tuple(_read(tables, item) for item in value)
+    if not isinstance(value, Mapping):
+        return value
+    kind = value.get("kind", "")
+    return next((table for table in tables if table.kind == kind), tables[0]).from_dict(value)
+
+
+def _written(value: Any) -> Any:
+    if isinstance(value, Table):
+        return value.as_dict()
+    if isinstance(value, list | tuple):
+        return [_written(item) for item in value]
+    return value
