@@ -12,7 +12,7 @@ from haploop.launch.processes import run_directory
 from haploop.launch.processes.control import ask
 from haploop.launch.runs.start import prepare, run
 from haploop.protocol.sockets import open_socket
-from haploop.protocol.transport import Transport, TransportError, Wires
+from haploop.protocol.transport import SecureContext, Transport, TransportError
 from haploop.protocol.wire import encode
 
 SCENE = Path(__file__).parents[2] / "launch" / "scenes" / "fig6c.toml"
@@ -29,22 +29,22 @@ SCENE = Path(__file__).parents[2] / "launch" / "scenes" / "fig6c.toml"
 )
 def test_a_loop_others_could_steer_is_refused(host, keys, why):
     with pytest.raises(TransportError, match=why):
-        Transport.of(host, keys and Path(keys))
+        Transport.from_options(host, keys and Path(keys))
 
 
 def test_keys_are_made_once_private_and_kept(tmp_path):
     keys = tmp_path / "keys"
-    Transport.of("127.0.0.1", keys)
+    Transport.from_options("127.0.0.1", keys)
     secret = (keys / "server.key_secret").read_bytes()
     for private in (keys, keys / "server.key_secret", keys / "client.key_secret"):
         assert private.stat().st_mode & 0o077 == 0
-    Transport.of("127.0.0.1", keys)
+    Transport.from_options("127.0.0.1", keys)
     assert (keys / "server.key_secret").read_bytes() == secret
 
 
 @pytest.mark.parametrize("with_keys", [False, True])
 def test_a_run_over_tcp_gives_the_bits_of_one_process_and_answers_whoever_may_ask(tmp_path, with_keys):
-    transport = Transport.of("127.0.0.1", tmp_path / "keys" if with_keys else None)
+    transport = Transport.from_options("127.0.0.1", tmp_path / "keys" if with_keys else None)
     settings = ["duration=1.5", "run.pin=false"]
     alone = run(prepare(SCENE, settings, out=tmp_path / "alone"), in_process=True)
     results, identities = [], []
@@ -61,7 +61,7 @@ def test_a_run_over_tcp_gives_the_bits_of_one_process_and_answers_whoever_may_as
     assert ask(live, "status")[1]["end"] == 1500
     if with_keys:
         assert not answers(address, Transport()), "a client without keys was answered"
-        Transport.of("127.0.0.1", tmp_path / "other")
+        Transport.from_options("127.0.0.1", tmp_path / "other")
         assert not answers(address, stranger(tmp_path, tmp_path / "other")), "a stranger's key was let in"
     thread.join(60)
     assert results[0]["trajectory_sha256"] == alone["trajectory_sha256"]
@@ -75,7 +75,7 @@ def stranger(tmp_path: Path, other: Path) -> Transport:
 
 def answers(address: str, transport: Transport) -> bool:
     """Whether the clock at ``address`` answers a status command."""
-    context = Wires.over(transport)
+    context = SecureContext.from_transport(transport)
     socket = open_socket(context, zmq.DEALER)
     socket.connect(address)
     socket.send(encode("COMMAND", "status", {}))

@@ -150,7 +150,7 @@ def _loops(  # pragma: no cover
 def run_kernel(scenes: list[dict[str, Any]], energy: bool) -> np.ndarray:
     """Extremes, what the window shows and ``BOOKS``, as ``results_of`` tells them; shape (scenes, FIGURES + books)."""
     first = scenes[0]
-    time = Timebase.of(first["clock"], first["duration"])
+    time = Timebase.from_clock(first["clock"], first["duration"])
     m, n = Mechanics.of(first), time.steps_per_tick
     motion = LinearMotion(first, time)
     held = HeldFlow.of(m.mass_kg, m.damping, m.stiffness, time.step_s, n).coefficients

@@ -31,7 +31,7 @@ def test_adding_up_the_step_does_not():
 
 @pytest.mark.parametrize("tick", [1, 9_999_999, 9_999_998, 7_654_321, 3])
 def test_a_tick_far_out_is_found_from_its_time_and_has_its_whole_nanoseconds(tick):
-    time = Timebase.of(LONG, FAR / RATE)
+    time = Timebase.from_clock(LONG, FAR / RATE)
     assert time.ticks == FAR // 10
     assert time.first_tick_at(tick / CONTROL) == tick
     assert time.first_tick_at(math.nextafter(tick / CONTROL, 0.0)) == tick
@@ -41,7 +41,7 @@ def test_a_tick_far_out_is_found_from_its_time_and_has_its_whole_nanoseconds(tic
 
 def test_the_line_delays_the_two_hundred_thousandth_command_as_it_does_the_first():
     """Command k from step k n + 13 on: three steps of the one before the last, seven of the last but one tick ago."""
-    line = CommandLine(Timebase.of(LONG, FAR / RATE))
+    line = CommandLine(Timebase.from_clock(LONG, FAR / RATE))
     line.receive([0.0])
     for tick in range(199_999):
         line.receive([float(tick + 1)])

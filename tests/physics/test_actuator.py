@@ -93,7 +93,7 @@ def test_a_command_that_is_no_finite_number_ends_the_run_where_it_would_act(forc
     """Neither is it clipped to a force, nor rounded away."""
     limits = {"actuator": actuator} if actuator else {}
     tables = scene(duration=0.1, clock={"round_trip_delay": 0.0023}, **limits, **late)
-    plant = Plant(tables, Timebase.of(tables["clock"], 0.1))
+    plant = Plant(tables, Timebase.from_clock(tables["clock"], 0.1))
     plant.run_until(100, lambda tick, samples: [force if tick + i == 20 else 0.1 for i in range(len(samples))])
     assert plant.stop_reason == f"command 20 was {force}, which no device can apply, at tick 22"
     assert plant.reached == 22

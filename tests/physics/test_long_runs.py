@@ -27,7 +27,7 @@ SWINGING = {
 
 def plainly_added(resolved) -> tuple[np.ndarray, np.ndarray]:
     """The motion without forces by the same flow, x + dx and v + dv rounded at every step."""
-    m, time = Mechanics.of(resolved), Timebase.of(resolved["clock"], resolved["duration"])
+    m, time = Mechanics.of(resolved), Timebase.from_clock(resolved["clock"], resolved["duration"])
     flow = StepFlow.of(m.mass_kg, m.damping, m.stiffness, time.step_s)
     x, v = m.start
     states = [(x, v)]
@@ -39,7 +39,7 @@ def plainly_added(resolved) -> tuple[np.ndarray, np.ndarray]:
 
 def relative_residual(resolved, x: np.ndarray, v: np.ndarray) -> float:
     """What the plant's books leave unexplained of a motion without commands, over the energy moved."""
-    books = PlantBooks(resolved, Timebase.of(resolved["clock"], resolved["duration"]))
+    books = PlantBooks(resolved, Timebase.from_clock(resolved["clock"], resolved["duration"]))
     columns = {"x": x, "v": v, "force": np.zeros(len(x))}
     moved = Displacement(dx := np.diff(x), by_tick(dx, books._n))
     changes = np.stack(list(books.increments(0, columns, moved, [])))

@@ -1,4 +1,4 @@
-"""A lossy member hears everything it keeps up with, knows what it missed, and never costs the loop anything."""
+"""A lossy node hears everything it keeps up with, knows what it missed, and never costs the loop anything."""
 
 import time
 
@@ -17,7 +17,7 @@ def heard(observer, until=ALL):
     frames = []
     while not set(until) <= observer.ended.keys():
         observer.wait(200)
-        frames += observer.turn()
+        frames += observer.poll()
     return frames
 
 
@@ -34,10 +34,10 @@ def joined(frames, name, column, steps=1):
 def test_an_observer_hears_every_tick_of_all_three_streams_and_every_event_at_its_tick(tmp_path):
     with going(tmp_path, "duration=3", pauses=(7,)) as subject:
         subject.stands_at(7)
-        context = subject.live.wires()
+        context = subject.live.make_context()
         observer = Observer(context, "print", subject.live.clock, ALL)
         try:
-            while len([None for _, f in observer.turn() if f.name == "STATE"]) < len(ALL):
+            while len([None for _, f in observer.poll() if f.name == "STATE"]) < len(ALL):
                 observer.wait(200)
                 if observer._streams.tick == 7:
                     break
@@ -63,17 +63,17 @@ def test_one_that_does_not_listen_costs_the_run_no_bit_and_is_told_what_it_misse
     """Blocks so short that there are far more of them than any queue holds."""
     with going(tmp_path, "duration=30", "run.block_ticks=10", pauses=(7, 29_000)) as subject:
         subject.stands_at(7)
-        context = subject.live.wires()
+        context = subject.live.make_context()
         observer = Observer(context, "view", subject.live.clock, ALL)
         try:
             while observer._streams.tick < 7:
                 observer.wait(200)
-                observer.turn()
+                observer.poll()
             subject.ask("resume")
             subject.stands_at(29_000)
             for _ in range(10):  # it wakes up, and takes what its queues still hold
                 observer.wait(50)
-                observer.turn()
+                observer.poll()
             subject.ask("resume")
             heard(observer)
         finally:
@@ -87,13 +87,13 @@ def test_one_that_does_not_listen_costs_the_run_no_bit_and_is_told_what_it_misse
 def test_status_shows_an_observer_with_its_tick_its_lag_and_what_it_skipped(tmp_path):
     with going(tmp_path, "duration=600", pauses=(300,)) as subject:
         subject.stands_at(300)
-        context = subject.live.wires()
+        context = subject.live.make_context()
         observer = Observer(context, "view", subject.live.clock, ALL)
         try:
             rows = []
             for _ in range(100):
                 observer.wait(50)
-                observer.turn()
+                observer.poll()
                 rows = [node for node in subject.ask("status")[1]["nodes"] if node["role"] == "view"]
                 if rows and rows[0]["tick"] == 300:
                     break
@@ -116,22 +116,22 @@ def test_status_shows_an_observer_with_its_tick_its_lag_and_what_it_skipped(tmp_
 def test_one_the_clock_has_dropped_joins_again_by_itself_and_hears_each_event_once(tmp_path):
     with going(tmp_path, "duration=600", pauses=(300,)) as subject:
         subject.stands_at(300)
-        context = subject.live.wires()
+        context = subject.live.make_context()
         observer = Observer(context, "view", subject.live.clock, ALL)
         try:
             events = []
             for _ in range(20):
                 observer.wait(50)
-                observer.turn()
+                observer.poll()
                 events += observer.take_events()
             # As if the clock had taken it off: the next report is refused.
-            observer._member.leave("LEAVE", 300)
-            first = observer._member
-            observer._member = type(first)(context, "view", subject.live.clock, "")
+            observer._client.leave("LEAVE", 300)
+            first = observer._client
+            observer._client = type(first)(context, "view", subject.live.clock, "")
             subject.ask("set", set={"wall.stiffness": 200.0})
             for _ in range(60):
                 observer.wait(50)
-                observer.turn()
+                observer.poll()
                 events += observer.take_events()
             roles = [node["role"] for node in subject.ask("status")[1]["nodes"]]
             assert roles.count("view") == 1

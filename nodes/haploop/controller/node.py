@@ -11,8 +11,8 @@ import zmq
 from haploop.controller.controller import Controller
 from haploop.controller.dissipation import ElementError, PluginError, registry
 from haploop.protocol.block_length import BlockLength
+from haploop.protocol.clock_client import ClockClient
 from haploop.protocol.loop import ControllerEnd
-from haploop.protocol.member import Member
 from haploop.protocol.node import NodeError, run_node
 from haploop.protocol.processes import PROCESSES
 from haploop.protocol.sockets import bind
@@ -25,11 +25,11 @@ ROLE = "controller"
 class ControllerNode:
     """Follows the plant, sample by sample, no further than granted."""
 
-    def __init__(self, member: Member, context: zmq.Context[zmq.Socket[bytes]], directory: Path) -> None:
-        self._member = member
+    def __init__(self, client: ClockClient, context: zmq.Context[zmq.Socket[bytes]], directory: Path) -> None:
+        self._client = client
         self._publisher = Publisher(context, ROLE, self._state)
         address = bind(self._publisher.socket, directory, PROCESSES[ROLE].binds["telemetry"])
-        welcome = member.join({"telemetry": address})
+        welcome = client.join({"telemetry": address})
         scene = welcome["scene"]
         kinds = registry([Path(path) for path in welcome["context"]["plugins"]])
         self._controller = Controller(scene, Timebase(**welcome["timebase"]), kinds)
@@ -45,29 +45,29 @@ class ControllerNode:
         """Greet the plant and wait for the logger."""
         self._loop.greet(self._secret)
         self._publisher.await_subscriber(lambda: self._wait("logger"))
-        self._member.ready(0)
+        self._client.ready(0)
 
     def run(self) -> tuple[int, dict[str, Any]]:
         """Answer until the plant ends the run; returns the number of ticks answered."""
-        controller, member, loop = self._controller, self._member, self._loop
+        controller, client, loop = self._controller, self._client, self._loop
         while (samples := loop.samples(controller.tick)) is not None:
             end = controller.tick + len(samples)
-            while member.until < end:
-                member.wait(controller.tick)
-            if member.events:
+            while client.until < end:
+                client.wait(controller.tick)
+            if client.events:
                 self._schedule()
             try:
                 loop.answer(controller.tick, controller.answer(samples))
             except ElementError:
                 self._flush()
                 raise
-            if end - self._reported >= self._block.ticks or end >= member.until:
+            if end - self._reported >= self._block.ticks or end >= client.until:
                 self._flush()
-                member.poll()
+                client.poll()
         return self._end()
 
     def _schedule(self) -> None:
-        for tick, event in self._member.take_events():
+        for tick, event in self._client.take_events():
             if "swap" in event or "set" in event:
                 self._controller.schedule(tick, event)
 
@@ -75,7 +75,7 @@ class ControllerNode:
         self._flush()
         tick, trouble = self._controller.tick, self._controller.recorder.trouble
         self._publisher.publish("END", tick, "", trouble)
-        return tick, {"strangers": self._publisher.strangers, "trouble": trouble}
+        return tick, {"strangers": self._publisher.unknown_peers, "trouble": trouble}
 
     def _flush(self) -> None:
         """Publish what was answered, answer new subscribers, report."""
@@ -86,7 +86,7 @@ class ControllerNode:
         self._publisher.serve()
         self._reported = self._controller.tick
         refused, recorder.refused = recorder.refused, []
-        self._member.progress(self._reported, {"refused": refused} if refused else None)
+        self._client.progress(self._reported, {"refused": refused} if refused else None)
         self._block.next()
 
     def _await_plant(self) -> None:
@@ -94,16 +94,16 @@ class ControllerNode:
 
     def _wait(self, on: str) -> None:
         """Nothing came for a while: say so, and serve whoever subscribes to a loop that stands still."""
-        self._member.waiting(self._controller.tick, on)
-        self._member.poll()
+        self._client.waiting(self._controller.tick, on)
+        self._client.poll()
         if self._controller.recorder.is_empty:
             self._publisher.serve()
 
 
-def work(member: Member, context: zmq.Context[zmq.Socket[bytes]], directory: Path) -> tuple[int, dict[str, Any]]:
-    """Run the controller as a member of a run."""
+def work(client: ClockClient, context: zmq.Context[zmq.Socket[bytes]], directory: Path) -> tuple[int, dict[str, Any]]:
+    """Run the controller as a node of a run."""
     try:
-        node = ControllerNode(member, context, directory)
+        node = ControllerNode(client, context, directory)
         node.connect()
         return node.run()
     except PluginError as error:

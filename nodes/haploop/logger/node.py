@@ -14,7 +14,7 @@ import zmq
 from haploop.logger.books.buffers import TelemetryGap
 from haploop.logger.log.error import LogError
 from haploop.logger.session import Keeper, open_keeper
-from haploop.protocol.member import REPORT_MS, Aborted, Member
+from haploop.protocol.clock_client import REPORT_MS, Aborted, ClockClient
 from haploop.protocol.node import NodeError, run_node
 from haploop.protocol.processes import PROCESSES
 from haploop.protocol.sockets import bind
@@ -34,13 +34,13 @@ class LoggerNode:
 
     def __init__(
         self,
-        member: Member,
+        client: ClockClient,
         context: zmq.Context[zmq.Socket[bytes]],
         publisher: Publisher | None,
         leave: Callable[[], str | None] = lambda: None,
     ) -> None:
         """``leave`` is asked at every turn: None to stay, why it is no use to stay, or "" to go in order."""
-        self._member, self._context, self._publisher, self._leave = member, context, publisher, leave
+        self._client, self._context, self._publisher, self._leave = client, context, publisher, leave
         self._ended: dict[str, tuple[int, str, str | None]] = {}
         self._status: dict[str, Any] = {}
         self._status_due = 0.0
@@ -67,30 +67,30 @@ class LoggerNode:
                 else:
                     early.append((role, frame))
             if not received:
-                self._member.waiting(0, "controller" if "plant" in states else "plant")
-            self._member.poll()
+                self._client.waiting(0, "controller" if "plant" in states else "plant")
+            self._client.poll()
             if (why := self._leave()) is not None:
                 raise Aborted(why or "The logger left before anything came.")
         self.keeper.logger.start(states["plant"], states["controller"]["history"])
         self._started = True
         for role, frame in early:
             self._take(role, frame)
-        self._member.ready(self.keeper.logger.tick)
+        self._client.ready(self.keeper.logger.tick)
 
     def run(self) -> tuple[int, dict[str, Any]]:
         """Take blocks until plant and controller have ended, then close the log and write the summary."""
         poller = zmq.Poller()
-        poller.register(self._member.socket, zmq.POLLIN)
+        poller.register(self._client.socket, zmq.POLLIN)
         self._streams.register(poller)
         reported = -1
-        while len(self._ended) < 2 or not self._member.last:  # the last grant brings the last events
+        while len(self._ended) < 2 or not self._client.last:  # the last grant brings the last events
             idle = not poller.poll(REPORT_MS)
-            if not self._member.until:  # the run has not begun
+            if not self._client.until:  # the run has not begun
                 self.keeper.logger.count_wall_time()
             if idle:
-                self._member.waiting(self.keeper.logger.tick, "plant")
+                self._client.waiting(self.keeper.logger.tick, "plant")
             self._drain()
-            self._member.poll()
+            self._client.poll()
             self._note_events()
             if (why := self._leave()) is not None:
                 return self.finish(why)
@@ -117,7 +117,7 @@ class LoggerNode:
             self._ended[role] = tick, reason, trouble
 
     def _note_events(self) -> None:
-        for tick, event in self._member.take_events():
+        for tick, event in self._client.take_events():
             self.keeper.logger.event(tick, event)
 
     def _report(self, tick: int) -> None:
@@ -125,12 +125,12 @@ class LoggerNode:
         if now >= self._status_due:
             self._status_due = now + _STATUS_S
             self._status, self._judged_at = self.keeper.logger.status(), tick
-            self._member.progress(tick, self._status)
+            self._client.progress(tick, self._status)
         else:
-            self._member.progress(tick)
+            self._client.progress(tick)
 
     def _publish_energy(self, first: int, books: dict[str, np.ndarray]) -> None:
-        if self._publisher and self._publisher.heard:
+        if self._publisher and self._publisher.subscribed:
             columns = {name: column.tobytes() for name, column in books.items()}
             self._publisher.publish("ENERGY_BLOCK", first, self.keeper.logger.tick - first, columns, self._status)
 
@@ -154,7 +154,7 @@ class LoggerNode:
         return self.keeper.logger.tick, result
 
 
-def work(member: Member, context: zmq.Context[zmq.Socket[bytes]], directory: Path) -> tuple[int, dict[str, Any]]:
+def work(client: ClockClient, context: zmq.Context[zmq.Socket[bytes]], directory: Path) -> tuple[int, dict[str, Any]]:
     """Run the run's own logger."""
     node: LoggerNode
 
@@ -163,8 +163,8 @@ def work(member: Member, context: zmq.Context[zmq.Socket[bytes]], directory: Pat
 
     publisher = Publisher(context, ROLE, state)
     address = bind(publisher.socket, directory, PROCESSES[ROLE].binds["telemetry"])
-    welcome = member.join({"telemetry": address})
-    node = LoggerNode(member, context, publisher)
+    welcome = client.join({"telemetry": address})
+    node = LoggerNode(client, context, publisher)
     try:
         try:
             node.start(welcome, Path(welcome["context"]["out"]))

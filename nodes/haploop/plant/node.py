@@ -9,8 +9,8 @@ import zmq
 
 from haploop.plant.plant import Plant
 from haploop.protocol.block_length import BlockLength
+from haploop.protocol.clock_client import ClockClient
 from haploop.protocol.loop import PlantEnd
-from haploop.protocol.member import Member
 from haploop.protocol.node import NodeError, run_node
 from haploop.protocol.processes import PROCESSES
 from haploop.protocol.sockets import bind
@@ -23,14 +23,14 @@ ROLE = "plant"
 class PlantNode:
     """Leads the loop: steps as far as granted, L + 1 samples a message, and ends the run for plant and controller."""
 
-    def __init__(self, member: Member, context: zmq.Context[zmq.Socket[bytes]], directory: Path) -> None:
-        self._member = member
+    def __init__(self, client: ClockClient, context: zmq.Context[zmq.Socket[bytes]], directory: Path) -> None:
+        self._client = client
         self._loop = PlantEnd(context, self._await_controller)
         self._publisher = Publisher(context, ROLE, self._state)
         names = PROCESSES[ROLE].binds
         sockets = {"loop": self._loop.socket, "telemetry": self._publisher.socket}
         endpoints = {channel: bind(socket, directory, names[channel]) for channel, socket in sockets.items()}
-        welcome = member.join(endpoints)
+        welcome = client.join(endpoints)
         self._plant = Plant(welcome["scene"], Timebase(**welcome["timebase"]))
         self._block = BlockLength(welcome["scene"]["run"]["block_ticks"])
         self._secret = welcome["context"]["secret"]
@@ -43,19 +43,19 @@ class PlantNode:
         """Find the controller and the logger; no tick is worked on before both listen."""
         self._loop.greet(self._secret)
         self._publisher.await_subscriber(lambda: self._wait("logger"))
-        self._member.ready(0)
+        self._client.ready(0)
 
     def run(self) -> tuple[int, dict[str, Any]]:
         """Work until the run ends; returns the tick it ended at."""
-        member, plant = self._member, self._plant
-        while plant.stop_reason is None and not (member.last and plant.tick >= member.until):
-            for tick, event in member.take_events():
+        client, plant = self._client, self._plant
+        while plant.stop_reason is None and not (client.last and plant.tick >= client.until):
+            for tick, event in client.take_events():
                 plant.schedule(tick, event)
-            plant.run_until(min(plant.tick + self._block.ticks, member.until), self._loop.exchange)
+            plant.run_until(min(plant.tick + self._block.ticks, client.until), self._loop.exchange)
             self._flush()
-            member.poll()
-            while plant.tick >= member.until and not member.last and plant.stop_reason is None:
-                member.wait(plant.tick)
+            client.poll()
+            while plant.tick >= client.until and not client.last and plant.stop_reason is None:
+                client.wait(plant.tick)
                 self._publisher.serve()
         return self._end()
 
@@ -65,8 +65,8 @@ class PlantNode:
         self._flush()
         self._publisher.publish("END", plant.reached, plant.stop_reason or "", None)
         if plant.stop_reason:
-            self._member.ended(plant.reached, plant.stop_reason)
-        return plant.reached, {"strangers": self._loop.strangers + self._publisher.strangers}
+            self._client.ended(plant.reached, plant.stop_reason)
+        return plant.reached, {"strangers": self._loop.unknown_peers + self._publisher.unknown_peers}
 
     def _flush(self) -> None:
         """Publish what was stepped, answer new subscribers, report."""
@@ -74,20 +74,20 @@ class PlantNode:
         if ticks:
             self._publisher.publish("PLANT_BLOCK", first, ticks, columns)
         self._publisher.serve()
-        self._member.progress(self._plant.reached)
+        self._client.progress(self._plant.reached)
         self._block.next()
 
     def _await_controller(self) -> None:
         self._wait("controller")
 
     def _wait(self, on: str) -> None:
-        self._member.waiting(self._plant.tick, on)
-        self._member.poll()
+        self._client.waiting(self._plant.tick, on)
+        self._client.poll()
 
 
-def work(member: Member, context: zmq.Context[zmq.Socket[bytes]], directory: Path) -> tuple[int, dict[str, Any]]:
-    """Run the plant as a member of a run."""
-    node = PlantNode(member, context, directory)
+def work(client: ClockClient, context: zmq.Context[zmq.Socket[bytes]], directory: Path) -> tuple[int, dict[str, Any]]:
+    """Run the plant as a node of a run."""
+    node = PlantNode(client, context, directory)
     node.connect()
     try:
         return node.run()

@@ -7,7 +7,7 @@ import time as wall_clock
 from typing import Any
 
 from haploop.logger.log.error import LogError
-from haploop.protocol.member import Aborted, Refused
+from haploop.protocol.clock_client import Aborted, Refused
 from haploop.view.draw.state import WAITING, state
 from haploop.view.receive.backfill import Past
 from haploop.view.receive.clock_answers import ClockAnswers
@@ -104,7 +104,7 @@ class Viewer:
         """Turn after turn until the run is over."""
         due = gone_due = wall_clock.monotonic()
         while not followed.over:
-            followed.turn()
+            followed.poll()
             self._turn_is_over()
             now = wall_clock.monotonic()
             if now >= gone_due:
@@ -118,7 +118,7 @@ class Viewer:
     @staticmethod
     def _vanished(followed: Followed) -> None:
         """The launcher has gone: in order, with its last words still to be heard or lost, or killed."""
-        followed.turn()
+        followed.poll()
         if not followed.over:
             followed.end("ended", "")
             if followed.summary is None:

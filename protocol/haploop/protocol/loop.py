@@ -8,7 +8,7 @@ from typing import Any
 import msgpack
 import zmq
 
-from haploop.protocol.member import REPORT_MS
+from haploop.protocol.clock_client import REPORT_MS
 from haploop.protocol.messages import MESSAGES, VERSION
 from haploop.protocol.sockets import bare_send, open_socket
 from haploop.protocol.wire import Frame, WireError, decode, encode
@@ -31,7 +31,7 @@ class PlantEnd:
 
     Attributes:
         socket: to be bound by the node.
-        strangers: frames that came from anyone but the controller.
+        unknown_peers: frames that came from anyone but the controller.
     """
 
     def __init__(self, context: zmq.Context[zmq.Socket[bytes]], idle: Idle) -> None:
@@ -39,7 +39,7 @@ class PlantEnd:
         self.socket.setsockopt(zmq.RCVTIMEO, REPORT_MS)
         self._idle = idle
         self._partner = b""
-        self.strangers = 0
+        self.unknown_peers = 0
         self._pack = msgpack.Packer(autoreset=True).pack
         self._emit = bare_send(self.socket)
 
@@ -51,7 +51,7 @@ class PlantEnd:
                 self._partner = sender
                 self._send(encode("HELLO", secret))
                 return
-            self.strangers += 1
+            self.unknown_peers += 1
 
     def exchange(self, tick: int, samples: list[tuple[float, ...]]) -> list[float]:
         """Send the samples of the ticks from ``tick`` on and return the commands that answer them.
@@ -67,7 +67,7 @@ class PlantEnd:
             _let_go(error)
         sender, data = self._receive()
         while sender != partner:
-            self.strangers += 1
+            self.unknown_peers += 1
             sender, data = self._receive()
         answer = msgpack.unpackb(data)
         if answer[:3] != [VERSION, _COMMANDS, tick] or len(answer[3]) != len(samples):

@@ -13,12 +13,12 @@ from typing import Any
 
 import zmq
 
+from haploop.protocol.clock_client import Aborted, ClockClient, Refused
 from haploop.protocol.loop import LoopError
-from haploop.protocol.member import Aborted, Member, Refused
-from haploop.protocol.transport import Transport, Wires
+from haploop.protocol.transport import SecureContext, Transport
 
-# work(member, context, directory of sockets) -> (tick reached, result for the clock)
-Work = Callable[[Member, "zmq.Context[zmq.Socket[bytes]]", Path], tuple[int, dict[str, Any]]]
+# work(client, context, directory of sockets) -> (tick reached, result for the clock)
+Work = Callable[[ClockClient, "zmq.Context[zmq.Socket[bytes]]", Path], tuple[int, dict[str, Any]]]
 
 
 class NodeError(Exception):
@@ -39,22 +39,22 @@ def run_node(role: str, work: Work) -> None:
     start = json.loads(line)
     threading.Thread(target=_end_with_parent, daemon=True).start()
     gc.freeze()
-    context = Wires.over(Transport.from_dict(start["transport"]))
-    member = Member(context, role, start["address"], start["secret"])
+    context = SecureContext.from_transport(Transport.from_dict(start["transport"]))
+    client = ClockClient(context, role, start["address"], start["secret"])
     try:
-        tick, result = work(member, context, directory)
-        member.leave("DONE", tick, result)
+        tick, result = work(client, context, directory)
+        client.leave("DONE", tick, result)
         status = 0
     except Aborted:
         status = 1
     except (Refused, NodeError, LoopError) as error:
-        member.leave("FAILED", -1, str(error))
+        client.leave("FAILED", -1, str(error))
         status = 1
     except Exception as error:
         import traceback
 
         traceback.print_exc()
-        member.leave("FAILED", -1, f"{type(error).__name__}: {error}")
+        client.leave("FAILED", -1, f"{type(error).__name__}: {error}")
         status = 1
     context.destroy(linger=1000)
     sys.exit(status)

@@ -8,7 +8,7 @@ from typing import Any
 
 import zmq
 
-from haploop.protocol.member import Member
+from haploop.protocol.clock_client import ClockClient
 from haploop.protocol.telemetry import Subscriber
 from haploop.protocol.wire import Frame
 
@@ -17,7 +17,7 @@ _REPORT_S = 0.2
 
 
 class Observer:
-    """A lossy member of a running loop; one thread's, never blocking but in ``wait``.
+    """A lossy node of a running loop; one thread's, never blocking but in ``wait``.
 
     The clock may drop one that was stopped for long (its queue is full then): it joins again by itself and goes on
     with what is sent from there.
@@ -40,29 +40,29 @@ class Observer:
         self._context, self._role, self._clock = context, role, clock
         self._taken = 0
         self._events: list[tuple[int, dict[str, Any]]] = []
-        self._member = self._join()
+        self._client = self._join()
         addresses = {name: self.welcome["endpoints"][name]["telemetry"] for name in listens}
         self._streams = Subscriber(context, addresses)
         self.ended: dict[str, Frame] = {}
         self._report_due = 0.0
 
-    def _join(self) -> Member:
-        member = Member(self._context, self._role, self._clock, "")
+    def _join(self) -> ClockClient:
+        client = ClockClient(self._context, self._role, self._clock, "")
         try:
-            self.welcome = member.join({}, lossless=False)
+            self.welcome = client.join({}, lossless=False)
         except BaseException:
-            member.close()
+            client.close()
             raise
-        member.ready(0)
+        client.ready(0)
         self._known_before = self._taken
-        return member
+        return client
 
     @property
     def skipped(self) -> dict[str, int]:
         """Ticks that never came, by role."""
         return self._streams.gaps
 
-    def turn(self) -> list[tuple[str, Frame]]:
+    def poll(self) -> list[tuple[str, Frame]]:
         """What came since the last call, (role, message), without waiting.
 
         Raises:
@@ -70,21 +70,21 @@ class Observer:
         """
         frames = self._streams.drain()
         self.ended |= {role: frame for role, frame in frames if frame.name == "END"}
-        self._member.poll()
-        if self._member.refused:
-            self._member.close()
-            self._member = self._join()
+        self._client.poll()
+        if self._client.refused:
+            self._client.close()
+            self._client = self._join()
         self._note_events()
         now = time.monotonic()
         if now >= self._report_due:
             self._report_due = now + _REPORT_S
-            status = {"skipped_ticks": sum(self.skipped.values()), "garbled": self._streams.garbled}
-            self._member.progress(min(self._streams.tick, self._member.until), status)
+            status = {"skipped_ticks": sum(self.skipped.values()), "garbled": self._streams.malformed}
+            self._client.progress(min(self._streams.tick, self._client.until), status)
         return frames
 
     def _note_events(self) -> None:
         """The clock tells all events from the first on whenever a node joins: those known already are passed over."""
-        events = self._member.take_events()
+        events = self._client.take_events()
         passed = min(self._known_before, len(events))
         self._known_before -= passed
         self._taken += len(events) - passed
@@ -98,11 +98,11 @@ class Observer:
     def wait(self, timeout_ms: int) -> None:
         """Wait until something comes."""
         poller = zmq.Poller()
-        poller.register(self._member.socket, zmq.POLLIN)
+        poller.register(self._client.socket, zmq.POLLIN)
         self._streams.register(poller)
         poller.poll(timeout_ms)
 
     def leave(self) -> None:
         """Go; the run goes on."""
-        self._member.leave("LEAVE", self._streams.tick)
+        self._client.leave("LEAVE", self._streams.tick)
         self._streams.close()

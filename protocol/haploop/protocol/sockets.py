@@ -9,7 +9,7 @@ from typing import Any
 
 import zmq
 
-from haploop.protocol.transport import Transport, Wires
+from haploop.protocol.transport import SecureContext, Transport
 from haploop.protocol.wire import MAX_FRAME_BYTES
 
 # A subscriber this many blocks behind starts to lose blocks; the grant window keeps lossless ones far below.
@@ -45,7 +45,7 @@ def bare_send(socket: zmq.Socket[bytes]) -> Callable[..., Any]:
 
 
 def _transport(context: zmq.Context[zmq.Socket[bytes]]) -> Transport:
-    return context.transport if isinstance(context, Wires) else Transport()
+    return context.transport if isinstance(context, SecureContext) else Transport()
 
 
 def has_message(socket: zmq.Socket[bytes]) -> bool:

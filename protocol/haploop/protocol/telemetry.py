@@ -22,8 +22,8 @@ class Publisher:
 
     Attributes:
         socket: to be bound by the node.
-        heard: whether anyone has subscribed so far.
-        strangers: frames that were no subscriptions to this stream.
+        subscribed: whether anyone has subscribed so far.
+        unknown_peers: frames that were no subscriptions to this stream.
     """
 
     def __init__(
@@ -32,8 +32,8 @@ class Publisher:
         self.socket = open_socket(context, zmq.XPUB)
         self._topic = role.encode()
         self._state = state
-        self.heard = False
-        self.strangers = 0
+        self.subscribed = False
+        self.unknown_peers = 0
 
     def publish(self, name: str, *fields: Any) -> None:
         """Send one message to all subscribers."""
@@ -49,14 +49,14 @@ class Publisher:
             if request[:1] == b"\x01" and self._topic.startswith(request[1:]):
                 new = True
             elif request[:1] != b"\x00":
-                self.strangers += 1
+                self.unknown_peers += 1
         if new:
-            self.heard = True
+            self.subscribed = True
             self.publish("STATE", *self._state())
 
     def await_subscriber(self, idle: Callable[[], None]) -> None:
         """Wait until someone listens, calling ``idle`` now and then."""
-        while not self.heard:
+        while not self.subscribed:
             if not self.socket.poll(100):
                 idle()
             self.serve()
@@ -67,7 +67,7 @@ class Subscriber:
 
     Attributes:
         gaps: blocks' worth of ticks that never came, by role.
-        garbled: frames that were no messages.
+        malformed: frames that were no messages.
     """
 
     def __init__(self, context: zmq.Context[zmq.Socket[bytes]], addresses: dict[str, str]) -> None:
@@ -79,7 +79,7 @@ class Subscriber:
             self._sockets[socket] = role
         self._next_tick: dict[str, int] = {}
         self.gaps = dict.fromkeys(addresses, 0)
-        self.garbled = 0
+        self.malformed = 0
 
     @property
     def tick(self) -> int:
@@ -112,7 +112,7 @@ class Subscriber:
         try:
             return decode(socket.recv_multipart()[-1])
         except WireError:
-            self.garbled += 1
+            self.malformed += 1
             return None
 
     def _follows(self, role: str, frame: Frame) -> bool:

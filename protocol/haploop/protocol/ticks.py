@@ -36,7 +36,7 @@ class Timebase:
     ticks: int
 
     @classmethod
-    def of(cls, clock: dict[str, Any], duration: float) -> Timebase:
+    def from_clock(cls, clock: dict[str, Any], duration: float) -> Timebase:
         """Build from a scene's ``[clock]`` table and its duration in seconds.
 
         Raises:

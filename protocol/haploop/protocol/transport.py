@@ -30,7 +30,7 @@ class Transport:
     keys: Path | None = None
 
     @classmethod
-    def of(cls, host: str | None, keys: Path | None) -> Transport:
+    def from_options(cls, host: str | None, keys: Path | None) -> Transport:
         """Check what was asked for; keys are made where the directory has none.
 
         Raises:
@@ -78,30 +78,30 @@ class Transport:
             socket.curve_serverkey = load_certificate(self.keys / f"{SERVER}.key")[0]
 
 
-class Wires(zmq.Context[zmq.Socket[bytes]]):
-    """A ZeroMQ context whose sockets all use one transport; closes its doorkeeper with itself."""
+class SecureContext(zmq.Context[zmq.Socket[bytes]]):
+    """A ZeroMQ context whose sockets all use one transport; stops its authenticator when it is destroyed."""
 
     transport: Transport = Transport()
-    _doorkeeper: Any = None
+    _authenticator: Any = None
 
     @classmethod
-    def over(cls, transport: Transport) -> Wires:
+    def from_transport(cls, transport: Transport) -> SecureContext:
         """A new context; with keys, only the holders of those in ``clients/`` get in."""
-        wires = cls()
-        wires.transport = transport
+        context = cls()
+        context.transport = transport
         if transport.keys and transport.host:
             from zmq.auth.thread import ThreadAuthenticator
 
-            wires._doorkeeper = ThreadAuthenticator(wires)
-            wires._doorkeeper.start()
-            wires._doorkeeper.configure_curve(domain="*", location=str(transport.keys / CLIENTS))
-        return wires
+            context._authenticator = ThreadAuthenticator(context)
+            context._authenticator.start()
+            context._authenticator.configure_curve(domain="*", location=str(transport.keys / CLIENTS))
+        return context
 
     def destroy(self, linger: int | None = None) -> None:
         """Close everything."""
-        if self._doorkeeper:
-            self._doorkeeper.stop()
-            self._doorkeeper = None
+        if self._authenticator:
+            self._authenticator.stop()
+            self._authenticator = None
         super().destroy(linger)
 
 

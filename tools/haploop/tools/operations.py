@@ -71,7 +71,7 @@ def operations(scene: dict[str, Any], kinds: Kinds) -> Operations:
 
     A run that ends earlier is counted over the second half of what it has.
     """
-    time = Timebase.of(scene["clock"], scene["duration"])
+    time = Timebase.from_clock(scene["clock"], scene["duration"])
     plant, controller = Plant(scene, time), Controller(scene, time, kinds)
     counter = _Counter()
     counts: list[tuple[int, int]] = []

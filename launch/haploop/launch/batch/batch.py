@@ -60,7 +60,7 @@ class LoopArray:
         trajectories: bool = False,
     ) -> None:
         self._scenes, scene = scenes, stacked(scenes)
-        self._time = time = Timebase.of(scene["clock"], scene["duration"])
+        self._time = time = Timebase.from_clock(scene["clock"], scene["duration"])
         self._motion, self._line = motion_of(scene, time), line_of(scene, time)
         self._quantise, self._sensor = position_sensor(scene, time), accelerometer(scene, time)
         self._feels = accelerometer_is_used(scene)

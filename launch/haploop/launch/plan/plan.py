@@ -87,7 +87,7 @@ def multiplications(scene: dict[str, Any]) -> int:
     One mass is moved once a hold and filled in at the plant steps; bodies in a row are moved to every plant step. The
     classical Runge-Kutta method moves them four times; of DOP853 twelve times a tick are counted, the least there is.
     """
-    time, size = Timebase.of(scene["clock"], scene["duration"]), len(Chain.of(scene).states)
+    time, size = Timebase.from_clock(scene["clock"], scene["duration"]), len(Chain.of(scene).states)
     if needs_chain(scene):
         moves = {"rk4": 4 * time.steps_per_tick, "dop853": 12}.get(integrator_of(scene), time.steps_per_tick)
         return moves * size * (size + 2)
@@ -118,7 +118,7 @@ def _plant_step(chain: Chain, named: tuple[Effect, ...], scene: dict[str, Any]) 
 
 
 def _tick(scene: dict[str, Any], chain: Chain, named: tuple[Effect, ...]) -> tuple[Step, ...]:
-    late = f"{Timebase.of(scene['clock'], scene['duration']).delay_steps} plant steps"
+    late = f"{Timebase.from_clock(scene['clock'], scene['duration']).delay_steps} plant steps"
     return (
         Step("plant", f"the position of the {chain.bodies[0]} is sampled"),
         *_stage("measurement", named, scene),

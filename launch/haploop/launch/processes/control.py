@@ -25,7 +25,7 @@ def ask(run: LiveRun, verb: str, **arguments: Any) -> tuple[str, dict[str, Any]]
         CommandRefused: it was refused; nothing has changed.
         RunNotFound: the run does not answer, or has ended.
     """
-    context = run.wires()
+    context = run.make_context()
     socket = open_socket(context, zmq.DEALER)
     try:
         socket.connect(run.clock)

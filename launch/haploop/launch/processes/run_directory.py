@@ -11,7 +11,7 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-from haploop.protocol.transport import Transport, Wires
+from haploop.protocol.transport import SecureContext, Transport
 
 # A socket's path must stay below the kernel's 107 bytes; this leaves room for the run and the socket's name.
 _LONGEST_BASE = 70
@@ -56,9 +56,9 @@ class LiveRun:
     out: str
     keys: str | None = None
 
-    def wires(self) -> Wires:
+    def make_context(self) -> SecureContext:
         """A context whose sockets may connect to the run."""
-        return Wires.over(Transport(keys=Path(self.keys) if self.keys else None))
+        return SecureContext.from_transport(Transport(keys=Path(self.keys) if self.keys else None))
 
 
 def create() -> Path:

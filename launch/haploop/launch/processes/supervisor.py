@@ -20,7 +20,7 @@ from haploop.launch.processes import run_directory
 from haploop.launch.processes.children import Child, start_children
 from haploop.launch.processes.interrupts import interrupts
 from haploop.protocol.ticks import Timebase
-from haploop.protocol.transport import Transport, Wires
+from haploop.protocol.transport import SecureContext, Transport
 
 if TYPE_CHECKING:
     from haploop.controller.dissipation import Element
@@ -93,10 +93,10 @@ class Supervisor:
     def __init__(self, request: RunRequest, sockets: Path, received: list[int]) -> None:
         self._request, self._sockets, self._interrupts = request, sockets, received
         scene = request.scene
-        timebase = Timebase.of(scene["clock"], scene["duration"])
+        timebase = Timebase.from_clock(scene["clock"], scene["duration"])
         self._clock = Clock(scene, timebase, request.kinds, request.pace)
         self._deadline_s = scene["run"]["deadline"]
-        self._context = Wires.over(request.transport)
+        self._context = SecureContext.from_transport(request.transport)
         secret = secrets.token_hex(16)
         welcome = {
             "run": sockets.name,

@@ -49,7 +49,7 @@ def run_in_process(
         RunFailed: an element raised, or gave something that is no number.
         LogError: the log could not be written.
     """
-    time = Timebase.of(scene["clock"], scene["duration"])
+    time = Timebase.from_clock(scene["clock"], scene["duration"])
     keeper = open_keeper(scene, time, out, attachments or {}, memory)
     loop = Loop(scene, time, kinds, keeper)
     loop.schedule(scene_events(scene, time) if events is None else events)

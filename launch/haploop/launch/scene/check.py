@@ -88,7 +88,7 @@ def _timebase(layers: Layers) -> Timebase | None:
         return None
     clock = table.as_dict()
     try:
-        return Timebase.of(clock, duration)
+        return Timebase.from_clock(clock, duration)
     except TimebaseError as error:
         for sentence in str(error).splitlines():
             name = sentence.split()[0]

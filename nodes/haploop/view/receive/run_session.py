@@ -11,7 +11,7 @@ from typing import Any
 
 import zmq
 
-from haploop.protocol.member import Aborted, Refused
+from haploop.protocol.clock_client import Aborted, Refused
 from haploop.protocol.observer import Observer
 from haploop.protocol.ticks import DELAY, Timebase
 from haploop.view.receive.at_work import at_work
@@ -46,7 +46,7 @@ class Followed:
 
     def __init__(self, run: Run) -> None:
         self.run = run
-        self._context = run.wires()
+        self._context = run.make_context()
         try:
             self._observer = Observer(self._context, ROLE, run.clock, _STREAMS)
         except (Refused, Aborted):
@@ -66,12 +66,12 @@ class Followed:
         self.skipped_ticks = 0
         self._seen: deque[tuple[float, int]] = deque()
 
-    def turn(self) -> None:
+    def poll(self) -> None:
         """Take in what has come."""
         if self.over:
             return
         try:
-            frames = self._observer.turn()
+            frames = self._observer.poll()
         except (Aborted, Refused) as error:
             self.end("failed", str(error))
             return

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, Protocol
 
-from haploop.protocol.transport import Wires
+from haploop.protocol.transport import SecureContext
 
 
 class CommandFailed(Exception):
@@ -33,7 +33,7 @@ class Run(Protocol):
         """Its directory."""
         ...
 
-    def wires(self) -> Wires:
+    def make_context(self) -> SecureContext:
         """A context whose sockets may connect to it."""
         ...
 

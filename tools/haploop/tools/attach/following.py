@@ -10,7 +10,7 @@ from typing import Any, Self
 
 from haploop.launch.processes import run_directory
 from haploop.launch.processes.run_directory import LiveRun, RunNotFound
-from haploop.protocol.member import Aborted, Refused
+from haploop.protocol.clock_client import Aborted, Refused
 from haploop.protocol.observer import Observer
 from haploop.protocol.processes import PROCESSES
 from haploop.protocol.wire import Frame
@@ -65,11 +65,11 @@ class Following:
         self._heard = dict.fromkeys(listens, 0)
         self._unheard_ticks = 0
         self.failure = ""
-        self._wires = run.wires()
+        self._context = run.make_context()
         try:
             self.observer = self._join(role)
         except BaseException:
-            self._wires.destroy(linger=0)
+            self._context.destroy(linger=0)
             raise
 
     def _join(self, role: str) -> Observer:
@@ -77,7 +77,7 @@ class Following:
         give_up = time.monotonic() + _BEGINS_WITHIN_S
         while not is_over(self._run):
             try:
-                return Observer(self._wires, role, self._run.clock, self._listens)
+                return Observer(self._context, role, self._run.clock, self._listens)
             except Refused:
                 if time.monotonic() > give_up:
                     raise
@@ -89,7 +89,7 @@ class Following:
         """Ticks that were never heard of, summed over the streams."""
         return sum(self.observer.skipped.values()) + self._unheard_ticks
 
-    def turns(self, every_s: float) -> Iterator[list[tuple[str, Frame]]]:
+    def frames(self, every_s: float) -> Iterator[list[tuple[str, Frame]]]:
         """What the run says, (role, message), gathered for ``every_s`` wall seconds each time, until it is over.
 
         An empty list comes now and then while it says nothing.
@@ -102,7 +102,7 @@ class Following:
             last = gone
             gone = is_over(self._run)
             try:
-                frames = self.observer.turn()
+                frames = self.observer.poll()
             except (Aborted, Refused) as error:
                 self._over, self.failure = True, str(error)
                 return
@@ -130,7 +130,7 @@ class Following:
     def __exit__(self, *_: object) -> None:
         if not self._over:
             self.observer.leave()
-        self._wires.destroy(linger=0)
+        self._context.destroy(linger=0)
 
 
 def summary_of(welcome: dict[str, Any]) -> dict[str, Any] | None:

@@ -9,7 +9,7 @@ from haploop.launch.processes.run_directory import LiveRun, RunNotFound
 from haploop.logger.books.buffers import as_float64
 from haploop.logger.log.channels import Channels
 from haploop.logger.log.columns import motion_columns
-from haploop.protocol.member import Refused
+from haploop.protocol.clock_client import Refused
 from haploop.protocol.ticks import Timebase
 from haploop.protocol.wire import Frame
 from haploop.tools.attach.following import Following, runs_to_come
@@ -51,7 +51,7 @@ def publish(run: LiveRun, outlet: Outlet) -> None:
         print(f"run {run.id}: {run.title}", file=sys.stderr)
         stream = Stream(Timebase(**following.observer.welcome["timebase"]))
         try:
-            for frames in following.turns(BATCH_S):
+            for frames in following.frames(BATCH_S):
                 for role, frame in frames:
                     stream.take(role, frame)
                 outlet.listen()

@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable, Iterator
 
 from haploop.launch.processes import run_directory
-from haploop.protocol.member import Refused
+from haploop.protocol.clock_client import Refused
 from haploop.tools.attach.following import Following, summary_of
 from haploop.tools.attach.live_table import ending, live_line, live_table
 from haploop.tools.attach.watched import Watched
@@ -41,7 +41,7 @@ def _watch(run: run_directory.LiveRun) -> Watched:
     with Following(run, ROLE) as following, _screen() as show:
         observer = following.observer
         watched = Watched(run.id, observer.welcome)
-        for frames in following.turns(_DRAWN_S):
+        for frames in following.frames(_DRAWN_S):
             watched.take(frames, time.monotonic())
             for tick, event in observer.take_events():
                 watched.note(tick, event)

@@ -76,7 +76,7 @@ def _transport(host: str | None, keys: Path | None, in_process: bool) -> Transpo
     if host and in_process:
         leave("--tcp needs the sockets of a run as processes; leave out --in-process.", WRONG_USE)
     try:
-        return Transport.of(host, keys)
+        return Transport.from_options(host, keys)
     except TransportError as error:
         leave(str(error), WRONG_USE)
 

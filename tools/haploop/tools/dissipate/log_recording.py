@@ -54,7 +54,7 @@ class LogRecording:
         self._path, self.name = path, scene["title"]
         delay_s = scene["clock"]["round_trip_delay"] if delay_s is None else delay_s
         try:
-            time = Timebase.of({**scene["clock"], "round_trip_delay": delay_s}, scene["duration"])
+            time = Timebase.from_clock({**scene["clock"], "round_trip_delay": delay_s}, scene["duration"])
         except TimebaseError as error:
             raise RecordingError(f"The {error}") from error
         self.period_s, self.delay_s, self.notes = time.period_s, delay_s, Notes()

@@ -36,7 +36,7 @@ class LinearController(NamedTuple):
         By superposition: a controller for many loops is run until its memory has its full size. Then loop i is given
         a memory, or a sample, of 1 in place i and 0 elsewhere. One tick later the memory is A and B, row by row.
         """
-        time, inputs = Timebase.of(scene["clock"], scene["duration"]), 1 + accelerometer_is_used(scene)
+        time, inputs = Timebase.from_clock(scene["clock"], scene["duration"]), 1 + accelerometer_is_used(scene)
         controller = ControllerArray({**scene, "wall": _ALWAYS_INSIDE}, time, dict(kinds))
         places = -1
         while places != (places := len(_memory(controller))):

@@ -52,7 +52,7 @@ def ticks_of(scene: dict[str, Any]) -> Timebase:
     if wrong:
         raise ValueError(f"A continuous plant cannot follow {', '.join(wrong)}; take it out of the scene.")
     rate = scene["clock"]["control_rate"]
-    time = Timebase.of({**scene["clock"], "plant_rate": rate}, scene["duration"])
+    time = Timebase.from_clock({**scene["clock"], "plant_rate": rate}, scene["duration"])
     late = Fraction(repr(scene.get("accelerometer", {}).get("delay", 0.0))) * rate
     corners = [t * rate for t, _ in _points(scene)]
     if any(t.denominator > 1 for t in (late, *corners)):

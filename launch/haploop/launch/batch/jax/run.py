@@ -78,7 +78,7 @@ def _is_worth_compiling(scene: Scene, loops: int, least: int) -> bool:
     if needs_chain(scene) or ("accelerometer" in scene and accelerometer_is_used(scene)):
         return False
     asked = _programs().PROGRAMS.asked
-    asked[structure(scene)] += loops * Timebase.of(scene["clock"], scene["duration"]).ticks
+    asked[structure(scene)] += loops * Timebase.from_clock(scene["clock"], scene["duration"]).ticks
     return asked[structure(scene)] >= least
 
 

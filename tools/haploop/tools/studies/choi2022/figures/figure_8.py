@@ -99,7 +99,7 @@ def contacts(setup: Setup, work: Work) -> list[Contact]:
 
 def booked_on(scene: dict[str, Any], log: Any, work: Work) -> Booked:
     """Damping and both inertias on the motion of a run, in the order of ``LABELS``."""
-    time = Timebase.of(scene["clock"], scene["duration"])
+    time = Timebase.from_clock(scene["clock"], scene["duration"])
     n, late = time.steps_per_tick, time.delay_steps % time.steps_per_tick
     elements = [
         *elements_of("damping", BOOKED_DAMPING),

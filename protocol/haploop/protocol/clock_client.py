@@ -23,14 +23,14 @@ class Refused(Exception):
     """The clock did not let this node join; the message says why."""
 
 
-class Member:
+class ClockClient:
     """One node's side of the conversation with the clock.
 
     Attributes:
         until: ticks before this one may be worked on.
         last: whether no further ticks will be granted.
         events: granted events not yet taken, (tick, event), in order.
-        garbled: frames from the clock's address that were no messages.
+        malformed: frames from the clock's address that were no messages.
         refused: what the clock last said no to, "" for nothing: after joining, that this node is no longer a member.
     """
 
@@ -41,7 +41,7 @@ class Member:
         self.until = 0
         self.last = False
         self.events: list[tuple[int, dict[str, Any]]] = []
-        self.garbled = 0
+        self.malformed = 0
         self.refused = ""
 
     @property
@@ -85,7 +85,7 @@ class Member:
         try:
             frame = decode(self._socket.recv())
         except WireError:
-            self.garbled += 1
+            self.malformed += 1
             return None
         if frame.name == "GRANT":
             until, self.last, events = frame.fields
