@@ -15,9 +15,9 @@ from pathlib import Path
 
 from haploop.tools.executor.parts import MOST, Group
 from haploop.tools.executor.pool import Pool
+from haploop.tools.executor.work import Work
 from haploop.tools.machine import machine
 from haploop.tools.sweep.file.sweep_file import load
-from haploop.tools.sweep.run.work import Work
 
 SCENE = Path(__file__).parents[2] / "launch" / "scenes" / "fig6b.toml"
 

@@ -14,7 +14,8 @@ from scene_makers import KINDS, scene
 
 from haploop.launch.batch.run import results_of
 from haploop.tools.linear.one_tick import OneTickMap
-from haploop.tools.sweep.run.boundary import Boundary, Candidate, Tolerance, boundaries, holds_verdict, run_scenes
+from haploop.tools.search.bisect import Tolerance
+from haploop.tools.sweep.run.boundary import Boundary, Candidate, find_boundaries, verdict_is
 
 POINTS = [0.0, 25.0, 50.0, 75.0, 100.0]
 
@@ -33,7 +34,7 @@ def found(
         for place, (row, value) in reversed([*enumerate(candidates)]):
             yield place, {"holds": rules[row](value), "why": "out of order"}
 
-    return boundaries(len(rules), points, tolerance, run, lambda result: result["holds"])
+    return find_boundaries(len(rules), points, tolerance, run, lambda result: result["holds"])
 
 
 @given(st.floats(1e-3, 99.999), st.booleans())
@@ -127,19 +128,18 @@ def test_bisected_from_runs_the_boundary_of_a_linear_loop_is_where_the_spectral_
         growth, outside = result["window"]["growth_1_s"], result["window"]["outside_fraction"]
         return result["verdict"] == "steady" or (growth is not None and growth < 0 and not outside)
 
-    run = run_scenes(lambda row, stiffness: pressed(*loops[row], stiffness), partial(_results, energy=False))
+    def run(candidates: Sequence[Candidate]) -> Iterator[tuple[int, dict[str, Any]]]:
+        scenes = [pressed(*loops[row], stiffness) for row, stiffness in candidates]
+        return results_of(scenes, KINDS, energy=False, fewest=1)
+
     points = [20.0 * 2**k for k in range(12)]
-    for limit, one in zip(limits, boundaries(3, points, Tolerance(relative=0.002), run, shrinking), strict=True):
+    for limit, one in zip(limits, find_boundaries(3, points, Tolerance(relative=0.002), run, shrinking), strict=True):
         assert one.low == pytest.approx(limit, rel=0.004)
         assert one.why == ""
 
 
-def _results(scenes: Sequence[dict[str, Any]], energy: bool) -> Iterator[tuple[int, dict[str, Any]]]:
-    return results_of(scenes, KINDS, energy=energy, fewest=1)
-
-
 def test_a_verdict_holds_or_not_and_a_failed_run_has_none() -> None:
-    holds = holds_verdict("steady")
+    holds = verdict_is("steady")
     assert [holds({"verdict": "steady"}), holds({"verdict": "diverged"}), holds({"ended": "failed"})] == [
         True,
         False,

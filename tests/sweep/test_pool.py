@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Iterator
 from pathlib import Path
@@ -13,11 +14,13 @@ from sweep.makers import of_stiffness, pressed, threads
 
 from haploop.controller.dissipation import PluginError
 from haploop.launch.batch.run import run_array
+from haploop.tools.executor.executors import make_executor, map_parallel
 from haploop.tools.executor.parts import Group, Sizes, cut, grouped
 from haploop.tools.executor.pool import DIED, Pool, results
-from haploop.tools.sweep.run.work import Work, kinds_of
+from haploop.tools.executor.work import Work, load_kinds
 
 DEADLY = """
+import math
 import os
 from typing import Annotated
 from haploop.controller.dissipation import Element, Motion, Quantity
@@ -74,7 +77,7 @@ def test_of_the_scenes_that_were_under_way_when_a_worker_died_only_the_culprits_
     came = dict(results(scenes, [deadly], workers=2))
     assert [index for index in range(40) if came[index]["ended"] != "done"] == [5, 17]
     assert came[5] == {"title": "least", "seed": 0, "ended": "failed", "why": DIED}
-    kinds = kinds_of(((str(deadly), DEADLY),))
+    kinds = load_kinds(((str(deadly), DEADLY),))
     alone = [index for index in range(40) if index not in (5, 17)]
     assert [came[index] for index in alone] == run_array([scenes[index] for index in alone], kinds)
 
@@ -180,3 +183,21 @@ def test_workers_use_one_thread_each_and_this_process_keeps_its_settings() -> No
         ]
     assert set(came) == {"1"}
     assert dict(os.environ) == before
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_answers_come_in_the_order_of_the_items_and_each_is_told(workers: int) -> None:
+    told: list[None] = []
+    with make_executor(workers) as executor:
+        assert map_parallel(executor, math.sqrt, [9.0, 4.0, 1.0], lambda: told.append(None)) == [3.0, 2.0, 1.0]
+        assert map_parallel(executor, math.sqrt, []) == []
+    assert len(told) == 3
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_an_error_in_a_call_is_raised_where_the_answers_are_waited_for(workers: int) -> None:
+    with (
+        make_executor(workers) as executor,
+        pytest.raises(ValueError, match=r"math domain error|expected a nonnegative"),
+    ):
+        map_parallel(executor, math.sqrt, [1.0, -1.0])

@@ -10,10 +10,9 @@ from typing import Any, Self
 
 from haploop.controller.dissipation import load_plugin
 from haploop.launch.batch.stacking import runs_in_arrays, structure
+from haploop.tools.executor.executors import make_executor
 from haploop.tools.executor.parts import Group, Sizes, cut, grouped
-from haploop.tools.executor.workers import Cluster, Here, Processes, Workers
-from haploop.tools.machine import cores
-from haploop.tools.sweep.run.work import Result, Scene, Work
+from haploop.tools.executor.work import Result, Scene, Work
 
 _LOOK_S = 0.3
 DIED = "The process that ran it died: it was killed, ran out of memory or crashed in compiled code."
@@ -40,7 +39,7 @@ def results(
 
     Raises:
         PluginError: a plugin cannot be used.
-        WorkersError: no worker can be started.
+        ExecutorError: no worker can be started.
     """
     with Pool(workers) as pool:
         yield from pool.results(scenes, plugins, energy=energy, trajectories=trajectories)
@@ -54,12 +53,11 @@ class Pool:
         dask: address of a Dask scheduler, whose workers are used instead.
 
     Raises:
-        WorkersError: there is no such cluster.
+        ExecutorError: there is no such cluster.
     """
 
     def __init__(self, workers: int | None = None, dask: str | None = None) -> None:
-        count = workers or cores()
-        self._workers: Workers = Cluster(dask) if dask else Here() if count == 1 else Processes(count)
+        self._executor = make_executor(workers, dask)
 
     def __enter__(self) -> Self:
         return self
@@ -67,12 +65,12 @@ class Pool:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None:
-        self._workers.close(at_once=kind is not None)
+        self._executor.__exit__(kind, error, traceback)
 
     @property
     def count(self) -> int:
         """Workers at once."""
-        return self._workers.count
+        return self._executor.count
 
     def results(
         self, scenes: Iterable[Scene], plugins: Sequence[Path] = (), *, energy: bool = True, trajectories: bool = False
@@ -105,14 +103,14 @@ class Pool:
 
         Raises:
             PluginError: a plugin does not load in a worker.
-            WorkersError: no worker can be started.
+            ExecutorError: no worker can be started.
         """
         sizes = Sizes(self.count, count)
         source = cut(groups, sizes)
         flying: dict[Future[Any], Group] = {}
         try:
             while True:
-                while not stop() and len(flying) < self._workers.room and (part := next(source, None)):
+                while not stop() and len(flying) < self._executor.room and (part := next(source, None)):
                     flying[self._submitted(work, part.items)] = part
                 if not flying:
                     return
@@ -135,7 +133,7 @@ class Pool:
 
     def _by_itself(self, work: Work, items: Sequence[Any], stop: Callable[[], bool]) -> Iterator[list[tuple[Any, Any]]]:
         """Items that were under way when a worker died, with nothing beside it."""
-        self._workers.renew()
+        self._executor.renew()
         if stop():
             return
         if outcome := self._outcome(self._submitted(work, items)):
@@ -149,8 +147,8 @@ class Pool:
 
     def _submitted(self, work: Work, items: Sequence[Any]) -> Future[Any]:
         try:
-            return self._workers.submit(work.run, items)
-        except self._workers.deaths as error:
+            return self._executor.submit(work.run, items)
+        except self._executor.worker_died as error:
             future: Future[Any] = Future()
             future.set_exception(error)
             return future
@@ -159,7 +157,7 @@ class Pool:
         """What a part came to, None if its worker died; waits for it."""
         try:
             return future.result()
-        except self._workers.deaths:
+        except self._executor.worker_died:
             return None
 
 

@@ -16,6 +16,7 @@ from haploop.protocol.ticks import Timebase
 from haploop.tools.linear.controller import LinearController
 from haploop.tools.linear.linearity import Kinds, installed_kinds, why_not_linear
 from haploop.tools.linear.stable_ranges import crossings
+from haploop.tools.search.bisect import bisect
 
 # No wall is softer than this, and none stiffer is looked at.
 _LEAST_N_M, _MOST_N_M = 1e-3, 1e12
@@ -122,12 +123,8 @@ class OneTickMap:
         for near in (edge * (1.0 - _NEAR), edge * (1.0 + _NEAR)):
             if low < near < high:
                 low, high = (near, high) if (self.growth(near) < 1.0) == low_is_stable else (low, near)
-        while low < (middle := (low + high) / 2.0) < high:
-            if (self.growth(middle) < 1.0) == low_is_stable:
-                low = middle
-            else:
-                high = middle
-        return low if low_is_stable else high
+        stable, unstable = (low, high) if low_is_stable else (high, low)
+        return bisect(lambda stiffness: self.growth(stiffness) < 1.0, stable, unstable)[0]
 
 
 def _after_a_tick(scene: dict[str, Any], controller: LinearController) -> np.ndarray:

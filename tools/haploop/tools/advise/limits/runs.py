@@ -13,7 +13,7 @@ from typing import Any, Self
 from haploop.launch.batch.run import groups
 from haploop.tools.executor.parts import Group
 from haploop.tools.executor.pool import Pool, sources_of
-from haploop.tools.sweep.run.work import Result, Results, Scene, Work, kinds_of
+from haploop.tools.executor.work import Result, Results, Scene, Work, load_kinds
 
 # Without energy books, so many loops of one structure are already sooner run in an array; more than so many with
 # friction, whose stops and starts take their time, are better shared between workers.
@@ -44,7 +44,7 @@ class Bundles(Work):
     def _results(self) -> Results:
         from haploop.launch.batch.run import results_of
 
-        return partial(results_of, kinds=kinds_of(self.sources), energy=self.energy, fewest=self.fewest)
+        return partial(results_of, kinds=load_kinds(self.sources), energy=self.energy, fewest=self.fewest)
 
 
 class Runs:

@@ -18,8 +18,8 @@ from haploop.launch.scene.mistakes import Mistake, SceneError
 from haploop.launch.scene.overrides import key_path, lay_value
 from haploop.launch.scene.toml_writer import Lines, inline, lines_of, to_toml
 from haploop.tools.executor.parts import Group
+from haploop.tools.executor.work import Sources, load_kinds
 from haploop.tools.sweep.run.columns import CELL, ENDED, NUMBER, SCENE, SEED, TEXT, WHOLE, WHY, Column
-from haploop.tools.sweep.run.work import Sources, kinds_of
 
 # Scenes that differ in these tables are run in different arrays.
 _APART = ("clock", "duration", "event")
@@ -144,7 +144,7 @@ class Sweep:
             ElementError: an element's own code refuses its parameters.
         """
         values, seed = self.values(item)
-        kinds = kinds_of(self.sources)
+        kinds = load_kinds(self.sources)
         scene = resolved({"seed": seed, **values}, self.base, kinds)
         try_out(elements_of(scene), kinds)
         return scene

@@ -21,11 +21,11 @@ from haploop.launch.scene.schema import TomlSchema
 from haploop.launch.scene.tables.base import Model
 from haploop.launch.scene.tables.number import Number, si
 from haploop.protocol.quantity import Quantity
+from haploop.tools.executor.work import Sources, load_kinds
 from haploop.tools.sweep.file.cells import Axis, Bisect, Refused, Sweep, resolved
 from haploop.tools.sweep.file.keys import NoSuchKey, number_at
 from haploop.tools.sweep.file.points import PointsError, Span, listed, points_of
 from haploop.tools.sweep.file.record import USUAL, RecordError, columns_of
-from haploop.tools.sweep.run.work import Sources, kinds_of
 
 MOST_AXES = 3
 Verdict = Literal["steady", "limit-cycle", "diverged", "no-contact"]
@@ -66,7 +66,7 @@ def load(path: Path, overrides: Sequence[str] = (), sources: Sources = ()) -> Sw
         PluginError: a plugin does not load.
     """
     data = parse(path, "sweep", "a scene and [axes]")
-    return _Reader(path, data, kinds_of(sources), sources).sweep(overrides)
+    return _Reader(path, data, load_kinds(sources), sources).sweep(overrides)
 
 
 class _Reader:

@@ -14,8 +14,8 @@ from haploop.launch.output import PLUGINS, OutputError, keep_plugin, kept_name, 
 from haploop.launch.processes.interrupts import interrupts
 from haploop.logger.summary import write
 from haploop.tools.cli.exit_codes import FAILED, WRONG_USE, leave, plain_errors, print_json
+from haploop.tools.executor.executors import ExecutorError
 from haploop.tools.executor.pool import Pool, sources_of
-from haploop.tools.executor.workers import WorkersError
 from haploop.tools.machine import machine, versions
 from haploop.tools.sweep.file.record import wants_trajectories
 from haploop.tools.sweep.file.sweep_file import load
@@ -67,7 +67,7 @@ def sweep(request: Request, as_json: bool) -> None:
                 _demand_compiler(made)
             directory = _directory(request, made)
             summary = _run(request, made, directory)
-        except (NeedsPyarrow, WorkersError) as error:
+        except (NeedsPyarrow, ExecutorError) as error:
             leave(str(error), WRONG_USE)
         except StoreError as error:
             leave(str(error), FAILED)
@@ -191,14 +191,14 @@ def _demand_compiler(made: Sweep) -> None:
     """Before anything is started.
 
     Raises:
-        WorkersError: JAX is not there, or bits are asked for.
+        ExecutorError: JAX is not there, or bits are asked for.
     """
     if wants_trajectories(made.record):
-        raise WorkersError(
+        raise ExecutorError(
             "--jax keeps to a tolerance, so that trajectory_sha256 means nothing; leave it out of record."
         )
 
     try:
         import jax  # noqa: F401
     except ImportError as error:
-        raise WorkersError("--jax needs JAX; install it with: pip install 'haploop[jax]'") from error
+        raise ExecutorError("--jax needs JAX; install it with: pip install 'haploop[jax]'") from error

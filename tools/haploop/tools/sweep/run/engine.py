@@ -9,12 +9,13 @@ from typing import Any, Protocol
 
 from haploop.tools.executor.parts import Group
 from haploop.tools.executor.pool import Pool
+from haploop.tools.executor.work import Work
+from haploop.tools.search.bisect import Tolerance
 from haploop.tools.sweep.file.cells import Axis, Bisect, Extra, Item, Sweep
 from haploop.tools.sweep.file.record import VERDICT, wants_energy, wants_trajectories
-from haploop.tools.sweep.run.boundary import Boundary, Candidate, Tolerance, boundaries, holds_verdict
+from haploop.tools.sweep.run.boundary import Boundary, Candidate, find_boundaries, verdict_is
 from haploop.tools.sweep.run.columns import CELL, ENDED, NUMBER, SEED, TEXT, WHOLE, WHY, Column, schema_of, table_of
 from haploop.tools.sweep.run.store import Store
-from haploop.tools.sweep.run.work import Work
 
 Row = dict[str, Any]
 
@@ -66,7 +67,7 @@ class Engine:
         Raises:
             Stopped: before all was done.
             StoreError: a file could not be written.
-            WorkersError: no worker can be had.
+            ExecutorError: no worker can be had.
             PluginError: a plugin does not load in a worker.
         """
         if self._sweep.bisect is None:
@@ -119,12 +120,12 @@ class Engine:
             for item, row in self._rows([Group(missing, together)], len(missing)):
                 yield places[_cell(item)], row
 
-        return boundaries(
+        return find_boundaries(
             len(rows),
             axis.values,
             Tolerance(bisect.tolerance, bisect.relative),
             run,
-            holds_verdict(bisect.holds),
+            verdict_is(bisect.holds),
             bisect.holds,
         )
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 import numpy as np
 
 from haploop.tools.linear.one_tick import OneTickMap
+from haploop.tools.search.bisect import bisect_many
 from haploop.tools.studies.choi2022.experiment.setup import KINDS, Setup, elements_of
 from haploop.tools.studies.choi2022.gate.gated_map import GatedMap
 
@@ -66,12 +67,14 @@ def gated_ends(gated: GatedMap, masses: np.ndarray) -> np.ndarray:
     coarse = np.geomspace(_SOFTEST, _STIFFEST, _COARSE)
     grows = gated.growth(coarse[:, None], masses[None, :]) >= 0.0
     first = np.where(grows.any(axis=0), grows.argmax(axis=0), len(coarse) - 1)
-    low, high = np.where(first > 0, coarse[first - 1], 0.0), coarse[first]
-    for _ in range(_HALVINGS):
-        middle = (low + high) / 2.0
-        above = gated.growth(middle, masses) >= 0.0
-        low, high = np.where(above, low, middle), np.where(above, middle, high)
-    return low
+    ends = zip(np.where(first > 0, coarse[first - 1], 0.0).tolist(), coarse[first].tolist(), strict=True)
+
+    def shrinks(middles: Mapping[int, float]) -> dict[int, bool]:
+        growth = gated.growth(np.array(list(middles.values())), masses[list(middles)])
+        return dict(zip(middles, (growth < 0.0).tolist(), strict=True))
+
+    found = bisect_many(dict(enumerate(ends)), shrinks, most_rounds=_HALVINGS)
+    return np.array([found[i][0] for i in range(len(masses))])
 
 
 def _best(ends: Callable[[np.ndarray], np.ndarray], sizes: np.ndarray) -> Best:

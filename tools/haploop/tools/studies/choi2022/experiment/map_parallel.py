@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any, TypeVar
 
+from haploop.tools.executor.executors import make_executor, map_parallel
 from haploop.tools.executor.pool import Pool
-from haploop.tools.executor.workers import Here, Processes, Workers
-from haploop.tools.machine import cores
 from haploop.tools.studies.choi2022.work import Work
 
 Item = TypeVar("Item")
@@ -16,20 +15,8 @@ Answer = TypeVar("Answer")
 
 def many(work: Work, name: str, call: Callable[[Item], Answer], items: Sequence[Item]) -> list[Answer]:
     """What a function that can be imported makes of each item, in their order."""
-    count = work.workers or cores()
-    workers: Workers = Here() if count == 1 else Processes(count)
-    advance = work.stage(name, len(items))
-    at_once = True
-    try:
-        futures = []
-        for item in items:
-            futures.append(workers.submit(call, item))
-            futures[-1].add_done_callback(lambda _: advance())
-        answers = [future.result() for future in futures]
-        at_once = False
-    finally:
-        workers.close(at_once=at_once)
-    return answers
+    with make_executor(work.workers) as executor:
+        return map_parallel(executor, call, items, work.stage(name, len(items)))
 
 
 def runs(work: Work, name: str, scenes: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:

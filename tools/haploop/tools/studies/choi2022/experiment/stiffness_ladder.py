@@ -9,6 +9,7 @@ import numpy as np
 
 from haploop.controller.dissipation import registry
 from haploop.launch.batch.run import run_array
+from haploop.tools.search import ladder
 from haploop.tools.studies.choi2022.experiment.map_parallel import is_steady
 from haploop.tools.studies.choi2022.experiment.setup import KINDS, Elements, Setup, both, elements_of
 
@@ -46,21 +47,22 @@ def climb(setups: Sequence[Setup], stiffnesses: np.ndarray = STIFFNESSES) -> lis
     Args:
         setups: best of one structure, so that they run in arrays.
     """
+
+    def ask(stiffness: float, going: Sequence[tuple[int, str]]) -> list[list[bool]]:
+        scenes = [setups[i].scene(stiffness, made(name, size)) for i, name in going for size in SIZES[name]]
+        steady = iter(map(is_steady, run_all(scenes)))
+        return [[next(steady) for _ in SIZES[name]] for _, name in going]
+
+    members = [(i, name) for i in range(len(setups)) for name in NAMES]
     found = [{name: np.zeros((len(stiffnesses), len(SIZES[name])), bool) for name in NAMES} for _ in setups]
-    going = [(i, name) for i in range(len(setups)) for name in NAMES]
-    for level, stiffness in enumerate(stiffnesses.tolist()):
-        cells = [(i, name, j) for i, name in going for j in range(len(SIZES[name]))]
-        results = run_all([setups[i].scene(stiffness, made(name, SIZES[name][j])) for i, name, j in cells])
-        for (i, name, j), result in zip(cells, results, strict=True):
-            found[i][name][level, j] = is_steady(result)
-        going = [(i, name) for i, name in going if found[i][name][level].any()]
+    for (i, name), rows in ladder.climb(members, stiffnesses.tolist(), ask, passes=any).items():
+        found[i][name][: len(rows)] = rows
     return found
 
 
 def largest(steady: np.ndarray, stiffnesses: np.ndarray = STIFFNESSES) -> float:
     """The largest stiffness that some size leaves steady, as all softer ones do; N/m, 0 where none is."""
-    some = np.asarray(steady.any(axis=1))
-    count = len(some) if some.all() else int((~some).argmax())
+    count = ladder.rungs_held(sizes.any() for sizes in steady)
     return float(stiffnesses[count - 1]) if count else 0.0
 
 

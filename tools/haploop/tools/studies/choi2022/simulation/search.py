@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from concurrent.futures import as_completed
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from haploop.tools.executor.workers import Here, Processes, Workers
-from haploop.tools.machine import cores
+from haploop.tools.executor.executors import Executor, make_executor, map_parallel
 from haploop.tools.render.stages import Stage
 from haploop.tools.studies.choi2022.simulation.reading import BASE, Reading, draw
 from haploop.tools.studies.choi2022.simulation.reading_runs import shortfalls
@@ -67,47 +64,33 @@ def search(size: Size, workers: int | None, stage: Stage) -> Found:
     one that only just holds is worth less than one whose neighbours hold, too.
     """
     rng = np.random.default_rng(SEED)
-    with _crew(workers) as crew:
-        seen = _run(crew, draw(rng, size.structures, size.each), "random", stage)
+    with make_executor(workers) as executor:
+        seen = _run(executor, draw(rng, size.structures, size.each), "random", stage)
         for spread in np.geomspace(FAR, CLOSE, size.rounds):
             parents = _best(seen, size.best)
             groups = [[parent.near(rng, float(spread)) for _ in range(size.children)] for parent in parents]
-            seen += _run(crew, groups, "refined", stage)
+            seen += _run(executor, groups, "refined", stage)
         finalists = _best(seen, size.best)
         around = [[one.near(rng, NEIGHBOURLY) for _ in range(size.neighbours)] for one in finalists]
-        nearby = _run(crew, around, "neighbour", stage)
+        nearby = _run(executor, around, "neighbour", stage)
         index = _nearest(seen, finalists, nearby)
         nearest = finalists[index].rounded()
-        ends = _run(crew, [[BASE]], "base", stage) + _run(crew, [[nearest]], "nearest", stage)
+        ends = _run(executor, [[BASE]], "base", stage) + _run(executor, [[nearest]], "nearest", stage)
     kept = nearby[index * size.neighbours : (index + 1) * size.neighbours]
     return Found([row for _, row in [*ends, *seen, *kept]], nearest)
-
-
-@contextmanager
-def _crew(count: int | None) -> Iterator[Workers]:
-    """Workers that end with their work, and at once when it is broken off."""
-    crew = Here() if (count := count or cores()) == 1 else Processes(count)
-    try:
-        yield crew
-    except BaseException:
-        crew.close(at_once=True)
-        raise
-    crew.close(at_once=False)
 
 
 Seen = list[tuple[Reading, dict[str, Any]]]
 
 
-def _run(crew: Workers, groups: Sequence[Sequence[Reading]], name: str, stage: Stage) -> Seen:
+def _run(executor: Executor, groups: Sequence[Sequence[Reading]], name: str, stage: Stage) -> Seen:
     """Every reading with its row, in order."""
     advance = stage(f"{name} readings, in groups", len(groups))
-    futures = [crew.submit(shortfalls, group) for group in groups]
-    for _ in as_completed(futures):
-        advance()
+    answers = map_parallel(executor, shortfalls, groups, advance)
     return [
         (reading, row | {"stage": name})
-        for group, future in zip(groups, futures, strict=True)
-        for reading, row in zip(group, future.result(), strict=True)
+        for group, rows in zip(groups, answers, strict=True)
+        for reading, row in zip(group, rows, strict=True)
     ]
 
 

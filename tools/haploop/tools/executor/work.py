@@ -1,4 +1,4 @@
-"""What a worker does with a part of a sweep: make its scenes, run them together, keep what is asked for."""
+"""The work of a worker on a part of a sweep: make its scenes, run them together, keep what is asked for."""
 
 from __future__ import annotations
 
@@ -17,37 +17,37 @@ Sources = tuple[tuple[str, str], ...]
 Results = Callable[[list[Scene]], Iterator[tuple[int, Result]]]
 
 
-def itself(item: Any) -> Any:
-    """The item, which is a scene already."""
+def scene_itself(item: Any) -> Any:
+    """Returns the item, which is a scene already."""
     return item
 
 
-def whole(_item: Any, _scene: Scene | None, result: Result) -> Result:
-    """The whole result."""
+def whole_result(_item: Any, _scene: Scene | None, result: Result) -> Result:
+    """Returns the whole result."""
     return result
 
 
 @dataclass(frozen=True)
 class Work:
-    """A job that travels to workers with every part: nothing but values and functions that can be imported.
+    """A job that is sent to workers with every part: nothing but values and functions that can be imported.
 
     Attributes:
-        make: from an item to its resolved scene. What it raises is the reason why the item is refused.
+        make: from an item to its resolved scene; an error that it raises is the reason why the item is refused.
         keep: from an item, its scene (None where it was refused) and its result to what travels back.
         sources: plugin files as (name, text); a worker on another machine has no files of this one.
         energy, trajectories: as for ``results_of``.
         compiled: whether to run compiled by JAX, which hashes no trajectories.
     """
 
-    make: Callable[[Any], Scene] = itself
-    keep: Callable[[Any, Scene | None, Result], Any] = whole
+    make: Callable[[Any], Scene] = scene_itself
+    keep: Callable[[Any, Scene | None, Result], Any] = whole_result
     sources: Sources = ()
     energy: bool = True
     trajectories: bool = False
     compiled: bool = False
 
     def run(self, items: Sequence[Any]) -> tuple[float, list[Any]]:
-        """What is kept of every item, and the seconds all of it took.
+        """Runs the items; returns the seconds all of it took, and what is kept of every item.
 
         Raises:
             PluginError: a plugin does not load here.
@@ -61,12 +61,12 @@ class Work:
         return time.perf_counter() - began, [kept[index] for index in range(len(items))]
 
     def lost(self, item: Any, why: str) -> Any:
-        """What is kept of an item that cannot be run."""
+        """Returns what is kept of an item that cannot be run."""
         scenes, kept = self._made([item])
         return self.keep(item, scenes[0], _failed(scenes[0], why)) if scenes else kept[0]
 
     def _made(self, items: Sequence[Any]) -> tuple[dict[int, Scene], dict[int, Any]]:
-        """Scenes by index, and what is kept of the items that have none."""
+        """Returns scenes by index, and what is kept of the items that have none."""
         scenes, kept = {}, {}
         for index, item in enumerate(items):
             try:
@@ -76,10 +76,10 @@ class Work:
         return scenes, kept
 
     def _results(self) -> Results:
-        """What runs scenes."""
-        kinds = kinds_of(self.sources)
+        """Returns the function that runs scenes, in arrays or compiled."""
+        kinds = load_kinds(self.sources)
         if self.compiled:
-            import jax  # noqa: F401 (what raises here is no fault of a scene)
+            import jax  # noqa: F401 (an error raised here is no fault of a scene)
 
             from haploop.launch.batch.jax.run import results_of_compiled
 
@@ -90,7 +90,7 @@ class Work:
 
 
 def _safely(results: Results, scenes: dict[int, Scene], left: list[int]) -> Iterator[tuple[int, Result]]:
-    """Every result; where a scene raises, those without a result are run in halves until it stands alone."""
+    """Yields every result; where a scene raises, those without a result are run in halves until it stands alone."""
     done: set[int] = set()
     try:
         for place, result in results([scenes[index] for index in left]):
@@ -106,8 +106,8 @@ def _safely(results: Results, scenes: dict[int, Scene], left: list[int]) -> Iter
 
 
 @lru_cache(maxsize=8)
-def kinds_of(sources: Sources) -> dict[str, type[Element]]:
-    """The element kinds at hand: the installed ones, and those of these sources, loaded once in this process.
+def load_kinds(sources: Sources) -> dict[str, type[Element]]:
+    """Loads the element kinds at hand, the installed ones and those of these sources, once in this process.
 
     Raises:
         PluginError: one does not load.

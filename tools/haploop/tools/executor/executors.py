@@ -1,0 +1,227 @@
+"""Executors of calls: this process, processes of this machine, or a Dask cluster, used as ``concurrent.futures``."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+import threading
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterable, Iterator
+from concurrent import futures
+from concurrent.futures import BrokenExecutor, Future, ProcessPoolExecutor
+from multiprocessing import get_context
+from multiprocessing.connection import Connection
+from types import TracebackType
+from typing import Any, Self, TypeVar
+
+from haploop.tools.machine import cores
+
+Item = TypeVar("Item")
+Answer = TypeVar("Answer")
+# NumPy's linear algebra would start a thread a core in every worker.
+_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
+
+
+class ExecutorError(Exception):
+    """No worker can be had; the message says why and what to do."""
+
+
+class Executor(ABC):
+    """Runs calls; a context manager, at whose end the calls in flight are waited for, or dropped after an error.
+
+    Attributes:
+        count: calls run at once.
+        room: calls that are worth having under way.
+        worker_died: errors of a call whose worker died; all others in flight may raise them, too.
+    """
+
+    count: int
+    room: int
+    worker_died: tuple[type[BaseException], ...]
+
+    @abstractmethod
+    def submit(self, call: Callable[..., Any], *arguments: Any) -> Future[Any]:
+        """Has a call run; starts the workers when there are none."""
+
+    @abstractmethod
+    def renew(self) -> None:
+        """Replaces workers that died."""
+
+    @abstractmethod
+    def close(self, at_once: bool) -> None:
+        """Ends the workers: after the calls in flight, or now."""
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        self.close(at_once=kind is not None)
+
+
+def make_executor(workers: int | None = None, dask: str | None = None) -> Executor:
+    """Makes the executor for a number of workers.
+
+    Args:
+        workers: processes; as many as there are cores when None; 1 runs in this process.
+        dask: address of a Dask scheduler, whose workers are used instead.
+
+    Raises:
+        ExecutorError: there is no such cluster.
+    """
+    if dask:
+        return DaskExecutor(dask)
+    count = workers or cores()
+    return InlineExecutor() if count == 1 else ProcessExecutor(count)
+
+
+def map_parallel(
+    executor: Executor,
+    call: Callable[[Item], Answer],
+    items: Iterable[Item],
+    advance: Callable[[], object] = lambda: None,
+) -> list[Answer]:
+    """Calls a function on each item and returns the answers in the order of the items.
+
+    Args:
+        executor: runs the calls.
+        call: a function that can be imported.
+        items: one a call; all are under way at once.
+        advance: called after each answer, in any thread.
+    """
+    submitted: list[Future[Answer]] = []
+    for item in items:
+        submitted.append(executor.submit(call, item))
+        submitted[-1].add_done_callback(lambda _: advance())
+        if submitted[-1].done():
+            submitted[-1].result()  # an error ends the work at once
+    return [future.result() for future in submitted]
+
+
+class InlineExecutor(Executor):
+    """This process: a call is done when it has been submitted."""
+
+    count = room = 1
+    worker_died: tuple[type[BaseException], ...] = ()
+
+    def submit(self, call: Callable[..., Any], *arguments: Any) -> Future[Any]:
+        future: Future[Any] = Future()
+        try:
+            future.set_result(call(*arguments))
+        except Exception as error:
+            future.set_exception(error)
+        return future
+
+    def renew(self) -> None:
+        """Does nothing: no worker dies without this process."""
+
+    def close(self, at_once: bool) -> None:
+        """Does nothing: no call is in flight."""
+
+
+class ProcessExecutor(Executor):
+    """Processes of this machine, started anew (spawned), one thread each.
+
+    They hold one end of a pipe; when the other is closed, by this object or by the end of this process, however it
+    ended, they end at once.
+    """
+
+    worker_died: tuple[type[BaseException], ...] = (BrokenExecutor,)
+
+    def __init__(self, count: int) -> None:
+        self.count, self.room = count, 2 * count
+        self._executor: futures.Executor | None = None
+        # Workers hold the first end, this process alone the second.
+        self._pipe: tuple[Connection, Connection] | None = None
+
+    def submit(self, call: Callable[..., Any], *arguments: Any) -> Future[Any]:
+        with _one_thread_each():  # processes may be started at any submit
+            if self._executor is None:
+                self._start()
+            assert self._executor
+            return self._executor.submit(call, *arguments)
+
+    def renew(self) -> None:
+        self.close(at_once=True)
+
+    def close(self, at_once: bool) -> None:
+        if not self._executor or not self._pipe:
+            return
+        held, ours = self._pipe
+        if at_once:
+            ours.close()
+        self._executor.shutdown(wait=True, cancel_futures=at_once)
+        ours.close()
+        held.close()
+        self._executor = self._pipe = None
+
+    def _start(self) -> None:
+        """Starts workers and sees that they do start: of one that cannot, every scene would seem to be at fault."""
+        context = get_context("spawn")
+        self._pipe = context.Pipe(duplex=False)
+        self._executor = ProcessPoolExecutor(self.count, context, initializer=_begin, initargs=self._pipe[:1])
+        try:
+            self._executor.submit(os.getpid).result()
+        except BrokenExecutor as error:
+            self.close(at_once=True)
+            raise ExecutorError(
+                "Worker processes cannot be started. In a script of your own, what it does must stand below "
+                '`if __name__ == "__main__":`, since every worker imports the script; or ask for one worker.'
+            ) from error
+
+
+class DaskExecutor(Executor):
+    """A Dask cluster that runs already; its scheduler finds new workers for those that died."""
+
+    def __init__(self, address: str) -> None:
+        try:
+            import distributed
+        except ImportError as error:
+            raise ExecutorError("A cluster needs Dask; install it with: pip install 'haploop[cluster]'") from error
+        try:
+            self._client = distributed.Client(address, timeout="10s", set_as_default=False)
+        except (OSError, ValueError, TypeError) as error:
+            raise ExecutorError(f"There is no Dask scheduler at {address}: {error}") from error
+        self._executor = self._client.get_executor(pure=False)
+        self.count = sum(dict(self._client.nthreads()).values())  # pyright: ignore
+        self.room = 2 * self.count
+        self.worker_died = (distributed.KilledWorker,)
+        if not self.count:
+            self.close(at_once=True)
+            raise ExecutorError(f"The Dask scheduler at {address} has no workers yet; start some with: dask worker")
+
+    def submit(self, call: Callable[..., Any], *arguments: Any) -> Future[Any]:
+        return self._executor.submit(call, *arguments)
+
+    def renew(self) -> None:
+        """Leaves it to the scheduler."""
+
+    def close(self, at_once: bool) -> None:
+        self._executor.shutdown(wait=not at_once)
+        self._client.close()
+
+
+def _begin(held: Connection) -> None:
+    """Makes this process a worker: Ctrl-C is for the one that started it, and without that one it ends."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_end_with, args=(held,), daemon=True).start()
+
+
+def _end_with(held: Connection) -> None:
+    with contextlib.suppress(EOFError, OSError):
+        held.recv()
+    os._exit(1)
+
+
+@contextlib.contextmanager
+def _one_thread_each() -> Iterator[None]:
+    """Gives processes started in here one thread each, unless the user asked for another number."""
+    ours = [name for name in _THREADS if name not in os.environ]
+    os.environ.update(dict.fromkeys(ours, "1"))
+    try:
+        yield
+    finally:
+        for name in ours:
+            del os.environ[name]

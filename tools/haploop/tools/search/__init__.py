@@ -1,0 +1,1 @@
+"""Searches that ask many members at once: bisection of a boundary, and a ladder of rungs."""

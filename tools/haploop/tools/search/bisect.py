@@ -1,0 +1,74 @@
+"""Bisection of the boundary between where a property holds and where it does not, for many members at once."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from itertools import count
+from typing import TypeVar
+
+Member = TypeVar("Member")
+# Two values: the property holds at the first, and does not at the second.
+Bracket = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Tolerance:
+    """The width down to which a bracket is halved: absolute, or relative to its greater end.
+
+    With neither, a bracket is halved down to neighbouring floats.
+    """
+
+    absolute: float = 0.0
+    relative: float = 0.0
+
+    def met(self, near: float, far: float) -> bool:
+        """Tells whether the bracket is narrow enough, or holds no number between its ends."""
+        width, size = abs(far - near), max(abs(near), abs(far))
+        return width <= max(self.absolute, self.relative * size) or self.middle(near, far) in (near, far)
+
+    def middle(self, near: float, far: float) -> float:
+        """Returns the geometric mean for a relative tolerance between ends of one sign, else the arithmetic mean."""
+        if self.relative and not self.absolute and near * far > 0.0:
+            return math.copysign(math.sqrt(abs(near)) * math.sqrt(abs(far)), far)
+        return near + (far - near) / 2.0
+
+
+EXACT = Tolerance()
+
+
+def bisect_many(
+    brackets: Mapping[Member, Bracket],
+    holds: Callable[[Mapping[Member, float]], Mapping[Member, bool | None]],
+    tolerance: Tolerance = EXACT,
+    most_rounds: int | None = None,
+) -> dict[Member, Bracket]:
+    """Halves the brackets of all members in common rounds, one value of each member a round.
+
+    Args:
+        brackets: by member.
+        holds: from values by member to whether the property holds there; None, or no answer, ends the search of that
+            member with the bracket it has.
+        tolerance: of every bracket.
+        most_rounds: halvings at most; as many as the tolerance takes when None.
+    """
+    narrowed = dict(brackets)
+    going = dict(brackets)
+    for done in count():
+        middles = {member: tolerance.middle(*ends) for member, ends in going.items() if not tolerance.met(*ends)}
+        if not middles or done == most_rounds:
+            return narrowed
+        answers = holds(middles)
+        going = {}
+        for member, middle in middles.items():
+            answer = answers.get(member)
+            if answer is not None:
+                near, far = narrowed[member]
+                going[member] = narrowed[member] = (middle, far) if answer else (near, middle)
+    raise AssertionError  # not reached
+
+
+def bisect(holds: Callable[[float], bool], near: float, far: float, tolerance: Tolerance = EXACT) -> Bracket:
+    """Halves one bracket; the property holds at ``near`` and does not at ``far``."""
+    return bisect_many({0: (near, far)}, lambda middles: {0: holds(middles[0])}, tolerance)[0]
