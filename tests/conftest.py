@@ -1,10 +1,56 @@
-"""No test fails for being slow: the machine that runs it may be busy. Nor for being run in the background."""
+"""Fixtures of all tests. No test fails for being slow (the machine that runs it may be busy), nor for being run in the
+background; and every test has a place of its own for live runs, so that none meets another's, nor one of the user's."""
+
+from __future__ import annotations
 
 import signal
+import tempfile
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
 
+import pytest
 from hypothesis import HealthCheck, settings
+
+from helpers.live.launched import Launched, Run
 
 settings.register_profile("haploop", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("haploop")
 # A shell has its background jobs ignore Ctrl-C, and what they start inherits that.
 signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+@pytest.fixture(autouse=True)
+def live_runs_here(monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """A short directory: the path of a socket must not be long."""
+    with tempfile.TemporaryDirectory(prefix="hl", dir="/tmp") as directory:
+        monkeypatch.setenv("XDG_RUNTIME_DIR", directory)
+        yield Path(directory)
+
+
+@pytest.fixture
+def launched() -> Iterator[Callable[..., Launched]]:
+    """Starts haploop as a process; whatever the test leaves running is ended."""
+    started: list[Launched] = []
+
+    def start(*arguments: Any, **options: Any) -> Launched:
+        started.append(Launched(*arguments, **options))
+        return started[-1]
+
+    yield start
+    for process in started:
+        process.clear_away()
+
+
+@pytest.fixture
+def running(tmp_path: Path) -> Iterator[Callable[..., Run]]:
+    """Starts a run, by default a long one of figure 6(c), into a directory of its own; it is ended with the test."""
+    started: list[Run] = []
+
+    def start(*arguments: str, **options: Any) -> Run:
+        started.append(Run(tmp_path / f"out{len(started) or ''}", *arguments, **options))
+        return started[-1]
+
+    yield start
+    for run in started:
+        run.clear_away()

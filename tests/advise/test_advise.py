@@ -6,7 +6,6 @@ from pathlib import Path
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from scene_makers import KINDS, scene
 from typer.testing import CliRunner
 
 from haploop.launch.runs.in_process import run_in_process
@@ -17,6 +16,7 @@ from haploop.tools.advise.limits.tasks import SEEDS, tasks
 from haploop.tools.advise.limits.variations import Change, corners, scaled, singles
 from haploop.tools.advise.subject import DEFAULT_HAND, WrongAsk, settled, subject
 from haploop.tools.cli.main import app
+from helpers.scenes.least import KINDS, scene
 
 SCENES = Path(__file__).parents[2] / "launch" / "scenes"
 

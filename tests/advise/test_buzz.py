@@ -3,13 +3,13 @@
 from typing import Any
 
 import pytest
-from scene_makers import KINDS, scene
 
 from haploop.tools.advise.buzz import Buzz, Without, why
 from haploop.tools.advise.effects_off import causes, freed
 from haploop.tools.advise.limits.largest import Limit
 from haploop.tools.advise.limits.steady import Judge
 from haploop.tools.advise.sentences import buzz_sentences
+from helpers.scenes.least import KINDS, scene
 
 HAND = {"force": {"kind": "minimum-jerk", "value": -1.0, "rise_time": 0.2}, "stiffness": 20.0, "damping": 0.3}
 BASE: dict[str, Any] = {"device": {"mass": 0.05, "damping": 0.2, "position": 1e-3}, "hand": HAND}

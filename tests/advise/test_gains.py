@@ -3,7 +3,6 @@
 from typing import Any
 
 import pytest
-from scene_makers import KINDS, scene
 
 from haploop.launch.runs.in_process import run_in_process
 from haploop.tools.advise.advice import Advice, advice
@@ -11,6 +10,7 @@ from haploop.tools.advise.limits.steady import Judge
 from haploop.tools.advise.limits.variations import Change, corners, scaled
 from haploop.tools.advise.subject import Subject
 from haploop.tools.linear.one_tick import NeverStable, OneTickMap
+from helpers.scenes.least import KINDS, scene
 
 # No encoder and no friction: every family but those with unidirectional inertia is linear.
 LOOP = scene(

@@ -5,7 +5,6 @@ from typing import Any
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from scene_makers import KINDS, scene
 
 from haploop.tools.advise.limits.largest import LEAST_N_M, Limit, Loops, largest
 from haploop.tools.advise.limits.pace import NEAR, WIDE, Pace
@@ -13,6 +12,7 @@ from haploop.tools.advise.limits.steady import Judge, Judgement
 from haploop.tools.advise.limits.tasks import tasks
 from haploop.tools.advise.limits.variations import Change
 from haploop.tools.linear.one_tick import OneTickMap
+from helpers.scenes.least import KINDS, scene
 
 QUICK, SLOW = WIDE["arrays"], WIDE["alone"]
 

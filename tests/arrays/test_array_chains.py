@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from arrays.makers import alone, diverging, together
-from physics.effect_tables import EFFECTS, slowly, tap
-from physics.varied_scenes import drawn_chain, varied
-from scene_makers import scene
 
 from haploop.launch.batch import batch
 from haploop.launch.batch.stacking import runs_in_arrays, structure
+from helpers.runs.batches import alone, diverging, together
+from helpers.scenes.effect_tables import EFFECTS, slowly, tap
+from helpers.scenes.least import scene
+from helpers.scenes.varied_scenes import drawn_chain, varied
 
 LINES = {"friction", "jitter", "loss"}
 

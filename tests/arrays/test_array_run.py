@@ -8,9 +8,6 @@ from typing import Annotated, Any
 
 import numpy as np
 import pytest
-from arrays.makers import PUSH, Stiffening, alone, diverging, pressed, together
-from physics.varied_scenes import drawn_base, varied
-from scene_makers import KINDS, WALL
 
 from haploop.controller.dissipation import Element, Motion, Quantity, where
 from haploop.launch.batch import batch
@@ -22,6 +19,9 @@ from haploop.logger.batch import LoggerArray
 from haploop.logger.verdict.window_batch import WindowArray
 from haploop.plant import choose_batch
 from haploop.plant.motion.one_mass_batch import LinearMotionArray
+from helpers.runs.batches import PUSH, Stiffening, alone, diverging, pressed, together
+from helpers.scenes.least import KINDS, WALL
+from helpers.scenes.varied_scenes import drawn_base, varied
 
 
 @pytest.mark.parametrize("seed", range(40))

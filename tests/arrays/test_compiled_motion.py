@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from arrays.compiled import agree, compiled
-from arrays.makers import pressed
-from physics.varied_scenes import drawn_base, varied
-from scene_makers import KINDS
 
 from haploop.launch.batch.batch import LoopArray
 from haploop.launch.batch.run import run_array
+from helpers.runs.batches import pressed
+from helpers.runs.compiled import agree, compiled
+from helpers.scenes.least import KINDS
+from helpers.scenes.varied_scenes import drawn_base, varied
 
 # Of the largest excursion of each loop.
 TOLERANCE = 1e-11

@@ -9,13 +9,13 @@ from typing import Annotated, Any
 
 import numpy as np
 import pytest
-from arrays.compiled import agree, compiled, jax, many
-from arrays.makers import PUSH, Stiffening, alone, pressed
-from scene_makers import KINDS
 
 from haploop.controller.dissipation import Element, Motion, Quantity, where
 from haploop.launch.batch.jax.run import compiling, results_of_compiled
 from haploop.launch.batch.run import run_array
+from helpers.runs.batches import PUSH, Stiffening, alone, pressed
+from helpers.runs.compiled import agree, compiled, jax, many
+from helpers.scenes.least import KINDS
 
 
 def test_results_are_those_of_arrays_but_for_the_last_digits() -> None:

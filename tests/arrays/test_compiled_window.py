@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from arrays.compiled import agree
 
 from haploop.controller.controller_batch import Row
 from haploop.protocol.ticks import Timebase
+from helpers.runs.compiled import agree
 
 
 def test_windows_read_by_a_program_show_what_they_show_by_themselves() -> None:

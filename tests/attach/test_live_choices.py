@@ -3,15 +3,15 @@
 import math
 
 import pytest
-from clock.makers import clock, granted
-from live_run import going
-from scene_makers import KINDS, WALL, scene
 
 from haploop.launch.clock.capabilities import options
 from haploop.launch.clock.clock import ClockError
 from haploop.launch.processes.control import CommandRefused
 from haploop.launch.runs.replay import replay
 from haploop.logger import read
+from helpers.live.live_run import going
+from helpers.runs.clocks import clock, granted
+from helpers.scenes.least import KINDS, WALL, scene
 
 DAMPING = {"kind": "damping", "damping": 0.5}
 

@@ -7,7 +7,6 @@ import socket
 import msgpack
 import numpy as np
 import pytest
-from attach.plotjuggler_rules import Parser
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
@@ -16,6 +15,7 @@ from haploop.logger.log.channels import Channels
 from haploop.logger.log.table import TableLayout
 from haploop.protocol.ticks import Timebase
 from haploop.tools.attach.plotjuggler import MOST_SAMPLES, Batches, Outlet, PortTaken, array_of_maps
+from oracles.plotjuggler_rules import Parser
 
 TIME = Timebase(plant_rate=10_000, control_rate=1_000, delay_steps=0, ticks=3000)
 

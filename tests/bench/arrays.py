@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import importlib.util
 import statistics
+import sys
 import time
 from collections.abc import Callable
 from functools import partial
@@ -21,6 +22,7 @@ from haploop.launch.runs.in_process import run_in_process
 from haploop.launch.scene.file import load
 from haploop.tools.machine import machine
 
+sys.path.append(str(Path(__file__).parents[1]))  # where the oracles are
 SCENE = Path(__file__).parents[2] / "launch" / "scenes" / "fig6b.toml"
 
 
@@ -48,7 +50,7 @@ def measured_us(run: Callable[[], Any], ticks: int) -> float:
 
 def check_kernel(scenes: list[dict[str, Any]], kinds: dict[str, Any]) -> None:
     """That the yardstick does the same work: its books are those of the arrays."""
-    from array_kernel import BOOKS, FIGURES, run_kernel
+    from oracles.array_kernel import BOOKS, FIGURES, run_kernel
 
     for result, row in zip(run_array(scenes, kinds), run_kernel(scenes, True)[:, FIGURES:], strict=True):
         energy, found = result["energy"], dict(zip(BOOKS, row.tolist(), strict=True))
@@ -78,7 +80,7 @@ def main() -> None:
         "arrays, without": (lambda: run_array(scenes, kinds, energy=False), len(scenes)),
     }
     if importlib.util.find_spec("numba"):
-        from array_kernel import run_kernel
+        from oracles.array_kernel import run_kernel
 
         check_kernel(few, kinds)
         rows["numba kernel, with the books"] = (lambda: run_kernel(scenes, True), len(scenes))

@@ -7,24 +7,13 @@ from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Any
 
 import pytest
-from faults.conftest import launched as launched
-from faults.conftest import live_runs_here as live_runs_here
-from faults.conftest import running as running
+
+from helpers.live.browser import ARGUMENTS, DESK, NAMES, is_complaint
 
 if TYPE_CHECKING:
-    from browser.stand_in import StandIn
     from playwright.sync_api import Browser, Page
 
-NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
-# Nothing is fetched, synchronised or reported: what the page asks for is all that is asked for.
-ARGUMENTS = [
-    "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking",
-    "--disable-component-update", "--disable-sync",
-]  # fmt: skip
-# What a browser says because of what a test does: it stops a server, and reads the pixels of a chart.
-OF_THE_TEST = ("ERR_CONNECTION_REFUSED", "willReadFrequently")
-DESK = {"width": 1280, "height": 720}
-PHONE = {"width": 390, "height": 844}
+    from helpers.live.stand_in import StandIn
 
 
 @pytest.fixture(scope="session")
@@ -66,16 +55,11 @@ def open_page(browser: Browser) -> Iterator[Callable[..., Page]]:
     assert complaints == []
 
 
-def is_complaint(said: Any) -> bool:
-    """Whether a word on the console is one of the page."""
-    return said.type in ("error", "warning") and not any(word in said.text for word in OF_THE_TEST)
-
-
 @pytest.fixture
 def stand_in() -> Iterator[StandIn]:
     """A server that tells the page whatever a test wants."""
     pytest.importorskip("aiohttp", reason="the live page needs aiohttp: pip install 'haploop[view]'")
-    from browser.stand_in import StandIn
+    from helpers.live.stand_in import StandIn
 
     server = StandIn()
     yield server

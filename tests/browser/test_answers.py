@@ -1,8 +1,9 @@
 """What the page answers at once: verdict, state and numbers, with and without a run, with and without a server."""
 
-from browser.pictures import contact
-from browser.stand_in import RUNNING, WAITING
 from playwright.sync_api import expect
+
+from helpers.live.stand_in import RUNNING, WAITING
+from oracles.pictures import contact
 
 LEAK = {"total_J": -1.2e-3, "sampling_and_hold_J": -1e-4, "quantisation_J": 2e-6, "delay_J": -1.1e-3}
 SUMMARY = {

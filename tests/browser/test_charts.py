@@ -4,8 +4,9 @@ import math
 import re
 
 import pytest
-from browser.pictures import contact, picture, table
 from playwright.sync_api import expect
+
+from oracles.pictures import contact, picture, table
 
 NAN = math.nan
 ROWS = 400

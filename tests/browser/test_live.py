@@ -7,8 +7,9 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from faults.launched import Launched, Run, wait_for
 from playwright.sync_api import Page, expect
+
+from helpers.live.launched import Launched, Run, wait_for
 
 pytest.importorskip("aiohttp", reason="the live page needs aiohttp: pip install 'haploop[view]'")
 LINK = re.compile(r"http://127\.0\.0\.1:(\d+)/#token=\S+")

@@ -1,10 +1,11 @@
 """The page on a desk and on a phone, in light and dark: everything is there, nothing is covered or cut off."""
 
 import pytest
-from browser.conftest import DESK, PHONE
-from browser.pictures import contact
-from faults.launched import first_and_slowly
 from playwright.sync_api import expect
+
+from helpers.live.browser import DESK, PHONE
+from helpers.live.launched import first_and_slowly
+from oracles.pictures import contact
 
 TABLET, LARGE = {"width": 820, "height": 1180}, {"width": 1920, "height": 1080}
 MAIN = ["#verdict", "#position", "#force", "#energy", "#pause", "[data-step='100']", "#stop", "#freeze", "#help"]

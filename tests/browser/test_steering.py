@@ -1,9 +1,10 @@
 """Steering from the page: orders that go out as they were meant, and what is refused is told and changes nothing."""
 
 import pytest
-from browser.pictures import contact
-from browser.stand_in import OPTIONS, RUNNING, TOKEN
 from playwright.sync_api import expect
+
+from helpers.live.stand_in import OPTIONS, RUNNING, TOKEN
+from oracles.pictures import contact
 
 
 @pytest.fixture

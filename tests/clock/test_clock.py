@@ -3,12 +3,12 @@
 import math
 from typing import Any
 
-from clock.makers import DAMPING, SWAP, TICKS, WINDOW, clock, granted, sent
 from hypothesis import given
 from hypothesis import strategies as st
 
 from haploop.launch.clock.clock import AHEAD_S, ClockError
 from haploop.launch.scene.mistakes import SceneError
+from helpers.runs.clocks import DAMPING, SWAP, TICKS, WINDOW, clock, granted, sent
 
 # How far
 

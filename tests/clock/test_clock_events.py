@@ -4,10 +4,10 @@ import math
 from typing import Any
 
 import pytest
-from clock.makers import DAMPING, SWAP, clock, granted, sent
 
 from haploop.launch.clock.clock import ClockError
 from haploop.launch.scene.mistakes import SceneError
+from helpers.runs.clocks import DAMPING, SWAP, clock, granted, sent
 
 
 def test_a_change_without_a_time_takes_effect_at_the_first_tick_not_granted() -> None:

@@ -11,7 +11,6 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from cost.makers import METHODS, RATES, fake_cost
 
 from haploop.tools.ablation import AGAIN, NONE, WHOLE
 from haploop.tools.cost import finding_words
@@ -22,6 +21,7 @@ from haploop.tools.cost.findings import findings
 from haploop.tools.cost.prices import findings as price_findings
 from haploop.tools.cost.prices.data import PriceGroup, as_data, price
 from haploop.tools.linear.stiffness_limit import StiffnessLimit
+from helpers.data.costs import METHODS, RATES, fake_cost
 
 HOUSE = Path(__file__).parents[2]
 

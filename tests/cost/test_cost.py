@@ -6,13 +6,13 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from cost.cost_scene import SMOOTH, exact_reference, outcomes
 from typer.testing import CliRunner
 
 from haploop.tools.cli.main import app
 from haploop.tools.cost.data import load
 from haploop.tools.cost.grid import METHODS, accuracy_scenes, grid
 from haploop.tools.cost.measure import Measurement
+from helpers.scenes.cost_scene import SMOOTH, exact_reference, outcomes
 
 
 @pytest.fixture

@@ -3,12 +3,12 @@
 from dataclasses import replace
 
 import pytest
-from cost.makers import fake_cost, fake_error
 from rich.console import Console
 
 from haploop.tools.cost.advice import advice, cheapest
 from haploop.tools.cost.data import Load, Point, ReferenceNote, SceneCost, Spread
 from haploop.tools.cost.draw.report import report
+from helpers.data.costs import fake_cost, fake_error
 
 
 def point(method, rate, size_m, us, right=True, pointwise=True):

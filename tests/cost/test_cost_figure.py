@@ -10,8 +10,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from cost.makers import METHODS, RATES, SCENES, fake_cost, fake_point
-from shown.test_figure import artists
 
 from haploop.tools.cost.data import Cost, Point, Spread
 from haploop.tools.cost.draw.figure import draw as draw_cost
@@ -19,6 +17,8 @@ from haploop.tools.cost.draw.figure import figure_of
 from haploop.tools.cost.draw.panel import LOOKS, drawn_m
 from haploop.tools.figure.data import FigureError
 from haploop.tools.figure.labels import Label, place_labels
+from helpers.data.costs import METHODS, RATES, SCENES, fake_cost, fake_point
+from helpers.shown import artists
 
 
 @pytest.fixture(scope="module")

@@ -5,8 +5,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from cost.cost_scene import SMOOTH, count_stages, exact_reference
-from cost.makers import fake_cost
 
 from haploop.launch.scene.file import load as load_scene
 from haploop.tools.cost import measure, times
@@ -14,6 +12,8 @@ from haploop.tools.cost.data import CostFileError, Spread, load, save
 from haploop.tools.cost.grid import grid
 from haploop.tools.cost.measure import Measurement
 from haploop.tools.cost.store import Store
+from helpers.data.costs import fake_cost
+from helpers.scenes.cost_scene import SMOOTH, count_stages, exact_reference
 
 
 @pytest.fixture

@@ -11,9 +11,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from cost.makers import fake_cost
-from scene_makers import KINDS, scene
-from shown.test_figure import artists
 
 from haploop.controller.controller import Controller
 from haploop.launch.plan.plan import effects_of
@@ -30,6 +27,9 @@ from haploop.tools.figure.data import FigureError
 from haploop.tools.linear.one_tick import OneTickMap
 from haploop.tools.linear.stiffness_limit import StiffnessLimit
 from haploop.tools.operations import Operations
+from helpers.data.costs import fake_cost
+from helpers.scenes.least import KINDS, scene
+from helpers.shown import artists
 
 SCENES = Path(__file__).parents[2] / "launch/scenes"
 

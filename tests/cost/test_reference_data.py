@@ -8,8 +8,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from mpmath import mpf
-from physics.effects_reference import Bodies
-from scene_makers import scene
 
 from haploop.launch.scene.file import load
 from haploop.tools.reference.loop import close_loop, ticks_of
@@ -27,6 +25,8 @@ from haploop.tools.reference.nearest import (
 )
 from haploop.tools.reference.plant import ContinuousPlant
 from haploop.tools.trajectory import trajectory
+from helpers.scenes.least import scene
+from oracles.effects_reference import Bodies
 
 RATES = (1_000, 2_000, 5_000, 10_000, 20_000, 50_000, 100_000)
 NAMES = sorted(path.stem for path in SCENES.glob("*.toml"))

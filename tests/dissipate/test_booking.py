@@ -8,10 +8,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from dissipate.recordings import PERIOD_S, booking, outcome, samples, write
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scene_makers import KINDS, scene
 
 from haploop.controller.dissipation import ElementError
 from haploop.launch.runs.in_process import run_in_process
@@ -20,6 +18,8 @@ from haploop.logger import read
 from haploop.tools.dissipate.booking import Booking
 from haploop.tools.dissipate.samples import RecordingError
 from haploop.tools.dissipate.text_recording import Layout
+from helpers.data.recordings import PERIOD_S, booking, outcome, samples, write
+from helpers.scenes.least import KINDS, scene
 
 A, B, M = 2e-3, 2.7, 0.0018
 

@@ -7,8 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from dissipate.recordings import outcome, write
-from scene_makers import KINDS, scene
 from typer.testing import CliRunner, Result
 
 from haploop.launch.runs.in_process import run_in_process
@@ -16,6 +14,8 @@ from haploop.launch.scene.toml_writer import to_toml
 from haploop.tools.cli.main import app
 from haploop.tools.dissipate.figure import figure_of
 from haploop.tools.dissipate.report import answer
+from helpers.data.recordings import outcome, write
+from helpers.scenes.least import KINDS, scene
 
 T = np.arange(3000) * 1e-3
 X = 2e-3 * np.sin(2.0 * np.pi * 6.0 * T) + 3e-5 * np.sin(2.0 * np.pi * 180.0 * T)

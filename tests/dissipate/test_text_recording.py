@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from dissipate.recordings import outcome, write
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from haploop.controller.dissipation import ElementError
 from haploop.tools.dissipate.samples import RecordingError
 from haploop.tools.dissipate.text_recording import Layout, TextRecording
+from helpers.data.recordings import outcome, write
 
 T = np.arange(200) * 1e-3
 X = 2e-3 * np.sin(2.0 * np.pi * 15.0 * T)

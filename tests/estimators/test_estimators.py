@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from estimators.estimates import COUNT, ENCODER, EVERYTHING, FUSED, KALMAN, SIGMA, T, estimates, floats
 from hypothesis import given
 from hypothesis import strategies as st
 
 from haploop.launch.runs.start import prepare, run
 from haploop.plant.sensing.encoder import accelerometer_is_used
+from helpers.runs.estimates import COUNT, ENCODER, EVERYTHING, FUSED, KALMAN, SIGMA, T, estimates, floats
 
 SCENE = Path(__file__).parents[2] / "launch/scenes/fig6c.toml"
 

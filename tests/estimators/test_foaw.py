@@ -5,9 +5,10 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from estimators.estimates import COUNT, ENCODER, T, estimates, floats, measured
 from hypothesis import given
 from hypothesis import strategies as st
+
+from helpers.runs.estimates import COUNT, ENCODER, T, estimates, floats, measured
 
 
 def longest_window(counts: Sequence[int], k: int, ticks: int, bound_counts: Fraction | int) -> int:

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from estimators.estimates import CORNER, COUNT, ENCODER, FUSED, JERK, KALMAN, SIGMA, T, estimates, floats
 
 from haploop.controller.estimators.kalman import jerk_density_limits, steady_state
+from helpers.runs.estimates import CORNER, COUNT, ENCODER, FUSED, JERK, KALMAN, SIGMA, T, estimates, floats
 
 
 def test_the_kalman_filter_follows_an_acceleration_without_delay_and_a_jerk_late_by_its_gains():

@@ -11,13 +11,13 @@ from typing import Any
 import jsonschema
 import numpy as np
 import pytest
-from log.makers import AFTER, PLANT, SCENE, same_bits, swapped_run
 from mcap.reader import make_reader
 from typer.testing import CliRunner
 
 from haploop.logger import read
 from haploop.logger.log.recording import Recording
 from haploop.tools.cli.main import app
+from helpers.data.logs import AFTER, PLANT, SCENE, same_bits, swapped_run
 
 TABLES = {"/plant": PLANT, "/controller": AFTER}
 

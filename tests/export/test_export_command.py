@@ -8,14 +8,14 @@ import sys
 from pathlib import Path
 
 import pytest
-from faults.launched import on_a_disk_of
-from log.makers import cut, swapped_run
 from mcap.writer import Writer
 from typer.testing import CliRunner, Result
 
 from haploop.logger import read
 from haploop.logger.log.writer import Log
 from haploop.tools.cli.main import app
+from helpers.data.logs import cut, swapped_run
+from helpers.live.launched import on_a_disk_of
 
 FORMATS = ("csv", "npz", "parquet", "json-mcap")
 

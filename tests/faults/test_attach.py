@@ -5,13 +5,13 @@ import signal
 
 import numpy as np
 import pytest
-from faults.launched import SCENE, alive, first_and_slowly
 
 import haploop.logger
 from haploop.controller.dissipation import registry
 from haploop.launch.runs.in_process import run_in_process
 from haploop.launch.runs.replay import ReplayError, replay
 from haploop.launch.scene.file import load
+from helpers.live.launched import SCENE, alive, first_and_slowly
 
 KINDS = registry()
 # It stands still at tick 500, so that it is surely still there when something joins it.

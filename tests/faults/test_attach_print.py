@@ -5,11 +5,11 @@ from __future__ import annotations
 import signal
 
 import pytest
-from faults.launched import SCENE, wait_for
 
 from haploop.controller.dissipation import registry
 from haploop.launch.runs.in_process import run_in_process
 from haploop.launch.scene.file import load
+from helpers.live.launched import SCENE, wait_for
 
 KINDS = registry()
 # It stands still at tick 500, so that it is surely still there when something joins it.

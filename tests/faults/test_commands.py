@@ -5,13 +5,13 @@ import math
 import signal
 
 import pytest
-from faults.launched import SCENE, command, same_bits
 
 from haploop.controller.dissipation import registry
 from haploop.launch.processes import control
 from haploop.launch.runs.in_process import run_in_process
 from haploop.launch.runs.replay import replay
 from haploop.launch.scene.file import load
+from helpers.live.launched import SCENE, command, same_bits
 
 KINDS = registry()
 

@@ -4,11 +4,11 @@ import re
 import signal
 
 import pytest
-from faults.launched import LONG, ROLES, alive, first_and_slowly, same_bits, wait_for
 
 import haploop.logger
 from haploop.launch.processes import run_directory
 from haploop.launch.runs.replay import replay
+from helpers.live.launched import LONG, ROLES, alive, first_and_slowly, same_bits, wait_for
 
 NAMED = r"The {} was killed by SIGKILL; the last tick all nodes had done is (\d+) "
 

@@ -4,10 +4,10 @@ import json
 
 import numpy as np
 import pytest
-from faults.launched import first_and_slowly
 
 import haploop.logger
 from haploop.launch.runs.replay import replay
+from helpers.live.launched import first_and_slowly
 
 # A force -b v held over T on a free mass m turns v over and more than back when b T / m > 2.
 UNSTABLE = ('dissipation=[{kind="damping", damping=60.0, acts="always"}]',)

@@ -6,10 +6,10 @@ import shutil
 import signal
 
 import pytest
-from faults.launched import LONG, SCENE, command, processes, same_bits, wait_for
 
 import haploop.logger
 from haploop.launch.processes import run_directory
+from helpers.live.launched import LONG, SCENE, command, processes, same_bits, wait_for
 
 LIMIT_BYTES = 4_000_000
 

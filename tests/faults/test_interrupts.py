@@ -4,10 +4,10 @@ import json
 import signal
 
 import pytest
-from faults.launched import SCENE, first_and_slowly, same_bits, wait_for
 
 import haploop.logger
 from haploop.launch.runs.replay import replay
+from helpers.live.launched import SCENE, first_and_slowly, same_bits, wait_for
 
 SIGNALS = first_and_slowly(signal.SIGINT, signal.SIGTERM)
 

@@ -9,9 +9,6 @@ from typing import Self
 
 import numpy as np
 import pytest
-from attach.plotjuggler_rules import Viewer
-from faults.launched import command, wait_for
-from live_run import Going, going, undisturbed
 
 import haploop.logger
 from haploop.launch.processes.run_directory import LiveRun
@@ -19,6 +16,9 @@ from haploop.logger.log.recording import Recording
 from haploop.tools.attach import plotjuggler
 from haploop.tools.attach.plotjuggler import Outlet
 from haploop.tools.attach.plotjuggler_node import publish
+from helpers.live.launched import command, wait_for
+from helpers.live.live_run import Going, going, undisturbed
+from oracles.plotjuggler_rules import Viewer
 
 END = "/end"
 ROWS_A_TICK = {"/plant": 10, "/controller": 1, "/energy": 1}

@@ -4,11 +4,11 @@ import signal
 
 import numpy as np
 import pytest
-from faults.launched import ROLES, SCENES, command, first_and_slowly, wait_for
 
 import haploop.logger
 from haploop.launch.processes import control
 from haploop.launch.runs.replay import replay
+from helpers.live.launched import ROLES, SCENES, command, first_and_slowly, wait_for
 
 HEAD = """
 import math, os, sys

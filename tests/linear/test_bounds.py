@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from linear.linear_scenes import linear_scene
-from scene_makers import scene
 
 from haploop.tools.linear.bounds import Bound, bounds_of
 from haploop.tools.linear.one_tick import NeverStable, OneTickMap
+from helpers.scenes.least import scene
+from helpers.scenes.linear_scenes import linear_scene
 
 COLGATE, GIL, EXACT, ABBOTT = "Colgate & Schenkel 1997", "Gil et al. 2009", "Exact, no delay", "Abbott & Okamura 2005"
 ENCODER = {"resolution": 1e-5}

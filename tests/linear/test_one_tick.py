@@ -8,15 +8,15 @@ from typing import Annotated, Any
 
 import numpy as np
 import pytest
-from linear.linear_scenes import linear_scene
-from physics.captured import run
-from physics.one_tick_map import growth_of
-from scene_makers import KINDS, scene
 
 from haploop.controller.dissipation import Element, Motion, Quantity
 from haploop.tools.linear.linearity import is_linear, left_out, why_not_linear
 from haploop.tools.linear.one_tick import NeverStable, OneTickMap
 from haploop.tools.linear.stiffness_limit import pressed_deep, smooth, stiffness_limit
+from helpers.runs.captured import run
+from helpers.scenes.least import KINDS, scene
+from helpers.scenes.linear_scenes import linear_scene
+from oracles.one_tick_map import growth_of
 
 SEEDS = range(24)
 

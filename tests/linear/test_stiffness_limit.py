@@ -7,13 +7,13 @@ from decimal import Decimal
 from typing import Any
 
 import pytest
-from physics.chain_map import ChainLoop
-from physics.one_tick_map import LinearLoop
-from scene_makers import KINDS, scene
 
 from haploop.launch.runs.in_process import run_in_process
 from haploop.tools.linear.one_tick import NeverStable, NotLinear, OneTickMap
 from haploop.tools.linear.stiffness_limit import StiffnessLimit, pressed_deep, stiffness_limit
+from helpers.scenes.least import KINDS, scene
+from oracles.chain_map import ChainLoop
+from oracles.one_tick_map import LinearLoop
 
 CABLE = {"motor_mass": 0.01, "stiffness": 2e4, "damping": 0.5, "motor_damping": 0.05}
 HAND = {"mass": 0.05, "damping": 0.4, "stiffness": 20.0, "grip": {"stiffness": 800.0, "damping": 3.0}}

@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from log.makers import AFTER, BEFORE, PLANT, SCENE, cut, same_bits, swapped_run
 
 from haploop.logger import read, stream
 from haploop.logger.log.error import LogError
 from haploop.logger.log.recording import Table, merge_columns
 from haploop.logger.log.stream import LogStream, survey
 from haploop.logger.log.writer import Log
+from helpers.data.logs import AFTER, BEFORE, PLANT, SCENE, cut, same_bits, swapped_run
 
 
 @pytest.fixture(scope="module")

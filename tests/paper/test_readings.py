@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scene_makers import KINDS
 
 from haploop.launch.runs.in_process import run_in_process
 from haploop.launch.scene.check import resolve
@@ -20,6 +19,7 @@ from haploop.tools.studies.choi2022.simulation.reading_files import scene_text, 
 from haploop.tools.studies.choi2022.simulation.reading_runs import CLAIMS, MOST, SMALL_M, extent, over, shortfalls
 from haploop.tools.studies.choi2022.simulation.scenes import fig6
 from haploop.tools.studies.choi2022.simulation.shares import decider, never_together, options, share
+from helpers.scenes.least import KINDS
 
 SCENES = Path(__file__).parents[2] / "launch/scenes"
 # What the paper states (section V.A), by table; nothing else of these tables is left but what is listed.

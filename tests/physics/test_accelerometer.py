@@ -9,14 +9,13 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from physics.captured import run
-from physics.test_blocks import in_blocks, of_the_scene
-from scene_makers import WALL, scene
 from scipy import integrate
 
 from haploop.plant.counters import CLIPPED
 from haploop.plant.sensing.accelerometer import Accelerometer
 from haploop.protocol.ticks import Timebase
+from helpers.runs.captured import in_blocks, of_the_scene, run
+from helpers.scenes.least import WALL, scene
 
 TIME = Timebase(plant_rate=10_000, control_rate=1000, delay_steps=0, ticks=10**6)
 IDEAL = {"noise_density": 0.0, "delay": 0.0, "bias": 0.0, "mount": "tip"}

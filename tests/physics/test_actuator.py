@@ -8,15 +8,14 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from physics.captured import run
-from physics.test_blocks import in_blocks, of_the_scene
-from scene_makers import WALL, scene
 
 from haploop.plant.counters import SATURATED
 from haploop.plant.line.actuator import Actuator
 from haploop.plant.line.delay import CommandLine, line_of
 from haploop.plant.plant import Plant
 from haploop.protocol.ticks import Timebase
+from helpers.runs.captured import in_blocks, of_the_scene, run
+from helpers.scenes.least import WALL, scene
 
 FORCES = st.floats(-1e3, 1e3)
 

@@ -8,9 +8,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from physics.captured import run
-from physics.effects_reference import Bodies
-from scene_makers import scene
+
+from helpers.runs.captured import run
+from helpers.scenes.least import scene
+from oracles.effects_reference import Bodies
 
 Rates = Callable[[np.ndarray], np.ndarray]
 Method = Callable[[Rates, np.ndarray, float], np.ndarray]

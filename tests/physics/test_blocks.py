@@ -3,28 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import pytest
-from physics.captured import summarise
-from physics.random_scenes import drawn
 
 from haploop.launch.runs.start import prepare
 from haploop.launch.runs.start import run as run_prepared
 from haploop.launch.scene.file import load
+from helpers.runs.captured import in_blocks, of_the_scene
+from helpers.scenes.random_scenes import drawn
 
 SCENES = sorted((Path(__file__).parents[2] / "launch/scenes").glob("*.toml"))
-OF_THE_MACHINE = ("wall_s", "real_time_factor", "versions")
-
-
-def of_the_scene(summary: dict[str, Any]) -> dict[str, Any]:
-    """The summary but for what differs between two runs of the same scene."""
-    return {name: value for name, value in summary.items() if name not in OF_THE_MACHINE}
-
-
-def in_blocks(scene: dict[str, Any], block_ticks: int, window_blocks: int = 1) -> dict[str, Any]:
-    cut = {"block_ticks": block_ticks, "window_blocks": window_blocks}
-    return of_the_scene(summarise(scene | {"run": scene["run"] | cut}))
 
 
 @pytest.mark.parametrize("seed", [6, 11, 24, 25, 29])

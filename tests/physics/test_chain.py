@@ -7,26 +7,17 @@ from typing import Any
 
 import numpy as np
 import pytest
-from physics.captured import Captured, run
-from physics.chain_map import ChainLoop
-from physics.effect_tables import slowly
-from physics.effects_run import EffectsTruth, follow, simulate
-from physics.one_tick_map import growth_of
-from scene_makers import scene
+
+from helpers.runs.captured import Captured, bodies, run
+from helpers.scenes.effect_tables import slowly
+from helpers.scenes.least import scene
+from oracles.chain_map import ChainLoop
+from oracles.effects_run import EffectsTruth, follow, simulate
+from oracles.one_tick_map import growth_of
 
 MEASURED_TICKS = 400
 CABLE = {"motor_mass": 0.02, "stiffness": 5e4}
 GRIP = {"stiffness": 600.0, "damping": 2.0}
-
-
-def bodies(ran: Captured) -> dict[str, np.ndarray]:
-    """Positions of all bodies at the steps, from the first to the last, by name."""
-    plant = ran.plant
-    x = {"body 0": plant["x"]}
-    for link in ("cable", "grip"):
-        if f"{link}.stretch" in plant:
-            x[link] = list(x.values())[-1] + plant[f"{link}.stretch"]
-    return x
 
 
 # Closed forms

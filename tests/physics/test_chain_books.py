@@ -9,10 +9,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from physics.captured import run
-from physics.chain_by_hand import MOST_N, Made, chain_scene, make
-from physics.effect_tables import slowly
-from scene_makers import KINDS, scene
 
 from haploop.controller.controller import Controller
 from haploop.logger.books.buffers import PIECES
@@ -20,6 +16,10 @@ from haploop.logger.books.chain import ChainBooks
 from haploop.logger.logger import Logger
 from haploop.plant.plant import Plant
 from haploop.protocol.ticks import Timebase
+from helpers.runs.captured import run
+from helpers.scenes.effect_tables import slowly
+from helpers.scenes.least import KINDS, scene
+from oracles.chain_by_hand import MOST_N, Made, chain_scene, make
 
 CASES = [
     "friction",

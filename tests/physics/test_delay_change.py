@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from physics.captured import Captured, run
-from physics.test_blocks import in_blocks
-from scene_makers import WALL, mistakes, scene
+
+from helpers.runs.captured import Captured, in_blocks, run
+from helpers.scenes.least import WALL, mistakes, scene
 
 PRESSED: dict[str, Any] = {
     "duration": 0.12,

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from physics.captured import run
-from physics.effect_tables import EFFECTS, slowly, subsets, tap
-from physics.effects_run import follow
+
+from helpers.runs.captured import run
+from helpers.scenes.effect_tables import EFFECTS, slowly, subsets, tap
+from oracles.effects_run import follow
 
 SOME, OTHERS = [*subsets(0, 1), *subsets(7, 8)], subsets(2, 6)
 

@@ -6,11 +6,12 @@ import math
 
 import numpy as np
 import pytest
-from physics.captured import run
-from physics.chain_map import ChainLoop
-from physics.effects_run import follow, simulate
-from physics.one_tick_map import LinearLoop
-from scene_makers import scene
+
+from helpers.runs.captured import run
+from helpers.scenes.least import scene
+from oracles.chain_map import ChainLoop
+from oracles.effects_run import follow, simulate
+from oracles.one_tick_map import LinearLoop
 
 EVERY_EFFECT = {
     "friction": {"kinetic": 0.048, "breakaway": 0.06, "stribeck_velocity": 0.01},

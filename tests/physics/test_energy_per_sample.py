@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from physics.synthetic import books_along
-from scene_makers import scene
+
+from helpers.runs.given_motion import books_along
+from helpers.scenes.least import scene
 
 AMPLITUDE_M, PERIOD_S, STEPS = 0.01, 1e-3, 10
 K, B, M = 200.0, 0.8, 0.01

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from physics.captured import run
-from scene_makers import scene
+
+from helpers.runs.captured import run
+from helpers.scenes.least import scene
 
 DAMPING = {"kind": "damping", "damping": 0.3}
 INERTIA = {"kind": "bidirectional-inertia", "mass": 0.005}

@@ -6,10 +6,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from physics.captured import run
-from physics.effect_tables import slowly
-from physics.test_hard_cases import log_uniform
-from scene_makers import scene
+
+from helpers.runs.captured import run
+from helpers.scenes.effect_tables import slowly
+from helpers.scenes.least import scene
+from helpers.scenes.random_scenes import log_uniform
 
 
 def extreme(seed: int) -> dict[str, Any]:

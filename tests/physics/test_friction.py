@@ -7,9 +7,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from physics.captured import run
-from physics.effect_tables import slowly
-from scene_makers import scene
+
+from helpers.runs.captured import run
+from helpers.scenes.effect_tables import slowly
+from helpers.scenes.least import scene
 
 RATE = 10_000
 

@@ -8,11 +8,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from physics.captured import run
-from physics.effect_tables import slowly
-from physics.effects_run import follow
-from physics.friction_heats import friction_heats
-from scene_makers import scene
+
+from helpers.runs.captured import run
+from helpers.scenes.effect_tables import slowly
+from helpers.scenes.least import scene
+from oracles.effects_run import follow
+from oracles.friction_heats import friction_heats
 
 RATE = 10_000
 

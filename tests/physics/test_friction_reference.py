@@ -6,13 +6,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from physics.captured import run
-from physics.effect_tables import slowly
-from physics.effects_run import follow
-from physics.friction_heats import friction_heats
-from physics.test_chain import bodies
-from physics.test_hard_cases import log_uniform
-from scene_makers import scene
+
+from helpers.runs.captured import bodies, run
+from helpers.scenes.effect_tables import slowly
+from helpers.scenes.least import scene
+from helpers.scenes.random_scenes import log_uniform
+from oracles.effects_run import follow
+from oracles.friction_heats import friction_heats
 
 
 def drawn(seed: int, fastest: float) -> dict[str, Any]:

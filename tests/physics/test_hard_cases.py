@@ -6,10 +6,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from physics.captured import run
-from scene_makers import scene
 
 from haploop.logger.books import one_mass
+from helpers.runs.captured import run
+from helpers.scenes.least import scene
+from helpers.scenes.random_scenes import log_uniform
 
 STIFF_WALL = {"position": -1e-3, "stiffness": 5e4}
 ALWAYS_INERTIA = {"kind": "unidirectional-inertia", "mass": 0.05, "acts": "always"}
@@ -47,10 +48,6 @@ def test_the_books_close_to_1e_12_in_every_hard_case(case):
     ran = run(scene(**HARD[case] | {"duration": 0.5}))
     assert ran.energy["moved_J"] > 0
     assert ran.relative_residual < 1e-12
-
-
-def log_uniform(rng: np.random.Generator, low: float, high: float) -> float:
-    return float(np.exp(rng.uniform(np.log(low), np.log(high))))
 
 
 def extreme(seed: int) -> dict[str, Any]:

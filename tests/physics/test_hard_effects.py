@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from physics.captured import Captured, run
-from physics.effect_tables import EFFECTS, slowly, subsets, tap
-from scene_makers import KINDS, scene
 
 from haploop.controller.dissipation import Element, Motion
+from helpers.runs.captured import Captured, run
+from helpers.scenes.effect_tables import EFFECTS, slowly, subsets, tap
+from helpers.scenes.least import KINDS, scene
 
 FREE_EFFECTS = ("friction", "transmission", "grip", "accelerometer")
 

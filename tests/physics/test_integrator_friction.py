@@ -7,16 +7,16 @@ from typing import Any
 
 import numpy as np
 import pytest
-from physics.captured import run, summarise
-from physics.effect_tables import EFFECTS, tap
-from scene.test_plan import EVERYTHING, METHODS
-from scene_makers import mistakes, scene
 from typer.testing import CliRunner
 
 import haploop.launch.runs.start as start
 from haploop.launch.scene.combinations import notes
 from haploop.plant.integrators.one_step import growth
 from haploop.tools.cli.main import app
+from helpers.runs.captured import run, summarise
+from helpers.scenes.effect_tables import EFFECTS, tap
+from helpers.scenes.every_effect import EVERYTHING, METHODS
+from helpers.scenes.least import mistakes, scene
 
 SCENES = Path(__file__).parents[2] / "launch/scenes"
 ONE_STEP = METHODS[:-1]

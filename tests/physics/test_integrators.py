@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from physics.captured import Captured, run
-from physics.effects_run import follow
-from scene_makers import scene
 
 from haploop.logger.log.columns import motion_columns
+from helpers.runs.captured import Captured, run
+from helpers.scenes.least import scene
+from oracles.effects_run import follow
 
 ORDERS = {"euler": 1, "semi-implicit-euler": 1, "implicit-midpoint": 2, "rk4": 4}
 ONE_STEP = tuple(ORDERS)

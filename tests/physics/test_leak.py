@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from physics.captured import run
-from physics.synthetic import books_along
-from scene_makers import scene
+
+from helpers.runs.captured import run
+from helpers.runs.given_motion import books_along
+from helpers.scenes.least import scene
 
 K, SPEED, PERIOD_S, STEPS = 200.0, 0.1, 1e-3, 10
 WALL = {"position": 0.0, "stiffness": K}

@@ -10,9 +10,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from physics.captured import run
-from physics.test_blocks import in_blocks
-from scene_makers import WALL, scene
 from scipy import stats
 
 from haploop.plant.counters import DROPPED, LOST
@@ -21,6 +18,8 @@ from haploop.plant.line.jitter import additional_delays
 from haploop.plant.line.loss import losses
 from haploop.plant.line.lossy import UncertainLine
 from haploop.protocol.ticks import Timebase
+from helpers.runs.captured import in_blocks, run
+from helpers.scenes.least import WALL, scene
 
 MANY = 100_000
 # Five standard errors: a right program meets another 999 999 of a million seeds as well.

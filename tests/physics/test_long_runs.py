@@ -6,8 +6,6 @@ import math
 
 import numpy as np
 import pytest
-from physics.captured import run
-from scene_makers import scene
 
 from haploop.logger.books.one_mass import PlantBooks
 from haploop.logger.books.sums import by_tick
@@ -15,6 +13,8 @@ from haploop.logger.books.work import Displacement
 from haploop.plant.motion.mechanics import Mechanics
 from haploop.plant.motion.transition import StepFlow
 from haploop.protocol.ticks import Timebase
+from helpers.runs.captured import run
+from helpers.scenes.least import scene
 
 # So light that v loses a few ten thousand units of its last place a step, and always the same broken number of them.
 LIGHT = {"device": {"mass": 0.05, "damping": 1.7e-9, "velocity": 1.0}, "duration": 100.0, "diverged_beyond": 1e3}

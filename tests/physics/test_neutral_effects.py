@@ -12,8 +12,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from physics.captured import run
-from scene_makers import scene
+
+from helpers.runs.captured import run
+from helpers.scenes.least import scene
 
 HAND = {"mass": 0.01, "damping": 0.01, "stiffness": 10.0, "force": {"kind": "ramp", "value": -0.65, "rise_time": 0.1}}
 PLAIN: dict[str, Any] = {

@@ -6,15 +6,14 @@ import math
 
 import numpy as np
 import pytest
-from physics.captured import run
-from physics.test_blocks import in_blocks, of_the_scene
-from scene_makers import WALL, scene
 from scipy import signal, stats
 
 from haploop.launch.runs.replay import replay
 from haploop.launch.runs.start import prepare
 from haploop.launch.runs.start import run as run_prepared
 from haploop.plant.sensing.noise import position_noise
+from helpers.runs.captured import in_blocks, of_the_scene, run
+from helpers.scenes.least import WALL, scene
 
 PERIOD_S = 1e-3
 MANY = 200_000

@@ -11,12 +11,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from physics.captured import Captured, run
-from physics.random_scenes import drawn, is_comparable
-from physics.reference_run import Truth, simulate
 
 from haploop.launch.plan.plan import effects_of
 from haploop.launch.scene.file import load
+from helpers.runs.captured import Captured, run
+from helpers.scenes.random_scenes import drawn, is_comparable
+from oracles.reference_run import Truth, simulate
 
 AGREEMENT = 1e-11
 SEEDS = range(30)

@@ -7,9 +7,10 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from physics.captured import run
-from physics.one_tick_map import LinearLoop, growth_of
-from scene_makers import scene
+
+from helpers.runs.captured import run
+from helpers.scenes.least import scene
+from oracles.one_tick_map import LinearLoop, growth_of
 
 SURFACE_M = 0.1
 

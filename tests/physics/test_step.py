@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from physics.decimal_flow import flow_minus_identity
 from scipy.integrate import quad_vec
 from scipy.linalg import expm
 
 from haploop.plant.motion.transition import StepFlow, gramian, motion_integrals, natural_rate
+from oracles.decimal_flow import flow_minus_identity
 
 H = 1e-4
 CRITICAL = 2 * np.sqrt(0.02 * 10.0)

@@ -6,8 +6,9 @@ import math
 
 import numpy as np
 import pytest
-from physics.captured import run
-from scene_makers import scene
+
+from helpers.runs.captured import run
+from helpers.scenes.least import scene
 
 DELAYS = [0, 1, 3, 9, 10, 11, 13, 20, 25, 50]
 PRESSED = {

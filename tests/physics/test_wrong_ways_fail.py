@@ -7,14 +7,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-from physics.captured import run
-from physics.random_scenes import is_comparable
-from physics.reference_run import simulate
-from scene_makers import scene
 
 from haploop.logger.books import one_mass
 from haploop.logger.books.books import Books
 from haploop.plant.motion.transition import HeldFlow, StepFlow
+from helpers.runs.captured import run
+from helpers.scenes.least import scene
+from helpers.scenes.random_scenes import is_comparable
+from oracles.reference_run import simulate
 
 
 def busy() -> dict:

@@ -12,14 +12,14 @@ from typing import Any
 import numpy as np
 import pytest
 import zmq
-from live_run import Going, going, undisturbed
-from protocol import attacks
-from scene_makers import KINDS, scene
 
 import haploop.logger
 from haploop.launch.clock.clock import Clock
 from haploop.launch.clock.server import ClockServer
 from haploop.protocol.ticks import Timebase
+from helpers.live import attacks
+from helpers.live.live_run import Going, going, undisturbed
+from helpers.scenes.least import KINDS, scene
 
 REFUSED, WELCOME, REPLY = 3, 2, 14
 

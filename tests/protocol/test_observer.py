@@ -4,10 +4,10 @@ import time
 
 import numpy as np
 import pytest
-from live_run import going, undisturbed
 
 from haploop.logger import read
 from haploop.protocol.observer import Observer
+from helpers.live.live_run import going, undisturbed
 
 ALL = ("plant", "controller", "logger")
 

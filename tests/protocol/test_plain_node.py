@@ -12,11 +12,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from live_run import Going, going, undisturbed
 
 import haploop.logger
+from helpers.live.live_run import Going, going, undisturbed
 
-OBSERVER = Path(__file__).with_name("plain_observer.py")
+OBSERVER = Path(__file__).parents[1] / "oracles/plain_observer.py"
 README = Path(__file__).parents[2] / "protocol" / "README.md"
 STEPS_PER_TICK = 10
 

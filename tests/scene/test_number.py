@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from pydantic_core import PydanticCustomError
-from scene_makers import mistakes, scene
 
 from haploop.launch.scene.tables.number import si
+from helpers.scenes.least import mistakes, scene
 
 
 @pytest.mark.parametrize(

@@ -7,11 +7,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from scene_makers import KINDS
 
 from haploop.launch.scene.check import resolve
 from haploop.launch.scene.file import load
 from haploop.launch.scene.layers import read_layers
+from helpers.scenes.least import KINDS
 
 LAUNCH = Path(__file__).parents[2] / "launch"
 DEVICES = sorted((LAUNCH / "devices").glob("*.toml"))

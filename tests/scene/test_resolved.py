@@ -6,10 +6,10 @@ from typing import Any
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from scene_makers import KINDS, LEAST, scene
 
 from haploop.launch.scene.file import load
 from haploop.launch.scene.toml_writer import to_toml
+from helpers.scenes.least import KINDS, LEAST, scene
 
 _TEXT = st.text(st.characters(exclude_categories=["Cs"]), max_size=12)
 _SCALARS = st.booleans() | st.integers() | st.floats(allow_nan=False, allow_infinity=False) | _TEXT

@@ -5,13 +5,13 @@ from typing import Annotated
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from scene_makers import KINDS, LEAST, WALL, mistakes, scene
 
 from haploop.controller.dissipation import Element, Quantity
 from haploop.launch.scene.check import resolve
 from haploop.launch.scene.layers import Layers
 from haploop.launch.scene.mistakes import SceneError
 from haploop.protocol.scene.scene import Scene
+from helpers.scenes.least import KINDS, LEAST, WALL, mistakes, scene
 
 
 def test_defaults_are_filled_in_and_absent_tables_stay_absent():

@@ -5,7 +5,6 @@ from typing import Any
 
 import jsonschema
 import pytest
-from scene_makers import KINDS, LEAST, mistakes, scene
 from typer.testing import CliRunner
 
 from haploop.launch.scene.combinations import notes
@@ -14,6 +13,7 @@ from haploop.launch.scene.layers import Layers
 from haploop.launch.scene.schema import json_schema
 from haploop.launch.scene.toml_writer import to_toml
 from haploop.tools.cli.main import app
+from helpers.scenes.least import KINDS, LEAST, mistakes, scene
 
 LEAST_OF_EACH: dict[str, Any] = {
     "transmission": {"motor_mass": 0.003, "stiffness": 4000},

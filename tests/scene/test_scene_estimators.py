@@ -3,12 +3,12 @@
 from pathlib import Path
 
 import pytest
-from estimators.estimates import ENCODER, KALMAN
-from scene_makers import KINDS, LEAST, mistakes, scene
 
 from haploop.launch.scene.check import resolve
 from haploop.launch.scene.file import load
 from haploop.launch.scene.layers import Layers
+from helpers.runs.estimates import ENCODER, KALMAN
+from helpers.scenes.least import KINDS, LEAST, mistakes, scene
 
 SCENE = Path(__file__).parents[2] / "launch/scenes/fig6c.toml"
 

@@ -1,10 +1,10 @@
 """Events: each is checked against the elements that are there when it comes."""
 
 import pytest
-from scene_makers import KINDS, WALL, mistakes, scene
 
 from haploop.launch.scene.check import resolve_event
 from haploop.launch.scene.mistakes import SceneError
+from helpers.scenes.least import KINDS, WALL, mistakes, scene
 
 DAMPING = {"kind": "damping", "damping": 0.8}
 INERTIA = {"kind": "unidirectional-inertia", "mass": "10 g"}

@@ -1,10 +1,10 @@
 """Scene files: what extends what, who said what, and files that cannot be read."""
 
 import pytest
-from scene_makers import LEAST_TOML, file_mistakes
 
 from haploop.launch.scene.file import load
 from haploop.launch.scene.mistakes import SceneError
+from helpers.scenes.least import LEAST_TOML, file_mistakes
 
 
 @pytest.fixture

@@ -3,12 +3,12 @@
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from scene_makers import LEAST_TOML, file_mistakes
 
 from haploop.launch.scene.file import load
 from haploop.launch.scene.layers import Layers
 from haploop.launch.scene.mistakes import SceneError
 from haploop.launch.scene.overrides import lay_overrides
+from helpers.scenes.least import LEAST_TOML, file_mistakes
 
 SCENE = (
     LEAST_TOML

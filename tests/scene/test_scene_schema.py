@@ -5,11 +5,11 @@ from pathlib import Path
 
 import jsonschema
 import pytest
-from scene_makers import KINDS, LEAST, WALL
 
 from haploop.controller.dissipation import Element
 from haploop.launch.scene.file import load
 from haploop.launch.scene.schema import json_schema
+from helpers.scenes.least import KINDS, LEAST, WALL
 
 SCENES = sorted((Path(__file__).parents[2] / "launch/scenes").glob("*.toml"))
 SCHEMA = json_schema(KINDS)

@@ -7,8 +7,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from shown.test_figure import artists
-from shown.test_report import row, shown
 
 import haploop.logger
 from haploop.launch.runs.start import prepare, run
@@ -18,6 +16,7 @@ from haploop.tools.figure.run_figure import figure_of
 from haploop.tools.figure.words import book_rows
 from haploop.tools.render.amounts import amount
 from haploop.tools.render.report import summary_table
+from helpers.shown import artists, row, shown
 
 SCENES = Path(__file__).parents[2] / "launch/scenes"
 OF_THE_MACHINE = ("wall_s", "real_time_factor", "versions")

@@ -5,8 +5,6 @@ import sys
 from pathlib import Path
 
 import pytest
-from scene.test_plan import BESIDE, EVERYTHING, NAMING
-from scene_makers import KINDS, scene
 from typer.testing import CliRunner
 
 from haploop.controller.dissipation.damping import Damping
@@ -15,6 +13,8 @@ from haploop.launch.plan.plan import effects_of
 from haploop.launch.scene.file import load
 from haploop.tools.cli.main import app
 from haploop.tools.operations import bill, operations, without
+from helpers.scenes.every_effect import BESIDE, EVERYTHING, NAMING
+from helpers.scenes.least import KINDS, scene
 
 SCENES = Path(__file__).parents[2] / "launch/scenes"
 MINOR = f"{sys.version_info.major}.{sys.version_info.minor}"

@@ -21,6 +21,7 @@ from haploop.tools.figure.history import History
 from haploop.tools.figure.loops import force_position_loop, momentum_loop
 from haploop.tools.figure.run_figure import FigureError, draw, figure_of
 from haploop.tools.figure.words import event_lines, key_numbers
+from helpers.shown import artists
 
 SCENES = Path(__file__).parents[2] / "launch/scenes"
 PNG = b"\x89PNG"
@@ -73,11 +74,6 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
         "ticks": made(base / "ticks", "fig6c", 'run.log="ticks"', "duration=1.2"),
         "never-there": made(base / "never-there", "fig6c", "duration=0.2"),
     }
-
-
-def artists(figure: Any, name: str) -> list[Any]:
-    """Everything drawn under a name, in the order of drawing."""
-    return [one for one in figure.findobj() if one.get_gid() == name]
 
 
 def axes(figure: Any) -> list[Any]:

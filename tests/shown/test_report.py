@@ -16,6 +16,7 @@ from haploop.launch.runs.start import prepare, run
 from haploop.protocol.quantity import Quantity
 from haploop.tools.render.amounts import amount, fixed
 from haploop.tools.render.report import ProgressLine, plugins_table, status_table, summary_table
+from helpers.shown import row, shown
 
 SCENES = Path(__file__).parents[2] / "launch/scenes"
 STATUS = {"t_s": 1.25, "verdict": "limit-cycle", "oscillation_m": 1.23e-3, "residual_J": 3e-18}
@@ -24,18 +25,6 @@ STATUS = {"t_s": 1.25, "verdict": "limit-cycle", "oscillation_m": 1.23e-3, "resi
 @pytest.fixture(scope="module")
 def swap(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     return run(prepare(SCENES / "swap.toml", out=tmp_path_factory.mktemp("run") / "swap"), in_process=True)
-
-
-def shown(renderable: Any, width: int = 100) -> str:
-    terminal = Console(width=width, file=io.StringIO(), highlight=False)
-    terminal.print(renderable)
-    return terminal.file.getvalue()  # pyright: ignore[reportAttributeAccessIssue]
-
-
-def row(text: str, begins: str) -> list[str]:
-    """The cells of the line that begins with some words."""
-    (line,) = [line for line in text.splitlines() if line.strip().startswith(begins)]
-    return [cell.strip() for cell in line.strip().removeprefix(begins).split("  ") if cell.strip()]
 
 
 @pytest.mark.parametrize("width", [80, 100, 140])

@@ -10,12 +10,12 @@ from typing import Any
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from scene_makers import KINDS, scene
 
 from haploop.launch.batch.run import results_of
 from haploop.tools.linear.one_tick import OneTickMap
 from haploop.tools.search.bisect import Tolerance
 from haploop.tools.sweep.run.boundary import Boundary, Candidate, find_boundaries, verdict_is
+from helpers.scenes.least import KINDS, scene
 
 POINTS = [0.0, 25.0, 50.0, 75.0, 100.0]
 

@@ -13,9 +13,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from scene_makers import scene
-from shown.test_figure import artists
-from sweep.map_makers import cells_of, ran, said, table
 
 from haploop.launch.scene.toml_writer import inline
 from haploop.tools.figure.data import FigureError
@@ -27,6 +24,9 @@ from haploop.tools.sweep.map.axis import Ruler
 from haploop.tools.sweep.map.data import AMPLITUDE, NOT_RUN, VERDICTS, Axis, MapData, data_of
 from haploop.tools.sweep.map.draw.figure import figure_of
 from haploop.tools.sweep.map.draw.look import LOOKS
+from helpers.data.sweep_tables import cells_of, ran, said, table
+from helpers.scenes.least import scene
+from helpers.shown import artists
 
 K, B = "wall.stiffness", "dissipation.0.damping"
 STIFFNESSES, DAMPINGS = [100.0, 200.0, 300.0, 400.0], [0.1, 0.2, 0.5, 1.0, 2.0]

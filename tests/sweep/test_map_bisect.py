@@ -10,8 +10,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from shown.test_figure import artists
-from sweep.map_makers import UNITS, said
 from typer.testing import CliRunner
 
 from haploop.tools.cli.main import app
@@ -21,6 +19,8 @@ from haploop.tools.sweep.map.data import AMPLITUDE, MapData, data_of
 from haploop.tools.sweep.map.draw.bisect import MOST_LINES, bisect_figure
 from haploop.tools.sweep.map.file import draw_map
 from haploop.tools.sweep.table import read
+from helpers.data.sweep_tables import UNITS, said
+from helpers.shown import artists
 
 K, B, KIND = "wall.stiffness", "dissipation.0.damping", "dissipation.0.kind"
 DELAY = "clock.round_trip_delay"

@@ -8,9 +8,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scene_makers import scene
-from shown.test_figure import artists
-from sweep.map_makers import UNITS, cells_of, said, table
 
 from haploop.tools.linear.bounds import bounds_of
 from haploop.tools.linear.one_tick import NotLinear, OneTickMap
@@ -21,6 +18,9 @@ from haploop.tools.sweep.map.lines.bounds import bound_boundaries
 from haploop.tools.sweep.map.lines.contour import zero_lines
 from haploop.tools.sweep.map.lines.limit import EXACT, exact_boundary
 from haploop.tools.sweep.map.plane import Plane, set_key
+from helpers.data.sweep_tables import UNITS, cells_of, said, table
+from helpers.scenes.least import scene
+from helpers.shown import artists
 
 K, B, M, DELAY = "wall.stiffness", "dissipation.0.damping", "dissipation.0.mass", "clock.round_trip_delay"
 WALL = {"position": -0.001, "stiffness": 100.0}

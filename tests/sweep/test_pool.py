@@ -9,8 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from scene_makers import KINDS
-from sweep.makers import of_stiffness, pressed, threads
 
 from haploop.controller.dissipation import PluginError
 from haploop.launch.batch.run import run_array
@@ -18,6 +16,8 @@ from haploop.tools.executor.executors import make_executor, map_parallel
 from haploop.tools.executor.parts import Group, Sizes, cut, grouped
 from haploop.tools.executor.pool import DIED, Pool, results
 from haploop.tools.executor.work import Work, load_kinds
+from helpers.runs.workers import of_stiffness, pressed, threads
+from helpers.scenes.least import KINDS
 
 DEADLY = """
 import math

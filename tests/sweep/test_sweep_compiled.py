@@ -5,7 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from sweep.sweep_files import GRID, swept
+
+from helpers.scenes.sweep_files import GRID, swept
 
 pytest.importorskip("jax")
 

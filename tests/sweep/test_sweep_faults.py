@@ -11,11 +11,10 @@ from pathlib import Path
 
 import pyarrow.parquet
 import pytest
-from faults.conftest import launched as launched
-from faults.launched import Launched, alive, processes, wait_for
-from sweep.sweep_files import PRESS, sweep_file, swept
 
 from haploop.tools.sweep.table import read
+from helpers.live.launched import Launched, alive, processes, wait_for
+from helpers.scenes.sweep_files import PRESS, sweep_file, swept
 
 # Such scenes go into no array: so many take so long that something can be done to the sweep meanwhile.
 SLOW_PRESS = PRESS.replace("duration = 0.05", "duration = 0.5") + '[clock]\nintegrator = "rk4"\n'

@@ -6,14 +6,14 @@ import tomllib
 from pathlib import Path
 
 import pytest
-from scene_makers import KINDS
-from sweep.sweep_files import GRID, PRESS, loaded, mistakes, sweep_file
 
 from haploop.launch.scene.file import load as scene_of
 from haploop.launch.scene.mistakes import SceneError
 from haploop.launch.scene.toml_writer import to_toml
 from haploop.tools.sweep.file.cells import Extra
 from haploop.tools.sweep.file.sweep_file import load
+from helpers.scenes.least import KINDS
+from helpers.scenes.sweep_files import GRID, PRESS, loaded, mistakes, sweep_file
 
 
 def test_axes_hold_si_numbers_with_both_ends(tmp_path: Path) -> None:

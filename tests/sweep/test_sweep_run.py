@@ -10,8 +10,6 @@ from typing import Any
 import numpy as np
 import pyarrow.parquet
 import pytest
-from scene_makers import KINDS
-from sweep.sweep_files import GRID, PRESS, loaded, sweep_file, swept
 
 from haploop.launch.runs.in_process import run_in_process
 from haploop.launch.scene.file import load as load_scene
@@ -24,6 +22,8 @@ from haploop.tools.sweep.run.engine import Engine, Stopped
 from haploop.tools.sweep.run.shown import SweepProgress
 from haploop.tools.sweep.run.store import Store
 from haploop.tools.sweep.table import TableError, read
+from helpers.scenes.least import KINDS
+from helpers.scenes.sweep_files import GRID, PRESS, loaded, sweep_file, swept
 
 RECORD = 'record = ["trajectory_sha256", "energy.residual_J", "window.oscillation_m", "ticks", "final.x_m"]\n'
 BISECT = '[bisect]\naxis = "wall.stiffness"\ntolerance = "8 N/m"\nholds = "no-contact"\n'

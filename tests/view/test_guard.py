@@ -5,12 +5,12 @@ from functools import wraps
 
 import aiohttp
 import pytest
-from view.browsing import site, to_its_end
 
 from haploop.view.receive.runs import CommandFailed
 from haploop.view.serve import assets
 from haploop.view.serve.guard import Guard
 from haploop.view.serve.program import PortTaken, listen
+from helpers.live.browsing import site, to_its_end
 
 
 class NoRuns:

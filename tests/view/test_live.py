@@ -7,11 +7,11 @@ import signal
 
 import numpy as np
 import pytest
-from live_run import going, undisturbed
-from view.browsing import site, to_its_end
 
 from haploop.launch.errors import RunFailed
 from haploop.logger import read
+from helpers.live.browsing import site, to_its_end
+from helpers.live.live_run import going, undisturbed
 
 TOUCHING = ("wall.position=-0.001", "duration=600", "run.deadline=30")
 

@@ -4,7 +4,6 @@ import math
 
 import numpy as np
 import pytest
-from view.browsing import decode
 
 from haploop.protocol.ticks import Timebase
 from haploop.view.draw.snapshot import picture
@@ -12,6 +11,7 @@ from haploop.view.receive.at_work import at_work
 from haploop.view.receive.event_lines import event_lines
 from haploop.view.serve.watch import Watch
 from haploop.view.store.history import History
+from helpers.live.browsing import decode
 
 TIME = Timebase(10_000, 1_000, 0, 100_000)
 WALL = {"position": 0.0, "stiffness": 100.0, "into_wall": -1.0}

@@ -13,10 +13,10 @@ from typing import Any
 
 import aiohttp
 import pytest
-from faults.conftest import launched as launched
-from faults.launched import SCENE, Launched, alive, command, processes, wait_for
-from live_run import going, undisturbed
-from view.browsing import Tab, stream, to_its_end
+
+from helpers.live.browsing import Tab, stream, to_its_end
+from helpers.live.launched import SCENE, Launched, alive, command, processes, wait_for
+from helpers.live.live_run import going, undisturbed
 
 LINK = re.compile(r"(http://127\.0\.0\.1:\d+)/#token=(\S+)")
 

@@ -16,7 +16,7 @@ from haploop.launch.processes.run_directory import LiveRun
 from haploop.launch.runs.in_process import run_in_process
 from haploop.launch.runs.start import Prepared, prepare, run
 
-SCENE = Path(__file__).parents[1] / "launch" / "scenes" / "fig6c.toml"
+SCENE = Path(__file__).parents[3] / "launch" / "scenes" / "fig6c.toml"
 
 
 class Going:

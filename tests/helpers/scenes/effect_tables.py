@@ -7,7 +7,8 @@ from itertools import combinations
 from typing import Any
 
 import pytest
-from scene_makers import scene
+
+from helpers.scenes.least import scene
 
 EFFECTS: dict[str, dict[str, Any]] = {
     "friction": {"friction": {"kinetic": 0.04, "breakaway": 0.05}},

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from physics.reference import Controller, Mechanics, hand_force_N
+
+from oracles.reference import Controller, Mechanics, hand_force_N
 
 
 @dataclass

@@ -7,8 +7,9 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from physics.effects_reference import Bodies
-from physics.reference import Controller, hand_force_N
+
+from oracles.effects_reference import Bodies
+from oracles.reference import Controller, hand_force_N
 
 
 class EffectsTruth:

@@ -20,7 +20,7 @@ from haploop.logger import read
 from haploop.logger.log.recording import Recording
 from haploop.protocol.processes import PROCESSES
 
-SCENES = Path(__file__).parents[2] / "launch/scenes"
+SCENES = Path(__file__).parents[3] / "launch/scenes"
 SCENE = SCENES / "fig6c.toml"
 HAPLOOP = [sys.executable, "-m", "haploop.tools.cli"]
 # So long that it surely goes on while a test does something to it.

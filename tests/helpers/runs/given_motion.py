@@ -5,13 +5,13 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from scene_makers import KINDS
 
 from haploop.controller.controller import Controller
 from haploop.logger.logger import Logger
 from haploop.logger.summary import energy
 from haploop.plant.sensing.encoder import encoder
 from haploop.protocol.ticks import Timebase
+from helpers.scenes.least import KINDS
 
 
 def books_along(scene: dict[str, Any], x: np.ndarray) -> tuple[dict[str, np.ndarray], dict[str, Any]]:

@@ -6,11 +6,11 @@ import math
 from typing import Any
 
 import pytest
-from arrays.makers import pressed
-from scene_makers import KINDS
 
 from haploop.controller.dissipation import Element
 from haploop.launch.batch.jax.run import results_of_compiled
+from helpers.runs.batches import pressed
+from helpers.scenes.least import KINDS
 
 jax = pytest.importorskip("jax")
 

@@ -6,12 +6,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scene_makers import KINDS
 
 from haploop.launch.runs.in_process import Loop, scene_events
 from haploop.logger.logger import Block, Logger
 from haploop.logger.session import Keeper
 from haploop.protocol.ticks import Timebase
+from helpers.scenes.least import KINDS
 
 
 @dataclass
@@ -96,3 +96,26 @@ def _joined_rows(blocks: list[Block]) -> tuple[dict[str, np.ndarray], dict[int, 
             force = forces.setdefault(element["book"], np.zeros(ticks))
             force[covered] = np.frombuffer(block["columns"][f"dissipation.{index}"])
     return rows, forces
+
+
+OF_THE_MACHINE = ("wall_s", "real_time_factor", "versions")
+
+
+def of_the_scene(summary: dict[str, Any]) -> dict[str, Any]:
+    """The summary but for what differs between two runs of the same scene."""
+    return {name: value for name, value in summary.items() if name not in OF_THE_MACHINE}
+
+
+def in_blocks(scene: dict[str, Any], block_ticks: int, window_blocks: int = 1) -> dict[str, Any]:
+    cut = {"block_ticks": block_ticks, "window_blocks": window_blocks}
+    return of_the_scene(summarise(scene | {"run": scene["run"] | cut}))
+
+
+def bodies(ran: Captured) -> dict[str, np.ndarray]:
+    """Positions of all bodies at the steps, from the first to the last, by name."""
+    plant = ran.plant
+    x = {"body 0": plant["x"]}
+    for link in ("cable", "grip"):
+        if f"{link}.stretch" in plant:
+            x[link] = list(x.values())[-1] + plant[f"{link}.stretch"]
+    return x

@@ -5,8 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from physics.reference_run import Truth, simulate
-from scene_makers import scene
+
+from helpers.scenes.least import scene
+from oracles.reference_run import Truth, simulate
 
 DELAYS = (0, 3, 10, 20, 25, 50)
 RATES = ((10_000, 1_000), (10_000, 2_000), (8_000, 500), (5_000, 5_000), (12_000, 1_500))
@@ -111,3 +112,7 @@ def _events(rng: np.random.Generator, kinds: list[dict[str, Any]], count: int) -
         {"at": 0.0817, "set": {"wall.stiffness": 120.0, f"dissipation.{slot}.{parameter}": new[parameter] / 2}},
         {"at": 0.12, "element": slot, "swap": {"kind": "none"}},
     ]
+
+
+def log_uniform(rng: np.random.Generator, low: float, high: float) -> float:
+    return float(np.exp(rng.uniform(np.log(low), np.log(high))))

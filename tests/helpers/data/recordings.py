@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scene_makers import KINDS
 
 from haploop.tools.dissipate.booking import Booking
 from haploop.tools.dissipate.command import Request, dissipation_of
@@ -15,6 +14,7 @@ from haploop.tools.dissipate.outcome import Outcome
 from haploop.tools.dissipate.samples import Floats, Samples
 from haploop.tools.dissipate.setting import Asked, setting_of_text
 from haploop.tools.dissipate.text_recording import Layout
+from helpers.scenes.least import KINDS
 
 PERIOD_S = 1e-3
 

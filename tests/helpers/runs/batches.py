@@ -6,12 +6,12 @@ import math
 from typing import Annotated, Any
 
 import numpy as np
-from scene_makers import KINDS, scene
 
 from haploop.controller.dissipation import Element, Motion, Quantity
 from haploop.launch.batch.batch import LoopArray
 from haploop.launch.runs.in_process import run_in_process
 from haploop.logger.summary import OF_THE_MACHINE
+from helpers.scenes.least import KINDS, scene
 
 PUSH = {"mass": 0.01, "stiffness": 10.0, "damping": 0.01, "force": {"kind": "ramp", "value": -0.8, "rise_time": 0.05}}
 

@@ -5,8 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from physics.random_scenes import tables_of
-from scene_makers import scene
+
+from helpers.scenes.least import scene
+from helpers.scenes.random_scenes import tables_of
 
 # Numbers that scenes of one structure share.
 _SHARED = {"clock", "duration", "at", "delay", "time", "run", "diverged_beyond"}

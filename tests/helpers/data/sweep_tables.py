@@ -6,11 +6,10 @@ import itertools
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from scene_makers import KINDS
-
 from haploop.launch.batch.run import run_array
 from haploop.launch.scene.toml_writer import to_toml
 from haploop.tools.sweep.map.data import AMPLITUDE, MapData, data_of
+from helpers.scenes.least import KINDS
 
 UNITS = {
     "wall.stiffness": "N/m",

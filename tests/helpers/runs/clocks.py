@@ -3,10 +3,9 @@
 import math
 from typing import Any
 
-from scene_makers import KINDS, WALL, scene
-
 from haploop.launch.clock.clock import Clock
 from haploop.protocol.ticks import Timebase
+from helpers.scenes.least import KINDS, WALL, scene
 
 DAMPING = {"kind": "damping", "damping": 0.5}
 SWAP = {"swap": DAMPING, "element": 0}

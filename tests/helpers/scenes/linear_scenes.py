@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from scene_makers import scene
+
+from helpers.scenes.least import scene
 
 DELAYS = (0, 3, 10, 13, 20, 37)
 RATES = ((10_000, 1_000), (10_000, 2_000), (8_000, 500), (5_000, 5_000), (12_000, 1_500))

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from physics.effects_reference import Bodies
-from physics.one_tick_map import OneTickMap
+
+from oracles.effects_reference import Bodies
+from oracles.one_tick_map import OneTickMap
 
 
 @dataclass(frozen=True)

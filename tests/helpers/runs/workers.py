@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from typing import Any
 
-from scene_makers import scene
+from helpers.scenes.least import scene
 
 PUSH = {"mass": 0.01, "stiffness": 10.0, "damping": 0.01, "force": {"kind": "ramp", "value": -0.8, "rise_time": 0.02}}
 

@@ -10,9 +10,10 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from physics.effects_reference import Bodies
-from scene_makers import scene
 from scipy.linalg import expm
+
+from helpers.scenes.least import scene
+from oracles.effects_reference import Bodies
 
 RATE, STEPS = 2_000, 100
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(10)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from physics.captured import Captured
+
+from helpers.runs.captured import Captured
 
 
 def friction_heats(ran: Captured) -> np.ndarray:

@@ -13,7 +13,7 @@ from typing import Any
 
 from aiohttp import WSMsgType, web
 
-STATIC = Path(__file__).parents[2] / "nodes/haploop/view/serve/static"
+STATIC = Path(__file__).parents[3] / "nodes/haploop/view/serve/static"
 TOKEN = "a-token"
 HEADERS = {"Content-Security-Policy": "default-src 'self'", "Cache-Control": "no-store"}
 QUANTITY = {"at_least": None, "above": None, "at_most": None, "below": None}

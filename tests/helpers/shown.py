@@ -1,0 +1,25 @@
+"""What a figure and a terminal show, taken apart."""
+
+from __future__ import annotations
+
+import io
+from typing import Any
+
+from rich.console import Console
+
+
+def artists(figure: Any, name: str) -> list[Any]:
+    """Everything drawn under a name, in the order of drawing."""
+    return [one for one in figure.findobj() if one.get_gid() == name]
+
+
+def shown(renderable: Any, width: int = 100) -> str:
+    terminal = Console(width=width, file=io.StringIO(), highlight=False)
+    terminal.print(renderable)
+    return terminal.file.getvalue()  # pyright: ignore[reportAttributeAccessIssue]
+
+
+def row(text: str, begins: str) -> list[str]:
+    """The cells of the line that begins with some words."""
+    (line,) = [line for line in text.splitlines() if line.strip().startswith(begins)]
+    return [cell.strip() for cell in line.strip().removeprefix(begins).split("  ") if cell.strip()]
