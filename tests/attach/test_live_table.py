@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from rich.console import Console
 
+from haploop.protocol.changes import describe
 from haploop.protocol.wire import Frame
 from haploop.tools.attach.live_table import ending, live_line, live_table
 from haploop.tools.attach.print import Lines
 from haploop.tools.attach.watched import Watched
-from haploop.tools.render.event_words import event_words
 
 WELCOME = {
     "scene": {"title": "a tap on a wall [of 0.15 N/mm]"},
@@ -153,13 +153,13 @@ def test_a_change_is_shown_with_its_time_and_tick_whatever_is_in_its_words() -> 
         ({"set": {"wall.stiffness": 200.0, "clock.round_trip_delay": 0.002}}, "set wall.stiffness = 200, clock.round"),
         ({"pace": 0.1}, "pace 0.1"),
         ({"pace": "free"}, "as fast as it goes"),
-        ({"pause": True, "at": 0.5}, "pause"),
-        ({"step": 10}, "step"),
-        ({"stop": True, "by": "signal"}, "stop"),
+        ({"pause": True, "at": 0.5}, "paused"),
+        ({"step": 10}, "10 ticks on"),
+        ({"stop": True, "by": "signal"}, "stopped"),
     ],
 )
 def test_every_kind_of_event_has_its_words(event: dict[str, Any], words: str) -> None:
-    assert event_words(event).startswith(words)
+    assert describe(event).startswith(words)
 
 
 def summary(**changes: Any) -> dict[str, Any]:
@@ -209,6 +209,6 @@ def test_into_a_pipe_go_lines_one_for_every_change_and_none_twice(capsys: pytest
     subject.end("", summary())
     lines.show(subject)
     rest = capsys.readouterr().out.splitlines()
-    assert [line.split("  ")[:2] for line in first] == [["1.000 s", "pause"], ["1.250 s", "x −61.2 mm"]]
+    assert [line.split("  ")[:2] for line in first] == [["1.000 s", "paused"], ["1.250 s", "x −61.2 mm"]]
     assert [line.split("  ")[1] for line in rest] == ["resume", "x −61.2 mm"]
     assert "steady" in rest[-1]

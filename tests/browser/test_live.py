@@ -63,7 +63,7 @@ def test_a_swap_in_mid_contact_takes_effect_at_its_tick_is_marked_and_stands_in_
     page.keyboard.press("Escape")
     page.click("[data-step='100']")
     stands_at(page, 1100)
-    expect(page.locator("#events")).to_contain_text("tick 1000 element 0 becomes damping (0.8 N s/m)")
+    expect(page.locator("#events")).to_contain_text("tick 1000 element 0 becomes damping (damping 0.8 N s/m)")
     expect(page.locator("#force .legend")).to_contain_text("0: damping")
     expect(page.locator("[id='set-dissipation.0.damping']")).to_have_value("0.8")
     run.ask("stop")

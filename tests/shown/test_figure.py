@@ -187,9 +187,10 @@ def test_a_change_that_was_refused_leaves_history_as_it_was() -> None:
     scene = {"dissipation": [{"kind": "damping", "damping": 1.0}]}
     swap = {"tick": 5, "timestamp": 0.005, "element": 0, "swap": {"kind": "none"}}
     refusal = {
-        "tick": 5,
-        "timestamp": 0.005,
-        "refused": "swap of element 0 to none at tick 5 was refused: ValueError: no",
+        "tick": 7,
+        "timestamp": 0.007,
+        "refused": "No.",
+        "change": {"tick": 5, "element": 0, "swap": swap["swap"]},
     }
     assert [span.to_tick for span in History(scene, [swap]).elements] == [5]
     assert [span.to_tick for span in History(scene, [swap, refusal]).elements] == [np.inf]

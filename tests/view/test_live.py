@@ -185,8 +185,8 @@ def test_commands_of_the_page_reach_the_run_and_what_took_effect_is_told_with_it
         told = [(event["tick"], event["kind"], event["text"]) for event in tab.events]
         assert told[:4] == [
             (500, "pause", "paused"),
-            (500, "swap", "element 0 becomes damping (0.8 N s/m)"),
-            (500, "set", "wall.stiffness = 200 N/m, clock.round_trip_delay = 0.001 s"),
+            (500, "swap", "element 0 becomes damping (damping 0.8 N s/m)"),
+            (500, "set", "set wall.stiffness = 200 N/m, clock.round_trip_delay = 0.001 s"),
             (500, "step", "7 ticks on"),
         ]
         assert tuple(kind for _, kind, _ in told[4:6]) == ("pace", "resume")

@@ -5,9 +5,10 @@ import math
 import numpy as np
 import pytest
 
+from haploop.protocol.changes import changes_of, spans
 from haploop.protocol.ticks import Timebase
 from haploop.view.draw.snapshot import picture
-from haploop.view.receive.at_work import at_work
+from haploop.view.receive.at_work import elements_of, wall_of
 from haploop.view.receive.event_lines import event_lines
 from haploop.view.serve.watch import Watch
 from haploop.view.store.history import History
@@ -105,7 +106,8 @@ def test_a_swap_and_a_set_change_what_is_at_work_from_their_tick_on_and_a_refuse
         (8, {"swap": {"kind": "none"}, "element": 0}),
     ]
     found = [
-        (span.from_tick, [e["kind"] for e in span.elements], span.wall["stiffness"]) for span in at_work(scene, events)
+        (span.from_tick, [e["kind"] for e in elements_of(span.scene)], wall_of(span.scene)["stiffness"])
+        for span in spans(scene, changes_of(events))
     ]
     assert found == [
         (0, ["damping"], 5.0),
@@ -113,8 +115,9 @@ def test_a_swap_and_a_set_change_what_is_at_work_from_their_tick_on_and_a_refuse
         (5, ["damping", "inertia"], 7.0),
         (8, ["inertia"], 7.0),
     ]
-    assert at_work(scene, events)[1].elements[0]["parameters"] == {"damping": 2.0, "acts": "always"}
-    assert at_work(scene, [])[0].wall == {"position": 0.1, "stiffness": 5.0, "into_wall": 1.0}
+    set_scene = spans(scene, changes_of(events))[1].scene
+    assert elements_of(set_scene)[0]["parameters"] == {"damping": 2.0, "acts": "always"}
+    assert wall_of(scene) == {"position": 0.1, "stiffness": 5.0, "into_wall": 1.0}
 
 
 DAMPING = {"swap": {"kind": "damping", "damping": 0.8, "acts": "in-contact"}}
@@ -124,17 +127,17 @@ ALWAYS = {"swap": {"kind": "damping", "damping": 0.8, "acts": "always"}}
 @pytest.mark.parametrize(
     ("event", "text"),
     [
-        (DAMPING | {"element": 1}, "element 1 becomes damping (0.8 N s/m)"),
-        (ALWAYS, "element 0 becomes damping (0.8 N s/m, acts always)"),
-        ({"swap": {"kind": "none"}, "element": 2}, "element 2 removed"),
-        ({"set": {"wall.stiffness": 200.0}}, "wall.stiffness = 200 N/m"),
+        (DAMPING | {"element": 1}, "element 1 becomes damping (damping 0.8 N s/m)"),
+        (ALWAYS, "element 0 becomes damping (damping 0.8 N s/m, always)"),
+        ({"swap": {"kind": "none"}, "element": 2}, "element 2 is removed"),
+        ({"set": {"wall.stiffness": 200.0}}, "set wall.stiffness = 200 N/m"),
         ({"pause": True}, "paused"),
         ({"resume": True}, "resumed"),
         ({"step": 1}, "1 tick on"),
         ({"step": 7}, "7 ticks on"),
         ({"stop": True, "by": "signal"}, "stopped"),
-        ({"pace": 0.1}, "pace 0.1×"),
-        ({"pace": "free"}, "pace free"),
+        ({"pace": 0.1}, "pace 0.1"),
+        ({"pace": "free"}, "as fast as it goes"),
         ({"refused": "No."}, "No."),
     ],
 )  # fmt: skip

@@ -7,11 +7,12 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from haploop.controller.active_elements import Slots
-from haploop.controller.changes import Change, apply_change
+from haploop.controller.changes import apply_change
 from haploop.controller.dissipation import Element, ElementError, Motion
 from haploop.controller.estimators.choose import Sample, estimators
 from haploop.controller.recorder import MOTION_COLUMNS, Recorder
 from haploop.controller.wall import NoWall, Wall
+from haploop.protocol.changes import Change, Event
 from haploop.protocol.ticks import DELAY, Timebase
 
 
@@ -34,7 +35,7 @@ class Controller:
         self._wall = Wall(scene["wall"]) if "wall" in scene else NoWall()
         self._slots = Slots(scene.get("dissipation", []), self._kinds)
         self._motion = Motion(time.period_s, self._wall.into_wall)
-        self._changes: list[tuple[int, Change]] = []
+        self._changes: list[Change] = []
         self._next_change = math.inf
         self.recorder = Recorder(self._wall, self._slots, history_ticks=time.lookahead_ticks + 2)
         self.tick = 0
@@ -44,12 +45,13 @@ class Controller:
         """Direction that leads into the wall, 0.0 without one."""
         return self._motion.into_wall
 
-    def schedule(self, tick: int, change: Change) -> None:
+    def schedule(self, tick: int, event: Event) -> None:
         """Have a checked swap or set take effect at ``tick``, before that tick's force."""
-        if DELAY in (values := change.get("set", {})):
-            self.recorder.cover(math.ceil(values[DELAY] * self._control_rate) + 2)
-        self._changes.append((tick, change))
-        self._next_change = self._changes[0][0]
+        change = Change.from_dict(tick, event)
+        if DELAY in change.set:
+            self.recorder.cover(math.ceil(change.set[DELAY] * self._control_rate) + 2)
+        self._changes.append(change)
+        self._next_change = self._changes[0].tick
 
     def answer(self, samples: Sequence[Sample]) -> list[float]:
         """The commands in N that answer the next samples, in order.
@@ -92,9 +94,9 @@ class Controller:
     def _change(self) -> None:
         """Carry out what is due; later ticks are written to a new block, since its columns may differ."""
         self.recorder.cut()
-        while self._changes and self._changes[0][0] <= self.tick:
-            refusal = apply_change(self._changes.pop(0)[1], self.tick, self._slots, self._wall, self._kinds)
+        while self._changes and self._changes[0].tick <= self.tick:
+            refusal = apply_change(self._changes.pop(0), self._slots, self._wall, self._kinds)
             if refusal:
                 self.recorder.refused.append(refusal)
-        self._next_change = self._changes[0][0] if self._changes else math.inf
+        self._next_change = self._changes[0].tick if self._changes else math.inf
         self.recorder.open()

@@ -11,6 +11,7 @@ import zmq
 from haploop.controller.controller import Controller
 from haploop.controller.dissipation import ElementError, PluginError, registry
 from haploop.protocol.block_length import BlockLength
+from haploop.protocol.changes import is_change, refusals_as_status
 from haploop.protocol.clock_client import ClockClient
 from haploop.protocol.loop import ControllerEnd
 from haploop.protocol.node import NodeError, run_node
@@ -68,7 +69,7 @@ class ControllerNode:
 
     def _schedule(self) -> None:
         for tick, event in self._client.take_events():
-            if "swap" in event or "set" in event:
+            if is_change(event):
                 self._controller.schedule(tick, event)
 
     def _end(self) -> tuple[int, dict[str, Any]]:
@@ -86,7 +87,7 @@ class ControllerNode:
         self._publisher.serve()
         self._reported = self._controller.tick
         refused, recorder.refused = recorder.refused, []
-        self._client.progress(self._reported, {"refused": refused} if refused else None)
+        self._client.progress(self._reported, refusals_as_status(refused))
         self._block.next()
 
     def _await_plant(self) -> None:

@@ -8,6 +8,7 @@ from typing import Any
 
 from haploop.controller.active_elements import Slots
 from haploop.controller.wall import Wall
+from haploop.protocol.changes import Change
 
 Block = dict[str, Any]
 MOTION_COLUMNS = ("x", "v", "a", "wall")
@@ -21,7 +22,7 @@ class Recorder:
 
     Attributes:
         add: takes the row of one tick.
-        refused: changes that could not be carried out, as sentences.
+        refused: changes that could not be carried out.
         history: the newest blocks taken, covering every command that may still be in flight.
         trouble: the element that first gave a force which is no finite number, as a sentence, or None.
     """
@@ -30,7 +31,7 @@ class Recorder:
         self._wall, self._slots = wall, slots
         self._history_ticks = history_ticks
         self._cut: list[Block] = []
-        self.refused: list[str] = []
+        self.refused: list[Change] = []
         self.history: list[Block] = []
         self.trouble: str | None = None
         self._next_tick = 0

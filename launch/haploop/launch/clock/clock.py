@@ -9,13 +9,11 @@ from typing import TYPE_CHECKING, Any
 
 from haploop.launch.scene.check import resolve_event
 from haploop.launch.scene.elements import swapped_in, try_out
-from haploop.launch.scene.events import changed
+from haploop.protocol.changes import Event, at_work, changes_of
 from haploop.protocol.ticks import Timebase
 
 if TYPE_CHECKING:
     from haploop.controller.dissipation import Element
-
-Event = dict[str, Any]
 
 # At a given pace, time is granted this far ahead of the wall clock.
 AHEAD_S = 0.02
@@ -209,7 +207,7 @@ class Clock:
 
     def present(self) -> dict[str, Any]:
         """The scene as it stands at the first tick not yet granted: everything that has taken effect done to it."""
-        return changed(self._scene, [event for tick, event in self.events if tick <= self.until])
+        return at_work(self._scene, [change for change in changes_of(self.events) if change.tick <= self.until])
 
     def stop(self) -> int:
         """End the run at the first tick not yet granted; returns it."""

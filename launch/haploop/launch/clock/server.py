@@ -12,6 +12,7 @@ import zmq
 from haploop.launch.clock.clock import Clock
 from haploop.launch.clock.roster import Node, Roster
 from haploop.launch.errors import RunFailed
+from haploop.protocol.changes import refusals_of
 from haploop.protocol.processes import PROCESSES
 from haploop.protocol.sockets import bind, has_message, open_socket
 from haploop.protocol.wire import Frame, WireError, decode, encode
@@ -197,8 +198,8 @@ class ClockServer:
         node.tick = max(node.tick, tick)
         node.status = status or node.status
         if node.role == "controller":
-            for refusal in status.get("refused", []):
-                self._clock.note({"refused": refusal})
+            for refusal in refusals_of(status):
+                self._clock.note(refusal)
 
     def _on_waiting(self, node: Node, tick: int, on: str) -> None:
         node.waits_for = on

@@ -12,13 +12,13 @@ from haploop.launch.errors import RunFailed
 from haploop.logger.session import Keeper, open_keeper
 from haploop.plant.plant import Plant
 from haploop.protocol.block_length import BlockLength
+from haploop.protocol.changes import Event, is_change, refusal
 from haploop.protocol.ticks import Timebase
 
 if TYPE_CHECKING:
     from haploop.controller.dissipation import Element
     from haploop.logger.log.memory import MemoryLog
 
-Event = dict[str, Any]
 Progress = Callable[[dict[str, Any]], None]
 
 
@@ -86,7 +86,7 @@ class Loop:
         """Have events take effect at their ticks."""
         for tick, event in events:
             self._keeper.logger.event(tick, event)
-            if "swap" in event or "set" in event:
+            if is_change(event):
                 self._controller.schedule(tick, event)
                 self._plant.schedule(tick, event)
             elif event.get("stop"):
@@ -108,8 +108,8 @@ class Loop:
             logger.plant_block({"from_tick": first, "ticks": ticks, "columns": columns})
         for block in self._controller.recorder.take():
             logger.controller_block(block)
-        for refusal in self._controller.recorder.refused:
-            logger.event(self._controller.tick, {"refused": refusal})
+        for change in self._controller.recorder.refused:
+            logger.event(self._controller.tick, refusal(change))
         self._controller.recorder.refused = []
 
     def end_here(self) -> None:

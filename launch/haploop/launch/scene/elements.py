@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
 from haploop.controller.active_elements import make_element
-from haploop.launch.scene.events import NO_ELEMENT
+from haploop.protocol.changes import NO_ELEMENT
 
 if TYPE_CHECKING:
     from haploop.controller.dissipation import Element

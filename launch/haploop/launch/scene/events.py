@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from pydantic_core import PydanticCustomError
@@ -11,6 +11,7 @@ from haploop.launch.scene.layers import KeyPath, Layers
 from haploop.launch.scene.mistakes import counted, nearest
 from haploop.launch.scene.tables.models import EventModel, number_in, number_of
 from haploop.launch.scene.tables.number import Number
+from haploop.protocol.changes import NO_ELEMENT
 from haploop.protocol.scene.scene import Clock, Wall
 from haploop.protocol.ticks import DELAY, Timebase, whole_count
 
@@ -19,7 +20,6 @@ if TYPE_CHECKING:
 
 VERBS = ("swap", "set", "pause", "stop")
 SETTABLE_OF_WALL = ("stiffness", "position")
-NO_ELEMENT = "none"
 
 
 def check_events(
@@ -113,21 +113,6 @@ def _setting(
                 layers.complain(key, sentence)
         return value
     return None
-
-
-def changed(scene: dict[str, Any], events: Iterable[dict[str, Any]]) -> dict[str, Any]:
-    """A resolved scene after these resolved events, in order: elements swapped, values set."""
-    now = {**scene, "clock": dict(scene["clock"]), "dissipation": [dict(e) for e in scene.get("dissipation", [])]}
-    now |= {"wall": dict(scene["wall"])} if "wall" in scene else {}
-    for event in events:
-        if "swap" in event:
-            index, table = event["element"], event["swap"]
-            now["dissipation"][index : index + 1] = [] if table["kind"] == NO_ELEMENT else [dict(table)]
-        for key, value in event.get("set", {}).items():
-            table, _, name = key.rpartition(".")
-            place, _, index = table.partition(".")
-            (now[place][int(index)] if index else now[place])[name] = value
-    return now
 
 
 def _nearest_key(name: str, settable: dict[str, Number]) -> str | None:

@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 
 from haploop.logger.log.stream import Batch, LogStream
+from haploop.protocol.changes import Event, Span, changes_of, spans
 from haploop.protocol.ticks import Timebase
-from haploop.view.receive.at_work import AtWork, Event, at_work
+from haploop.view.receive.at_work import elements_of, wall_of
 from haploop.view.store.history import TRUE, History
 
 _POSITIONS = ("x", "tip_x", "hand_x")
@@ -33,7 +34,7 @@ class Past:
         self._every_step = scene["run"]["log"] == "steps"
         self._log: LogStream | None = None
         self._known_events = -1
-        self._at_work: list[AtWork] = []
+        self._at_work: list[Span] = []
         self.history = History(time, 0)
 
     def read(self) -> None:
@@ -59,8 +60,8 @@ class Past:
             return
         for first, end, span in self._spans(tick, tick + len(rows["timestamp"])):
             columns = {name: column[first - tick : end - tick] for name, column in rows.items()}
-            elements = [element for i, element in enumerate(span.elements) if f"dissipation.{i}" in rows]
-            self.history.controlled(first, columns, elements, span.wall)
+            elements = [element for i, element in enumerate(elements_of(span.scene)) if f"dissipation.{i}" in rows]
+            self.history.controlled(first, columns, elements, wall_of(span.scene))
 
     def _plant(self, rows: dict[str, np.ndarray]) -> None:
         """Steps of whole ticks, after which the end state of the run may follow."""
@@ -74,14 +75,13 @@ class Past:
         if whole < len(rows["t"]):
             self.history.ended(tick + whole // n, {name: column[whole:] for name, column in columns.items()})
 
-    def _spans(self, tick: int, end: int) -> Iterator[tuple[int, int, AtWork]]:
+    def _spans(self, tick: int, end: int) -> Iterator[tuple[int, int, Span]]:
         """What was at work within some ticks: (from, to, what)."""
         if len(self._events) != self._known_events:
             self._known_events = len(self._events)
-            self._at_work = at_work(self._scene, self._events)
-        ends = [span.from_tick for span in self._at_work[1:]] + [end]
-        for span, span_end in zip(self._at_work, ends, strict=True):
-            first, last = max(tick, span.from_tick), min(end, span_end)
+            self._at_work = spans(self._scene, changes_of(self._events))
+        for span in self._at_work:
+            first, last = max(tick, span.from_tick), int(min(end, span.to_tick))
             if first < last:
                 yield first, last, span
 

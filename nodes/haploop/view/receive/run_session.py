@@ -11,10 +11,11 @@ from typing import Any
 
 import zmq
 
+from haploop.protocol.changes import at_work, changes_of
 from haploop.protocol.clock_client import Aborted, Refused
 from haploop.protocol.observer import Observer
 from haploop.protocol.ticks import DELAY, Timebase
-from haploop.view.receive.at_work import at_work
+from haploop.view.receive.at_work import elements_of, wall_of
 from haploop.view.receive.ingest import hear
 from haploop.view.receive.runs import Run
 from haploop.view.store.history import History
@@ -78,8 +79,8 @@ class Followed:
         self.status |= hear(self.history, frames)
         self._note_events()
         if not self.history.wall:
-            now_at_work = at_work(self.scene, self.events)[-1]
-            self.history.works(now_at_work.elements, now_at_work.wall)
+            now = at_work(self.scene, changes_of(self.events))
+            self.history.works(elements_of(now), wall_of(now))
         self.skipped_ticks = sum(self._observer.skipped.values())
         self._count_time()
         if "logger" in self._observer.ended:

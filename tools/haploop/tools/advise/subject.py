@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from haploop.launch.scene.file import resolved
 from haploop.launch.scene.layers import Layers, read_layers
 from haploop.launch.scene.mistakes import nearest
+from haploop.protocol.changes import at_work, changes_of
 from haploop.tools.advise.limits.tasks import MOST_DELAY_S
 from haploop.tools.cost.grid import scenes_folder
 
@@ -86,22 +87,9 @@ def subject(
 
 
 def settled(scene: dict[str, Any]) -> dict[str, Any]:
-    """The scene with its swaps and sets done from the start, and without events."""
-    from haploop.launch.scene.layers import Layers
-    from haploop.launch.scene.overrides import lay_overrides
-    from haploop.launch.scene.toml_writer import inline
-
-    layers = Layers(Path(scene["title"]), {key: value for key, value in scene.items() if key != "event"})
-    elements = list(scene.get("dissipation", []))
-    for event in scene["event"]:
-        if "swap" in event:
-            elements[event["element"] : event["element"] + 1] = [event["swap"]]
-            layers.data["dissipation"] = elements
-        lay_overrides(layers, [f"{key}={inline(value)}" for key, value in event.get("set", {}).items()])
-    left = [table for table in elements if table["kind"] != "none"]
-    return {key: value for key, value in layers.data.items() if key != "dissipation"} | (
-        {"dissipation": left} if left else {}
-    )
+    """Returns the scene with its swaps and sets made from the start, and without events."""
+    made = at_work(scene, changes_of([(0, event) for event in scene["event"]]))
+    return {key: value for key, value in made.items() if key != "event" and value != []}
 
 
 def presets(folder: str) -> dict[str, Path]:

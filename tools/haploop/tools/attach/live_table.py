@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from haploop.protocol.changes import describe
 from haploop.tools.attach.watched import Watched
 from haploop.tools.render.amounts import amount, fixed
-from haploop.tools.render.event_words import event_words
 from haploop.tools.render.report import VERDICT_STYLES
 
 if TYPE_CHECKING:
@@ -90,7 +90,7 @@ def _figures(watched: Watched) -> Table:
     grid.add_row("skipped", Text(f"{watched.skipped_ticks} ticks", "yellow" if watched.skipped_ticks else ""))
     if watched.changes:
         tick, event = watched.changes[-1]
-        words = f"{event_words(event)}, at {tick / watched.time.control_rate:g} s (tick {tick})"
+        words = f"{describe(event)}, at {tick / watched.time.control_rate:g} s (tick {tick})"
         grid.add_row("last change", Text(words))
     return grid
 

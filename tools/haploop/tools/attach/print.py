@@ -8,12 +8,12 @@ import time
 from collections.abc import Callable, Iterator
 
 from haploop.launch.processes import run_directory
+from haploop.protocol.changes import describe
 from haploop.protocol.clock_client import Refused
 from haploop.tools.attach.following import Following, summary_of
 from haploop.tools.attach.live_table import ending, live_line, live_table
 from haploop.tools.attach.watched import Watched
 from haploop.tools.cli.exit_codes import FAILED, WRONG_USE, leave
-from haploop.tools.render.event_words import event_words
 from haploop.tools.render.report import console
 
 ROLE = "print"
@@ -76,7 +76,7 @@ class Lines:
     def show(self, watched: Watched) -> None:
         """Print what is due."""
         for tick, event in watched.changes[self._told :]:
-            print(f"{tick / watched.time.control_rate:.3f} s  {event_words(event)}", flush=True)
+            print(f"{tick / watched.time.control_rate:.3f} s  {describe(event)}", flush=True)
         self._told = len(watched.changes)
         now = time.monotonic()
         if watched.ended or (watched.tick != self._tick and now >= self._due):

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass, replace
 from typing import Any
 
-from haploop.controller.changes import describe
+from haploop.protocol.changes import changes_of, spans
 
 
 @dataclass
@@ -47,48 +47,44 @@ class History:
     """
 
     def __init__(self, scene: dict[str, Any], events: list[dict[str, Any]]) -> None:
-        wall = scene.get("wall")
-        self.walls = [WallSpan(0, wall["position"], wall["stiffness"])] if wall else []
-        self.into_wall = 1.0 if wall and wall.get("occupies") == "above" else -1.0
+        self.walls: list[WallSpan] = []
+        self.into_wall = 1.0 if scene.get("wall", {}).get("occupies") == "above" else -1.0
         self.elements: list[ElementSpan] = []
-        self._at_work: list[ElementSpan] = []
-        for table in scene.get("dissipation", []):
-            self._place(len(self._at_work), table, 0)
-        refused = [event["refused"] for event in events if "refused" in event]
-        for event in events:
-            tick = int(event.get("tick", 0))
-            if not any(text.startswith(f"{describe(event)} at tick {tick} ") for text in refused):
-                self._follow(event, tick)
+        changes = changes_of((int(event.get("tick", 0)), event) for event in events)
+        before: list[tuple[dict[str, Any], ElementSpan]] = []
+        for span in spans(scene, (single for change in changes for single in change.singly())):
+            if wall := span.scene.get("wall"):
+                self._note_wall(WallSpan(span.from_tick, wall["position"], wall["stiffness"]))
+            before = self._note_elements(span.scene.get("dissipation", []), before, span.from_tick)
         # What was replaced in the tick of its coming has no book.
         self.elements = [span for span in self.elements if span.to_tick > span.from_tick]
         for number, span in enumerate(self.elements):
             same = sum(before.kind == span.kind for before in self.elements[:number])
             span.name = f"{span.kind}-{same + 1}" if same else span.kind
 
-    def _follow(self, event: dict[str, Any], tick: int) -> None:
-        if "swap" in event:
-            self._place(event.get("element") or 0, event["swap"], tick)
-        for key, value in event.get("set", {}).items():
-            match key.split("."):
-                case ["wall", name]:
-                    self.walls.append(replace(self.walls[-1], from_tick=tick, **{_WALL_FIELDS[name]: value}))
-                case ["dissipation", index, name]:
-                    span = self._at_work[int(index)]
-                    self._place(int(index), {"kind": span.kind, **span.parameters, name: value}, tick)
+    def _note_wall(self, wall: WallSpan) -> None:
+        if not self.walls or replace(self.walls[-1], from_tick=wall.from_tick) != wall:
+            self.walls.append(wall)
 
-    def _place(self, index: int, table: dict[str, Any], tick: int) -> None:
-        """Put an element into place ``index``; those after it may move, and with them the columns of their forces."""
-        kind = table["kind"]
-        for span in self._at_work[index:]:
-            span.slots[-1] = (*span.slots[-1][:2], tick)
-        for span in self._at_work[index : index + 1]:
-            span.to_tick = tick
-        parameters = {name: value for name, value in table.items() if name != "kind"}
-        new = [] if kind == "none" else [ElementSpan(kind, kind, parameters, [], tick)]
-        self._at_work[index : index + 1] = new
-        self.elements += new
-        for place, span in enumerate(self._at_work[index:], start=index):
-            span.slots.append((place, tick, math.inf))
-
-
-_WALL_FIELDS = {"position": "position_m", "stiffness": "stiffness_N_m"}
+    def _note_elements(
+        self, tables: list[dict[str, Any]], before: list[tuple[dict[str, Any], ElementSpan]], tick: int
+    ) -> list[tuple[dict[str, Any], ElementSpan]]:
+        """Ends the spans of elements that are gone, begins those of new ones, and follows all that change places."""
+        known = {id(table): span for table, span in before}
+        for table, span in before:
+            if not any(table is other for other in tables):
+                span.to_tick = tick
+        for place, (_, span) in enumerate(before):
+            if place >= len(tables) or known.get(id(tables[place])) is not span:
+                span.slots[-1] = (*span.slots[-1][:2], tick)
+        now = []
+        for place, table in enumerate(tables):
+            span = known.get(id(table))
+            if span is None:
+                parameters = {name: value for name, value in table.items() if name != "kind"}
+                span = ElementSpan(table["kind"], table["kind"], parameters, [], tick)
+                self.elements.append(span)
+            if place >= len(before) or before[place][1] is not span:
+                span.slots.append((place, tick, math.inf))
+            now.append((table, span))
+        return now

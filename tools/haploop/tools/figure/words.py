@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from haploop.protocol.changes import describe
 from haploop.tools.figure.data import Book, RunData
 from haploop.tools.figure.style import GREY, INK, LARGE, SMALL, TEXT, VERDICTS
 from haploop.tools.render.amounts import amount, parameters, spring
-from haploop.tools.render.event_words import event_words
 from haploop.tools.render.plant_words import counts, plant_books
 
 if TYPE_CHECKING:
@@ -125,7 +125,7 @@ def event_lines(run: RunData) -> list[str]:
     """What the numbers at the events stand for, as lines that fit below the figure."""
     lines = [""]
     for number, event in enumerate(run.events, start=1):
-        words = f"{number} at {event['timestamp']:g} s: {event_words(event)}"
+        words = f"{number} at {event['timestamp']:g} s: {describe(event)}"
         if lines[-1] and len(lines[-1]) + len(words) + 5 > _LINE_LETTERS:
             if len(lines) == _MOST_LINES:
                 lines[-1] += f"     and {len(run.events) - number + 1} more"

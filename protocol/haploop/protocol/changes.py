@@ -1,0 +1,222 @@
+"""The events of a run and the one meaning of a change: what a swap or a set does to a scene, from which tick on.
+
+An event is a map, as ``[[event]]`` of a scene, GRANT and the log's ``/events`` hold it. Some events change what is
+simulated: ``swap`` (an element comes, goes or takes another's place) and ``set`` (values of wall, delay or elements).
+The others (pause, resume, step, pace, stop, refused) change no bit of it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from functools import reduce
+from typing import Any
+
+Event = dict[str, Any]
+
+KINDS = ("swap", "set", "pause", "resume", "step", "stop", "pace", "refused")
+# The kind of a swap that takes an element out.
+NO_ELEMENT = "none"
+_NO_UNITS: Mapping[str, str] = {}
+
+
+@dataclass(frozen=True)
+class Change:
+    """A swap or a set at its tick.
+
+    Attributes:
+        tick: the first tick that sees the change.
+        swap: table of the element that comes, as in ``[[dissipation]]``; kind "none" takes one out. None for a set.
+        element: place in the list of elements, counted from 0; one past the end adds an element.
+        set: dotted key -> value in SI units.
+        plugin: path of a file that defines the element, loaded first; None for none.
+        refused: why it could not be carried out, a full sentence; None where it was.
+    """
+
+    tick: int
+    swap: Mapping[str, Any] | None = None
+    element: int = 0
+    set: Mapping[str, Any] = field(default_factory=dict)
+    plugin: str | None = None
+    refused: str | None = None
+
+    @classmethod
+    def from_dict(cls, tick: int, event: Mapping[str, Any]) -> Change:
+        """Reads an event that is a change."""
+        return cls(
+            tick,
+            event.get("swap"),
+            event.get("element") or 0,
+            event.get("set") or {},
+            event.get("plugin"),
+            event.get("refused"),
+        )
+
+    def as_dict(self) -> Event:
+        """Returns a map that ``from_dict`` reads back, the tick aside."""
+        content: Event = {"set": dict(self.set)} if self.swap is None else self._swap_as_dict()
+        extra = {"plugin": self.plugin, "refused": self.refused}
+        return {"tick": self.tick, **content, **{key: value for key, value in extra.items() if value is not None}}
+
+    def _swap_as_dict(self) -> Event:
+        return {"swap": dict(self.swap or {}), "element": self.element}
+
+    def apply(self, scene: dict[str, Any]) -> dict[str, Any]:
+        """Returns the scene with the change made, or as it is where the change was refused.
+
+        What the change leaves alone is shared with ``scene``: an element that stays is the same object.
+        """
+        if self.refused is not None:
+            return scene
+        now = dict(scene)
+        if self.swap is not None:
+            new = [] if self.swap["kind"] == NO_ELEMENT else [dict(self.swap)]
+            now["dissipation"] = _put(scene.get("dissipation", []), self.element, new)
+        for key, value in self.set.items():
+            table, _, name = key.rpartition(".")
+            place, _, index = table.partition(".")
+            if index:
+                changed = {**now[place][int(index)], name: value}
+                now[place] = _put(now[place], int(index), [changed])
+            else:
+                now[place] = {**now[place], name: value}
+        return now
+
+    def singly(self) -> Iterator[Change]:
+        """Yields the change value by value: each set of an element's parameter opens a book of its own."""
+        if self.swap is not None or len(self.set) < 2:
+            yield self
+            return
+        for key, value in self.set.items():
+            yield replace(self, set={key: value})
+
+    def describe(self, units: Mapping[str, str] = _NO_UNITS) -> str:
+        """Returns the change in a few words, such as ``element 0 becomes damping (damping 0.8 N s/m)``.
+
+        Args:
+            units: unit by settable key, and by kind and parameter (``damping.damping``); a number without is bare.
+        """
+        if self.swap is None:
+            return "set " + ", ".join(f"{key} = {_amount(value, units.get(key))}" for key, value in self.set.items())
+        kind = self.swap["kind"]
+        if kind == NO_ELEMENT:
+            return f"element {self.element} is removed"
+        words = [
+            f"{name} {_amount(value, units.get(f'{kind}.{name}'))}"
+            for name, value in self.swap.items()
+            if name not in ("kind", "acts")
+        ]
+        words += ["always"] if self.swap.get("acts") == "always" else []
+        return f"element {self.element} becomes {kind}" + (f" ({', '.join(words)})" if words else "")
+
+    def refuse(self, error: Exception) -> Change:
+        """Returns the change as one that could not be carried out."""
+        sentence = f"The change at tick {self.tick}, {self.describe()}, was refused: {type(error).__name__}: {error}"
+        return replace(self, refused=sentence)
+
+
+@dataclass(frozen=True)
+class Span:
+    """A scene as it was at work from a tick on and up to another, which is infinite for the last span."""
+
+    from_tick: int
+    to_tick: float
+    scene: dict[str, Any]
+
+
+def is_change(event: Mapping[str, Any]) -> bool:
+    """Returns whether an event changes what is simulated."""
+    return "swap" in event or "set" in event
+
+
+def refusal(change: Change) -> Event:
+    """Returns the event that puts a refused change on record; it comes later than the event of the change itself."""
+    return {"refused": change.refused, "change": {k: v for k, v in change.as_dict().items() if k != "refused"}}
+
+
+def refusals_as_status(refused: Iterable[Change]) -> Event | None:
+    """Returns what the controller's PROGRESS reports of refused changes; None where there are none."""
+    events = [refusal(change) for change in refused]
+    named = {"refused": "refused", "refused_changes": "change"}
+    return {key: [event[name] for event in events] for key, name in named.items()} if events else None
+
+
+def refusals_of(status: Mapping[str, Any]) -> list[Event]:
+    """Returns the events that put on record what a PROGRESS reported, which need not tell the changes themselves."""
+    changes = status.get("refused_changes", [])
+    return [
+        {"refused": sentence, **({"change": changes[number]} if number < len(changes) else {})}
+        for number, sentence in enumerate(status.get("refused", []))
+    ]
+
+
+def changes_of(events: Iterable[tuple[int, Mapping[str, Any]]]) -> list[Change]:
+    """Returns the changes among (tick, event) in order, with ``refused`` where a later event refuses one."""
+    events = list(events)
+    refusals = [event for _, event in events if "refused" in event]
+    return [_with_refusal(Change.from_dict(tick, event), refusals) for tick, event in events if is_change(event)]
+
+
+def spans(scene: dict[str, Any], changes: Iterable[Change]) -> list[Span]:
+    """Returns what was at work from when to when, in order: a span for the start and one for each change made."""
+    made = [change for change in changes if change.refused is None]
+    ends = [*(change.tick for change in made), math.inf]
+    found = [Span(0, ends[0], scene)]
+    for change, end in zip(made, ends[1:], strict=True):
+        found.append(Span(change.tick, end, change.apply(found[-1].scene)))
+    return found
+
+
+def at_work(scene: dict[str, Any], changes: Iterable[Change]) -> dict[str, Any]:
+    """Returns the scene after all these changes."""
+    return reduce(lambda now, change: change.apply(now), changes, scene)
+
+
+def describe(event: Mapping[str, Any], units: Mapping[str, str] = _NO_UNITS) -> str:
+    """Returns any event in a few words; ``units`` as in :meth:`Change.describe`."""
+    if is_change(event):
+        return Change.from_dict(0, event).describe(units)
+    match next((kind for kind in KINDS if kind in event), None):
+        case "step":
+            return f"{event['step']} tick{'s' * (event['step'] != 1)} on"
+        case "pace":
+            return "as fast as it goes" if event["pace"] == "free" else f"pace {_amount(event['pace'], None)}"
+        case "refused":
+            return str(event["refused"])
+        case kind:
+            return {"pause": "paused", "resume": "resumed", "stop": "stopped"}.get(kind or "", "changed")
+
+
+def _put(items: Iterable[Any], index: int, new: list[Any]) -> list[Any]:
+    items = list(items)
+    items[index : index + 1] = new
+    return items
+
+
+def _amount(value: Any, unit: str | None) -> str:
+    is_number = isinstance(value, int | float) and not isinstance(value, bool)
+    return f"{value:g} {unit or ''}".rstrip() if is_number else str(value)
+
+
+def _with_refusal(change: Change, refusals: list[Mapping[str, Any]]) -> Change:
+    sentence = next((event["refused"] for event in refusals if _refuses(event, change)), None)
+    return change if sentence is None else replace(change, refused=sentence)
+
+
+def _refuses(event: Mapping[str, Any], change: Change) -> bool:
+    """Compares by the change that the refusal holds; logs of before that field only tell of it in their sentence."""
+    if "change" in event:
+        other = Change.from_dict(event["change"]["tick"], event["change"])
+        return (other.tick, other.swap, other.element, other.set) == (
+            change.tick,
+            change.swap,
+            change.element,
+            change.set,
+        )
+    if change.swap is None:
+        words = "set " + ", ".join(f"{key} = {value}" for key, value in change.set.items())
+    else:
+        words = f"swap of element {change.element} to {change.swap['kind']}"
+    sentence = str(event["refused"])
+    return sentence.startswith(words) and f" at tick {change.tick} was refused" in sentence

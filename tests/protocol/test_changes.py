@@ -1,0 +1,122 @@
+"""The one meaning of a change: what it does to a scene, from which tick on, and what is told of one refused."""
+
+import json
+from typing import Any
+
+import pytest
+
+from haploop.protocol.changes import (
+    Change,
+    at_work,
+    changes_of,
+    describe,
+    is_change,
+    refusal,
+    refusals_as_status,
+    refusals_of,
+    spans,
+)
+
+DAMPING = {"kind": "damping", "damping": 1.0}
+INERTIA = {"kind": "inertia", "mass": 0.01, "acts": "always"}
+SCENE: dict[str, Any] = {
+    "clock": {"round_trip_delay": 0.0},
+    "wall": {"stiffness": 5.0, "position": 0.0},
+    "dissipation": [DAMPING],
+}
+SWAP = {"swap": INERTIA, "element": 0}
+SET = {"set": {"wall.stiffness": 7.0, "dissipation.0.damping": 2.0, "clock.round_trip_delay": 0.001}}
+
+
+@pytest.mark.parametrize("event", [SWAP, {**SWAP, "plugin": "/run/brake.py"}, SET, {**SWAP, "refused": "No."}])
+def test_a_change_comes_back_from_its_map_also_through_json(event: dict[str, Any]) -> None:
+    change = Change.from_dict(5, event)
+    assert Change.from_dict(5, json.loads(json.dumps(change.as_dict()))) == change
+    assert change.as_dict() == {"tick": 5, **event}
+
+
+@pytest.mark.parametrize(
+    ("event", "elements"),
+    [
+        (SWAP, [INERTIA]),
+        ({"swap": INERTIA, "element": 1}, [DAMPING, INERTIA]),
+        ({"swap": {"kind": "none"}, "element": 0}, []),
+        ({"swap": {"kind": "none"}, "element": None}, []),
+    ],
+)
+def test_a_swap_puts_an_element_into_its_place_adds_one_or_takes_one_out(
+    event: dict[str, Any], elements: list[dict[str, Any]]
+) -> None:
+    assert Change.from_dict(3, event).apply(SCENE)["dissipation"] == elements
+    assert SCENE["dissipation"] == [DAMPING]
+
+
+def test_a_set_gives_wall_delay_and_elements_their_values_and_leaves_the_scene_before_as_it_was() -> None:
+    before = json.dumps(SCENE)
+    now = Change.from_dict(3, SET).apply(SCENE)
+    assert now["wall"] == {"stiffness": 7.0, "position": 0.0}
+    assert now["clock"] == {"round_trip_delay": 0.001}
+    assert now["dissipation"] == [{"kind": "damping", "damping": 2.0}]
+    assert json.dumps(SCENE) == before
+
+
+def test_an_element_that_stays_is_the_same_object_so_that_it_can_be_followed_through_places() -> None:
+    scene = {**SCENE, "dissipation": [DAMPING, INERTIA]}
+    now = Change.from_dict(3, {"swap": {"kind": "none"}, "element": 0}).apply(scene)
+    assert now["dissipation"][0] is INERTIA
+
+
+def test_spans_cover_the_run_without_gap_and_leave_out_what_was_refused() -> None:
+    refused = Change.from_dict(4, SWAP).refuse(ValueError("no"))
+    events = [(3, SET), (4, SWAP), (9, refusal(refused)), (6, {"pause": True}), (8, SWAP)]
+    found = spans(SCENE, changes_of(events))
+    assert [(span.from_tick, span.to_tick) for span in found] == [(0, 3), (3, 8), (8, float("inf"))]
+    assert [span.scene["dissipation"][0]["kind"] for span in found] == ["damping", "damping", "inertia"]
+    assert at_work(SCENE, changes_of(events)) == found[-1].scene
+
+
+def test_of_two_changes_at_one_tick_only_the_one_named_is_refused() -> None:
+    other = {"swap": DAMPING, "element": 1}
+    events = [(4, SWAP), (4, other), (4, refusal(Change.from_dict(4, other).refuse(ValueError("no"))))]
+    assert [change.refused is None for change in changes_of(events)] == [True, False]
+
+
+@pytest.mark.parametrize(
+    ("event", "sentence"),
+    [
+        (SWAP, "swap of element 0 to inertia (mass = 0.01, acts = always) at tick 4 was refused: ValueError: no"),
+        ({"set": {"wall.stiffness": 7.0}}, "set wall.stiffness = 7.0 at tick 4 was refused: ValueError: no"),
+    ],
+)
+def test_a_log_that_tells_of_a_refusal_in_its_sentence_alone_is_still_understood(
+    event: dict[str, Any], sentence: str
+) -> None:
+    (refused,) = changes_of([(4, event), (6, {"refused": sentence})])
+    (made,) = changes_of([(5, event), (6, {"refused": sentence})])
+    assert (refused.refused, made.refused) == (sentence, None)
+
+
+def test_what_the_controller_reports_of_refused_changes_goes_on_record_with_each_change() -> None:
+    refused = [Change.from_dict(4, event).refuse(ValueError("no")) for event in (SWAP, SET)]
+    status = refusals_as_status(refused)
+    assert status is not None
+    assert refusals_of(json.loads(json.dumps(status))) == [refusal(change) for change in refused]
+    assert refusals_as_status([]) is None
+    assert refusals_of({"refused": ["A sentence alone."]}) == [{"refused": "A sentence alone."}]
+
+
+def test_the_sentence_of_a_refusal_names_tick_change_and_reason() -> None:
+    refused = Change.from_dict(4, SWAP).refuse(ValueError("too heavy")).refused
+    assert refused == (
+        "The change at tick 4, element 0 becomes inertia (mass 0.01, always), was refused: ValueError: too heavy"
+    )
+
+
+def test_pauses_and_refusals_are_no_changes() -> None:
+    assert [is_change(event) for event in (SWAP, SET, {"pause": True}, {"refused": "No.", "change": SWAP})] == [
+        True,
+        True,
+        False,
+        False,
+    ]
+    assert describe({"refused": "No.", "change": SWAP}) == "No."
