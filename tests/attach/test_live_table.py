@@ -210,5 +210,5 @@ def test_into_a_pipe_go_lines_one_for_every_change_and_none_twice(capsys: pytest
     lines.show(subject)
     rest = capsys.readouterr().out.splitlines()
     assert [line.split("  ")[:2] for line in first] == [["1.000 s", "paused"], ["1.250 s", "x −61.2 mm"]]
-    assert [line.split("  ")[1] for line in rest] == ["resume", "x −61.2 mm"]
+    assert [line.split("  ")[1] for line in rest] == ["resumed", "x −61.2 mm"]
     assert "steady" in rest[-1]
