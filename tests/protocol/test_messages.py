@@ -53,15 +53,15 @@ def test_a_complaint_names_message_field_and_what_came(fields: list[object], say
 
 def test_the_readme_holds_exactly_what_the_tables_say() -> None:
     text = README.read_text(encoding="utf-8")
-    assert document.renewed(text) == text, f"renew it: {document.COMMAND}"
+    assert document.with_tables(text) == text, f"renew it: {document.COMMAND}"
 
 
 def test_a_readme_that_differs_from_the_tables_is_noticed() -> None:
     text = README.read_text(encoding="utf-8")
-    assert document.renewed(text.replace("| 6 | `PROGRESS`", "| 60 | `PROGRESS`")) == text
-    assert document.renewed(text.replace("| 23 | `LAST`", "")) == text
+    assert document.with_tables(text.replace("| 6 | `PROGRESS`", "| 60 | `PROGRESS`")) == text
+    assert document.with_tables(text.replace("| 23 | `LAST`", "")) == text
     with pytest.raises(ValueError, match="marked once"):
-        document.renewed(text.replace(document.END, ""))
+        document.with_tables(text.replace(document.END, ""))
 
 
 def test_the_readme_explains_every_message_beyond_its_row_and_no_other() -> None:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from haploop.logger import read
+from haploop.protocol.clock_client import ClockClient
 from haploop.protocol.observer import Observer
 from helpers.live.live_run import going, undisturbed
 
@@ -39,7 +40,7 @@ def test_an_observer_hears_every_tick_of_all_three_streams_and_every_event_at_it
         try:
             while len([None for _, f in observer.poll() if f.name == "STATE"]) < len(ALL):
                 observer.wait(200)
-                if observer._streams.tick == 7:
+                if observer.tick == 7:
                     break
             subject.ask("set", set={"wall.stiffness": 200.0})
             subject.ask("resume")
@@ -66,7 +67,7 @@ def test_one_that_does_not_listen_costs_the_run_no_bit_and_is_told_what_it_misse
         context = subject.live.make_context()
         observer = Observer(context, "view", subject.live.clock, ALL)
         try:
-            while observer._streams.tick < 7:
+            while observer.tick < 7:
                 observer.wait(200)
                 observer.poll()
             subject.ask("resume")
@@ -125,9 +126,8 @@ def test_one_the_clock_has_dropped_joins_again_by_itself_and_hears_each_event_on
                 observer.poll()
                 events += observer.take_events()
             # As if the clock had taken it off: the next report is refused.
-            observer._client.leave("LEAVE", 300)
-            first = observer._client
-            observer._client = type(first)(context, "view", subject.live.clock, "")
+            observer.client.leave("LEAVE", 300)
+            observer.client = ClockClient(context, "view", subject.live.clock, "")
             subject.ask("set", set={"wall.stiffness": 200.0})
             for _ in range(60):
                 observer.wait(50)

@@ -1,4 +1,4 @@
-"""How many ticks go into one block of telemetry."""
+"""The number of ticks in one block of telemetry, adapted to the speed of the run."""
 
 from __future__ import annotations
 
@@ -10,7 +10,9 @@ _FIRST_TICKS = 100
 
 
 class BlockLength:
-    """As many ticks as the scene's ``block_ticks`` allows, fewer where ticks are slow; no bit of a run depends on it.
+    """Adapts the length of blocks so that each takes 0.05 to 0.1 s of wall time, up to the scene's ``block_ticks``.
+
+    No bit of a run depends on it.
 
     Attributes:
         ticks: length of the block being worked on.
@@ -22,7 +24,7 @@ class BlockLength:
         self._began = time.perf_counter()
 
     def next(self) -> None:
-        """A block is done: the next is twice as long if that one was quick, half as long if it was slow."""
+        """Ends a block; doubles the length after a fast one, halves it after a slow one."""
         now = time.perf_counter()
         took_s, self._began = now - self._began, now
         if took_s < AT_MOST_S / 2:

@@ -1,4 +1,4 @@
-"""A node's tie to the clock: join, work no further than granted, report, leave."""
+"""A node's connection to the clock: joins, works no further than granted, reports, leaves."""
 
 from __future__ import annotations
 
@@ -24,14 +24,15 @@ class Refused(Exception):
 
 
 class ClockClient:
-    """One node's side of the conversation with the clock.
+    """Speaks to the clock for one node.
 
     Attributes:
         until: ticks before this one may be worked on.
         last: whether no further ticks will be granted.
         events: granted events not yet taken, (tick, event), in order.
         malformed: frames from the clock's address that were no messages.
-        refused: what the clock last said no to, "" for nothing: after joining, that this node is no longer a member.
+        refused: the reason of the clock's last REFUSED, "" for none; after joining, it means that the clock has dropped
+            this node.
     """
 
     def __init__(self, context: zmq.Context[zmq.Socket[bytes]], role: str, address: str, secret: str) -> None:
@@ -46,11 +47,11 @@ class ClockClient:
 
     @property
     def socket(self) -> zmq.Socket[bytes]:
-        """For pollers."""
+        """Returns the DEALER socket, for pollers."""
         return self._socket
 
     def join(self, endpoints: dict[str, str], lossless: bool = True) -> dict[str, Any]:
-        """Ask to take part and wait for the welcome; returns its fields by name.
+        """Asks to take part, waits for the WELCOME and returns its fields by name.
 
         Raises:
             Refused: the clock said no, or said nothing for 20 s.
@@ -68,12 +69,12 @@ class ClockClient:
         raise Refused(f"The clock did not answer within {_JOIN_MS // 1000} s; is the run still there?")
 
     def poll(self) -> None:
-        """Take what the clock has sent, without waiting."""
+        """Takes what the clock has sent, without waiting."""
         while has_message(self._socket):
             self._receive()
 
     def wait(self, tick: int) -> bool:
-        """Wait for the clock to say something; after a while report being alive and return False."""
+        """Waits for a message of the clock; after 0.2 s without one, reports WAITING and returns False."""
         if self._socket.poll(REPORT_MS):
             self._receive()
             self.poll()
@@ -98,31 +99,31 @@ class ClockClient:
         return frame
 
     def take_events(self) -> list[tuple[int, dict[str, Any]]]:
-        """The granted events since the last call."""
+        """Returns the events granted since the last call, (tick, event) in order."""
         events, self.events = self.events, []
         return events
 
     def ready(self, tick: int) -> None:
-        """All connections stand; work starts at ``tick``."""
+        """Reports that all connections stand and that work starts at ``tick``."""
         self._socket.send(encode("READY", tick))
 
     def progress(self, tick: int, status: dict[str, Any] | None = None) -> None:
-        """Every tick before ``tick`` is done."""
+        """Reports that every tick before ``tick`` is done."""
         self._socket.send(encode("PROGRESS", tick, status or {}))
 
     def waiting(self, tick: int, on: str) -> None:
-        """Alive, but waiting for another process."""
+        """Reports that this node is alive and waits for the process ``on``."""
         self._socket.send(encode("WAITING", tick, on))
 
     def ended(self, tick: int, reason: str) -> None:
-        """The plant ended the run by itself."""
+        """Reports that the plant ended the run by itself."""
         self._socket.send(encode("ENDED", tick, reason))
 
     def leave(self, name: str, *fields: Any) -> None:
-        """Say DONE, FAILED or LEAVE, make sure it goes out, and close."""
+        """Sends DONE, FAILED or LEAVE, allows it 1 s to go out, and closes."""
         self._socket.send(encode(name, *fields))
         self._socket.close(linger=1000)
 
     def close(self) -> None:
-        """Close without a word."""
+        """Closes without a message."""
         self._socket.close(linger=0)

@@ -1,4 +1,4 @@
-"""The tables in ``protocol/README.md``, written from those in the code by ``python -m haploop.protocol.document``."""
+"""Generator of the tables in ``protocol/README.md``, run as ``python -m haploop.protocol.document``."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ README = Path(__file__).parents[2] / "README.md"
 
 
 def table() -> str:
-    """Processes, channels and messages as markdown."""
+    """Returns processes, channels and messages as markdown."""
     parts = [_processes()]
     for channel, sockets in CHANNELS.items():
         rows = (
@@ -51,8 +51,8 @@ def _markdown(header: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> str:
     return "\n".join("| " + " | ".join(cell.replace("|", "\\|") for cell in line) + " |" for line in lines)
 
 
-def renewed(text: str) -> str:
-    """``text`` with what stands between the two marker comments replaced by ``table()``.
+def with_tables(text: str) -> str:
+    """Returns ``text`` with everything between the two marker comments replaced by ``table()``.
 
     Raises:
         ValueError: the markers are not there, once each and in order.
@@ -65,4 +65,4 @@ def renewed(text: str) -> str:
 
 
 if __name__ == "__main__":
-    README.write_text(renewed(README.read_text(encoding="utf-8")), encoding="utf-8")
+    README.write_text(with_tables(README.read_text(encoding="utf-8")), encoding="utf-8")

@@ -1,4 +1,4 @@
-"""The direct line between plant and controller: every message stamped with its tick, every answer checked."""
+"""The direct connection of plant and controller: every message carries its tick, every answer is checked."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ Idle = Callable[[], None]
 
 
 class LoopError(RuntimeError):
-    """A gap, a repeat or a wrong tick between plant and controller."""
+    """Raised on a gap, a repeat or a wrong tick between plant and controller."""
 
 
 class PlantEnd:
-    """The plant's end: binds a ROUTER, so that a stranger who connects gets nothing and disturbs nothing.
+    """The plant's end of the connection: a ROUTER, so that an unknown peer gets nothing and disturbs nothing.
 
     Args:
         idle: called now and then while an answer is awaited.
@@ -44,7 +44,7 @@ class PlantEnd:
         self._emit = bare_send(self.socket)
 
     def greet(self, secret: str) -> None:
-        """Wait for the controller, known by the run's secret, and greet it back."""
+        """Waits for the controller, known by the run's secret, and answers its HELLO."""
         while True:
             sender, data = self._receive()
             if _is_hello(data, secret):
@@ -54,7 +54,7 @@ class PlantEnd:
             self.unknown_peers += 1
 
     def exchange(self, tick: int, samples: list[tuple[float, ...]]) -> list[float]:
-        """Send the samples of the ticks from ``tick`` on and return the commands that answer them.
+        """Sends the samples of the ticks from ``tick`` on and returns the forces that answer them, N.
 
         Raises:
             LoopError: the answer is for other ticks.
@@ -64,7 +64,7 @@ class PlantEnd:
             emit(partner, zmq.SNDMORE)
             emit(self._pack((VERSION, _SAMPLES, tick, samples)))
         except zmq.ZMQError as error:
-            _let_go(error)
+            _raise_unless_gone(error)
         sender, data = self._receive()
         while sender != partner:
             self.unknown_peers += 1
@@ -75,19 +75,19 @@ class PlantEnd:
         return answer[3]
 
     def close(self, tick: int) -> None:
-        """Tell the controller that the run ends at ``tick``."""
+        """Tells the controller that the run ends at ``tick``."""
         self._send(encode("LAST", tick))
 
     def _send(self, data: bytes) -> None:
-        """Send to the controller."""
+        """Sends one frame to the controller."""
         try:
             self._emit(self._partner, zmq.SNDMORE)
             self._emit(data)
         except zmq.ZMQError as error:
-            _let_go(error)
+            _raise_unless_gone(error)
 
     def _receive(self) -> tuple[bytes, bytes]:
-        """Sender and last frame of the next message."""
+        """Waits for the next message; returns its sender and its last frame."""
         while True:
             try:
                 sender = self.socket.recv()
@@ -95,14 +95,19 @@ class PlantEnd:
                 self._idle()
                 continue
             data = b"" if sender != self._partner else self.socket.recv()
-            if not data:  # a stranger may have sent any number of frames; the controller sends one
+            if not data:  # an unknown peer may have sent any number of frames; the controller sends one
                 while self.socket.rcvmore:
                     data = self.socket.recv()
             return sender, data
 
 
 class ControllerEnd:
-    """The controller's end: a DEALER that knows only the plant; ``idle`` as for the plant's end."""
+    """The controller's end of the connection: a DEALER that knows only the plant.
+
+    Args:
+        address: of the plant's socket.
+        idle: called now and then while samples are awaited.
+    """
 
     def __init__(self, context: zmq.Context[zmq.Socket[bytes]], address: str, idle: Idle) -> None:
         self._idle = idle
@@ -113,13 +118,13 @@ class ControllerEnd:
         self._emit = bare_send(self.socket)
 
     def greet(self, secret: str) -> None:
-        """Present ourselves with the run's secret and wait for the plant's greeting."""
+        """Sends HELLO with the run's secret and waits for the plant's answer."""
         self.socket.send(encode("HELLO", secret))
         if not _is_hello(self._receive(), secret):
             raise LoopError("The plant's greeting did not carry the secret of this run.")
 
     def samples(self, tick: int) -> list[list[float]] | None:
-        """The next samples, which must start at ``tick``; None when the run ends there.
+        """Waits for the next samples, which must start at ``tick``; returns None when the run ends there.
 
         Raises:
             LoopError: samples of other ticks came, or none will come although some are missing.
@@ -134,7 +139,7 @@ class ControllerEnd:
         raise LoopError(_mismatch("samples", tick, None, frame))
 
     def answer(self, tick: int, forces: list[float]) -> None:
-        """Send the commands of the ticks from ``tick`` on."""
+        """Sends the forces of the ticks from ``tick`` on, N."""
         self._emit(self._pack((VERSION, _COMMANDS, tick, forces)))
 
     def _receive(self) -> bytes:
@@ -145,8 +150,8 @@ class ControllerEnd:
                 self._idle()
 
 
-def _let_go(error: zmq.ZMQError) -> None:
-    """A controller that has gone is no error here: the clock sees it too, and says what comes of it."""
+def _raise_unless_gone(error: zmq.ZMQError) -> None:
+    """Ignores that the controller has gone, which the clock notices too and deals with; raises any other error."""
     if error.errno != zmq.EHOSTUNREACH:
         raise error
 

@@ -101,7 +101,7 @@ BY_CODE: dict[int, str] = {message.code: name for name, message in MESSAGES.item
 
 
 def complaint(name: str, fields: list[object]) -> str | None:
-    """What is wrong with the fields of a message, or None."""
+    """Returns what is wrong with the fields of a message, or None."""
     expected = MESSAGES[name].fields
     if len(fields) != len(expected):
         return f"{name} has {len(expected)} fields ({', '.join(n for n, _ in expected)}), but {len(fields)} came"

@@ -1,4 +1,4 @@
-"""What every node's process does around its work: start, tie to its parent, tell the clock how it ended."""
+"""The frame of a node's process: start, watch on its parent, report to the clock of how it ended."""
 
 from __future__ import annotations
 
@@ -22,15 +22,15 @@ Work = Callable[[ClockClient, "zmq.Context[zmq.Socket[bytes]]", Path], tuple[int
 
 
 class NodeError(Exception):
-    """Something a user can mend, as a full sentence; reported without a traceback."""
+    """Raised for a failure that a user can mend; its full sentence is reported without a traceback."""
 
 
 def run_node(role: str, work: Work) -> None:
-    """Run a node as a process: ``python -m module DIRECTORY`` with a line of JSON on stdin:
-    the clock's address, the run's secret, the transport.
+    """Runs a node as a process, ``python -m module DIRECTORY``, and exits with status 0 after DONE, else 1.
 
-    Stdin stays open as long as the launcher lives; at its end this process ends at once, whatever it is doing.
-    Exit status: 0 when the node said DONE, 1 otherwise.
+    Stdin brings one line of JSON: address of the clock, secret and transport of the run.
+
+    It stays open as long as the launcher lives; at its end this process ends at once, whatever it is doing.
     """
     directory = Path(sys.argv[1])
     line = sys.stdin.readline()

@@ -1,4 +1,4 @@
-"""An attached node that watches: it hears telemetry, may skip what it is too slow for, and never holds the loop up."""
+"""An attached node that observes: it receives telemetry, may skip blocks, and never holds the simulation up."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _REPORT_S = 0.2
 
 
 class Observer:
-    """A lossy node of a running loop; one thread's, never blocking but in ``wait``.
+    """Joins a running simulation as a lossy node; for one thread, never blocking but in ``wait``.
 
     The clock may drop one that was stopped for long (its queue is full then): it joins again by itself and goes on
     with what is sent from there.
@@ -26,11 +26,12 @@ class Observer:
         context: of the run's transport.
         role: under which name the clock lists it.
         clock: the clock's address.
-        listens: roles whose telemetry it hears.
+        listens: roles whose telemetry it receives.
 
     Attributes:
         welcome: run, scene, timebase, endpoints, granted and context, as the clock gave them.
         ended: last frame of every stream that has ended, by role: its tick, reason and trouble.
+        client: the connection to the clock.
 
     Raises:
         Refused: the clock did not let it join.
@@ -40,7 +41,7 @@ class Observer:
         self._context, self._role, self._clock = context, role, clock
         self._taken = 0
         self._events: list[tuple[int, dict[str, Any]]] = []
-        self._client = self._join()
+        self.client = self._join()
         addresses = {name: self.welcome["endpoints"][name]["telemetry"] for name in listens}
         self._streams = Subscriber(context, addresses)
         self.ended: dict[str, Frame] = {}
@@ -58,51 +59,56 @@ class Observer:
         return client
 
     @property
+    def tick(self) -> int:
+        """Returns the tick before which everything has come from every stream, or never will."""
+        return self._streams.tick
+
+    @property
     def skipped(self) -> dict[str, int]:
-        """Ticks that never came, by role."""
+        """Returns the number of ticks that never came, by role."""
         return self._streams.gaps
 
     def poll(self) -> list[tuple[str, Frame]]:
-        """What came since the last call, (role, message), without waiting.
+        """Returns the messages since the last call, (role, message), without waiting.
 
         Raises:
             Aborted: the run failed, or the clock goes on without this node for good.
         """
         frames = self._streams.drain()
         self.ended |= {role: frame for role, frame in frames if frame.name == "END"}
-        self._client.poll()
-        if self._client.refused:
-            self._client.close()
-            self._client = self._join()
+        self.client.poll()
+        if self.client.refused:
+            self.client.close()
+            self.client = self._join()
         self._note_events()
         now = time.monotonic()
         if now >= self._report_due:
             self._report_due = now + _REPORT_S
             status = {"skipped_ticks": sum(self.skipped.values()), "garbled": self._streams.malformed}
-            self._client.progress(min(self._streams.tick, self._client.until), status)
+            self.client.progress(min(self.tick, self.client.until), status)
         return frames
 
     def _note_events(self) -> None:
-        """The clock tells all events from the first on whenever a node joins: those known already are passed over."""
-        events = self._client.take_events()
+        """Takes new events; those that the clock repeats after a node has joined again are passed over."""
+        events = self.client.take_events()
         passed = min(self._known_before, len(events))
         self._known_before -= passed
         self._taken += len(events) - passed
         self._events += events[passed:]
 
     def take_events(self) -> list[tuple[int, dict[str, Any]]]:
-        """What changed the run, (tick, event) in order, since the last call; at first everything since its start."""
+        """Returns the events since the last call, (tick, event) in order; at first all since the start of the run."""
         events, self._events = self._events, []
         return events
 
     def wait(self, timeout_ms: int) -> None:
-        """Wait until something comes."""
+        """Waits until a message comes, at most ``timeout_ms``."""
         poller = zmq.Poller()
-        poller.register(self._client.socket, zmq.POLLIN)
+        poller.register(self.client.socket, zmq.POLLIN)
         self._streams.register(poller)
         poller.poll(timeout_ms)
 
     def leave(self) -> None:
-        """Go; the run goes on."""
-        self._client.leave("LEAVE", self._streams.tick)
+        """Leaves the run, which goes on."""
+        self.client.leave("LEAVE", self.tick)
         self._streams.close()

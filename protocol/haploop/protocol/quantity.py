@@ -1,4 +1,4 @@
-"""A declared number: its SI unit and the values it may take."""
+"""The declaration of a number: its SI unit and its bounds."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Quantity:
     whole: bool = False
 
     def complaint(self, value: float) -> str | None:
-        """What is wrong with ``value`` ("must be above 0 kg"), or None when it may be used."""
+        """Returns what is wrong with ``value`` ("must be above 0 kg"), or None when it may be used."""
         if not math.isfinite(value):
             return "must be a finite number" + (f" of {self.unit}" if self.unit else "")
         for holds, bound, words in (

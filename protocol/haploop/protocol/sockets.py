@@ -1,4 +1,4 @@
-"""Opening sockets so that nothing is lost, nothing hangs at the end and nothing grows without bound."""
+"""Sockets whose options are such that nothing is lost, nothing hangs at the end and nothing grows without bound."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _LONGEST_PATH = 107
 
 
 def open_socket(context: zmq.Context[zmq.Socket[bytes]], kind: int) -> zmq.Socket[bytes]:
-    """A socket of a type such as ``zmq.DEALER`` with the options every socket of a run has."""
+    """Opens a socket of a type such as ``zmq.DEALER`` with the options every socket of a run has."""
     socket = context.socket(kind)
     socket.linger = 0
     _transport(context).guard(socket, binds=kind in _BINDING)
@@ -40,7 +40,7 @@ def open_socket(context: zmq.Context[zmq.Socket[bytes]], kind: int) -> zmq.Socke
 
 
 def bare_send(socket: zmq.Socket[bytes]) -> Callable[..., Any]:
-    """``socket.send`` without the checks of options that the loop does not use: a third of its time."""
+    """Returns ``socket.send`` without pyzmq's checks of options that the loop does not use, a third of its time."""
     return super(zmq.Socket, socket).send
 
 
@@ -49,12 +49,12 @@ def _transport(context: zmq.Context[zmq.Socket[bytes]]) -> Transport:
 
 
 def has_message(socket: zmq.Socket[bytes]) -> bool:
-    """Whether a message is there to be taken."""
+    """Tells whether a message is there to be taken."""
     return bool(int(socket.get(zmq.EVENTS)) & zmq.POLLIN)
 
 
 def bind(socket: zmq.Socket[bytes], directory: Path, name: str) -> str:
-    """Bind in the run's directory of sockets, or to a free TCP port where that was asked for; return the address.
+    """Binds in the run's directory of sockets, or to a free port of the transport's TCP host; returns the address.
 
     Raises:
         OSError: the path is longer than the kernel allows, or is taken.

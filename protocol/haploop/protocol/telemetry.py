@@ -15,7 +15,7 @@ _AT_ONCE = 200
 
 
 class Publisher:
-    """A node's own stream of blocks.
+    """Publishes a node's stream of blocks.
 
     Each message is two frames: the publisher's role as topic, then the message. A new subscription is answered, at
     the next block boundary, with STATE; from its tick on the stream has no gap for whoever keeps up.
@@ -36,11 +36,11 @@ class Publisher:
         self.unknown_peers = 0
 
     def publish(self, name: str, *fields: Any) -> None:
-        """Send one message to all subscribers."""
+        """Sends one message to all subscribers."""
         self.socket.send_multipart([self._topic, encode(name, *fields)])
 
     def serve(self) -> None:
-        """Answer new subscriptions; call at block boundaries only, where the state is that of a tick."""
+        """Answers new subscriptions; to be called at block boundaries only, where the state is that of a tick."""
         new = False
         for _ in range(_AT_ONCE):
             if not has_message(self.socket):
@@ -55,7 +55,7 @@ class Publisher:
             self.publish("STATE", *self._state())
 
     def await_subscriber(self, idle: Callable[[], None]) -> None:
-        """Wait until someone listens, calling ``idle`` now and then."""
+        """Waits for the first subscriber, calling ``idle`` now and then."""
         while not self.subscribed:
             if not self.socket.poll(100):
                 idle()
@@ -63,10 +63,10 @@ class Publisher:
 
 
 class Subscriber:
-    """Listens to several publishers over one socket each; tells gaps by the ticks of the blocks.
+    """Receives from several publishers over one socket each; detects gaps by the ticks of the blocks.
 
     Attributes:
-        gaps: blocks' worth of ticks that never came, by role.
+        gaps: number of ticks that never came, by role.
         malformed: frames that were no messages.
     """
 
@@ -83,23 +83,23 @@ class Subscriber:
 
     @property
     def tick(self) -> int:
-        """Every tick before it has come from every publisher, or never will."""
+        """Returns the tick before which everything has come from every publisher, or never will."""
         return min(self._next_tick.values(), default=0) if len(self._next_tick) == len(self.gaps) else 0
 
     def register(self, poller: zmq.Poller) -> None:
-        """Have a poller watch all sockets."""
+        """Registers all sockets with a poller."""
         for socket in self._sockets:
             poller.register(socket, zmq.POLLIN)
 
     def receive(self, timeout_ms: int) -> list[tuple[str, Frame]]:
-        """What is there, (role, message), after waiting at most ``timeout_ms`` for the first."""
+        """Waits at most ``timeout_ms`` for a message; returns all there are, (role, message)."""
         poller = zmq.Poller()
         self.register(poller)
         poller.poll(timeout_ms)
         return self.drain()
 
     def drain(self) -> list[tuple[str, Frame]]:
-        """What is there now, without waiting; blocks from before the publisher's STATE are left out."""
+        """Returns the messages there are, (role, message), without those from before the publisher's STATE."""
         messages = []
         for socket, role in self._sockets.items():
             while has_message(socket):
@@ -130,6 +130,6 @@ class Subscriber:
         return True
 
     def close(self) -> None:
-        """Stop listening."""
+        """Closes all sockets."""
         for socket in self._sockets:
             socket.close(0)

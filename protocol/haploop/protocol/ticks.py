@@ -13,7 +13,7 @@ DELAY = "clock.round_trip_delay"
 
 
 class TimebaseError(ValueError):
-    """Rates, delay or duration that do not fall on whole steps and ticks."""
+    """Raised where rates, delay or duration do not fall on whole steps and ticks."""
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ class Timebase:
 
     @classmethod
     def from_clock(cls, clock: dict[str, Any], duration: float) -> Timebase:
-        """Build from a scene's ``[clock]`` table and its duration in seconds.
+        """Makes the timebase of a scene's ``[clock]`` table and its duration in seconds.
 
         Raises:
             TimebaseError: the plant rate is no whole multiple of the control rate, the delay is no whole number of
@@ -60,40 +60,43 @@ class Timebase:
         return cls(plant_rate, control_rate, delay_steps, ticks)
 
     def as_dict(self) -> dict[str, int]:
-        """The four integers, as they travel on the wire."""
+        """Returns the four integers, as they travel on the wire."""
         return asdict(self)
 
     @property
     def steps_per_tick(self) -> int:
-        """n: plant steps in one control period."""
+        """Returns n, the number of plant steps in one control period."""
         return self.plant_rate // self.control_rate
 
     @property
     def step_s(self) -> float:
-        """h: one plant step in seconds."""
+        """Returns h, one plant step in seconds."""
         return 1.0 / self.plant_rate
 
     @property
     def period_s(self) -> float:
-        """T: one control period in seconds."""
+        """Returns T, one control period in seconds."""
         return 1.0 / self.control_rate
 
     @property
     def lookahead_ticks(self) -> int:
-        """L: interval k needs no command later than k - L, so L + 1 samples may go out before a reply is awaited."""
+        """Returns L, the whole control periods in the delay, floor(delay_steps / n).
+
+        Interval k needs no command later than k - L, so L + 1 samples may go out before a reply is awaited.
+        """
         return self.delay_steps // self.steps_per_tick
 
     def tick_ns(self, tick: int) -> int:
-        """Time of a tick in whole nanoseconds (rounded down)."""
+        """Returns the time of a tick in whole nanoseconds, rounded down."""
         return tick * 1_000_000_000 // self.control_rate
 
     def first_tick_at(self, seconds: float) -> int:
-        """The first tick that sees something which happens at ``seconds``: ceil(seconds * control_rate)."""
+        """Returns the first tick at or after a time in s, ceil(seconds * control_rate)."""
         return math.ceil(seconds * self.control_rate - _WHOLE_WITHIN)
 
 
 def whole_count(seconds: float, rate: int, name: str, units: str, complaints: list[str]) -> int:
-    """``seconds * rate`` as the whole number it must be; otherwise append a complaint naming the nearest two.
+    """Returns ``seconds * rate`` as a whole number; where it is none, appends a complaint that names the nearest two.
 
     Args:
         name: what the sentence begins with.

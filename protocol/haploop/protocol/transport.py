@@ -1,4 +1,4 @@
-"""How the sockets of a run are reached: local files, or TCP where that was asked for, in the open only with keys."""
+"""Transport of a run's sockets: local files by default, or TCP, which beyond the loopback needs CURVE keys."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ SERVER, CLIENT, CLIENTS = "server", "client", "clients"
 
 
 class TransportError(ValueError):
-    """An address that must not be used, or keys that cannot be; the message says what to do."""
+    """Raised for an address or keys that cannot be used; the message says what to do."""
 
 
 @dataclass(frozen=True)
 class Transport:
-    """Where sockets are bound, and the keys that guard them.
+    """The address at which sockets are bound, and the CURVE keys that guard them.
 
     Attributes:
         host: address that TCP sockets are bound to, each at a port of its own; None for local (ipc) sockets.
@@ -31,7 +31,7 @@ class Transport:
 
     @classmethod
     def from_options(cls, host: str | None, keys: Path | None) -> Transport:
-        """Check what was asked for; keys are made where the directory has none.
+        """Makes the transport that a command's options ask for, and keys where the directory has none.
 
         Raises:
             TransportError: a host that others can reach without keys, no address at all, or keys without TCP.
@@ -55,17 +55,17 @@ class Transport:
         return cls("127.0.0.1" if host == "localhost" else host, keys and keys.resolve())
 
     def as_dict(self) -> dict[str, str | None]:
-        """Plain values, for JSON."""
+        """Returns plain values, for JSON."""
         return {"host": self.host, "keys": str(self.keys) if self.keys else None}
 
     @classmethod
     def from_dict(cls, values: dict[str, str | None]) -> Transport:
-        """The inverse of ``as_dict``."""
+        """Makes the transport from the values of ``as_dict``."""
         keys = values.get("keys")
         return cls(values.get("host"), Path(keys) if keys else None)
 
     def guard(self, socket: zmq.Socket[bytes], binds: bool) -> None:
-        """Set the keys of a socket that will be bound, or connected."""
+        """Sets the keys of a socket that will be bound, or connected."""
         if self.keys is None:
             return
         from zmq.auth import load_certificate
@@ -86,7 +86,7 @@ class SecureContext(zmq.Context[zmq.Socket[bytes]]):
 
     @classmethod
     def from_transport(cls, transport: Transport) -> SecureContext:
-        """A new context; with keys, only the holders of those in ``clients/`` get in."""
+        """Makes a context; with keys, only peers that hold one of those in ``clients/`` can connect to its sockets."""
         context = cls()
         context.transport = transport
         if transport.keys and transport.host:
@@ -98,7 +98,7 @@ class SecureContext(zmq.Context[zmq.Socket[bytes]]):
         return context
 
     def destroy(self, linger: int | None = None) -> None:
-        """Close everything."""
+        """Stops the authenticator, closes all sockets and ends the context."""
         if self._authenticator:
             self._authenticator.stop()
             self._authenticator = None

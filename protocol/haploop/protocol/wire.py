@@ -1,4 +1,4 @@
-"""Frames: the table's messages in msgpack, checked on the way in; nothing in them is ever executed."""
+"""Frames: the messages of the table in msgpack, checked when decoded; nothing in them is ever executed."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ MAX_FRAME_BYTES = 64 * 1024 * 1024
 
 
 class WireError(ValueError):
-    """A frame that is no message of this version; the message says what is wrong with it."""
+    """Raised for a frame that is no message of this version; its text says what is wrong."""
 
 
 class Frame(NamedTuple):
-    """A message that came: its name and its fields in the order of the table."""
+    """A decoded message: its name and its fields in the order of the table."""
 
     name: str
     fields: list[Any]
 
     def as_dict(self) -> dict[str, Any]:
-        """The fields by name."""
+        """Returns the fields by name."""
         return {name: value for (name, _), value in zip(MESSAGES[self.name].fields, self.fields, strict=True)}
 
 
@@ -31,12 +31,12 @@ _packer = msgpack.Packer(autoreset=True)
 
 
 def encode(name: str, *fields: Any) -> bytes:
-    """A message as bytes; the fields in the order of the table."""
+    """Returns a message as bytes; ``fields`` in the order of the table."""
     return _packer.pack((VERSION, MESSAGES[name].code, *fields))
 
 
 def decode(data: bytes) -> Frame:
-    """The message in a frame.
+    """Returns the message in a frame.
 
     Raises:
         WireError: not msgpack, another version, an unknown code, missing or wrong fields.
@@ -49,16 +49,16 @@ def decode(data: bytes) -> Frame:
         raise WireError(f"A frame must be an array [version, code, fields...], but is {type(items).__name__}.")
     version, code, *fields = items
     if type(version) is not int or version != VERSION:
-        raise WireError(f"This is protocol version {VERSION}, but a frame of version {_shown(version)} came.")
+        raise WireError(f"This is protocol version {VERSION}, but a frame of version {_describe(version)} came.")
     name = BY_CODE.get(code) if type(code) is int else None
     if name is None:
-        raise WireError(f"No message has the code {_shown(code)}.")
+        raise WireError(f"No message has the code {_describe(code)}.")
     wrong = complaint(name, fields)
     if wrong:
         raise WireError(wrong + ".")
     return Frame(name, fields)
 
 
-def _shown(value: Any) -> str:
-    """A number as it is, anything else by its type: it may be huge, or nested deeper than Python can print."""
+def _describe(value: Any) -> str:
+    """Returns a number as text, anything else as its type: it may be huge, or nested deeper than Python can print."""
     return str(value) if isinstance(value, int | float) else f"({type(value).__name__})"
