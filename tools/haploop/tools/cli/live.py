@@ -85,6 +85,6 @@ def seconds(text: str | None, option: str = "--at") -> float | None:
     from haploop.protocol.quantity import Quantity
 
     try:
-        return float(Number(Quantity("s", at_least=0), "time").read(text))
+        return float(Number(Quantity("s", at_least=0, about="time")).read(text))
     except ValueError as error:
         leave(f"{option} must be a time such as 1.5 or '1500 ms', but {text!r} was given: {error}", WRONG_USE)
