@@ -5,8 +5,11 @@ BIN := .venv/bin
 PIP := $(PYTHON) -m pip --python $(BIN)/python -qq --disable-pip-version-check --no-input
 READY := .venv/.installed
 
+QUICK := tests/scene tests/log tests/estimators tests/clock $(patsubst %,tests/physics/test_%.py,\
+  step stability leak energy_per_sample timing_rules random_stream event_timing)
+
 .DEFAULT_GOAL := help
-.PHONY: help demo test slow check bench accuracy paper notebook lock clean
+.PHONY: help demo quick test slow check bench accuracy paper notebook lock clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-8s %s\n", $$1, $$2 }' Makefile
@@ -15,6 +18,9 @@ demo: $(READY) ## run the scene of figure 6c into runs/demo and draw it; the las
 	@rm -rf runs/demo
 	@$(BIN)/haploop run launch/scenes/fig6c.toml --out runs/demo
 	@$(BIN)/haploop plot runs/demo
+
+quick: $(READY) ## run the tests of scene, log, estimators, clock and physics in closed form (below 30 s)
+	@$(BIN)/pytest -q -n auto --dist worksteal -m "not slow" $(QUICK)
 
 test: $(READY) ## run the tests
 	@$(BIN)/pytest -q -n auto --dist worksteal -m "not slow"
