@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from haploop.launch.scene.file import load
-from haploop.tools.render.stages import silent
+from haploop.tools.render.progress import silent
 from haploop.tools.studies.choi2022.claims import Finding
 from haploop.tools.studies.choi2022.command import make_figure
 from haploop.tools.studies.choi2022.figures.registry import figure

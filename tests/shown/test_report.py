@@ -14,8 +14,9 @@ from rich.console import Console
 from haploop.controller.dissipation import Element, Motion, registry
 from haploop.launch.runs.start import prepare, run
 from haploop.protocol.quantity import Quantity
-from haploop.tools.render.amounts import amount, fixed
-from haploop.tools.render.report import ProgressLine, plugins_table, status_table, summary_table
+from haploop.tools.render.progress import ProgressLine
+from haploop.tools.render.report import plugins_table, status_table, summary_table
+from haploop.tools.render.units import amount, fixed
 from helpers.shown import row, shown
 
 SCENES = Path(__file__).parents[2] / "launch/scenes"

@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 from rich.console import Console
 
-from haploop.tools.render import report
-from haploop.tools.render.stages import bars
+from haploop.tools.render import progress
+from haploop.tools.render.progress import bars
 
 
 def test_without_a_terminal_a_stage_is_one_line(capsys: pytest.CaptureFixture[str]) -> None:
@@ -29,7 +29,7 @@ def test_on_a_terminal_a_bar_counts_the_parts(by_itself: bool, monkeypatch: pyte
     def terminal(**_: Any) -> Console:
         return Console(file=screen, force_terminal=True, width=80)
 
-    monkeypatch.setattr(report, "console", terminal)
+    monkeypatch.setattr(progress, "console", terminal)
     with bars(by_itself=by_itself) as stage:
         advance = stage("runs", 3)
         advance()

@@ -74,7 +74,7 @@ def advise(request: Request, as_json: bool) -> None:
         print_json(data)
     else:
         from haploop.tools.advise.screen import report
-        from haploop.tools.render.report import console
+        from haploop.tools.render.terminal import console
 
         console().print(report(found))
     for path in data["files"].values():
@@ -110,7 +110,7 @@ def _progress() -> Iterator[tuple[Callable[[str], None], Callable[[int], None]]]
     """A bar of the stages on a terminal, with the runs so far; a line a stage elsewhere."""
     from rich import progress
 
-    from haploop.tools.render.report import console
+    from haploop.tools.render.terminal import console
 
     screen = console(stderr=True)
     columns = (

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from rich import box
 from rich.console import Group
 from rich.table import Table
 from rich.text import Text
 
 from haploop.tools.advise.sentences import buzz_sentences, gain_sentences, largest, share, stiff
-from haploop.tools.render.amounts import amount
+from haploop.tools.render.terminal import make_table, verdict_style
+from haploop.tools.render.units import amount
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -126,10 +126,8 @@ def why_table(buzz: Buzz) -> RenderableType:
 
 
 def _verdict(steady: bool, verdict: str) -> Text:
-    from haploop.tools.render.report import VERDICT_STYLES
-
     word = "dies away" if steady and verdict != "steady" else verdict
-    return Text(word, style=VERDICT_STYLES.get("steady" if steady else verdict, "bold"))
+    return Text(word, style=verdict_style("steady" if steady else verdict))
 
 
 def _swing(oscillation_m: float) -> str:
@@ -138,7 +136,4 @@ def _swing(oscillation_m: float) -> str:
 
 
 def _table(*names: str) -> Table:
-    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 1, 0, 0))
-    for name in names:
-        table.add_column(name, min_width=_LONGEST_WORD if name == names[0] else None)
-    return table
+    return make_table(*names, padding=(0, 1, 0, 0), first_width=_LONGEST_WORD)

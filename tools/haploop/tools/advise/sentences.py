@@ -6,7 +6,7 @@ import math
 from typing import TYPE_CHECKING
 
 from haploop.tools.advise.effects_off import SAMPLING
-from haploop.tools.render.amounts import amount, fixed
+from haploop.tools.render.units import amount, fixed
 
 if TYPE_CHECKING:
     from haploop.tools.advise.advice import Advice

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 from haploop.protocol.changes import describe
 from haploop.tools.attach.watched import Watched
-from haploop.tools.render.amounts import amount, fixed
-from haploop.tools.render.report import VERDICT_STYLES
+from haploop.tools.render.terminal import make_facts, make_table, verdict_style
+from haploop.tools.render.units import amount, fixed
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -70,19 +70,14 @@ def _progress(watched: Watched) -> Text:
 
 
 def _figures(watched: Watched) -> Table:
-    from rich.table import Table
     from rich.text import Text
 
-    grid = Table.grid(padding=(0, 2))
-    grid.add_column(style="dim", no_wrap=True, min_width=12)
-    grid.add_column()
+    grid = make_facts([], least_width=12)
     status, motion = watched.status(), watched.motion()
     if status:
         word = status["verdict"]
         swing = f"  oscillation {amount(status['oscillation_m'], 'm')} peak to peak"
-        grid.add_row(
-            "verdict" if watched.ended else "so far", Text.assemble((word, VERDICT_STYLES.get(word, "bold")), swing)
-        )
+        grid.add_row("verdict" if watched.ended else "so far", Text.assemble((word, verdict_style(word)), swing))
     grid.add_row("position", amount(motion.get("x"), "m") + _where(watched.penetration_m()))
     grid.add_row("velocity", amount(motion.get("v"), "m/s"))
     parts = ", ".join(f"{name} {amount(force, 'N')}" for name, force in watched.parts().items())
@@ -105,13 +100,8 @@ def _where(penetration_m: float | None) -> str:
 
 def _books(watched: Watched) -> Table:
     """Energy by wall and element, and what the books leave unexplained."""
-    from rich import box
-    from rich.table import Table
-
-    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 1))
-    table.add_column("energy taken out of the device by")
-    for name in ("true", "sampled"):
-        table.add_column(name, justify="right", no_wrap=True, min_width=9)
+    numbers = ("true", "sampled")
+    table = make_table("energy taken out of the device by", *numbers, numbers=numbers, least_width=9)
     books = watched.books()
     no_wall = watched.penetration_m() is None
     for name in (name.removesuffix(_TRUE) for name in books if name.endswith(_TRUE)):

@@ -14,7 +14,7 @@ from haploop.tools.attach.following import Following, summary_of
 from haploop.tools.attach.live_table import ending, live_line, live_table
 from haploop.tools.attach.watched import Watched
 from haploop.tools.cli.exit_codes import FAILED, WRONG_USE, leave
-from haploop.tools.render.report import console
+from haploop.tools.render.terminal import console
 
 ROLE = "print"
 # How often the table is drawn anew, and a line printed into a pipe, in wall time.

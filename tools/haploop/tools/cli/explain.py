@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from haploop.tools.cli.exit_codes import plain_errors, print_json
 from haploop.tools.cli.scenes import kinds_with, print_notes
+from haploop.tools.render.terminal import console, make_facts, make_table
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -39,8 +40,6 @@ def explain_scene(scene_path: Path, overrides: list[str], plugins: list[Path], a
     if as_json:
         print_json(as_data(scene, planned, costs))
         return
-    from haploop.tools.render.report import console
-
     console().print(explanation(scene, planned, costs))
 
 
@@ -107,8 +106,6 @@ def explanation(scene: dict[str, Any], planned: Plan, costs: Bill) -> Renderable
 
 
 def _facts(planned: Plan) -> Table:
-    from rich.table import Table
-
     facts = {
         "bodies": ", ".join(f"{name} {mass * 1e3:g} g" for name, mass in planned.bodies.items()),
         "states": f"{len(planned.states)}: {', '.join(planned.states)}",
@@ -120,12 +117,7 @@ def _facts(planned: Plan) -> Table:
         facts[f"log {channel}"] = ", ".join(columns)
     facts["counts"] = ", ".join(planned.counts) or "nothing"
     facts["absent"] = ", ".join(effect.name for effect in planned.absent)
-    grid = Table.grid(padding=(0, 2))
-    grid.add_column(style="dim", no_wrap=True)
-    grid.add_column()
-    for row in facts.items():
-        grid.add_row(*row)
-    return grid
+    return make_facts(facts.items())
 
 
 def _short(module: str) -> str:
@@ -133,7 +125,7 @@ def _short(module: str) -> str:
 
 
 def _order(title: str, steps: tuple[Step, ...]) -> Table:
-    table = _table(title, "node", "named by")
+    table = make_table(title, "node", "named by")
     for step in steps:
         table.add_row(step.what, step.node, step.effect or "–")
     return table
@@ -141,9 +133,8 @@ def _order(title: str, steps: tuple[Step, ...]) -> Table:
 
 def _costs(scene: dict[str, Any], planned: Plan, costs: Bill) -> Table:
     """What each effect and each element adds."""
-    table = _table("what is named", "written in", "every")
-    for name in ("states", "multiplications", "instructions"):
-        table.add_column(name, justify="right", no_wrap=True)
+    numbers = ("states", "multiplications", "instructions")
+    table = make_table("what is named", "written in", "every", *numbers, numbers=numbers)
     for effect in planned.named:
         modules = effect.modules_in(scene)
         module = _short(modules[0]) if modules else effect.node
@@ -151,14 +142,4 @@ def _costs(scene: dict[str, Any], planned: Plan, costs: Bill) -> Table:
         table.add_row(effect.name, module, effect.acts.removeprefix("every "), str(effect.states_in(scene)), *numbers)
     for element, cost in zip(scene.get("dissipation", []), costs.elements, strict=True):
         table.add_row(element["kind"], "controller.dissipation", "tick", "–", "–", f"{cost:+.0f}")
-    return table
-
-
-def _table(*names: str) -> Table:
-    from rich import box
-    from rich.table import Table
-
-    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 1))
-    for name in names:
-        table.add_column(name, overflow="fold")
     return table

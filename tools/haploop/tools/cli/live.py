@@ -40,7 +40,8 @@ def show_status(run_id: str | None, as_json: bool) -> None:
     elif not answers:
         print("No run is live.")
     else:
-        from haploop.tools.render.report import console, status_table
+        from haploop.tools.render.report import status_table
+        from haploop.tools.render.terminal import console
 
         for identity, data in answers.items():
             console().print(status_table({**data, "run": identity}))

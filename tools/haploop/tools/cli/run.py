@@ -30,7 +30,8 @@ def run_scene(
 ) -> None:
     """Run a scene, show how it goes and what came of it."""
     from haploop.launch.runs.start import prepare, run
-    from haploop.tools.render.report import ProgressLine, print_summary
+    from haploop.tools.render.progress import ProgressLine
+    from haploop.tools.render.report import print_summary
 
     with plain_errors():
         rate = _pace(pace, in_process)

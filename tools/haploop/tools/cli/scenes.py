@@ -58,7 +58,8 @@ def list_plugins(plugins: list[Path], as_json: bool) -> None:
     if as_json:
         print_json({kind: _parameters(element) for kind, element in kinds.items()})
         return
-    from haploop.tools.render.report import console, plugins_table
+    from haploop.tools.render.report import plugins_table
+    from haploop.tools.render.terminal import console
 
     console().print(plugins_table(kinds))
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from haploop.tools.cost.data import Point, SceneCost, Spread
-from haploop.tools.render.amounts import amount, fixed
+from haploop.tools.render.units import amount, fixed
 
 
 def cheapest(scene: SceneCost, tolerance_m: float) -> Point | None:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from haploop.launch.scene.mistakes import nearest
 from haploop.tools.cli.exit_codes import FAILED, WRONG_USE, leave, plain_errors, print_json
-from haploop.tools.render.stages import bars
+from haploop.tools.render.progress import bars
 
 if TYPE_CHECKING:
     from haploop.tools.cost.data import Cost
@@ -88,7 +88,7 @@ def _show(result: Cost, out: Path, as_json: bool) -> None:
     """Tables and advice, or JSON, on stdout; the files on stderr."""
     from haploop.tools.cost.data import COST_FILE
     from haploop.tools.cost.draw.report import report
-    from haploop.tools.render.report import console
+    from haploop.tools.render.terminal import console
 
     if as_json:
         print_json(dataclasses.asdict(result))

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from haploop.tools.cost.advice import rate
 from haploop.tools.cost.data import Point, SceneCost
-from haploop.tools.render.amounts import amount, fixed
+from haploop.tools.render.units import amount, fixed
 
 
 @dataclass(frozen=True)

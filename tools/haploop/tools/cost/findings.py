@@ -9,7 +9,7 @@ from haploop.tools.cost.data import Cost, Point, SceneCost
 from haploop.tools.cost.finding_words import Finding, joined, length, name_of, of_scenes, rates, span
 from haploop.tools.cost.prices.data import price_groups
 from haploop.tools.cost.prices.findings import other_prices, stiffness
-from haploop.tools.render.amounts import amount
+from haploop.tools.render.units import amount
 
 
 def findings(cost: Cost, count: int = 5) -> list[Finding]:

@@ -19,7 +19,7 @@ from haploop.tools.cost.prices.prices import Prices
 from haploop.tools.cost.store import Store
 from haploop.tools.cost.times import IN_PROCESS, PROCESSES, Job
 from haploop.tools.machine import commit, machine, source_digest, versions
-from haploop.tools.render.stages import Stage
+from haploop.tools.render.progress import Stage
 
 if TYPE_CHECKING:
     from haploop.tools.reference.nearest import Reference

@@ -57,7 +57,7 @@ def dissipate(request: Request, as_json: bool) -> None:
         print_json(outcome.as_data() | {"figure": str(figure) if figure else None})
         return
     from haploop.tools.dissipate.report import report
-    from haploop.tools.render.report import console
+    from haploop.tools.render.terminal import console
 
     console(stderr=True).print(report(outcome))
     if figure:
@@ -114,7 +114,7 @@ def _open(request: Request, kinds: dict[str, type[Element]]) -> tuple[Any, dict[
 @contextlib.contextmanager
 def _shown(name: str) -> Iterator[Callable[[float], None]]:
     """On a terminal, a line that tells how far the recording is booked, fed with its time in s."""
-    from haploop.tools.render.report import console
+    from haploop.tools.render.terminal import console
 
     shown = console(stderr=True)
     if not shown.is_terminal:

@@ -27,7 +27,7 @@ from haploop.tools.figure.style import (
     few_ticks,
     legend,
 )
-from haploop.tools.render.amounts import prefix_for
+from haploop.tools.render.units import prefix_for
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from haploop.tools.dissipate.booking import Booking
 from haploop.tools.dissipate.course import Course
 from haploop.tools.dissipate.samples import Notes, Recording
-from haploop.tools.render.amounts import amount
+from haploop.tools.render.units import amount
 
 if TYPE_CHECKING:
     from haploop.controller.dissipation import Element

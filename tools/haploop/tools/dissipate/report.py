@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from haploop.tools.dissipate.outcome import ElementOutcome, Outcome, in_words
-from haploop.tools.render.amounts import amount, fixed
+from haploop.tools.render.terminal import make_table
+from haploop.tools.render.units import amount, fixed
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -13,15 +14,11 @@ if TYPE_CHECKING:
 
 def report(outcome: Outcome) -> RenderableType:
     """Answer, table and what is to be known."""
-    from rich import box
     from rich.console import Group
-    from rich.table import Table
     from rich.text import Text
 
-    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 1))
-    table.add_column("would have taken out of the device")
-    for name in ("true", "sampled", "took", "gave back", "largest force"):
-        table.add_column(name, justify="right", no_wrap=True)
+    numbers = ("true", "sampled", "took", "gave back", "largest force")
+    table = make_table("would have taken out of the device", *numbers, numbers=numbers)
     for element in outcome.elements:
         table.add_row(*row_of(element))
     head = Text(f"{outcome.name}: {answer(outcome)}", style="bold")

@@ -107,7 +107,7 @@ def _progress(total_bytes: int) -> Iterator[Callable[[int], None]]:
     """A bar on a terminal, fed with how much of the log is done; nothing elsewhere."""
     from rich.progress import Progress
 
-    from haploop.tools.render.report import console
+    from haploop.tools.render.terminal import console
 
     shown = console(stderr=True)
     with Progress(console=shown, transient=True, disable=not shown.is_terminal) as bar:

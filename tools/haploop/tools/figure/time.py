@@ -20,7 +20,7 @@ from haploop.tools.figure.style import (
     element_colour,
     legend,
 )
-from haploop.tools.render.amounts import prefix_for
+from haploop.tools.render.units import prefix_for
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

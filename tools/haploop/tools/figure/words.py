@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 from haploop.protocol.changes import describe
 from haploop.tools.figure.data import Book, RunData
 from haploop.tools.figure.style import GREY, INK, LARGE, SMALL, TEXT, VERDICTS
-from haploop.tools.render.amounts import amount, parameters, spring
-from haploop.tools.render.plant_words import counts, plant_books
+from haploop.tools.render.sentences import count_losses, plant_books
+from haploop.tools.render.units import amount, parameters, spring
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -108,7 +108,7 @@ def book_rows(run: RunData, books: list[Book]) -> list[Row]:
         rows.append(Row(f"and {len(shown) - _MOST_BOOKS} more elements in summary.json", ""))
     for key, words in plant_books(energy).items():
         rows.append(Row(words, amount(energy[key], "J"), book=_LINES.get(key, "")))
-    return rows + [Row(words, f"{count}") for words, count in counts(run.summary).items()]
+    return rows + [Row(words, f"{count}") for words, count in count_losses(run.summary).items()]
 
 
 def _leak_rows(wall: dict[str, Any]) -> list[Row]:

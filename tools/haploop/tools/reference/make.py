@@ -94,7 +94,7 @@ def main(names: list[str]) -> None:
     """Make some references, or all, and show how far it is."""
     from rich.progress import Progress
 
-    from haploop.tools.render.report import console
+    from haploop.tools.render.terminal import console
 
     paths = [SCENES / f"{name}.toml" for name in names] or sorted(SCENES.glob("*.toml"))
     REFERENCES.mkdir(exist_ok=True)

@@ -1,1 +1,1 @@
-"""Text for people: numbers with units, tables, progress, and fixed sentences."""
+"""Text for people: numbers with units, tables on the terminal and in Markdown, progress, and fixed sentences."""

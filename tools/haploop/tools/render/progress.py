@@ -1,25 +1,31 @@
-"""The line that tells how far a run is, kept up to date on a terminal."""
+"""Progress on the terminal: the line of a run, and bars for work of several stages."""
 
 from __future__ import annotations
 
+import sys
 import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
 
-from haploop.tools.render.amounts import amount, fixed
+from haploop.tools.render.terminal import console, verdict_style
+from haploop.tools.render.units import amount, fixed
 
 if TYPE_CHECKING:
     from rich.console import Console
     from rich.live import Live
     from rich.text import Text
 
+# Names a stage of so many parts; what it returns is called after each of them.
+Stage = Callable[[str, int], Callable[[], None]]
 _REFRESH_S = 0.1
 # Columns that all but the bar need, and the bar's bounds.
 _WORDS, _LEAST_BAR, _MOST_BAR = 70, 4, 24
 
 
 class ProgressLine:
-    """A context manager: one live line while a run goes on, gone when it ends; nothing where there is no terminal.
+    """One live line while a run goes on, gone when it ends; nothing where there is no terminal. A context manager.
 
     Args:
         title: of the run.
@@ -36,8 +42,6 @@ class ProgressLine:
         self._began: tuple[float, float] | None = None
 
     def __enter__(self) -> Self:
-        from haploop.tools.render.report import console
-
         self._console = self._console or console(stderr=True)
         if self._console.is_terminal:
             from rich.live import Live
@@ -53,11 +57,11 @@ class ProgressLine:
             self._live.stop()
 
     def announce(self, run_id: str) -> None:
-        """Name the run, as other terminals may call it."""
+        """Names the run, as other terminals may call it."""
         self._run_id = run_id
 
     def update(self, status: dict[str, Any]) -> None:
-        """Take the logger's status; cheap, and shown a few times a second at most."""
+        """Takes the logger's status; cheap, and shown a few times a second at most."""
         now = time.monotonic()
         if not status or now < self._due:
             return
@@ -70,10 +74,14 @@ class ProgressLine:
             self._live.update(self.line(status, factor, self._live.console.width), refresh=True)
 
     def line(self, status: dict[str, Any], factor: float, width: int) -> Text:
-        """The line for a status, cut to ``width`` columns; ``factor`` is simulated over real time, 0 if unknown."""
-        from rich.text import Text
+        """Makes the line for a status, cut to ``width`` columns.
 
-        from haploop.tools.render.report import VERDICT_STYLES
+        Args:
+            status: of the logger.
+            factor: simulated over real time; 0 where unknown.
+            width: columns of the terminal.
+        """
+        from rich.text import Text
 
         bar = max(_LEAST_BAR, min(_MOST_BAR, width - _WORDS))
         done = round(min(1.0, status["t_s"] / self._duration_s) * bar)
@@ -83,10 +91,52 @@ class ProgressLine:
             ("━" * done, "green"), ("─" * (bar - done), "dim"),
             f" {status['t_s']:.2f}/{self._duration_s:g} s",
             f" {fixed(factor)}×" if factor else "",
-            "  ", (verdict, VERDICT_STYLES.get(verdict, "bold")),
+            "  ", (verdict, verdict_style(verdict)),
             f"  {amount(status['oscillation_m'], 'm')} p-p",
             f"  residual {status['residual_J']:.0e} J",
             (f"  {self._title}", "dim"),
         )  # fmt: skip
         text.truncate(width, overflow="ellipsis")
         return text
+
+
+def silent(_name: str, _count: int) -> Callable[[], None]:
+    """Begins a stage that shows nothing."""
+    return lambda: None
+
+
+@contextmanager
+def bars(*, by_itself: bool = True) -> Iterator[Stage]:
+    """Shows a bar a stage on a terminal's stderr, and a line a stage elsewhere.
+
+    Args:
+        by_itself: whether a thread keeps them moving; without one they move after each part only, so that what is
+            measured between is not disturbed.
+    """
+    from rich import progress
+
+    terminal = console(stderr=True)
+    shown = terminal.is_terminal
+    columns = (
+        "{task.description}",
+        progress.BarColumn(),
+        progress.MofNCompleteColumn(),
+        progress.TimeRemainingColumn(),
+    )
+    with progress.Progress(*columns, console=terminal, disable=not shown, auto_refresh=by_itself) as drawn:
+
+        def stage(name: str, count: int) -> Callable[[], None]:
+            if not shown:
+                print(f"{name}: {count}", file=sys.stderr)
+            task = drawn.add_task(name, total=count)
+            if not by_itself:
+                drawn.refresh()
+
+            def advance() -> None:
+                drawn.advance(task)
+                if not by_itself:
+                    drawn.refresh()
+
+            return advance
+
+        yield stage

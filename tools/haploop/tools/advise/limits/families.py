@@ -6,7 +6,7 @@ import itertools
 from dataclasses import dataclass
 from typing import Any
 
-from haploop.tools.render.amounts import amount
+from haploop.tools.render.units import amount
 
 Scene = dict[str, Any]
 _UNITS = {"damping": "N s/m", "mass": "kg"}

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from haploop.plant.sensing.encoder import accelerometer_is_used
-from haploop.tools.render.amounts import amount
+from haploop.tools.render.units import amount
 
 Scene = dict[str, Any]
 # Speed of a firm tap; more than that no task starts with.

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from haploop.tools.render.amounts import amount
+from haploop.tools.render.units import amount
 
 Scene = dict[str, Any]
 Factors = Mapping[str, float]

@@ -10,7 +10,7 @@ from haploop.tools.cost.draw.panel import UNCERTAIN, draw_panel, label_points, l
 from haploop.tools.figure.data import FigureError
 from haploop.tools.figure.file import empty_figure, fix_layout, write_figure
 from haploop.tools.figure.style import GREY, INK, SMALL, TEXT
-from haploop.tools.render.amounts import amount
+from haploop.tools.render.units import amount
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

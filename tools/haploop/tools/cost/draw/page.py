@@ -15,7 +15,8 @@ from haploop.tools.cost.findings import findings
 from haploop.tools.cost.prices import figure as prices_figure
 from haploop.tools.cost.prices.data import Price, PriceGroup, price_groups
 from haploop.tools.figure.data import FigureError
-from haploop.tools.render.amounts import amount, fixed
+from haploop.tools.render.markdown import markdown_table
+from haploop.tools.render.units import amount, fixed
 
 PAGE, FIGURE, PRICES_FIGURE = "accuracy.md", "accuracy.png", "accuracy_prices.png"
 _INTRO = """\
@@ -130,8 +131,7 @@ def _price(price: Price) -> list[str]:
 
 
 def _table(heads: list[str], rows: list[list[str]]) -> str:
-    lines = [heads, ["---"] + ["---:"] * (len(heads) - 2) + ["---" if heads[-1] == "buys" else "---:"], *rows]
-    return "\n".join(f"| {' | '.join(cells)} |" for cells in lines)
+    return markdown_table(heads, rows, numbers=range(1, len(heads) - (heads[-1] == "buys")))
 
 
 def _quiet(cost: Cost) -> str:

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from rich import box
 from rich.console import Group
-from rich.table import Table
 from rich.text import Text
 
 from haploop.tools.cost.advice import rate
 from haploop.tools.cost.data import QUIET_LOAD, QUIET_SPREAD, Cost, Errors, Point, SceneCost, Spread
 from haploop.tools.cost.prices.data import PriceGroup, price_groups
-from haploop.tools.render.amounts import amount, fixed
+from haploop.tools.render.terminal import make_table
+from haploop.tools.render.units import amount, fixed
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -38,12 +37,10 @@ def report(cost: Cost) -> RenderableType:
 
 def scene_table(scene: SceneCost) -> RenderableType:
     """Every point of a scene, method by method."""
-    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, padding=0)
-    table.add_column("method", no_wrap=True)
     names = _POINTWISE if scene.reference.pointwise else _SWINGS
-    for name in (*names, "residual", "µs/tick", "spread", "procs", "bytecode"):
-        table.add_column(name, justify="right", no_wrap=True)
-    table.add_column("verdict", no_wrap=True)
+    numbers = (*names, "residual", "µs/tick", "spread", "procs", "bytecode")
+    unbroken = ("method", "verdict")
+    table = make_table("method", *numbers, "verdict", numbers=numbers, unbroken=unbroken, padding=(0, 0, 0, 0))
     before = ""
     for point in scene.points:
         if point.method != before:
@@ -103,11 +100,8 @@ def _verdict(point: Point) -> Text:
 
 def price_table(group: PriceGroup) -> RenderableType:
     """One of the other prices; its first row is what the ratios are against."""
-    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 1, 0, 0))
-    table.add_column("", no_wrap=True)
-    for name in (group.unit, "spread", "ratio"):
-        table.add_column(name, justify="right", no_wrap=True)
-    table.add_column("what it buys")
+    numbers = (group.unit, "spread", "ratio")
+    table = make_table("", *numbers, "what it buys", numbers=numbers, unbroken=("",), padding=(0, 1, 0, 0))
     for price in group.prices:
         table.add_row(price.what, fixed(price.time.median), _spread(price.time), f"{price.ratio:.2f}", price.buys)
     return Group(Text(group.title, style="bold"), Text(f"{group.how}.", style="dim"), table)

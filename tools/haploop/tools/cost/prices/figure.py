@@ -15,7 +15,7 @@ from haploop.tools.figure.data import FigureError
 from haploop.tools.figure.file import empty_figure, fix_layout, write_figure
 from haploop.tools.figure.labels import Label, place_labels
 from haploop.tools.figure.style import ELEMENTS, FAINT, GREY, INK, SMALL, TEXT, WALL, dress, plain_numbers
-from haploop.tools.render.amounts import fixed
+from haploop.tools.render.units import fixed
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

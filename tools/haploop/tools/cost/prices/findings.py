@@ -5,7 +5,7 @@ from __future__ import annotations
 from haploop.tools.ablation import NONE
 from haploop.tools.cost.finding_words import Finding, times
 from haploop.tools.cost.prices.data import Price, PriceGroup, chance_in
-from haploop.tools.render.amounts import fixed, spring
+from haploop.tools.render.units import fixed, spring
 
 
 def other_prices(groups: dict[str, PriceGroup]) -> Finding | None:

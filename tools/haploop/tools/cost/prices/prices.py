@@ -19,8 +19,8 @@ from haploop.tools.cost.times import IN_PROCESS, PROCESSES
 from haploop.tools.linear.stiffness_limit import StiffnessLimit, stiffness_limit
 from haploop.tools.machine import machine, source_digest, versions
 from haploop.tools.operations import operations
-from haploop.tools.render.amounts import spring
-from haploop.tools.render.stages import Stage
+from haploop.tools.render.progress import Stage
+from haploop.tools.render.units import spring
 
 _PACKAGES = ("haploop.protocol", "haploop.plant", "haploop.controller", "haploop.logger", "haploop.launch")
 _FILES = (

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from haploop.tools.cli.exit_codes import WRONG_USE, leave, plain_errors
 from haploop.tools.figure.data import FigureError
-from haploop.tools.render.stages import Stage, bars, silent
+from haploop.tools.render.progress import Stage, bars, silent
 from haploop.tools.studies.choi2022.figures.registry import figure, numbers
 from haploop.tools.studies.choi2022.page import PAGE, write_page
 from haploop.tools.studies.choi2022.work import Work

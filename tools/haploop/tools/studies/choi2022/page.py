@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from haploop.tools.cli.exit_codes import WRONG_USE, leave
+from haploop.tools.render.markdown import markdown_table
 from haploop.tools.studies.choi2022.claims import ASSUMING, VERDICTS, Finding
 from haploop.tools.studies.choi2022.figures.registry import figure, numbers
 
@@ -88,13 +89,12 @@ def _section(place: str) -> str:
 
 
 def _table(rows: list[tuple[int, Finding]]) -> str:
-    lines = ["| the paper says | here | numbers | figure |", "|---|---|---|---|"]
+    table = []
     for number, finding in rows:
         place = finding.claim.place
         is_so = f"**holds assuming** {finding.assumption}" if finding.verdict == ASSUMING else f"**{finding.verdict}**"
-        cells = (f"“{finding.claim.quote}” ({place})", is_so, finding.numbers, f"[{number}](#figure-{number})")
-        lines.append(f"| {' | '.join(cell.replace('|', '/') for cell in cells)} |")
-    return "\n".join(lines)
+        table.append((f"“{finding.claim.quote}” ({place})", is_so, finding.numbers, f"[{number}](#figure-{number})"))
+    return markdown_table(("the paper says", "here", "numbers", "figure"), table)
 
 
 def _missing(kept: dict[int, dict[str, Any]]) -> list[str]:

@@ -11,7 +11,7 @@ import numpy as np
 
 from haploop.launch.scene.toml_writer import to_toml
 from haploop.tools.figure.file import write_figure
-from haploop.tools.render.stages import Stage, silent
+from haploop.tools.render.progress import Stage, silent
 from haploop.tools.studies.choi2022.claims import Finding
 
 if TYPE_CHECKING:

@@ -12,7 +12,7 @@ import numpy as np
 
 from haploop.launch.scene.toml_writer import inline
 from haploop.tools.figure.data import FigureError
-from haploop.tools.render.amounts import prefix_for
+from haploop.tools.render.units import prefix_for
 
 AMPLITUDE, STIFFNESS = "window.oscillation_m", "wall.stiffness"
 # The worse later: of several seeds a cell shows the worst. A failed run says nothing, a swinging one that it swings.

@@ -31,7 +31,7 @@ class SweepProgress:
     def __init__(self, title: str, screen: Console | None = None) -> None:
         from rich import progress
 
-        from haploop.tools.render.report import console
+        from haploop.tools.render.terminal import console
 
         self.counts: Counter[str] = Counter()
         self.ran, self.reason = 0, ""

@@ -6,7 +6,8 @@ from collections import Counter
 from collections.abc import Sequence
 from typing import Any
 
-from haploop.tools.render.amounts import amount
+from haploop.tools.render.markdown import markdown_table
+from haploop.tools.render.units import amount
 from haploop.tools.studies.choi2022.experiment.reading_rows import CLAIMS, PAPER
 from haploop.tools.studies.choi2022.experiment.reading_search import CLOSE, FAR, SEED, Found
 from haploop.tools.studies.choi2022.experiment.readings import SPACE
@@ -31,14 +32,14 @@ def _nearest(found: Found) -> list[str]:
         f"{values[:1].upper()}{values[1:]}: launch/scenes/{SCENE_FILE}, in which Figs. 8 to 13 are made. "
         f"{row['holding']} of the {len(CLAIMS)} claims hold for it; it lacks {lacks}. Largest steady stiffness "
         "in N/mm:",
-        "\n".join(
+        markdown_table(
+            ("", "nothing", "damping", "bidirectional", "unidirectional", "damping with unidirectional"),
             [
-                "| | nothing | damping | bidirectional | unidirectional | damping with unidirectional |",
-                "|---|---:|---:|---:|---:|---:|",
-                f"| the paper | | {' | '.join(f'{stiffness / 1e3:.1f}' for stiffness in PAPER.values())} |",
-                f"| nearest reading | {_stiffnesses(row)} |",
-                f"| with friction of 48 mN | {_stiffnesses(found.with_friction)} |",
-            ]
+                ("the paper", "", *(f"{stiffness / 1e3:.1f}" for stiffness in PAPER.values())),
+                ("nearest reading", *_stiffnesses(row)),
+                ("with friction of 48 mN", *_stiffnesses(found.with_friction)),
+            ],
+            numbers=range(1, 6),
         ),
         "The friction that Cavusoglu et al. 2002 found on one device steadies all the more, beyond what the paper "
         "reports; it is left out of the readings.",
@@ -51,16 +52,14 @@ def said(setup: Setup) -> str:
     return ", ".join(f"{SPACE.label(key)} {SPACE.value(key, values[key])}" for key in (*SPACE.choices, *SPACE.bounds))
 
 
-def _stiffnesses(row: dict[str, Any]) -> str:
-    return " | ".join(f"{row[f'{name}_N_m'] / 1e3:.1f}" for name in NAMES)
+def _stiffnesses(row: dict[str, Any]) -> list[str]:
+    return [f"{row[f'{name}_N_m'] / 1e3:.1f}" for name in NAMES]
 
 
 def _alone(found: Found, there: Sequence[Option]) -> list[str]:
     rows = found.of("random")
-    lines = [
-        "| claim | as tested | nearest | its neighbours | random readings | likeliest with, and least with |",
-        "|---|---|---|---:|---:|---|",
-    ]
+    heads = ("claim", "as tested", "nearest", "its neighbours", "random readings", "likeliest with, and least with")
+    lines = []
     for name, about in CLAIMS.items():
         decides = decider(there, name)
         cells = (
@@ -71,12 +70,12 @@ def _alone(found: Found, there: Sequence[Option]) -> list[str]:
             percent(share(rows, name)),
             decides.said(name) if decides else "",
         )
-        lines.append(f"| {' | '.join(cells)} |")
+        lines.append(cells)
     bears = sum(max(row[f"{name}_N_m"] for name in PAPER) > 0.0 for row in rows)
     return [
         "#### Each claim alone",
         f"Of {len(rows)} random readings {bears} let any element steady a wall of 2.5 N/mm. Shares are of all.",
-        "\n".join(lines),
+        markdown_table(heads, lines, numbers=(3, 4)),
     ]
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
-from haploop.tools.render.amounts import amount
+from haploop.tools.render.units import amount
 from haploop.tools.studies.choi2022.experiment.map_parallel import is_steady, runs
 from haploop.tools.studies.choi2022.experiment.setup import Elements, Setup
 from haploop.tools.studies.choi2022.work import Work

@@ -8,7 +8,7 @@ import numpy as np
 
 from haploop.tools.figure.file import empty_figure
 from haploop.tools.figure.style import FAINT, GREY, dress, legend, plain_numbers
-from haploop.tools.render.amounts import amount
+from haploop.tools.render.units import amount
 from haploop.tools.studies.choi2022.claims import Claim, Finding
 from haploop.tools.studies.choi2022.colours import COLOURS, SHORT
 from haploop.tools.studies.choi2022.experiment.limits import swings_at_Hz

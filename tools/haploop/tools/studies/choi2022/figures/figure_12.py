@@ -8,7 +8,7 @@ import numpy as np
 
 from haploop.tools.figure.file import empty_figure
 from haploop.tools.figure.style import legend
-from haploop.tools.render.amounts import amount
+from haploop.tools.render.units import amount
 from haploop.tools.studies.choi2022.claims import Claim, Finding
 from haploop.tools.studies.choi2022.experiment.press_figure import Press, draw_press
 from haploop.tools.studies.choi2022.experiment.setup import Elements, both

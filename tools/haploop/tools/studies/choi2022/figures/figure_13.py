@@ -6,7 +6,7 @@ import numpy as np
 
 from haploop.tools.figure.file import empty_figure
 from haploop.tools.figure.style import SMALL, WALL_FILL, dress
-from haploop.tools.render.amounts import amount
+from haploop.tools.render.units import amount
 from haploop.tools.studies.choi2022.claims import Claim, Finding
 from haploop.tools.studies.choi2022.colours import COLOURS
 from haploop.tools.studies.choi2022.experiment.setup import KINDS

@@ -9,6 +9,7 @@ import numpy as np
 
 from haploop.tools.figure.file import empty_figure
 from haploop.tools.figure.style import INK, SMALL, TEXT, dress
+from haploop.tools.render.markdown import markdown_table
 from haploop.tools.studies.choi2022.claims import Claim, Finding
 from haploop.tools.studies.choi2022.colours import COLOURS, SHORT
 from haploop.tools.studies.choi2022.experiment.limits import Best, limits
@@ -151,17 +152,16 @@ def _lead(work: Work) -> tuple[str, str]:
     setups = [replace(_BASE, mode_Hz=mode) for mode in modes]
     found = many(work, "soft and stiff drives", limits, setups)
     rows = [
-        f"| {setup.mode_Hz:g} | " + " | ".join(_words(one[kind]) for kind in KINDS) + " |"
-        for setup, one in zip(setups, found, strict=True)
+        (f"{setup.mode_Hz:g}", *(_words(one[kind]) for kind in KINDS)) for setup, one in zip(setups, found, strict=True)
     ]
     ahead = [max(one[kind].stiffness for kind in KINDS[2:]) / max(one[KINDS[1]].stiffness, 1.0) for one in found]
     first = next((mode for mode, times in zip(modes, ahead, strict=True) if times < 1.0), None)
     turns = f"up to {modes[modes.index(first) - 1]:g} Hz; from {first:g} Hz on damping does" if first else "throughout"
-    head = "| mode (Hz) | " + " | ".join(SHORT[kind] for kind in KINDS) + " |\n|" + "---:|" * (len(KINDS) + 1)
+    heads = ("mode (Hz)", *(SHORT[kind] for kind in KINDS))
     table = (
         "#### Soft and stiff drives\n\nLargest steady stiffness in kN/m (element's size in N s/m or g), with 0.5 ms "
         "of extra delay, an ideal unit at the near mass and 0.3 of the mass there:\n\n"
-        + "\n".join([head, *rows])
+        + markdown_table(heads, rows, numbers=range(len(heads)))
         + "\n\n"
         f"The better inertia bears ×{ahead[0]:.1f} of what damping does at {modes[0]:g} Hz and ×{ahead[-1]:.1f} at "
         f"{modes[-1]:g} Hz. Inertia wins {turns}."

@@ -8,7 +8,7 @@ import numpy as np
 
 from haploop.tools.figure.file import empty_figure
 from haploop.tools.figure.style import INK, PRESSING, RELEASING, SMALL, dress, legend
-from haploop.tools.render.amounts import amount
+from haploop.tools.render.units import amount
 from haploop.tools.studies.choi2022.claims import Claim, Finding
 from haploop.tools.studies.choi2022.motion.prescribed import PERIOD_S, SPRING, STIFFNESS_N_M, forces, taken_J
 from haploop.tools.studies.choi2022.simulation.scenes import run, single_contact

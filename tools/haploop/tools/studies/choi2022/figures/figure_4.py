@@ -8,7 +8,7 @@ import numpy as np
 
 from haploop.tools.figure.file import empty_figure
 from haploop.tools.figure.style import INK, SMALL
-from haploop.tools.render.amounts import amount, fixed
+from haploop.tools.render.units import amount, fixed
 from haploop.tools.studies.choi2022.claims import Claim, Finding
 from haploop.tools.studies.choi2022.motion.acceleration import (
     CUTOFFS_HZ,

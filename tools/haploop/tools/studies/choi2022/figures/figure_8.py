@@ -12,7 +12,7 @@ from haploop.tools.dissipate.booking import Booked, Booking
 from haploop.tools.dissipate.samples import Samples
 from haploop.tools.figure.file import empty_figure
 from haploop.tools.figure.style import GREY, dress, legend
-from haploop.tools.render.amounts import amount
+from haploop.tools.render.units import amount
 from haploop.tools.studies.choi2022.claims import Claim, Finding
 from haploop.tools.studies.choi2022.colours import COLOURS
 from haploop.tools.studies.choi2022.experiment.reading_notes import said

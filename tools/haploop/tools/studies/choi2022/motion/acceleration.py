@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from haploop.tools.linear.one_tick import OneTickMap
-from haploop.tools.render.amounts import fixed
+from haploop.tools.render.units import fixed
 from haploop.tools.studies.choi2022.motion.prescribed import PERIOD_S, mean_taken
 from haploop.tools.studies.choi2022.simulation.scenes import fig6, run, single_contact
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from haploop.tools.render.amounts import amount
+from haploop.tools.render.units import amount
 from haploop.tools.studies.choi2022.claims import Claim, Finding
 from haploop.tools.studies.choi2022.motion.spectrum import faster_m, strongest_Hz
 from haploop.tools.studies.choi2022.simulation.panels import Run

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from haploop.tools.executor.executors import Executor, make_executor, map_parallel
-from haploop.tools.render.stages import Stage
+from haploop.tools.render.progress import Stage
 from haploop.tools.studies.choi2022.simulation.reading import BASE, Reading, draw
 from haploop.tools.studies.choi2022.simulation.reading_runs import shortfalls
 

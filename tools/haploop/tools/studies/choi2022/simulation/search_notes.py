@@ -6,7 +6,8 @@ from collections import Counter
 
 import numpy as np
 
-from haploop.tools.render.amounts import amount
+from haploop.tools.render.markdown import markdown_table
+from haploop.tools.render.units import amount
 from haploop.tools.studies.choi2022.simulation.reading import ABOUT, BOUNDS, SPACE, words
 from haploop.tools.studies.choi2022.simulation.reading_runs import ASIDE, CLAIMS
 from haploop.tools.studies.choi2022.simulation.search import CLOSE, FAR, SEED, Found
@@ -33,7 +34,7 @@ def _how(found: Found) -> list[str]:
         for key, some in SPACE.choices.items()
     ]
     numbers = [
-        f"| {SPACE.label(key)} | {SPACE.value(key, low)} | {SPACE.value(key, high)} | {ABOUT[key][1]} |"
+        (SPACE.label(key), SPACE.value(key, low), SPACE.value(key, high), ABOUT[key][1])
         for key, (low, high) in BOUNDS.items()
     ]
     return [
@@ -47,7 +48,7 @@ def _how(found: Found) -> list[str]:
         "seen: *sampled* is what a controller in front of them reads, *true* what acts on the device behind them. A "
         "low-pass over the position itself, as the paper's words could also mean, is not among the choices.",
         "\n".join(choices),
-        "\n".join(["| number, drawn evenly in its logarithm | from | to | why |", "|---|---:|---:|---|", *numbers]),
+        markdown_table(("number, drawn evenly in its logarithm", "from", "to", "why"), numbers, numbers=(1, 2)),
         "The distance of a reading is the sum over the claims of how far each is from holding: ln of the factor "
         "that is missing (at most 3), 1 for a yes that is a no, 3 for a run that diverged.",
     ]
@@ -57,10 +58,8 @@ def _alone(found: Found) -> list[str]:
     """A table of claims: how often, and what decides."""
     rows, [base], [nearest] = found.of("random"), found.of("base"), found.of("nearest")
     around, there = found.of("neighbour"), options(rows, SPACE)
-    lines = [
-        "| claim | as tested | our reading | nearest | its neighbours | random readings | decided most by |",
-        "|---|---|---|---|---:|---:|---|",
-    ]
+    heads = ("claim", "as tested", "our reading", "nearest", "its neighbours", "random readings", "decided most by")
+    lines = []
     for name, about in [*CLAIMS.items(), ("all", "all of the above"), *ASIDE.items()]:
         decides = decider(there, name)
         cells = (
@@ -72,9 +71,13 @@ def _alone(found: Found) -> list[str]:
             percent(share(rows, name)),
             decides.said(name) if decides else "",
         )
-        lines.append(f"| {' | '.join(cells)} |")
+        lines.append(cells)
     aside = ", ".join(f"*{name}*" for name in ASIDE)
-    return ["#### Each claim alone", "\n".join(lines), f"Not counted in a reading's distance: {aside}."]
+    return [
+        "#### Each claim alone",
+        markdown_table(heads, lines, numbers=(4, 5)),
+        f"Not counted in a reading's distance: {aside}.",
+    ]
 
 
 def _together(found: Found) -> list[str]:

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from haploop.tools.render.amounts import amount
+from haploop.tools.render.units import amount
 
 Row = Mapping[str, Any]
 # An option with fewer readings says nothing.

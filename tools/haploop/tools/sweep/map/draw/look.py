@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from haploop.tools.figure.style import VERDICTS as COLOURS
-from haploop.tools.render.amounts import amount
+from haploop.tools.render.units import amount
 from haploop.tools.sweep.map.data import DIVERGED, FAILED, LIMIT_CYCLE, NO_CONTACT, STEADY, VERDICTS
 
 if TYPE_CHECKING:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from haploop.tools.render.amounts import spring
+from haploop.tools.render.units import spring
 from haploop.tools.sweep.map.answer import StiffestSteady
 from haploop.tools.sweep.map.data import (
     FAILED,

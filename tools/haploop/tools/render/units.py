@@ -1,4 +1,4 @@
-"""Numbers as people read them: with a prefix that suits their size, and their unit."""
+"""Numbers with their units, and with the prefix that suits their size."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ PREFIXES = {1e3: "k", 1.0: "", 1e-3: "m", 1e-6: "µ", 1e-9: "n"}
 
 
 def prefix_for(values: Iterable[float]) -> tuple[float, str]:
-    """The factor and letter that suit the largest of some values: 1 <= |largest| / factor < 1000 where possible."""
+    """Returns the factor and letter with which the largest of some values lies between 1 and 1000 where possible."""
     largest = max((abs(value) for value in values if math.isfinite(value)), default=0.0)
     if largest == 0.0:
         return 1.0, ""
@@ -19,7 +19,7 @@ def prefix_for(values: Iterable[float]) -> tuple[float, str]:
 
 
 def amount(value: float | None, unit: str, digits: int = 3) -> str:
-    """A number with its unit: ``"5.14 mm"``; a dash for no number, powers of ten where no prefix helps."""
+    """Returns a number with its unit, ``"5.14 mm"``; a dash for no number, powers of ten where no prefix helps."""
     if value is None or math.isnan(value):
         return "–"
     if not math.isfinite(value):
@@ -31,7 +31,7 @@ def amount(value: float | None, unit: str, digits: int = 3) -> str:
 
 
 def fixed(value: float, digits: int = 3) -> str:
-    """``digits`` significant digits without powers of ten; digits before the point are never rounded away."""
+    """Returns ``digits`` significant digits without powers of ten; digits before the point are never rounded away."""
     if value == 0.0 or not math.isfinite(value):
         return f"{value:g}".replace("-0", "0")
     # Of the number as rounded: 99.97 has three digits before its point.
@@ -41,7 +41,7 @@ def fixed(value: float, digits: int = 3) -> str:
 
 
 def spring(stiffness_N_m: float | None) -> str:
-    """A stiffness; kept in N/m, as scene files have it."""
+    """Returns a stiffness in N/m without a prefix, as scene files have it."""
     if stiffness_N_m is None:
         return "–"
     if abs(stiffness_N_m) >= 1e7:
@@ -50,6 +50,6 @@ def spring(stiffness_N_m: float | None) -> str:
 
 
 def parameters(table: dict[str, object]) -> str:
-    """An element's parameters in short: ``"mass 0.01, always"``; acting in contact goes without saying."""
+    """Returns an element's parameters in short, ``"mass 0.01, always"``; acting in contact goes without saying."""
     words = [f"{name} {value:g}" for name, value in table.items() if isinstance(value, int | float)]
     return ", ".join(words + (["always"] if table.get("acts") == "always" else []))

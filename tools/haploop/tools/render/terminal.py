@@ -1,0 +1,77 @@
+"""The terminal: a console, the colours of verdicts, and tables of one look."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+VERDICT_STYLES = {"steady": "bold green", "limit-cycle": "bold yellow", "diverged": "bold red", "no-contact": "bold"}
+_WIDTH_OF_A_PIPE = 100
+
+
+def console(stderr: bool = False) -> Console:
+    """Makes the console of a terminal, or of a pipe: then without colours, and 100 columns wide."""
+    from rich.console import Console
+
+    made = Console(stderr=stderr, highlight=False)
+    if not made.is_terminal:
+        made.width = _WIDTH_OF_A_PIPE
+    return made
+
+
+def verdict_style(verdict: str) -> str:
+    """Returns the style of a verdict; bold for one that has no colour."""
+    return VERDICT_STYLES.get(verdict, "bold")
+
+
+def make_table(
+    *heads: str,
+    numbers: Collection[str] = (),
+    unbroken: Collection[str] = (),
+    padding: tuple[int, int, int, int] = (0, 1, 0, 1),
+    least_width: int | None = None,
+    first_width: int | None = None,
+) -> Table:
+    """Makes a table with a line below its heads and no other.
+
+    Args:
+        heads: of the columns.
+        numbers: heads of the columns whose cells are set to the right, on one line.
+        unbroken: heads of other columns whose cells stay on one line.
+        padding: of every cell: top, right, bottom, left.
+        least_width: of the columns of numbers, letters.
+        first_width: least width of the first column, letters.
+    """
+    from rich import box
+    from rich.table import Table
+
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, padding=padding)
+    for place, head in enumerate(heads):
+        if head in numbers:
+            table.add_column(head, justify="right", no_wrap=True, min_width=least_width)
+        else:
+            width = None if place else first_width
+            table.add_column(head, no_wrap=head in unbroken, overflow="fold", min_width=width)
+    return table
+
+
+def make_facts(rows: Iterable[tuple[str, str | Text]], least_width: int | None = None) -> Table:
+    """Makes a grid of names and values, without lines or heads.
+
+    Args:
+        rows: name and value.
+        least_width: of the names, letters.
+    """
+    from rich.table import Table
+
+    grid = Table.grid(padding=(0, 2))
+    grid.add_column(style="dim", no_wrap=True, min_width=least_width)
+    grid.add_column()
+    for row in rows:
+        grid.add_row(*row)
+    return grid
