@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from haploop.launch.clock.capabilities import options
+from haploop.launch.clock.capabilities import capabilities
 from haploop.launch.clock.clock import ClockError
 from haploop.launch.processes.control import CommandRefused
 from haploop.launch.runs.replay import replay
@@ -17,7 +17,7 @@ DAMPING = {"kind": "damping", "damping": 0.5}
 
 
 def test_options_name_every_key_that_can_be_set_with_unit_bounds_and_present_value():
-    data = options(scene(wall=WALL, dissipation=[DAMPING], clock={"round_trip_delay": "2 ms"}), KINDS)
+    data = capabilities(scene(wall=WALL, dissipation=[DAMPING], clock={"round_trip_delay": "2 ms"}), KINDS)
     settable = data["settable"]
     assert set(settable) == {"wall.stiffness", "wall.position", "clock.round_trip_delay", "dissipation.0.damping"}
     assert settable["wall.stiffness"]["unit"] == "N/m"
@@ -32,7 +32,7 @@ def test_options_name_every_key_that_can_be_set_with_unit_bounds_and_present_val
 
 
 def test_options_of_a_scene_without_a_wall_offer_none():
-    assert set(options(scene(), KINDS)["settable"]) == {"clock.round_trip_delay"}
+    assert set(capabilities(scene(), KINDS)["settable"]) == {"clock.round_trip_delay"}
 
 
 def test_the_present_scene_has_every_change_that_has_taken_effect_and_none_that_has_not():

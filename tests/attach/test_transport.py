@@ -50,7 +50,7 @@ def test_a_run_over_tcp_gives_the_bits_of_one_process_and_answers_whoever_may_as
     results, identities = [], []
     prepared = prepare(SCENE, settings, out=tmp_path / "out")
     thread = threading.Thread(
-        target=lambda: results.append(run(prepared, transport=transport, pace=1.0, announced=identities.append))
+        target=lambda: results.append(run(prepared, transport=transport, pace=1.0, on_started=identities.append))
     )
     thread.start()
     while not identities:

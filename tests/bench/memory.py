@@ -41,7 +41,7 @@ def main() -> None:
             seen[when] = {role: resident_MB(pid) for role, pid in processes_of(identities[0]).items()}
 
     with tempfile.TemporaryDirectory() as folder:
-        run(prepare(SCENE, ["duration=600"], out=Path(folder, "out")), progress=look, announced=identities.append)
+        run(prepare(SCENE, ["duration=600"], out=Path(folder, "out")), on_progress=look, on_started=identities.append)
     for role, before in seen["one minute"].items():
         after = seen["ten minutes"][role]
         print(f"{role:<12}{before:8.1f} MB after one minute {after:8.1f} MB after ten {after - before:+7.2f} MB")

@@ -168,8 +168,8 @@ def test_the_clock_grants_after_a_turns_worth_of_messages_however_many_wait(
             while sum(turns) < 900:
                 server.socket.poll()
                 threading.Event().wait(0.02)  # let more of them come in
-                before = server.strangers
+                before = server.unknown_peers
                 server.serve()
-                turns.append(server.strangers - before)
+                turns.append(server.unknown_peers - before)
         server.close()
     assert max(turns) <= 200

@@ -14,7 +14,8 @@ import pytest
 from haploop.launch.processes import control, run_directory
 from haploop.launch.processes.run_directory import LiveRun
 from haploop.launch.runs.in_process import run_in_process
-from haploop.launch.runs.start import Prepared, prepare, run
+from haploop.launch.runs.start import prepare, run
+from haploop.launch.spec import RunSpec
 
 SCENE = Path(__file__).parents[3] / "launch" / "scenes" / "fig6c.toml"
 
@@ -27,7 +28,7 @@ class Going:
         live: as other terminals find it.
     """
 
-    def __init__(self, prepared: Prepared, announced: Callable[[Path], object], options: dict[str, Any]) -> None:
+    def __init__(self, prepared: RunSpec, announced: Callable[[Path], object], options: dict[str, Any]) -> None:
         self.prepared = prepared
         self._result: dict[str, Any] = {}
         self._error: BaseException | None = None
@@ -41,7 +42,7 @@ class Going:
 
     def _lead(self, options: dict[str, Any]) -> None:
         try:
-            self._result = run(self.prepared, announced=self._note, **options)
+            self._result = run(self.prepared, on_started=self._note, **options)
         except BaseException as error:
             self._error = error
         finally:
@@ -106,6 +107,6 @@ def going(
             subject.end()
 
 
-def undisturbed(prepared: Prepared) -> dict[str, Any]:
+def undisturbed(prepared: RunSpec) -> dict[str, Any]:
     """The summary of the same scene run in one process, with nobody watching."""
     return run_in_process(prepared.scene, prepared.kinds)

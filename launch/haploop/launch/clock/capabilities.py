@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from haploop.controller.dissipation import Element
 
 
-def options(scene: dict[str, Any], kinds: Mapping[str, type[Element]]) -> dict[str, Any]:
+def capabilities(scene: dict[str, Any], kinds: Mapping[str, type[Element]]) -> dict[str, Any]:
     """Everything a form needs, as plain values.
 
     Args:

@@ -9,14 +9,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from haploop.controller.dissipation import ElementError, PluginError, load_plugin
-from haploop.launch.clock.capabilities import options
+from haploop.launch.clock.capabilities import capabilities
 from haploop.launch.clock.clock import Clock, ClockError
 from haploop.launch.clock.roster import Roster
 from haploop.launch.output import OutputError, keep_plugin
 from haploop.launch.scene.mistakes import SceneError
 
 if TYPE_CHECKING:
-    from haploop.launch.processes.supervisor import RunRequest
+    from haploop.launch.spec import RunSpec
 
 Answer = tuple[bool, str, dict[str, Any]]
 
@@ -32,9 +32,9 @@ class Commands:
     Whatever is refused leaves the run as it was.
     """
 
-    def __init__(self, clock: Clock, request: RunRequest, roster: Callable[[], Roster]) -> None:
-        self._clock, self._request, self._roster = clock, request, roster
-        self._rate = request.scene["clock"]["control_rate"]
+    def __init__(self, clock: Clock, spec: RunSpec, roster: Callable[[], Roster]) -> None:
+        self._clock, self._spec, self._roster = clock, spec, roster
+        self._rate = spec.scene["clock"]["control_rate"]
         self._verbs = {
             "status": self._status,
             "options": self._options,
@@ -67,8 +67,8 @@ class Commands:
         clock, roster = self._clock, self._roster()
         logger = roster.own("logger")
         data = {
-            "title": self._request.scene["title"],
-            "out": str(self._request.out),
+            "title": self._spec.scene["title"],
+            "out": str(self._spec.out),
             "tick": logger.tick if logger else 0,
             "granted": clock.until,
             "end": clock.end,
@@ -84,7 +84,7 @@ class Commands:
 
     def _options(self) -> tuple[str, dict[str, Any]]:
         """What can be set and swapped in now: units, bounds, present values."""
-        data = options(self._clock.present(), self._request.kinds)
+        data = capabilities(self._clock.present(), self._spec.kinds)
         return f"{len(data['settable'])} keys can be set, {len(data['kinds'])} kinds swapped in", data
 
     def _pause(self) -> tuple[str, dict[str, Any]]:
@@ -120,12 +120,12 @@ class Commands:
     def _swap(
         self, swap: dict[str, Any], element: int = 0, at: float | None = None, reload: bool = False
     ) -> tuple[str, dict[str, Any]]:
-        kinds = dict(self._request.kinds)
+        kinds = dict(self._spec.kinds)
         extra = self._reload(str(swap.get("kind"))) if reload else {}
         try:
             tick = self._clock.change({"swap": swap, "element": element}, at, **extra)
         except Exception:
-            self._request.kinds.update(kinds)
+            self._spec.kinds.update(kinds)
             raise
         return f"element {element} becomes {swap['kind']} at {self._at(tick)}", {"tick": tick}
 
@@ -136,13 +136,13 @@ class Commands:
 
     def _reload(self, kind: str) -> dict[str, Any]:
         """Take up the edited file of a kind named at launch; a file that does not load changes nothing."""
-        source: Path | None = self._request.plugin_sources.get(kind)
+        source: Path | None = self._spec.plugin_sources.get(kind)
         if source is None:
-            known = ", ".join(sorted(self._request.plugin_sources)) or "none"
+            known = ", ".join(sorted(self._spec.plugin_sources)) or "none"
             raise ClockError(f"Only kinds from --plugin files can be reloaded ({known}), but {kind} was asked for.")
         loaded = load_plugin(source)
         if kind not in loaded:
             raise ClockError(f"{source} no longer defines {kind}, but {', '.join(loaded)}; the old element stays.")
-        kept = keep_plugin(source, self._request.out)
-        self._request.kinds.update(loaded)
+        kept = keep_plugin(source, self._spec.out)
+        self._spec.kinds.update(loaded)
         return {"plugin": str(kept.resolve())}

@@ -78,7 +78,7 @@ class Roster:
         silent = [node for node in self.nodes.values() if not node.done and now - node.heard > deadline_s]
         return sorted(silent, key=lambda node: node.heard)
 
-    def forgive(self, seconds: float) -> None:
+    def discount_silence(self, seconds: float) -> None:
         """Not to count some time as silence."""
         for node in self.nodes.values():
             node.heard += seconds

@@ -31,13 +31,13 @@ class ClockServer:
         clock: decides how far and when.
         welcome: fields of WELCOME but for endpoints and granted: run, scene, timebase, context.
         command: carries out a command from a client.
-        held: whether the first tick waits still; it is given the pids of all that are ready.
+        start_gate: given the pids of all that are ready, returns whether the first tick may be worked on.
 
     Attributes:
         address: where the clock listens.
         roster: who takes part.
         results: role -> result of each own process that is done.
-        strangers: frames that were no messages, or from nobody who joined.
+        unknown_peers: frames that were no messages, or from nobody who joined.
     """
 
     def __init__(
@@ -48,15 +48,15 @@ class ClockServer:
         clock: Clock,
         welcome: dict[str, Any],
         command: Command,
-        held: Callable[[set[int]], bool],
+        start_gate: Callable[[set[int]], bool],
     ) -> None:
         self._socket = open_socket(context, zmq.ROUTER)
         self.address = bind(self._socket, sockets, "clock")
         self._secret, self._clock, self._welcome, self._command = secret, clock, welcome, command
         self.roster = Roster()
         self.results: dict[str, dict[str, Any]] = {}
-        self.strangers = 0
-        self._greeted, self._held = False, held
+        self.unknown_peers = 0
+        self._greeted, self._start_gate = False, start_gate
         self._granted = -1
         self._last_sent = False
 
@@ -82,18 +82,18 @@ class ClockServer:
             try:
                 self._take(sender, decode(frames[-1] if frames else b""))
             except WireError as error:
-                self.strangers += 1
+                self.unknown_peers += 1
                 self._send(sender, "REFUSED", str(error))
         if not self._greeted and self.roster.joined():
             self._greeted = True
             for node in list(self.roster.nodes.values()):
                 self._greet(node)
-        if self.roster.all_own("ready") and not self._is_held():
+        if self.roster.all_own("ready") and self._may_start():
             self.grant()
 
-    def _is_held(self) -> bool:
+    def _may_start(self) -> bool:
         has_begun = self._granted >= 0 or self._clock.is_last
-        return not has_begun and self._held({node.pid for node in self.roster.nodes.values() if node.ready})
+        return has_begun or self._start_gate({node.pid for node in self.roster.nodes.values() if node.ready})
 
     def grant(self) -> None:
         """Tell everyone how far they may go, and what changes on the way, if that is news."""
@@ -130,11 +130,11 @@ class ClockServer:
             return
         node = self.roster.nodes.get(sender)
         if node is None:
-            self.strangers += 1
+            self.unknown_peers += 1
             self._send(sender, "REFUSED", f"{frame.name} came from somebody who has not joined; send JOIN first.")
             return
         if frame.name in ("READY", "PROGRESS") and not 0 <= frame.fields[0] <= self._clock.until:
-            self.strangers += 1
+            self.unknown_peers += 1
             self._send(
                 sender, "REFUSED", f"{frame.name} must name a tick from 0 to {self._clock.until}, which is granted."
             )
@@ -143,7 +143,7 @@ class ClockServer:
         node.waits_for = ""
         handler = getattr(self, f"_on_{frame.name.lower()}", None)
         if handler is None:
-            self.strangers += 1
+            self.unknown_peers += 1
             self._send(sender, "REFUSED", f"{frame.name} is not for the clock.")
             return
         handler(node, *frame.fields)

@@ -46,7 +46,7 @@ class Child:
     def pid(self) -> int:
         return self._process.pid
 
-    def fate(self) -> str:
+    def exit_description(self) -> str:
         """How the process ended, in words."""
         try:
             code = self._process.wait(timeout=1.0)

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import math
 import secrets
 import time
-from collections.abc import Callable
-from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import zmq
 
@@ -19,11 +16,9 @@ from haploop.launch.errors import RunFailed
 from haploop.launch.processes import run_directory
 from haploop.launch.processes.children import Child, start_children
 from haploop.launch.processes.interrupts import interrupts
+from haploop.launch.spec import RunSpec
 from haploop.protocol.ticks import Timebase
-from haploop.protocol.transport import SecureContext, Transport
-
-if TYPE_CHECKING:
-    from haploop.controller.dissipation import Element
+from haploop.protocol.transport import SecureContext
 
 _START_DEADLINE_S = 20.0
 # What the logger is given to save its files after another node has failed.
@@ -38,39 +33,7 @@ _PROBE_S = 0.2
 _HELD_UP_S = 1.0
 
 
-@dataclass
-class RunRequest:
-    """All that is needed to run a scene as processes.
-
-    Attributes:
-        scene: the resolved scene.
-        kinds: element kinds by name.
-        out: the run's directory, made.
-        attachments: text files for the log, by name.
-        plugins: plugin files within ``out`` that the controller loads.
-        plugin_sources: kind -> the user's file it came from, for reloading.
-        pace: simulated seconds per wall second; infinite for as fast as it goes.
-        transport: how the sockets are reached.
-        progress: called now and then with the logger's status.
-        announced: called once with the run's id, and the clock's address where that is one of TCP.
-        held: whether the first tick waits still, for a process that is to be there from the start; it is given the
-            pids of all nodes that are ready.
-    """
-
-    scene: dict[str, Any]
-    kinds: dict[str, type[Element]]
-    out: Path
-    attachments: dict[str, str] = field(default_factory=dict)
-    plugins: list[Path] = field(default_factory=list)
-    plugin_sources: dict[str, Path] = field(default_factory=dict)
-    pace: float = math.inf
-    transport: Transport = field(default_factory=Transport)
-    progress: Callable[[dict[str, Any]], None] = lambda status: None
-    announced: Callable[[str], None] = lambda run_id: None
-    held: Callable[[set[int]], bool] = lambda ready: False
-
-
-def run_processes(request: RunRequest) -> dict[str, Any]:
+def run_processes(spec: RunSpec) -> dict[str, Any]:
     """Run to the end and return the summary.
 
     The first SIGINT or SIGTERM ends the run in order, with a summary of what ran; the second at once.
@@ -82,7 +45,7 @@ def run_processes(request: RunRequest) -> dict[str, Any]:
     sockets = run_directory.create()
     try:
         with interrupts(usual_from=3) as received:
-            return Supervisor(request, sockets, received).run()
+            return Supervisor(spec, sockets, received).run()
     finally:
         run_directory.remove(sockets)
 
@@ -90,13 +53,13 @@ def run_processes(request: RunRequest) -> dict[str, Any]:
 class Supervisor:
     """One run's processes and its clock."""
 
-    def __init__(self, request: RunRequest, sockets: Path, received: list[int]) -> None:
-        self._request, self._sockets, self._interrupts = request, sockets, received
-        scene = request.scene
+    def __init__(self, spec: RunSpec, sockets: Path, received: list[int]) -> None:
+        self._spec, self._sockets, self._interrupts = spec, sockets, received
+        scene = spec.scene
         timebase = Timebase.from_clock(scene["clock"], scene["duration"])
-        self._clock = Clock(scene, timebase, request.kinds, request.pace)
+        self._clock = Clock(scene, timebase, spec.kinds, spec.pace)
         self._deadline_s = scene["run"]["deadline"]
-        self._context = SecureContext.from_transport(request.transport)
+        self._context = SecureContext.from_transport(spec.transport)
         secret = secrets.token_hex(16)
         welcome = {
             "run": sockets.name,
@@ -104,17 +67,17 @@ class Supervisor:
             "timebase": timebase.as_dict(),
             "context": {
                 "secret": secret,
-                "out": str(request.out.resolve()),
-                "plugins": [str(path.resolve()) for path in request.plugins],
-                "attachments": request.attachments,
+                "out": str(spec.out.resolve()),
+                "plugins": [str(path.resolve()) for path in spec.plugins],
+                "attachments": spec.attachments,
             },
         }
-        commands = Commands(self._clock, request, lambda: self._server.roster)
-        self._server = ClockServer(self._context, sockets, secret, self._clock, welcome, commands, request.held)
-        keys = request.transport.as_dict()["keys"]
-        run_directory.announce(sockets, self._server.address, scene["title"], str(request.out), keys)
+        commands = Commands(self._clock, spec, lambda: self._server.roster)
+        self._server = ClockServer(self._context, sockets, secret, self._clock, welcome, commands, spec.start_gate)
+        keys = spec.transport.as_dict()["keys"]
+        run_directory.announce(sockets, self._server.address, scene["title"], str(spec.out), keys)
         run_number = len(run_directory.live_runs()) - 1
-        start = {"address": self._server.address, "secret": secret, "transport": request.transport.as_dict()}
+        start = {"address": self._server.address, "secret": secret, "transport": spec.transport.as_dict()}
         self._children = start_children(sockets, start, scene["run"]["pin"], run_number)
         self._started = self._looked = time.monotonic()
         self._probe_due = 0.0
@@ -123,8 +86,8 @@ class Supervisor:
     def run(self) -> dict[str, Any]:
         """Lead the run to its end."""
         try:
-            address = f" at {self._server.address}" if self._request.transport.host else ""
-            self._request.announced(self._sockets.name + address)
+            address = f" at {self._server.address}" if self._spec.transport.host else ""
+            self._spec.on_started(self._sockets.name + address)
             self._lead()
             return self._server.results["logger"]
         except RunFailed as error:
@@ -153,18 +116,18 @@ class Supervisor:
             self._check_deadlines()
             logger = self._server.roster.own("logger")
             if logger:
-                self._request.progress(logger.status)
+                self._spec.on_progress(logger.status)
         for child in self._children.values():
             child.wait(2.0)
 
     def _look_at(self, child: Child) -> None:
         """A process has ended: in order after DONE, otherwise the run fails."""
-        fate = child.fate()
+        ended = child.exit_description()
         given_up = time.monotonic() + (_LAST_WORDS_S if child.exited() else 0.0)
         self._server.serve()
         while not self._is_done(child.role):
             if time.monotonic() > given_up:
-                raise RunFailed(f"The {child.role} {fate}; {self._where()}")
+                raise RunFailed(f"The {child.role} {ended}; {self._where()}")
             self._server.socket.poll(20)
             self._server.serve()
 
@@ -172,17 +135,17 @@ class Supervisor:
         node = self._server.roster.own(role)
         return node is not None and node.done
 
-    def _forgive(self, now: float) -> None:
+    def _discount_silence(self, now: float) -> None:
         """Time in which the launcher itself did not listen is nobody's silence."""
         held_up_s = now - self._looked
         self._looked = now
         if held_up_s > _HELD_UP_S:
             self._started += held_up_s
-            self._server.roster.forgive(held_up_s)
+            self._server.roster.discount_silence(held_up_s)
 
     def _check_deadlines(self) -> None:
         now = time.monotonic()
-        self._forgive(now)
+        self._discount_silence(now)
         if not self._server.roster.joined():
             if now - self._started > _START_DEADLINE_S:
                 missing = [role for role in self._children if not self._server.roster.own(role)]
@@ -204,7 +167,7 @@ class Supervisor:
 
     def _where(self) -> str:
         tick = self._server.roster.common_tick()
-        rate = self._request.scene["clock"]["control_rate"]
+        rate = self._spec.scene["clock"]["control_rate"]
         return f"the last tick all nodes had done is {tick} ({tick / rate:g} s)."
 
     def _heed_signals(self) -> None:

@@ -29,7 +29,7 @@ def run_in_process(
     out: Path | None = None,
     attachments: dict[str, str] | None = None,
     events: list[tuple[int, Event]] | None = None,
-    progress: Progress | None = None,
+    on_progress: Progress | None = None,
     memory: MemoryLog | None = None,
     stop: Callable[[], bool] = lambda: False,
 ) -> dict[str, Any]:
@@ -41,7 +41,7 @@ def run_in_process(
         out: directory for log and summary; no file is written when None.
         attachments: text files for the log, by name.
         events: (tick, event) in order; the scene's own when None. Pauses are of the wall clock and change nothing.
-        progress: called now and then with the logger's status.
+        on_progress: called now and then with the logger's status.
         memory: where to log without a directory.
         stop: asked after every block; True ends the run there.
 
@@ -56,8 +56,8 @@ def run_in_process(
     try:
         while loop.block():
             keeper.flush_when_due()
-            if progress:
-                progress(keeper.logger.status())
+            if on_progress:
+                on_progress(keeper.logger.status())
             if stop():
                 loop.end_here()
     except ElementError as error:

@@ -46,16 +46,16 @@ def run_scene(
 
                 def told(run_id: str) -> None:
                     line.announce(run_id)
-                    viewing.announced(run_id)
+                    viewing.on_started(run_id)
 
                 summary = run(
                     prepared,
                     in_process=in_process,
                     pace=rate,
                     transport=transport,
-                    progress=line.update,
-                    announced=told,
-                    held=viewing.held,
+                    on_progress=line.update,
+                    on_started=told,
+                    start_gate=viewing.may_start,
                 )
         except RunFailed as error:
             leave(f"{error}\nWhat was logged is in {prepared.out}.", FAILED)

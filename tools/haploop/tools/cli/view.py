@@ -116,12 +116,12 @@ def _at_eof(loop: asyncio.AbstractEventLoop, act: Callable[[], None]) -> None:
 class Viewing:
     """What a run has to do with whoever shows it: nothing, where nobody does."""
 
-    def announced(self, run_id: str) -> None:
+    def on_started(self, run_id: str) -> None:
         """The run can be found by this id."""
 
-    def held(self, ready: set[int]) -> bool:
-        """Whether the run is not to begin yet, given the pids of all nodes that are ready."""
-        return False
+    def may_start(self, ready: set[int]) -> bool:
+        """Returns whether the run may begin, given the pids of all nodes that are ready."""
+        return True
 
     def stay(self) -> None:
         """The run is over."""
@@ -150,7 +150,7 @@ class _Viewer(Viewing):
     _process: subprocess.Popen[str] | None = None
     _link = ""
 
-    def announced(self, run_id: str) -> None:
+    def on_started(self, run_id: str) -> None:
         words = ["view", "--run", run_id.partition(" ")[0], "--led"]
         self._since = time.monotonic()
         self._process = subprocess.Popen(
@@ -162,10 +162,10 @@ class _Viewer(Viewing):
         )
         threading.Thread(target=self._tell, daemon=True).start()
 
-    def held(self, ready: set[int]) -> bool:
+    def may_start(self, ready: set[int]) -> bool:
         process = self._process
         is_on_its_way = process is not None and process.pid not in ready and process.poll() is None
-        return is_on_its_way and time.monotonic() - self._since < _HELD_S
+        return not is_on_its_way or time.monotonic() - self._since >= _HELD_S
 
     def _tell(self) -> None:
         assert self._process
