@@ -9,7 +9,7 @@ import pytest
 from haploop.view.receive.runs import CommandFailed
 from haploop.view.serve import assets
 from haploop.view.serve.guard import Guard
-from haploop.view.serve.program import PortTaken, listen
+from haploop.view.serve.server import PortTaken, listen
 from helpers.live.browsing import site, to_its_end
 
 
@@ -168,12 +168,12 @@ async def test_garbage_from_a_page_closes_that_page_alone(garbage):
 @scenario
 async def test_the_way_in_leads_to_the_token_once_and_then_no_more():
     async with site(NoRuns()) as here:
-        entrance = here.guard.entrance
-        assert here.guard.token not in entrance
-        async with here.session.get(entrance, allow_redirects=False) as answer:
+        one_time_link = here.guard.one_time_link
+        assert here.guard.token not in one_time_link
+        async with here.session.get(one_time_link, allow_redirects=False) as answer:
             assert answer.status == 302
             assert answer.headers["Location"] == here.guard.link
-        async with here.session.get(entrance, allow_redirects=False) as answer:
+        async with here.session.get(one_time_link, allow_redirects=False) as answer:
             assert answer.status == 403
             assert here.guard.token not in await answer.text()
         assert await status(here, "/enter/guess") == 403
@@ -181,8 +181,8 @@ async def test_the_way_in_leads_to_the_token_once_and_then_no_more():
 
 def test_a_wrong_key_does_not_use_the_way_in_up():
     guard = Guard(1234)
-    assert not guard.admits("wrong")
-    assert guard.admits(guard.entrance.rpartition("/")[2])
+    assert not guard.redeem("wrong")
+    assert guard.redeem(guard.one_time_link.rpartition("/")[2])
 
 
 def test_the_tokens_of_two_servers_differ():

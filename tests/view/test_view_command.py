@@ -91,9 +91,9 @@ def test_the_browser_is_opened_with_a_link_that_holds_no_token(launched, tmp_pat
     monkeypatch.setenv("BROWSER", f"{browser} %s")
     viewer = launched("view")
     address, token = link(viewer)
-    entrance = wait_for("the browser", lambda: opened.exists() and opened.read_text().strip())
-    assert entrance.startswith(f"{address}/enter/")
-    assert token not in entrance
+    one_time_link = wait_for("the browser", lambda: opened.exists() and opened.read_text().strip())
+    assert one_time_link.startswith(f"{address}/enter/")
+    assert token not in one_time_link
 
 
 def test_run_with_view_serves_the_run_and_stays_until_ctrl_c(launched, tmp_path, monkeypatch):

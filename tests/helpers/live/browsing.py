@@ -15,7 +15,7 @@ import numpy as np
 from haploop.tools.cli.view import LiveRuns
 from haploop.view.receive.runs import Runs
 from haploop.view.serve.guard import Guard
-from haploop.view.serve.program import listen, serve
+from haploop.view.serve.server import listen, serve
 
 # A test gives up after so long. It says nothing about how long anything may take.
 PATIENCE_S = 40.0
@@ -160,7 +160,7 @@ async def site(runs: Runs | None = None, **options: Any) -> AsyncIterator[Site]:
     """A server on a free port, and a session of a browser."""
     ready: asyncio.Future[Guard] = asyncio.get_running_loop().create_future()
     end = asyncio.Event()
-    server = asyncio.create_task(serve(runs or LiveRuns(), listen(0), serving=ready.set_result, end=end, **options))
+    server = asyncio.create_task(serve(runs or LiveRuns(), listen(0), on_serving=ready.set_result, end=end, **options))
     await asyncio.wait((ready, server), return_when=asyncio.FIRST_COMPLETED)
     assert ready.done(), server.result()
     async with aiohttp.ClientSession() as session:

@@ -1,1 +1,1 @@
-"""Snapshots for the page: tables of what to draw, packed into frames of bytes."""
+"""Messages to the page: snapshots as tables packed into bytes, state and events as JSON."""

@@ -1,1 +1,1 @@
-"""Telemetry in: the session of a run as a viewer receives it, and the backfill from its log."""
+"""Sources of the page: telemetry and events of a run, backfill from its log, answers of its clock."""

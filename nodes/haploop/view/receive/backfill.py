@@ -1,4 +1,4 @@
-"""What a run logged before a viewer joined it, read from its log while the run goes on."""
+"""Backfill: what a run logged before the viewer joined it, read from its log while the run goes on."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ import numpy as np
 from haploop.logger.log.stream import Batch, LogStream
 from haploop.protocol.changes import Event, Span, changes_of, spans
 from haploop.protocol.ticks import Timebase
-from haploop.view.receive.at_work import elements_of, wall_of
+from haploop.view.receive.ingest import elements_as_telemetry, wall_as_telemetry
 from haploop.view.store.history import TRUE, History
 
 _POSITIONS = ("x", "tip_x", "hand_x")
 
 
-class Past:
-    """A history that is filled from the log of a run.
+class Backfill:
+    """Fills a history from the log of a run.
 
     Args:
         out: the run's directory.
@@ -38,7 +38,7 @@ class Past:
         self.history = History(time, 0)
 
     def read(self) -> None:
-        """Go on reading, up to where the log ends now.
+        """Reads on, up to the present end of the log.
 
         Raises:
             FileNotFoundError, LogError: there is no log, or none that can be read.
@@ -56,27 +56,31 @@ class Past:
             return
         tick = round(float(rows["timestamp"][0]) * self._time.control_rate)
         if batch.topic == "/energy":
-            self.history.booked(tick, {name: rows[name] for name in rows if name == "residual" or name.endswith(TRUE)})
+            self.history.append_energy(
+                tick, {name: rows[name] for name in rows if name == "residual" or name.endswith(TRUE)}
+            )
             return
         for first, end, span in self._spans(tick, tick + len(rows["timestamp"])):
             columns = {name: column[first - tick : end - tick] for name, column in rows.items()}
-            elements = [element for i, element in enumerate(elements_of(span.scene)) if f"dissipation.{i}" in rows]
-            self.history.controlled(first, columns, elements, wall_of(span.scene))
+            elements = [
+                element for i, element in enumerate(elements_as_telemetry(span.scene)) if f"dissipation.{i}" in rows
+            ]
+            self.history.append_ticks(first, columns, elements, wall_as_telemetry(span.scene))
 
     def _plant(self, rows: dict[str, np.ndarray]) -> None:
-        """Steps of whole ticks, after which the end state of the run may follow."""
+        """Takes the steps of whole ticks, after which the end state of the run may follow."""
         n = self._time.steps_per_tick
         columns = {name: rows[name] for name in _POSITIONS if name in rows}
         columns["force"] = rows["actuator"] if "actuator" in rows else rows["force"]
         tick = round(float(rows["t"][0]) * self._time.plant_rate) // n
         whole = len(rows["t"]) // n * n
         if whole:
-            self.history.moved(tick, {name: column[:whole] for name, column in columns.items()})
+            self.history.append_steps(tick, {name: column[:whole] for name, column in columns.items()})
         if whole < len(rows["t"]):
-            self.history.ended(tick + whole // n, {name: column[whole:] for name, column in columns.items()})
+            self.history.end(tick + whole // n, {name: column[whole:] for name, column in columns.items()})
 
     def _spans(self, tick: int, end: int) -> Iterator[tuple[int, int, Span]]:
-        """What was at work within some ticks: (from, to, what)."""
+        """Yields the spans within some ticks: (from, to, span)."""
         if len(self._events) != self._known_events:
             self._known_events = len(self._events)
             self._at_work = spans(self._scene, changes_of(self._events))
@@ -85,11 +89,11 @@ class Past:
             if first < last:
                 yield first, last, span
 
-    def meets(self, live: History) -> bool:
-        """Whether what was read so far reaches to where a live history begins and still holds everything."""
-        pairs = zip(self.history.tracks, live.tracks, strict=True)
-        logged = [(read, heard) for read, heard in pairs if self._every_step or read is not self.history.steps]
+    def reaches(self, live: History) -> bool:
+        """Tells whether the log has been read up to where a live history begins and still holds every row."""
+        pairs = zip(self.history.all_series, live.all_series, strict=True)
+        logged = [(own, its) for own, its in pairs if self._every_step or own is not self.history.steps]
         return all(
-            heard.first_tick is not None and read.end_tick >= max(heard.first_tick, heard.full_from_tick)
-            for read, heard in logged
+            its.first_tick is not None and own.end_tick >= max(its.first_tick, its.full_from_tick)
+            for own, its in logged
         )

@@ -1,21 +1,21 @@
-"""What the clock of a run answers: who waits for whom, what can be chosen, and what came of a command."""
+"""Answers of a run's clock: its status, the options that can be changed, and the replies to commands."""
 
 from __future__ import annotations
 
 import asyncio
 from typing import Any
 
-from haploop.view.receive.run_session import Followed
+from haploop.view.receive.run_session import RunSession
 from haploop.view.receive.runs import CommandFailed, Runs
 
 # How often the clock is asked for its status.
 _ASK_S = 0.5
-# Whatever changes what can be chosen.
+# Kinds of events after which the options may be others.
 _CHANGES = ("swap", "set", "refused")
 
 
 class ClockAnswers:
-    """The latest answers, kept up by asking now and then, aside of the loop that draws.
+    """Keeps the latest answers, asked for now and then beside the task that draws.
 
     Attributes:
         status: the answer to ``status``, {} before the first.
@@ -25,44 +25,44 @@ class ClockAnswers:
     def __init__(self, runs: Runs) -> None:
         self._runs = runs
         self._ask_now = asyncio.Event()
-        self.forget()
+        self.reset()
 
-    def forget(self) -> None:
-        """Another run is to be asked."""
+    def reset(self) -> None:
+        """Forgets all answers, before another run is asked."""
         self.status: dict[str, Any] = {}
         self.options: dict[str, Any] | None = None
         self._changes = -1  # how many changes the options have seen
 
-    async def keep_asking(self, followed: Followed) -> None:
-        """Ask for good, at once after a command; to be cancelled."""
+    async def keep_asking(self, session: RunSession) -> None:
+        """Asks every 0.5 s and at once after a command, until it is cancelled."""
         while True:
-            await self._ask(followed)
+            await self._ask(session)
             self._ask_now.clear()
             try:
                 await asyncio.wait_for(self._ask_now.wait(), _ASK_S)
             except TimeoutError:
                 continue
 
-    async def _ask(self, followed: Followed) -> None:
-        changes = sum(any(kind in event for kind in _CHANGES) for _, event in followed.events)
+    async def _ask(self, session: RunSession) -> None:
+        changes = sum(any(kind in event for kind in _CHANGES) for _, event in session.events)
         try:
-            _, self.status = await asyncio.to_thread(self._runs.ask, followed.run, "status", {})
+            _, self.status = await asyncio.to_thread(self._runs.ask, session.run, "status", {})
             if changes != self._changes:
-                _, self.options = await asyncio.to_thread(self._runs.ask, followed.run, "options", {})
+                _, self.options = await asyncio.to_thread(self._runs.ask, session.run, "options", {})
                 self._changes = changes
         except CommandFailed:
             return  # it is about to end
 
-    async def command(self, followed: Followed | None, verb: str, arguments: dict[str, Any]) -> str:
-        """Have a run do something; returns its answer.
+    async def command(self, session: RunSession | None, verb: str, arguments: dict[str, Any]) -> str:
+        """Sends a command to a run; returns its answer, a sentence.
 
         Raises:
-            CommandFailed: it did not.
+            CommandFailed: the run refused it, is over, or there is none.
         """
-        if followed is None:
+        if session is None:
             raise CommandFailed("No run is live; start one with haploop run SCENE.")
-        if followed.over:
-            raise CommandFailed(f"Run {followed.run.id} is over; nothing about it can change any more.")
-        text, _ = await asyncio.to_thread(self._runs.ask, followed.run, verb, arguments)
+        if session.outcome:
+            raise CommandFailed(f"Run {session.run.id} is over; nothing about it can change any more.")
+        text, _ = await asyncio.to_thread(self._runs.ask, session.run, verb, arguments)
         self._ask_now.set()
         return text

@@ -1,4 +1,4 @@
-"""From the frames of telemetry to a history: blocks that follow each other are taken in at once."""
+"""Ingestion of telemetry into a history: blocks without a gap between them are taken at once."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ import numpy as np
 from haploop.protocol.wire import Frame
 from haploop.view.store.history import TRUE, History
 
-# Of the plant, what positions and forces are made of; of the controller, what is shown of it.
+# Columns from which positions and forces of the plant are made, and those of the controller that are shown.
 _OF_PLANT = ("x", "v", "force", "actuator", "cable.stretch", "cable.rate", "grip.stretch", "grip.rate")
 _OF_CONTROLLER = ("x", "v", "wall", "total")
 _STATE_BYTES = 8
 
 
-def hear(history: History, frames: Sequence[tuple[str, Frame]]) -> dict[str, Any]:
-    """Take in what has come; returns the newest status of the logger, {} for none."""
+def ingest(history: History, frames: Sequence[tuple[str, Frame]]) -> dict[str, Any]:
+    """Appends the blocks of these messages to a history; returns the newest status of the logger, {} for none."""
     blocks: dict[str, list[dict[str, Any]]] = {}
     status: dict[str, Any] = {}
     ends = [frame.fields[0] for role, frame in frames if (role, frame.name) == ("plant", "END")]
@@ -32,20 +32,20 @@ def hear(history: History, frames: Sequence[tuple[str, Frame]]) -> dict[str, Any
         for run in _runs(blocks.get(name, [])):
             take(history, run)
     for tick in ends:
-        history.ended(tick)
+        history.end(tick)
     return status
 
 
 def _stands(history: History, role: str, state: dict[str, Any]) -> dict[str, Any]:
-    """Take note of what is at work in a run that may stand still; returns the status of the logger."""
+    """Notes elements and wall from a STATE, all there is of a run that stands still; returns the logger's status."""
     if role == "controller" and state["history"]:
         block = state["history"][-1]
-        history.works(block["elements"], block["wall"])
+        history.set_active(block["elements"], block["wall"])
     return state if role == "logger" else {}
 
 
 def _runs(blocks: list[dict[str, Any]]) -> list[list[dict[str, Any]]]:
-    """Blocks in groups of such as follow each other without a gap and have the same columns, elements and wall."""
+    """Groups blocks that follow each other without a gap and have the same columns, elements and wall."""
     runs: list[list[dict[str, Any]]] = []
     for block in blocks:
         if runs and _follows(runs[-1][-1], block):
@@ -69,25 +69,42 @@ def _joined(run: list[dict[str, Any]], names: Iterable[str]) -> dict[str, np.nda
 
 
 def _plant(history: History, run: list[dict[str, Any]]) -> None:
-    """Blocks of the plant share the state between them: it is left out of all but the last."""
+    """Joins blocks of the plant; two neighbours share the state between them, so all but the last leave it out."""
     columns = {}
     for name in _OF_PLANT:
         if name in run[0]["columns"]:
             parts = [block["columns"][name] for block in run]
             parts[:-1] = [part[:-_STATE_BYTES] for part in parts[:-1]]
             columns[name] = np.frombuffer(b"".join(parts), "<f8")
-    history.plant(run[0]["from_tick"], columns)
+    history.append_plant_block(run[0]["from_tick"], columns)
 
 
 def _controller(history: History, run: list[dict[str, Any]]) -> None:
     elements = run[0]["elements"]
     names = [*_OF_CONTROLLER, *(f"dissipation.{place}" for place in range(len(elements)))]
-    history.controlled(run[0]["from_tick"], _joined(run, names), elements, run[0]["wall"])
+    history.append_ticks(run[0]["from_tick"], _joined(run, names), elements, run[0]["wall"])
 
 
 def _energy(history: History, run: list[dict[str, Any]]) -> None:
     names = [name for name in run[0]["columns"] if name == "residual" or name.endswith(TRUE)]
-    history.booked(run[0]["from_tick"], _joined(run, names))
+    history.append_energy(run[0]["from_tick"], _joined(run, names))
 
 
 _TAKERS = {"PLANT_BLOCK": _plant, "CONTROLLER_BLOCK": _controller, "ENERGY_BLOCK": _energy}
+
+
+def elements_as_telemetry(scene: dict[str, Any]) -> list[dict[str, Any]]:
+    """Returns kind and parameters of each element of a resolved scene, as CONTROLLER_BLOCK has them."""
+    return [
+        {"kind": table["kind"], "parameters": {name: value for name, value in table.items() if name != "kind"}}
+        for table in scene.get("dissipation", [])
+    ]
+
+
+def wall_as_telemetry(scene: dict[str, Any]) -> dict[str, float]:
+    """Returns position in m, stiffness in N/m and direction into the wall, all 0 without one, as CONTROLLER_BLOCK."""
+    if "wall" not in scene:
+        return {"position": 0.0, "stiffness": 0.0, "into_wall": 0.0}
+    wall = scene["wall"]
+    into_wall = 1.0 if wall.get("occupies") == "above" else -1.0
+    return {"position": wall["position"], "stiffness": wall["stiffness"], "into_wall": into_wall}

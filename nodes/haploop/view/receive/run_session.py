@@ -1,4 +1,4 @@
-"""One run as a viewer hears it, from joining it to its end and beyond."""
+"""The session of one run: its telemetry and events from joining it to its end, then its summary."""
 
 from __future__ import annotations
 
@@ -15,30 +15,27 @@ from haploop.protocol.changes import at_work, changes_of
 from haploop.protocol.clock_client import Aborted, Refused
 from haploop.protocol.observer import Observer
 from haploop.protocol.ticks import DELAY, Timebase
-from haploop.view.receive.at_work import elements_of, wall_of
-from haploop.view.receive.ingest import hear
+from haploop.view.receive.ingest import elements_as_telemetry, ingest, wall_as_telemetry
 from haploop.view.receive.runs import Run
 from haploop.view.store.history import History
 
 ROLE = "view"
 _STREAMS = ("plant", "controller", "logger")
-# Real time is counted over so much of it, and over no less.
+# Wall time over which the real-time factor is taken, at most and at least.
 _FACTOR_S, _LEAST_FACTOR_S = 1.0, 0.3
 
 
-class Followed:
-    """A run, what is known of it, and how it ended.
-
-    Making one joins the run, which may take a while.
+class RunSession:
+    """Joins a run, which may take a while, and keeps all that is received of it.
 
     Attributes:
-        run: as it was found.
+        run: the run that was joined.
         scene, time, out: the resolved scene, its integers, the run's directory.
-        history: what was heard.
-        status: how the run looks, as its logger says.
-        events: (tick, event) in order, everything that changed the run.
-        delay_s: the round-trip delay as it stands.
-        over: "" while the run goes on, then "ended" or "failed"; ``why`` is a sentence, if there is one.
+        history: telemetry received, and what was logged before once ``prepend`` has been called.
+        status: newest status of the logger.
+        events: (tick, event) in order, all since the start of the run.
+        delay_s: the round-trip delay at present.
+        outcome: "" while the run goes on, then "ended" or "failed"; ``why`` is a sentence, if there is one.
         summary: of the run, once it is there.
 
     Raises:
@@ -62,32 +59,32 @@ class Followed:
         self.status: dict[str, Any] = {}
         self.events: list[tuple[int, dict[str, Any]]] = []
         self.delay_s: float = self.scene["clock"]["round_trip_delay"]
-        self.over = self.why = ""
+        self.outcome = self.why = ""
         self.summary: dict[str, Any] | None = None
         self.skipped_ticks = 0
         self._seen: deque[tuple[float, int]] = deque()
 
     def poll(self) -> None:
-        """Take in what has come."""
-        if self.over:
+        """Takes the messages that have come."""
+        if self.outcome:
             return
         try:
             frames = self._observer.poll()
         except (Aborted, Refused) as error:
             self.end("failed", str(error))
             return
-        self.status |= hear(self.history, frames)
+        self.status |= ingest(self.history, frames)
         self._note_events()
         if not self.history.wall:
             now = at_work(self.scene, changes_of(self.events))
-            self.history.works(elements_of(now), wall_of(now))
+            self.history.set_active(elements_as_telemetry(now), wall_as_telemetry(now))
         self.skipped_ticks = sum(self._observer.skipped.values())
         self._count_time()
         if "logger" in self._observer.ended:
             self.end("ended", "")
 
     def _count_time(self) -> None:
-        """Remember when how much had come, as far back as the real-time factor looks."""
+        """Notes wall time and tick, for the real-time factor."""
         now = wall_clock.monotonic()
         if self.history.first_tick is not None:
             self._seen.append((now, self.history.end_tick))
@@ -102,42 +99,42 @@ class Followed:
 
     @property
     def real_time_factor(self) -> float | None:
-        """Simulated seconds per second of the last one; None when nothing moves."""
+        """Returns simulated over wall time, taken over the last second; None when nothing moves."""
         if len(self._seen) < 2:
             return None
         (began, first), (now, last) = self._seen[0], self._seen[-1]
-        moves = not self.over and last > first and now - began > _LEAST_FACTOR_S
+        moves = not self.outcome and last > first and now - began > _LEAST_FACTOR_S
         return (last - first) / self.time.control_rate / (now - began) if moves else None
 
     def end(self, how: str, why: str) -> None:
-        """The run is over: nothing more will come."""
+        """Ends the session: no more telemetry will come."""
         self._note_events()
-        self.over, self.why = how, why
+        self.outcome, self.why = how, why
         self.read_summary()
 
     def close(self) -> None:
-        """Leave the run, which may go on, and let go of its sockets."""
+        """Leaves the run, which may go on, and closes its sockets."""
         with contextlib.suppress(zmq.ZMQError):  # closed already, where the clock did not let this viewer in again
             self._observer.leave()
         self._context.destroy(linger=200)
 
     def read_summary(self) -> None:
-        """Look for the run's summary; a run that failed may still be writing it."""
+        """Reads the run's summary if it is there; a run that failed may still be writing it."""
         try:
             summary = json.loads((self.out / "summary.json").read_text(encoding="utf-8"))
         except (OSError, ValueError):
             return
         self.summary = summary
-        self.over = "failed" if summary.get("ended") == "failed" else self.over
+        self.outcome = "failed" if summary.get("ended") == "failed" else self.outcome
         self.why = self.why or summary.get("why", "")
 
     @property
     def is_complete(self) -> bool:
-        """Whether every tick was surely heard from the start on."""
-        begun = all(track.first_tick == 0 for track in self.history.tracks)
-        return begun and not self.skipped_ticks and self.over != "failed"
+        """Tells whether every tick from the start on was surely received."""
+        begun = all(series.first_tick == 0 for series in self.history.all_series)
+        return begun and not self.skipped_ticks and self.outcome != "failed"
 
-    def recall(self, past: History) -> None:
-        """Put what was read of the log in front of what was heard."""
-        past.continue_with(self.history)
-        self.history = past
+    def prepend(self, logged: History) -> None:
+        """Puts what was read from the log in front of what was received."""
+        logged.extend_from(self.history)
+        self.history = logged

@@ -1,4 +1,4 @@
-"""What a viewer needs of the place it runs in: live runs to follow, and a way to steer them."""
+"""Interfaces through which a viewer finds and steers live runs; implemented by whoever starts it."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from haploop.protocol.transport import SecureContext
 
 
 class CommandFailed(Exception):
-    """A run did not do what was asked; the message says why, for people."""
+    """Raised where a run did not carry out a command; the message says why, for people."""
 
 
 class Run(Protocol):
@@ -17,12 +17,12 @@ class Run(Protocol):
 
     @property
     def id(self) -> str:
-        """Its name among live runs."""
+        """Identifier among live runs."""
         ...
 
     @property
     def clock(self) -> str:
-        """The clock's address."""
+        """Address of the clock."""
         ...
 
     @property
@@ -30,11 +30,11 @@ class Run(Protocol):
 
     @property
     def out(self) -> str:
-        """Its directory."""
+        """Directory of the run's log and summary."""
         ...
 
     def make_context(self) -> SecureContext:
-        """A context whose sockets may connect to it."""
+        """Makes a context whose sockets may connect to the run."""
         ...
 
 
@@ -42,13 +42,13 @@ class Runs(Protocol):
     """All runs of this user."""
 
     def live(self) -> Sequence[Run]:
-        """Those that live now, the oldest first."""
+        """Returns the runs that live now, the oldest first."""
         ...
 
     def ask(self, run: Any, verb: str, arguments: dict[str, Any]) -> tuple[str, dict[str, Any]]:
-        """Have a run carry out a command; returns its answer, a sentence and data.
+        """Sends a command to a run; returns its answer, a sentence and data.
 
         Raises:
-            CommandFailed: it refused, or does not answer.
+            CommandFailed: the run refused, or does not answer.
         """
         ...

@@ -1,1 +1,1 @@
-"""The page out: the HTTP server on loopback, its guard, and the connection of every page."""
+"""The HTTP server on loopback: files, access control, and the connection of every page."""

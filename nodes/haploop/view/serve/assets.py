@@ -16,14 +16,14 @@ TYPES = {
 
 
 class MissingExtra(RuntimeError):
-    """Something is not installed that the page needs; the message says what, and how to get it."""
+    """Raised where a package that the page needs is not installed; the message says how to get it."""
 
 
 def check_installed() -> None:
-    """Look for what the page needs beside haploop itself, without loading it.
+    """Looks for the packages that the page needs, without importing them.
 
     Raises:
-        MissingExtra: some of it is not there.
+        MissingExtra: one of them is not installed.
     """
     if importlib.util.find_spec("aiohttp") is None or _uplot() is None:
         raise MissingExtra(
@@ -32,7 +32,7 @@ def check_installed() -> None:
 
 
 def _uplot() -> Path | None:
-    """Where the installed package keeps uPlot's files; importing it would load far more."""
+    """Returns the folder of uPlot's files in the installed package, whose import would load far more."""
     spec = importlib.util.find_spec("uplot")
     places = spec.submodule_search_locations if spec else None
     folders = [Path(place, "static") for place in places or ()]
@@ -40,7 +40,7 @@ def _uplot() -> Path | None:
 
 
 def assets() -> dict[str, Path]:
-    """Every file the page may ask for, by name.
+    """Returns every file the page may ask for, by name.
 
     Raises:
         MissingExtra: uPlot is not installed.

@@ -1,4 +1,4 @@
-"""Who may look and who may steer: this machine's browser alone, and to steer only with the link that was printed.
+"""Access control: the browser of this machine alone may look, and steer only with the link that was printed.
 
 A page from elsewhere reaches a server on loopback too, through the browser of whoever visits it. It can make that
 browser send requests, but not with another Host (its own name may resolve to this machine: DNS rebinding), not with
@@ -15,7 +15,7 @@ _NAMES = (HOST, "localhost")
 
 
 class Guard:
-    """The names, the token and the key of one server.
+    """Holds the host names, the token and the one-time key of one server.
 
     Attributes:
         token: what every command must carry.
@@ -28,41 +28,41 @@ class Guard:
 
     @property
     def address(self) -> str:
-        """Where the page is."""
+        """Returns the address of the page."""
         return f"http://{self._hosts[0]}/"
 
     @property
     def link(self) -> str:
-        """The page with the token in its fragment, which no browser sends to any server."""
+        """Returns the address with the token in its fragment, which no browser sends to any server."""
         return f"{self.address}#token={self.token}"
 
     @property
-    def entrance(self) -> str:
-        """A link that leads to the page with its token once: a browser is started with it, for all users to see."""
+    def one_time_link(self) -> str:
+        """Returns a link that leads to ``link`` once: all users can see the command line that starts a browser."""
         return f"{self.address}enter/{self._key}"
 
-    def admits(self, key: str) -> bool:
-        """Whether this is the key of the entrance, which is then used up."""
+    def redeem(self, key: str) -> bool:
+        """Tells whether this is the key of the one-time link, and uses it up."""
         if self._key is None or not hmac.compare_digest(key.encode(), self._key.encode()):
             return False
         self._key = None
         return True
 
-    def knows_host(self, host: str | None) -> bool:
-        """Whether a request is for this server by one of its own names."""
+    def is_own_host(self, host: str | None) -> bool:
+        """Tells whether a request names this server as its host."""
         return host in self._hosts
 
-    def knows_origin(self, origin: str | None) -> bool:
-        """Whether a request comes from a page of this server."""
+    def is_own_origin(self, origin: str | None) -> bool:
+        """Tells whether a request comes from a page of this server."""
         return origin in [f"http://{host}" for host in self._hosts]
 
     def may_steer(self, token: str) -> bool:
-        """Whether this is the token, in a time that does not tell how much of it is right."""
+        """Tells whether this is the token, in a time that does not depend on how much of it is right."""
         return hmac.compare_digest(token.encode(), self.token.encode())
 
     @property
     def headers(self) -> dict[str, str]:
-        """What every answer says of itself: nothing from elsewhere in it, and no page of others around it."""
+        """Returns the headers of every answer: nothing from elsewhere in it, and no page of others around it."""
         sockets = " ".join(f"ws://{host}" for host in self._hosts)
         return {
             "Content-Security-Policy": (

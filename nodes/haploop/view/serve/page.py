@@ -1,4 +1,4 @@
-"""One page in a browser: what it watches goes out to it, what it asks for comes in."""
+"""The connection of one page: snapshots, state and events go out, its viewport and commands come in."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from typing import Any
 
 from aiohttp import WSCloseCode, WSMsgType, web
 
-from haploop.view.draw.snapshot import picture
+from haploop.view.draw.snapshot import snapshot
 from haploop.view.receive.runs import CommandFailed
 from haploop.view.serve.guard import Guard
-from haploop.view.serve.watch import VERBS, BadMessage, Command, Watch, message_of
+from haploop.view.serve.messages import VERBS, BadMessage, Command, Viewport, parse_message
 from haploop.view.viewer import Viewer
 
 # The state goes out at least so often.
@@ -23,22 +23,22 @@ _LONGEST_REASON = 120
 
 
 class Page:
-    """The conversation with one page; it sees fewer pictures when it is slow, and nobody else notices."""
+    """Serves one page over its WebSocket; a slow page gets fewer snapshots, and no other page is affected."""
 
     def __init__(self, socket: web.WebSocketResponse, viewer: Viewer, guard: Guard) -> None:
         self._socket, self._viewer, self._guard = socket, viewer, guard
-        self._watch = Watch()
+        self._viewport = Viewport()
         self._state_due = 0.0
-        self._state_said = self._events_said = self._shown = ()
+        self._sent_state = self._sent_events = self._sent_snapshot = ()
 
-    async def converse(self) -> None:
-        """Until the page closes, or says something that makes no sense."""
-        showing = asyncio.create_task(self._show())
+    async def run(self) -> None:
+        """Serves the page until it closes, or sends an invalid message."""
+        showing = asyncio.create_task(self._send_updates())
         try:
             async for message in self._socket:
                 if message.type is not WSMsgType.TEXT:
                     raise BadMessage("Messages must be text.")
-                await self._take(message_of(message.data))
+                await self._take(parse_message(message.data))
         except BadMessage as error:
             reason = str(error).encode()[:_LONGEST_REASON].decode(errors="ignore").encode()
             await self._socket.close(code=WSCloseCode.POLICY_VIOLATION, message=reason)
@@ -51,9 +51,9 @@ class Page:
 
     # In
 
-    async def _take(self, message: Watch | Command) -> None:
-        if isinstance(message, Watch):
-            self._watch = message
+    async def _take(self, message: Viewport | Command) -> None:
+        if isinstance(message, Viewport):
+            self._viewport = message
             return
         try:
             ok, text = True, await self._carry_out(message)
@@ -70,36 +70,36 @@ class Page:
 
     # Out
 
-    async def _show(self) -> None:
-        """Send what is new, turn after turn; a page that cannot take it holds up this loop alone."""
+    async def _send_updates(self) -> None:
+        """Sends what is new after every update; a page that does not read blocks this task alone."""
         try:
             while True:
-                await self._tell()
-                await self._draw()
-                await self._viewer.next_turn()
+                await self._send_news()
+                await self._send_snapshot()
+                await self._viewer.wait_for_update()
         except ConnectionError:
             pass  # it has gone
         finally:
             await self._socket.close()
 
-    async def _tell(self) -> None:
-        """State and events when they have changed, the state anyway now and then."""
+    async def _send_news(self) -> None:
+        """Sends state and events when they have changed, the state anyway every 0.4 s."""
         now, viewer = wall_clock.monotonic(), self._viewer
-        if (signs := viewer.signs_of_events) != self._events_said:
-            self._events_said = signs
+        if (version := viewer.events_version) != self._sent_events:
+            self._sent_events = version
             await self._send(viewer.events())
-        if (signs := viewer.signs_of_state) != self._state_said or now >= self._state_due:
-            self._state_said, self._state_due = signs, now + _STATE_S
+        if (version := viewer.state_version) != self._sent_state or now >= self._state_due:
+            self._sent_state, self._state_due = version, now + _STATE_S
             await self._send(viewer.state())
 
-    async def _draw(self) -> None:
-        followed = self._viewer.followed
-        if followed is None:
+    async def _send_snapshot(self) -> None:
+        session = self._viewer.session
+        if session is None:
             return
-        showing = (followed.history, followed.history.version, self._watch)
-        if showing != self._shown:
-            self._shown = showing
-            await self._socket.send_bytes(picture(followed.history, self._watch))
+        showing = (session.history, session.history.version, self._viewport)
+        if showing != self._sent_snapshot:
+            self._sent_snapshot = showing
+            await self._socket.send_bytes(snapshot(session.history, self._viewport))
 
     async def _send(self, message: dict[str, Any]) -> None:
         await self._socket.send_str(json.dumps(message, allow_nan=False))

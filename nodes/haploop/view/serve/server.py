@@ -1,17 +1,20 @@
-"""The page's server: its files, and the stream of what there is to see, on loopback alone."""
+"""The page's server on loopback: its files, its stream, and the program that runs it until it is told to end."""
 
 from __future__ import annotations
 
 import asyncio
 import contextlib
+import signal
 import socket
 import weakref
+from collections.abc import Callable
 
 from aiohttp import WSCloseCode, hdrs, web
 from aiohttp.typedefs import Handler, Middleware
 
+from haploop.view.receive.runs import Runs
 from haploop.view.serve.assets import TYPES, assets
-from haploop.view.serve.guard import Guard
+from haploop.view.serve.guard import HOST, Guard
 from haploop.view.serve.page import Page
 from haploop.view.viewer import Viewer
 
@@ -19,14 +22,14 @@ from haploop.view.viewer import Viewer
 _LARGEST_MESSAGE = 64 * 1024
 # A page that does not answer for so long is gone.
 _HEARTBEAT_S = 20.0
-# So long a page is waited for that has been told to go.
+# How long pages that have been told to close, and requests under way, are waited for at the end.
 _GOODBYE_S = 1.0
 # So much may wait in the system for a page that is slow; then it gets fewer pictures.
 _WAITING_BYTES = 256 * 1024
 
 
-def app_of(viewer: Viewer, guard: Guard) -> web.Application:
-    """The web application.
+def make_app(viewer: Viewer, guard: Guard) -> web.Application:
+    """Makes the web application.
 
     GET / is the page, /static/NAME its files, /stream a WebSocket (see :mod:`haploop.view.serve.page`), /enter/KEY
     the way in for a browser that is started with a link.
@@ -41,12 +44,12 @@ def app_of(viewer: Viewer, guard: Guard) -> web.Application:
         return web.FileResponse(path, headers={hdrs.CONTENT_TYPE: f"{TYPES[path.suffix]}; charset=utf-8"})
 
     async def enter(request: web.Request) -> web.StreamResponse:
-        if not guard.admits(request.match_info["key"]):
+        if not guard.redeem(request.match_info["key"]):
             raise web.HTTPForbidden(text="This link has been used. Open the one that haploop view printed.")
         raise web.HTTPFound(guard.link)
 
     async def stream(request: web.Request) -> web.StreamResponse:
-        if not guard.knows_origin(request.headers.get(hdrs.ORIGIN)):
+        if not guard.is_own_origin(request.headers.get(hdrs.ORIGIN)):
             raise web.HTTPForbidden(text="Only the page of this server may listen here.")
         page = web.WebSocketResponse(
             timeout=_GOODBYE_S,
@@ -58,7 +61,7 @@ def app_of(viewer: Viewer, guard: Guard) -> web.Application:
         await page.prepare(request)
         _narrow(page)
         pages.add(page)
-        await Page(page, viewer, guard).converse()
+        await Page(page, viewer, guard).run()
         return page
 
     async def protect(_: web.Request, response: web.StreamResponse) -> None:
@@ -82,7 +85,7 @@ def app_of(viewer: Viewer, guard: Guard) -> web.Application:
 def _only_by_name(guard: Guard) -> Middleware:
     @web.middleware
     async def check(request: web.Request, handler: Handler) -> web.StreamResponse:
-        if not guard.knows_host(request.headers.get(hdrs.HOST)):
+        if not guard.is_own_host(request.headers.get(hdrs.HOST)):
             raise web.HTTPForbidden(text=f"This server answers at {guard.address} alone.")
         return await handler(request)
 
@@ -90,7 +93,73 @@ def _only_by_name(guard: Guard) -> Middleware:
 
 
 def _narrow(page: web.WebSocketResponse) -> None:
-    """Let little wait on the way: what waits there is old when it arrives."""
+    """Shrinks the send buffer of a page: snapshots that wait in it are old when they arrive."""
     connection = page.get_extra_info("socket")
     if connection is not None:
         connection.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _WAITING_BYTES)
+
+
+class PortTaken(OSError):
+    """Raised where the port cannot be used; the message says what to do."""
+
+
+def listen(port: int) -> socket.socket:
+    """Opens a socket that listens on loopback, at any free port for 0.
+
+    Raises:
+        PortTaken: the port cannot be had.
+    """
+    listening = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+    listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    try:
+        listening.bind((HOST, port))
+        listening.listen()
+    except OSError as error:
+        listening.close()
+        raise PortTaken(
+            f"Port {port} of {HOST} cannot be used ({error.strerror}); name another with --port, or 0 for any free one."
+        ) from error
+    return listening
+
+
+async def serve(
+    runs: Runs,
+    listening: socket.socket,
+    *,
+    first: str | None = None,
+    from_start: bool = True,
+    on_serving: Callable[[Guard], object] = lambda guard: None,
+    end: asyncio.Event | None = None,
+) -> None:
+    """Serves the page until SIGINT, SIGTERM or ``end``.
+
+    Args:
+        runs: where runs are found and asked.
+        listening: from :func:`listen`.
+        first: id of the run to follow first; the newest when None.
+        from_start: whether the page shows what was logged before this viewer joined.
+        on_serving: called once the page can be opened.
+        end: set from outside to end.
+    """
+    guard = Guard(listening.getsockname()[1])
+    viewer = Viewer(runs, first, from_start)
+    end = end or asyncio.Event()
+    loop = asyncio.get_running_loop()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        with contextlib.suppress(NotImplementedError, RuntimeError, ValueError):  # not in the main thread
+            loop.add_signal_handler(number, end.set)
+    runner = web.AppRunner(make_app(viewer, guard), access_log=None, shutdown_timeout=_GOODBYE_S)
+    await runner.setup()
+    following, ending = asyncio.create_task(viewer.follow_runs()), asyncio.create_task(end.wait())
+    try:
+        await web.SockSite(runner, listening).start()
+        on_serving(guard)
+        await asyncio.wait((following, ending), return_when=asyncio.FIRST_COMPLETED)
+        if following.done():
+            following.result()
+    finally:
+        for task in (following, ending):
+            task.cancel()
+        with contextlib.suppress(asyncio.CancelledError):
+            await following
+        await runner.cleanup()

@@ -1,4 +1,4 @@
-"""One coarseness of a track: the rows of ticks, or the two extremes of buckets of ticks."""
+"""One level of detail of a series: a ring buffer of rows, or of the two extremes of buckets of ticks."""
 
 from __future__ import annotations
 
@@ -6,16 +6,84 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from haploop.view.store.ring import Ring
+
+def extremes(values: np.ndarray, group: int) -> np.ndarray:
+    """Returns the least and the greatest of every ``group`` consecutive values, in the order in which they came.
+
+    A line through the result covers the same band as one through all values, and the extremes of such extremes are
+    those of the values themselves, so decimation can be repeated. NaN counts for nothing.
+
+    Args:
+        values: shape (columns, count), ``count`` a multiple of ``group``.
+
+    Returns:
+        Shape (columns, 2 * count / group); NaN where a group holds nothing else.
+    """
+    columns, count = values.shape
+    groups = values.reshape(columns, count // group, group)
+    least, greatest = np.fmin.reduce(groups, axis=2), np.fmax.reduce(groups, axis=2)
+    rises = (groups == least[..., None]).argmax(axis=2) <= (groups == greatest[..., None]).argmax(axis=2)
+    pairs = np.empty((columns, count // group, 2))
+    pairs[..., 0] = np.where(rises, least, greatest)
+    pairs[..., 1] = np.where(rises, greatest, least)
+    return pairs.reshape(columns, 2 * (count // group))
+
+
+class Ring:
+    """Holds at least the newest ``capacity`` values of each of several columns.
+
+    There is room for twice as many: when it is full, the newest half moves to the front, so that what is asked for is
+    always one piece of memory and a value is moved once at most, on average.
+
+    Args:
+        capacity: values of each column that are surely held.
+        columns: how many columns there are at first.
+
+    Attributes:
+        start, end: numbers of the first value held and of the one after the last; the first ever appended has number 0.
+    """
+
+    def __init__(self, capacity: int, columns: int) -> None:
+        self._values = np.full((columns, 2 * capacity), np.nan)
+        self.capacity = capacity
+        self.start = self.end = 0
+
+    @property
+    def nbytes(self) -> int:
+        """Returns the memory of the buffer in bytes."""
+        return self._values.nbytes
+
+    def append(self, values: np.ndarray) -> None:
+        """Appends values of shape (columns, count), ``count`` at most the capacity."""
+        count, used = values.shape[1], self.end - self.start
+        if used + count > self._values.shape[1]:
+            self._values[:, : self.capacity] = self._values[:, used - self.capacity : used]
+            self.start, used = self.end - self.capacity, self.capacity
+        self._values[:, used : used + count] = values
+        self.end += count
+
+    def between(self, first: int, end: int) -> np.ndarray:
+        """Returns a view of the values from number ``first`` to before ``end``, as far as held, (columns, count)."""
+        first, end = max(first, self.start), min(end, self.end)
+        return self._values[:, first - self.start : max(first, end) - self.start]
+
+    def grow(self, columns: int) -> None:
+        """Adds columns up to this number; their values so far are NaN."""
+        more = np.full((columns - len(self._values), self._values.shape[1]), np.nan)
+        self._values = np.concatenate([self._values, more])
+
+    def clear(self, column: int) -> None:
+        """Sets all values of a column to NaN."""
+        self._values[column] = np.nan
 
 
 @dataclass
-class Level:
-    """So many values for so many ticks.
+class LodLevel:
+    """A ring buffer with its scale: ``values`` values of each column per ``ticks`` ticks.
 
     Attributes:
         ring: the values.
-        ticks, values: ticks of a bucket, and values of each column for them; ticks are counted from the track's origin.
+        ticks, values: ticks of a bucket, counted from the origin of the series, and values of each column for them.
     """
 
     ring: Ring
@@ -24,14 +92,14 @@ class Level:
 
     @property
     def start(self) -> int:
-        """The first tick that is held in whole."""
+        """Returns the first tick that is held in whole."""
         return -(-self.ring.start // self.values) * self.ticks
 
     @property
     def end(self) -> int:
-        """After the last tick that is held in whole."""
+        """Returns the tick after the last one that is held in whole."""
         return self.ring.end // self.values * self.ticks
 
     def between(self, from_tick: int, to_tick: int) -> np.ndarray:
-        """Values between two ticks that are multiples of ``ticks``."""
+        """Returns the values between two ticks that are multiples of ``ticks``."""
         return self.ring.between(from_tick // self.ticks * self.values, to_tick // self.ticks * self.values)

@@ -1,4 +1,4 @@
-"""Columns of numbers at a fixed rate, of a run of any length: the newest in full, all of them ever coarser."""
+"""Series at several levels of detail: the newest rows in full, those of the whole run ever coarser."""
 
 from __future__ import annotations
 
@@ -6,24 +6,22 @@ from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 
-from haploop.view.store.extremes import extremes
-from haploop.view.store.lod_level import Level
-from haploop.view.store.ring import Ring
+from haploop.view.store.lod_level import LodLevel, Ring, extremes
 
-# Buckets that make one of the next level.
+# Buckets of a level that make one of the next.
 FOLD = 2
-# A bucket of the first coarse level has at least so many rows.
+# Rows of a bucket of the first coarse level, at least.
 _LEAST_ROWS = 4
-# Buckets that a coarse level surely holds, each two values.
+# Buckets that a coarse level holds at least, two values each.
 _BUCKETS = 2048
-# Buckets are made for so many ticks at once: fewer are not worth the calls.
+# Ticks for which buckets are made at once; fewer are not worth the calls.
 _AT_ONCE_TICKS = 128
-# Elements come and go; more columns than these are never kept.
+# Columns that are kept, at most: elements come and go.
 MOST_COLUMNS = 48
 
 
-class Track:
-    """Rows of named columns, a whole number of them a tick, from tick ``origin`` on.
+class LodSeries:
+    """Keeps rows of named columns, a whole number of them a tick, from tick ``origin`` on.
 
     Level 0 holds the newest rows. Every other level holds the least and the greatest of buckets of some ticks, twice as
     many as on the level before it; before a level would forget its oldest buckets there is a next one, so that some
@@ -32,19 +30,19 @@ class Track:
 
     Args:
         rows_per_tick: rows of one tick.
-        recent_ticks: ticks that are surely held in full.
+        recent_ticks: ticks that are held in full, at least.
         origin: the first tick.
 
     Attributes:
-        names: columns, in the order in which they came.
-        first_tick: where what is known begins; None before anything is.
+        names: columns, in the order of their first rows.
+        first_tick: first tick that is known; None before anything is.
     """
 
     def __init__(self, rows_per_tick: int, recent_ticks: int, origin: int) -> None:
         self.rows_per_tick, self.origin = rows_per_tick, origin
         self.first_tick: int | None = None
         self._columns: dict[str, int] = {}
-        self._levels = [Level(Ring(recent_ticks * rows_per_tick, 0), 1, rows_per_tick)]
+        self._levels = [LodLevel(Ring(recent_ticks * rows_per_tick, 0), 1, rows_per_tick)]
         self._add_level()
         # No level is given more at once than half of what it surely holds, so that nothing is lost on the way up.
         self._at_once = min(recent_ticks, _BUCKETS * self._levels[1].ticks) * rows_per_tick // 2
@@ -54,35 +52,37 @@ class Track:
         return list(self._columns)
 
     @property
+    def nbytes(self) -> int:
+        """Returns the memory of all levels in bytes."""
+        return sum(level.ring.nbytes for level in self._levels)
+
+    @property
     def end_tick(self) -> int:
-        """Every tick before it is known, or will never be."""
+        """Returns the tick before which every tick is known, or never will be."""
         return self.origin + self._levels[0].end
 
     @property
     def full_from_tick(self) -> int:
-        """From here on rows are held in full."""
+        """Returns the tick from which on rows are held in full."""
         return self.origin + self._levels[0].start
 
     def _add_level(self) -> None:
         first = max(1, _LEAST_ROWS // self.rows_per_tick)
         ticks = self._levels[-1].ticks * FOLD if len(self._levels) > 1 else first
-        self._levels.append(Level(Ring(2 * _BUCKETS, len(self._columns)), ticks, 2))
-
-    # What comes
+        self._levels.append(LodLevel(Ring(2 * _BUCKETS, len(self._columns)), ticks, 2))
 
     def begin(self, tick: int) -> None:
-        """Rows from ``tick`` on are to come; what was said first counts."""
+        """Notes that rows begin at ``tick``; the first call counts."""
         if self.first_tick is None:
             self.first_tick = max(tick, self.origin)
 
     def append(self, tick: int, columns: Mapping[str, np.ndarray]) -> None:
-        """Take the rows of some ticks from ``tick`` on.
+        """Appends the rows of some ticks from ``tick`` on.
 
-        Ticks that are known already are passed over; those missing in between stay unknown, NaN, as does a column
-        that has no rows here.
+        Ticks that are known already are passed over; ticks missing in between, and columns without rows here, are NaN.
 
         Args:
-            tick: the first of them.
+            tick: first of the ticks.
             columns: name -> array of shape (ticks * rows_per_tick,).
         """
         rows = len(next(iter(columns.values())))
@@ -106,7 +106,7 @@ class Track:
             missing -= self._at_once
 
     def _open(self, name: str, present: Collection[str]) -> None:
-        """Have a column of this name; where there are too many, in place of the oldest that is not present any more."""
+        """Adds a column; where there are too many, in place of the oldest that is not present any more."""
         if len(self._columns) < MOST_COLUMNS:
             self._columns[name] = len(self._columns)
             for level in self._levels:
@@ -114,15 +114,15 @@ class Track:
         elif oldest := next((old for old in self._columns if old not in present), None):
             self._columns[name] = place = self._columns.pop(oldest)
             for level in self._levels:
-                level.ring.forget(place)
+                level.ring.clear(place)
 
     def _take(self, values: np.ndarray) -> None:
         for start in range(0, values.shape[1], self._at_once):
             self._levels[0].ring.append(values[:, start : start + self._at_once])
-            self._hand_up(0)
+            self._propagate(0)
 
-    def _hand_up(self, depth: int) -> None:
-        """Tell the next coarser level what has come to this one, if there is enough of it."""
+    def _propagate(self, depth: int) -> None:
+        """Appends what is new on this level to the next coarser one, if there is enough of it."""
         below = self._levels[depth]
         if depth + 1 == len(self._levels):
             if below.ring.end < below.ring.capacity // 4:
@@ -133,19 +133,17 @@ class Track:
         if buckets * above.ticks >= (_AT_ONCE_TICKS if depth == 0 else 1):
             group = above.ticks // below.ticks * below.values
             above.ring.append(extremes(below.between(above.end, above.end + buckets * above.ticks), group))
-            self._hand_up(depth + 1)
+            self._propagate(depth + 1)
 
-    def continue_with(self, other: Track) -> None:
-        """Take from another track what it holds in full and this one has not reached."""
+    def extend_from(self, other: LodSeries) -> None:
+        """Appends what another series holds in full and this one has not reached."""
         first, end = max(self.end_tick, other.full_from_tick), other.end_tick
         if first < end:
             rows = other.rows(other.names, first, end)
             self.append(first, dict(zip(other.names, rows, strict=True)))
 
-    # What is asked for
-
     def rows(self, names: Sequence[str], from_tick: int, to_tick: int) -> np.ndarray:
-        """Rows in full between two ticks, shape (names, rows); NaN where there is nothing."""
+        """Returns the rows in full between two ticks, shape (names, rows); NaN where there are none."""
         level, n = self._levels[0], self.rows_per_tick
         found = np.full((len(names), (to_tick - from_tick) * n), np.nan)
         first, end = max(from_tick, self.full_from_tick), min(to_tick, self.end_tick)
@@ -155,14 +153,14 @@ class Track:
         return found
 
     def _pick(self, values: np.ndarray, names: Sequence[str], into: np.ndarray, group: int = 0) -> None:
-        """Columns by name, thinned out to the extremes of every ``group`` values unless it is 0."""
+        """Copies columns by name, reduced to the extremes of every ``group`` values unless it is 0."""
         known = [row for row, name in enumerate(names) if name in self._columns]
         if known:
             chosen = values[[self._columns[names[row]] for row in known]]
             into[known] = extremes(chosen, group) if group else chosen
 
     def bucket_from(self, from_tick: int, bucket_ticks: int) -> int:
-        """Ticks of a bucket for :meth:`envelope` from ``from_tick`` on: so many, or more where the past is coarser."""
+        """Returns the ticks of a bucket for :meth:`envelope`: ``bucket_ticks``, or more where the past is coarser."""
         while not self._reaches_back(self.aligned(from_tick, bucket_ticks), bucket_ticks):
             bucket_ticks *= 2
         return bucket_ticks
@@ -172,15 +170,15 @@ class Track:
         return any(level.ticks <= bucket_ticks and level.start <= at for level in self._levels)
 
     def aligned(self, tick: int, bucket_ticks: int) -> int:
-        """Where the bucket that holds a tick begins."""
+        """Returns the first tick of the bucket that holds a tick."""
         return tick - (tick - self.origin) % bucket_ticks
 
     def envelope(self, names: Sequence[str], from_tick: int, to_tick: int, bucket_ticks: int) -> np.ndarray:
-        """The extremes of consecutive buckets, in the order in which they came; NaN where there is nothing.
+        """Returns the extremes of consecutive buckets, in the order in which they came; NaN where there are none.
 
         Args:
             names: columns.
-            from_tick, to_tick: where the first bucket begins and the last one ends, ``aligned``.
+            from_tick, to_tick: begin of the first bucket and end of the last one, ``aligned``.
             bucket_ticks: a power of two, from :meth:`bucket_from`.
 
         Returns:
@@ -188,7 +186,7 @@ class Track:
         """
         found = np.full((len(names), (to_tick - from_tick) // bucket_ticks * 2), np.nan)
         at, end, filled = from_tick - self.origin, min(to_tick, self.end_tick) - self.origin, 0
-        # From the coarsest level that is fine enough on: what has not been handed up to it comes from the finer ones.
+        # From the coarsest level that is fine enough on; what has not been propagated to it comes from the finer ones.
         levels = [level for level in reversed(self._levels) if level.ticks <= bucket_ticks]
         for level in levels:
             buckets = max(0, min(level.end, end) - at) // bucket_ticks

@@ -56,7 +56,7 @@ def view(run_id: str | None, port: int, since: str, browser: bool, led: bool) ->
     import asyncio
 
     from haploop.launch.processes import run_directory
-    from haploop.view.serve.program import PortTaken, listen, serve
+    from haploop.view.serve.server import PortTaken, listen, serve
 
     with plain_errors():
         first = run_directory.find(run_id).id if run_id else None
@@ -71,13 +71,13 @@ def view(run_id: str | None, port: int, since: str, browser: bool, led: bool) ->
         else:
             print(_AT.format(guard.link), file=sys.stderr, flush=True)
         if browser:
-            threading.Thread(target=_open, args=(guard.entrance,), daemon=True).start()
+            threading.Thread(target=_open, args=(guard.one_time_link,), daemon=True).start()
 
     async def main() -> None:
         end = asyncio.Event()
         if led:
             _at_eof(asyncio.get_running_loop(), end.set)
-        await serve(LiveRuns(), listening, first=first, from_start=since == "start", serving=serving, end=end)
+        await serve(LiveRuns(), listening, first=first, from_start=since == "start", on_serving=serving, end=end)
 
     with contextlib.suppress(KeyboardInterrupt):
         asyncio.run(main())

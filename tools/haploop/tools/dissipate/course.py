@@ -6,7 +6,7 @@ import numpy as np
 
 from haploop.tools.dissipate.booking import Booked
 from haploop.tools.dissipate.samples import Floats
-from haploop.view.store.extremes import extremes
+from haploop.view.store.lod_level import extremes
 
 # A line is thinned out when it has so many points.
 _MOST = 8192

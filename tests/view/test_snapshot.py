@@ -1,4 +1,4 @@
-"""What a picture of a history holds, and the form in which it travels."""
+"""What a snapshot of a history holds, and the form in which it travels."""
 
 import math
 
@@ -7,10 +7,10 @@ import pytest
 
 from haploop.protocol.changes import changes_of, spans
 from haploop.protocol.ticks import Timebase
-from haploop.view.draw.snapshot import picture
-from haploop.view.receive.at_work import elements_of, wall_of
-from haploop.view.receive.event_lines import event_lines
-from haploop.view.serve.watch import Watch
+from haploop.view.draw.snapshot import snapshot
+from haploop.view.draw.state import event_lines
+from haploop.view.receive.ingest import elements_as_telemetry, wall_as_telemetry
+from haploop.view.serve.messages import Viewport
 from haploop.view.store.history import History
 from helpers.live.browsing import decode
 
@@ -23,28 +23,28 @@ def element(kind, **parameters):
     return {"kind": kind, "parameters": {**parameters, "acts": "in-contact"}}
 
 
-def heard(ticks=100, elements=(), wall=WALL, books=None):
+def made_up(ticks=100, elements=(), wall=WALL, books=None):
     """A history of some ticks of made-up numbers."""
     history = History(TIME, 0)
     row, steps = np.arange(float(ticks)), np.arange(ticks * 10 + 1.0)
-    history.plant(0, {"x": steps, "v": steps, "force": -steps})
+    history.append_plant_block(0, {"x": steps, "v": steps, "force": -steps})
     forces = {f"dissipation.{place}": row * (place + 2) for place in range(len(elements))}
-    history.controlled(0, {"x": row, "v": row / 10, "wall": row, "total": row, **forces}, list(elements), wall)
-    history.booked(0, {"wall.true": row, "residual": row * 1e-20, **(books or {})})
+    history.append_ticks(0, {"x": row, "v": row / 10, "wall": row, "total": row, **forces}, list(elements), wall)
+    history.append_energy(0, {"wall.true": row, "residual": row * 1e-20, **(books or {})})
     return history
 
 
-def seen(history, **watch):
-    return decode(picture(history, Watch(**watch)))
+def drawn(history, **watch):
+    return decode(snapshot(history, Viewport(**watch)))
 
 
-def test_nothing_heard_is_an_empty_picture():
-    assert seen(History(TIME, 0))["tables"] == {}
-    assert seen(History(TIME, 0), span_s=None)["tables"] == {}
+def test_no_telemetry_gives_an_empty_snapshot():
+    assert drawn(History(TIME, 0))["tables"] == {}
+    assert drawn(History(TIME, 0), span_s=None)["tables"] == {}
 
 
 def test_without_a_wall_there_is_none_to_draw_and_no_loop():
-    tables = seen(heard(wall=NO_WALL))["tables"]
+    tables = drawn(made_up(wall=NO_WALL))["tables"]
     assert "loop" not in tables
     assert "wall" not in tables["force"]["values"]
     assert "wall" not in tables["energy"]["values"]
@@ -52,13 +52,13 @@ def test_without_a_wall_there_is_none_to_draw_and_no_loop():
 
 
 def test_without_an_inertia_there_is_no_momentum():
-    assert "momentum" not in seen(heard(elements=[element("damping", damping=1.0)]))["tables"]
+    assert "momentum" not in drawn(made_up(elements=[element("damping", damping=1.0)]))["tables"]
 
 
 def test_the_momentum_of_an_inertia_counts_only_while_it_is_at_work():
     """m[k-1] v[k] against v[k-1], m[k] being 0 where its force is (Choi et al. 2022, eq. 8)."""
-    history = heard(elements=[element("damping", damping=1.0), element("unidirectional-inertia", mass=0.02)])
-    momentum = seen(history)["tables"]["momentum"]
+    history = made_up(elements=[element("damping", damping=1.0), element("unidirectional-inertia", mass=0.02)])
+    momentum = drawn(history)["tables"]["momentum"]
     v = np.arange(100.0) / 10
     mass = np.where(np.arange(100) == 0, 0.0, 0.02)
     np.testing.assert_array_equal(momentum["values"]["v"], v[:-1].astype(np.float32))
@@ -69,26 +69,26 @@ def test_the_momentum_of_an_inertia_counts_only_while_it_is_at_work():
 def test_a_book_that_is_closed_is_shown_only_while_its_energy_changes():
     row = np.arange(100.0)
     books = {"damping.true": np.where(row < 10, row, 9.0), "damping-2.true": np.zeros(100), "brake.true": row * 0.0}
-    history = heard(elements=[element("damping", damping=1.0)], books=books)
-    shown = [column["name"] for column in seen(history, span_s=0.05)["tables"]["energy"]["columns"]]
+    history = made_up(elements=[element("damping", damping=1.0)], books=books)
+    shown = [column["name"] for column in drawn(history, span_s=0.05)["tables"]["energy"]["columns"]]
     assert shown == ["wall", "damping-2", "residual"]
-    shown = [column["name"] for column in seen(history, span_s=1.0)["tables"]["energy"]["columns"]]
+    shown = [column["name"] for column in drawn(history, span_s=1.0)["tables"]["energy"]["columns"]]
     assert shown == ["wall", "damping", "damping-2", "residual"]
 
 
-def test_numbers_beyond_what_a_float32_holds_do_not_break_the_picture():
+def test_numbers_beyond_what_a_float32_holds_do_not_break_the_snapshot():
     history = History(TIME, 0)
-    history.booked(0, {"wall.true": np.array([1e300, np.inf]), "residual": np.array([np.nan, 1e-320])})
-    history.controlled(0, {name: np.zeros(2) for name in ("x", "v", "wall", "total")}, [], WALL)
-    assert seen(history)["tables"]["energy"]["values"]["wall"].tolist() == [math.inf, math.inf]
+    history.append_energy(0, {"wall.true": np.array([1e300, np.inf]), "residual": np.array([np.nan, 1e-320])})
+    history.append_ticks(0, {name: np.zeros(2) for name in ("x", "v", "wall", "total")}, [], WALL)
+    assert drawn(history)["tables"]["energy"]["values"]["wall"].tolist() == [math.inf, math.inf]
 
 
 def test_bodies_beyond_the_device_are_shown_where_they_are():
     history, steps = History(TIME, 0), np.arange(101.0)
     names: list[str] = ["x", "v", "force", "cable.stretch", "cable.rate"]
     columns = dict.fromkeys(names, steps)
-    history.plant(0, columns)
-    np.testing.assert_array_equal(seen(history)["tables"]["position"]["values"]["tip_x"], 2 * steps[:-1])
+    history.append_plant_block(0, columns)
+    np.testing.assert_array_equal(drawn(history)["tables"]["position"]["values"]["tip_x"], 2 * steps[:-1])
 
 
 def test_a_swap_and_a_set_change_what_is_at_work_from_their_tick_on_and_a_refused_one_does_not():
@@ -106,7 +106,11 @@ def test_a_swap_and_a_set_change_what_is_at_work_from_their_tick_on_and_a_refuse
         (8, {"swap": {"kind": "none"}, "element": 0}),
     ]
     found = [
-        (span.from_tick, [e["kind"] for e in elements_of(span.scene)], wall_of(span.scene)["stiffness"])
+        (
+            span.from_tick,
+            [e["kind"] for e in elements_as_telemetry(span.scene)],
+            wall_as_telemetry(span.scene)["stiffness"],
+        )
         for span in spans(scene, changes_of(events))
     ]
     assert found == [
@@ -116,8 +120,8 @@ def test_a_swap_and_a_set_change_what_is_at_work_from_their_tick_on_and_a_refuse
         (8, ["inertia"], 7.0),
     ]
     set_scene = spans(scene, changes_of(events))[1].scene
-    assert elements_of(set_scene)[0]["parameters"] == {"damping": 2.0, "acts": "always"}
-    assert wall_of(scene) == {"position": 0.1, "stiffness": 5.0, "into_wall": 1.0}
+    assert elements_as_telemetry(set_scene)[0]["parameters"] == {"damping": 2.0, "acts": "always"}
+    assert wall_as_telemetry(scene) == {"position": 0.1, "stiffness": 5.0, "into_wall": 1.0}
 
 
 DAMPING = {"swap": {"kind": "damping", "damping": 0.8, "acts": "in-contact"}}

@@ -1,4 +1,4 @@
-"""A track keeps the newest rows in full and all since the start ever coarser: no peak is lost, memory is bounded."""
+"""A series keeps the newest rows in full and all since the start ever coarser: no peak is lost, memory is bounded."""
 
 import numpy as np
 import pytest
@@ -6,10 +6,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from haploop.protocol.ticks import Timebase
-from haploop.view.store.extremes import extremes
 from haploop.view.store.history import History
-from haploop.view.store.lod_series import MOST_COLUMNS, Track
-from haploop.view.store.ring import Ring
+from haploop.view.store.lod_level import Ring, extremes
+from haploop.view.store.lod_series import MOST_COLUMNS, LodSeries
 
 VALUES = st.one_of(st.floats(-10, 10, width=32), st.just(float("nan")))
 
@@ -56,16 +55,16 @@ def test_a_ring_holds_at_least_the_newest_of_its_capacity(pieces, columns):
 
 
 def fed(rows_per_tick, ticks, recent_ticks=512, seed=1, pieces=(37, 1, 400, 5)):
-    """A track with random rows, and the rows."""
+    """A series with random rows, and the rows."""
     random = np.random.default_rng(seed)
     rows = random.normal(size=ticks * rows_per_tick)
     rows[random.random(len(rows)) < 0.1] = np.nan
-    track, at, number = Track(rows_per_tick, recent_ticks, 0), 0, 0
+    series, at, number = LodSeries(rows_per_tick, recent_ticks, 0), 0, 0
     while at < ticks:
         end = min(ticks, at + pieces[number % len(pieces)])
-        track.append(at, {"x": rows[at * rows_per_tick : end * rows_per_tick]})
+        series.append(at, {"x": rows[at * rows_per_tick : end * rows_per_tick]})
         at, number = end, number + 1
-    return track, rows
+    return series, rows
 
 
 @pytest.mark.parametrize("rows_per_tick", [1, 10])
@@ -73,70 +72,70 @@ def fed(rows_per_tick, ticks, recent_ticks=512, seed=1, pieces=(37, 1, 400, 5)):
 @pytest.mark.parametrize("ticks", [300, 4000, 70_001])
 def test_an_envelope_keeps_every_least_and_every_greatest_value(rows_per_tick, bucket, ticks):
     """Level by level and in the unfinished last bucket too."""
-    track, rows = fed(rows_per_tick, ticks)
+    series, rows = fed(rows_per_tick, ticks)
     for from_tick in (0, ticks // 3, ticks - 200):
-        wide = track.bucket_from(from_tick, bucket)
-        first = track.aligned(from_tick, wide)
+        wide = series.bucket_from(from_tick, bucket)
+        first = series.aligned(from_tick, wide)
         end = ticks + (first - ticks) % wide
-        pairs = track.envelope(["x"], first, end, wide)[0].reshape(-1, 2)
+        pairs = series.envelope(["x"], first, end, wide)[0].reshape(-1, 2)
         padded = np.full((end - first) * rows_per_tick, np.nan)
         padded[: len(rows) - first * rows_per_tick] = rows[first * rows_per_tick :]
         np.testing.assert_array_equal(np.sort(pairs), least_and_greatest(padded.reshape(len(pairs), -1)))
 
 
 def test_an_envelope_that_ends_in_the_past_knows_nothing_of_what_came_later():
-    track, rows = fed(1, 5000)
-    pairs = track.envelope(["x"], 1024, 2048, 64)[0].reshape(-1, 2)
+    series, rows = fed(1, 5000)
+    pairs = series.envelope(["x"], 1024, 2048, 64)[0].reshape(-1, 2)
     np.testing.assert_array_equal(np.sort(pairs), least_and_greatest(rows[1024:2048].reshape(-1, 64)))
 
 
 def test_the_newest_rows_are_held_as_they_came_and_what_is_not_there_is_nan():
-    track, rows = fed(10, 3000)
-    found = track.rows(["x", "y"], 2600, 3100)
+    series, rows = fed(10, 3000)
+    found = series.rows(["x", "y"], 2600, 3100)
     np.testing.assert_array_equal(found[0, :4000], rows[26_000:])
     assert np.isnan(found[0, 4000:]).all()
     assert np.isnan(found[1]).all()
 
 
 def test_a_gap_stays_unknown_and_what_is_known_is_passed_over():
-    track = Track(1, 512, 0)
-    track.append(0, {"x": np.arange(100.0)})
-    track.append(50, {"x": np.full(60, -1.0)})
-    track.append(1500, {"x": np.full(10, 2.0)})
-    rows = track.rows(["x"], 1000, 1510)[0]
+    series = LodSeries(1, 512, 0)
+    series.append(0, {"x": np.arange(100.0)})
+    series.append(50, {"x": np.full(60, -1.0)})
+    series.append(1500, {"x": np.full(10, 2.0)})
+    rows = series.rows(["x"], 1000, 1510)[0]
     assert np.isnan(rows[:500]).all()
     assert (rows[500:] == 2.0).all()
-    pairs = track.envelope(["x"], 0, 1536, 8)[0].reshape(-1, 2)
+    pairs = series.envelope(["x"], 0, 1536, 8)[0].reshape(-1, 2)
     np.testing.assert_array_equal(pairs[12], [-1.0, 99.0][::-1])
     assert np.isnan(pairs[14:187]).all()
 
 
 def test_a_column_that_comes_in_mid_run_is_unknown_before_and_kept_from_there_on():
-    track = Track(1, 512, 0)
-    track.append(0, {"x": np.zeros(5000)})
-    track.append(5000, {"x": np.zeros(1000), "y": np.arange(1000.0)})
-    pairs = track.envelope(["y"], 0, 6016, 64)[0].reshape(-1, 2)
+    series = LodSeries(1, 512, 0)
+    series.append(0, {"x": np.zeros(5000)})
+    series.append(5000, {"x": np.zeros(1000), "y": np.arange(1000.0)})
+    pairs = series.envelope(["y"], 0, 6016, 64)[0].reshape(-1, 2)
     assert np.isnan(pairs[:78]).all()
     np.testing.assert_array_equal(pairs[80], [120.0, 183.0])
-    np.testing.assert_array_equal(track.rows(["y"], 5900, 6000)[0], np.arange(900.0, 1000.0))
+    np.testing.assert_array_equal(series.rows(["y"], 5900, 6000)[0], np.arange(900.0, 1000.0))
 
 
 def test_columns_without_end_replace_the_oldest_that_is_gone_and_never_one_that_is_there():
-    track = Track(1, 512, 0)
+    series = LodSeries(1, 512, 0)
     for number in range(3 * MOST_COLUMNS):
-        track.append(10 * number, {"x": np.full(10, 1.0), f"book-{number}": np.full(10, float(number))})
+        series.append(10 * number, {"x": np.full(10, 1.0), f"book-{number}": np.full(10, float(number))})
     last = 3 * MOST_COLUMNS - 1
-    assert len(track.names) == MOST_COLUMNS
-    assert "x" in track.names
-    assert "book-1" not in track.names
-    newest = track.rows([f"book-{last}", "x"], 10 * last - 10, 10 * last + 10)
+    assert len(series.names) == MOST_COLUMNS
+    assert "x" in series.names
+    assert "book-1" not in series.names
+    newest = series.rows([f"book-{last}", "x"], 10 * last - 10, 10 * last + 10)
     np.testing.assert_array_equal(newest[0], [np.nan] * 10 + [last] * 10)
     assert (newest[1] == 1.0).all()
 
 
 def size_bytes(history):
-    """Memory of every array of a history."""
-    return sum(level.ring._values.nbytes for track in history.tracks for level in track._levels)
+    """Returns the memory of every array of a history."""
+    return sum(series.nbytes for series in history.all_series)
 
 
 def test_the_memory_of_a_history_stays_bounded_over_a_million_ticks():
@@ -149,9 +148,9 @@ def test_the_memory_of_a_history_stays_bounded_over_a_million_ticks():
     elements = [{"kind": "damping", "parameters": {"damping": 0.1, "acts": "in-contact"}}]
     wall = {"position": 0.0, "stiffness": 100.0, "into_wall": -1.0}
     for tick in range(0, 1_000_000, 1000):
-        history.plant(tick, {"x": block, "v": block, "force": block})
-        history.controlled(tick, columns, elements, wall)
-        history.booked(tick, {"wall.true": ticks, "damping.true": ticks, "residual": ticks, "hand_work": ticks})
+        history.append_plant_block(tick, {"x": block, "v": block, "force": block})
+        history.append_ticks(tick, columns, elements, wall)
+        history.append_energy(tick, {"wall.true": ticks, "damping.true": ticks, "residual": ticks, "hand_work": ticks})
         sizes[tick] = size_bytes(history)
     assert sizes[999_000] < 1.25 * sizes[99_000]
     assert history.first_tick == 0
@@ -166,13 +165,13 @@ def test_any_amount_may_come_at_once_and_any_gap_may_lie_between(rows_per_tick):
     """Twenty times what is held in full, after a gap of as much."""
     ticks = 100_000
     rows = np.random.default_rng(2).normal(size=ticks * rows_per_tick)
-    track = Track(rows_per_tick, 5000, 0)
-    track.append(ticks, {"x": rows})
-    assert track.end_tick == 2 * ticks
-    assert track.first_tick == ticks
-    bucket = track.bucket_from(ticks, 1)
-    first, end = track.aligned(ticks, bucket), 2 * ticks + -2 * ticks % bucket
-    pairs = track.envelope(["x"], first, end, bucket)[0].reshape(-1, 2)
+    series = LodSeries(rows_per_tick, 5000, 0)
+    series.append(ticks, {"x": rows})
+    assert series.end_tick == 2 * ticks
+    assert series.first_tick == ticks
+    bucket = series.bucket_from(ticks, 1)
+    first, end = series.aligned(ticks, bucket), 2 * ticks + -2 * ticks % bucket
+    pairs = series.envelope(["x"], first, end, bucket)[0].reshape(-1, 2)
     padded = np.full((end - first) * rows_per_tick, np.nan)
     at = (ticks - first) * rows_per_tick
     padded[at : at + len(rows)] = rows

@@ -1,4 +1,4 @@
-"""What a page may say, checked: what it watches, and what it would have the run do."""
+"""Messages from a page, checked: the interval it shows, and commands to the run."""
 
 from __future__ import annotations
 
@@ -7,32 +7,21 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
+from haploop.view.draw.snapshot import Viewport
+
 FEWEST_POINTS, MOST_POINTS = 50, 8000
-# What a page may have a run do; everything else the clock answers is not for it.
+# Commands that a page may send; the clock answers more.
 VERBS = ("pause", "resume", "step", "stop", "swap", "set", "pace")
 _LONGEST_S = 1e9
 
 
 class BadMessage(ValueError):
-    """A page sent something that is no message of its side; the text says what was expected."""
-
-
-@dataclass(frozen=True)
-class Watch:
-    """What a page shows: the last ``span_s`` seconds of simulated time, or those before ``end_s``; all of it for None.
-
-    Attributes:
-        points: about how many points fit side by side.
-    """
-
-    span_s: float | None = 2.0
-    points: int = 1000
-    end_s: float | None = None
+    """Raised where a page sent no valid message; the text says what was expected."""
 
 
 @dataclass(frozen=True)
 class Command:
-    """What a page asks for."""
+    """A command of a page: number of the message, token, verb and arguments."""
 
     id: int
     token: str
@@ -40,11 +29,11 @@ class Command:
     arguments: dict[str, Any]
 
 
-def message_of(text: str) -> Watch | Command:
-    """What a page said.
+def parse_message(text: str) -> Viewport | Command:
+    """Returns the message in a text: ``watch`` as a viewport, ``command`` as a command.
 
     Raises:
-        BadMessage: it is none of the two messages a page may send.
+        BadMessage: it is neither of the two.
     """
     try:
         message = json.loads(text)
@@ -60,14 +49,14 @@ def message_of(text: str) -> Watch | Command:
     raise BadMessage("The type of a message must be watch or command.")
 
 
-def _watch(message: dict[str, Any]) -> Watch:
+def _watch(message: dict[str, Any]) -> Viewport:
     span_s, end_s = _seconds(message, "span_s"), _seconds(message, "end_s")
-    points = message.get("points", Watch.points)
+    points = message.get("points", Viewport.points)
     if span_s is not None and span_s <= 0.0:
         raise BadMessage("watch.span_s must be above 0, or null.")
     if isinstance(points, bool) or not isinstance(points, int | float) or not math.isfinite(points):
         raise BadMessage("watch.points must be a number.")
-    return Watch(span_s, int(min(max(points, FEWEST_POINTS), MOST_POINTS)), end_s)
+    return Viewport(span_s, int(min(max(points, FEWEST_POINTS), MOST_POINTS)), end_s)
 
 
 def _seconds(message: dict[str, Any], key: str) -> float | None:
