@@ -209,4 +209,4 @@ def test_without_measurements_the_command_says_what_to_run(tmp_path: Path) -> No
 def test_the_readme_links_to_the_page_on_its_first_screen_once_make_accuracy_has_written_it() -> None:
     first_screen = (HOUSE / "README.md").read_text(encoding="utf-8").splitlines()[:20]
     assert sum("](docs/accuracy.md)" in line for line in first_screen) == (HOUSE / "docs/accuracy.md").exists()
-    assert "cost.page runs/accuracy docs" in (HOUSE / "Makefile").read_text(encoding="utf-8")
+    assert "cost.draw.page runs/accuracy docs" in (HOUSE / "Makefile").read_text(encoding="utf-8")

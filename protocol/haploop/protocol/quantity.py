@@ -28,6 +28,11 @@ class Quantity:
     about: str = ""
     whole: bool = False
 
+    def as_dict(self) -> dict[str, str | float | None]:
+        """Returns unit and bounds by name, as they travel on the wire."""
+        names = ("unit", "at_least", "above", "at_most", "below")
+        return {name: getattr(self, name) for name in names}
+
     def complaint(self, value: float) -> str | None:
         """Returns what is wrong with ``value`` ("must be above 0 kg"), or None when it may be used."""
         if not math.isfinite(value):

@@ -28,8 +28,7 @@ def capabilities(scene: dict[str, Any], kinds: Mapping[str, type[Element]]) -> d
     keys = settable_keys([element["kind"] for element in elements], "wall" in scene, kinds)
     return {
         "settable": {
-            key: {**dataclasses.asdict(number.quantity), "value": _value(scene, key.split("."))}
-            for key, number in keys.items()
+            key: {**number.quantity.as_dict(), "value": _value(scene, key.split("."))} for key, number in keys.items()
         },
         "kinds": {
             kind: {"about": _about(element), "parameters": _parameters(element)} for kind, element in kinds.items()
@@ -52,6 +51,6 @@ def _about(element: type[Element]) -> str:
 def _parameters(element: type[Element]) -> dict[str, dict[str, Any]]:
     declared: dict[str, tuple[Quantity, Any]] = element.parameters()
     return {
-        name: {**dataclasses.asdict(quantity), "default": None if default is dataclasses.MISSING else default}
+        name: {**quantity.as_dict(), "default": None if default is dataclasses.MISSING else default}
         for name, (quantity, default) in declared.items()
     }

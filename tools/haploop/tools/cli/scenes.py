@@ -68,7 +68,7 @@ def _parameters(element: type[Element]) -> dict[str, Any]:
     import dataclasses
 
     return {
-        name: dataclasses.asdict(quantity) | ({} if default is dataclasses.MISSING else {"default": default})
+        name: quantity.as_dict() | ({} if default is dataclasses.MISSING else {"default": default})
         for name, (quantity, default) in element.parameters().items()
     }
 
