@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from mpmath import mp, mpf
 
-from haploop.tools.reference.roots import roots
+from haploop.tools.reference.plant import roots
 
 
 def series_of(places: list[Fraction]) -> list:

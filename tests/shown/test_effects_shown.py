@@ -13,7 +13,7 @@ from haploop.launch.runs.start import prepare, run
 from haploop.logger.log.columns import motion_columns
 from haploop.tools.figure.data import RunData
 from haploop.tools.figure.run_figure import figure_of
-from haploop.tools.figure.words import book_rows
+from haploop.tools.figure.text_panels import book_rows
 from haploop.tools.render.report import summary_table
 from haploop.tools.render.units import amount
 from helpers.shown import artists, row, shown

@@ -16,11 +16,11 @@ from hypothesis import strategies as st
 from haploop.launch.runs.start import prepare, run
 from haploop.logger import read
 from haploop.tools.figure.data import TOGETHER, RunData
-from haploop.tools.figure.envelope import extremes
 from haploop.tools.figure.history import History
 from haploop.tools.figure.loops import force_position_loop, momentum_loop
 from haploop.tools.figure.run_figure import FigureError, draw, figure_of
-from haploop.tools.figure.words import event_lines, key_numbers
+from haploop.tools.figure.text_panels import event_lines, key_numbers
+from haploop.tools.figure.time import extremes
 from helpers.shown import artists
 
 SCENES = Path(__file__).parents[2] / "launch/scenes"

@@ -19,11 +19,11 @@ from haploop.tools.figure.data import FigureError
 from haploop.tools.figure.file import write_figure
 from haploop.tools.linear.one_tick import OneTickMap
 from haploop.tools.linear.stiffness_limit import pressed_deep
-from haploop.tools.sweep.map.answer import stiffest_steady
 from haploop.tools.sweep.map.axis import Ruler
 from haploop.tools.sweep.map.data import AMPLITUDE, NOT_RUN, VERDICTS, Axis, MapData, data_of
-from haploop.tools.sweep.map.draw.figure import figure_of
-from haploop.tools.sweep.map.draw.look import LOOKS
+from haploop.tools.sweep.map.edges import stiffest_steady
+from haploop.tools.sweep.map.figure import figure_of
+from haploop.tools.sweep.map.legend import LOOKS
 from helpers.data.sweep_tables import cells_of, ran, said, table
 from helpers.scenes.least import scene
 from helpers.shown import artists

@@ -14,10 +14,10 @@ from typer.testing import CliRunner
 
 from haploop.tools.cli.main import app
 from haploop.tools.figure.data import FigureError
-from haploop.tools.sweep.map.boundary import ALL_HOLD, FOUND, NONE_HOLDS, UNKNOWN, edges_of
+from haploop.tools.sweep.map.bisect_figure import MOST_LINES, bisect_figure
 from haploop.tools.sweep.map.data import AMPLITUDE, MapData, data_of
-from haploop.tools.sweep.map.draw.bisect import MOST_LINES, bisect_figure
-from haploop.tools.sweep.map.file import draw_map
+from haploop.tools.sweep.map.edges import ALL_HOLD, FOUND, NONE_HOLDS, UNKNOWN, edges_of
+from haploop.tools.sweep.map.figure import draw_map
 from haploop.tools.sweep.table import read
 from helpers.data.sweep_tables import UNITS, said
 from helpers.shown import artists

@@ -12,11 +12,10 @@ import pytest
 from haploop.tools.linear.bounds import bounds_of
 from haploop.tools.linear.one_tick import NotLinear, OneTickMap
 from haploop.tools.sweep.map.axis import Ruler
+from haploop.tools.sweep.map.boundaries import EXACT, bound_boundaries, exact_boundary
+from haploop.tools.sweep.map.contour import zero_lines
 from haploop.tools.sweep.map.data import Axis
-from haploop.tools.sweep.map.draw.figure import figure_of
-from haploop.tools.sweep.map.lines.bounds import bound_boundaries
-from haploop.tools.sweep.map.lines.contour import zero_lines
-from haploop.tools.sweep.map.lines.limit import EXACT, exact_boundary
+from haploop.tools.sweep.map.figure import figure_of
 from haploop.tools.sweep.map.plane import Plane, set_key
 from helpers.data.sweep_tables import UNITS, cells_of, said, table
 from helpers.scenes.least import scene

@@ -16,12 +16,11 @@ from haploop.launch.scene.file import load as load_scene
 from haploop.tools.executor.pool import Pool
 from haploop.tools.linear.one_tick import OneTickMap
 from haploop.tools.sweep.run.boundary import Boundary
-from haploop.tools.sweep.run.columns import schema_of
 from haploop.tools.sweep.run.command import Request, sweep
 from haploop.tools.sweep.run.engine import Engine, Stopped
 from haploop.tools.sweep.run.shown import SweepProgress
 from haploop.tools.sweep.run.store import Store
-from haploop.tools.sweep.table import TableError, read
+from haploop.tools.sweep.table import TableError, read, schema_of
 from helpers.scenes.least import KINDS
 from helpers.scenes.sweep_files import GRID, PRESS, loaded, sweep_file, swept
 

@@ -79,7 +79,7 @@ def plot_directory(directory: Path) -> None:
     from haploop.tools.sweep.table import is_sweep
 
     if is_sweep(directory):
-        from haploop.tools.sweep.map.file import draw_map as draw
+        from haploop.tools.sweep.map.figure import draw_map as draw
     else:
         from haploop.tools.figure.run_figure import draw
 

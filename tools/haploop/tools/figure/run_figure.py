@@ -9,8 +9,8 @@ from haploop.tools.figure.data import TOGETHER, FigureError, RunData
 from haploop.tools.figure.file import empty_figure, write_figure
 from haploop.tools.figure.loops import draw_force_position, draw_momentum
 from haploop.tools.figure.style import CLOSE, INK, OF_THE_PLANT, WALL, element_colour, few_ticks, legend
+from haploop.tools.figure.text_panels import draw_books, draw_events, draw_header, event_lines
 from haploop.tools.figure.time import energy_panel, force_panel, mark_events, position_panel
-from haploop.tools.figure.words import draw_books, draw_events, draw_header, event_lines
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

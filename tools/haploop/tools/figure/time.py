@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from haploop.tools.figure.data import Book, Floats, RunData
-from haploop.tools.figure.envelope import extremes
 from haploop.tools.figure.style import (
     FAINT,
     GREY,
@@ -153,3 +152,26 @@ def mark_events(axes: list[Axes], run: RunData) -> None:
             ha="center", va="top", fontsize=SMALL, color="white", gid="event-label", annotation_clip=True,
             bbox={"boxstyle": "round,pad=0.25", "facecolor": GREY, "linewidth": 0},
         )  # fmt: skip
+
+
+def extremes(y: np.ndarray, buckets: int = 1500) -> np.ndarray:
+    """Which samples to draw so that the line looks like the whole series: of each bucket the smallest and the largest.
+
+    Args:
+        y: shape (samples,); samples that are no finite number are passed over where others are at hand.
+        buckets: stretches of equal length into which the series is cut.
+
+    Returns:
+        Indices in rising order, at most ``2 * buckets + 2``, the first and last sample among them; all of a short
+        series.
+    """
+    samples = len(y)
+    width = -(-samples // buckets)
+    if width <= 2:
+        return np.arange(samples)
+    table = np.pad(y, (0, -samples % width), constant_values=np.nan).reshape(-1, width)
+    finite = np.isfinite(table)
+    starts = np.arange(len(table)) * width
+    lowest = starts + np.where(finite, table, np.inf).argmin(axis=1)
+    highest = starts + np.where(finite, table, -np.inf).argmax(axis=1)
+    return np.unique(np.concatenate([[0, samples - 1], lowest, highest]))

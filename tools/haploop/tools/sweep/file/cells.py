@@ -19,7 +19,7 @@ from haploop.launch.scene.overrides import key_path, lay_value
 from haploop.launch.scene.toml_writer import Lines, inline, lines_of, to_toml
 from haploop.tools.executor.parts import Group
 from haploop.tools.executor.work import Sources, load_kinds
-from haploop.tools.sweep.run.columns import CELL, ENDED, NUMBER, SCENE, SEED, TEXT, WHOLE, WHY, Column
+from haploop.tools.sweep.table import CELL, ENDED, NUMBER, SCENE, SEED, TEXT, WHOLE, WHY, Column
 
 # Scenes that differ in these tables are run in different arrays.
 _APART = ("clock", "duration", "event")

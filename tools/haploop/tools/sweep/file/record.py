@@ -10,7 +10,7 @@ from haploop.launch.runs.in_process import run_in_process
 from haploop.launch.runs.result import unit_of
 from haploop.launch.scene.mistakes import nearest
 from haploop.logger.summary import OF_THE_MACHINE
-from haploop.tools.sweep.run.columns import ENDED, NUMBER, TEXT, TRUTH, WHY, Column
+from haploop.tools.sweep.table import ENDED, NUMBER, TEXT, TRUTH, WHY, Column
 
 if TYPE_CHECKING:
     from haploop.controller.dissipation import Element

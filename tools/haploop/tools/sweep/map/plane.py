@@ -13,8 +13,8 @@ import numpy as np
 
 from haploop.protocol.ticks import TimebaseError
 from haploop.tools.sweep.map.axis import Ruler
+from haploop.tools.sweep.map.contour import FEW_POINTS, POINTS, Level, fine_values, zero_lines
 from haploop.tools.sweep.map.data import STIFFNESS
-from haploop.tools.sweep.map.lines.contour import FEW_POINTS, POINTS, Level, fine_values, zero_lines
 
 _DELAY = "clock.round_trip_delay"
 

@@ -19,11 +19,10 @@ from haploop.tools.executor.pool import Pool, sources_of
 from haploop.tools.machine import machine, versions
 from haploop.tools.sweep.file.record import wants_trajectories
 from haploop.tools.sweep.file.sweep_file import load
-from haploop.tools.sweep.run.columns import NeedsPyarrow, pyarrow, schema_of
 from haploop.tools.sweep.run.engine import Engine, Stopped
 from haploop.tools.sweep.run.shown import SweepProgress, counted
 from haploop.tools.sweep.run.store import Store, StoreError
-from haploop.tools.sweep.table import SWEEP
+from haploop.tools.sweep.table import SWEEP, NeedsPyarrow, pyarrow, schema_of
 
 if TYPE_CHECKING:
     from haploop.tools.sweep.file.cells import Sweep

@@ -14,8 +14,8 @@ from haploop.tools.search.bisect import Tolerance
 from haploop.tools.sweep.file.cells import Axis, Bisect, Extra, Item, Sweep
 from haploop.tools.sweep.file.record import VERDICT, wants_energy, wants_trajectories
 from haploop.tools.sweep.run.boundary import Boundary, Candidate, find_boundaries, verdict_is
-from haploop.tools.sweep.run.columns import CELL, ENDED, NUMBER, SEED, TEXT, WHOLE, WHY, Column, schema_of, table_of
 from haploop.tools.sweep.run.store import Store
+from haploop.tools.sweep.table import CELL, ENDED, NUMBER, SEED, TEXT, WHOLE, WHY, Column, schema_of, table_of
 
 Row = dict[str, Any]
 

@@ -9,7 +9,7 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
 
 from haploop.tools.sweep.file.record import VERDICT
-from haploop.tools.sweep.run.columns import ENDED, WHY
+from haploop.tools.sweep.table import ENDED, WHY
 
 if TYPE_CHECKING:
     from rich.console import Console

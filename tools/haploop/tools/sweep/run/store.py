@@ -13,8 +13,7 @@ from types import TracebackType
 from typing import Any, Self
 
 from haploop.launch.output import OutputError
-from haploop.tools.sweep.run.columns import CELL, pyarrow, table_of
-from haploop.tools.sweep.table import BOUNDARY, PARTS, TABLE
+from haploop.tools.sweep.table import BOUNDARY, CELL, PARTS, TABLE, pyarrow, table_of
 
 LOCK = ".lock"
 # Rows that are merged into a group of the table, which a reader can read by itself.

@@ -8,17 +8,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from haploop.tools.figure.file import fix_layout
+from haploop.tools.figure.labels import LabelRoom
 from haploop.tools.figure.style import ELEMENTS, FAINT, INK, WALL
 from haploop.tools.sweep.map.axis import Ruler
-from haploop.tools.sweep.map.boundary import ALL_HOLD, FOUND, NONE_HOLDS, UNKNOWN, Edges, edges_of
+from haploop.tools.sweep.map.boundaries import Over, over_scene
+from haploop.tools.sweep.map.curves import draw_boundary, styles_of
 from haploop.tools.sweep.map.data import Axis, MapData
-from haploop.tools.sweep.map.draw.edge_words import edge_description, edge_notes, furthest
-from haploop.tools.sweep.map.draw.header import Sheet
-from haploop.tools.sweep.map.draw.labels import LabelRoom
-from haploop.tools.sweep.map.draw.legend import Legend
-from haploop.tools.sweep.map.draw.look import LOOKS
-from haploop.tools.sweep.map.lines.curves import draw_boundary, styles_of
-from haploop.tools.sweep.map.lines.over import Over, over_scene
+from haploop.tools.sweep.map.edges import ALL_HOLD, FOUND, NONE_HOLDS, UNKNOWN, Edges, edges_of
+from haploop.tools.sweep.map.legend import LOOKS, Legend
+from haploop.tools.sweep.map.sentences import edge_description, edge_notes, furthest
+from haploop.tools.sweep.map.sheet import Sheet
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -142,8 +141,8 @@ def _names(
 ) -> None:
     """The furthest boundary, and the names of the lines where there is one line of cells."""
     room = LabelRoom(ax)
-    room.keep_off_markers()
-    room.keep_off_lines(line for over in overs for lines in over.drawn.values() for line in lines)
+    room.avoid_markers()
+    room.avoid_lines(line for over in overs for lines in over.drawn.values() for line in lines)
     if best := furthest(edges):
         at = x.coordinates[best.index[0]], float(y.place([best.value])[0])
         ax.plot(*at, "*", color=_STAR, markersize=13, markeredgecolor="white", zorder=6, gid="star")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from haploop.tools.figure.style import INK
-from haploop.tools.sweep.map.lines.limit import EXACT, Boundary
+from haploop.tools.sweep.map.boundaries import EXACT, Boundary
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -1,24 +1,32 @@
-"""The map of a sweep: what stays steady over its axes, in one look."""
+"""The figure of a sweep: a map of its cells, a panel for each combination of the axes beyond two."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-from haploop.tools.figure.file import fix_layout
-from haploop.tools.sweep.map.answer import stiffest_steady
+from haploop.tools.figure.data import FigureError
+from haploop.tools.figure.file import fix_layout, write_figure
+from haploop.tools.figure.labels import LabelRoom
 from haploop.tools.sweep.map.axis import Ruler
-from haploop.tools.sweep.map.data import LIMIT_CYCLE, Axis, Cells, MapData
-from haploop.tools.sweep.map.draw.header import Sheet, fit_title, panel_title
-from haploop.tools.sweep.map.draw.labels import LabelRoom
-from haploop.tools.sweep.map.draw.legend import Legend
-from haploop.tools.sweep.map.draw.line import SwingScale, count_disagreement, draw_swings, label_swings
-from haploop.tools.sweep.map.draw.look import amplitude_scale
-from haploop.tools.sweep.map.draw.panel import draw_cells, mark_disagreement
-from haploop.tools.sweep.map.draw.words import answer, counted, description, failures, star_words, unknown_amplitudes
-from haploop.tools.sweep.map.layout import MOST_PANELS, Layout, Panel
-from haploop.tools.sweep.map.lines.curves import draw_boundary, styles_of
-from haploop.tools.sweep.map.lines.over import Over, over_scene
+from haploop.tools.sweep.map.bisect_figure import bisect_figure
+from haploop.tools.sweep.map.boundaries import Over, over_scene
+from haploop.tools.sweep.map.curves import draw_boundary, styles_of
+from haploop.tools.sweep.map.data import LIMIT_CYCLE, Axis, Cells, MapData, data_of
+from haploop.tools.sweep.map.edges import stiffest_steady
+from haploop.tools.sweep.map.legend import Legend, amplitude_scale
+from haploop.tools.sweep.map.panels import (
+    SwingScale,
+    count_disagreement,
+    draw_cells,
+    draw_swings,
+    label_swings,
+    mark_disagreement,
+)
+from haploop.tools.sweep.map.sentences import answer, counted, description, failures, star_words, unknown_amplitudes
+from haploop.tools.sweep.map.sheet import MOST_PANELS, Layout, Panel, Sheet, fit_title, panel_title
+from haploop.tools.sweep.table import NeedsPyarrow, TableError, read
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -88,10 +96,10 @@ def _label(
     """Star and names, once the panel has its place."""
     room = LabelRoom(ax)
     found = stiffest_steady(tuple(along), panel.cells)
-    room.keep_off(ax.texts)
-    room.keep_off_lines(line for lines in over.drawn.values() for line in lines)
+    room.avoid_texts(ax.texts)
+    room.avoid_lines(line for lines in over.drawn.values() for line in lines)
     if len(rulers) == 1:
-        room.keep_off_markers()
+        room.avoid_markers()
     if found:
         x, *rest = (ruler.coordinates[index] for ruler, index in zip(rulers, found.index, strict=True))
         y = rest[0] if rest else float(swings.place(panel.cells.amplitude_m)[found.index])
@@ -123,3 +131,25 @@ def _notes(data: MapData, cells: Cells, layout: Layout, overs: Sequence[Over]) -
         notes.append("Upright lines reach down to the seed that swings least.")
     notes += [unknown_amplitudes(data, cells), failures(data)]
     return [note for note in notes if note]
+
+
+def draw_map(directory: Path, target: Path | None = None) -> Path:
+    """Draw a sweep, finished or not.
+
+    Args:
+        directory: that ``haploop sweep`` writes to.
+        target: file of the figure, in the format of its suffix; ``figure.png`` in the directory when None.
+
+    Returns:
+        The file.
+
+    Raises:
+        FigureError: matplotlib or pyarrow is missing, there is nothing to draw, or the file cannot be written.
+    """
+    try:
+        table = read(directory)
+    except (TableError, NeedsPyarrow) as error:
+        raise FigureError(str(error)) from error
+    data = data_of(table.columns, table.units, table.sweep, table.boundary)
+    figure = bisect_figure(data) if data.has_edges else figure_of(data)
+    return write_figure(figure, target or directory / "figure.png")

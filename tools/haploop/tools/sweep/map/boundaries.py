@@ -1,0 +1,125 @@
+"""The lines over a map that need no run: the exact limit of the linear loop, and analytic bounds."""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from haploop.tools.linear.bounds import Bound, bounds_of
+from haploop.tools.linear.linearity import installed_kinds, left_out, why_not_linear
+from haploop.tools.linear.one_tick import NotLinear, OneTickMap
+from haploop.tools.sweep.map.axis import Ruler
+from haploop.tools.sweep.map.data import STIFFNESS
+from haploop.tools.sweep.map.plane import Plane, value_at
+
+EXACT = "ρ(M) = 1"
+
+
+@dataclass(frozen=True)
+class Boundary:
+    """A named line over a map.
+
+    Attributes:
+        name: what is written on it.
+        words: what it says, and its source.
+        lines: points of each piece, values of the axes in SI, shape (n, axes).
+    """
+
+    name: str
+    words: str
+    lines: list[np.ndarray]
+
+
+def exact_boundary(plane: Plane) -> Boundary:
+    """Where rho(M) = 1 for the linear loop at every place; without lines where it grows nowhere or everywhere.
+
+    Raises:
+        NotLinear: the loop of some place is no linear map; the message names what makes it none, in a few words.
+    """
+    scenes = plane.own_scenes()
+    if any("wall" not in scene for scene in scenes):
+        raise NotLinear("there is no wall")
+    if curved := [reason for scene in scenes for reason in why_not_linear(scene)]:
+        raise NotLinear(", ".join(dict.fromkeys(curved)))
+    loops: dict[tuple[float, ...], OneTickMap] = {}
+
+    def level(x: float, y: float) -> float:
+        key = plane.but_for_stiffness(x, y)
+        if key not in loops:
+            loops[key] = OneTickMap.of(plane.at(x, y))
+        return math.log(loops[key].growth(plane.stiffness(x, y)))
+
+    without = f", without {', '.join(left)}" if (left := left_out(plane.scene)) else ""
+    return Boundary(EXACT, f"exact, linear loop in contact{without}", plane.zero_lines(level))
+
+
+_MEANING = {"passivity": "passive, whatever passive hand holds it", "stability": "stable with the scene's own hand"}
+_MOST_LOG = 50.0
+
+
+def bound_boundaries(plane: Plane) -> list[Boundary]:
+    """Every known bound that applies at some place of a panel, as the line on which the wall is as stiff as it allows.
+
+    A bound that applies but allows no wall of the panel, or every one, has no lines.
+    """
+    if value_at(plane.scene, STIFFNESS) is None:
+        return []
+    known: dict[tuple[float, ...], dict[str, Bound]] = {}
+
+    def at(x: float, y: float) -> dict[str, Bound]:
+        key = plane.but_for_stiffness(x, y)
+        if key not in known:
+            known[key] = {bound.name: bound for bound in bounds_of(plane.at(x, y))}
+        return known[key]
+
+    first = {bound.name: bound for bound in bounds_of(plane.scene)}
+    lines = {name: plane.zero_lines(_level(plane, at, name), whole_ticks=True) for name in first}
+    applied = {name for bounds in known.values() for name, bound in bounds.items() if bound.applies}
+    return [Boundary(name, _MEANING[bound.kind], lines[name]) for name, bound in first.items() if name in applied]
+
+
+def _level(plane: Plane, at: Callable[[float, float], dict[str, Bound]], name: str) -> Callable[[float, float], float]:
+    """How far the wall is beyond what a bound allows, as a logarithm; NaN where the bound does not apply."""
+
+    def level(x: float, y: float) -> float:
+        allowed = at(x, y)[name].stiffness_N_m
+        if allowed is None:
+            return math.nan
+        stiffness = plane.stiffness(x, y)
+        if not allowed or not stiffness:
+            return _MOST_LOG if stiffness > allowed else -_MOST_LOG
+        return float(np.clip(math.log(stiffness / allowed), -_MOST_LOG, _MOST_LOG))
+
+    return level
+
+
+@dataclass
+class Over:
+    """The boundaries of a panel, and where they run on the paper by name; ``why_none`` where there is no exact one."""
+
+    boundaries: list[Boundary] = field(default_factory=list)
+    why_none: str = ""
+    drawn: dict[str, list[np.ndarray]] = field(default_factory=dict)
+
+
+def over_scene(texts: Iterable[str | None], rulers: Sequence[Ruler], bounds: bool = True) -> Over:
+    """The boundaries of the first scene there is among some of a panel, as TOML; none over names."""
+    text = next((text for text in texts if text), None)
+    if text is None:
+        return Over(why_none="none of its cells has a scene")
+    if any(ruler.axis.names for ruler in rulers):
+        return Over()
+    scene = tomllib.loads(text)
+    elements = {table["kind"] for table in scene.get("dissipation", [])}
+    if foreign := sorted(elements - set(installed_kinds())):
+        return Over(why_none=f"the element {foreign[0]} comes from a plugin")
+    plane = Plane(scene, rulers)
+    known = bound_boundaries(plane) if bounds else []
+    try:
+        return Over([exact_boundary(plane), *known])
+    except NotLinear as error:
+        return Over(known, str(error))

@@ -1,1 +1,0 @@
-"""Drawing a map of a sweep."""
