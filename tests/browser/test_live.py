@@ -137,7 +137,7 @@ def test_what_the_page_draws_are_the_numbers_of_the_log(running, viewing):
     stands_at(page, 1000)
     shown = page.evaluate(
         """async () => {
-            const { decode } = await import("/static/picture.js");
+            const { decode } = await import("/static/snapshot.js");
             const socket = new WebSocket(`ws://${location.host}/stream`);
             socket.binaryType = "arraybuffer";
             socket.onopen = () => socket.send(JSON.stringify({ type: "watch", span_s: 0.1, points: 2000, end_s: 1.0 }));

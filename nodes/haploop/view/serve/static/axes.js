@@ -1,4 +1,4 @@
-// How the axes of every chart look: one hand for all of them.
+// The axes of every chart.
 
 import { axisNumbers } from "./amounts.js";
 import { colour } from "./palette.js";

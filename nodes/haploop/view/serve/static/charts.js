@@ -1,10 +1,10 @@
-// All charts of the page, filled from one picture at a time.
+// All charts of the page, filled from one snapshot at a time.
 
 import { amount, isNumber } from "./amounts.js";
 import { byId } from "./dom.js";
-import { Loops } from "./loops.js";
+import { PhasePlots } from "./phase_plots.js";
 import { linesFor } from "./palette.js";
-import { scaled, times } from "./picture.js";
+import { scaled, times } from "./snapshot.js";
 import { TimeChart } from "./time_chart.js";
 
 const CHARTS = {
@@ -15,25 +15,25 @@ const CHARTS = {
 const NO_TIMES = new Float64Array(0);
 
 export class Charts {
-  /** @param {import("./look.js").Look} look what is looked at. */
-  constructor(look) {
-    this.look = look;
+  /** @param {import("./viewport.js").Viewport} viewport what is looked at. */
+  constructor(viewport) {
+    this.viewport = viewport;
     this.charts = Object.fromEntries(
-      Object.entries(CHARTS).map(([name, options]) => [name, new TimeChart(byId(name), options, look)]),
+      Object.entries(CHARTS).map(([name, options]) => [name, new TimeChart(byId(name), options, viewport)]),
     );
-    this.loops = new Loops(byId("loop"), byId("momentum"));
-    new ResizeObserver(([{ contentRect }]) => look.fit(contentRect.width)).observe(byId("position"));
+    this.loops = new PhasePlots(byId("loop"), byId("momentum"));
+    new ResizeObserver(([{ contentRect }]) => viewport.fit(contentRect.width)).observe(byId("position"));
   }
 
   /**
-   * Draw a picture.
+   * Draw a snapshot.
    *
-   * @param {object} picture as decoded.
+   * @param {object} snapshot as decoded.
    * @param {object} state the run's state.
    * @param {object[]} marks what changed the run.
    */
   show({ from_s, to_s, tables }, state, marks) {
-    this.look.shown = [from_s, to_s];
+    this.viewport.shown = [from_s, to_s];
     for (const [name, chart] of Object.entries(this.charts)) {
       const lines = tables[name] ? linesOf(tables[name], CHARTS[name].factor) : [];
       chart.show([from_s, to_s], tables[name] ? times(tables[name]) : NO_TIMES, lines, {

@@ -4,12 +4,12 @@ import { byId, make } from "./dom.js";
 
 const AROUND_S = 0.1;
 
-/** List the events; `look` is told which moment to show. */
-export function showEvents(events, look) {
+/** List the events; `viewport` is told which moment to show. */
+export function showEvents(events, viewport) {
   const items = events.toReversed().map(({ tick, t_s, text, kind }) => {
     const time = make("span", { class: "tick" }, `tick ${tick}`);
     const button = make("button", { type: "button", title: `${t_s} s: show this moment` }, time, ` ${text}`);
-    button.addEventListener("click", () => look.at(t_s - AROUND_S, t_s + AROUND_S));
+    button.addEventListener("click", () => viewport.at(t_s - AROUND_S, t_s + AROUND_S));
     return make("li", { "data-kind": kind }, button);
   });
   if (!items.length) items.push(make("li", { class: "nothing" }, "Nothing has been changed so far."));

@@ -9,7 +9,7 @@ const OWN = new Set([" ", "ArrowLeft", "ArrowRight"]);
 
 /** Listen to the keys, for the controls of time and view. */
 export function listen(time, view, steerable) {
-  const look = view.look;
+  const viewport = view.viewport;
   const keys = [
     [[" "], "Space", "pause or resume", () => time.toggle(), true],
     [[".", "1"], ". or 1", "step 1 tick", () => time.step(1), true],
@@ -21,11 +21,11 @@ export function listen(time, view, steerable) {
     [["x"], "x", "stop the run (asks first)", () => time.askToStop(), true],
     [["s"], "s", "swap an element: go to the form", () => byId("swap-kind").focus(), true],
     [["e"], "e", "set a number: go to the form", () => document.querySelector("#set input")?.focus(), true],
-    [["["], "[", "show a shorter time", () => look.widen(-1), false],
-    [["]"], "]", "show a longer time", () => look.widen(1), false],
-    [["f"], "f", "freeze, or go live", () => look.freeze(), false],
-    [["ArrowLeft"], "←", "earlier", () => look.shift(-0.5), false],
-    [["ArrowRight"], "→", "later", () => look.shift(0.5), false],
+    [["["], "[", "show a shorter time", () => viewport.widen(-1), false],
+    [["]"], "]", "show a longer time", () => viewport.widen(1), false],
+    [["f"], "f", "freeze, or go live", () => viewport.freeze(), false],
+    [["ArrowLeft"], "←", "earlier", () => viewport.shift(-0.5), false],
+    [["ArrowRight"], "→", "later", () => viewport.shift(0.5), false],
     [["?"], "?", "these keys", () => byId("keys").showModal(), false],
   ];
   for (const [, name, does] of keys) {

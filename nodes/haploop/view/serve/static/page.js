@@ -5,11 +5,11 @@ import { byId, put } from "./dom.js";
 import { showEvents } from "./events.js";
 import { showHeader } from "./header.js";
 import { listen } from "./keys.js";
-import { Look } from "./look.js";
+import { Viewport } from "./viewport.js";
 import { marksOf } from "./marks.js";
 import { showNodes } from "./nodes.js";
 import { onSchemeChange } from "./palette.js";
-import { decode } from "./picture.js";
+import { decode } from "./snapshot.js";
 import { SetForm } from "./set_form.js";
 import { allow, obstacle, Steering } from "./steering.js";
 import { Stream } from "./stream.js";
@@ -22,21 +22,21 @@ let state = { phase: "waiting", nodes: [] };
 let connected = false;
 let marks = [];
 let newest = null;
-let picture = null;
+let snapshot = null;
 let drawn = 0;
 
 const phase = () => (connected ? state.phase : "lost");
 
-const look = new Look(() => {
-  stream.watch(look.wish());
+const viewport = new Viewport(() => {
+  stream.watch(viewport.request());
   view.update();
   charts.refit();
 });
-const charts = new Charts(look);
-const stream = new Stream({ connected: onConnection, state: onState, events: onEvents, picture: onPicture });
+const charts = new Charts(viewport);
+const stream = new Stream({ connected: onConnection, state: onState, events: onEvents, snapshot: onSnapshot });
 const steering = new Steering(stream);
 const time = new TimeControls(steering);
-const view = new ViewControls(look);
+const view = new ViewControls(viewport);
 const swapForm = new SwapForm(steering);
 const setForm = new SetForm(steering);
 
@@ -48,14 +48,14 @@ function onConnection(isThere) {
 function onState(now) {
   const isNew = now.run !== state.run;
   state = now;
-  look.first_s = now.first_s ?? 0;
-  look.last_s = now.control_rate ? now.tick / now.control_rate : 0;
+  viewport.first_s = now.first_s ?? 0;
+  viewport.last_s = now.control_rate ? now.tick / now.control_rate : 0;
   if (isNew) newRun();
   showState();
 }
 
 function newRun() {
-  look.live();
+  viewport.live();
   charts.refit();
 }
 
@@ -76,25 +76,25 @@ function showState() {
 
 function onEvents(events) {
   marks = marksOf(events);
-  showEvents(events, look);
+  showEvents(events, viewport);
   redraw();
 }
 
-/** Only the newest picture is ever drawn; one that came too early for the screen is forgotten. */
-function onPicture(buffer) {
+/** Only the newest snapshot is ever drawn; one that came too early for the screen is forgotten. */
+function onSnapshot(buffer) {
   if (!newest) requestAnimationFrame(draw);
   newest = buffer;
 }
 
 function draw() {
-  picture = decode(newest);
+  snapshot = decode(newest);
   newest = null;
   drawn += 1;
   redraw();
 }
 
 function redraw() {
-  if (picture) charts.show(picture, state, marks);
+  if (snapshot) charts.show(snapshot, state, marks);
 }
 
 listen(time, view, () => obstacle(phase()) === "");
@@ -104,7 +104,7 @@ setInterval(() => {
   put(byId("rate"), String(drawn));
   drawn = 0;
 }, 1000);
-stream.watch(look.wish());
+stream.watch(viewport.request());
 view.update();
-showEvents([], look);
+showEvents([], viewport);
 showState();

@@ -1,4 +1,4 @@
-// The range of an axis that follows its data without trembling at every picture.
+// The range of an axis that follows its data without trembling at every snapshot.
 
 const MARGIN = 0.07;
 // Data that fill less than this of the axis draw it closer.

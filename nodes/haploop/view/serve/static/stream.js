@@ -1,4 +1,4 @@
-// The line to haploop view: what it tells, what is asked of it. A lost line is taken up again by itself.
+// The connection to haploop view. A lost one is opened again by itself.
 
 const FIRST_WAIT_MS = 250;
 const LONGEST_WAIT_MS = 2000;
@@ -13,11 +13,11 @@ export const maySteer = () => token() !== "";
 
 export class Stream {
   /**
-   * @param {object} heard what to call: connected(boolean), state(state), events(list), picture(buffer).
+   * @param {object} handlers what to call: connected(boolean), state(state), events(list), snapshot(buffer).
    */
-  constructor(heard) {
-    this.heard = heard;
-    this.wish = null;
+  constructor(handlers) {
+    this.handlers = handlers;
+    this.request = null;
     this.waiting = new Map();
     this.commands = 0;
     this.waitMs = FIRST_WAIT_MS;
@@ -29,25 +29,25 @@ export class Stream {
     this.socket.binaryType = "arraybuffer";
     this.socket.onopen = () => {
       this.waitMs = FIRST_WAIT_MS;
-      this.heard.connected(true);
-      if (this.wish) this.send(this.wish);
+      this.handlers.connected(true);
+      if (this.request) this.send(this.request);
     };
     this.socket.onmessage = ({ data }) => {
-      if (typeof data === "string") this.hear(JSON.parse(data));
-      else this.heard.picture(data);
+      if (typeof data === "string") this.receive(JSON.parse(data));
+      else this.handlers.snapshot(data);
     };
     this.socket.onclose = () => {
       for (const answer of this.waiting.values()) answer({ ok: false, text: UNANSWERED });
       this.waiting.clear();
-      this.heard.connected(false);
+      this.handlers.connected(false);
       setTimeout(() => this.open(), this.waitMs);
       this.waitMs = Math.min(2 * this.waitMs, LONGEST_WAIT_MS);
     };
   }
 
-  hear(message) {
-    if (message.type === "state") this.heard.state(message);
-    else if (message.type === "events") this.heard.events(message.events);
+  receive(message) {
+    if (message.type === "state") this.handlers.state(message);
+    else if (message.type === "events") this.handlers.events(message.events);
     else if (message.type === "answer") {
       this.waiting.get(message.id)?.(message);
       this.waiting.delete(message.id);
@@ -60,10 +60,10 @@ export class Stream {
     return open;
   }
 
-  /** Ask for pictures of a stretch of time: {span_s, points, end_s}. Said again after every new connection. */
-  watch(wish) {
-    this.wish = { type: "watch", ...wish };
-    this.send(this.wish);
+  /** Asks for snapshots of an interval of time: {span_s, points, end_s}. Sent again after every new connection. */
+  watch(request) {
+    this.request = { type: "watch", ...request };
+    this.send(this.request);
   }
 
   /** Have the run do something; the answer, {ok, text}, comes whatever happens. */

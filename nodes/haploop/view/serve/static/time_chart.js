@@ -7,7 +7,7 @@ import { Legend, stroke } from "./legend.js";
 import { drawMarks } from "./marks.js";
 import { colour } from "./palette.js";
 import { halfPlane, line as linePath } from "./paths.js";
-import { last } from "./picture.js";
+import { last } from "./snapshot.js";
 import { extent, Range } from "./range.js";
 
 const CURSORS = "haploop";
@@ -17,10 +17,10 @@ export class TimeChart {
    * @param {HTMLElement} host takes the chart.
    * @param {object} options label and unit of the left axis; decimals of the numbers in the legend; least: the axis
    *   never covers less; zero: the axis always shows 0; times: whether the times stand below it.
-   * @param {import("./look.js").Look} look what dragging in the chart changes.
+   * @param {import("./viewport.js").Viewport} viewport what dragging in the chart changes.
    */
-  constructor(host, options, look) {
-    Object.assign(this, { host, options, look });
+  constructor(host, options, viewport) {
+    Object.assign(this, { host, options, viewport });
     this.range = new Range(options.least);
     this.legend = new Legend(host, () => this.retoggle());
     this.plot = host.appendChild(make("div", { class: "plot" }));
@@ -63,7 +63,7 @@ export class TimeChart {
         points: { show: false },
         drag: { x: true, y: false, setScale: false, dist: 6 },
         sync: { key: CURSORS, scales: ["x", null], filters: { sub: (type) => type === "mousemove" } },
-        bind: { dblclick: () => () => this.look.live() },
+        bind: { dblclick: () => () => this.viewport.live() },
       },
       hooks: {
         drawClear: [(u) => this.shade(u)],
@@ -137,7 +137,7 @@ export class TimeChart {
 
   select(u) {
     const { left, width } = u.select;
-    if (width > 0) this.look.at(u.posToVal(left, "x"), u.posToVal(left + width, "x"));
+    if (width > 0) this.viewport.at(u.posToVal(left, "x"), u.posToVal(left + width, "x"));
     u.setSelect({ left: 0, width: 0, top: 0, height: 0 }, false);
   }
 

@@ -6,20 +6,20 @@ const PART = 0.5;
 const ALL = "all";
 
 export class ViewControls {
-  /** @param {import("./look.js").Look} look what they change. */
-  constructor(look) {
-    this.look = look;
+  /** @param {import("./viewport.js").Viewport} viewport what they change. */
+  constructor(viewport) {
+    this.viewport = viewport;
     for (const radio of document.getElementsByName("span")) {
-      radio.addEventListener("change", () => look.show(radio.value === ALL ? null : Number(radio.value)));
+      radio.addEventListener("change", () => viewport.show(radio.value === ALL ? null : Number(radio.value)));
     }
-    byId("freeze").addEventListener("click", () => look.freeze());
-    byId("earlier").addEventListener("click", () => look.shift(-PART));
-    byId("later").addEventListener("click", () => look.shift(PART));
+    byId("freeze").addEventListener("click", () => viewport.freeze());
+    byId("earlier").addEventListener("click", () => viewport.shift(-PART));
+    byId("later").addEventListener("click", () => viewport.shift(PART));
   }
 
   /** Show how it is looked now. */
   update() {
-    const { span_s: span, frozen } = this.look;
+    const { span_s: span, frozen } = this.viewport;
     for (const radio of document.getElementsByName("span")) {
       radio.checked = radio.value === (span === null ? ALL : String(span));
     }

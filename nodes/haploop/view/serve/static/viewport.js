@@ -1,11 +1,11 @@
-// Which stretch of simulated time is looked at: the last seconds, as they come, or one that stands still.
+// The interval of simulated time that is shown: the last seconds, as they come, or one that is frozen.
 
 export const SPANS_S = [0.2, 1, 2, 10, null];
 const LEAST_POINTS = 200;
 const MOST_POINTS = 2000;
 const LEAST_SPAN_S = 0.005;
 
-export class Look {
+export class Viewport {
   /** @param {() => void} changed called after every change. */
   constructor(changed) {
     this.changed = changed;
@@ -23,7 +23,7 @@ export class Look {
   }
 
   /** As the server wants to be asked. */
-  wish() {
+  request() {
     return { span_s: this.span_s, points: this.points, end_s: this.end_s };
   }
 

@@ -8,7 +8,7 @@ import { extent, Range } from "./range.js";
 const NOTHING = new Float64Array(1).fill(NaN);
 const SHAPE = { width: 1, dash: [] };
 
-export class LoopChart {
+export class PhaseChart {
   /**
    * @param {HTMLElement} host takes the chart.
    * @param {object} options x and y: names of the axes with units; least: [x, y] the axes never cover less.

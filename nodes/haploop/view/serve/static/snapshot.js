@@ -1,9 +1,9 @@
-// A picture as it comes from the server: a header, then every column of every table as 32-bit floats.
+// A snapshot as it comes from the server: a header, then every column of every table as 32-bit floats.
 
 const utf8 = new TextDecoder();
 
 /**
- * Decode a picture.
+ * Decode a snapshot.
  *
  * @param {ArrayBuffer} buffer uint32 length of the header (little-endian), the header as JSON, then the tables.
  * @returns {object} from_s, to_s and tables: name -> {t0_s, dt_s, rows, envelope, columns: [{name, unit, label, values}]}

@@ -1,9 +1,9 @@
 // The two loops of Choi et al. 2022: force against penetration (Fig. 3) and virtual momentum against velocity (Fig. 4).
 
-import { LoopChart } from "./loop_chart.js";
+import { PhaseChart } from "./phase_chart.js";
 import { linesFor } from "./palette.js";
 import { dots, line } from "./paths.js";
-import { scaled } from "./picture.js";
+import { scaled } from "./snapshot.js";
 
 const MM = 1e3;
 const GRAMS = 1e3;
@@ -21,14 +21,14 @@ const LINES = {
 const whole = (u, xs, ys) => line(u, xs, ys);
 const inPixels = (size) => (u, xs, ys) => dots(u, xs, ys, size * devicePixelRatio);
 
-export class Loops {
+export class PhasePlots {
   constructor(loop, momentum) {
-    this.loop = new LoopChart(loop, { x: "penetration (mm)", y: "force out of the wall (N)", least: [0.01, 0.001] });
-    this.momentum = new LoopChart(momentum, { x: "velocity (m/s)", y: "momentum (g m/s)", least: [1e-4, 1e-4] });
+    this.loop = new PhaseChart(loop, { x: "penetration (mm)", y: "force out of the wall (N)", least: [0.01, 0.001] });
+    this.momentum = new PhaseChart(momentum, { x: "velocity (m/s)", y: "momentum (g m/s)", least: [1e-4, 1e-4] });
     this.charts = [this.loop, this.momentum];
   }
 
-  /** Show the loops among the tables of a picture, or say why there is none. */
+  /** Show the loops among the tables of a snapshot, or say why there is none. */
   show({ loop, momentum }) {
     this.loop.show(loop ? forceLoop(loop) : [], loop ? "" : NO_WALL);
     this.momentum.show(momentum ? momentumLoops(momentum) : [], momentum ? "" : NO_INERTIA);
