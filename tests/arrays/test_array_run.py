@@ -15,8 +15,8 @@ from haploop.launch.batch import run as array_run
 from haploop.launch.batch.batch import LoopArray
 from haploop.launch.batch.run import run_array
 from haploop.launch.batch.stacking import runs_in_arrays, stacked, structure, structures
-from haploop.logger.batch import LoggerArray
-from haploop.logger.verdict.window_batch import WindowArray
+from haploop.logger.batch import BatchLogger
+from haploop.logger.verdict.window import Window
 from haploop.plant import choose_batch
 from haploop.plant.motion.one_mass_batch import LinearMotionArray
 from helpers.runs.batches import PUSH, Stiffening, alone, diverging, pressed, together
@@ -79,9 +79,9 @@ def test_loops_that_diverge_leave_with_their_results_and_disturb_no_other() -> N
 
 def test_windows_are_read_with_the_buffers_of_a_loop_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     """NumPy before 2.3 lets the bits of a sum depend on them; while loops run they are shorter."""
-    shown, book, seen = WindowArray.shown, LoggerArray.book, {"shown": set[int](), "booked": set[int]()}
-    monkeypatch.setattr(WindowArray, "shown", lambda *of: seen["shown"].add(np.getbufsize()) or shown(*of))
-    monkeypatch.setattr(LoggerArray, "book", lambda *of: seen["booked"].add(np.getbufsize()) or book(*of))
+    shown, book, seen = Window.measures, BatchLogger.book, {"shown": set[int](), "booked": set[int]()}
+    monkeypatch.setattr(Window, "measures", lambda *of: seen["shown"].add(np.getbufsize()) or shown(*of))
+    monkeypatch.setattr(BatchLogger, "book", lambda *of: seen["booked"].add(np.getbufsize()) or book(*of))
     usual = np.getbufsize()
     together(diverging())
     assert seen["shown"] == {usual} == {np.getbufsize()}

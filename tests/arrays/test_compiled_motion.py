@@ -37,7 +37,7 @@ def loops_of(scenes: list[dict[str, Any]], by_program: bool) -> LoopArray:
 
 
 def positions(loops: LoopArray, ticks: int) -> np.ndarray:
-    return loops._logger._window._x[: ticks * loops._time.steps_per_tick]
+    return loops._logger.window.state.x[: ticks * loops._time.steps_per_tick]
 
 
 def nudged(scene: dict[str, Any], by: float) -> dict[str, Any]:

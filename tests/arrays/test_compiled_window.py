@@ -1,11 +1,10 @@
-"""What windows show of the compiled way."""
+"""Windows of the compiled way."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from haploop.controller.controller_batch import Row
 from haploop.protocol.ticks import Timebase
 from helpers.runs.compiled import agree
 
@@ -32,16 +31,16 @@ def test_windows_read_by_a_program_show_what_they_show_by_themselves() -> None:
                 "in_contact": 1.0 * (x[::4] < 0.0),
                 "wall_position": 0 * x[::4],
             }
-            rows = [Row({name: column[k] for name, column in columns.items()}, {}, []) for k in range(first, last)]
+            rows = {name: column[first:last] for name, column in columns.items()}
             window.add(x[first * 4 : last * 4 + 1], x[first * 4 : last * 4 + 1], rows)
-        by_itself = list(window.shown(range(16)))
+        by_itself = list(window.measures(range(16)))
         with in_double():
-            window.take(Rings(window._x.reshape(-1, 4, 16), dict(window._ticks)), writable=False)
-            by_program = list(window.shown(range(16)))
+            window.take(Rings(window.state.x.reshape(-1, 4, 16), dict(window.state.rows)), writable=False)
+            by_program = list(window.measures(range(16)))
         for one, other in zip(by_itself, by_program, strict=True):
-            assert (one.seen.touched, one.seen.crossings) == (other.seen.touched, other.seen.crossings)
-            assert agree(one.seen.figures, other.seen.figures, 1e-9)
-            assert one.seen.growth == pytest.approx(other.seen.growth, rel=1e-9)
+            assert (one.window.touched, one.window.crossings) == (other.window.touched, other.window.crossings)
+            assert agree(one.window.figures, other.window.figures, 1e-9)
+            assert one.window.growth == pytest.approx(other.window.growth, rel=1e-9)
             assert (one.extremes, one.swing_m) == (other.extremes, other.swing_m)
-        assert any(one.seen.crossings > 3 for one in by_itself)
-        assert not by_program[3].seen.touched
+        assert any(one.window.crossings > 3 for one in by_itself)
+        assert not by_program[3].window.touched

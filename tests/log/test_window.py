@@ -10,6 +10,7 @@ import pytest
 
 from haploop.logger.verdict.measures import swings
 from haploop.logger.verdict.window import Window
+from haploop.protocol.ticks import Timebase
 
 RATE, N = 10_000, 10
 WALL = -0.06
@@ -17,26 +18,28 @@ WALL = -0.06
 
 def judged(x_of_t, seconds: float = 1.0, resolution: float = 0.0, pieces: int = 7, diverged: str | None = None):
     """Verdict and figures of a device that moved as ``x_of_t`` says; the wall below ``WALL``, force 100 N/m deep."""
-    window = Window(RATE, N, resolution)
     ticks = round(seconds * RATE / N)
+    window = Window(Timebase(RATE, RATE // N, 0, ticks), resolution)
     bounds = [ticks * i // pieces for i in range(pieces + 1)]
     for first, last in pairwise(bounds):
         x = x_of_t(np.arange(first * N, last * N + 1) / RATE)
         at_ticks = x[:-1:N]
         depth = np.maximum(0.0, WALL - at_ticks)
         rows = {"x": at_ticks, "total": 100.0 * depth, "in_contact": (depth > 0).astype(float)}
-        window.add(x, np.repeat(100.0 * depth, N), rows | {"wall_position": np.full(len(at_ticks), WALL)})
-    return window.shown().verdict(diverged).word, window.shown().seen.figures, window
+        rows |= {"wall_position": np.full(len(at_ticks), WALL)}
+        window.add(x[:, None], 100.0 * depth[:, None], {name: column[:, None] for name, column in rows.items()})
+    (measures,) = window.measures()
+    return measures.verdict(diverged).word, measures.window.figures, measures.extremes
 
 
 def test_a_device_at_rest_in_the_wall_is_steady_and_shows_the_stiffness_of_the_wall():
-    word, figures, window = judged(lambda t: np.full_like(t, -0.061))
+    word, figures, extremes = judged(lambda t: np.full_like(t, -0.061))
     assert word == "steady"
     assert figures["oscillation_m"] == 0.0
     assert figures["outside_fraction"] == 0.0
     assert figures["displayed_stiffness_N_m"] == pytest.approx(100.0)
-    assert (window.x_min_m, window.x_max_m) == (-0.061, -0.061)
-    assert window.force_max_N == pytest.approx(0.1)
+    assert (extremes.x_min_m, extremes.x_max_m) == (-0.061, -0.061)
+    assert extremes.force_max_N == pytest.approx(0.1)
 
 
 @pytest.mark.parametrize("hz", [5.0, 60.0, 300.0])
@@ -99,11 +102,12 @@ def test_how_the_run_is_cut_changes_nothing(pieces):
 
 def test_a_position_on_the_face_but_for_rounding_counts_for_no_stiffness():
     """1e-5 * -6000 is -0.060000000000000005: force over that penetration would be anything."""
-    window = Window(RATE, N, 1e-5)
+    window = Window(Timebase(RATE, RATE // N, 0, 600), 1e-5)
     x = np.full(6001, 1e-5 * -6000)
     rows = {"x": x[:-1:N], "total": np.full(600, 0.3), "in_contact": np.ones(600), "wall_position": np.full(600, WALL)}
-    window.add(x, np.zeros(6000), rows)
-    assert window.shown().seen.figures["displayed_stiffness_N_m"] is None
+    window.add(x[:, None], np.zeros((6000, 1)), {name: column[:, None] for name, column in rows.items()})
+    (measures,) = window.measures()
+    assert measures.window.figures["displayed_stiffness_N_m"] is None
 
 
 def test_crossings_are_counted_from_beyond_one_side_to_beyond_the_other():

@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from haploop.logger.books.one_mass import PlantBooks
-from haploop.logger.books.sums import by_tick
-from haploop.logger.books.work import Displacement
+from haploop.logger.books.one_mass import OneMassBooks
+from haploop.logger.books.sums import sum_steps
+from haploop.logger.books.work import Displacement, by_interval
 from haploop.plant.motion.mechanics import Mechanics
 from haploop.plant.motion.transition import StepFlow
 from haploop.protocol.ticks import Timebase
@@ -39,9 +39,10 @@ def plainly_added(resolved) -> tuple[np.ndarray, np.ndarray]:
 
 def relative_residual(resolved, x: np.ndarray, v: np.ndarray) -> float:
     """What the plant's books leave unexplained of a motion without commands, over the energy moved."""
-    books = PlantBooks(resolved, Timebase.from_clock(resolved["clock"], resolved["duration"]))
+    time = Timebase.from_clock(resolved["clock"], resolved["duration"])
+    books = OneMassBooks(resolved, time)
     columns = {"x": x, "v": v, "force": np.zeros(len(x))}
-    moved = Displacement(dx := np.diff(x), by_tick(dx, books._n))
+    moved = Displacement(dx := by_interval(np.diff(x), time.steps_per_tick), sum_steps(dx))
     changes = np.stack(list(books.increments(0, columns, moved, [])))
     moved = books.stored_J(columns) + np.abs(changes).sum() / 2
     signs = np.array([1.0 if name == "hand_work" else -1.0 for name in books.names])

@@ -9,12 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from haploop.logger.books.books import Books
-from haploop.logger.books.buffers import ControllerTape, PlantTape
+from haploop.logger.books.books import Books, moved_J, residual_J
+from haploop.logger.books.buffers import ControllerBuffer, PlantBuffer
 from haploop.logger.log.channels import Channels
 from haploop.logger.log.columns import motion_columns
 from haploop.logger.summary import summary
-from haploop.logger.verdict.window import Window
+from haploop.logger.verdict.verdict import RunMeasures
+from haploop.logger.verdict.window import CONTROLLER_COLUMNS, Window
 from haploop.plant.counters import TALLIES
 from haploop.protocol.ticks import Timebase
 
@@ -38,7 +39,8 @@ class Logger:
         self._scene, self.time, self._channels = scene, time, channels
         self.books = Books(scene, time)
         resolution = scene.get("encoder", {}).get("resolution", 0.0)
-        self.window = Window(time.plant_rate, time.steps_per_tick, resolution)
+        self.window = Window(time, resolution)
+        self._measures: RunMeasures | None = None
         self._into_wall = 0.0
         self._accounts: dict[int, dict[str, Any]] = {}
         self._events: list[tuple[int, dict[str, Any]]] = []
@@ -48,37 +50,37 @@ class Logger:
         self.tick = self._first_tick = 0
 
     def count_wall_time(self) -> None:
-        """Count it from now on."""
+        """Counts wall time from now on."""
         self._began = wall_clock.perf_counter()
 
     def start(self, plant: dict[str, float], history: list[Block]) -> None:
-        """Begin with the plant's state and, when joining a run, the controller's last blocks."""
+        """Begins with the plant's state and, when joining a run, the controller's last blocks."""
         self.count_wall_time()
         known = history[-1]["from_tick"] + history[-1]["ticks"] if history else 0
         self.tick = self._first_tick = max(int(plant["tick"]), known)
-        self._plant = PlantTape(self.time.steps_per_tick, int(plant["tick"]))
-        self._controller = ControllerTape(history[0]["from_tick"] if history else self.tick)
+        self._plant = PlantBuffer(self.time.steps_per_tick, int(plant["tick"]))
+        self._controller = ControllerBuffer(history[0]["from_tick"] if history else self.tick)
         for block in history:
-            self._controller.add(block)
+            self._controller.add_block(block)
             self._note_accounts(block)
         self._end_state = {name: np.array([plant[name]]) for name in ("x", "v", "force")}
         self._started = False
 
     def plant_block(self, block: Block) -> None:
-        """Take a block of the plant."""
+        """Takes a block of the plant."""
         self._plant.add(block)
         self._book_common()
 
     def controller_block(self, block: Block) -> None:
-        """Take a block of the controller."""
-        self._controller.add(block)
+        """Takes a block of the controller."""
+        self._controller.add_block(block)
         self._note_accounts(block)
         if self._channels:
             self._channels.controller(block)
         self._book_common()
 
     def event(self, tick: int, event: dict[str, Any]) -> None:
-        """Take note of something that changes the run at ``tick``; it is logged once the books get there."""
+        """Takes note of something that changes the run at ``tick``; it is logged once the books get there."""
         self._events.append((tick, event))
         self._events.sort(key=lambda item: item[0])
         self._log_events()
@@ -96,7 +98,7 @@ class Logger:
             self._accounts.setdefault(element["book"], dict(element))["to_tick"] = end
 
     def _book_common(self) -> None:
-        """Book the intervals of which both sides are known, block by block of the controller.
+        """Books the intervals of which both sides are known, block by block of the controller.
 
         Cutting only where elements change makes the log's columns independent of how telemetry was cut. One that joins
         begins where no command is in effect any more that is older than what it knows of the controller.
@@ -108,7 +110,7 @@ class Logger:
 
     @np.errstate(over="ignore", invalid="ignore")  # where a force is no finite number, its books are none either
     def _book(self, end: int) -> None:
-        """Book the intervals before ``end``."""
+        """Books the intervals before ``end``."""
         if self._plant.tick < self.tick:
             self._plant.take(self.tick)
         plant = self._plant.take(end)
@@ -119,8 +121,9 @@ class Logger:
             self._started = True
         rows = self.books.book(self.tick, plant, self._controller, self._into_wall)
         at = self.tick - self._controller.first
-        columns = {name: column[at : at + end - self.tick] for name, column in self._controller.columns.items()}
-        self.window.add(x, force[:-1], columns)
+        columns = {name: self._controller.columns[name][at : at + end - self.tick, None] for name in CONTROLLER_COLUMNS}
+        self.window.add(x[:, None], force[:-1, None], columns)
+        self._measures = None
         self._digest.update(np.stack([x[1:], v[1:]], axis=1).tobytes())
         for name in plant.keys() & TALLIES:
             self._counted[name] = self._counted.get(name, 0) + int(plant[name][-1] - plant[name][0])
@@ -149,7 +152,7 @@ class Logger:
         return f"{kind}{f'-{same.index(int(book)) + 1}' if same[0] != int(book) else ''}{dot}{side}"
 
     def summary(self, ended: str, why: str, diverged: str | None, telemetry_gaps: int) -> dict[str, Any]:
-        """The summary of what was booked so far.
+        """Returns the summary of what was booked so far.
 
         Args:
             ended: "done", "stopped", "diverged" or "failed".
@@ -170,10 +173,10 @@ class Logger:
             **self._counts(telemetry_gaps),
             "trajectory_sha256": self._digest.hexdigest(),
         }
-        return summary(self._scene, ran, self.window.shown(), self.books, self._covered_accounts(), diverged)
+        return summary(self._scene, ran, self._measured(), self.books.state, self._covered_accounts(), diverged)
 
     def _counts(self, telemetry_gaps: int) -> dict[str, dict[str, int]]:
-        """What was lost, and what the scene's effects counted, by entry of the summary."""
+        """Counts of what was lost, and of the scene's effects, by entry of the summary."""
         entries = {"lost": {"commands_dropped": 0, "commands_lost": 0, "telemetry_gaps": telemetry_gaps}}
         for name in TALLIES:
             if name in self._counted:
@@ -190,23 +193,29 @@ class Logger:
             if f"{a['book']}.true" in booked
         ]
 
+    def _measured(self) -> RunMeasures:
+        """The measures of the run as it stands, worked out once."""
+        if self._measures is None:
+            (self._measures,) = self.window.measures()
+        return self._measures
+
     def status(self) -> dict[str, Any]:
-        """Where the run is and how it looks, for progress lines and viewers."""
+        """Returns where the run is and its measures, for progress lines and viewers."""
         if not self.tick - self._first_tick:
             return {}
-        shown = self.window.shown()
-        verdict, figures = shown.verdict(None), shown.seen.figures
+        measures = self._measured()
+        verdict, figures = measures.verdict(None), measures.window.figures
         return {
             "t_s": self.tick / self.time.control_rate,
             "verdict": verdict.word,
             "verdict_rule": verdict.rule,
             "oscillation_m": figures["oscillation_m"],
             "displayed_stiffness_N_m": figures["displayed_stiffness_N_m"],
-            "residual_J": self.books.residual_J,
-            "moved_J": self.books.moved_J,
+            "residual_J": residual_J(self.books.state),
+            "moved_J": moved_J(self.books.state),
         }
 
     def end(self) -> None:
-        """Write the end state; call once, when no more blocks come."""
+        """Writes the end state; call once, when no more blocks come."""
         if self._channels:
             self._channels.plant_end(self.tick, self._end_state)

@@ -13,7 +13,7 @@ import zmq
 
 from haploop.logger.books.buffers import TelemetryGap
 from haploop.logger.log.error import LogError
-from haploop.logger.session import Keeper, open_keeper
+from haploop.logger.session import LogSession, open_session
 from haploop.protocol.clock_client import REPORT_MS, Aborted, ClockClient
 from haploop.protocol.node import NodeError, run_node
 from haploop.protocol.processes import PROCESSES
@@ -55,8 +55,8 @@ class LoggerNode:
             self._context, {role: endpoints[role]["telemetry"] for role in ("plant", "controller")}
         )
         time = Timebase(**welcome["timebase"])
-        self.keeper: Keeper = open_keeper(welcome["scene"], time, out, welcome["context"].get("attachments", {}))
-        self.keeper.logger.booked = self._publish_energy
+        self.session: LogSession = open_session(welcome["scene"], time, out, welcome["context"].get("attachments", {}))
+        self.session.logger.booked = self._publish_energy
         states: dict[str, dict[str, Any]] = {}
         early = []
         while len(states) < 2:
@@ -71,11 +71,11 @@ class LoggerNode:
             self._client.poll()
             if (why := self._leave()) is not None:
                 raise Aborted(why or "The logger left before anything came.")
-        self.keeper.logger.start(states["plant"], states["controller"]["history"])
+        self.session.logger.start(states["plant"], states["controller"]["history"])
         self._started = True
         for role, frame in early:
             self._take(role, frame)
-        self._client.ready(self.keeper.logger.tick)
+        self._client.ready(self.session.logger.tick)
 
     def run(self) -> tuple[int, dict[str, Any]]:
         """Take blocks until plant and controller have ended, then close the log and write the summary."""
@@ -86,21 +86,21 @@ class LoggerNode:
         while len(self._ended) < 2 or not self._client.last:  # the last grant brings the last events
             idle = not poller.poll(REPORT_MS)
             if not self._client.until:  # the run has not begun
-                self.keeper.logger.count_wall_time()
+                self.session.logger.count_wall_time()
             if idle:
-                self._client.waiting(self.keeper.logger.tick, "plant")
+                self._client.waiting(self.session.logger.tick, "plant")
             self._drain()
             self._client.poll()
             self._note_events()
             if (why := self._leave()) is not None:
                 return self.finish(why)
-            tick = self.keeper.logger.tick
+            tick = self.session.logger.tick
             if tick != reported or (idle and tick != self._judged_at):
                 self._report(tick)
                 reported = tick
             if self._publisher:
                 self._publisher.serve()
-            self.keeper.flush_when_due()
+            self.session.flush_when_due()
         return self.finish("")
 
     def _drain(self) -> None:
@@ -109,22 +109,22 @@ class LoggerNode:
 
     def _take(self, role: str, frame: Any) -> None:
         if frame.name == "PLANT_BLOCK":
-            self.keeper.logger.plant_block(frame.as_dict())
+            self.session.logger.plant_block(frame.as_dict())
         elif frame.name == "CONTROLLER_BLOCK":
-            self.keeper.logger.controller_block(frame.as_dict())
+            self.session.logger.controller_block(frame.as_dict())
         elif frame.name == "END":
             tick, reason, trouble = frame.fields
             self._ended[role] = tick, reason, trouble
 
     def _note_events(self) -> None:
         for tick, event in self._client.take_events():
-            self.keeper.logger.event(tick, event)
+            self.session.logger.event(tick, event)
 
     def _report(self, tick: int) -> None:
         now = wall_clock.monotonic()
         if now >= self._status_due:
             self._status_due = now + _STATUS_S
-            self._status, self._judged_at = self.keeper.logger.status(), tick
+            self._status, self._judged_at = self.session.logger.status(), tick
             self._client.progress(tick, self._status)
         else:
             self._client.progress(tick)
@@ -132,7 +132,7 @@ class LoggerNode:
     def _publish_energy(self, first: int, books: dict[str, np.ndarray]) -> None:
         if self._publisher and self._publisher.subscribed:
             columns = {name: column.tobytes() for name, column in books.items()}
-            self._publisher.publish("ENERGY_BLOCK", first, self.keeper.logger.tick - first, columns, self._status)
+            self._publisher.publish("ENERGY_BLOCK", first, self.session.logger.tick - first, columns, self._status)
 
     def save(self, failed: str) -> dict[str, Any] | None:
         """Finish because of what ``failed`` says, with the blocks that are here already; None if nothing has begun."""
@@ -148,10 +148,10 @@ class LoggerNode:
         self._streams.close()
         reason = next((reason for _, reason, _ in self._ended.values() if reason), None)
         trouble = next((trouble for _, _, trouble in self._ended.values() if trouble), None)
-        result = self.keeper.close(failed, reason, trouble, sum(self._streams.gaps.values()))
+        result = self.session.close(failed, reason, trouble, sum(self._streams.gaps.values()))
         if self._publisher:
-            self._publisher.publish("END", self.keeper.logger.tick, reason or "", trouble)
-        return self.keeper.logger.tick, result
+            self._publisher.publish("END", self.session.logger.tick, reason or "", trouble)
+        return self.session.logger.tick, result
 
 
 def work(client: ClockClient, context: zmq.Context[zmq.Socket[bytes]], directory: Path) -> tuple[int, dict[str, Any]]:
@@ -159,7 +159,7 @@ def work(client: ClockClient, context: zmq.Context[zmq.Socket[bytes]], directory
     node: LoggerNode
 
     def state() -> tuple[int, dict[str, Any]]:
-        return node.keeper.logger.tick, node.keeper.logger.status()
+        return node.session.logger.tick, node.session.logger.status()
 
     publisher = Publisher(context, ROLE, state)
     address = bind(publisher.socket, directory, PROCESSES[ROLE].binds["telemetry"])

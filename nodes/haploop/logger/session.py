@@ -19,7 +19,7 @@ LOG, SUMMARY = "log.mcap", "summary.json"
 _FLUSH_S = 0.4
 
 
-class Keeper:
+class LogSession:
     """Keeps a logger's log flushed and closes everything in order."""
 
     def __init__(self, logger: Logger, log: Log | MemoryLog | None, out: Path | None) -> None:
@@ -59,13 +59,13 @@ class Keeper:
         return summaries.finite(result)
 
 
-def open_keeper(
+def open_session(
     scene: dict[str, Any],
     time: Timebase,
     out: Path | None,
     attachments: dict[str, str],
     memory: MemoryLog | None = None,
-) -> Keeper:
+) -> LogSession:
     """A logger with its files in directory ``out``, or without any when None.
 
     Args:
@@ -79,7 +79,7 @@ def open_keeper(
     detail = scene["run"]["log"]
     log = None if detail == "none" else Log(out / LOG) if out else memory
     if log is None:
-        return Keeper(Logger(scene, time, None), None, out)
+        return LogSession(Logger(scene, time, None), None, out)
     for name, text in attachments.items():
         log.attach(name, "text/plain", text.encode())
-    return Keeper(Logger(scene, time, Channels(log, time, every_step=detail == "steps")), log, out)
+    return LogSession(Logger(scene, time, Channels(log, time, every_step=detail == "steps")), log, out)

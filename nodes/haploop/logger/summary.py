@@ -1,4 +1,4 @@
-"""The summary of a run: what came of it, in the figures people and programs ask for."""
+"""The summary of a run: the figures people and programs ask for."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from haploop.logger.books.books import Books
-from haploop.logger.verdict.verdict import Shown
+from haploop.logger.books.books import BooksState, moved_J, residual_J, stored_J, total_J
+from haploop.logger.verdict.verdict import RunMeasures
 
 # Entries that differ between two runs of the same scene.
 OF_THE_MACHINE = ("wall_s", "real_time_factor", "versions")
@@ -19,18 +19,21 @@ _FINITE = (str, int, bool)
 
 
 def versions() -> dict[str, str]:
-    """What the run was made with."""
+    """Returns the versions of what the run was made with."""
     packages = {name: version(name) for name in ("haploop", "numpy", "pyzmq", "msgpack")}
     return {**packages, "python": platform.python_version()}
 
 
-def energy(books: Books, accounts: list[dict[str, Any]], has_wall: bool) -> dict[str, Any]:
-    """The ``energy`` entry: every book as it stands at the end of the run; arrays where the books are of many loops.
+def energy(books: BooksState, accounts: list[dict[str, Any]], has_wall: bool) -> dict[str, Any]:
+    """Returns the ``energy`` entry: every book as it stands; arrays over the members where the books are of a batch.
 
     The wall's leak is its true book less what an ideal spring would hold now (``ideal_J``, against the start), but for
     what changes of the wall in contact put into that spring (``changes_J``).
     """
-    total = books.total
+
+    def total(name: str) -> Any:
+        return total_J(books, name)
+
     elements = []
     for account in accounts:
         pair = {"sampled_J": total(f"{account['book']}.sampled"), "true_J": total(f"{account['book']}.true")}
@@ -48,52 +51,52 @@ def energy(books: Books, accounts: list[dict[str, Any]], has_wall: bool) -> dict
         "wall": wall,
         "hand_work_J": total("hand_work"),
         **plants,
-        "stored_J": books.stored_J,
-        "moved_J": books.moved_J,
-        "residual_J": books.residual_J,
+        "stored_J": stored_J(books),
+        "moved_J": moved_J(books),
+        "residual_J": residual_J(books),
     }
 
 
 def summary(
     scene: dict[str, Any],
     ran: dict[str, Any],
-    shown: Shown,
-    books: Books,
+    measures: RunMeasures,
+    books: BooksState,
     accounts: list[dict[str, Any]],
     diverged: str | None,
 ) -> dict[str, Any]:
-    """All entries of ``summary.json``.
+    """Returns all entries of ``summary.json``.
 
     Args:
         scene: the resolved scene.
-        ran: entries that say what ran: duration_s, ticks, steps, wall_s, ended, final, lost and what else was counted,
+        ran: entries on the run: duration_s, ticks, steps, wall_s, ended, final, lost and what else was counted,
             trajectory_sha256.
-        shown, books: as they stand at the end.
+        measures, books: as they stand at the end.
         accounts: every element's book: kind, parameters, from_tick, to_tick.
         diverged: why the plant ended by itself, or None.
     """
     wall_s = ran.pop("wall_s")
     factor = ran["duration_s"] / wall_s if wall_s else 0.0
     ran |= {"versions": versions(), "wall_s": wall_s, "real_time_factor": factor}
-    return outcome(scene, ran, shown, diverged) | {"energy": energy(books, accounts, "wall" in scene)}
+    return outcome(scene, ran, measures, diverged) | {"energy": energy(books, accounts, "wall" in scene)}
 
 
-def outcome(scene: dict[str, Any], ran: dict[str, Any], shown: Shown, diverged: str | None) -> dict[str, Any]:
-    """What came of a run but for its energies: ``ran``, the verdict and what it rests on."""
-    verdict = shown.verdict(diverged)
+def outcome(scene: dict[str, Any], ran: dict[str, Any], measures: RunMeasures, diverged: str | None) -> dict[str, Any]:
+    """Returns the entries of the summary but for energies: ``ran``, the verdict and what it rests on."""
+    verdict = measures.verdict(diverged)
     return {
         "title": scene["title"],
         "seed": scene["seed"],
         **ran,
         "verdict": verdict.word,
         "verdict_rule": verdict.rule,
-        "extremes": shown.extremes._asdict(),
-        "window": shown.seen.figures,
+        "extremes": measures.extremes._asdict(),
+        "window": measures.window.figures,
     }
 
 
 def write(summary: dict[str, Any], path: Path) -> None:
-    """Write as JSON, in one piece: a reader never sees half a file. Numbers that are not finite become null."""
+    """Writes as JSON, in one piece: a reader never sees half a file. Numbers that are not finite become null."""
     temporary = path.with_suffix(".part")
     try:
         temporary.write_text(json.dumps(finite(summary), indent=2) + "\n", encoding="utf-8")
@@ -105,7 +108,7 @@ def write(summary: dict[str, Any], path: Path) -> None:
 
 
 def finite(value: Any) -> Any:
-    """The same structure with None for every number that JSON cannot hold."""
+    """Returns the same structure with None for every number that JSON cannot hold."""
     if isinstance(value, float):
         return value if math.isfinite(value) else None
     if isinstance(value, dict):

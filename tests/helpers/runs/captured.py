@@ -9,7 +9,7 @@ import numpy as np
 
 from haploop.launch.runs.in_process import Loop, scene_events
 from haploop.logger.logger import Block, Logger
-from haploop.logger.session import Keeper
+from haploop.logger.session import LogSession
 from haploop.protocol.ticks import Timebase
 from helpers.scenes.least import KINDS
 
@@ -60,7 +60,7 @@ def run(scene: dict[str, Any]) -> Captured:
     """Run a resolved scene in this process and keep everything."""
     time = Timebase.from_clock(scene["clock"], scene["duration"])
     logger = _CapturingLogger(scene, time)
-    loop = Loop(scene, time, KINDS, Keeper(logger, None, None))
+    loop = Loop(scene, time, KINDS, LogSession(logger, None, None))
     loop.schedule(sorted(scene_events(scene, time), key=lambda event: event[0]))
     while loop.block():
         pass

@@ -49,4 +49,4 @@ def books_along(scene: dict[str, Any], x: np.ndarray) -> tuple[dict[str, np.ndar
     logger.plant_block({"from_tick": 0, "ticks": time.ticks, "columns": blocks})
     for block in controller.recorder.take():
         logger.controller_block(block)
-    return latest, energy(logger.books, [], "wall" in scene)
+    return latest, energy(logger.books.state, [], "wall" in scene)

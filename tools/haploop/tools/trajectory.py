@@ -10,7 +10,7 @@ import numpy as np
 from haploop.controller.dissipation import registry
 from haploop.launch.runs.in_process import Loop, scene_events
 from haploop.logger.logger import Logger
-from haploop.logger.session import Keeper
+from haploop.logger.session import LogSession
 from haploop.protocol.ticks import Timebase
 
 
@@ -51,7 +51,7 @@ def trajectory(scene: dict[str, Any]) -> Trajectory:
     """
     time = Timebase.from_clock(scene["clock"], scene["duration"])
     logger = _Remembering(scene, time)
-    loop = Loop(scene, time, registry(), Keeper(logger, None, None))
+    loop = Loop(scene, time, registry(), LogSession(logger, None, None))
     loop.schedule(scene_events(scene, time))
     while loop.block():
         pass

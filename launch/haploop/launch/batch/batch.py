@@ -14,7 +14,7 @@ from haploop.controller.controller_batch import ControllerArray
 from haploop.launch.batch.object_state import keep
 from haploop.launch.batch.stacking import stacked
 from haploop.launch.runs.in_process import scene_events
-from haploop.logger.batch import End, LoggerArray
+from haploop.logger.batch import BatchLogger, MemberEnd
 from haploop.plant.choose_batch import motion_of
 from haploop.plant.line.delay import line_of
 from haploop.plant.plant import beyond
@@ -65,7 +65,7 @@ class LoopArray:
         self._quantise, self._sensor = position_sensor(scene, time), accelerometer(scene, time)
         self._feels = accelerometer_is_used(scene)
         self._controller = ControllerArray(scene, time, kinds)
-        self._logger = LoggerArray(scene, time, energy=energy, trajectories=trajectories)
+        self._logger = BatchLogger(scene, time, len(scenes), energy=energy, trajectories=trajectories)
         self._take = self._motion.take_record if energy or trajectories else self._motion.take_positions
         self._in_flight: deque[Any] = deque(maxlen=time.lookahead_ticks + 1)
         self._limit_m, self._usual_buffer = scene["diverged_beyond"], np.getbufsize()
@@ -146,11 +146,11 @@ class LoopArray:
         x, v, sound = self._motion.x, self._motion.v, np.isfinite(self._motion.x)
         for force in self._in_flight:
             sound = sound & np.isfinite(force)
-        ends: dict[int, End] = {}
+        ends: dict[int, MemberEnd] = {}
         for place, reason in zip(places.tolist(), reasons or [None] * len(places), strict=True):
             if sound[place]:
                 index = int(self._scene_of[place])
-                ends[index] = End(place, self._scenes[index], float(x[place]), float(v[place]), reason)
+                ends[index] = MemberEnd(place, self._scenes[index], float(x[place]), float(v[place]), reason)
         counted = dict.fromkeys(self._line.tallies, getattr(self._line, "saturated", 0))
         if self._sensor:
             counted |= dict.fromkeys(self._sensor.tallies, getattr(self._sensor, "clipped", 0))

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 from haploop.controller.controller import Controller
 from haploop.controller.dissipation import ElementError
 from haploop.launch.errors import RunFailed
-from haploop.logger.session import Keeper, open_keeper
+from haploop.logger.session import LogSession, open_session
 from haploop.plant.plant import Plant
 from haploop.protocol.block_length import BlockLength
 from haploop.protocol.changes import Event, is_change, refusal
@@ -50,14 +50,14 @@ def run_in_process(
         LogError: the log could not be written.
     """
     time = Timebase.from_clock(scene["clock"], scene["duration"])
-    keeper = open_keeper(scene, time, out, attachments or {}, memory)
-    loop = Loop(scene, time, kinds, keeper)
+    session = open_session(scene, time, out, attachments or {}, memory)
+    loop = Loop(scene, time, kinds, session)
     loop.schedule(scene_events(scene, time) if events is None else events)
     try:
         while loop.block():
-            keeper.flush_when_due()
+            session.flush_when_due()
             if on_progress:
-                on_progress(keeper.logger.status())
+                on_progress(session.logger.status())
             if stop():
                 loop.end_here()
     except ElementError as error:
@@ -73,19 +73,21 @@ def scene_events(scene: dict[str, Any], time: Timebase) -> list[tuple[int, Event
 
 
 class Loop:
-    """Plant, controller and keeper of one scene, advanced block by block."""
+    """Plant, controller and session of one scene, advanced block by block."""
 
-    def __init__(self, scene: dict[str, Any], time: Timebase, kinds: dict[str, type[Element]], keeper: Keeper) -> None:
+    def __init__(
+        self, scene: dict[str, Any], time: Timebase, kinds: dict[str, type[Element]], session: LogSession
+    ) -> None:
         self._plant, self._controller = Plant(scene, time), Controller(scene, time, kinds)
-        self._keeper = keeper
+        self._session = session
         self._end = time.ticks
         self._block = BlockLength(scene["run"]["block_ticks"])
-        keeper.logger.start(self._plant.state(), [])
+        session.logger.start(self._plant.state(), [])
 
     def schedule(self, events: list[tuple[int, Event]]) -> None:
         """Have events take effect at their ticks."""
         for tick, event in events:
-            self._keeper.logger.event(tick, event)
+            self._session.logger.event(tick, event)
             if is_change(event):
                 self._controller.schedule(tick, event)
                 self._plant.schedule(tick, event)
@@ -103,7 +105,7 @@ class Loop:
 
     def _hand_over(self) -> None:
         first, ticks, columns = self._plant.take_block()
-        logger = self._keeper.logger
+        logger = self._session.logger
         if ticks:
             logger.plant_block({"from_tick": first, "ticks": ticks, "columns": columns})
         for block in self._controller.recorder.take():
@@ -127,4 +129,4 @@ class Loop:
         return self._close("")
 
     def _close(self, failed: str) -> dict[str, Any]:
-        return self._keeper.close(failed, self._plant.stop_reason, self._controller.recorder.trouble, 0)
+        return self._session.close(failed, self._plant.stop_reason, self._controller.recorder.trouble, 0)

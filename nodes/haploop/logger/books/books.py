@@ -1,24 +1,59 @@
-"""The energy books of a run: plant, wall and every element, sampled and true, and the residual they leave."""
+"""The energy books of a run or a batch: plant, wall, every element, sampled and true, and the residual."""
 
 from __future__ import annotations
 
-import copy
 import math
-from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from haploop.logger.books.buffers import ControllerTape
-from haploop.logger.books.one_mass import plant_books
-from haploop.logger.books.sums import RunningSums, by_tick, by_tick_of_loops, sum_in_order, sum_rows
-from haploop.logger.books.wall_leak import CAUSES, held_J, ideal_and_undelayed
-from haploop.logger.books.work import Displacement, in_effect, sampled_flows, wall_at
+from haploop.logger.books.one_mass import OneMassBooks
+from haploop.logger.books.sums import (
+    Sums,
+    add_columns,
+    add_columns_of_batch,
+    no_sums,
+    sum_in_order,
+    sum_rows,
+    sum_steps,
+    with_rows,
+)
+from haploop.logger.books.work import (
+    CAUSES,
+    Displacement,
+    by_interval,
+    displacement,
+    held_J,
+    ideal_springs,
+    in_effect,
+    sampled_work,
+)
 from haploop.protocol.arrays import first_row
 from haploop.protocol.ticks import Timebase
 
 if TYPE_CHECKING:
-    from haploop.logger.books.buffers_batch import ControllerTapeArray
+    from haploop.logger.books.buffers import ControllerBuffer
+    from haploop.logger.books.chain import ChainBooks
+
+
+class BooksState(NamedTuple):
+    """All that books remember; in a batch, arrays have the members as their last axis.
+
+    Attributes:
+        names: the books, in the order of the rows of the sums: the plant's, the causes of the wall's leak where there
+            is a wall, ``moved``, then ``<b>.sampled`` and ``<b>.true`` for the wall and for every element's book b.
+        sums: how they stand, J.
+        stored_at_start_J: kinetic and spring energy at the start.
+        wall: position in m and stiffness in N/m where the last intervals were booked; None before the first.
+        wall_changes_J: what changes of the wall in contact would have put into an ideal spring.
+    """
+
+    names: tuple[str, ...]
+    sums: Sums
+    stored_at_start_J: Any
+    wall: tuple[Any, Any] | None
+    wall_changes_J: Any
 
 
 class Books:
@@ -30,95 +65,94 @@ class Books:
     its place: half of the sum of all changes in magnitude (each joule leaves one book and enters another), and the
     energy stored at the start.
 
+    Args:
+        scene: a resolved scene, or the stacked one of a batch.
+        time: its integers.
+        members: of the batch; None for one run, whose arrays have no axis for members.
+
     Attributes:
-        names: all books, in the order of the rows of ``book``: the plant's, the causes of the wall's leak where there
-            is a wall, ``moved``, then ``<b>.sampled`` and ``<b>.true`` for the wall and for every element's book b.
-        wall_changes_J: what changes of the wall in contact would have put into an ideal spring.
+        plant: the books of the plant.
+        state: all that changes from block to block.
     """
 
-    def __init__(self, scene: dict[str, Any], time: Timebase) -> None:
+    def __init__(self, scene: dict[str, Any], time: Timebase, members: int | None = None) -> None:
         self._time = time
-        self._plant = plant_books(scene, time)
+        self.plant = plant_books(scene, time, members)
         self._has_wall = "wall" in scene
-        self._by_tick = by_tick_of_loops if "loops" in scene else by_tick
-        self._sums = RunningSums(*([scene["loops"]] if "loops" in scene else []))
-        self._rows: dict[str, int] = {}
-        self._balance: list[tuple[float, int]] = []
-        self._open([*self._plant.names, *(CAUSES if self._has_wall else ()), "moved"])
-        self._accounts = 0
-        self._open_account("wall")
-        self._stored_at_start_J = 0.0
-        self._wall: tuple[Any, Any] | None = None
-        self.wall_changes_J: Any = 0.0
+        names = [*self.plant.names, *(CAUSES if self._has_wall else ()), "moved"]
+        self.state = BooksState((), no_sums(0, members), 0.0, None, 0.0)
+        self._open([*names, *_of_account("wall")])
 
     @property
-    def names(self) -> list[str]:
-        return list(self._rows)
+    def names(self) -> tuple[str, ...]:
+        """All books, in the order of the rows of the sums."""
+        return self.state.names
 
-    def _open(self, names: list[str]) -> None:
-        for name in names:
-            if sign := self._sign(name):
-                self._balance.append((sign, len(self._rows)))
-            self._rows[name] = len(self._rows)
-        self._sums.grow(len(self._rows))
-
-    def _open_account(self, name: str) -> None:
-        self._open([f"{name}.sampled", f"{name}.true"])
+    def _open(self, names: Sequence[str]) -> None:
+        all_names = (*self.state.names, *names)
+        self.state = self.state._replace(names=all_names, sums=with_rows(self.state.sums, len(all_names)))
 
     def start(self, plant: dict[str, np.ndarray]) -> None:
-        """Begin with the plant in the first state of its first columns."""
-        self._stored_at_start_J = self._plant.stored_J(plant)
+        """Begins with the plant in the first state of its first columns."""
+        self.state = self.state._replace(stored_at_start_J=self.plant.stored_J(plant))
 
-    def book(self, tick: int, plant: dict[str, np.ndarray], tape: ControllerTape, into_wall: float) -> np.ndarray:
-        """Book the intervals from ``tick`` on that ``plant`` covers.
+    def book(self, tick: int, plant: dict[str, np.ndarray], buffer: ControllerBuffer, into_wall: float) -> np.ndarray:
+        """Books the intervals of one run from ``tick`` on that ``plant`` covers.
 
         Args:
             tick: first interval; in all of them the wall is the same.
-            plant: telemetry columns of the plant with ticks * n + 1 rows.
-            tape: controller rows of these ticks and of all commands in effect in them.
+            plant: telemetry columns of the plant, shape (ticks * n + 1,) each.
+            buffer: controller rows of these ticks and of all commands in effect in them.
             into_wall: direction into the wall, +1 or -1.
 
         Returns:
-            The books as they stand at each of these ticks, shape (rows, ticks), rows as ``names``: true and plant
-            books up to the tick's step, sampled books with the tick's sample.
+            The books as they stand at each of these ticks, shape (rows, ticks), rows as ``names``: true and plant books
+            up to the tick's step, sampled books with the tick's sample.
         """
-        added, sampled_rows = self._added(tick, plant, tape, into_wall)
-        totals = self._sums.add(added)
+        added, sampled = self._added(tick, plant, buffer, into_wall)
+        sums, totals = add_columns(self.state.sums, added)
+        self.state = self.state._replace(sums=sums)
         at_ticks = totals[:, :-1]
-        at_ticks[sampled_rows] = totals[sampled_rows, 1:]
+        at_ticks[sampled] = totals[sampled, 1:]
         return at_ticks
 
-    def book_loops(self, tick: int, plant: dict[str, np.ndarray], tape: ControllerTapeArray, into_wall: float) -> None:
-        """The same for many loops at once; all columns have a last axis for them."""
-        self._sums.add_of_loops(self._added(tick, plant, tape, into_wall)[0])
+    def book_batch(self, tick: int, plant: dict[str, np.ndarray], buffer: ControllerBuffer, into_wall: float) -> None:
+        """Books the intervals of a batch from ``tick`` on; columns have a last axis for the members."""
+        added, _ = self._added(tick, plant, buffer, into_wall)
+        self.state = self.state._replace(sums=add_columns_of_batch(self.state.sums, added))
 
     def _added(
-        self, tick: int, plant: dict[str, np.ndarray], tape: ControllerTape | ControllerTapeArray, into_wall: float
+        self, tick: int, plant: dict[str, np.ndarray], buffer: ControllerBuffer, into_wall: float
     ) -> tuple[np.ndarray, list[int]]:
         """What each tick adds to each book, shape (rows, ticks), and which rows are of sampled books."""
-        ticks = (len(plant["x"]) - 1) // self._time.steps_per_tick
-        forces = {"wall": tape.wall_forces()}
-        for book, force in tape.forces_opened_before(tick + ticks).items():
+        n = self._time.steps_per_tick
+        ticks = (len(plant["x"]) - 1) // n
+        forces = {"wall": buffer.columns["wall"]}
+        for book, force in buffer.forces_opened_before(tick + ticks).items():
             forces[str(book)] = force
-            if f"{book}.true" not in self._rows:
-                self._open_account(str(book))
+            if f"{book}.true" not in self.state.names:
+                self._open(_of_account(str(book)))
+        row_of = {name: row for row, name in enumerate(self.state.names)}
 
-        added = np.zeros((len(self._rows), ticks, *self._sums.sums.shape[1:]))
-        moved = added[self._rows["moved"]]
-        displacement = Displacement.of(plant, self._time.steps_per_tick, self._by_tick)
-        for name, flow in self._exchanged(tick, plant, displacement, tape.first, forces):
-            added[self._rows[name]] = flow
-            moved += np.abs(flow)
+        added = np.zeros((len(row_of), ticks, *plant["x"].shape[1:]))
+        moved, magnitude = added[row_of["moved"]], np.empty(added.shape[1:])
+        way = displacement(plant["x"], plant["x_low"], n, sum_steps)
+        for name, flow in self._exchanged(tick, plant, way, buffer.first, forces):
+            added[row_of[name]] = flow
+            moved += np.abs(flow, out=magnitude)
         moved *= 0.5
         if self._has_wall:
-            at_ticks, computed = plant["x"][:: self._time.steps_per_tick], forces["wall"][tick - tape.first :][:ticks]
-            self._note_wall(first_row(at_ticks), wall := wall_at(tick, tape), into_wall)
-            springs = ideal_and_undelayed(at_ticks, displacement.by_tick, computed, wall, into_wall)
+            at_ticks, computed = plant["x"][::n], forces["wall"][tick - buffer.first :][:ticks]
+            self._note_wall(first_row(at_ticks), wall := _wall_at(tick, buffer), into_wall)
+            springs = ideal_springs(at_ticks, way.by_tick, computed, wall, into_wall)
             for name, flow in zip(CAUSES, springs, strict=True):
-                added[self._rows[name]] = flow
-        sampled_rows = [self._rows[f"{account}.sampled"] for account in forces]
-        added[sampled_rows] = sampled_flows(tick, ticks, tape, list(forces.values()))
-        return added, sampled_rows
+                added[row_of[name]] = flow
+        sampled = [row_of[f"{account}.sampled"] for account in forces]
+        first = max(tick - 1, buffer.first)  # nothing is sampled at the first tick there is
+        x_m, known = buffer.rows("x", first, tick + ticks), slice(first - buffer.first, tick + ticks - 1 - buffer.first)
+        for row, force in zip(sampled, forces.values(), strict=True):
+            added[row, ticks + 1 - len(x_m) :] = sampled_work(x_m, force[known])
+        return added, sampled
 
     def _exchanged(
         self,
@@ -132,74 +166,96 @@ class Books:
         n = self._time.steps_per_tick
         command = plant["command"][:-1].astype(np.intp)
         commanded = (in_effect(force, command, first_command) for force in forces.values())
-        of_plant = self._plant.increments(tick * n, plant, moved, commanded, self._by_tick)
-        yield from zip(self._plant.names, of_plant, strict=True)
+        yield from zip(self.plant.names, self.plant.increments(tick * n, plant, moved, commanded), strict=True)
         ways, late = [(0, moved.by_tick)], self._time.delay_steps % n
         if late:
-            ways = [(first, self._by_tick(moved.by_step, n, first, end)) for first, end in ((0, late), (late, n))]
-        by_interval = command.reshape(-1, n)
-        changes = by_interval[:, 1:] != by_interval[:, :-1]
+            ways = [(first, sum_steps(moved.by_step, first, end)) for first, end in ((0, late), (late, n))]
+        by_tick = command.reshape(-1, n)
+        changes = by_tick[:, 1:] != by_tick[:, :-1]
         if late:
             changes[:, late - 1] = False
         uneven = changes.any(axis=1)
         for account, force in forces.items():
             flow = sum_rows(-in_effect(force, command[first::n], first_command) * way for first, way in ways)
             if uneven.any():
-                by_step = -in_effect(force, command, first_command) * moved.by_step
-                flow[uneven] = self._by_tick(by_step, n)[uneven]
+                by_step = -by_interval(in_effect(force, command, first_command), n) * moved.by_step
+                flow[uneven] = sum_steps(by_step)[uneven]
             yield f"{account}.true", flow
 
     def _note_wall(self, x: Any, wall: tuple[Any, Any], into_wall: float) -> None:
-        if self._wall and not np.array_equal(wall, self._wall):
-            change_J = held_J(x, wall, into_wall) - held_J(x, self._wall, into_wall)
-            self.wall_changes_J = self.wall_changes_J + change_J
-        self._wall = wall
-
-    def of_loops(self, loops: np.ndarray) -> Books:
-        """The books of some loops, whose places are ``loops``, out of those of many."""
-        some = copy.copy(self)
-        some._sums = self._sums.of_loops(loops)
-        some._stored_at_start_J, some.wall_changes_J = (
-            np.broadcast_to(value, self._sums.sums.shape[1:])[loops]
-            for value in (self._stored_at_start_J, self.wall_changes_J)
-        )
-        return some
-
-    def total(self, name: str) -> Any:
-        """One book as it stands, J; shape (loops,) where there are many."""
-        row = self._rows[name]
-        total = self._sums.sums[row] + self._sums.errors[row]
-        return total if total.shape else float(total)
-
-    @property
-    def stored_J(self) -> Any:
-        """Kinetic and spring energy now."""
-        return self._stored_at_start_J + self.total("kinetic") + self.total("spring")
-
-    @property
-    def moved_J(self) -> Any:
-        """Energy that changed its place so far."""
-        return abs(self._stored_at_start_J) + self.total("moved")
-
-    @property
-    def residual_J(self) -> Any:
-        """What the books leave unexplained, in magnitude."""
-        parts = [sign * of[row] for sign, row in self._balance for of in (self._sums.sums, self._sums.errors)]
-        columns = np.array(parts)
-        if columns.ndim == 1:
-            return _magnitude(columns.tolist())
-        return np.array([_magnitude(of_one) for of_one in columns.T.tolist()])
+        before = self.state.wall
+        if before and not np.array_equal(wall, before):
+            change_J = held_J(x, wall, into_wall) - held_J(x, before, into_wall)
+            self.state = self.state._replace(wall_changes_J=self.state.wall_changes_J + change_J)
+        self.state = self.state._replace(wall=wall)
 
     def residuals(self, at_ticks: np.ndarray) -> np.ndarray:
-        """The signed residual at each tick from the rows that ``book`` returned, shape (ticks,)."""
-        signs, rows = zip(*self._balance, strict=True)
+        """Returns the signed residual at each tick from the rows that ``book`` returned, shape (ticks,), J."""
+        signs, rows = zip(*balance(self.state.names), strict=True)
         return sum_in_order((at_ticks[list(rows)] * np.array(signs)[:, None]).T)
 
-    def _sign(self, name: str) -> float:
-        """How a book counts in the balance, 0 where it is no part of it."""
-        if name == "hand_work":
-            return 1.0
-        return -1.0 if name in self._plant.names or name.endswith(".true") else 0.0
+
+def plant_books(scene: dict[str, Any], time: Timebase, members: int | None = None) -> OneMassBooks | ChainBooks:
+    """Returns the books of a scene's plant: one mass under held forces, or a chain of bodies.
+
+    Their integrals are those of the exact motion from each recorded state on. Where ``clock.integrator`` is another,
+    what its next state has more or less is in no book: the residual is then the energy error of the method.
+    """
+    bandwidth = "bandwidth" in scene.get("actuator", {})
+    if bandwidth or "grip" in scene.get("hand", {}) or scene.keys() & {"friction", "transmission"}:
+        from haploop.logger.books.chain import ChainBooks
+
+        return ChainBooks(scene, time, members)
+    return OneMassBooks(scene, time, members)
+
+
+def _of_account(name: str) -> tuple[str, str]:
+    return f"{name}.sampled", f"{name}.true"
+
+
+def _wall_at(tick: int, buffer: ControllerBuffer) -> tuple[Any, Any]:
+    """Position of the wall at a tick, m, and its stiffness, N/m."""
+    position, stiffness = (first_row(buffer.rows(f"wall_{of}", tick, tick + 1)) for of in ("position", "stiffness"))
+    return position, stiffness
+
+
+# How books count in the balance: what the hand gave less what is elsewhere.
+_SIGNS = {"hand_work": 1.0, "kinetic": -1.0, "spring": -1.0, "actuator": -1.0}
+
+
+def balance_sign(name: str) -> float:
+    """Returns how a book counts in the balance, 0 where it is no part of it."""
+    return _SIGNS.get(name, -1.0 if name.endswith(("_heat", ".true")) else 0.0)
+
+
+def balance(names: Sequence[str]) -> list[tuple[float, int]]:
+    """Returns the sign and the row of every book of the balance."""
+    return [(sign, row) for row, name in enumerate(names) if (sign := balance_sign(name))]
+
+
+def total_J(state: BooksState, name: str) -> Any:
+    """Returns one book as it stands, J; shape (batch,) for a batch."""
+    row = state.names.index(name)
+    total = state.sums.sums[row] + state.sums.errors[row]
+    return total if total.shape else float(total)
+
+
+def stored_J(state: BooksState) -> Any:
+    """Returns kinetic and spring energy now, J."""
+    return state.stored_at_start_J + total_J(state, "kinetic") + total_J(state, "spring")
+
+
+def moved_J(state: BooksState) -> Any:
+    """Returns the energy that changed its place so far, J."""
+    return abs(state.stored_at_start_J) + total_J(state, "moved")
+
+
+def residual_J(state: BooksState) -> Any:
+    """Returns what the books leave unexplained, in magnitude, J; infinite where a book is no finite number."""
+    parts = np.array([sign * of[row] for sign, row in balance(state.names) for of in state.sums])
+    if parts.ndim == 1:
+        return _magnitude(parts.tolist())
+    return np.array([_magnitude(of_member) for of_member in parts.T.tolist()])
 
 
 def _magnitude(parts: list[float]) -> float:

@@ -6,12 +6,12 @@ from typing import Any
 
 import numpy as np
 
-# Columns of pieces of steps have a row for each piece, in order; ``pieces.step`` says of which step it is.
-PIECES = "pieces."
+from haploop.logger.books.segments import PIECES
+from haploop.protocol.trees import tree_select
 
 
 def as_float64(data: bytes) -> np.ndarray:
-    """A telemetry column as an array."""
+    """Returns a telemetry column as an array."""
     return np.frombuffer(data, "<f8")
 
 
@@ -19,8 +19,12 @@ class TelemetryGap(RuntimeError):
     """A block that does not follow the one before it."""
 
 
-class PlantTape:
-    """Plant states at every step from ``tick`` on; the last state is the start of what comes next."""
+class PlantBuffer:
+    """Plant states at every step from ``tick`` on; the last state is the start of what comes next.
+
+    Attributes:
+        tick, end: first tick kept, and the tick after the last.
+    """
 
     def __init__(self, steps_per_tick: int, tick: int) -> None:
         self._steps = steps_per_tick
@@ -28,7 +32,7 @@ class PlantTape:
         self._columns: dict[str, np.ndarray] = {}
 
     def add(self, block: dict[str, Any]) -> None:
-        """Append a block.
+        """Appends a block.
 
         Raises:
             TelemetryGap: it does not start where the last one ended.
@@ -46,15 +50,15 @@ class PlantTape:
         self.end += block["ticks"]
 
     def first_tick_from(self, command: int) -> int:
-        """The first tick from which on every command in effect is ``command`` or later; or none has come yet."""
+        """Returns the first tick from which on every command in effect is ``command`` or later; or none has come."""
         in_effect = self._columns["command"][:-1]
         older = np.flatnonzero((in_effect >= 0) & (in_effect < command))
         return self.tick + (int(older[-1]) // self._steps + 1 if len(older) else 0)
 
     def take(self, tick: int) -> dict[str, np.ndarray]:
-        """States of the intervals before ``tick``, end state included; what comes from there on stays."""
+        """Returns the states of the intervals before ``tick``, end state included; what comes from there on stays."""
         rows = (tick - self.tick) * self._steps
-        pieces = int(np.searchsorted(self._columns.get(PIECES + "step", ()), tick * self._steps))
+        pieces = int(np.searchsorted(self._columns.get(f"{PIECES}step", ()), tick * self._steps))
         cuts = {name: (pieces, pieces) if name.startswith(PIECES) else (rows + 1, rows) for name in self._columns}
         taken = {name: column[: cuts[name][0]] for name, column in self._columns.items()}
         self._columns = {name: column[cuts[name][1] :] for name, column in self._columns.items()}
@@ -62,25 +66,26 @@ class PlantTape:
         return taken
 
 
-class ControllerTape:
+class ControllerBuffer:
     """Controller rows by tick, with every book's force and the wall as it stood.
 
     Attributes:
         first: tick of the first row kept.
         end: tick after the last row.
-        columns: x, v, a, wall, total, in_contact, wall_position, wall_stiffness; shape (end - first,) each.
+        columns: x, v, a, wall, total, in_contact, wall_position, wall_stiffness, of which a batch has those that are
+            read; shape (end - first,), or (end - first, batch), each.
         forces: force of every book that has acted within these ticks, 0 where it was not at work.
     """
 
-    def __init__(self, tick: int) -> None:
+    def __init__(self, tick: int = 0) -> None:
         self.first = self.end = tick
         self.columns: dict[str, np.ndarray] = {}
         self.forces: dict[int, np.ndarray] = {}
         self._opened: dict[int, int] = {}
         self._part_ends: list[int] = []
 
-    def add(self, block: dict[str, Any]) -> None:
-        """Append a block.
+    def add_block(self, block: dict[str, Any]) -> None:
+        """Appends a block of one run.
 
         Raises:
             TelemetryGap: it does not start where the last one ended.
@@ -89,42 +94,52 @@ class ControllerTape:
             raise TelemetryGap(
                 f"A controller block from tick {self.end} was expected, but one from {block['from_tick']} came."
             )
-        new = {name: as_float64(data) for name, data in block["columns"].items()}
-        books = {e["book"]: new.pop(f"dissipation.{i}") for i, e in enumerate(block["elements"])}
-        ticks, kept = block["ticks"], self.end - self.first
+        columns = {name: as_float64(data) for name, data in block["columns"].items()}
+        forces = {e["book"]: columns.pop(f"dissipation.{i}") for i, e in enumerate(block["elements"])}
         for name in ("position", "stiffness"):
-            new[f"wall_{name}"] = np.full(ticks, block["wall"][name])
-        self.columns = {name: np.concatenate([self.columns.get(name, new[name][:0]), new[name]]) for name in new}
-        self.forces = {
-            book: np.concatenate([self.forces.get(book, np.zeros(kept)), books.get(book, np.zeros(ticks))])
-            for book in sorted(self.forces.keys() | books.keys())
-        }
+            columns[f"wall_{name}"] = np.full(block["ticks"], block["wall"][name])
+        self.add(columns, forces)
         for element in block["elements"]:
             self._opened[element["book"]] = element["from_tick"]
-        self.end += ticks
         self._part_ends.append(self.end)
 
+    def add(self, columns: dict[str, np.ndarray], forces: dict[int, np.ndarray]) -> None:
+        """Appends the next ticks.
+
+        Args:
+            columns: shape (ticks,), or (ticks, batch), each.
+            forces: of every book at work, likewise.
+        """
+        kept, none = self.end - self.first, np.zeros_like(columns["x"])
+        self.columns = {name: np.concatenate([self.columns.get(name, new[:0]), new]) for name, new in columns.items()}
+        before = np.zeros((kept, *none.shape[1:]))
+        self.forces = {
+            book: np.concatenate([self.forces.get(book, before), forces.get(book, none)])
+            for book in sorted(self.forces.keys() | forces.keys())
+        }
+        self.end += len(none)
+
     def part_end(self, tick: int) -> int:
-        """Where the block that holds ``tick`` ends: up to there the elements are the same."""
+        """Returns where the block that holds ``tick`` ends: up to there the elements are the same."""
         return next((end for end in self._part_ends if end > tick), self.end)
 
     def rows(self, name: str, first: int, end: int) -> np.ndarray:
-        """A column at the ticks first ... end - 1."""
+        """Returns a column at the ticks first ... end - 1."""
         return self.columns[name][first - self.first : end - self.first]
 
-    def wall_forces(self) -> np.ndarray:
-        """Force of the wall at all ticks kept."""
-        return self.columns["wall"]
-
     def forces_opened_before(self, tick: int) -> dict[int, np.ndarray]:
-        """``forces`` without the books that open at ``tick`` or later."""
-        return {book: force for book, force in self.forces.items() if self._opened[book] < tick}
+        """Returns ``forces`` without the books that open at ``tick`` or later."""
+        return {book: force for book, force in self.forces.items() if self._opened.get(book, tick - 1) < tick}
 
     def forget_before(self, tick: int, command: int) -> None:
-        """Drop the rows before the last tick and before ``command``, in effect then, and books with no force left."""
+        """Drops the rows before the last tick and before ``command``, in effect then, and books with no force left."""
         drop = max(0, min(tick - 1, command) - self.first)
         if drop:
             self.columns = {name: column[drop:] for name, column in self.columns.items()}
             self.forces = {book: force[drop:] for book, force in self.forces.items() if force[drop:].any()}
             self.first += drop
         self._part_ends = [end for end in self._part_ends if end > tick]
+
+    def select(self, kept: np.ndarray) -> None:
+        """Drops the members of a batch for which ``kept``, shape (members,), is false."""
+        self.columns, self.forces = tree_select((self.columns, self.forces), kept)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from functools import reduce
 from itertools import accumulate
@@ -11,11 +11,11 @@ from typing import Any
 
 import numpy as np
 
-from haploop.logger.books.chain_integrals import ChainForms, ChainFormsArray
+from haploop.logger.books.chain_integrals import ChainForms
 from haploop.logger.books.one_mass import beyond_limits
-from haploop.logger.books.segments import Columns, Moves
-from haploop.logger.books.sums import by_tick, sum_rows
-from haploop.logger.books.work import Displacement
+from haploop.logger.books.segments import Columns, Segments, end_to_end
+from haploop.logger.books.sums import sum_rows, sum_steps
+from haploop.logger.books.work import Displacement, by_interval
 from haploop.plant.chain.chain import Chain
 from haploop.plant.motion.hand_force import hand_force
 from haploop.protocol.arrays import first_row
@@ -36,83 +36,108 @@ class ChainBooks:
     true books of wall and elements are those of the forces they commanded. Integrals are forms of the rates at the
     start (``ChainIntegrals``). Nothing is taken from the balance, so that its residual is a proof.
 
+    In a batch with friction all members have the same chain. Their steps are booked as if they were whole; members in
+    which friction cut a step are then booked anew, one after the other as if they were one run.
+
     Attributes:
-        names: the books, in the order of the rows of ``increments``; heats end in ``_heat``.
-        forms: the integrals.
-        least_friction_J: the least heat of friction in any step so far, 0 or above but for rounding.
+        names: the books, in the order in which ``increments`` yields them; heats end in ``_heat``.
     """
 
-    def __init__(self, scene: dict[str, Any], time: Timebase) -> None:
+    def __init__(self, scene: dict[str, Any], time: Timebase, members: int | None = None) -> None:
         # A sensor takes no energy.
         self._chain = replace(Chain.of(scene), sensor=None)
         self._n, self._tau = time.steps_per_tick, hand_force(scene, time.plant_rate)
-        self.forms: Any = (ChainFormsArray if "loops" in scene else ChainForms)(self._chain, time.step_s)
         self._rubs, self._is_limited = "friction" in scene, "actuator" in scene
-        self._heats = [name for name in self.forms.names if name.endswith("_heat")]
+        self._forms = ChainForms(self._chain, time.step_s, of_batch=members is not None and not self._rubs)
+        self._heats = [name for name in self._forms.names if name.endswith("_heat")]
         friction, actuator = ["friction_heat"] * self._rubs, ["actuator"] * self._is_limited
         self.names = ["hand_work", *self._heats, *friction, "kinetic", "spring", *actuator]
-        self.least_friction_J = 0.0
 
     def increments(
-        self,
-        first_step: int,
-        columns: Columns,
-        moved: Displacement,
-        commanded: Iterable[np.ndarray],
-        summed: Callable[[Any, int], Any] = by_tick,
+        self, first_step: int, columns: dict[str, Any], moved: Displacement, commanded: Iterable[np.ndarray]
     ) -> Iterator[np.ndarray]:
-        """What each interval adds to each book, J; see ``PlantBooks.increments``."""
-        for book in self.by_step(first_step, columns, moved.by_step, commanded):
-            yield summed(book, self._n)
+        """Yields what each interval adds to each book, J; see ``OneMassBooks.increments``.
+
+        ``columns`` of a batch with friction have ``pieces``: the pieces of every member that has any, by its place.
+        """
+        dx = moved.by_step.reshape(-1, *moved.by_step.shape[2:])
+        for book in self.by_step(first_step, columns, dx, commanded):
+            yield sum_steps(by_interval(book, self._n))
 
     def by_step(
-        self, first_step: int, columns: Columns, dx: np.ndarray, commanded: Iterable[np.ndarray]
+        self, first_step: int, columns: dict[str, Any], dx: np.ndarray, commanded: Iterable[np.ndarray]
     ) -> Iterator[np.ndarray]:
-        """What each step adds to each book, J, shape (steps,) each."""
-        tau, force = self._tau.at_steps(first_step, first_step + len(dx) + 1), columns["force"][:-1]
-        return self.of_moves(Moves.of(self._chain, first_step, columns), tau, force, dx, commanded)
+        """Yields what each step adds to each book, J, shape (steps,), or (steps, batch), each."""
+        tau = self._tau.at_steps(first_step, first_step + len(dx) + 1)
+        if not columns.get("pieces"):
+            return self._of_run(first_step, columns, tau, dx, commanded)
+        return self._with_cut_steps(first_step, columns, tau, dx, list(commanded))
 
-    def of_moves(
-        self, moves: Moves, tau: np.ndarray, force: np.ndarray, dx: np.ndarray, commanded: Iterable[np.ndarray]
+    def _with_cut_steps(
+        self, first_step: int, columns: dict[str, Any], tau: np.ndarray, dx: np.ndarray, commanded: list[np.ndarray]
     ) -> Iterator[np.ndarray]:
-        """The same from the moves that the steps consist of, tau at the steps and at the end, and the force held."""
-        steps = len(dx)
-        rise = np.diff(tau, axis=0)[moves.step]
-        start = tau[:-1][moves.step] + rise * moves.elapsed
-        found = self.forms.integrals(moves, force[moves.step], start, rise)
-        integrals = dict(zip(self.forms.names, found, strict=True))
-        risen = np.ldexp(rise, -moves.level)
-        way = sum_rows(moves.ways)
-        books = {"hand_work": (start + risen / 2.0) * way + risen * integrals["swing"]}
+        pieces = dict[int, list[Columns]]()
+        for place, cut in columns["pieces"]:
+            pieces.setdefault(place, []).append(cut)
+        places, rows, shape = sorted(pieces), len(dx) + 1, columns["x"].shape
+        whole = {name: column for name, column in columns.items() if np.shape(column) == shape}
+        in_order = [
+            (at, {name: np.concatenate([cut[name] for cut in pieces[place]]) for name in pieces[place][0]})
+            for at, place in enumerate(places)
+        ]
+
+        def joined(values: np.ndarray) -> np.ndarray:
+            """A column of all steps, of those members one after the other; 0 where there is no step between them."""
+            column = np.zeros((len(places), rows))
+            column[:, : len(values)] = np.broadcast_to(values, (len(values), shape[1]))[:, places].T
+            return column.ravel()
+
+        cut = end_to_end(first_step, {name: column[:, places] for name, column in whole.items()}, in_order)
+        forces = [joined(force)[:-1] for force in commanded]
+        anew = self._of_run(0, cut, joined(tau), joined(dx)[:-1], forces)
+        for flow, of_cut in zip(self._of_run(first_step, whole, tau, dx, commanded), anew, strict=True):
+            flow = np.array(flow)
+            flow[:, places] = np.append(of_cut, 0.0).reshape(-1, rows).T[:-1]
+            yield flow
+
+    def _of_run(
+        self, first_step: int, columns: Columns, tau: np.ndarray, dx: np.ndarray, commanded: Iterable[np.ndarray]
+    ) -> Iterator[np.ndarray]:
+        """What each step adds to each book, where all steps of a batch are whole; tau at the steps and at the end."""
+        segments, force, steps = Segments.from_columns(self._chain, first_step, columns), columns["force"][:-1], len(dx)
+        rise = np.diff(tau, axis=0)[segments.step]
+        start = tau[:-1][segments.step] + rise * segments.elapsed
+        found = self._forms.integrals(segments, force[segments.step], start, rise)
+        integrals = dict(zip(self._forms.names, found, strict=True))
+        risen = np.ldexp(rise, -segments.level)
+        way = sum_rows(segments.displacements)
+        books = {"hand_work": (start + risen / 2.0) * way + risen * integrals["lag_integral"]}
         books |= {name: integrals[name] for name in self._heats}
         if self._rubs:
-            books["friction_heat"] = -moves.friction * moves.ways[0] + moves.snap
-        books |= {"kinetic": self._kinetic(moves), "spring": self._spring(moves, way)}
-        for name, book in books.items():
-            by_step = _by_step(book, moves.step, steps)
-            if name == "friction_heat":
-                self.least_friction_J = min(self.least_friction_J, float(by_step.min(initial=0.0)))
-            yield by_step
+            books["friction_heat"] = -segments.friction * segments.displacements[0] + segments.stop_loss
+        books |= {"kinetic": self._kinetic(segments), "spring": self._spring(segments, way)}
+        for book in books.values():
+            yield _by_step(book, segments.step, steps)
         if self._is_limited:
-            lag = _by_step(integrals.get("lag", np.zeros(way.shape)), moves.step, steps)
+            lag = _by_step(integrals.get("lag", np.zeros(way.shape)), segments.step, steps)
             yield lag + beyond_limits(commanded, force) * dx
 
-    def _kinetic(self, moves: Moves) -> np.ndarray:
+    def _kinetic(self, segments: Segments) -> np.ndarray:
         n, masses = self._chain.count, self._chain.masses_kg
-        v, dv = np.cumsum(moves.states[n : 2 * n], axis=0), np.cumsum(moves.changes, axis=0)
+        v, dv = np.cumsum(segments.states[n : 2 * n], axis=0), np.cumsum(segments.changes, axis=0)
         return sum_rows([masses[body] * dv[body] * (v[body] + dv[body] / 2.0) for body in range(n)])
 
-    def _spring(self, moves: Moves, way: np.ndarray) -> np.ndarray:
+    def _spring(self, segments: Segments, way: np.ndarray) -> np.ndarray:
         """Change of energy in the hand's spring, whose end moves by ``way``, and in the links."""
-        (stiffness, rest), lengths = self._chain.spring, moves.states[: self._chain.count]
-        beyond = sum_rows([lengths[0] - rest, *lengths[1:], *moves.lows])
+        (stiffness, rest), lengths = self._chain.spring, segments.states[: self._chain.count]
+        beyond = sum_rows([lengths[0] - rest, *lengths[1:], *segments.lows])
         parts = [stiffness * way * (beyond + way / 2.0)]
-        for link, stretch, change in zip(self._chain.links, lengths[1:], moves.ways[1:], strict=True):
+        for link, stretch, change in zip(self._chain.links, lengths[1:], segments.displacements[1:], strict=True):
             parts.append(link.stiffness * change * (stretch + change / 2.0))
         return sum_rows(parts)
 
     def stored_J(self, columns: Columns) -> Any:
-        """Kinetic and spring energy in the first state of some telemetry."""
+        """Returns kinetic and spring energy in the first state of some telemetry, J."""
         chain, n = self._chain, self._chain.count
         state = [first_row(columns[name]) for name in chain.states]
         (stiffness, rest), velocities = chain.spring, accumulate(state[n : 2 * n])
@@ -123,5 +148,5 @@ class ChainBooks:
 
 
 def _by_step(values: np.ndarray, step: np.ndarray, steps: int) -> np.ndarray:
-    """The sum over the moves of each step, in their order."""
+    """The sum over the segments of each step, in their order."""
     return values if len(values) == steps == step[-1] + 1 else np.bincount(step, values, steps)

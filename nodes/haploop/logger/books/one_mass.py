@@ -1,44 +1,82 @@
-"""The plant's own energy books, by exact integrals over each step."""
+"""The energy books of one mass under held forces, by exact integrals over each plant step."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterable, Iterator, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from haploop.logger.books.sums import by_tick, sum_rows
-from haploop.logger.books.work import Displacement
+from haploop.logger.books.sums import sum_rows, sum_steps
+from haploop.logger.books.work import Displacement, SumSteps, by_interval
 from haploop.plant.motion.hand_force import hand_force
 from haploop.plant.motion.mechanics import Mechanics
 from haploop.plant.motion.transition import motion_integrals, natural_rate
 from haploop.protocol.arrays import each, first_row
 from haploop.protocol.ticks import Timebase
 
-if TYPE_CHECKING:
-    from haploop.logger.books.chain import ChainBooks
 
+class OneMassParams(NamedTuple):
+    """The numbers of the books of one mass; in a batch, arrays have the members as their last axis.
 
-def plant_books(scene: dict[str, Any], time: Timebase) -> PlantBooks | ChainBooks:
-    """The books of a scene's plant: one mass under held forces, or a chain of bodies.
-
-    Their integrals are those of the exact motion from each recorded state on. Where ``clock.integrator`` is another,
-    what its next state has more or less is in no book: the residual is then the energy error of the method.
+    Attributes:
+        mechanics: mass, dampers, spring.
+        square: factors of ``sum_squares`` that give integral v^2 dt over a step, shape (6,).
+        lag: factors of v, m a and tau' h that give integral (t - h/2)/h v dt over a step, shape (3,).
     """
-    bandwidth = "bandwidth" in scene.get("actuator", {})
-    if bandwidth or "grip" in scene.get("hand", {}) or scene.keys() & {"friction", "transmission"}:
-        if "friction" in scene and "loops" in scene:
-            from haploop.logger.books.friction_batch import FrictionBooksArray
 
-            return FrictionBooksArray(scene, time)
-        from haploop.logger.books.chain import ChainBooks
-
-        return ChainBooks(scene, time)
-    return PlantBooks(scene, time)
+    mechanics: Mechanics
+    square: np.ndarray
+    lag: np.ndarray
 
 
-class PlantBooks:
-    """What every interval moves between the hand's muscles, the dampers, the mass and the spring.
+class Steps(NamedTuple):
+    """The beginning of every plant step, and what acts in it; shape (ticks, steps), or (ticks, steps, batch).
+
+    Attributes:
+        x, v: position in m and velocity in m/s.
+        force: held, N.
+        tau: of the hand's muscles, N.
+        rise: by which tau rises over the step, N; None where it rises over none.
+        dx: displacement over the step, m.
+    """
+
+    x: Any
+    v: Any
+    force: Any
+    tau: Any
+    rise: Any
+    dx: Any
+
+
+class Ticks(NamedTuple):
+    """The device at the ticks: x in m and v in m/s at each and at the end; ``dx``, displacement between them, m."""
+
+    x: Any
+    v: Any
+    dx: Any
+
+
+def one_mass_params(scene: dict[str, Any], time: Timebase, members: int | None = None) -> OneMassParams:
+    """Returns the parameters of a resolved scene, or of a batch of so many in a stacked scene."""
+    m, step_s = Mechanics.of(scene), time.step_s
+
+    def forms(mass: float, damping: float, stiffness: float) -> tuple[np.ndarray, np.ndarray]:
+        square, lag = motion_integrals(mass, damping, stiffness, step_s)
+        push = 1.0 / (np.longdouble(mass) * natural_rate(mass, stiffness, step_s))
+        scales = np.array([1.0, push, push])
+        return as_squares(square * np.outer(scales, scales)).astype(float), (lag * scales).astype(float)
+
+    square, lag = each(forms, m.mass_kg, m.damping, m.stiffness)
+    if members is not None:
+        square, lag = square.reshape(6, -1), lag.reshape(3, -1)
+    return OneMassParams(m, square, lag)
+
+
+def increments(
+    params: OneMassParams, steps: Steps, ticks: Ticks, commanded: Iterable[Any] | None, summed: SumSteps
+) -> Iterator[Any]:
+    """Yields what every interval moves between the hand's muscles, the dampers, the mass and the spring, J.
 
     Over a plant step from x, v to x+, v+ with dx = x+ - x, under the held force f and tau linear in time:
         work of tau        integral tau v dt = (tau + tau+)/2 dx + (tau+ - tau) integral (t - h/2)/h v dt
@@ -50,90 +88,52 @@ class PlantBooks:
     Nothing is taken from the balance, so that its residual is a proof. Forces times dx (and not times v) keep the
     books of a device at rest under load at rest too.
 
-    Attributes:
-        names: the books, in the order of the rows of ``increments``; heats end in ``_heat``.
+    Args:
+        params: of the books.
+        steps, ticks: of the same intervals.
+        commanded: the force of the wall and of every element over each step, N; None without an actuator's limits.
+        summed: sums steps over their interval.
+
+    Yields:
+        Shape (ticks,), or (ticks, batch), each, ordered as ``OneMassBooks.names``.
     """
-
-    def __init__(self, scene: dict[str, Any], time: Timebase) -> None:
-        m = self.mechanics = Mechanics.of(scene)
-        self._n, self._tau, step_s = time.steps_per_tick, hand_force(scene, time.plant_rate), time.step_s
-
-        def forms(mass: float, damping: float, stiffness: float) -> tuple[np.ndarray, np.ndarray]:
-            square, lag = motion_integrals(mass, damping, stiffness, step_s)
-            push = 1.0 / (np.longdouble(mass) * natural_rate(mass, stiffness, step_s))
-            scales = np.array([1.0, push, push])
-            return as_squares(square * np.outer(scales, scales)).astype(float), (lag * scales).astype(float)
-
-        self._square, self._lag = each(forms, m.mass_kg, m.damping, m.stiffness)
-        if "loops" in scene:
-            self._square, self._lag = self._square.reshape(6, -1), self._lag.reshape(3, -1)
-        self._is_limited = "actuator" in scene
-        self.names = ["hand_work", *(f"{name}_heat" for name in m.dampers), "kinetic", "spring"]
-        self.names += ["actuator"] * self._is_limited
-
-    def increments(
-        self,
-        first_step: int,
-        columns: dict[str, np.ndarray],
-        moved: Displacement,
-        commanded: Iterable[np.ndarray],
-        summed: Callable[[Any, int], Any] = by_tick,
-    ) -> Iterator[np.ndarray]:
-        """What each interval adds to each book, J; of many loops at once where the arrays have a last axis for them.
-
-        Args:
-            first_step: step of the first state.
-            columns: plant telemetry of whole intervals, the end state included; shape (ticks * n + 1,) each.
-            moved: displacement over these steps and intervals.
-            commanded: the force of the wall and of every element over each step, shape (ticks * n,) each.
-            summed: how steps are summed over their tick.
-
-        Yields:
-            Shape (ticks,) each, ordered as ``names``.
-        """
-        n, m, x, v, force = self._n, self.mechanics, columns["x"], columns["v"], columns["force"][:-1]
-        tau = self._tau.at_steps(first_step, first_step + len(x))
-        rise = tau[1:] - tau[:-1]
-        net = force + tau[:-1] - m.damping * v[:-1] - m.stiffness * (x[:-1] - m.rest_m)
-        rates = [v[:-1], net, rise] if self._rises(rise) else [v[:-1], net]
-        yield summed(self._hand_work(tau, rise, moved.by_step, rates), n)
-        square = summed(sum_squares(self._square, rates), n)
-        for damping in m.dampers.values():
-            yield damping * square
-        at_ticks, way = x[::n], moved.by_tick
-        yield self._kinetic(v[::n])
-        yield m.stiffness * way * (at_ticks[:-1] - m.rest_m + way * 0.5)
-        if self._is_limited:
-            yield summed(beyond_limits(commanded, force) * moved.by_step, n)
-
-    def _kinetic(self, v: np.ndarray) -> np.ndarray:
-        start, change = v[:-1], v[1:] - v[:-1]
-        return self.mechanics.mass_kg * change * (start + change * 0.5)
-
-    @staticmethod
-    def _rises(rise: np.ndarray) -> bool:
-        """Whether the force of the hand changes over any step."""
-        return bool(rise.any())
-
-    def _hand_work(self, tau: np.ndarray, rise: np.ndarray, dx: np.ndarray, rates: Sequence[np.ndarray]) -> np.ndarray:
-        if len(rates) < 3:
-            return tau[:-1] * dx
-        of_v, of_net, of_rise = self._lag
-        lagged = rise * of_v * rates[0] + rise * of_net * rates[1] + rise * of_rise * rise
-        return (tau[:-1] + rise * 0.5) * dx + lagged
-
-    def stored_J(self, columns: dict[str, np.ndarray]) -> Any:
-        """Kinetic and spring energy in the first state of some telemetry."""
-        return self.mechanics.kinetic_J(first_row(columns["v"])) + self.mechanics.spring_J(first_row(columns["x"]))
+    m, (x, v, force, tau, rise, dx) = params.mechanics, steps
+    net = force + tau
+    net -= m.damping * v
+    beyond = x - m.rest_m
+    beyond *= m.stiffness
+    net -= beyond
+    rates = [v, net] if rise is None else [v, net, rise]
+    yield summed(_hand_work(params.lag, tau, rise, dx, rates))
+    square = summed(sum_squares(params.square, rates))
+    for damping in m.dampers.values():
+        yield damping * square
+    start, change = ticks.v[:-1], ticks.v[1:] - ticks.v[:-1]
+    yield m.mass_kg * change * (start + change * 0.5)
+    yield m.stiffness * ticks.dx * (ticks.x[:-1] - m.rest_m + ticks.dx * 0.5)
+    if commanded is not None:
+        yield summed(beyond_limits(commanded, force) * dx)
 
 
-def beyond_limits(commanded: Iterable[np.ndarray], force: np.ndarray) -> np.ndarray:
-    """What was commanded in all beyond the force that the actuator holds, N."""
+def _hand_work(lag: np.ndarray, tau: Any, rise: Any, dx: Any, rates: Sequence[Any]) -> Any:
+    if rise is None:
+        return tau * dx
+    of_v, of_net, of_rise = lag
+    lagged = rise * of_v * rates[0]
+    lagged += rise * of_net * rates[1]
+    lagged += rise * of_rise * rise
+    work = (tau + rise * 0.5) * dx
+    work += lagged
+    return work
+
+
+def beyond_limits(commanded: Iterable[Any], force: Any) -> Any:
+    """Returns what was commanded in all beyond the force that the actuator holds, N."""
     return sum_rows(commanded) - force
 
 
 def as_squares(form: np.ndarray) -> np.ndarray:
-    """What makes w' Q w of three entries a sum of squares a (w0 + b w1 + c w2)^2 + d (w1 + e w2)^2 + f w2^2.
+    """Returns what makes w' Q w of three entries a sum of squares a (w0 + b w1 + c w2)^2 + d (w1 + e w2)^2 + f w2^2.
 
     Q is positive: no term is below 0, and where they are far apart none cancels another.
 
@@ -147,11 +147,66 @@ def as_squares(form: np.ndarray) -> np.ndarray:
     return np.array([a, b, c, d, e, form[2, 2] - a * c * c - e * rest])
 
 
-def sum_squares(factors: np.ndarray, w: Sequence[np.ndarray]) -> np.ndarray:
-    """The sum of ``as_squares`` at every step; an entry of w that is left out at its end is 0."""
+def sum_squares(factors: np.ndarray, w: Sequence[Any]) -> Any:
+    """Returns the sum of ``as_squares`` at every step; an entry of w that is left out at its end is 0."""
     a, b, c, d, e, f = factors
-    first, second = w[0] + b * w[1], w[1]
-    if len(w) < 3:
-        return a * (first * first) + d * (second * second)
-    first, second = first + c * w[2], second + e * w[2]
-    return a * (first * first) + d * (second * second) + f * w[2] * w[2]
+    first, second = b * w[1], w[1]
+    first += w[0]
+    if len(w) > 2:
+        first += c * w[2]
+        second = second + e * w[2]
+    first *= first
+    first *= a
+    total = second * second
+    total *= d
+    total += first
+    if len(w) > 2:
+        total += f * w[2] * w[2]
+    return total
+
+
+class OneMassBooks:
+    """The books of one mass.
+
+    Attributes:
+        names: the books, in the order in which ``increments`` yields them; heats end in ``_heat``.
+        params: their numbers.
+        is_limited: whether an actuator has limits.
+    """
+
+    def __init__(self, scene: dict[str, Any], time: Timebase, members: int | None = None) -> None:
+        self.params = one_mass_params(scene, time, members)
+        self._n, self._tau = time.steps_per_tick, hand_force(scene, time.plant_rate)
+        self.is_limited = "actuator" in scene
+        dampers = self.params.mechanics.dampers
+        self.names = ["hand_work", *(f"{name}_heat" for name in dampers), "kinetic", "spring"]
+        self.names += ["actuator"] * self.is_limited
+
+    def increments(
+        self, first_step: int, columns: dict[str, np.ndarray], moved: Displacement, commanded: Iterable[np.ndarray]
+    ) -> Iterator[np.ndarray]:
+        """Yields what each interval adds to each book, J.
+
+        Args:
+            first_step: step of the first state.
+            columns: plant telemetry of whole intervals, the end state included; shape (ticks * n + 1,), or
+                (ticks * n + 1, batch), each.
+            moved: displacement over these steps and intervals.
+            commanded: the force of the wall and of every element over each step, shape (ticks * n,), or with a batch.
+
+        Yields:
+            Shape (ticks,), or (ticks, batch), each, ordered as ``names``.
+        """
+        n, x, v = self._n, columns["x"], columns["v"]
+        tau = self._tau.at_steps(first_step, first_step + len(x))
+        rise = tau[1:] - tau[:-1]
+        starts = (by_interval(column[:-1], n) for column in (x, v, columns["force"], tau))
+        steps = Steps(*starts, rise=by_interval(rise, n) if rise.any() else None, dx=moved.by_step)
+        ticks = Ticks(x[::n], v[::n], moved.by_tick)
+        limited = (by_interval(force, n) for force in commanded) if self.is_limited else None
+        return increments(self.params, steps, ticks, limited, sum_steps)
+
+    def stored_J(self, columns: dict[str, np.ndarray]) -> Any:
+        """Returns kinetic and spring energy in the first state of some telemetry, J."""
+        m = self.params.mechanics
+        return m.kinetic_J(first_row(columns["v"])) + m.spring_J(first_row(columns["x"]))

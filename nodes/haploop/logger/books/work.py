@@ -1,40 +1,54 @@
-"""What ticks and plant steps hand to the books: how far the device went, and under which forces."""
+"""Work of held forces over ticks and plant steps: displacements, forces in effect, and where a wall leaks."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, NamedTuple
+from collections.abc import Callable, Iterator
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from haploop.protocol.arrays import first_row
+from haploop.protocol.arrays import each
 
-if TYPE_CHECKING:
-    from haploop.logger.books.buffers import ControllerTape
-    from haploop.logger.books.buffers_batch import ControllerTapeArray
+# Sums a flow over the plant steps of each interval, from a first step on before an end.
+SumSteps = Callable[..., Any]
+# The springs whose books part the leak of a wall into its causes, as ``ideal_springs`` yields them.
+CAUSES = ("ideal", "sampled_and_held", "quantised")
 
 
 class Displacement(NamedTuple):
-    """How far the device goes, with the digits that the difference of two positions has lost, m.
+    """The way of the device, with the digits that the difference of two positions has lost, m.
 
     Attributes:
-        by_step: over every plant step, shape (ticks * n,).
-        by_tick: over every interval, shape (ticks,).
+        by_step: over every plant step, shape (ticks, steps), or (ticks, steps, batch).
+        by_tick: over every interval, shape (ticks,), or (ticks, batch).
     """
 
     by_step: Any
     by_tick: Any
 
-    @classmethod
-    def of(cls, plant: dict[str, np.ndarray], steps_per_tick: int, summed: Callable[[Any, int], Any]) -> Displacement:
-        """From telemetry columns; ``summed`` sums steps over their tick."""
-        x, low = plant["x"], plant["x_low"]
-        dx = (x[1:] - x[:-1]) + (low[1:] - low[:-1])
-        return cls(dx, summed(dx, steps_per_tick))
+
+def displacement(x: Any, x_low: Any, steps_per_tick: int | None, sum_steps: SumSteps) -> Displacement:
+    """Returns the displacement between recorded positions.
+
+    Args:
+        x: positions at every step and at the end, shape (ticks * n + 1,), or (ticks * n + 1, batch), m.
+        x_low: what rounding left of them, m.
+        steps_per_tick: n; None where the steps are those of one interval and have no axis for ticks.
+    """
+    dx = x[1:] - x[:-1]
+    dx += x_low[1:] - x_low[:-1]
+    if steps_per_tick is not None:
+        dx = by_interval(dx, steps_per_tick)
+    return Displacement(dx, sum_steps(dx))
 
 
-def sampled_flow(x_m: np.ndarray, force: np.ndarray) -> np.ndarray:
-    """-f[k-1] (x_m[k] - x_m[k-1]), J (Choi et al. 2022, eq. 4).
+def by_interval(column: np.ndarray, steps_per_tick: int) -> np.ndarray:
+    """Returns a column of shape (ticks * n, ...) as (ticks, n, ...)."""
+    return column.reshape(-1, steps_per_tick, *column.shape[1:])
+
+
+def sampled_work(x_m: Any, force: Any) -> Any:
+    """Returns -f[k-1] (x_m[k] - x_m[k-1]), J: all that a controller can know (Choi et al. 2022, eq. 4).
 
     Args:
         x_m: positions as measured at consecutive ticks, m, shape (ticks + 1,).
@@ -43,35 +57,51 @@ def sampled_flow(x_m: np.ndarray, force: np.ndarray) -> np.ndarray:
     return force * -(x_m[1:] - x_m[:-1])
 
 
-def sampled_flows(
-    tick: int, ticks: int, tape: ControllerTape | ControllerTapeArray, forces: list[np.ndarray]
-) -> np.ndarray:
-    """``sampled_flow`` of every account at every tick; nothing at the first tick there is.
-
-    Returns:
-        Shape (accounts, ticks).
-    """
-    first, end = max(tick - 1, tape.first), tick + ticks
-    x_m = tape.rows("x", first, end)
-    known = slice(first - tape.first, end - 1 - tape.first)
-    added = np.zeros((len(forces), ticks, *x_m.shape[1:]))
-    for row, force in zip(added, forces, strict=True):
-        row[ticks + 1 - len(x_m) :] = sampled_flow(x_m, force[known])
-    return added
-
-
-def wall_at(tick: int, tape: ControllerTape | ControllerTapeArray) -> tuple[Any, Any]:
-    """Where the wall is at a tick, m, and how stiff, N/m."""
-    position, stiffness = (first_row(tape.rows(f"wall_{of}", tick, tick + 1)) for of in ("position", "stiffness"))
-    return position, stiffness
-
-
 def in_effect(force: np.ndarray, command: np.ndarray, first: int) -> np.ndarray:
-    """What an account commanded where each of these commands is in effect, N; 0 before the first command.
+    """Returns what an account commanded where each of these commands is in effect, N; 0 before the first command.
 
     Args:
         force: of the commands from ``first`` on.
+        command: tick of each command, -1 before the first.
     """
+    start, end = int(command[0]), int(command[-1])
+    if first <= start and end - start == len(command) - 1 and (command[1:] > command[:-1]).all():
+        return force[start - first : end - first + 1]
     found = force.take(np.maximum(command - first, 0), axis=0)
     found[command < 0] = 0.0
     return found
+
+
+def held_J(x: Any, wall: tuple[Any, Any], into_wall: float) -> Any:
+    """Returns what an ideal spring of position and stiffness ``wall`` holds with the device at x: k p^2 / 2, J."""
+    return each(_held_J, x, *wall, into_wall)
+
+
+def _held_J(x: float, position: float, stiffness: float, into_wall: float) -> float:
+    return stiffness * max(0.0, (x - position) * into_wall) ** 2 / 2.0
+
+
+def ideal_springs(x: Any, way: Any, force: Any, wall: tuple[Any, Any], into_wall: float) -> Iterator[Any]:
+    """Yields the energy taken out of the device on the same trajectory by springs better than the true one, J.
+
+    ideal             that of a real spring, always there: change of k p^2 / 2, p the true penetration
+    sampled_and_held  its force taken from the true position at the tick and held: what sampling and hold add
+    quantised         the force the controller computed, without delay: what quantisation and noise add
+    The true book adds the delay. Leak = true - ideal; its parts are the differences from line to line.
+
+    Args:
+        x: true position at the ticks and at the end, shape (ticks + 1,), m.
+        way: displacement over each interval, shape (ticks,), m.
+        force: what the controller computed for the wall at these ticks, shape (ticks,), N.
+        wall: position in m and stiffness in N/m.
+        into_wall: +1 or -1.
+
+    Yields:
+        Shape (ticks,) each, ordered as ``CAUSES``; all arrays may have a last axis for a batch.
+    """
+    position, stiffness = wall
+    depth = x.__array_namespace__().maximum(0.0, (x - position) * into_wall)
+    before, after = depth[:-1], depth[1:]
+    yield 0.5 * stiffness * (after - before) * (after + before)
+    yield into_wall * stiffness * before * way
+    yield -force * way

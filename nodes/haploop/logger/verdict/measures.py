@@ -1,4 +1,4 @@
-"""What the last half second of some runs shows, worked out for all of them at once."""
+"""Measures of the last half second of some runs, worked out for all of them at once."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ CROSSINGS = 4
 ROUNDING = 1e-12
 
 
-class Seen(NamedTuple):
-    """What a window shows of one run.
+class WindowMeasures(NamedTuple):
+    """Measures of the window of one run.
 
     Attributes:
         touched: whether any tick was in contact.
-        crossings, growth: as ``swings`` tells them.
+        crossings, growth: of ``swings``.
         figures: the ``window`` entry of the summary. The displayed stiffness is the mean of total force over
             penetration, ticks in contact (Choi et al. 2022, V.B.2); ticks whose penetration is a rounding error of the
             wall's position are left out of it. ``growth_1_s`` is the r of e^(r t) by which the swings grow (decay
@@ -32,11 +32,11 @@ class Seen(NamedTuple):
     figures: dict[str, Any]
 
 
-class Measured(NamedTuple):
-    """What was measured in the windows of some runs: a list each.
+class MeasuredColumns(NamedTuple):
+    """Measures of the windows of some runs, a list each.
 
     Attributes:
-        crossings, growth: as ``swings`` tells them.
+        crossings, growth: of ``swings``.
         width_m: peak to peak.
         inside: ticks in contact.
         stiffness_N_m, depth_m: displayed stiffness and penetration, means of ticks in contact; None of none.
@@ -51,35 +51,37 @@ class Measured(NamedTuple):
 
 
 class Span(NamedTuple):
-    """What part of a run a window covers: its plant steps, its ticks, and its first step."""
+    """The part of a run that a window covers: its plant steps, its ticks, and its first step."""
 
     steps: int
     ticks: int
     first: int
 
-    @classmethod
-    def of(cls, ran: int, keep: int, steps_per_tick: int) -> Span:
-        """The last ``keep`` steps of a run of ``ran`` steps, or its second half if it is shorter."""
-        steps = min(keep, ran if ran >= keep else ran // 2)
-        first = ran - steps
-        ticks = ran // steps_per_tick + bool(ran % steps_per_tick)
-        return cls(steps, ticks - -(-first // steps_per_tick), first)
+
+def window_span(ran: int, keep: int, steps_per_tick: int) -> Span:
+    """Returns the last ``keep`` steps of a run of ``ran`` steps, or its second half if it is shorter."""
+    steps = min(keep, ran if ran >= keep else ran // 2)
+    first = ran - steps
+    ticks = ran // steps_per_tick + bool(ran % steps_per_tick)
+    return Span(steps, ticks - -(-first // steps_per_tick), first)
 
 
 def _rate(growth: float, seconds: float) -> float | None:
-    """r in 1/s if what is ``growth`` times as wide in the second half of ``seconds`` follows e^(r t)."""
+    """Returns r in 1/s if what is ``growth`` times as wide in the second half of ``seconds`` follows e^(r t)."""
     return 2.0 * math.log(growth) / seconds if growth > 0.0 else None
 
 
 @lru_cache(maxsize=4)
 def _centred(count: int) -> tuple[np.ndarray, float]:
-    """So many equal steps around 0, and the sum of their squares."""
+    """Returns so many equal steps around 0, and the sum of their squares."""
     t = np.arange(count) - (count - 1) / 2.0
     return t, np.dot(t, t)
 
 
-def look(x: np.ndarray, rows: dict[str, np.ndarray], span: Span, rate: int, swing_m: np.ndarray) -> list[Seen]:
-    """What the windows of some runs show; each is worked out as if it were alone.
+def measure_window(
+    x: np.ndarray, rows: dict[str, np.ndarray], span: Span, rate: int, swing_m: np.ndarray
+) -> list[WindowMeasures]:
+    """Returns the measures of the windows of some runs; each is worked out as if it were alone.
 
     Args:
         x: positions at the last plant steps at least, shape (runs, steps), m.
@@ -94,20 +96,20 @@ def look(x: np.ndarray, rows: dict[str, np.ndarray], span: Span, rate: int, swin
     depth = held["wall_position"] - held["x"]
     real = inside & (np.abs(depth) > ROUNDING * np.abs(held["wall_position"]))
     stiffness = np.divide(held["total"], depth, out=np.zeros_like(depth), where=real)
-    measured = Measured(
+    measured = MeasuredColumns(
         *swings(x, swing_m),
         np.ptp(x, axis=1).tolist() if x.shape[1] else [0.0] * len(x),
         np.count_nonzero(inside, axis=1).tolist(),
         _means(stiffness, real),
         _means(np.abs(depth), inside),
     )
-    return seen_of(measured, span, rate)
+    return window_measures(measured, span, rate)
 
 
-def seen_of(measured: Measured, span: Span, rate: int) -> list[Seen]:
-    """What was measured in each run's window, as the summary tells it."""
+def window_measures(measured: MeasuredColumns, span: Span, rate: int) -> list[WindowMeasures]:
+    """Returns the measures of each run's window, with the figures of the summary."""
     start_s, seconds = span.first / rate, (span.steps + 1) / rate
-    seen = []
+    measures = []
     for crossings, growth, width_m, inside, stiffness_N_m, depth_m in zip(*measured, strict=True):
         figures = {
             "from_s": start_s,
@@ -117,18 +119,18 @@ def seen_of(measured: Measured, span: Span, rate: int) -> list[Seen]:
             "displayed_stiffness_N_m": stiffness_N_m,
             "penetration_mean_m": depth_m,
         }
-        seen.append(Seen(inside > 0, crossings, growth, figures))
-    return seen
+        measures.append(WindowMeasures(inside > 0, crossings, growth, figures))
+    return measures
 
 
 def _means(values: np.ndarray, counted: np.ndarray) -> list[float | None]:
-    """The mean of those counted in each row; None of none."""
+    """Returns the mean of those counted in each row; None of none."""
     chosen = [row[mask] for row, mask in zip(values, counted, strict=True)]
     return [float(np.add.reduce(row)) / len(row) if len(row) else None for row in chosen]
 
 
 def swings(x: np.ndarray, swing_m: np.ndarray) -> tuple[list[int], list[float]]:
-    """How often x swings across its straight trend by more than ``swing_m`` on either side, and how the width grows.
+    """Counts how often x swings across its straight trend by more than ``swing_m``, and measures how the width grows.
 
     Args:
         x: positions of some runs at equal steps, shape (runs, steps), m.

@@ -23,7 +23,7 @@ from haploop.controller.dissipation import ElementError, registry
 from haploop.launch.errors import RunFailed
 from haploop.launch.runs.in_process import Loop, scene_events
 from haploop.launch.runs.start import prepare, run
-from haploop.logger.session import open_keeper
+from haploop.logger.session import open_session
 from haploop.protocol.ticks import Timebase
 from haploop.tools.cost.data import Load
 from haploop.tools.cost.grid import Candidate
@@ -99,16 +99,16 @@ def loop_us(scene: dict[str, Any]) -> float | None:
     a single block is counted whole. A method that blows up overflows: its warnings are kept back by the caller.
     """
     base = Timebase.from_clock(scene["clock"], scene["duration"])
-    keeper = open_keeper(scene, base, None, {})
-    loop = Loop(scene, base, registry(), keeper)
+    session = open_session(scene, base, None, {})
+    loop = Loop(scene, base, registry(), session)
     loop.schedule(scene_events(scene, base))
     going: list[bool] = []
     try:
         took_s = timed_s(lambda: going.append(loop.block()))
-        first = ticks = keeper.logger.tick
+        first = ticks = session.logger.tick
         if going[0]:
             took_s = timed_s(lambda: _finish(loop))
-            ticks = keeper.logger.tick - first
+            ticks = session.logger.tick - first
     except (ElementError, ArithmeticError):
         return None
     return took_s / ticks * 1e6 if ticks else None

@@ -13,8 +13,8 @@ from haploop.controller.controller import Controller
 from haploop.controller.dissipation import ElementError
 from haploop.controller.estimators.choose import Estimator, Sample
 from haploop.logger.books.buffers import as_float64
-from haploop.logger.books.sums import RunningSums
-from haploop.logger.books.work import sampled_flow
+from haploop.logger.books.sums import add_columns, no_sums
+from haploop.logger.books.work import sampled_work
 from haploop.protocol.ticks import Timebase
 from haploop.tools.dissipate.samples import Floats, Samples
 
@@ -73,8 +73,7 @@ class Booking:
         self._late = max(0.0, periods - self._lookahead)
         self._time = MeasuredTime.of_period(period_s, self._lookahead)
         self._count = len(scene["dissipation"])
-        self._sums = RunningSums()
-        self._sums.grow(2 * self._count)
+        self._sums = no_sums(2 * self._count)
         self._events = _wall_events(scene, self._time)
         self.taken_J, self.given_J, self.strongest_N = np.zeros((3, self._count))
 
@@ -93,7 +92,7 @@ class Booking:
         periods = slice(1 - first, count), slice(2 - first, count + 1)  # of the old and the new command in each
         known = forces[:, self._lookahead + 2 - first : self._lookahead + 1 + count]
         added = np.zeros((2 * self._count, count))
-        added[: self._count, 1 - first :] = sampled_flow(x_m, known)
+        added[: self._count, 1 - first :] = sampled_work(x_m, known)
         added[self._count :, 1 - first :] = _held(forces[:, periods[0]], forces[:, periods[1]], true_x, between)
         self._forces = forces[:, -self._lookahead - 2 :]
         self._last_x, self._last_true_x = piece.x_m[-1:], piece.true_x_m[-1:]
@@ -154,7 +153,8 @@ class Booking:
         true = added[self._count :]
         self.taken_J += np.maximum(true, 0.0).sum(axis=1)
         self.given_J -= np.minimum(true, 0.0).sum(axis=1)
-        return self._sums.add(added)
+        self._sums, totals = add_columns(self._sums, added)
+        return totals
 
 
 def _held(old: Floats, new: Floats, true_x: Floats, between: Floats) -> Floats:

@@ -124,6 +124,8 @@ def _verdict(scene: dict[str, Any], time: Timebase, controller: Controller, x: l
     [block] = controller.recorder.take()
     rows = {name: np.frombuffer(column) for name, column in block["columns"].items()}
     rows["wall_position"] = np.full(time.ticks, block["wall"]["position"])
-    window = Window(time.control_rate, 1, scene.get("encoder", {}).get("resolution", 0.0))
-    window.add(np.array(x), np.array(forces), {name: rows[name] for name in CONTROLLER_COLUMNS})
-    return window.shown().verdict(None).word
+    window = Window(time, scene.get("encoder", {}).get("resolution", 0.0))
+    columns = {name: rows[name][:, None] for name in CONTROLLER_COLUMNS}
+    window.add(np.array(x)[:, None], np.array(forces)[:, None], columns)
+    (measures,) = window.measures()
+    return measures.verdict(None).word

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 import jax
 import numpy as np
 
-from haploop.controller.controller_batch import Row
 from haploop.launch.batch.batch import LoopArray
 from haploop.launch.batch.jax.block import RINGS, Block, Carry, Given, Rings
 from haploop.launch.batch.jax.books import Forces
@@ -18,7 +17,9 @@ from haploop.launch.batch.jax.stand_ins import Outside
 from haploop.launch.batch.jax.tick import NoTick, Tick
 from haploop.launch.batch.jax.window import CompiledWindow
 from haploop.launch.batch.stacking import structure
+from haploop.logger.books.buffers import ControllerBuffer
 from haploop.logger.books.chain import ChainBooks
+from haploop.logger.books.sums import Sums
 from haploop.plant.motion.one_mass_batch import LinearMotionArray
 from haploop.plant.plant import beyond
 from haploop.plant.random.streams import Draw
@@ -52,8 +53,8 @@ class CompiledLoops(LoopArray):
         self._programs = programs
         self._key = structure(scenes[0]), frozenset(kinds.items()), energy
         self._has_wall = "wall" in scenes[0]
-        resolutions = self._logger._window._resolutions
-        self._window = self._logger._window = CompiledWindow(self._time, resolutions, size, spare_ticks=BLOCK_TICKS)
+        resolution = self._logger.window.swing_m
+        self._window = self._logger.window = CompiledWindow(self._time, resolution, size, spare_ticks=BLOCK_TICKS)
         # A loop of which only the program changes anything needs the window at its end, unless it diverges.
         self._keep_from = 0 if self._changes else max(0, self._end - self._window.kept_ticks)
 
@@ -105,7 +106,7 @@ class CompiledLoops(LoopArray):
         return at.leaves.shapes(), len(at.leaves.whole)
 
     def _tick(self, tick: int) -> Tick:
-        motion, books = self._motion, self._logger._books._plant if self._logger._books else None
+        motion, books = self._motion, self._logger.books.plant if self._logger.books else None
         if not isinstance(motion, LinearMotionArray) or isinstance(books, ChainBooks):
             raise NoTick("there are several bodies")
         return Tick(tick, motion, self._line, self._quantise, self._feels, self._controller, books)
@@ -119,7 +120,7 @@ class CompiledLoops(LoopArray):
             *((np.shape(a), np.result_type(a)) for a in jax.tree.leaves((tick.leaves.data, given, carry))),
         )
         program = self._programs.known(key)
-        block = program.block if program else Block(tick, self._logger._books is not None, self._has_wall)
+        block = program.block if program else Block(tick, self._logger.books is not None, self._has_wall)
         if not program:
             block.learn(given.outside._replace(commands=tuple(tick.commands[:2])))
         changing, constant = block.split(tick.leaves.data)
@@ -132,7 +133,7 @@ class CompiledLoops(LoopArray):
         before = deque[tuple[Carry, Given]](maxlen=-(-self._window.kept_ticks // BLOCK_TICKS) + 1)
         while done < until and not self._ended.all():
             end = min(done + BLOCK_TICKS, until)
-            if done - first < len(self._window._ticks["wall_position"]):  # beyond, what would be written is there
+            if done - first < len(self._window.state.rows["wall_position"]):  # beyond, what would be written is there
                 self._note_wall_position(done, end)
             given = self._given(tick, done, end)._replace(constant=constant)
             before.append((carry, given))
@@ -183,23 +184,23 @@ class CompiledLoops(LoopArray):
 
     def _carry(self, tick: Tick) -> Carry:
         """Where a program begins, but for the leaves."""
-        loops, books, window = len(self._ended), self._logger._books, self._window
+        loops, books, window = len(self._ended), self._logger.books, self._window
         sums = {}
         if books:
-            for name, row in books._rows.items():
-                sums[name] = books._sums.sums[row], books._sums.errors[row]
-        extremes = window._x_min, window._x_max, window._force_max
-        x_m = np.broadcast_to(self._logger._tape._kept[-1].columns["x"], loops) if books else np.zeros(loops)
+            sums = dict(zip(books.names, zip(*books.state.sums, strict=True), strict=True))
+        extremes = window.state.x_min_m, window.state.x_max_m, window.state.force_max_N
+        x_m = self._logger.buffer.columns["x"][-1] if books else np.zeros(loops)
         return Carry([], ~self._ended, np.zeros(loops, np.int64), extremes, sums, x_m, self._past(tick))
 
     def _past(self, tick: Tick) -> Forces:
         """Commands on their way, and the forces that go with them."""
         loops = len(self._ended)
         columns: dict[str, list[Any]] = {"command": tick.commands}
-        if self._logger._books:
-            rows = self._logger._tape._kept
-            columns["wall"] = [row.columns["wall"] for row in rows]
-            columns |= {str(book): [row.forces[book] for row in rows] for book in rows[-1].forces}
+        if self._logger.books:
+            buffer = self._logger.buffer
+            columns["wall"] = wall = list(buffer.columns["wall"])
+            for element in self._controller.recorder._elements:
+                columns[str(element["book"])] = list(buffer.forces.get(element["book"], [0.0] * len(wall)))
         past = {}
         for name, column in columns.items():
             past[name] = np.zeros((len(column) + 1, loops))
@@ -208,8 +209,8 @@ class CompiledLoops(LoopArray):
 
     def _rings(self) -> Rings:
         """Where a program begins with what windows are read from."""
-        x = self._window._x.reshape(-1, self._time.steps_per_tick, len(self._ended))
-        return Rings(x, {name: self._window._ticks[name] for name in RINGS})
+        x = self._window.state.x.reshape(-1, self._time.steps_per_tick, len(self._ended))
+        return Rings(x, {name: self._window.state.rows[name] for name in RINGS})
 
     def _last(self, carry: Carry, tick: int) -> list[dict[str, np.ndarray]]:
         """The forces of the ticks before ``tick`` of which a command has yet to act, or is the last to have acted."""
@@ -218,18 +219,18 @@ class CompiledLoops(LoopArray):
         return [{name: ring[k % size].copy() for name, ring in past.items()} for k in range(tick - size + 1, tick)]
 
     def _note_wall_position(self, first: int, end: int) -> None:
-        ring = self._window._ticks["wall_position"]
+        ring = self._window.state.rows["wall_position"]
         ring[np.arange(first, end) % len(ring)] = self._controller.recorder._place["position"]
 
     def _fetch(self, carry: Carry, rings: Rings, *, writable: bool) -> None:
         """Let the logger have what the program has kept."""
-        window, books = self._window, self._logger._books
+        window, books = self._window, self._logger.books
         window.take(rings, writable=writable)
-        window._x_min, window._x_max, window._force_max = map(np.array, carry.extremes)
+        least, most, strongest = map(np.array, carry.extremes)
+        window.state = window.state._replace(x_min_m=least, x_max_m=most, force_max_N=strongest)
         if books:
-            books._sums.sums, books._sums.errors = (
-                np.stack(part) for part in zip(*(carry.books[name] for name in books.names), strict=True)
-            )
+            sums = Sums(*(np.stack(part) for part in zip(*(carry.books[name] for name in books.names), strict=True)))
+            books.state = books.state._replace(sums=sums)
 
     def _report_ends(self, new: np.ndarray, ticks: np.ndarray) -> None:
         """Take the results of the loops that diverged after these numbers of ticks."""
@@ -242,17 +243,20 @@ class CompiledLoops(LoopArray):
         self._ended = self._ended | new
 
     def _log_stands_at(self, tick: int) -> None:
-        self._logger.tick, self._window._steps = tick, tick * self._time.steps_per_tick
-        self._logger._note_accounts(Row({}, {}, self._controller.recorder._elements))
+        self._logger.tick = tick
+        self._window.state = self._window.state._replace(steps=tick * self._time.steps_per_tick)
+        self._logger.note_accounts(self._controller.recorder._elements)
 
     def _resume(self, carry: Carry, tick: int) -> None:
         """Have the logger go on from here by itself."""
         self._log_stands_at(tick)
-        elements, tape = self._controller.recorder._elements, self._logger._tape
-        if self._logger._books:
-            tape._kept = []
-            for forces in self._last(carry, tick):
-                columns = {"x": np.array(carry.x_m), "wall": forces.pop("wall")}
-                del forces["command"]
-                tape._kept.append(Row(columns, {int(book): force for book, force in forces.items()}, elements))
-            tape.first, tape.end = tick - len(tape._kept), tick
+        if self._logger.books:
+            last = self._last(carry, tick)
+            forces = {name: np.stack([row[name] for row in last]) for name in last[0] if name != "command"}
+            wall = forces.pop("wall")
+            x, unread = np.broadcast_to(np.array(carry.x_m), wall.shape), np.zeros_like(wall)
+            buffer = self._logger.buffer = ControllerBuffer(tick - len(last))
+            buffer.add(
+                {"x": x, "wall": wall, "wall_position": unread, "wall_stiffness": unread},
+                {int(book): force for book, force in forces.items()},
+            )

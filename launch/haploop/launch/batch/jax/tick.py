@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from types import MethodWrapperType
+from types import MethodWrapperType, SimpleNamespace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,16 +13,12 @@ from haploop.launch.batch.jax.rows import Rows
 from haploop.launch.batch.jax.stand_ins import Drawn, Given, Outside, rounded
 from haploop.launch.batch.jax.state import Leaves
 from haploop.launch.batch.object_state import replace
-from haploop.logger.books.one_mass import PlantBooks
+from haploop.logger.books.one_mass import OneMassBooks
 from haploop.plant.motion.one_mass import change_over
 from haploop.plant.motion.one_mass_batch import LinearMotionArray
 from haploop.plant.motion.transition import HeldFlow
 from haploop.plant.random.streams import Draw
 from haploop.plant.random.streams_batch import Draws
-
-
-def _always(_rise: Any) -> bool:
-    return True
 
 
 class NoTick(Exception):
@@ -38,7 +34,7 @@ class Ticked(NamedTuple):
         row: the controller's: x, v, a, wall, total, in_contact and more.
         forces: force of every element's book.
         wall: its position, stiffness and direction.
-        first_step: of the interval.
+        tau: of the hand at the steps and at the end, N, n + 1 rows.
     """
 
     x: Rows
@@ -48,7 +44,7 @@ class Ticked(NamedTuple):
     row: dict[str, Any]
     forces: dict[int, Any]
     wall: tuple[Any, Any, Any]
-    first_step: int
+    tau: Rows
 
 
 class Tick:
@@ -62,7 +58,7 @@ class Tick:
 
     def __init__(
         self, at: int, motion: LinearMotionArray, line: Any, quantise: Any, feels: bool, controller: ControllerArray,
-        books: PlantBooks | None,
+        books: OneMassBooks | None,
     ) -> None:  # fmt: skip
         self.at, self._motion, self._line, self._quantise, self._feels = at, motion, line, quantise, feels
         self._controller = controller
@@ -77,14 +73,13 @@ class Tick:
         load = np.shape(self.tau.at_steps(0, 1) + motion._spring_at_origin_N)
         self.is_shared = motion._held.coefficients.shape[-1] == load[-1] == 1
         self._line.forget_before(at)
-        self.books, self._tau_of_books = books, books and books._tau
-        if books:
-            books._tau, books._rises = None, _always  # pyright: ignore[reportAttributeAccessIssue]
+        # Apart from the force of the hand, which comes from outside.
+        self.books: Any = books and SimpleNamespace(params=books.params, names=books.names, is_limited=books.is_limited)
         while hasattr(line, "_line"):
             line = line._line
         self._forces: list[Any] = line._forces
         self.commands, self._forces[:] = list(self._forces), [None] * len(self._forces)
-        self._by_itself = [quantise, *controller.carried, books]
+        self._by_itself = [quantise, *controller.carried, self.books]
         self._root = [motion, self._line, *self._by_itself]
         self.leaves = Leaves(self._root)
 
@@ -115,9 +110,6 @@ class Tick:
         self._controller.tick += ticks
         motion._over = motion._held.by_count()
         motion._tau, motion._pieces = self.tau, self._pieces
-        if self.books:
-            self.books._tau = self._tau_of_books  # pyright: ignore[reportAttributeAccessIssue]
-            del self.books._rises
         motion._response_first = motion._response_end = 0
         replace(self._quantise, Drawn, lambda _: next(draws))
 
@@ -143,7 +135,7 @@ class Tick:
         self._line.receive(forces)
         motion.advance(tick, self._line.holds(tick))
         (row,) = self._controller.recorder.take_rows()
-        told = self._told(start, row)
+        told = self._told(*start, row)
         reported = report(told)
         self._end(tick)
         if Leaves(self._by_itself).whole != counted:
@@ -154,14 +146,12 @@ class Tick:
         self.leaves.put(self.leaves.data, whole)
         return after.data, after.whole, reported
 
-    def _begin(self, tick: int, outside: Outside) -> Any:
+    def _begin(self, tick: int, outside: Outside) -> tuple[Any, Rows]:
         motion = self._motion
         n = motion._steps
         tau = Rows(list(outside.tau))
         given = Given(tick * n, tau)
         motion._tau = given  # pyright: ignore[reportAttributeAccessIssue]
-        if self.books:
-            self.books._tau = given  # pyright: ignore[reportAttributeAccessIssue]
         self._forces[:2] = outside.commands[: len(self._forces)]
         for drawn, row in zip(self._drawn, outside.noise, strict=True):
             drawn.row = row
@@ -173,9 +163,9 @@ class Tick:
         else:
             response = Rows(list(outside.response))
         motion._response, motion._response_first, motion._response_end = [response[-1]], tick, tick + 1
-        return response
+        return response, tau
 
-    def _told(self, response: Any, row: Any) -> Ticked:
+    def _told(self, response: Any, tau: Rows, row: Any) -> Ticked:
         motion = self._motion
         starts, motion._starts = motion._starts, []
         x_rows, v_rows, x_low_rows, held_forces = [], [], [], []
@@ -193,8 +183,7 @@ class Tick:
         x, v, x_low = Rows([*x_rows, motion.x]), Rows([*v_rows, motion.v]), Rows([*x_low_rows, motion._x_low])
         wall = self._controller._wall
         place = wall.position, wall.stiffness, wall.into_wall
-        first_step = self.at * motion._steps
-        return Ticked(x, v, x_low, held_forces, row.columns, row.forces, place, first_step)
+        return Ticked(x, v, x_low, held_forces, row.columns, row.forces, place, tau)
 
     def _end(self, tick: int) -> None:
         self._line.forget_before(tick + 1)
@@ -203,7 +192,5 @@ class Tick:
         self._motion._response = []
         self._motion._over = []
         self._motion._tau = None  # pyright: ignore[reportAttributeAccessIssue]
-        if self.books:
-            self.books._tau = None  # pyright: ignore[reportAttributeAccessIssue]
         for drawn in self._drawn:
             drawn.row = None

@@ -1,4 +1,4 @@
-"""What the windows of many loops show, worked out by a program that goes through their rings step by step."""
+"""Measures of the windows of a batch, worked out by a program that goes through their rings step by step."""
 
 from __future__ import annotations
 
@@ -11,14 +11,13 @@ import jax.numpy as jnp
 import numpy as np
 
 from haploop.launch.batch.jax.block import Rings
-from haploop.logger.verdict.measures import ROUNDING, Measured, Span, seen_of
-from haploop.logger.verdict.verdict import SMALLEST_SWING_M, Shown
-from haploop.logger.verdict.window import keep_steps
-from haploop.logger.verdict.window_batch import WindowArray
+from haploop.logger.verdict.measures import ROUNDING, MeasuredColumns, window_measures, window_span
+from haploop.logger.verdict.verdict import RunMeasures
+from haploop.logger.verdict.window import Window, keep_steps
 
 
-class CompiledWindow(WindowArray):
-    """``WindowArray`` whose rings are filled by compiled programs, and read by one.
+class CompiledWindow(Window):
+    """``Window`` of a batch whose rings are filled by compiled programs, and read by one.
 
     Attributes:
         rings: what the programs have left; None where the loops went on by themselves since.
@@ -29,24 +28,25 @@ class CompiledWindow(WindowArray):
     def take(self, rings: Rings, *, writable: bool) -> None:
         """Have the rings of a program; ``writable`` where the loops are to go on by themselves."""
         held = np.array if writable else np.asarray
-        self._x = held(rings.x).reshape(-1, len(self._resolutions))
-        self._ticks |= {name: held(ring) for name, ring in rings.rows.items()}
+        x, rows = held(rings.x).reshape(-1, len(self.swing_m)), {name: held(ring) for name, ring in rings.rows.items()}
+        self.state = self.state._replace(x=x, rows=self.state.rows | rows)
         self.rings = None if writable else rings
 
-    def shown(self, loops: Iterable[int]) -> Iterator[Shown]:
-        """As there; window figures to the last digits, and a crossing by less than these may count or not."""
-        rate, n, steps = self._time.plant_rate, self._time.steps_per_tick, self._steps
-        span = Span.of(steps, keep_steps(rate), n)
+    def measures(self, places: Iterable[int] = (0,)) -> Iterator[RunMeasures]:
+        """Yields the measures of these members; figures to the last digits, a crossing by less may count or not."""
+        rate, n, steps = self._time.plant_rate, self._time.steps_per_tick, self.state.steps
+        span = window_span(steps, keep_steps(rate), n)
         if self.rings is None or steps < span.steps + n:
-            yield from super().shown(loops)
+            yield from super().measures(places)
             return
-        wanted = np.fromiter(loops, np.intp)
-        swing_m = np.maximum(self._resolutions, SMALLEST_SWING_M)
-        rows = {**self.rings.rows, "wall_position": self._ticks["wall_position"]}
-        found = _look(self.rings.x, rows, np.int64(steps), swing_m, steps=span.steps + 1, ticks=span.ticks)
+        wanted = np.fromiter(places, np.intp)
+        rows = {**self.rings.rows, "wall_position": self.state.rows["wall_position"]}
+        found = _look(self.rings.x, rows, np.int64(steps), self.swing_m, steps=span.steps + 1, ticks=span.ticks)
         columns = [np.asarray(column)[wanted].tolist() for column in found]
-        measured = Measured(*columns[:4], *(_where_any(*columns[at : at + 2]) for at in (4, 6)))
-        yield from map(Shown, seen_of(measured, span, rate), self._extremes_of(wanted), swing_m[wanted].tolist())
+        measured = MeasuredColumns(*columns[:4], *(_where_any(*columns[at : at + 2]) for at in (4, 6)))
+        yield from map(
+            RunMeasures, window_measures(measured, span, rate), self.extremes(wanted), self.swing_m[wanted].tolist()
+        )
 
 
 def _where_any(counts: list[int], means: list[float]) -> list[float | None]:
@@ -64,7 +64,7 @@ class _Swings(NamedTuple):
 
 @partial(jax.jit, static_argnames=("steps", "ticks"))
 def _look(x: Any, rows: dict[str, Any], ran: Any, swing_m: Any, *, steps: int, ticks: int) -> list[Any]:
-    """The columns of ``Measured``, as ``look`` and ``swings`` define them, with the counts before each mean.
+    """Returns the columns of ``MeasuredColumns``, with the counts before each mean; see ``measure_window``.
 
     Args:
         x: positions, shape (ticks kept, n, loops); rows: ``CONTROLLER_COLUMNS``, shape (ticks kept, loops).
