@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from haploop.plant.sensing.encoder import accelerometer_is_used
+from haploop.tools.ablation import without_keys
 
 Scene = dict[str, Any]
 SAMPLING = "sampling and hold"
@@ -83,7 +84,7 @@ def _quantisation(scene: Scene) -> Scene | None:
         velocity = {**velocity, "measurement_noise": scene["encoder"]["resolution"] / 12**0.5}
     if velocity.get("estimator") == "foaw" and "bound" not in velocity:
         velocity = {**velocity, "bound": scene["encoder"]["resolution"]}
-    kept = _without(_without(scene, "encoder"), "accelerometer", "resolution")
+    kept = without_keys(scene, "encoder", "accelerometer.resolution")
     return {**kept, "velocity": velocity} if velocity else kept
 
 
@@ -91,7 +92,7 @@ def _noise(scene: Scene) -> Scene | None:
     noisy = accelerometer_is_used(scene) and scene.get("accelerometer", {}).get("noise_density")
     if "noise" not in scene and not noisy:
         return None
-    scene = _without(scene, "noise")
+    scene = without_keys(scene, "noise")
     return {**scene, "accelerometer": {**scene["accelerometer"], "noise_density": 0.0}} if noisy else scene
 
 
@@ -108,7 +109,7 @@ def _lag(scene: Scene) -> Scene | None:
     if (plain and not late) or not scene.get("dissipation"):
         return None
     source = acceleration.get("source", "encoder")
-    scene = _without(_without(_without(scene, "velocity"), "accelerometer", "bandwidth"), "accelerometer", "delay")
+    scene = without_keys(scene, "velocity", "accelerometer.bandwidth", "accelerometer.delay")
     if "accelerometer" in scene:
         scene = {**scene, "accelerometer": {"delay": 0.0, **scene["accelerometer"]}}
     return {**scene, "acceleration": {"source": source if source == "accelerometer" else "encoder"}}
@@ -124,19 +125,19 @@ def _mode(scene: Scene) -> Scene | None:
         "mass": device["mass"] + cable["motor_mass"],
         "damping": device["damping"] + cable["motor_damping"],
     }
-    return {**_without(scene, "transmission"), "device": rigid}
+    return {**without_keys(scene, "transmission"), "device": rigid}
 
 
 def _actuator(scene: Scene) -> Scene | None:
-    return _without(scene, "actuator") if "actuator" in scene else None
+    return without_keys(scene, "actuator") if "actuator" in scene else None
 
 
 def _line(scene: Scene) -> Scene | None:
-    return _without(_without(scene, "jitter"), "loss") if scene.get("jitter") or scene.get("loss") else None
+    return without_keys(scene, "jitter", "loss") if scene.get("jitter") or scene.get("loss") else None
 
 
 def _friction(scene: Scene) -> Scene | None:
-    return _without(scene, "friction") if scene.get("friction") else None
+    return without_keys(scene, "friction") if scene.get("friction") else None
 
 
 def _without_element(index: int) -> Callable[[Scene], Scene | None]:
@@ -145,18 +146,9 @@ def _without_element(index: int) -> Callable[[Scene], Scene | None]:
         if index >= len(elements):
             return None
         left = elements[:index] + elements[index + 1 :]
-        return {**scene, "dissipation": left} if left else _without(scene, "dissipation")
+        return {**scene, "dissipation": left} if left else without_keys(scene, "dissipation")
 
     return off
-
-
-def _without(scene: Scene, name: str, key: str | None = None) -> Scene:
-    """The scene without a table, or without a key of it."""
-    if name not in scene:
-        return scene
-    if key is None:
-        return {other: table for other, table in scene.items() if other != name}
-    return {**scene, name: {other: value for other, value in scene[name].items() if other != key}}
 
 
 _CAUSES = (

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import sys
-import tomllib
 from typing import Any, Literal
 
 from haploop.tools.cli.exit_codes import WRONG_USE, leave, plain_errors, print_json
@@ -48,17 +47,13 @@ def show_status(run_id: str | None, as_json: bool) -> None:
 
 
 def assignments(texts: list[str]) -> dict[str, Any]:
-    """``KEY=VALUE`` words as a table; a value is TOML where it parses, else text ("0.15 N/mm")."""
-    table: dict[str, Any] = {}
-    for text in texts:
-        key, equals, value = text.partition("=")
-        if not equals or not key.strip():
-            leave(f"KEY=VALUE was expected, but {text!r} was given.", WRONG_USE)
-        try:
-            table[key.strip()] = tomllib.loads(f"v = {value}")["v"]
-        except tomllib.TOMLDecodeError:
-            table[key.strip()] = value.strip()
-    return table
+    """Returns ``KEY=VALUE`` words as a table; a value is TOML where it parses, else text ("0.15 N/mm")."""
+    from haploop.launch.scene.overrides import split_assignment
+
+    pairs = [split_assignment(text) for text in texts]
+    if None in pairs:
+        leave(f"KEY=VALUE was expected, but {texts[pairs.index(None)]!r} was given.", WRONG_USE)
+    return dict(pair for pair in pairs if pair)
 
 
 def pace_of(text: str) -> float | Literal["free"]:

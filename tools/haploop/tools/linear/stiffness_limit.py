@@ -11,6 +11,7 @@ from haploop.controller.estimators.kalman import assumed_noises
 from haploop.launch.runs.in_process import run_in_process
 from haploop.logger.verdict.measures import WINDOW_S
 from haploop.plant.chain.chain import Chain
+from haploop.tools.ablation import without_keys
 from haploop.tools.linear.one_tick import OneTickMap
 
 if TYPE_CHECKING:
@@ -19,6 +20,11 @@ if TYPE_CHECKING:
 BELOW, ABOVE = 0.97, 1.03
 # The surface is this far from where the loop rests inside the wall; its swings start with this and must change by this.
 _DEPTH_M, _START_M, _CHANGE = 2e-3, 3e-6, 100.0
+# Tables and keys that round, limit or disturb.
+_ROUGH = (
+    "encoder", "noise", "event", "accelerometer.range", "accelerometer.resolution", "actuator.resolution",
+    "actuator.saturation",
+)  # fmt: skip
 # Links that are stretched and an actuator that lags start with swings of up to the depth: it is then less.
 _DEPTH_OF_MORE_STATES_M = 6e-5
 
@@ -85,12 +91,7 @@ def smooth(scene: dict[str, Any]) -> dict[str, Any]:
     period_s = 1.0 / scene["clock"]["control_rate"]
     if scene.get("velocity", {}).get("estimator") == "kalman":
         smoothed["velocity"] |= assumed_noises(scene, period_s)
-    for table in ("encoder", "noise", "event"):
-        smoothed.pop(table, None)
-    for key in ("noise_density", "bias", "range", "resolution"):
-        smoothed.get("accelerometer", {}).pop(key, None)
+    smoothed = without_keys(smoothed, *_ROUGH)
     if "accelerometer" in smoothed:
         smoothed["accelerometer"] |= {"noise_density": 0.0, "bias": 0.0}
-    for key in ("resolution", "saturation"):
-        smoothed.get("actuator", {}).pop(key, None)
     return smoothed
