@@ -1,4 +1,4 @@
-"""docs/accuracy.md and its figures, written from a cost.json: ``make accuracy``."""
+"""Writer of docs/accuracy.md and its figures from a cost.json: ``make accuracy``."""
 
 from __future__ import annotations
 
@@ -6,14 +6,12 @@ import sys
 from pathlib import Path
 
 from haploop.tools.cli.exit_codes import WRONG_USE, leave
-from haploop.tools.cost.advice import rate
-from haploop.tools.cost.data import Cost, CostFileError, Point, SceneCost, load
-from haploop.tools.cost.draw import figure
-from haploop.tools.cost.draw.report import made_with
-from haploop.tools.cost.finding_words import length, name_of
-from haploop.tools.cost.findings import findings
+from haploop.tools.cost import figure
+from haploop.tools.cost.advice import length, name_of, rate
+from haploop.tools.cost.data import Cost, CostFileError, Point, Price, PriceGroup, SceneCost, load
+from haploop.tools.cost.findings import FindingTable, findings
 from haploop.tools.cost.prices import figure as prices_figure
-from haploop.tools.cost.prices.data import Price, PriceGroup, price_groups
+from haploop.tools.cost.report import made_with
 from haploop.tools.figure.data import FigureError
 from haploop.tools.render.markdown import markdown_table
 from haploop.tools.render.units import amount, fixed
@@ -28,7 +26,7 @@ in bold, the scene's own setting."""
 
 
 def write(directory: Path, docs: Path) -> Path:
-    """Write page and figures from DIRECTORY/cost.json into ``docs``; returns the page's file.
+    """Writes page and figures from DIRECTORY/cost.json into ``docs``; returns the page's file.
 
     Raises:
         CostFileError: there is no cost.json.
@@ -45,25 +43,29 @@ def write(directory: Path, docs: Path) -> Path:
 
 
 def page(cost: Cost) -> str:
-    """The page in Markdown."""
-    found = [f"{number}. **{one.about}.** {one.text}" for number, one in enumerate(findings(cost), start=1)]
+    """Makes the page in Markdown."""
     parts = [
         "# What accuracy costs",
         _INTRO,
-        "## Five findings",
-        "\n".join(found),
+        "## Findings",
+        *(part for table in findings(cost) for part in _finding(table)),
         "## Error against time",
         f"![Error of each method against the time of a tick, scene by scene]({FIGURE})",
         *(part for scene in cost.scenes for part in _scene(scene)),
-        *_prices(price_groups(cost)),
+        *_prices(cost.prices),
         "## Measured on",
         f"{made_with(cost)} {_quiet(cost)}".strip(),
     ]
     return "\n\n".join(parts) + "\n"
 
 
+def _finding(table: FindingTable) -> list[str]:
+    """Formats a table of findings with its title and sentences."""
+    return [f"### {table.title}", markdown_table(table.heads, table.rows), *table.notes]
+
+
 def _scene(scene: SceneCost) -> list[str]:
-    """Reference, table and advice of one scene."""
+    """Makes the section of a scene: reference, table and advice."""
     reference = scene.reference
     rates = sorted({point.plant_rate for point in scene.points})
     methods = dict.fromkeys(point.method for point in scene.points)
@@ -75,7 +77,7 @@ def _scene(scene: SceneCost) -> list[str]:
 
 
 def _cell(scene: SceneCost, method: str, hertz: int) -> str:
-    """Error and time of a point; what is wrong about it; the scene's own setting in bold."""
+    """Formats error, wrong verdict and time of a point; the scene's own setting in bold."""
     point = next((p for p in scene.points if (p.method, p.plant_rate) == (method, hertz)), None)
     if point is None:
         return ""
@@ -91,14 +93,14 @@ def _power(metres: float) -> str:
 
 
 def _failures(scene: SceneCost) -> str:
-    """Why points failed: for each method one reason, that of its highest rate."""
+    """Returns why points failed: for each method one reason, that of its highest rate."""
     last: dict[str, Point] = {point.method: point for point in scene.points if point.failure}
     reasons = [f"{method} at {rate(point.plant_rate)}: {point.failure}" for method, point in last.items()]
     return "\n".join(f"- Failed: {reason}" for reason in reasons)
 
 
 def _prices(groups: list[PriceGroup]) -> list[str]:
-    """The other prices: the figure and a table a group."""
+    """Makes the section of the prices: the figure and a table a group."""
     if not groups:
         return []
     parts = ["## The other prices", f"![What books, log, effects, processes, delay and rate cost]({PRICES_FIGURE})"]
@@ -135,7 +137,7 @@ def _table(heads: list[str], rows: list[list[str]]) -> str:
 
 
 def _quiet(cost: Cost) -> str:
-    """Whether something else ran meanwhile."""
+    """Returns the load of the machine as sentences."""
     if cost.load is None:
         return ""
     spread = f"a fixed loop timed once a round varied by {100 * cost.load.calibration_spread:.1f} %"
@@ -145,7 +147,7 @@ def _quiet(cost: Cost) -> str:
 
 
 def main() -> None:
-    """``python -m haploop.tools.cost.draw.page DIRECTORY DOCS``."""
+    """Runs ``python -m haploop.tools.cost.page DIRECTORY DOCS``."""
     if len(sys.argv) != 3:
         leave("Two directories were expected: that of a haploop cost, and where the page goes.", WRONG_USE)
     try:

@@ -1,21 +1,27 @@
-"""One panel of the work-precision figure: the error of every method against its time, for one scene."""
+"""The work-precision figure: error of every method against its time, one panel a scene."""
 
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from textwrap import wrap
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from haploop.tools.cost.data import Point, SceneCost
-from haploop.tools.cost.finding_words import name_of
+from haploop.tools.cost.advice import name_of
+from haploop.tools.cost.data import Cost, Point, SceneCost
+from haploop.tools.figure.data import FigureError
+from haploop.tools.figure.file import empty_figure, fix_layout, write_figure
 from haploop.tools.figure.labels import Label, place_labels
-from haploop.tools.figure.style import ELEMENTS, FAINT, GREY, INK, SMALL, WALL, dress, plain_numbers
+from haploop.tools.figure.style import ELEMENTS, FAINT, GREY, INK, SMALL, TEXT, WALL, dress, plain_numbers
+from haploop.tools.render.units import amount
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
+_PANEL_IN = 5.0, 4.4
 _MARKED_HZ = 10_000
 UNCERTAIN = "#E4E4E4"
 _TITLE_LETTERS = 58
@@ -34,13 +40,74 @@ _WITHIN = 0.3
 _ROW = 0.045
 
 
-def look(method: str) -> tuple[str, str]:
-    """Colour and marker of a method."""
+def draw(cost: Cost, target: Path) -> Path:
+    """Draws all measurements into a file, in the format of its suffix.
+
+    Raises:
+        FigureError: matplotlib is missing, nothing was measured, or the file cannot be written.
+    """
+    return write_figure(figure_of(cost), target)
+
+
+def figure_of(cost: Cost) -> Figure:
+    """Makes the figure: one panel a scene, and one that says how to read them.
+
+    Raises:
+        FigureError: matplotlib is missing, or no scene has a point with a time.
+    """
+    scenes = [scene for scene in cost.scenes if any(point.us_per_tick for point in scene.points)]
+    if not scenes:
+        raise FigureError("No scene has a point with a time, so there is nothing to draw.")
+    columns = min(3, len(scenes) + 1)
+    rows = -(-(len(scenes) + 1) // columns)
+    figure = empty_figure(columns * _PANEL_IN[0], rows * _PANEL_IN[1])
+    panels = figure.subplots(rows, columns, squeeze=False).ravel()
+    for ax, scene in zip(panels, scenes, strict=False):
+        draw_panel(ax, scene, cost.tolerance_m)
+    _how_to_read(panels[len(scenes)], cost, scenes)
+    for ax in panels[len(scenes) + 1 :]:
+        ax.set_axis_off()
+    fix_layout(figure)
+    for ax, scene in zip(panels, scenes, strict=False):
+        label_points(ax, scene)
+    return figure
+
+
+def _how_to_read(ax: Axes, cost: Cost, scenes: list[SceneCost]) -> None:
+    """Draws the legend of methods and signs, and names the machine."""
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
+
+    ax.set_axis_off()
+    handles: list[Any] = []
+    for method in methods_of(scenes):
+        colour, marker = method_look(method)
+        handles.append(Line2D([], [], color=colour, marker=marker, linewidth=1.6, label=method))
+    sign: dict[str, Any] = {"linestyle": "none", "color": GREY}
+    black: dict[str, Any] = sign | {"color": INK}
+    handles += [
+        Line2D([], [], marker="o", markersize=11, markerfacecolor="none", label="at 10 kHz", **black),
+        Line2D([], [], marker="o", markerfacecolor="white", label="wrong verdict", **sign),
+        Line2D([], [], marker="x", markersize=7, markeredgewidth=1.8, label="failed: no error to draw", **sign),
+        Line2D([], [], color=GREY, dashes=(4, 3), linewidth=0.9, label=f"tolerance {amount(cost.tolerance_m, 'm')}"),
+        Patch(facecolor=UNCERTAIN, label="the reference's own uncertainty"),
+    ]
+    ax.legend(handles=handles, loc="upper left", bbox_to_anchor=(0.0, 1.0), frameon=False, fontsize=TEXT, ncols=1)
+    words = [
+        "Numbers: plant rate in kHz. Lower is more exact, further left is cheaper.",
+        f"Times: medians of {cost.repeats} repeats, interleaved in random order; bars: quartiles.",
+        cost.machine + (", which was busy meanwhile" if cost.load and cost.load.busy else ""),
+    ]
+    ax.text(0.02, 0.0, "\n".join(words), fontsize=SMALL, color=GREY, va="bottom", transform=ax.transAxes, gid="words")
+
+
+def method_look(method: str) -> tuple[str, str]:
+    """Returns colour and marker of a method."""
     return LOOKS.get(method, (GREY, "X"))
 
 
 def draw_panel(ax: Axes, scene: SceneCost, tolerance_m: float) -> None:
-    """Every point of a scene that has a time; labels come once the panel has its place."""
+    """Draws every point of a scene that has a time; labels come once the panel has its place."""
     reference = scene.reference
     what = "RMS error of the position (m)" if reference.pointwise else "error of the amplitude (m)"
     dress(ax, _title(scene), "time per simulated tick, in one process (µs)", what)
@@ -59,12 +126,12 @@ def draw_panel(ax: Axes, scene: SceneCost, tolerance_m: float) -> None:
 
 
 def _title(scene: SceneCost) -> str:
-    """Its name, in two lines where it is long."""
+    """Returns the scene's name, in two lines where it is long."""
     return "\n".join(wrap(name_of(scene), _TITLE_LETTERS))
 
 
 def _limits(scene: SceneCost, tolerance_m: float) -> tuple[float, float]:
-    """Whole decades around all errors, the reference's and the tolerance, and room for crosses above."""
+    """Returns whole decades around all errors, the reference's and the tolerance, with room for crosses above."""
     sizes = [drawn_m(point, scene) for point in scene.points if point.error]
     sizes = [size for size in [*sizes, scene.reference.error_m, tolerance_m] if 0.0 < size < math.inf]
     low, high = math.floor(math.log10(min(sizes)) - 0.3), math.ceil(math.log10(max(sizes)) + 0.2)
@@ -73,7 +140,7 @@ def _limits(scene: SceneCost, tolerance_m: float) -> tuple[float, float]:
 
 
 def drawn_m(point: Point, scene: SceneCost) -> float:
-    """The error of a point as drawn: within the reference's uncertainty, what is smaller shows nothing more."""
+    """Returns the error of a point as drawn: no less than a share of the reference's uncertainty."""
     size = point.error.size_m if point.error else math.inf
     return max(size, _WITHIN * scene.reference.error_m, 1e-18)
 
@@ -83,13 +150,13 @@ def _failed(point: Point) -> bool:
 
 
 def _failing(scene: SceneCost) -> list[str]:
-    """Methods that fail at some rate, in the order of their rows."""
+    """Returns the methods that fail at some rate, in the order of their rows."""
     failing = {point.method for point in scene.points if point.us_per_tick and _failed(point)}
     return [method for method in methods_of([scene]) if method in failing]
 
 
 def _mark_failures(ax: Axes, scene: SceneCost) -> None:
-    """Above a line at the top there are no errors to be read, but failures."""
+    """Draws the line above which points are failures, without an error."""
     if not (rows := len(_failing(scene))):
         return
     low, high = np.log10(ax.get_ylim())
@@ -100,8 +167,8 @@ def _mark_failures(ax: Axes, scene: SceneCost) -> None:
     ax.text(0.995, 1.0 - _ROW * rows / 2.0, "failed", fontsize=SMALL, color=GREY, **place)
 
 
-def _place_of(ax: Axes, point: Point, scene: SceneCost) -> tuple[float, float]:
-    """Where a point is drawn: its time and its error; without one, in the row of its method at the top edge."""
+def _position(ax: Axes, point: Point, scene: SceneCost) -> tuple[float, float]:
+    """Returns where a point is drawn: its time and its error; without one, in the row of its method at the top edge."""
     assert point.us_per_tick is not None
     if not _failed(point):
         return point.us_per_tick.median, drawn_m(point, scene)
@@ -111,13 +178,13 @@ def _place_of(ax: Axes, point: Point, scene: SceneCost) -> tuple[float, float]:
 
 
 def _curve(ax: Axes, points: list[Point], scene: SceneCost) -> None:
-    """A method's line, broken where it failed; the quartiles of its times; what is wrong about a point."""
+    """Draws a method's line, broken where it failed, the quartiles of its times, and marks of wrong verdicts."""
     points = sorted((point for point in points if point.us_per_tick), key=lambda point: point.plant_rate)
     if not points:
         return
     method = points[0].method
-    colour, marker = look(method)
-    xy = np.array([_place_of(ax, point, scene) for point in points])
+    colour, marker = method_look(method)
+    xy = np.array([_position(ax, point, scene) for point in points])
     failed = np.array([_failed(point) for point in points])
     wide = 2.2 if method == "exact" else 1.2
     ax.plot(xy[:, 0], np.where(failed, np.nan, xy[:, 1]), color=colour, linewidth=wide, zorder=3, gid=f"line {method}")
@@ -139,19 +206,19 @@ def _curve(ax: Axes, points: list[Point], scene: SceneCost) -> None:
 
 
 def label_points(ax: Axes, scene: SceneCost) -> None:
-    """The plant rate in kHz beside the points: of the scene's own method first, then where there is room."""
+    """Writes the plant rate in kHz beside the points: of the scene's own method first, then where there is room."""
     timed = [point for point in scene.points if point.us_per_tick]
     labels = []
     for point in sorted(timed, key=lambda point: (point.method != scene.own_method, _failed(point))):
-        in_kHz, colour = f"{point.plant_rate / 1000:g}", look(point.method)[0]
+        in_kHz, colour = f"{point.plant_rate / 1000:g}", method_look(point.method)[0]
         half_px = 9.0 if point.plant_rate == _MARKED_HZ else 5.0
-        labels.append(Label(*_place_of(ax, point, scene), in_kHz, colour, in_kHz, half_px))
+        labels.append(Label(*_position(ax, point, scene), in_kHz, colour, in_kHz, half_px))
     lines = [line.get_xydata() for line in ax.lines if (line.get_gid() or "").startswith("line ")]
     whole = [line[np.isfinite(line).all(axis=1)] for line in map(np.asarray, lines)]
     place_labels(ax, labels, whole)
 
 
 def methods_of(scenes: list[SceneCost]) -> list[str]:
-    """All methods, in the order of the looks, others after."""
+    """Returns all methods, in the order of their looks, others after."""
     found = dict.fromkeys(point.method for scene in scenes for point in scene.points)
     return [method for method in LOOKS if method in found] + [method for method in found if method not in LOOKS]

@@ -1,4 +1,4 @@
-"""What ``haploop cost`` shows on the terminal: a table a scene, how quiet the machine was, and the advice."""
+"""The terminal report of ``haploop cost``: a table a scene, the load of the machine, and the advice."""
 
 from __future__ import annotations
 
@@ -8,8 +8,7 @@ from rich.console import Group
 from rich.text import Text
 
 from haploop.tools.cost.advice import rate
-from haploop.tools.cost.data import QUIET_LOAD, QUIET_SPREAD, Cost, Errors, Point, SceneCost, Spread
-from haploop.tools.cost.prices.data import PriceGroup, price_groups
+from haploop.tools.cost.data import QUIET_LOAD, QUIET_SPREAD, Cost, Errors, Point, PriceGroup, SceneCost, Spread
 from haploop.tools.render.terminal import make_table
 from haploop.tools.render.units import amount, fixed
 
@@ -27,16 +26,16 @@ _READING = (
 
 
 def report(cost: Cost) -> RenderableType:
-    """Everything, the advice last, where it is seen."""
+    """Makes the whole report, the advice last, where it is seen."""
     tables: list[RenderableType] = [scene_table(scene) for scene in cost.scenes]
     lines = [Text.assemble((f"{scene.name}: ", "bold"), scene.advice) for scene in cost.scenes]
     small = [Text(words, style="dim") for words in (_READING, made_with(cost))]
-    tables += [price_table(group) for group in price_groups(cost)]
+    tables += [price_table(group) for group in cost.prices]
     return Group(*tables, *small, *_warnings(cost), *lines)
 
 
 def scene_table(scene: SceneCost) -> RenderableType:
-    """Every point of a scene, method by method."""
+    """Makes the table of a scene: every point, method by method."""
     names = _POINTWISE if scene.reference.pointwise else _SWINGS
     numbers = (*names, "residual", "µs/tick", "spread", "procs", "bytecode")
     unbroken = ("method", "verdict")
@@ -70,7 +69,7 @@ def _row(point: Point) -> list[str | Text]:
 
 
 def _figures(error: Errors) -> list[str]:
-    """In metres, or relative where swings are compared."""
+    """Returns the errors in metres, or relative ones where swings are compared."""
     pointwise = error.final_m, error.rms_m, error.max_m
     swings = error.amplitude, error.frequency, error.energy_per_cycle
     return [_power(value) for value in (pointwise if error.rms_m is not None else swings)]
@@ -81,7 +80,7 @@ def _power(value: float | None) -> str:
 
 
 def _time(point: Point) -> str:
-    """In brackets where only the few ticks of a failure could be timed."""
+    """Formats the time; in brackets where only the few ticks of a failure could be timed."""
     if point.us_per_tick is None:
         return "–"
     median = fixed(point.us_per_tick.median)
@@ -99,7 +98,7 @@ def _verdict(point: Point) -> Text:
 
 
 def price_table(group: PriceGroup) -> RenderableType:
-    """One of the other prices; its first row is what the ratios are against."""
+    """Makes the table of a group of prices; ratios are over its first row."""
     numbers = (group.unit, "spread", "ratio")
     table = make_table("", *numbers, "what it buys", numbers=numbers, unbroken=("",), padding=(0, 1, 0, 0))
     for price in group.prices:
@@ -108,13 +107,13 @@ def price_table(group: PriceGroup) -> RenderableType:
 
 
 def _reasons(scene: SceneCost) -> list[Text]:
-    """Why points failed, a line each."""
+    """Returns the reasons of failures, a line each."""
     failed = [point for point in scene.points if point.failure]
     return [Text(f"✗ {p.method} at {rate(p.plant_rate)}: {p.failure}", style="dim") for p in failed]
 
 
 def made_with(cost: Cost) -> str:
-    """Machine, versions and repeats."""
+    """Returns machine, versions and repeats as a sentence."""
     made = ", ".join(f"{name} {number}" for name, number in cost.versions.items())
     at = f" at {cost.commit}" if cost.commit else ""
     ways = f"one process {cost.repeats}, as processes {cost.processes_repeats or 'none'}"
@@ -122,7 +121,7 @@ def made_with(cost: Cost) -> str:
 
 
 def _warnings(cost: Cost) -> list[Text]:
-    """Whether the times can be trusted."""
+    """Returns a warning where the machine was busy."""
     if cost.load is None or not cost.load.busy:
         return []
     seen = [f"a fixed loop varied by {100 * cost.load.calibration_spread:.0f} % (quiet: {100 * QUIET_SPREAD:.0f} %)"]
