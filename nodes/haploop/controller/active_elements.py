@@ -53,35 +53,37 @@ def make_element(table: dict[str, Any], kinds: Mapping[str, type[Element]]) -> t
         ) from error
 
 
-class OwnAttributes:
-    """Detection of elements that keep attributes of their own, which must not be shared by the members of a batch.
+def keeps_attributes(element: Element) -> bool:
+    """Tells whether an element has attributes beside its parameters, or a container that its class shares."""
+    kinds = type(element).__mro__[: type(element).__mro__.index(Element)]
+    entries = [(name, value) for kind in kinds for name, value in vars(kind).items()]
+    slots = any(name == "__slots__" for name, _ in entries)
+    shared = any(_can_change(value) for name, value in entries if not name.startswith("__"))
+    return vars(element).keys() != element.values().keys() or slots or shared
 
-    An element may keep what it likes while it works for one loop. In a batch ``check`` is called after every tick.
+
+def _can_change(value: Any) -> bool:
+    return not isinstance(value, type) and any(hasattr(value, name) for name in ("append", "__setitem__", "add"))
+
+
+class Unchanged:
+    """Guard of elements whose ``force`` may change nothing but the memory it returns: those of a batch.
+
+    Members share their elements, so one that keeps attributes of its own would come to other numbers than alone.
 
     Raises:
-        ElementError: an element has attributes beside its declared parameters, or slots, or a container that its class
-            shares; ``check``: it has changed one.
+        ElementError: an element keeps such attributes; ``check``: it has come to, or has changed a parameter.
     """
 
     def __init__(self, active: tuple[ActiveElement, ...]) -> None:
         self._elements = [each.element for each in active]
-        for element in self._elements:
-            kinds = type(element).__mro__[: type(element).__mro__.index(Element)]
-            shared = [value for kind in kinds for name, value in vars(kind).items() if not name.startswith("__")]
-            if vars(element).keys() != element.values().keys() or any(map(_can_change, shared)) or _has_slots(kinds):
-                raise ElementError(f"The element {element.kind} keeps attributes of its own.")
-        self._parameters = [[*vars(element).values()] for element in self._elements]
+        self._known = [[*vars(element).values()] for element in self._elements]
+        for element in filter(keeps_attributes, self._elements):
+            raise ElementError(f"The element {element.kind} keeps attributes of its own.")
 
     def check(self) -> None:
-        for element, known in zip(self._elements, self._parameters, strict=True):
-            now = [*vars(element).values()]
+        """Look again, after a tick."""
+        for element, known in zip(self._elements, self._known, strict=True):
+            now = vars(element).values()
             if len(now) != len(known) or any(new is not old for new, old in zip(now, known, strict=True)):
                 raise ElementError(f"The element {element.kind} has changed attributes of its own.")
-
-
-def _can_change(value: Any) -> bool:
-    return isinstance(value, list | dict | set | bytearray) or hasattr(value, "append") or hasattr(value, "__setitem__")
-
-
-def _has_slots(kinds: tuple[type, ...]) -> bool:
-    return any("__slots__" in vars(kind) for kind in kinds)

@@ -34,17 +34,16 @@ def _swapped(
     params: ControllerParams, state: ControllerState, change: Change, table: dict[str, Any], kinds: Kinds
 ) -> tuple[ControllerParams, ControllerState]:
     """Both with a new element in its place, one more past the end, or one less; a new one's memory is fresh."""
-    new: tuple[ActiveElement, ...] = ()
-    if table["kind"] != NO_ELEMENT:
-        new = (ActiveElement(*make_element(table, kinds), params.books, change.tick),)
-    elements, memories = list(params.elements), list(state.elements)
-    if not new:
-        del elements[change.element]
-        del memories[change.element]
-    elements[change.element : change.element + len(new)] = new
-    memories[change.element : change.element + len(new)] = [active.element.memory for active in new]
-    params = replace(params, elements=tuple(elements), books=params.books + len(new))
-    return params, state._replace(elements=tuple(memories))
+    place, elements, memories, books = change.element, list(params.elements), list(state.elements), params.books
+    if table["kind"] == NO_ELEMENT:
+        del elements[place]
+        del memories[place]
+    else:
+        active = ActiveElement(*make_element(table, kinds), books, change.tick)
+        elements[place : place + 1] = [active]
+        memories[place : place + 1] = [active.element.memory]
+        books += 1
+    return replace(params, elements=tuple(elements), books=books), state._replace(elements=tuple(memories))
 
 
 def _set(params: ControllerParams, tick: int, path: list[str], value: float) -> ControllerParams:

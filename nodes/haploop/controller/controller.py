@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from typing import Any
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
 
 from haploop.controller.active_elements import ActiveElement, make_element
 from haploop.controller.changes import apply_change
@@ -16,6 +16,10 @@ from haploop.controller.tick import ControllerParams, ControllerState, NoForce, 
 from haploop.controller.wall import Wall
 from haploop.protocol.changes import Change, Event
 from haploop.protocol.ticks import DELAY, Timebase
+from haploop.protocol.trees import tree_select
+
+if TYPE_CHECKING:
+    import numpy as np
 
 # Later than any tick; compared as an int, which is quicker than infinity.
 _NEVER = 2**62
@@ -27,7 +31,7 @@ def make_params(scene: dict[str, Any], period_s: float, kinds: dict[str, type[El
         ActiveElement(*make_element(table, kinds), book, 0) for book, table in enumerate(scene.get("dissipation", []))
     )
     wall = Wall.from_scene(scene)
-    motion = Motion(wall.inward, period_s)
+    motion = Motion(period_s, wall.inward)
     return ControllerParams(*make_estimators(scene, period_s), wall, elements, len(elements), motion)
 
 
@@ -38,7 +42,7 @@ class Controller:
         scene: resolved, of one loop, or stacked of a batch.
         time: of the scene.
         kinds: element kinds at hand.
-        recorder: makes the recorder of the first parameters; one for a single loop when None.
+        recorder: of a batch; one for a single loop when None.
 
     Attributes:
         params, state: what ``tick`` is given, both replaced between ticks; the state is None before the first sample.
@@ -51,7 +55,7 @@ class Controller:
         scene: dict[str, Any],
         time: Timebase,
         kinds: dict[str, type[Element]],
-        recorder: Callable[[ControllerParams], Recorder] | None = None,
+        recorder: Recorder | None = None,
     ) -> None:
         self._kinds, self._control_rate = dict(kinds), time.control_rate
         self.params = make_params(scene, time.period_s, self._kinds)
@@ -59,7 +63,14 @@ class Controller:
         self.tick = 0
         self._changes: list[Change] = []
         self._next_change = _NEVER
-        self.recorder = recorder(self.params) if recorder else Recorder(self.params, time.lookahead_ticks + 2)
+        self.recorder = recorder or Recorder(time.lookahead_ticks + 2)
+        self.recorder.open(self.params)
+
+    def select(self, kept: np.ndarray) -> None:
+        """Keep these members of a batch, whose rows have been taken; ``kept`` is their mask, shape (members,)."""
+        self.params, self.state = tree_select(self.params, kept), tree_select(self.state, kept)
+        self._changes = tree_select(self._changes, kept)
+        self.recorder.open(self.params)
 
     def schedule(self, tick: int, event: Event) -> None:
         """Have a checked swap or set take effect at ``tick``, before that tick's force."""

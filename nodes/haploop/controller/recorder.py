@@ -6,13 +6,8 @@ import math
 from array import array
 from typing import Any, NamedTuple
 
-<<<<<<< HEAD
-from haploop.controller.active_elements import Slots
-from haploop.controller.wall import Wall
-from haploop.protocol.changes import Change
-=======
 from haploop.controller.tick import ControllerParams
->>>>>>> 8bcd206 (wip controller)
+from haploop.protocol.changes import Change
 
 Block = dict[str, Any]
 MOTION_COLUMNS = ("x", "v", "a", "wall")
@@ -31,14 +26,13 @@ class Recorder:
         trouble: the element that first gave a force which is no finite number, as a sentence, or None.
     """
 
-    def __init__(self, params: ControllerParams, history_ticks: int) -> None:
+    def __init__(self, history_ticks: int) -> None:
         self._history_ticks = history_ticks
         self._cut: list[Block] = []
         self.refused: list[Change] = []
         self.history: list[Block] = []
         self.trouble: str | None = None
         self._next_tick = 0
-        self.open(params)
 
     def open(self, params: ControllerParams) -> None:
         """Start a block with the columns of these elements, in which wall and elements are as they are now."""
@@ -122,9 +116,9 @@ class Row(NamedTuple):
 class BatchRecorder(Recorder):
     """Rows of the controller of a batch, kept one by one until they are taken."""
 
-    def __init__(self, params: ControllerParams) -> None:
+    def __init__(self) -> None:
+        super().__init__(history_ticks=0)
         self._taken: list[Row] = []
-        super().__init__(params, history_ticks=0)
 
     def open(self, params: ControllerParams) -> None:
         """From now on rows have the columns of these elements and this wall."""

@@ -11,6 +11,7 @@ from haploop.controller.estimators.base import Estimator, Sample
 from haploop.controller.wall import Wall
 from haploop.protocol.arrays import where
 
+
 @dataclass(frozen=True, slots=True)
 class ControllerParams:
     """Everything that a tick depends on but state and sample; another one takes its place where something changes.
@@ -75,7 +76,13 @@ def initial_state(params: ControllerParams, sample: Sample) -> ControllerState:
     velocity, x = params.velocity, sample[0]
     memory = velocity.start(x, sample)
     after, v = velocity.step(memory, x, sample)
-    u = v if params.input == "encoder" else sample[1] if params.input == "accelerometer" else velocity.acceleration(after)
+    u = (
+        v
+        if params.input == "encoder"
+        else sample[1]
+        if params.input == "accelerometer"
+        else velocity.acceleration(after)
+    )
     elements = tuple([active.element.memory for active in params.elements])
     return ControllerState(memory, params.acceleration.start(u, sample), 0.0, elements)
 

@@ -14,7 +14,7 @@ class ElementError(Exception):
 
 
 class Motion:
-    """Motion of the device at tick k, as the controller knows it; one object, renewed each tick, read only for elements.
+    """Motion of the device at tick k as the controller knows it; renewed each tick, read only for elements.
 
     Attributes:
         x: measured position x_m[k], m.
@@ -28,7 +28,7 @@ class Motion:
 
     __slots__ = ("a", "a_before", "contact", "inward", "period_s", "v", "x")
 
-    def __init__(self, inward: float, period_s: float) -> None:
+    def __init__(self, period_s: float, inward: float) -> None:
         self.x: Any = 0.0
         self.v: Any = 0.0
         self.a: Any = 0.0

@@ -63,7 +63,9 @@ class Kalman(Estimator):
         density = scene[of]["jerk_density"]
         gain = each(lambda jerk, *noises: steady_state(jerk, list(noises), period_s)[0], density, *noises)
         entries = gain.tolist() if gain.ndim == 2 else gain
-        return (FusedKalman if len(noises) > 1 else Kalman)(tuple(map(tuple, entries)), period_s, period_s * period_s / 2.0)
+        return (FusedKalman if len(noises) > 1 else Kalman)(
+            tuple(map(tuple, entries)), period_s, period_s * period_s / 2.0
+        )
 
     def start(self, u: Any, sample: Sample) -> Memory:
         """Returns the first position, at rest."""

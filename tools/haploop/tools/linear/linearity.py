@@ -6,7 +6,9 @@ from collections.abc import Mapping
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
+from haploop.controller.active_elements import keeps_attributes, make_element
 from haploop.controller.dissipation import registry
+from haploop.controller.estimators.choose import estimator_class
 from haploop.plant.choose import integrator_of
 
 if TYPE_CHECKING:
@@ -37,12 +39,13 @@ def why_not_linear(scene: dict[str, Any], kinds: Kinds | None = None) -> list[st
     kinds = installed_kinds() if kinds is None else kinds
     curved = [f"[{table}]" for table in ("friction", "jitter", "loss") if scene.get(table)]
     for table in ("velocity", "acceleration"):
-        if scene.get(table, {}).get("estimator") == "foaw":
-            curved.append(f'{table}.estimator = "foaw"')
+        estimator = scene.get(table, {}).get("estimator") or "difference"
+        if not estimator_class(estimator).linear:
+            curved.append(f'{table}.estimator = "{estimator}"')
     if (integrator := integrator_of(scene)) not in _EXACT:
         curved.append(f'clock.integrator = "{integrator}"')
-    elements = dict.fromkeys(table["kind"] for table in scene.get("dissipation", []))
-    return curved + [f"the element {kind}" for kind in elements if not kinds[kind].linear]
+    elements = {table["kind"]: make_element(table, kinds)[0] for table in scene.get("dissipation", [])}
+    return curved + [f"the element {kind}" for kind, one in elements.items() if not one.linear or keeps_attributes(one)]
 
 
 def left_out(scene: dict[str, Any]) -> list[str]:
