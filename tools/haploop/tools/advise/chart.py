@@ -7,8 +7,19 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from haploop.tools.advise.sentences import buzz_sentences, gain_sentences, largest, stiff
-from haploop.tools.figure.file import empty_figure, write_figure
-from haploop.tools.figure.style import GREY, INK, SMALL, TEXT, VERDICTS, WALL, WALL_FILL, dress, plain_numbers
+from haploop.tools.figure.style import (
+    GREY,
+    INK,
+    SMALL,
+    TEXT,
+    VERDICTS,
+    WALL,
+    WALL_FILL,
+    dress,
+    empty_figure,
+    plain_numbers,
+    write_figure,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

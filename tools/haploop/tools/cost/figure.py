@@ -12,9 +12,21 @@ import numpy as np
 from haploop.tools.cost.advice import name_of
 from haploop.tools.cost.data import Cost, Point, SceneCost
 from haploop.tools.figure.data import FigureError
-from haploop.tools.figure.file import empty_figure, fix_layout, write_figure
 from haploop.tools.figure.labels import Label, place_labels
-from haploop.tools.figure.style import ELEMENTS, FAINT, GREY, INK, SMALL, TEXT, WALL, dress, plain_numbers
+from haploop.tools.figure.style import (
+    ELEMENTS,
+    FAINT,
+    GREY,
+    INK,
+    SMALL,
+    TEXT,
+    WALL,
+    dress,
+    empty_figure,
+    fix_layout,
+    plain_numbers,
+    write_figure,
+)
 from haploop.tools.render.units import amount
 
 if TYPE_CHECKING:

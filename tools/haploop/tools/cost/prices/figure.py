@@ -11,9 +11,21 @@ from haploop.tools.ablation import AGAIN, NONE
 from haploop.tools.cost.data import Cost, Price, PriceGroup, chance_in
 from haploop.tools.cost.figure import UNCERTAIN
 from haploop.tools.figure.data import FigureError
-from haploop.tools.figure.file import empty_figure, fix_layout, write_figure
 from haploop.tools.figure.labels import Label, place_labels
-from haploop.tools.figure.style import ELEMENTS, FAINT, GREY, INK, SMALL, TEXT, WALL, dress, plain_numbers
+from haploop.tools.figure.style import (
+    ELEMENTS,
+    FAINT,
+    GREY,
+    INK,
+    SMALL,
+    TEXT,
+    WALL,
+    dress,
+    empty_figure,
+    fix_layout,
+    plain_numbers,
+    write_figure,
+)
 from haploop.tools.render.units import fixed
 
 if TYPE_CHECKING:

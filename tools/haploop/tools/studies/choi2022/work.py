@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from haploop.launch.scene.toml_writer import to_toml
-from haploop.tools.figure.file import write_figure
+from haploop.tools.figure.style import write_figure
 from haploop.tools.render.progress import Stage, silent
 from haploop.tools.studies.choi2022.claims import Finding
 

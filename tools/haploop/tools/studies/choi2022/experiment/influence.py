@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from haploop.tools.figure.file import empty_figure
-from haploop.tools.figure.style import GREY, INK, SMALL, dress
+from haploop.tools.figure.style import GREY, INK, SMALL, dress, empty_figure
 from haploop.tools.studies.choi2022.experiment.map_parallel import many
 from haploop.tools.studies.choi2022.experiment.readings import SPACE, structure
 from haploop.tools.studies.choi2022.experiment.setup import FRICTION_N, Setup

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from haploop.tools.figure.file import empty_figure
-from haploop.tools.figure.style import INK, SMALL, dress
+from haploop.tools.figure.style import INK, SMALL, dress, empty_figure
 from haploop.tools.studies.choi2022.claims import Claim, Finding
 from haploop.tools.studies.choi2022.experiment.map_parallel import is_steady, runs
 from haploop.tools.studies.choi2022.experiment.setup import both

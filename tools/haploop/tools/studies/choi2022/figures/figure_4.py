@@ -6,8 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from haploop.tools.figure.file import empty_figure
-from haploop.tools.figure.style import INK, SMALL
+from haploop.tools.figure.style import INK, SMALL, empty_figure
 from haploop.tools.render.units import amount, fixed
 from haploop.tools.studies.choi2022.claims import Claim, Finding
 from haploop.tools.studies.choi2022.motion.acceleration import (

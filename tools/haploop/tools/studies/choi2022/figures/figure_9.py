@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from haploop.tools.figure.file import empty_figure
-from haploop.tools.figure.style import legend
+from haploop.tools.figure.style import empty_figure, legend
 from haploop.tools.studies.choi2022.claims import Claim, Finding
 from haploop.tools.studies.choi2022.experiment.press_figure import Press, draw_press
 from haploop.tools.studies.choi2022.experiment.ranges import DAMPINGS, MASSES

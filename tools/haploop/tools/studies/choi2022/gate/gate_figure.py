@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from haploop.tools.figure.file import empty_figure
-from haploop.tools.figure.style import ELEMENTS, GREY, dress, legend
+from haploop.tools.figure.style import ELEMENTS, GREY, dress, empty_figure, legend
 from haploop.tools.studies.choi2022.colours import COLOURS
 from haploop.tools.studies.choi2022.experiment.setup import UNITS, VELOCITIES, Setup
 from haploop.tools.studies.choi2022.gate.gate import Felt, bidirectional, low_passed_s, unidirectional

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from haploop.tools.figure.file import empty_figure
-from haploop.tools.figure.style import INK, SMALL, TEXT
+from haploop.tools.figure.style import INK, SMALL, TEXT, empty_figure
 from haploop.tools.studies.choi2022.simulation.shares import Option, percent
 
 if TYPE_CHECKING:
