@@ -1,4 +1,4 @@
-"""Runs as somebody who only watches meets them: waiting for one, hearing it to its end, waiting for the next."""
+"""Observation of runs by attached nodes: waiting for a run, receiving it to its end, waiting for the next."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from haploop.protocol.observer import Observer
 from haploop.protocol.processes import PROCESSES
 from haploop.protocol.wire import Frame
 
-# How often to look for a run that starts, and to ask again to join one that is about to begin.
+# Intervals at which to look for a run that starts, and to ask again to join one that is about to begin.
 _LOOK_S, _ASK_AGAIN_S = 0.05, 0.02
-# A run that has not begun after so long never will.
+# Time after which a run that has not begun never will.
 _BEGINS_WITHIN_S = 30.0
-# Whoever watches looks around this often, even when nothing is said.
+# Longest wait for a message before the state of the run is checked.
 _IDLE_MS = 200
 
 
-def runs_to_come(run_id: str | None) -> Iterator[LiveRun]:
-    """The run with this id alone; without one, the run that is live or starts next, and after it every other.
+def iterate_runs(run_id: str | None) -> Iterator[LiveRun]:
+    """Yields the run with this id alone; without one, the run that is live or starts next, and then all later ones.
 
     Raises:
         RunNotFound: no run has the id, or several are live and none was named.
@@ -43,16 +43,16 @@ def runs_to_come(run_id: str | None) -> Iterator[LiveRun]:
 
 
 def is_over(run: LiveRun) -> bool:
-    """Whether a run's launcher has gone, or has cleared the run away."""
+    """Tells whether a run's launcher has gone, or has removed the run's directory."""
     return not (run_directory.is_live(run) and (run.sockets / "run.json").exists())
 
 
-class Following:
-    """One run, heard by an observer from wherever it is to its end; a context manager that leaves it.
+class ObservedRun:
+    """Observes one run from its present tick to its end; a context manager that leaves it.
 
     Attributes:
-        observer: what hears it.
-        failure: why the run ended before its time, as a sentence; "" while it goes on and after an end in order.
+        observer: the node that has joined it.
+        failure: why the run ended early, as a sentence; "" while it goes on and after a normal end.
 
     Raises:
         RunNotFound: the run has ended before it could be joined.
@@ -62,8 +62,8 @@ class Following:
     def __init__(self, run: LiveRun, role: str, listens: Sequence[str] = tuple(PROCESSES)) -> None:
         self._run, self._listens = run, listens
         self._over = False
-        self._heard = dict.fromkeys(listens, 0)
-        self._unheard_ticks = 0
+        self._received = dict.fromkeys(listens, 0)
+        self._missed_ticks = 0
         self.failure = ""
         self._context = run.make_context()
         try:
@@ -73,7 +73,7 @@ class Following:
             raise
 
     def _join(self, role: str) -> Observer:
-        """A run that is about to begin refuses; it is asked again until it has begun."""
+        """Joins the run; one that is about to begin refuses, and is asked again until it has begun."""
         give_up = time.monotonic() + _BEGINS_WITHIN_S
         while not is_over(self._run):
             try:
@@ -86,19 +86,19 @@ class Following:
 
     @property
     def skipped_ticks(self) -> int:
-        """Ticks that were never heard of, summed over the streams."""
-        return sum(self.observer.skipped.values()) + self._unheard_ticks
+        """Returns the ticks that were never received, summed over the streams."""
+        return sum(self.observer.skipped.values()) + self._missed_ticks
 
     def frames(self, every_s: float) -> Iterator[list[tuple[str, Frame]]]:
-        """What the run says, (role, message), gathered for ``every_s`` wall seconds each time, until it is over.
+        """Yields the messages of ``every_s`` wall seconds at a time, (role, message), until the run is over.
 
-        An empty list comes now and then while it says nothing.
+        An empty list comes now and then while there are none.
         """
         gone = False
         while not self._over:
             self.observer.wait(_IDLE_MS)
             time.sleep(every_s)
-            # Its last words may still be on their way when the run is gone: one more turn is for them.
+            # Its last messages may still be on their way when the run is gone: they are polled once more.
             last = gone
             gone = is_over(self._run)
             try:
@@ -107,22 +107,22 @@ class Following:
                 self._over, self.failure = True, str(error)
                 return
             for role, frame in frames:
-                self._heard[role] = frame.fields[0] + (frame.fields[1] if frame.name.endswith("_BLOCK") else 0)
+                self._received[role] = frame.fields[0] + (frame.fields[1] if frame.name.endswith("_BLOCK") else 0)
             ended = self.observer.ended.keys() >= set(self._listens)
             self._over = ended or last
             if last and not ended:
-                self._miss_the_end()
+                self._count_missed()
             yield frames
 
-    def _miss_the_end(self) -> None:
-        """The run ended while nobody listened here, or without a word: its summary tells how long it was."""
-        summary = summary_of(self.observer.welcome)
+    def _count_missed(self) -> None:
+        """Counts what was missed of a run whose END never came; its summary tells how long it was."""
+        summary = read_summary(self.observer.welcome)
         if summary is None:
             self.failure = "Its launcher has gone without a word."
             return
         end = summary["from_tick"] + summary["ticks"]
-        missed = (end - tick for role, tick in self._heard.items() if role not in self.observer.ended)
-        self._unheard_ticks = sum(max(0, ticks) for ticks in missed)
+        missed = (end - tick for role, tick in self._received.items() if role not in self.observer.ended)
+        self._missed_ticks = sum(max(0, ticks) for ticks in missed)
 
     def __enter__(self) -> Self:
         return self
@@ -133,8 +133,8 @@ class Following:
         self._context.destroy(linger=0)
 
 
-def summary_of(welcome: dict[str, Any]) -> dict[str, Any] | None:
-    """The summary a run has left; None where it left none, or on another machine."""
+def read_summary(welcome: dict[str, Any]) -> dict[str, Any] | None:
+    """Returns the summary that a run has written; None where there is none, or it is on another machine."""
     try:
         return json.loads((Path(welcome["context"]["out"]) / "summary.json").read_text(encoding="utf-8"))
     except (OSError, ValueError):
