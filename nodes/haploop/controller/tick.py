@@ -72,17 +72,13 @@ class NoForce(Exception):
 
 
 def initial_state(params: ControllerParams, sample: Sample) -> ControllerState:
-    """Returns the state before the first tick, whose sample is given."""
+    """Returns the state before the first tick, whose sample is given: at rest there."""
     velocity, x = params.velocity, sample[0]
     memory = velocity.start(x, sample)
-    after, v = velocity.step(memory, x, sample)
-    u = (
-        v
-        if params.input == "encoder"
-        else sample[1]
-        if params.input == "accelerometer"
-        else velocity.acceleration(after)
-    )
+    if params.input == "encoder":
+        u = 0.0 * x
+    else:
+        u = sample[1] if params.input == "accelerometer" else velocity.acceleration(velocity.step(memory, x, sample)[0])
     elements = tuple([active.element.memory for active in params.elements])
     return ControllerState(memory, params.acceleration.start(u, sample), 0.0, elements)
 
