@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 
 from haploop.controller.controller import Controller
-from haploop.launch.plan.plan import effects_of
+from haploop.launch.plan.effects import effects_of
 from haploop.launch.runs.in_process import run_in_process
 from haploop.launch.scene.file import load
 from haploop.tools.ablation import AGAIN, NONE, WHOLE, ablations

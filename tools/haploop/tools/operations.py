@@ -13,11 +13,10 @@ from types import FrameType
 from typing import TYPE_CHECKING, Any
 
 from haploop.controller.controller import Controller
-from haploop.launch.plan.effects import Effect
+from haploop.launch.plan.effect import Effect
 from haploop.launch.plan.plan import multiplications
 from haploop.plant.plant import Plant
 from haploop.protocol.ticks import Timebase
-from haploop.tools.ablation import without_effect
 
 if TYPE_CHECKING:
     from haploop.controller.dissipation import Element
@@ -119,7 +118,7 @@ def bill(scene: dict[str, Any], named: Iterable[Effect], kinds: Kinds) -> Bill:
         return whole.per_tick - operations(other, kinds).per_tick
 
     elements = scene.get("dissipation", [])
-    others = {effect.name: without_effect(effect, scene) for effect in named}
+    others = {effect.name: effect.without(scene) for effect in named}
     moving = multiplications(scene)
     return Bill(
         whole,

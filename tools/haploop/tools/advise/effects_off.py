@@ -6,8 +6,9 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any
 
+from haploop.launch.plan.effect import without_keys
+from haploop.launch.plan.effects import all_effects
 from haploop.plant.sensing.encoder import accelerometer_is_used
-from haploop.tools.ablation import without_keys
 
 Scene = dict[str, Any]
 SAMPLING = "sampling and hold"
@@ -74,28 +75,6 @@ def _delay(scene: Scene) -> Scene | None:
     return {**scene, "clock": {**scene["clock"], "round_trip_delay": 0.0}}
 
 
-def _quantisation(scene: Scene) -> Scene | None:
-    """Without counts, of the encoder and of the accelerometer."""
-    if "encoder" not in scene:
-        return None
-    # A Kalman filter has to be told what it may trust; it goes on trusting as before.
-    velocity = scene.get("velocity", {})
-    if velocity.get("estimator") == "kalman" and "measurement_noise" not in velocity:
-        velocity = {**velocity, "measurement_noise": scene["encoder"]["resolution"] / 12**0.5}
-    if velocity.get("estimator") == "foaw" and "bound" not in velocity:
-        velocity = {**velocity, "bound": scene["encoder"]["resolution"]}
-    kept = without_keys(scene, "encoder", "accelerometer.resolution")
-    return {**kept, "velocity": velocity} if velocity else kept
-
-
-def _noise(scene: Scene) -> Scene | None:
-    noisy = accelerometer_is_used(scene) and scene.get("accelerometer", {}).get("noise_density")
-    if "noise" not in scene and not noisy:
-        return None
-    scene = without_keys(scene, "noise")
-    return {**scene, "accelerometer": {**scene["accelerometer"], "noise_density": 0.0}} if noisy else scene
-
-
 def _lag(scene: Scene) -> Scene | None:
     """Plain differences of one tick; an accelerometer that is used, ideal.
 
@@ -115,29 +94,17 @@ def _lag(scene: Scene) -> Scene | None:
     return {**scene, "acceleration": {"source": source if source == "accelerometer" else "encoder"}}
 
 
-def _mode(scene: Scene) -> Scene | None:
-    """Motor and tip as one body."""
-    if "transmission" not in scene:
-        return None
-    cable, device = scene["transmission"], scene["device"]
-    rigid = {
-        **device,
-        "mass": device["mass"] + cable["motor_mass"],
-        "damping": device["damping"] + cable["motor_damping"],
-    }
-    return {**without_keys(scene, "transmission"), "device": rigid}
+def _of_effects(cause: str) -> Callable[[Scene], Scene | None]:
+    """What frees a scene of every effect that is part of a cause."""
 
+    def off(scene: Scene) -> Scene | None:
+        after = scene
+        for effect in all_effects():
+            if cause in effect.frees and effect.is_in(after):
+                after = effect.frees[cause](after)
+        return None if after is scene else after
 
-def _actuator(scene: Scene) -> Scene | None:
-    return without_keys(scene, "actuator") if "actuator" in scene else None
-
-
-def _line(scene: Scene) -> Scene | None:
-    return without_keys(scene, "jitter", "loss") if scene.get("jitter") or scene.get("loss") else None
-
-
-def _friction(scene: Scene) -> Scene | None:
-    return without_keys(scene, "friction") if scene.get("friction") else None
+    return off
 
 
 def _without_element(index: int) -> Callable[[Scene], Scene | None]:
@@ -153,12 +120,12 @@ def _without_element(index: int) -> Callable[[Scene], Scene | None]:
 
 _CAUSES = (
     Cause(SAMPLING, "controlled at every plant step", _sampling, "sampling_and_hold_J"),
-    Cause("quantisation", "positions that are not rounded", _quantisation, "quantisation_J"),
+    Cause("quantisation", "positions that are not rounded", _of_effects("quantisation"), "quantisation_J"),
     Cause("delay", "no delay", _delay, "delay_J"),
     Cause("estimator lag", "plain differences, ideal accelerometer", _lag),
-    Cause("structural mode", "a rigid transmission", _mode),
-    Cause("noise", "no noise", _noise),
-    Cause("actuator", "no limits of the actuator", _actuator),
-    Cause("jitter and loss", "a line without jitter and loss", _line),
-    Cause("friction", "no dry friction", _friction),
+    Cause("structural mode", "a rigid transmission", _of_effects("structural mode")),
+    Cause("noise", "no noise", _of_effects("noise")),
+    Cause("actuator", "no limits of the actuator", _of_effects("actuator")),
+    Cause("jitter and loss", "a line without jitter and loss", _of_effects("jitter and loss")),
+    Cause("friction", "no dry friction", _of_effects("friction")),
 )

@@ -13,12 +13,12 @@ Scene = dict[str, Any]
 Factors = Mapping[str, float]
 SHARE = 0.2
 DELAY = "delay"
-# What else is uncertain, and its keys; a grip and a motor go with the hand and the device they belong to.
+# What else is uncertain, and its key; effects such as a grip and a motor have keys that go with it.
 _KEYS = {
-    "device mass": ("device.mass", "transmission.motor_mass"),
-    "hand mass": ("hand.mass",),
-    "hand damping": ("hand.damping", "hand.grip.damping"),
-    "hand stiffness": ("hand.stiffness", "hand.grip.stiffness"),
+    "device mass": "device.mass",
+    "hand mass": "hand.mass",
+    "hand damping": "hand.damping",
+    "hand stiffness": "hand.stiffness",
 }
 # How far each is taken to find the nearest instability, beyond what is safe anyway.
 _FARTHER = (1.3, 1.5, 2.0, 3.0, 5.0, 1 / 1.3, 1 / 1.5, 1 / 2.0, 1 / 3.0, 1 / 5.0)
@@ -67,7 +67,7 @@ class Change:
 def quantities(scene: Scene) -> list[str]:
     """What can be a fifth more or less in a resolved scene: what is there and not 0."""
     found = [DELAY] if scene["clock"]["round_trip_delay"] else []
-    return found + [name for name, keys in _KEYS.items() if any(_at(scene, key) for key in keys)]
+    return found + [name for name in _KEYS if any(_at(scene, key) for key in _keys_of(name))]
 
 
 def singles(scene: Scene) -> list[Change]:
@@ -102,7 +102,7 @@ def scaled(scene: Scene, factors: Factors) -> Scene:
         if name == DELAY:
             scene = _with(scene, "clock.round_trip_delay", delay_s(scene, factor))
             continue
-        for key in _KEYS[name]:
+        for key in _keys_of(name):
             if value := _at(scene, key):
                 scene = _with(scene, key, value * factor)
         value = _at(scene, "hand.force.value")
@@ -121,8 +121,14 @@ def delay_s(scene: Scene, factor: float) -> float:
     return rounded / rate
 
 
+def _keys_of(quantity: str) -> list[str]:
+    from haploop.launch.plan.effects import all_effects
+
+    return [_KEYS[quantity], *(e.scaled_with[quantity] for e in all_effects() if quantity in e.scaled_with)]
+
+
 def _at(scene: Scene, key: str) -> Any:
-    from haploop.launch.plan.effects import at
+    from haploop.launch.plan.effect import at
 
     return at(scene, key)
 
