@@ -1,4 +1,4 @@
-"""What a loop can be freed of, each with how: the causes that a contact may buzz for."""
+"""The causes a contact may buzz for, each with the scene that is without it."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ SAMPLING = "sampling and hold"
 
 @dataclass(frozen=True)
 class Cause:
-    """One thing that may make a loop buzz.
+    """A cause that may make a loop buzz.
 
     Attributes:
         name: as in "because of the delay".
-        without: what takes its place, in a few words.
+        without: words for what takes its place.
         off: the resolved scene without it; None where the scene has none of it.
         leak: its part of the wall's leak, as the summary names it; None where the books cannot tell.
         is_element: whether it is a dissipation element, which is there to help.
@@ -34,7 +34,7 @@ class Cause:
 
 
 def causes(scene: Scene) -> list[Cause]:
-    """All that a resolved scene has of them."""
+    """Returns the causes that a resolved scene has."""
     tables = scene.get("dissipation", [])
     kinds = [table["kind"] for table in tables]
     elements = [
@@ -45,19 +45,19 @@ def causes(scene: Scene) -> list[Cause]:
 
 
 def _element(index: int, kind: str, count: int) -> str:
-    """Its kind, with its number where there are several of it."""
+    """Returns the element's kind, with its number where there are several of it."""
     return kind.replace("-", " ") + (f" (element {index})" if count > 1 else "")
 
 
-def freed(scene: Scene, some: Iterable[Cause]) -> Scene:
-    """The scene without some causes; elements go last, so that their numbers hold."""
+def without_causes(scene: Scene, some: Iterable[Cause]) -> Scene:
+    """Returns the scene without some causes; elements go last, so that their numbers hold."""
     for cause in sorted(some, key=lambda cause: cause.is_element):
         scene = cause.off(scene) or scene
     return scene
 
 
 def _sampling(scene: Scene) -> Scene | None:
-    """A tick at every plant step. Windows of so many ticks keep their time."""
+    """Puts a tick at every plant step; windows of so many ticks keep their time."""
     clock = scene["clock"]
     times = clock["plant_rate"] // clock["control_rate"]
     if times == 1:
@@ -76,7 +76,7 @@ def _delay(scene: Scene) -> Scene | None:
 
 
 def _lag(scene: Scene) -> Scene | None:
-    """Plain differences of one tick; an accelerometer that is used, ideal.
+    """Puts plain differences of one tick, and an ideal accelerometer where one is used.
 
     Without meaning where no element reads an estimate.
     """
@@ -95,7 +95,7 @@ def _lag(scene: Scene) -> Scene | None:
 
 
 def _of_effects(cause: str) -> Callable[[Scene], Scene | None]:
-    """What frees a scene of every effect that is part of a cause."""
+    """Returns a function that takes every effect of a cause out of a scene."""
 
     def off(scene: Scene) -> Scene | None:
         after = scene

@@ -1,4 +1,4 @@
-"""Which walls stay steady when the loop is not quite what it was taken for."""
+"""Search of the margins: walls that stay steady when delay, hand and device are a fifth off."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from haploop.tools.advise.limits.gains import Gains, Search, Values
-from haploop.tools.advise.limits.largest import LEAST_N_M, Limit, Loops, largest
-from haploop.tools.advise.limits.pace import NEAR, WIDE, way
-from haploop.tools.advise.limits.variations import Change, corners, farther, scaled, singles
+from haploop.tools.advise.gains import Gains, Search, Values
+from haploop.tools.advise.largest import LEAST_N_M, NEAR, WIDE, Limit, StiffnessQuery, largest_steady
+from haploop.tools.advise.runs import execution_mode
+from haploop.tools.advise.variations import Change, corners, larger_changes, scale_quantities, single_changes
 
 Scene = dict[str, Any]
 Vary = Callable[[Scene], Scene]
@@ -22,8 +22,8 @@ _LOWER, _TIMES, _MORE = 0.93, 4, 0.8
 
 
 @dataclass(frozen=True)
-class Safe:
-    """A gain that can be used.
+class Recommendation:
+    """The gain to use.
 
     Attributes:
         gains: of the family recommended.
@@ -40,31 +40,31 @@ class Safe:
     farthest: Change | None
 
 
-class Margins:
-    """The search for what is safe, after that for what is steady."""
+class MarginSearch:
+    """The search of safe gains, after that of steady ones."""
 
     def __init__(self, search: Search) -> None:
         self._search, self._tasks = search, search.tasks
-        ways = way(search.tasks.first)
+        ways = execution_mode(search.tasks.first)
         self._near, self._below = NEAR[ways], WIDE[ways].below if ways == "arrays" else ()
 
     def uncertain(self, found: list[Gains]) -> None:
-        """Find out what every family still allows when the loop is not quite what it was taken for."""
+        """Finds the limits of every family with single changes and in the corners that are likely the worst."""
         self._search.stage("a fifth more or less")
-        changes = singles(self._tasks.first)
+        changes = single_changes(self._tasks.first)
         cells = {
-            (index, change): self._changed(gains, gains.values, [change.on])
+            (index, change): self._changed(gains, gains.values, [change.apply])
             for index, gains in enumerate(found)
             for change in changes
         }
-        limits = largest(cells, self._search.judge.judged, self._near, rivals=lambda name: name[0], softest=True)
+        limits = largest_steady(cells, self._search.judge.judge, self._near, rivals=lambda name: name[0], softest=True)
         for (index, change), limit in limits.items():
             found[index].alone[change] = limit
         self._search.stage("the worst corner")
         finalists = [(gains, values) for gains in found for values in self._finalists(gains)]
         together = {index: self._in_corners(*finalist) for index, finalist in enumerate(finalists)}
-        limits = largest(
-            together, self._search.judge.judged, self._near, rivals=lambda index: finalists[index][0].family
+        limits = largest_steady(
+            together, self._search.judge.judge, self._near, rivals=lambda index: finalists[index][0].family
         )
         for index, safe in limits.items():
             gains, values = finalists[index]
@@ -73,7 +73,7 @@ class Margins:
                 gains.safe_values, gains.safe, gains.corner = values, Limit(*ends), _corner(gains.alone)
 
     def _finalists(self, gains: Gains) -> list[Values]:
-        """The best choice of a family, and gentler ones, which may bear more change."""
+        """Returns the best choice of a family, and gentler ones, which may bear more change."""
         ranked = sorted(gains.tried, key=lambda values: (-gains.tried[values].stiffness_N_m, values))
         chosen = ranked[:1]
         while len(chosen) < self._search.grid.finalists:
@@ -83,31 +83,35 @@ class Margins:
             chosen.append(gentler[0])
         return chosen
 
-    def _changed(self, gains: Gains, values: Values, changes: Sequence[Vary], most_N_m: float = math.inf) -> Loops:
-        """A family under some changes at once: all of them must be steady; from where the loop as described is."""
+    def _changed(
+        self, gains: Gains, values: Values, changes: Sequence[Vary], most_N_m: float = math.inf
+    ) -> StiffnessQuery:
+        """Makes the query of a family under some changes, all of which must be steady."""
         elements = gains.family.elements(values)
-        return Loops(
-            lambda k, thorough: [run for change in changes for run in self._tasks.of(k, elements, change, thorough)],
+        return StiffnessQuery(
+            lambda k, thorough: [
+                run for change in changes for run in self._tasks.make_runs(k, elements, change, thorough)
+            ],
             start_N_m=max(LEAST_N_M, gains.tried[values].stiffness_N_m),
             most_N_m=max(LEAST_N_M, min(self._search.most_N_m, most_N_m)),
-            are_few=self._tasks.is_one_run,
+            is_one_run=self._tasks.is_one_run,
         )
 
-    def _in_corners(self, gains: Gains, values: Values) -> Loops:
-        """In the corners that are likely the worst, and as described, unless it is known how far that goes."""
+    def _in_corners(self, gains: Gains, values: Values) -> StiffnessQuery:
+        """Makes the query in the corners that are likely the worst, and as described where that is not known."""
         known, worst = gains.tried[values], _likely_worst(gains)
         if known.is_within(self._search.tolerance):
             return self._changed(gains, values, worst, known.stiffness_N_m)
         return self._changed(gains, values, [_same, *worst], known.not_steady_N_m)
 
-    def safe(self, found: list[Gains]) -> Safe:
-        """The family to use and a stiffness that holds in every corner, rounded down to two digits.
+    def safe(self, found: list[Gains]) -> Recommendation:
+        """Returns the family to use and a stiffness that holds in every corner, rounded down to two digits.
 
         The family that allows most in its likely worst corner is tried in all; where they take so much that another
         comes out above, that is tried, too.
         """
         self._search.stage("every corner")
-        every = [_same, *(lambda scene, c=corner: scaled(scene, c) for corner in corners(self._tasks.first))]
+        every = [_same, *(lambda scene, c=corner: scale_quantities(scene, c) for corner in corners(self._tasks.first))]
         proved: dict[int, float] = {}
         while True:
             best = found[0]
@@ -120,12 +124,14 @@ class Margins:
             proved[id(best)] = holds = self._everywhere(best, every)
             if holds < rounded_down(best.safe.stiffness_N_m):
                 best.safe = Limit(holds, best.safe.stiffness_N_m)
-        changes = farther(self._tasks.first) if proved[id(best)] else []
+        changes = larger_changes(self._tasks.first) if proved[id(best)] else []
         nearest = self._nearest(best, proved[id(best)], changes)
-        return Safe(best, proved[id(best)], len(every), nearest, max(changes, key=lambda c: c.size, default=None))
+        return Recommendation(
+            best, proved[id(best)], len(every), nearest, max(changes, key=lambda c: c.size, default=None)
+        )
 
     def _everywhere(self, gains: Gains, every: list[Vary]) -> float:
-        """The largest stiffness of two digits, of some, that holds in every corner; 0 for none.
+        """Returns the largest stiffness of two digits that was seen to hold in every corner; 0 for none.
 
         Corners in which one failed are asked first about the next.
         """
@@ -142,30 +148,35 @@ class Margins:
         return 0.0
 
     def _failing(self, gains: Gains, stiffness: float, changes: list[Vary]) -> list[Vary]:
-        """The changes under which a wall is not steady; where that costs little, nor may a softer one be unsteady."""
+        """Returns the changes under which a wall, or where that costs little a softer one, is not steady."""
         elements = gains.family.elements(gains.safe_values)
         walls = [stiffness, *(max(LEAST_N_M, stiffness * share) for share in self._below)]
         runs = [
-            (i, run) for i, change in enumerate(changes) for k in walls for run in self._tasks.of(k, elements, change)
+            (i, run)
+            for i, change in enumerate(changes)
+            for k in walls
+            for run in self._tasks.make_runs(k, elements, change)
         ]
-        judged = self._search.judge.judged([run for _, run in runs])
+        judged = self._search.judge.judge([run for _, run in runs])
         failed = {i for (i, _), judgement in zip(runs, judged, strict=True) if not judgement.steady}
         return [change for i, change in enumerate(changes) if i in failed]
 
     def _known_well(self, gains: Gains) -> None:
-        """Find the limit of the choice that is safe, which may have been left off as not the best."""
+        """Finds the limit of the choice that is safe, which may have been left off as not the best."""
         values = gains.safe_values
         if not gains.tried[values].is_within(self._search.tolerance):
             known = self._search.limits([(gains.family, values)], max(LEAST_N_M, gains.tried[values].stiffness_N_m))
             gains.tried[values] = known[gains.family, values]
 
     def _nearest(self, gains: Gains, stiffness: float, changes: list[Change]) -> Change | None:
-        """The smallest change at which a stiffness is no longer steady."""
+        """Returns the smallest change at which a stiffness is no longer steady."""
         self._search.stage("the nearest instability")
         elements = gains.family.elements(gains.safe_values)
         for _, alike in itertools.groupby(sorted(changes, key=_size), key=_size):
-            runs = [(change, run) for change in alike for run in self._tasks.of(stiffness, elements, change.on)]
-            judged = self._search.judge.judged([run for _, run in runs])
+            runs = [
+                (change, run) for change in alike for run in self._tasks.make_runs(stiffness, elements, change.apply)
+            ]
+            judged = self._search.judge.judge([run for _, run in runs])
             failed = [change for (change, _), judgement in zip(runs, judged, strict=True) if not judgement.steady]
             if failed:
                 return failed[0]
@@ -177,25 +188,28 @@ def _same(scene: Scene) -> Scene:
 
 
 def _likely_worst(gains: Gains) -> list[Vary]:
-    """The worst change, and the worst signs of all together, with every mass also the other way."""
+    """Returns the worst change, and the worst signs of all together, with every mass also the other way."""
     corner = _corner(gains.alone)
     flipped = {name: 2.0 - factor if name.endswith("mass") else factor for name, factor in corner.items()}
-    together: list[Vary] = [lambda scene: scaled(scene, corner), lambda scene: scaled(scene, flipped)]
-    return together + ([gains.worst.on] if gains.worst else [])
+    together: list[Vary] = [
+        lambda scene: scale_quantities(scene, corner),
+        lambda scene: scale_quantities(scene, flipped),
+    ]
+    return together + ([gains.worst.apply] if gains.worst else [])
 
 
 def _is_gentler(values: Values, than: Values) -> bool:
-    """The last parameter, which is the inertia where there is one, a quarter smaller at least."""
+    """Tells whether the last parameter, the inertia where there is one, is a quarter smaller at least."""
     return bool(values) and values[-1] <= 0.75 * than[-1]
 
 
 def _allows(gains: Gains, proved: dict[int, float]) -> float:
-    """What a family is known, or likely, to bear in its worst corner."""
+    """Returns the stiffness that a family is known, or likely, to bear in its worst corner."""
     return proved.get(id(gains), gains.safe.stiffness_N_m)
 
 
 def rounded_down(value: float) -> float:
-    """To two digits."""
+    """Rounds down to two digits."""
     if value <= 0.0:
         return 0.0
     rounded = float(f"{value:.1e}")
@@ -207,7 +221,7 @@ def _size(change: Change) -> float:
 
 
 def _corner(alone: dict[Change, Limit]) -> dict[str, float]:
-    """Of every quantity the sign that allows less by itself."""
+    """Returns of every quantity the factor that allows less by itself."""
     worst: dict[str, Change] = {}
     for change, limit in alone.items():
         before = worst.get(change.quantity)

@@ -1,4 +1,4 @@
-"""A loop that is not quite what it was taken for: delay, hand and device, each a fifth more or less."""
+"""Variations of a loop: delay, hand and device, each a fifth more or less, alone and in every combination."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _ADDED_S = (1e-4, 2e-4, 5e-4, 1e-3, 2e-3, 5e-3)
 
 @dataclass(frozen=True)
 class Change:
-    """One quantity that is not what it was taken for.
+    """A change of one quantity.
 
     Attributes:
         quantity: its name.
@@ -42,12 +42,12 @@ class Change:
 
     @property
     def size(self) -> float:
-        """How far it is from no change, to order changes by."""
+        """The distance from no change, by which changes are ordered."""
         return max(self.factor, 1.0 / self.factor) + self.added_s * 1e3
 
     @property
     def words(self) -> str:
-        """``20 % more delay``."""
+        """The change in words: ``20 % more delay``."""
         if self.added_s:
             return f"{amount(self.added_s, 's')} more delay"
         if self.factor >= 2.0:
@@ -57,43 +57,43 @@ class Change:
         share = abs(self.factor - 1.0)
         return f"{share * 100:.0f} % {'more' if self.factor > 1.0 else 'less'} {self.quantity}"
 
-    def on(self, scene: Scene) -> Scene:
-        """The scene so changed."""
+    def apply(self, scene: Scene) -> Scene:
+        """Returns the scene so changed."""
         if self.added_s:
             return _with(scene, "clock.round_trip_delay", scene["clock"]["round_trip_delay"] + self.added_s)
-        return scaled(scene, {self.quantity: self.factor})
+        return scale_quantities(scene, {self.quantity: self.factor})
 
 
-def quantities(scene: Scene) -> list[str]:
-    """What can be a fifth more or less in a resolved scene: what is there and not 0."""
+def uncertain_quantities(scene: Scene) -> list[str]:
+    """Returns the quantities of a resolved scene that can be a fifth more or less: those that are there and not 0."""
     found = [DELAY] if scene["clock"]["round_trip_delay"] else []
     return found + [name for name in _KEYS if any(_at(scene, key) for key in _keys_of(name))]
 
 
-def singles(scene: Scene) -> list[Change]:
-    """Each quantity a fifth less and a fifth more."""
-    return [Change(name, factor) for name in quantities(scene) for factor in (1.0 - SHARE, 1.0 + SHARE)]
+def single_changes(scene: Scene) -> list[Change]:
+    """Returns each quantity a fifth less and a fifth more."""
+    return [Change(name, factor) for name in uncertain_quantities(scene) for factor in (1.0 - SHARE, 1.0 + SHARE)]
 
 
-def farther(scene: Scene) -> list[Change]:
-    """Each quantity ever more and ever less."""
-    found = [Change(name, factor) for name in quantities(scene) for factor in _FARTHER]
+def larger_changes(scene: Scene) -> list[Change]:
+    """Returns each quantity ever more and ever less."""
+    found = [Change(name, factor) for name in uncertain_quantities(scene) for factor in _FARTHER]
     rate = scene["clock"]["plant_rate"]
-    if DELAY not in quantities(scene):
+    if DELAY not in uncertain_quantities(scene):
         steps = dict.fromkeys(max(1, round(added * rate)) for added in _ADDED_S)
         found += [Change(DELAY, added_s=count / rate) for count in steps]
     return found
 
 
 def corners(scene: Scene) -> Iterator[dict[str, float]]:
-    """All quantities a fifth less or more, every combination."""
-    names = quantities(scene)
+    """Returns every combination of all quantities a fifth less or more."""
+    names = uncertain_quantities(scene)
     for factors in itertools.product((1.0 - SHARE, 1.0 + SHARE), repeat=len(names)):
         yield dict(zip(names, factors, strict=True))
 
 
-def scaled(scene: Scene, factors: Factors) -> Scene:
-    """The scene with these quantities multiplied.
+def scale_quantities(scene: Scene, factors: Factors) -> Scene:
+    """Returns the scene with these quantities multiplied.
 
     A delay is rounded to whole plant steps, by at least one. A force of the hand that works against its spring is
     multiplied with it: the hand still wants to reach as far.
@@ -112,7 +112,7 @@ def scaled(scene: Scene, factors: Factors) -> Scene:
 
 
 def delay_s(scene: Scene, factor: float) -> float:
-    """The delay multiplied and rounded to whole plant steps, but not to what it was."""
+    """Returns the delay multiplied and rounded to whole plant steps, but not to what it was, s."""
     rate = scene["clock"]["plant_rate"]
     steps = round(scene["clock"]["round_trip_delay"] * rate)
     rounded = round(steps * factor)
@@ -134,6 +134,6 @@ def _at(scene: Scene, key: str) -> Any:
 
 
 def _with(scene: Scene, key: str, value: Any) -> Scene:
-    """The scene with another value at a dotted key; the tables on the way are copied."""
+    """Returns the scene with another value at a dotted key; the tables on the way are copied."""
     name, _, rest = key.partition(".")
     return {**scene, name: _with(scene[name], rest, value) if rest else value}

@@ -1,4 +1,4 @@
-"""The figure of an advice: how stiff a wall each element allows, and what the contact buzzes for."""
+"""The figure of an advice: the stiffest wall with each element, and without each cause of buzzing."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from haploop.tools.advise.sentences import buzz_sentences, gain_sentences, largest, stiff
+from haploop.tools.advise.report import buzz_sentences, format_limit, format_stiffness, gain_sentences
 from haploop.tools.figure.style import (
     GREY,
     INK,
@@ -38,7 +38,7 @@ _LINE, _CLOSE = 125, 2.2
 
 
 def draw(found: Advice, target: Path) -> Path:
-    """Draw into a file, in the format of its suffix.
+    """Draws into a file, in the format of its suffix.
 
     Raises:
         FigureError: matplotlib is missing, or the file cannot be written.
@@ -47,7 +47,7 @@ def draw(found: Advice, target: Path) -> Path:
 
 
 def figure_of(found: Advice) -> Figure:
-    """Bars of what is steady; below, where something buzzes, bars of what would be without each cause.
+    """Makes bars of the largest steady walls; below, where something buzzes, bars of those without each cause.
 
     Raises:
         FigureError: matplotlib is missing.
@@ -64,17 +64,17 @@ def figure_of(found: Advice) -> Figure:
 
 
 def _gains(ax: Axes, found: Advice) -> None:
-    """Light: as described; dark: also with everything a fifth off. Analytic bounds as lines."""
+    """Draws a light bar for the loop as described, a dark one with everything a fifth off, and bounds as lines."""
     for row, gains in enumerate(found.gains):
         end = gains.limit.stiffness_N_m / 1e3
         safe = gains.safe.stiffness_N_m / 1e3
         ax.barh(row, end, _BAR, color=WALL_FILL, edgecolor=WALL, linewidth=0.8, label=_once(row, "as described"))
         ax.barh(row, safe, _BAR, color=WALL, label=_once(row, "also with all 20 % off"))
-        words = largest(gains.limit)
+        words = format_limit(gains.limit)
         if gains.family.parts and gains.limit.stiffness_N_m:
             words += f" with {gains.family.words(gains.values)}"
         if gains is found.safe.gains and found.safe.stiffness_N_m:
-            words += f"\nuse {stiff(found.safe.stiffness_N_m)}"
+            words += f"\nuse {format_stiffness(found.safe.stiffness_N_m)}"
             words += f" with {gains.family.words(gains.safe_values)}" * (gains.safe_values != gains.values)
         lines = [found.exact_N_m[row], *(bound.stiffness_N_m for bound in found.bounds[row])]
         right = max([end, safe, *(value / 1e3 for value in lines if value)])
@@ -89,7 +89,7 @@ def _gains(ax: Axes, found: Advice) -> None:
 
 
 def _beside(ax: Axes, right: float, row: int, words: str, bold: bool = False) -> None:
-    """Words at the end of a bar; at the axis where there is none."""
+    """Writes words at the end of a bar; at the axis where there is none."""
     ax.annotate(
         words, (right, row) if right else (0.0, row), (6, 0),
         xycoords="data" if right else ax.get_yaxis_transform(), textcoords="offset points",
@@ -99,12 +99,12 @@ def _beside(ax: Axes, right: float, row: int, words: str, bold: bool = False) ->
 
 
 def _once(row: int, label: str) -> str:
-    """One entry in the legend for all rows."""
+    """Returns the label for the first row only: one entry in the legend for all."""
     return label if row == 0 else "_"
 
 
 def _bounds(ax: Axes, found: Advice) -> None:
-    """A line across the row of each family that a bound speaks of."""
+    """Draws a line across the row of each family that a bound speaks of."""
     colours: dict[str, Any] = {}
     for row, (bounds, exact) in enumerate(zip(found.bounds, found.exact_N_m, strict=True)):
         lines = [("exact map, ρ(M) = 1", exact)] + [(f"{b.name} ({b.kind})", b.stiffness_N_m) for b in bounds]
@@ -125,7 +125,7 @@ def _bounds(ax: Axes, found: Advice) -> None:
 
 
 def _causes(ax: Axes, buzz: Buzz) -> None:
-    """The largest steady wall without each cause, against the wall of the scene."""
+    """Draws the largest steady wall without each cause, against the wall of the scene."""
     rows = _rows(buzz)
     names = ["as it is", *(" and ".join(f"without {name}" for name in without.names) for without in rows)]
     limits = [buzz.limit, *(without.limit for without in rows)]
@@ -136,8 +136,10 @@ def _causes(ax: Axes, buzz: Buzz) -> None:
         end = limit.stiffness_N_m / 1e3
         ax.barh(row, end, _BAR, color=VERDICTS["steady"] if cures else "#D9B08C")
         # The words begin beyond the line of the wall where it would run through them.
-        _beside(ax, wall if end < wall < _CLOSE * end else end, row, largest(limit))
-    ax.axvline(wall, color=VERDICTS["diverged"], linewidth=1.4, label=f"its wall, {stiff(buzz.stiffness_N_m)}")
+        _beside(ax, wall if end < wall < _CLOSE * end else end, row, format_limit(limit))
+    ax.axvline(
+        wall, color=VERDICTS["diverged"], linewidth=1.4, label=f"its wall, {format_stiffness(buzz.stiffness_N_m)}"
+    )
     _dress(ax, names, _title(buzz))
     _scale(ax, [buzz.stiffness_N_m, *(limit.stiffness_N_m for limit in limits if limit)])
     _below(ax, buzz_sentences(buzz))
@@ -162,7 +164,7 @@ def _dress(ax: Axes, names: list[str], title: str) -> None:
 
 
 def _scale(ax: Axes, stiffnesses: list[float]) -> None:
-    """Logarithmic from below the softest to well above the stiffest, where the words stand."""
+    """Scales the axis from below the softest to well above the stiffest, where the words stand."""
     real = [value / 1e3 for value in stiffnesses if value > 0.0 and math.isfinite(value)] or [1e-3, 1.0]
     low, high = min(real) / 3.0, max(real)
     ax.set_xscale("log")
@@ -175,14 +177,14 @@ def _scale(ax: Axes, stiffnesses: list[float]) -> None:
 
 
 def _legend(ax: Axes) -> None:
-    """Beside the axes, where no bar can run into it."""
+    """Draws the legend beside the axes, where no bar can run into it."""
     handles, labels = ax.get_legend_handles_labels()
     if handles:
         ax.legend(handles, labels, loc="upper left", bbox_to_anchor=(1.01, 1.0), fontsize=SMALL, frameon=False)
 
 
 def _below(ax: Axes, sentences: list[str]) -> None:
-    """The answer in words, below the axis."""
+    """Writes the sentences below the axis."""
     import textwrap
 
     lines = textwrap.wrap(" ".join(sentences), _LINE)

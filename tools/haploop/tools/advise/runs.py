@@ -1,4 +1,4 @@
-"""Many runs at once: loops of one structure in arrays, light work in this process, heavy work on several cores."""
+"""Many runs at once: scenes of one structure in arrays, light work in this process, heavy work on several cores."""
 
 from __future__ import annotations
 
@@ -11,11 +11,12 @@ from types import TracebackType
 from typing import Any, Self
 
 from haploop.launch.batch.run import groups
+from haploop.launch.batch.stacking import runs_in_arrays
 from haploop.tools.executor.parts import Group
 from haploop.tools.executor.pool import Pool, sources_of
 from haploop.tools.executor.work import Result, Results, Scene, Work, load_kinds
 
-# Without energy books, so many loops of one structure are already sooner run in an array; more than so many with
+# Ablation energy books, so many loops of one structure are already sooner run in an array; more than so many with
 # friction, whose stops and starts take their time, are better shared between workers.
 FEWEST, MOST = 3, 64
 # Processor seconds that a simulated second takes, about: of an array, of a loop in it with friction, of a loop alone.
@@ -26,18 +27,18 @@ _WORTH_S = 6.0
 
 @dataclass(frozen=True)
 class Bundles(Work):
-    """Work on bundles: an item is a list of scenes that run together; what is kept of it is a list of results."""
+    """Work on bundles: an item is a list of scenes that run together, its result a list of results."""
 
     fewest: int = FEWEST
 
     def run(self, items: Sequence[Any]) -> tuple[float, list[Any]]:
-        """What came of every scene of every bundle, and the seconds all of it took."""
+        """Runs every scene of every bundle; returns the seconds all of it took, and the results."""
         began, run = time.perf_counter(), super().run
         done = [run(bundle)[1] for bundle in items]
         return time.perf_counter() - began, done
 
     def lost(self, item: Any, why: str) -> Any:
-        """A result for every scene of a bundle that cannot be run."""
+        """Returns a result for every scene of a bundle that cannot be run."""
         lost = super().lost
         return [lost(scene, why) for scene in item]
 
@@ -53,14 +54,14 @@ class Runs:
     Args:
         plugins: files with elements.
         workers: processes; as many as there are cores when None.
-        told: called with the number of runs done so far.
+        on_progress: called with the number of runs done so far.
 
     Attributes:
         count: runs done so far.
     """
 
-    def __init__(self, plugins: Sequence[Path], workers: int | None, told: Callable[[int], object]) -> None:
-        self._sources, self._workers, self._told = sources_of(plugins), workers, told
+    def __init__(self, plugins: Sequence[Path], workers: int | None, on_progress: Callable[[int], object]) -> None:
+        self._sources, self._workers, self._told = sources_of(plugins), workers, on_progress
         self._here = Pool(1)
         self._pool: Pool | None = None
         self.count = 0
@@ -75,7 +76,7 @@ class Runs:
             self._pool.__exit__(kind, error, traceback)
 
     def results(self, scenes: Sequence[Scene], energy: bool) -> list[Result]:
-        """As of ``run_array``, in the order of the scenes."""
+        """Runs scenes and returns their summaries, in order."""
         bundles = sorted(_bundled(scenes), key=lambda bundle: -_seconds(scenes, bundle))
         found: list[Result] = [{}] * len(scenes)
         work = Bundles(sources=self._sources, energy=energy)
@@ -98,7 +99,7 @@ class Runs:
 
 
 def _bundled(scenes: Sequence[Scene]) -> list[list[int]]:
-    """Indices of the scenes that run together; each of the others by itself."""
+    """Returns indices of the scenes that run together; each of the others by itself."""
     found, alone = [], set(range(len(scenes)))
     for group in groups(scenes):
         if len(group) >= FEWEST:
@@ -109,7 +110,18 @@ def _bundled(scenes: Sequence[Scene]) -> list[list[int]]:
 
 
 def _seconds(scenes: Sequence[Scene], bundle: list[int]) -> float:
-    """Processor time that a bundle takes, about."""
+    """Returns about the processor time that a bundle takes, s."""
     first = scenes[bundle[0]]
     each_s = _ALONE_S if len(bundle) < FEWEST else _IN_IT_S * ("friction" in first) + _ARRAY_S / len(bundle)
     return first["duration"] * each_s * len(bundle)
+
+
+def execution_mode(scene: Scene) -> str:
+    """Returns how such scenes run.
+
+    ``"arrays"``, where hundreds cost little more than one; ``"friction"``, in arrays out of which every stop and start
+    is taken; ``"alone"``.
+    """
+    if not runs_in_arrays(scene):
+        return "alone"
+    return "friction" if "friction" in scene else "arrays"

@@ -1,4 +1,4 @@
-"""What a device is asked to do before its wall is called steady: a tap and a press, or the scene's own task."""
+"""Tasks by which a wall is called steady: a tap and a press, or the scene's own task."""
 
 from __future__ import annotations
 
@@ -26,22 +26,22 @@ _STAYS = (None, "constant", "ramp", "step", "minimum-jerk")
 
 @dataclass(frozen=True)
 class Tasks:
-    """What is run to judge a loop.
+    """The runs that judge a loop.
 
     Attributes:
         scenes: one a task, without dissipation elements in place of which others may be laid.
         seeds: of each task; one unless something is random.
-        words: what is done, for people.
+        words: for what is done.
     """
 
     scenes: tuple[Scene, ...]
     seeds: int
     words: str
 
-    def of(
+    def make_runs(
         self, stiffness: float, elements: Sequence[dict[str, Any]], vary: Any = None, thorough: bool = True
     ) -> list[Scene]:
-        """Every run that judges a wall of this stiffness with these elements; ``vary`` is laid on each scene.
+        """Makes every run that judges a wall of this stiffness with these elements; ``vary`` is applied to each scene.
 
         Unless ``thorough``, only the first task with one seed, which is where most walls fail that fail at all.
         """
@@ -51,7 +51,7 @@ class Tasks:
 
     @property
     def is_one_run(self) -> bool:
-        """Whether one run is all there is to a loop."""
+        """Whether a loop is judged by one run."""
         return len(self.scenes) == self.seeds == 1
 
     @property
@@ -60,8 +60,8 @@ class Tasks:
         return self.scenes[0]
 
 
-def tasks(scene: Scene, has_task: bool) -> Tasks:
-    """The tasks of a resolved scene: its own where its hand keeps pressing to the end, else tap and press."""
+def make_tasks(scene: Scene, has_task: bool) -> Tasks:
+    """Makes the tasks of a resolved scene: its own where its hand keeps pressing to the end, else tap and press."""
     quiet = {**scene, "run": {**scene["run"], "log": "none"}}
     seeds = SEEDS if is_random(scene) else 1
     of_seeds = f", each with {seeds} seeds" if seeds > 1 else ""
@@ -77,36 +77,36 @@ def tasks(scene: Scene, has_task: bool) -> Tasks:
 
 
 def keeps_pressing(scene: Scene) -> bool:
-    """Whether a scene has a wall, lasts long enough to be judged and its force stays."""
+    """Tells whether a scene has a wall, lasts long enough to be judged and its force stays."""
     kind = scene.get("hand", {}).get("force", {}).get("kind")
     return "wall" in scene and scene["duration"] >= lasts_s(scene) and kind in _STAYS
 
 
 def lasts_s(scene: Scene) -> float:
-    """How long the standard tasks of a scene are."""
+    """Returns the duration of the standard tasks of a scene, s."""
     return max(DURATION_S, float(math.ceil(ROUND_TRIPS * scene["clock"]["round_trip_delay"])))
 
 
 def is_held_by(scene: Scene, time_s: float) -> bool:
-    """Whether from then on the hand's force is what it stays at."""
+    """Tells whether from then on the hand's force is what it stays at."""
     force = scene.get("hand", {}).get("force", {})
     return force.get("kind") in _STAYS and force.get("at", 0.0) + force.get("rise_time", 0.0) <= time_s
 
 
 def press_N(scene: Scene) -> float:
-    """How hard the hand presses in the standard tasks."""
+    """Returns the force of the hand in the standard tasks, N."""
     most = scene.get("actuator", {}).get("saturation")
     return PRESS_N if most is None else min(PRESS_N, OF_THE_ACTUATOR * most)
 
 
 def is_random(scene: Scene) -> bool:
-    """Whether another seed gives another run."""
+    """Tells whether another seed gives another run."""
     noisy = accelerometer_is_used(scene) and scene.get("accelerometer", {}).get("noise_density")
     return bool(scene.get("noise") or scene.get("jitter") or scene.get("loss") or noisy)
 
 
 def with_wall(scene: Scene, stiffness: float, elements: Sequence[dict[str, Any]]) -> Scene:
-    """The scene with a wall of this stiffness and these dissipation elements in place of its own."""
+    """Returns the scene with a wall of this stiffness and these dissipation elements in place of its own."""
     laid = {**scene, "wall": {**scene["wall"], "stiffness": stiffness}, "dissipation": list(elements)}
     if not elements:
         del laid["dissipation"]
@@ -114,17 +114,17 @@ def with_wall(scene: Scene, stiffness: float, elements: Sequence[dict[str, Any]]
 
 
 def _tap(scene: Scene, force_N: float) -> Scene:
-    """Device and hand meet the wall at full speed, bounce as they may, and are held to it."""
+    """Makes the tap: device and hand meet the wall at full speed, bounce as they may, and are held to it."""
     return _standard(scene, "a tap", force_N, rise_time=0.1, position=2e-4, velocity=-TAP_M_S)
 
 
 def _press(scene: Scene, force_N: float) -> Scene:
-    """Touches the wall at a thousandth of a metre a second; not at rest, so that both tasks run in one array."""
+    """Makes the press: it touches the wall at 1 mm/s; not at rest, so that both tasks run in one array."""
     return _standard(scene, "a press", force_N, rise_time=0.3, position=2e-4, velocity=-1e-3)
 
 
 def _standard(scene: Scene, name: str, force_N: float, rise_time: float, position: float, velocity: float) -> Scene:
-    """The wall's surface and the rest of the hand's spring at 0; the hand presses down, smoothly, and holds."""
+    """Makes a task: wall and rest of the hand's spring at 0; the hand presses down, smoothly, and holds."""
     push = {"kind": "minimum-jerk", "value": -force_N, "rise_time": rise_time}
     return {
         **scene,

@@ -1,4 +1,4 @@
-"""Is a loop steady? Many at once, each run until its swings have died away or will not."""
+"""Judgement whether loops are steady: many at once, each run until its swings have died away or will not."""
 
 from __future__ import annotations
 
@@ -11,9 +11,8 @@ from typing import TYPE_CHECKING, Any, Self
 
 from haploop.launch.batch.run import groups
 from haploop.logger.verdict.verdict import SMALLEST_SWING_M
-from haploop.tools.advise.limits.pace import way
-from haploop.tools.advise.limits.runs import Runs
-from haploop.tools.advise.limits.tasks import is_held_by
+from haploop.tools.advise.runs import Runs, execution_mode
+from haploop.tools.advise.tasks import is_held_by
 from haploop.tools.linear.linearity import is_linear
 from haploop.tools.linear.one_tick import OneTickMap
 
@@ -31,7 +30,7 @@ GLANCE_S, _WORTH_A_GLANCE = 0.25, 8
 
 @dataclass(frozen=True)
 class Judgement:
-    """What a run came to.
+    """The judgement of a run.
 
     Attributes:
         steady: the verdict, or swings that die away too slowly for a run to end, in a loop whose exact map is stable.
@@ -55,7 +54,7 @@ class Judge:
         kinds: element kinds at hand.
         plugins: the files they came from.
         workers: processes for loops that do not run in arrays; as many as there are cores when None.
-        told: called with the number of runs done so far.
+        on_progress: called with the number of runs done so far.
     """
 
     def __init__(
@@ -63,9 +62,9 @@ class Judge:
         kinds: dict[str, type[Element]],
         plugins: Sequence[Path] = (),
         workers: int | None = None,
-        told: Callable[[int], object] = lambda runs: None,
+        on_progress: Callable[[int], object] = lambda runs: None,
     ) -> None:
-        self._kinds, self._runs = kinds, Runs(plugins, workers, told)
+        self._kinds, self._runs = kinds, Runs(plugins, workers, on_progress)
         self._maps: dict[str, OneTickMap] = {}
 
     def __enter__(self) -> Self:
@@ -78,13 +77,13 @@ class Judge:
 
     @property
     def runs(self) -> int:
-        """How many were run so far."""
+        """The number of runs so far."""
         return self._runs.count
 
-    def judged(
+    def judge(
         self, scenes: Sequence[Scene], patient: Sequence[bool] | None = None, energy: bool = False
     ) -> list[Judgement]:
-        """What each loop comes to, in order.
+        """Judges each loop, in order.
 
         A run whose swings die away too slowly for its duration is repeated as much longer as will do; one about which
         nobody is patient is taken as steady then, and ends early where it buzzes for good. All are patient where
@@ -105,8 +104,8 @@ class Judge:
         return [found[index] for index in range(len(scenes))]
 
     def _glanced(self, scenes: Sequence[Scene], hasty: set[int]) -> dict[int, Judgement]:
-        """Those of the hasty ones that buzz already and will not cease, where every start and stop takes its time."""
-        able = [i for i in sorted(hasty) if way(scenes[i]) == "friction" and _can_be_glanced_at(scenes[i])]
+        """Judges those of the hasty ones that buzz already and will not cease, where friction makes runs dear."""
+        able = [i for i in sorted(hasty) if execution_mode(scenes[i]) == "friction" and _can_be_glanced_at(scenes[i])]
         together = groups([scenes[index] for index in able])
         looked = [able[place] for group in together if len(group) >= _WORTH_A_GLANCE for place in group]
         results = self._runs.results([{**scenes[i], "duration": GLANCE_S} for i in looked], energy=False)
@@ -124,24 +123,24 @@ class Judge:
         return Judgement(steady, verdict, result["window"]["oscillation_m"], result, presumed)
 
     def _needed(self, scene: Scene, result: dict[str, Any]) -> int:
-        """How many times as long a run must be for its swings to die away; 1 where the exact map knows sooner."""
+        """Returns how many times as long a run must be for its swings to die away; 1 where the exact map tells."""
         rate = _dying_1_s(result)
         if not rate or is_linear(scene, self._kinds):
             return 1
         least_m = max(SMALLEST_SWING_M, scene.get("encoder", {}).get("resolution", 0.0))
         swing_m = result["window"]["oscillation_m"] / 2.0
         needs_s = result["duration_s"] + math.log(max(1.0, swing_m / least_m)) / rate
-        allowed = LONGER if way(scene) == "arrays" else LONGER[:1]
+        allowed = LONGER if execution_mode(scene) == "arrays" else LONGER[:1]
         return next((factor for factor in allowed if needs_s <= factor * scene["duration"]), 1)
 
     def _will_be(self, scene: Scene, result: dict[str, Any]) -> bool:
-        """Whether swings that die away more slowly than the run could show do so in the exact map, too."""
+        """Tells whether swings that die away more slowly than the run could show do so in the exact map, too."""
         if not _dying_1_s(result) or not is_linear(scene, self._kinds):
             return False
         return self._map(scene).growth(scene["wall"]["stiffness"]) < 1.0
 
     def _map(self, scene: Scene) -> OneTickMap:
-        """The exact map, which is one for all stiffnesses, starts and forces."""
+        """Returns the exact map, which is one for all stiffnesses, starts and forces."""
         hand = {key: value for key, value in scene.get("hand", {}).items() if key not in ("force", "rest")}
         aside = ("title", "seed", "run", "duration", "wall", "device", "hand")
         device = scene["device"]["mass"], scene["device"]["damping"]
@@ -156,12 +155,12 @@ def _can_be_glanced_at(scene: Scene) -> bool:
 
 
 def _goes_on(result: dict[str, Any]) -> bool:
-    """Whether a short run swings without dying away."""
+    """Tells whether a short run swings without dying away."""
     growth = result["window"]["growth_1_s"]
     return result["verdict"] == "limit-cycle" and growth is not None and growth > -_SURELY_DYING_1_S
 
 
 def _dying_1_s(result: dict[str, Any]) -> float:
-    """The rate r of e^(-r t) by which the swings of a limit cycle die away; 0 where they do not."""
+    """Returns the rate r of e^(-r t) by which the swings of a limit cycle die away; 0 where they do not."""
     rate = result["window"]["growth_1_s"] if result.get("verdict") == "limit-cycle" else None
     return -rate if rate is not None and rate < -_DYING_1_S else 0.0
