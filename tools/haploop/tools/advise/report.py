@@ -37,7 +37,7 @@ _NO_WALL = "No wall stays steady when delay, hand and device may each be 20 % of
 _RENDER = "Render at most {} with {}: steady{}."
 _MARGIN = ", also with {} each 20 % off, in all {} combinations"
 _AS_DESCRIBED = "In the loop as described the largest steady wall with these gains is {}."
-_NO_ELEMENT = "Without any element, and as safe, the largest is {}."
+_NO_ELEMENT = "Without any element the largest safe wall is {}."
 _TEMPTING = "Up to {} would be steady in the loop as described with {}, but with 20 % doubt only {}."
 _NEAREST = "The nearest instability is {}."
 _NO_NEAREST = "No other single change that was tried, up to five times more or less, makes it unsteady."
@@ -55,7 +55,7 @@ _TOO_STIFF = (
     "as the plant steps."
 )
 _NO_CAUSE = "Nothing that could be switched off makes it buzz."
-_HELPS = "It helps, for without it less is steady: {}."
+_HELPS = "Less is steady without: {}."
 
 
 def report(found: Advice) -> RenderableType:
