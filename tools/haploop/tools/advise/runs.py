@@ -16,7 +16,7 @@ from haploop.tools.executor.parts import Group
 from haploop.tools.executor.pool import Pool, sources_of
 from haploop.tools.executor.work import Result, Results, Scene, Work, load_kinds
 
-# Ablation energy books, so many loops of one structure are already sooner run in an array; more than so many with
+# Without energy books, so many loops of one structure are already sooner run in an array; more than so many with
 # friction, whose stops and starts take their time, are better shared between workers.
 FEWEST, MOST = 3, 64
 # Processor seconds that a simulated second takes, about: of an array, of a loop in it with friction, of a loop alone.
