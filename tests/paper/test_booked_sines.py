@@ -6,9 +6,16 @@ import numpy as np
 import pytest
 
 from haploop.tools.studies.choi2022.figures.figure_8 import ahead, first_ahead_Hz
-from haploop.tools.studies.choi2022.gate.booked_sines import bidirectional_J, damper_J, unidirectional_J
-from haploop.tools.studies.choi2022.gate.gate_timing import returned
-from haploop.tools.studies.choi2022.motion.prescribed import DAMPING_N_S_M, MASS_KG, PERIOD_S, mean_taken
+from haploop.tools.studies.choi2022.sampled import (
+    DAMPING_N_S_M,
+    MASS_KG,
+    PERIOD_S,
+    bidirectional_J,
+    damper_J,
+    mean_taken,
+    returned,
+    unidirectional_J,
+)
 
 FREQUENCIES_HZ = np.array([21.3, 77.7, 151.1, 233.9])
 

@@ -17,21 +17,25 @@ from haploop.launch.scene.file import load
 from haploop.tools.cost.grid import scenes_folder
 from haploop.tools.linear.one_tick import OneTickMap
 from haploop.tools.linear.stiffness_limit import smooth
+from haploop.tools.search.random import Point
 from haploop.tools.studies.choi2022.claims import Claim, Finding
 from haploop.tools.studies.choi2022.command import make_figure
-from haploop.tools.studies.choi2022.experiment.limits import first_end, gated_ends
-from haploop.tools.studies.choi2022.experiment.reading_file import file_text
-from haploop.tools.studies.choi2022.experiment.reading_rows import CLAIMS, rows
-from haploop.tools.studies.choi2022.experiment.readings import CHOICES, SPACE, around, draw, structure
+from haploop.tools.studies.choi2022.experiment.limits import GatedMap, first_end, gated_ends
+from haploop.tools.studies.choi2022.experiment.measure import CLAIMS, NAMES, SIZES, largest, measure, stiffness_ladder
+from haploop.tools.studies.choi2022.experiment.scene_file import file_text
+from haploop.tools.studies.choi2022.experiment.search import SPACE, setup_of
 from haploop.tools.studies.choi2022.experiment.setup import KINDS, SCENE_FILE, Setup, elements_of, nearest
-from haploop.tools.studies.choi2022.experiment.stiffness_ladder import NAMES, SIZES, climb, largest
-from haploop.tools.studies.choi2022.experiment.verdict_under_assumptions import READING, holding, judged, keep_shares
-from haploop.tools.studies.choi2022.experiment.verdict_under_assumptions import nearest as nearest_in
+from haploop.tools.studies.choi2022.experiment.verdicts import (
+    NEAREST,
+    keep_shares,
+    nearest_with,
+    verdict_under_assumptions,
+)
+from haploop.tools.studies.choi2022.experiment.verdicts import nearest as nearest_in
+from haploop.tools.studies.choi2022.figures import figure
 from haploop.tools.studies.choi2022.figures.figure_8 import contacts as figure_8_contacts
 from haploop.tools.studies.choi2022.figures.figure_11 import largest_steady
-from haploop.tools.studies.choi2022.figures.registry import figure
-from haploop.tools.studies.choi2022.gate.gated_map import GatedMap
-from haploop.tools.studies.choi2022.simulation.shares import options
+from haploop.tools.studies.choi2022.interpretations import options
 from haploop.tools.studies.choi2022.work import Work
 
 # A drive, a hand and a unit with all that a loop may have but friction.
@@ -41,21 +45,21 @@ SETUP = Setup(
 )  # fmt: skip
 
 
-def test_the_scene_file_is_the_nearest_reading() -> None:
-    """Written by the search, and read back to the same reading, whatever the reading chooses."""
+def test_the_scene_file_is_the_nearest_interpretation() -> None:
+    """Written by the search, and read back to the same setup, whatever it chooses."""
     assert (scenes_folder() / SCENE_FILE).read_text(encoding="utf-8") == file_text(nearest())
 
 
-@pytest.mark.parametrize("reading", [SETUP, replace(SETUP, unit="ideal", velocity="50 Hz", hand=0.7, mount="motor")])
-def test_a_reading_as_a_scene_file_reads_back(reading: Setup, tmp_path: Path) -> None:
+@pytest.mark.parametrize("setup", [SETUP, replace(SETUP, unit="ideal", velocity="50 Hz", hand=0.7, mount="motor")])
+def test_a_setup_as_a_scene_file_reads_back(setup: Setup, tmp_path: Path) -> None:
     for folder in ("devices", "hands"):
         shutil.copytree(scenes_folder().parent / folder, tmp_path / folder)
     file = tmp_path / "scenes" / SCENE_FILE
     file.parent.mkdir()
-    file.write_text(file_text(reading), encoding="utf-8")
+    file.write_text(file_text(setup), encoding="utf-8")
     scene = load(file)
-    assert Setup.of(scene) == reading
-    made = reading.scene(5000.0, [])
+    assert Setup.from_scene(scene) == setup
+    made = setup.scene(5000.0, [])
     for table in ("clock", "device", "transmission", "encoder", "actuator"):
         numbers = {key: value for key, value in made[table].items() if not isinstance(value, str)}
         assert scene[table] == made[table] | {key: pytest.approx(value, rel=1e-5) for key, value in numbers.items()}
@@ -74,13 +78,13 @@ def test_a_gate_without_inertia_leaves_the_exact_limit() -> None:
     """The gated map's first growth is rho(M) = 1 where the gate switches nothing."""
     setup = SETUP
     exact = first_end(setup, "nothing", 0.0)
-    gated = GatedMap.of(setup.linear_scene([]))
+    gated = GatedMap.from_scene(setup.linear_scene([]))
     assert gated_ends(gated, np.array([0.0]))[0] == pytest.approx(exact, rel=0.02)
 
 
 def test_the_gated_maps_growth_without_a_gate_is_that_of_the_eigenvalues() -> None:
     setup = SETUP
-    gated, exact = GatedMap.of(setup.linear_scene([])), OneTickMap.of(setup.linear_scene([]))
+    gated, exact = GatedMap.from_scene(setup.linear_scene([])), OneTickMap.of(setup.linear_scene([]))
     for stiffness in (1900.0, 2500.0):
         assert gated.growth(stiffness, 0.0) == pytest.approx(math.log(exact.growth(stiffness)), abs=1e-4)
 
@@ -89,7 +93,7 @@ def test_the_gated_maps_growth_without_a_gate_is_that_of_the_eigenvalues() -> No
 def test_runs_of_the_program_grow_and_decay_as_the_gated_map_says(share: float, grows: bool) -> None:
     """Without encoder, noise and friction; deep enough that the contact is never left while it matters."""
     setup, mass = SETUP, 0.02
-    limit = gated_ends(GatedMap.of(setup.linear_scene([])), np.array([mass]))[0]
+    limit = gated_ends(GatedMap.from_scene(setup.linear_scene([])), np.array([mass]))[0]
     scene = smooth(setup.scene(share * limit, elements_of(KINDS[3], mass)))
     scene["device"] |= {"velocity": -0.01}
     result = run_in_process(scene, registry())
@@ -99,21 +103,24 @@ def test_runs_of_the_program_grow_and_decay_as_the_gated_map_says(share: float, 
 def test_the_gated_map_refuses_estimates_that_it_does_not_have() -> None:
     scene = SETUP.linear_scene([]) | {"velocity": {"cutoff": 100.0}}
     with pytest.raises(ValueError, match="plain difference"):
-        GatedMap.of(scene)
+        GatedMap.from_scene(scene)
 
 
-def test_readings_are_a_function_of_their_seed_with_every_choice_equally_often() -> None:
+def test_interpretations_are_a_function_of_their_seed_with_every_choice_equally_often() -> None:
     """And those of a group run in arrays."""
-    first, again, other = (draw(np.random.default_rng(seed), 12, 2) for seed in (3, 3, 4))
+    first, again, other = (SPACE.draw(np.random.default_rng(seed), 12, 2) for seed in (3, 3, 4))
     assert first == again != other
-    for key, names in CHOICES.items():
-        counts = {sum(getattr(setup, key) == name for group in first for setup in group) for name in names}
+    for key, names in SPACE.choices.items():
+        counts = {sum(point.choices[key] == name for group in first for point in group) for name in names}
         assert counts == {24 // len(names)}
-    assert all(len({structure(setup) for setup in group}) == 1 for group in first)
+    assert all(point.choices == group[0].choices for group in first for point in group)
 
 
-def test_readings_around_one_share_its_choices_and_keep_to_whole_steps_of_delay() -> None:
-    near = around(np.random.default_rng(1), SETUP, 0.3, 6)
+def test_interpretations_around_one_share_its_choices_and_keep_to_whole_steps_of_delay() -> None:
+    values = SETUP.as_dict()
+    point = Point({key: values[key] for key in SPACE.choices}, {key: values[key] for key in SPACE.bounds})
+    assert setup_of(point) == SETUP
+    near = [setup_of(one) for one in SPACE.neighbours(np.random.default_rng(1), point, 0.3, 6)]
     assert len({setup.delay_s for setup in near}) == 1
     assert near[0].delay_s * 1e4 == pytest.approx(round(near[0].delay_s * 1e4))
     assert {(setup.unit, setup.mount, setup.velocity) for setup in near} == {("420 Hz", "tip", SETUP.velocity)}
@@ -131,7 +138,7 @@ def test_the_largest_stiffness_has_no_gap_below_it() -> None:
 def test_an_element_climbs_until_no_size_of_it_is_steady() -> None:
     """And what is called steady runs to that verdict by itself."""
     levels = np.array([500.0, 2500.0, 6000.0])
-    [found] = climb([SETUP], levels)
+    [found] = stiffness_ladder([SETUP], levels)
     for name in NAMES:
         some = np.asarray(found[name].any(axis=1))
         assert found[name].shape == (3, len(SIZES[name]))
@@ -144,25 +151,25 @@ def test_an_element_climbs_until_no_size_of_it_is_steady() -> None:
 @pytest.mark.slow
 def test_inertias_that_are_booked_unfelt_are_booked_as_recorded() -> None:
     """The books of a millionth, a million times: those of ``haploop dissipate`` on the run with the damper alone."""
-    row = rows([SETUP])[0]
+    row = measure([SETUP])[0]
     [*_, higher] = figure_8_contacts(SETUP, Work(Path(), 8))
     for i in range(3):
         assert row[f"higher {i}_J"] == pytest.approx(float(higher.booked.sampled_J[i, -1]), rel=1e-3)
 
 
-def test_a_claim_that_the_nearest_reading_breaks_may_hold_in_another(tmp_path: Path) -> None:
+def test_a_claim_that_the_nearest_interpretation_breaks_may_hold_in_another(tmp_path: Path) -> None:
     work, claim = Work(tmp_path, 8), Claim("V.B", "it does")
-    assert judged(work, claim, False, "1 J", "8 more").verdict == "does not hold here"
-    assert holding(work, "8 more") is None
+    assert verdict_under_assumptions(work, claim, False, "1 J", "8 more").verdict == "does not hold here"
+    assert nearest_with(work, "8 more") is None
     broken, held = ({name: float(not is_so) for name in CLAIMS} | {"distance": 3.0} for is_so in (False, True))
     table = [SETUP.as_dict() | broken] * 30 + [replace(SETUP, mount="motor").as_dict() | held] * 30
     keep_shares(work, list(CLAIMS), table, options(table, SPACE))
     work.scene("figure_7", replace(SETUP, mode_Hz=300.0).scene(5000.0, []))
-    found = judged(work, claim, False, "1 J", "8 more")
+    found = verdict_under_assumptions(work, claim, False, "1 J", "8 more")
     assert "mount of the unit: motor" in found.assumption
-    assert found.numbers == "1 J. In 50 % of 60 random readings"
-    assert judged(work, claim, True, "1 J", "8 more").assumption == READING
-    assert holding(work, "8 more") == replace(SETUP, mount="motor")
+    assert found.numbers == "1 J. In 50 % of 60 random interpretations"
+    assert verdict_under_assumptions(work, claim, True, "1 J", "8 more").assumption == NEAREST
+    assert nearest_with(work, "8 more") == replace(SETUP, mount="motor")
     assert nearest_in(work).mode_Hz == 300.0
     assert nearest_in(Work(tmp_path, 8, small=True)) == nearest()
 
@@ -171,8 +178,8 @@ def test_a_claim_that_the_nearest_reading_breaks_may_hold_in_another(tmp_path: P
 def test_a_small_figure_has_its_files_and_a_finding_for_every_claim(number: int, tmp_path: Path) -> None:
     make_figure(number, tmp_path, small=True, workers=1)
     kept = json.loads((tmp_path / f"figure_{number}.json").read_text(encoding="utf-8"))
-    claims = [Finding.of(entry).claim for entry in kept["findings"]]
-    assert sorted(claims, key=str) == sorted(figure(number).CLAIMS, key=str)
+    claims = [Finding.from_dict(entry).claim for entry in kept["findings"]]
+    assert sorted(claims, key=str) == sorted(figure(number).CLAIMS.values(), key=str)
     for name in kept["files"]:
         assert (tmp_path / name).stat().st_size > 0
         if name.endswith(".toml") and name != SCENE_FILE:  # that one extends what lies elsewhere

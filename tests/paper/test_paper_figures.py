@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from haploop.launch.scene.file import load
-from haploop.tools.render.progress import silent
+from haploop.tools.search.random import Effort
 from haploop.tools.studies.choi2022.claims import Finding
-from haploop.tools.studies.choi2022.command import make_figure
-from haploop.tools.studies.choi2022.figures.registry import figure
-from haploop.tools.studies.choi2022.page import page
-from haploop.tools.studies.choi2022.simulation.search import Size, search
+from haploop.tools.studies.choi2022.command import make_figure, page
+from haploop.tools.studies.choi2022.figures import figure
+from haploop.tools.studies.choi2022.simulation.search import search
+from haploop.tools.studies.choi2022.work import Work
 
 OURS = (3, 4, 5, 6)
 
@@ -28,8 +28,8 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[int, dict
 
 def test_every_claim_gets_exactly_one_finding(made) -> None:
     for number, kept in made[1].items():
-        claims = [Finding.of(entry).claim for entry in kept["findings"]]
-        assert sorted(claims, key=str) == sorted(figure(number).CLAIMS, key=str)
+        claims = [Finding.from_dict(entry).claim for entry in kept["findings"]]
+        assert sorted(claims, key=str) == sorted(figure(number).CLAIMS.values(), key=str)
         assert all(entry["numbers"] for entry in kept["findings"])
 
 
@@ -67,9 +67,9 @@ def test_the_page_of_them_says_that_it_is_a_trial(made) -> None:
 
 
 @pytest.mark.slow
-def test_a_search_is_a_function_of_its_size_and_fixed_seed_alone() -> None:
-    size = Size(structures=1, each=2, rounds=1, best=1, children=1, neighbours=1)
-    first, again = (search(size, 1, silent) for _ in range(2))
+def test_a_search_is_a_function_of_its_effort_and_fixed_seed_alone(tmp_path: Path) -> None:
+    effort = Effort(structures=1, each=2, rounds=1, best=1, children=1, neighbours=1)
+    first, again = (search(Work(tmp_path, 6, workers=1), effort) for _ in range(2))
     assert repr(first.rows) == repr(again.rows)  # NaN is not equal to itself
     assert first.nearest == again.nearest
     assert [row["stage"] for row in first.rows] == [

@@ -7,9 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from haploop.tools.studies.choi2022.motion.acceleration import largest_mass_kg, passive_up_to_Hz
-from haploop.tools.studies.choi2022.motion.momentum import steps_J
-from haploop.tools.studies.choi2022.motion.prescribed import (
+from haploop.tools.studies.choi2022.figures.figure_4 import largest_mass_kg, passive_up_to_Hz
+from haploop.tools.studies.choi2022.sampled import (
     DAMPING_N_S_M,
     KINDS,
     MASS_KG,
@@ -19,6 +18,7 @@ from haploop.tools.studies.choi2022.motion.prescribed import (
     forces,
     mean_taken,
     positions,
+    steps_J,
     taken_J,
 )
 

@@ -1,1 +1,1 @@
-"""The log of a run in the formats of other programs: ``haploop export``."""
+"""Logs in the formats of other programs."""

@@ -1,1 +1,1 @@
-"""Searches that ask many members at once: bisection of a boundary, and a ladder of rungs."""
+"""Searches: bisection of a boundary and a ladder of rungs, for many members at once, and random search of a space."""

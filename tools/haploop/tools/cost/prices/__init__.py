@@ -1,1 +1,1 @@
-"""Prices of books, log, effects, processes, delay and control rate: jobs to time, measurements, figure."""
+"""The prices of books, log, effects, processes, delay and control rate."""

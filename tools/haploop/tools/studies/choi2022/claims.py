@@ -1,8 +1,11 @@
-"""A claim of the paper, and what came of it here."""
+"""Claims of the paper, and the findings that tests of them come to."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import tomllib
+from dataclasses import asdict, dataclass
+from functools import cache
+from pathlib import Path
 from typing import Any, Literal
 
 Verdict = Literal["holds", "holds under a stated assumption", "does not hold here"]
@@ -12,7 +15,7 @@ VERDICTS: tuple[Verdict, ...] = (HOLDS, ASSUMING, FAILS)
 
 @dataclass(frozen=True)
 class Claim:
-    """Something the paper says.
+    """A sentence of the paper.
 
     Attributes:
         place: section, and figure, equation or item: "III, Fig. 4".
@@ -23,29 +26,34 @@ class Claim:
     quote: str
 
     def holds(self, numbers: str) -> Finding:
-        """It is so here: without any assumption beyond the paper's own words."""
+        """Finds that it holds, without any assumption beyond the paper's own words."""
         return Finding(self, HOLDS, numbers)
 
     def assuming(self, assumption: str, numbers: str) -> Finding:
-        """It is so where the assumption is met, and not elsewhere."""
+        """Finds that it holds where the assumption is met, and not elsewhere."""
         return Finding(self, ASSUMING, numbers, assumption)
 
     def fails(self, numbers: str) -> Finding:
-        """It is not so here."""
+        """Finds that it does not hold."""
         return Finding(self, FAILS, numbers)
 
-    def judged(self, is_so: bool, numbers: str) -> Finding:
-        """``holds`` or ``fails``."""
-        return self.holds(numbers) if is_so else self.fails(numbers)
+    def holds_if(self, is_so: bool, numbers: str, assumption: str = "", under_it: bool = False) -> Finding:
+        """Finds that it holds if ``is_so``, else that it holds under the assumption if ``under_it``, else neither."""
+        if is_so:
+            return self.holds(numbers)
+        return self.assuming(assumption, numbers) if under_it else self.fails(numbers)
 
 
 @dataclass(frozen=True)
 class Finding:
-    """What our test of a claim came to.
+    """The outcome of a test of a claim.
 
     Attributes:
         numbers: what was computed, with units.
         assumption: what has to be assumed for it to hold; empty for the other verdicts.
+
+    Raises:
+        ValueError: there is no such verdict, or an assumption does not belong to it.
     """
 
     claim: Claim
@@ -60,12 +68,21 @@ class Finding:
             raise ValueError(f"An assumption belongs to the verdict {ASSUMING!r} and to no other.")
 
     def as_dict(self) -> dict[str, Any]:
-        """As it is kept beside the figure."""
-        claim = {"place": self.claim.place, "quote": self.claim.quote}
-        return {**claim, "verdict": self.verdict, "assumption": self.assumption, "numbers": self.numbers}
+        """Returns it as it is kept beside the figure."""
+        kept = asdict(self)
+        return kept.pop("claim") | kept
 
     @classmethod
-    def of(cls, kept: dict[str, Any]) -> Finding:
-        """Read back what ``as_dict`` gave."""
-        claim = Claim(kept["place"], kept["quote"])
-        return cls(claim, kept["verdict"], kept["numbers"], kept["assumption"])
+    def from_dict(cls, kept: dict[str, Any]) -> Finding:
+        """Reads back what ``as_dict`` returned."""
+        return cls(Claim(kept["place"], kept["quote"]), kept["verdict"], kept["numbers"], kept["assumption"])
+
+
+def claims_of(figure: int) -> dict[str, Claim]:
+    """Returns the claims that a figure tests, by name, from ``claims.toml``."""
+    return {name: Claim(**claim) for name, claim in _claims()[str(figure)].items()}
+
+
+@cache
+def _claims() -> dict[str, dict[str, dict[str, str]]]:
+    return tomllib.loads(Path(__file__).with_name("claims.toml").read_text(encoding="utf-8"))

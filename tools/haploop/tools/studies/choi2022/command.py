@@ -1,20 +1,47 @@
-"""``haploop paper``: makes the figures of the paper and the page of its claims."""
+"""``haploop paper``: makes the figures of the paper and the page of its claims; ``make paper``: docs/paper.md."""
 
 from __future__ import annotations
 
+import json
+import shutil
+import sys
+from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from haploop.tools.cli.exit_codes import WRONG_USE, leave, plain_errors
 from haploop.tools.figure.data import FigureError
+from haploop.tools.render.markdown import markdown_table
 from haploop.tools.render.progress import Stage, bars, silent
-from haploop.tools.studies.choi2022.figures.registry import figure, numbers
-from haploop.tools.studies.choi2022.page import PAGE, write_page
+from haploop.tools.studies.choi2022.claims import ASSUMING, VERDICTS, Finding
+from haploop.tools.studies.choi2022.figures import figure, numbers
 from haploop.tools.studies.choi2022.work import Work
+
+PAGE = "paper.md"
+_INTRO = """\
+What Choi et al. 2022 ("Virtual Inertia as an Energy Dissipation Element for Haptic Interfaces", IEEE Robotics and
+Automation Letters) say in their sections II to VI, and what this program finds of it. Every number here was computed by
+`haploop paper` and written by `make paper`; none was typed."""
+_SMALL = "**Made with `--small`, with few runs: the numbers are those of a trial.**"
+_INTERPRETATIONS = """\
+The paper leaves much open: of the simulation the encoder's step, the noise, the operator's force and how the
+acceleration is had, of the experiments the device's inner mode, the loop's delay and the inertial unit. An
+*interpretation* chooses all of it and keeps every number the paper gives. Interpretations were drawn at random, with
+fixed seeds, and "in 37 % of 4096 interpretations" means that. A claim that holds under some interpretations only is
+said to hold *assuming* one."""
+_SECTIONS = {
+    "II": "Energy leak in haptic interfaces",
+    "III": "Energy behavior of virtual inertia",
+    "IV": "Unidirectional virtual inertia",
+    "V.A": "Simulation",
+    "V.B": "Experiment",
+    "VI": "Conclusion",
+}
 
 
 def paper(wanted: Sequence[int], out: Path, small: bool, workers: int | None) -> None:
-    """Make some figures, all when none is named, and write the page of what the directory then holds."""
+    """Makes some figures, all when none is named, and writes the page of what the directory then holds."""
     there = numbers()
     for number in wanted:
         if number not in there:
@@ -36,10 +63,113 @@ def paper(wanted: Sequence[int], out: Path, small: bool, workers: int | None) ->
 def make_figure(
     number: int, out: Path, *, small: bool = False, workers: int | None = None, stage: Stage = silent
 ) -> None:
-    """Make one figure: picture, data, scenes and findings go into ``out``.
+    """Makes one figure: picture, data, scenes and findings go into ``out``.
 
     Raises:
         FigureError: matplotlib is missing, or a picture cannot be written.
     """
     module, work = figure(number), Work(out, number, small=small, workers=workers, stage=stage)
     work.keep(module.TITLE, module.make(work))
+
+
+def write_page(directory: Path, target: Path | None = None, pictures: str = "") -> Path:
+    """Writes the page of the figures in a directory and returns its file.
+
+    Args:
+        directory: what ``haploop paper`` made, wholly or in part.
+        target: the page; ``paper.md`` in the directory when None.
+        pictures: where the pictures lie, seen from the page, with a slash at the end.
+    """
+    target = target or directory / PAGE
+    target.write_text(page(made(directory), pictures), encoding="utf-8")
+    return target
+
+
+def made(directory: Path) -> dict[int, dict[str, Any]]:
+    """Returns what the directory holds, by the number of the figure."""
+    files = ((number, directory / f"figure_{number}.json") for number in numbers())
+    return {number: json.loads(file.read_text(encoding="utf-8")) for number, file in files if file.exists()}
+
+
+def page(kept: dict[int, dict[str, Any]], pictures: str = "") -> str:
+    """Returns the page in Markdown: answers, the finding of every claim, then the figures."""
+    rows = [(number, Finding.from_dict(entry)) for number, one in kept.items() for entry in one["findings"]]
+    parts = ["# The paper, claim by claim", _INTRO]
+    parts += [_SMALL] if any(one["small"] for one in kept.values()) else []
+    # The last figures are nearest to a device that is to be built.
+    answers = [f"- {one['answer']} ([{number}](#figure-{number}))" for number, one in kept.items() if one.get("answer")]
+    parts += ["## What a builder can take from it", "\n".join(reversed(answers))] if answers else []
+    parts += ["## Claims", _count(rows), _INTERPRETATIONS, *_tables(rows), *_missing(kept), "## Figures"]
+    for number, one in kept.items():
+        parts += _figure(number, one, pictures)
+    return "\n\n".join(parts) + "\n"
+
+
+def _count(rows: list[tuple[int, Finding]]) -> str:
+    count = Counter(finding.verdict for _, finding in rows)
+    return f"{len(rows)} claims: {'; '.join(f'{verdict}: {count[verdict]}' for verdict in VERDICTS)}."
+
+
+def _tables(rows: list[tuple[int, Finding]]) -> list[str]:
+    """Returns a table for each section of the paper, in its order; within it by figure."""
+    parts = []
+    for section, title in _SECTIONS.items():
+        if there := [row for row in rows if _section(row[1].claim.place) == section]:
+            parts += [f"### {section}. {title}", _table(there)]
+    return parts
+
+
+def _section(place: str) -> str:
+    """Returns ``V.B`` of ``V.B.2, Fig. 8``."""
+    name = place.partition(",")[0]
+    return ".".join(name.split(".")[:2])
+
+
+def _table(rows: list[tuple[int, Finding]]) -> str:
+    cells = []
+    for number, finding in rows:
+        claim = f"“{finding.claim.quote}” ({finding.claim.place})"
+        is_so = f"**holds assuming** {finding.assumption}" if finding.verdict == ASSUMING else f"**{finding.verdict}**"
+        cells.append([claim, is_so, finding.numbers, f"[{number}](#figure-{number})"])
+    return markdown_table(["the paper says", "here", "numbers", "figure"], cells)
+
+
+def _missing(kept: dict[int, dict[str, Any]]) -> list[str]:
+    """Names the figures that were not made, and how many claims they would test."""
+    missing = [f"{number} ({len(figure(number).CLAIMS)} claims)" for number in numbers() if number not in kept]
+    return [f"Not made here: figure {', '.join(missing)}."] if missing else []
+
+
+def _figure(number: int, one: dict[str, Any], pictures: str) -> list[str]:
+    """Returns heading, pictures with what is seen on them, notes, and which files hold data and scenes."""
+    shown = [name for name in one["files"] if name.endswith(".png")]
+    others = ", ".join(f"`{name}`" for name in one["files"] if name not in shown)
+    parts = [f'<a id="figure-{number}"></a>', f"### Figure {number}: {one['title']}"]
+    for name in shown:
+        parts += [f"![{one['title']}]({pictures}{name})", one.get("seen", {}).get(name, "")]
+    parts += [one["caption"], *one["notes"]]
+    data = f"Data and scenes, beside the figure after `haploop paper --figure {number}`: {others}."
+    return [part for part in [*parts, data] if part]
+
+
+def main() -> None:
+    """``python -m haploop.tools.studies.choi2022.command RUN DOCS``: writes the page and its pictures into docs."""
+    if len(sys.argv) != 3:
+        leave("Two directories were expected: that of a haploop paper, and where the page goes.", WRONG_USE)
+    directory, docs = map(Path, sys.argv[1:])
+    kept = made(directory)
+    if not kept:
+        leave(f"There is no figure in {directory}; make them with haploop paper --out {directory}.", WRONG_USE)
+    pictures = docs / "paper"
+    pictures.mkdir(parents=True, exist_ok=True)
+    for old in pictures.glob("*.png"):
+        old.unlink()
+    for one in kept.values():
+        for name in one["files"]:
+            if name.endswith(".png"):
+                shutil.copyfile(directory / name, pictures / name)
+    print(write_page(directory, docs / PAGE, "paper/"))
+
+
+if __name__ == "__main__":
+    main()

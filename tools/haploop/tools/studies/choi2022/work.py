@@ -1,27 +1,31 @@
-"""Where a figure leaves what it made: picture, data, scenes and findings."""
+"""Where a figure leaves what it made: pictures, data, scenes and findings."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
+from haploop.controller.dissipation import registry
 from haploop.launch.scene.toml_writer import to_toml
-from haploop.tools.figure.style import write_figure
+from haploop.tools.executor.executors import make_executor, map_parallel
+from haploop.tools.executor.pool import Pool
+from haploop.tools.figure.file import write_figure
 from haploop.tools.render.progress import Stage, silent
 from haploop.tools.studies.choi2022.claims import Finding
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from haploop.controller.dissipation import Element
+Item = TypeVar("Item")
+Answer = TypeVar("Answer")
 
 
 class Work:
-    """One figure in the making.
+    """A figure in the making.
 
     Args:
         out: directory of all figures.
@@ -31,7 +35,7 @@ class Work:
         stage: told what goes on.
 
     Attributes:
-        kinds: elements at hand.
+        kinds: classes of elements, by name.
         answer: what a builder of devices can take from it, in a sentence or two; empty for what has none.
         caption: what is to be seen, in a sentence or two.
         notes: whole sections in Markdown that go below the figure on the page.
@@ -40,37 +44,54 @@ class Work:
     def __init__(
         self, out: Path, number: int, *, small: bool = False, workers: int | None = None, stage: Stage = silent
     ) -> None:
-        from haploop.controller.dissipation import registry
-
         self.out, self.number, self.small, self.workers, self.stage = out, number, small, workers, stage
-        self.kinds: dict[str, type[Element]] = registry()
+        self.kinds = registry()
         self.answer = self.caption = ""
         self.notes: list[str] = []
         self._files: list[str] = []
         self._seen: dict[str, str] = {}
 
+    def map_parallel(self, name: str, call: Callable[[Item], Answer], items: Sequence[Item]) -> list[Answer]:
+        """Returns what an importable function returns for each item, in their order."""
+        with make_executor(self.workers) as executor:
+            return map_parallel(executor, call, items, self.stage(name, len(items)))
+
+    def run_all(self, name: str, scenes: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
+        """Returns the results of scenes without their energy books, in their order."""
+        advance = self.stage(name, len(scenes))
+        found: dict[int, dict[str, Any]] = {}
+        with Pool(self.workers) as pool:
+            for index, result in pool.results(scenes, energy=False):
+                found[index] = result
+                advance()
+        return [found[index] for index in range(len(scenes))]
+
     def path(self, name: str) -> Path:
-        """A file of this figure, noted as one that belongs to it."""
+        """Returns the path of a file, noted as one that belongs to this figure."""
         if name not in self._files:
             self._files.append(name)
         return self.out / name
 
+    def text(self, name: str, text: str) -> None:
+        """Writes a text file."""
+        self.path(name).write_text(text, encoding="utf-8")
+
     def figure(self, figure: Figure, name: str, seen: str = "") -> None:
-        """Write a picture, ``name`` without its suffix; what is seen on it goes below it."""
+        """Writes a picture, ``name`` without its suffix; what is seen on it goes below it."""
         write_figure(figure, self.path(f"{name}.png"))
         self._seen[f"{name}.png"] = seen
 
     def data(self, name: str, columns: Mapping[str, Any]) -> None:
-        """Write arrays by name; the unit stands at the end of each name."""
+        """Writes arrays by name; the unit stands at the end of each name."""
         arrays: dict[str, Any] = {key: np.asarray(value) for key, value in columns.items()}
         np.savez_compressed(self.path(f"{name}.npz"), **arrays)
 
     def scene(self, name: str, scene: dict[str, Any]) -> None:
-        """Write a resolved scene that runs by itself."""
-        self.path(f"{name}.toml").write_text(to_toml(scene), encoding="utf-8")
+        """Writes a resolved scene that runs by itself."""
+        self.text(f"{name}.toml", to_toml(scene))
 
     def keep(self, title: str, findings: Sequence[Finding]) -> None:
-        """Write what the page needs: figure_N.json."""
+        """Writes what the page needs: figure_N.json."""
         kept = {
             "number": self.number,
             "title": title,

@@ -1,1 +1,1 @@
-"""The experiments of Choi et al. 2022, section V.B: the device as a model, and which walls each element steadies."""
+"""The experiments of section V.B: interpretations of the device, the search among them, and which walls are steady."""

@@ -1,22 +1,31 @@
-"""The largest stiffness that a loop in contact bears with each element and its best size, without a single run."""
+"""The largest stiffness that a loop in contact bears with each element and its best size, without a single run.
+
+Linear elements: where the one-tick map of the loop has the spectral radius 1. Unidirectional inertia: where the same
+map, switched by the gate of eq. 9, begins to grow.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import NamedTuple
+from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from haploop.plant.chain.chain import Chain
 from haploop.tools.linear.one_tick import OneTickMap
 from haploop.tools.search.bisect import bisect_many
 from haploop.tools.studies.choi2022.experiment.setup import KINDS, Setup, elements_of
-from haploop.tools.studies.choi2022.gate.gated_map import GatedMap
 
 # Sizes tried for every element: from next to nothing to beyond what any loop here bears. N s/m, and kg.
 DAMPINGS = np.geomspace(0.1, 40.0, 10)
 MASSES = np.geomspace(3e-4, 0.08, 10)
 _SOFTEST, _STIFFEST, _COARSE, _HALVINGS = 50.0, 60e3, 30, 4
 _REFINED = 3
+# A mass that adds nothing but keeps its place in the map, and one to take the map's slope from; kg.
+_NO_MASS, _SOME_MASS = 1e-15, 1e-3
+_NO_DAMPING = 1e-12
+_STARTS, _TICKS, _SETTLED, _RESCALED_EVERY = 3, 1200, 400, 50
 
 
 class Best(NamedTuple):
@@ -27,9 +36,9 @@ class Best(NamedTuple):
 
 
 def limits(setup: Setup) -> dict[str, Best]:
-    """Of every kind of ``KINDS``: exact (rho(M) = 1) for three, found with the gated map for the last."""
+    """Returns the limit of each of ``KINDS``: exact (rho(M) = 1) of three, by the gated map of the last."""
     scene = setup.linear_scene([])
-    gated = GatedMap.of(scene)
+    gated = GatedMap.from_scene(scene)
 
     def exact(kind: str) -> Callable[[np.ndarray], np.ndarray]:
         return lambda sizes: np.array([first_end(setup, kind, size) for size in sizes])
@@ -41,29 +50,21 @@ def limits(setup: Setup) -> dict[str, Best]:
     return found
 
 
-def limit_of_both(setup: Setup, dampings: np.ndarray, masses: np.ndarray) -> tuple[float, float, float]:
-    """The largest stiffness of damping with unidirectional inertia on a grid: (N/m, N s/m, kg)."""
-    scene = setup.linear_scene([])
-    ends = np.array([gated_ends(GatedMap.of(scene, float(damping)), masses) for damping in dampings])
-    i, j = np.unravel_index(ends.argmax(), ends.shape)
-    return float(ends[i, j]), float(dampings[i]), float(masses[j])
-
-
 def first_end(setup: Setup, kind: str, size: float) -> float:
-    """Where the range of steady stiffnesses that begins at 0 ends in N/m; 0 where there is none."""
+    """Returns the end of the range of steady stiffnesses that begins at 0, N/m; 0 where there is none."""
     ranges = OneTickMap.of(setup.linear_scene(elements_of(kind, float(size)))).stable_ranges()
     return min(ranges[0][1], _STIFFEST) if ranges and ranges[0][0] == 0.0 else 0.0
 
 
 def swings_at_Hz(setup: Setup, stiffness: float, kind: str = "nothing", size: float = 0.0) -> float:
-    """The frequency of what grows fastest, or decays slowest, at a stiffness in N/m."""
+    """Returns the frequency of what grows fastest, or decays slowest, at a stiffness in N/m."""
     scene = setup.linear_scene(elements_of(kind, size))
     values = np.linalg.eigvals(OneTickMap.of(scene).matrix(stiffness))
     return float(abs(np.angle(values[np.abs(values).argmax()])) / (2.0 * np.pi) * scene["clock"]["control_rate"])
 
 
 def gated_ends(gated: GatedMap, masses: np.ndarray) -> np.ndarray:
-    """For every mass of unidirectional inertia: the stiffness at which the loop first grows, N/m."""
+    """Returns for each mass of unidirectional inertia the stiffness at which the loop first grows, N/m."""
     coarse = np.geomspace(_SOFTEST, _STIFFEST, _COARSE)
     grows = gated.growth(coarse[:, None], masses[None, :]) >= 0.0
     first = np.where(grows.any(axis=0), grows.argmax(axis=0), len(coarse) - 1)
@@ -78,10 +79,90 @@ def gated_ends(gated: GatedMap, masses: np.ndarray) -> np.ndarray:
 
 
 def _best(ends: Callable[[np.ndarray], np.ndarray], sizes: np.ndarray) -> Best:
-    """The best of some sizes, and of others between its neighbours."""
+    """Returns the best of some sizes, and of others between its neighbours."""
     found = ends(sizes)
     i = int(found.argmax())
     finer = np.geomspace(sizes[max(i - 1, 0)], sizes[min(i + 1, len(sizes) - 1)], _REFINED + 2)[1:-1]
     sizes, found = np.append(sizes, finer), np.append(found, ends(finer))
     i = int(found.argmax())
     return Best(float(found[i]), float(sizes[i]))
+
+
+@dataclass(frozen=True)
+class GatedMap:
+    """The map w -> (A - K p q' + m g[k] P) w with g[k] = 1 if v[k] a[k-1] >= 0, else 0 (Choi et al. 2022, eq. 9).
+
+    The same one-tick map as of a linear loop in a contact that is never left (``OneTickMap``), switched by the signs of
+    v[k] = x[k] - x[k-1] and of the reading before the present one. The map is homogeneous: twice the swing takes
+    twice the course, so that a start either grows or decays, whatever its size. Which of them may depend on the start;
+    the fastest growth of a few random ones counts.
+
+    Attributes:
+        without: A, shape (w, w).
+        per_kg: P, shape (w, w).
+        pushed: p, shape (w,).
+        states: how many entries of w are the plant's; the reading follows them.
+    """
+
+    without: np.ndarray
+    per_kg: np.ndarray
+    pushed: np.ndarray
+    states: int
+
+    @classmethod
+    def from_scene(cls, scene: dict[str, Any], damping: float = 0.0) -> GatedMap:
+        """Makes the map of a resolved scene without elements, with so much damping in N s/m beside the inertia.
+
+        Raises:
+            ValueError: velocity or acceleration are not read as the map has it.
+            NotLinear: the rest of the loop is no linear map.
+        """
+        if scene.get("velocity") or scene.get("acceleration", {}) != {"source": "accelerometer"}:
+            raise ValueError("The gate's map is that of a plain difference of positions and a raw accelerometer.")
+
+        def map_with(mass: float) -> OneTickMap:
+            damped = {"kind": "damping", "acts": "always", "damping": damping or _NO_DAMPING}
+            inertia = {"kind": "bidirectional-inertia", "acts": "always", "mass": mass}
+            return OneTickMap.of({**scene, "dissipation": [damped, inertia]})
+
+        least, more = map_with(_NO_MASS), map_with(_SOME_MASS)
+        per_kg = (more.without_wall - least.without_wall) / (_SOME_MASS - _NO_MASS)
+        return cls(least.without_wall, per_kg, least.pushed, len(Chain.of(scene).states))
+
+    def growth(self, stiffness: Any, mass: Any, *, seed: int = 1, ticks: int = _TICKS) -> np.ndarray:
+        """Returns ln of the factor per tick by which the fastest of some random starts grows in the end, peak to peak.
+
+        Args:
+            stiffness, mass: N/m and kg, of the same shape or broadcast to one.
+        """
+        k, m = np.broadcast_arrays(np.asarray(stiffness, float), np.asarray(mass, float))
+        shape = (_STARTS, *k.shape)
+        k, m = np.tile(k.ravel(), _STARTS), np.tile(m.ravel(), _STARTS)
+        w = self._starts(len(k), seed)
+        x_before, a_before = w[0].copy(), np.zeros(len(k))
+        peak, grown, settled, units = np.zeros(len(k)), np.zeros(len(k)), np.zeros(len(k)), self._units()
+        for tick in range(1, ticks + 1):
+            x, a = w[0].copy(), w[self.states].copy()
+            gate = (x - x_before) * a_before >= 0.0
+            w = self.without @ w - self.pushed[:, None] * (k * x) + self.per_kg @ (w * (m * gate))
+            x_before, a_before = x, a
+            np.maximum(peak, np.abs(w[: self.states] / units).max(axis=0), out=peak)
+            if tick % _RESCALED_EVERY == 0:
+                size = peak + 1e-300
+                grown += np.log(size)
+                w, x_before, a_before, peak = w / size, x_before / size, a_before / size, np.zeros(len(k))
+            if tick == _SETTLED:
+                settled = grown.copy()
+        return ((grown - settled) / (ticks - _SETTLED)).reshape(shape).max(axis=0)
+
+    def _starts(self, count: int, seed: int) -> np.ndarray:
+        """Returns random positions and velocities of all bodies."""
+        w = np.zeros((len(self.without), count))
+        w[: self.states] = np.random.default_rng(seed).normal(size=(self.states, count)) * self._units()
+        return w
+
+    def _units(self) -> np.ndarray:
+        """Returns 1 m/s for every velocity and 1 mm for every length; what else is a state counts as a velocity."""
+        units = np.ones((self.states, 1))
+        units[: self.states // 2] = 1e-3
+        return units

@@ -1,10 +1,11 @@
-"""A PHANToM Premium 1.5 in a hand, tapping and pressing a wall, with all that nobody published as numbers to choose."""
+"""A PHANToM Premium 1.5 in a hand that taps and presses a wall, with all that nobody published as numbers to choose."""
 
 from __future__ import annotations
 
 import copy
 import math
-from dataclasses import asdict, dataclass
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, fields
 from functools import cache
 from typing import Any, Self
 
@@ -31,7 +32,7 @@ VELOCITIES: dict[str, float | None] = {"none": None, "200 Hz": 200.0, "50 Hz": 5
 
 @dataclass(frozen=True)
 class Setup:
-    """A reading of the experiments: what of them is not published, one value each.
+    """An interpretation of the experiments: one value for each thing that is not published.
 
     Two masses on an elastic drive ring at mode_Hz = sqrt(k / mu) / 2 pi, mu = m_1 m_2 / (m_1 + m_2), with the damping
     ratio d / (2 sqrt(k mu)). The near one carries actuator, encoder and friction.
@@ -46,7 +47,7 @@ class Setup:
         delay_s: extra delay of the loop, beyond the hold.
         unit: setting of the inertial unit, a key of ``UNITS``.
         mount: the mass the unit is on, "motor" (near) or "tip" (far).
-        velocity: what is made of the encoder's differences, a key of ``VELOCITIES``.
+        velocity: low-pass over the encoder's differences, a key of ``VELOCITIES``.
         acceleration: "unit", or "encoder" for differences of the velocity, which the paper found too noisy.
         friction_N: Coulomb friction at the near mass (published: 0.048 N); 0 leaves it out, which is some forty times
             cheaper to run.
@@ -66,8 +67,8 @@ class Setup:
     friction_N: float = 0.0
 
     @classmethod
-    def of(cls, scene: dict[str, Any]) -> Self:
-        """The reading that a scene made by ``scene``, or its file, has; its numbers to three digits."""
+    def from_scene(cls, scene: dict[str, Any]) -> Self:
+        """Reads it from a scene made by ``scene``, or from its file; numbers to three digits."""
         near, far = scene["transmission"]["motor_mass"], scene["device"]["mass"]
         reduced, spring = near * far / (near + far), scene["transmission"]["stiffness"]
         bandwidth, late = scene["accelerometer"].get("bandwidth"), scene["accelerometer"].get("delay", 0.0)
@@ -87,7 +88,7 @@ class Setup:
         )
 
     def scene(self, stiffness: float, elements: Elements, seed: int = 1) -> dict[str, Any]:
-        """The resolved scene with a wall of this stiffness in N/m."""
+        """Returns the resolved scene with a wall of this stiffness in N/m."""
         scene = copy.deepcopy(_base())
         near, far = self.near_share * MASS_KG, (1.0 - self.near_share) * MASS_KG
         reduced = near * far / MASS_KG
@@ -120,25 +121,30 @@ class Setup:
         return scene
 
     def linear_scene(self, elements: Elements) -> dict[str, Any]:
-        """The scene without friction and encoder, whose loop in contact is one linear map where its elements are."""
+        """Returns the scene without friction and encoder, linear in contact where its elements are."""
         from haploop.tools.linear.stiffness_limit import smooth
 
         scene = smooth(self.scene(1.0, elements))
         scene.pop("friction", None)
         return scene
 
+    @classmethod
+    def from_row(cls, row: Mapping[str, Any]) -> Self:
+        """Takes it from a row that holds its values among others."""
+        return cls(**{key.name: row[key.name] for key in fields(cls)})
+
     def as_dict(self) -> dict[str, Any]:
-        """All of it by name."""
+        """Returns all values by name."""
         return asdict(self)
 
 
 def nearest() -> Setup:
-    """The reading of ``premium_press.toml``: of those that ``haploop paper --figure 10`` tries, the paper's nearest."""
-    return Setup.of(_of_the_file())
+    """Returns the setup of ``premium_press.toml``: that nearest to the paper which the search of Fig. 7 found."""
+    return Setup.from_scene(_of_the_file())
 
 
 def elements_of(kind: str, size: float) -> Elements:
-    """One element of a kind of ``KINDS``: damping in N s/m, inertia in kg."""
+    """Makes one element of a kind of ``KINDS``: damping in N s/m, inertia in kg."""
     match kind:
         case "nothing":
             return []
@@ -149,7 +155,7 @@ def elements_of(kind: str, size: float) -> Elements:
 
 
 def both(damping: float, mass: float) -> Elements:
-    """Damping in N s/m with unidirectional inertia in kg."""
+    """Makes damping in N s/m with unidirectional inertia in kg."""
     return elements_of("damping", damping) + elements_of("unidirectional-inertia", mass)
 
 
@@ -164,10 +170,10 @@ def _of_the_file() -> dict[str, Any]:
 
 @cache
 def _base() -> dict[str, Any]:
-    """What every reading has in common: the published hand, and nothing of the unit's setting."""
+    """Returns what all setups have in common: the published hand, and nothing of the unit's setting."""
     scene = copy.deepcopy(_of_the_file())
     scene["dissipation"] = []
-    share = Setup.of(scene).hand
+    share = Setup.from_scene(scene).hand
     for table in (scene["hand"], scene["hand"]["grip"]):
         for key in table.keys() & {"mass", "damping", "stiffness"}:
             table[key] = _rounded(table[key] / share, 6)

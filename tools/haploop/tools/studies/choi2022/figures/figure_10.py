@@ -6,17 +6,25 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from haploop.tools.figure.style import FAINT, GREY, dress, empty_figure, legend, plain_numbers
+from haploop.tools.figure.file import empty_figure
+from haploop.tools.figure.style import FAINT, GREY, dress, legend, plain_numbers
 from haploop.tools.render.units import amount
-from haploop.tools.studies.choi2022.claims import Claim, Finding
-from haploop.tools.studies.choi2022.colours import COLOURS, SHORT
+from haploop.tools.studies.choi2022.claims import Finding, claims_of
+from haploop.tools.studies.choi2022.drawing import COLOURS, INSIDE, SHORT, UPPER_LEFT
 from haploop.tools.studies.choi2022.experiment.limits import swings_at_Hz
-from haploop.tools.studies.choi2022.experiment.ranges import FELT_M, STIFFNESSES, Range, ranges
-from haploop.tools.studies.choi2022.experiment.reading_rows import LOW_KG
+from haploop.tools.studies.choi2022.experiment.measure import LOW_KG
 from haploop.tools.studies.choi2022.experiment.setup import KINDS, Setup, elements_of
-from haploop.tools.studies.choi2022.experiment.verdict_under_assumptions import judged, nearest
-from haploop.tools.studies.choi2022.gate.gate import always_open_Hz
-from haploop.tools.studies.choi2022.gate.gate_figure import DELAYS_S, FREQUENCIES_HZ, OLD_S, damps, felt, gate_figure
+from haploop.tools.studies.choi2022.experiment.tuning import FELT_M, STIFFNESSES, Range, ranges
+from haploop.tools.studies.choi2022.experiment.verdicts import nearest, verdict_under_assumptions
+from haploop.tools.studies.choi2022.gate import (
+    DELAYS_S,
+    FREQUENCIES_HZ,
+    OLD_S,
+    always_open_Hz,
+    damps,
+    felt_with,
+    gate_figure,
+)
 from haploop.tools.studies.choi2022.work import Work
 
 if TYPE_CHECKING:
@@ -24,47 +32,27 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 TITLE = "Stable range of each element"
-WIDE = Claim(
-    "V.B.3, Fig. 10",
-    "For low-stiffness VW, a wide range of virtual damping could be injected … rapidly decreased with an increase in "
-    "stiffness",
-)
-DAMPING = Claim(
-    "V.B.3, Fig. 10",
-    "When the stiffness value reached 4.5 N/mm, no value of virtual damping could be injected without stability issue",
-)
-SIMILAR = Claim(
-    "V.B.3, Fig. 10",
-    "The bidirectional virtual inertia's maximum renderable stiffness was also 4.5 N/mm, similar to virtual damping",
-)
-LARGER = Claim(
-    "V.B.3, Fig. 10", "the unidirectional virtual inertia had a significantly larger and wider stable region"
-)
-EXCLUSIVE = Claim(
-    "V.B.3, Fig. 10",
-    "the two different types of virtual inertias had exclusive regions, particularly for lower values of inertia",
-)
-CLAIMS = (WIDE, DAMPING, SIMILAR, LARGER, EXCLUSIVE)
+CLAIMS = claims_of(10)
 
 
 def make(work: Work) -> list[Finding]:
-    """Ranges, and the gate."""
+    """Draws the ranges, and the gate of eq. 9."""
     setup = nearest(work)
     stiffnesses = STIFFNESSES[::4] if work.small else STIFFNESSES
     found = ranges(work, setup, stiffnesses)
     work.figure(
-        _drawn(found, stiffnesses),
+        _draw(found, stiffnesses),
         "figure_10",
         "Every mark is a run: full where it ends without vibration, faint where it does not. Vibration is what swings "
-        "beyond one encoder step to either side within the last half second, and does not die down. "
-        "More sizes are tried here than in the search for readings and in Fig. 11, so that a wall may be steadied here "
-        "that is not there.",
+        "beyond one encoder step to either side within the last half second, and does not die down. More sizes are "
+        "tried here than in the search for interpretations and in Fig. 11, so that a wall may be steadied here that is "
+        "not there.",
     )
     work.figure(
         gate_figure(setup),
         "figure_10_gate",
-        "What a virtual inertia m comes to at one frequency, w = 2π times it: above in the nearest reading, with its "
-        "delay, unit and low-pass of the velocity; below which inertia damps, over frequency and delay, with "
+        "What a virtual inertia m comes to at one frequency, w = 2π times it: above in the nearest interpretation, "
+        "with its delay, unit and low-pass of the velocity; below which inertia damps, over frequency and delay, with "
         "differences for the velocity.",
     )
     columns = {"stiffness_N_m": stiffnesses}
@@ -77,7 +65,7 @@ def make(work: Work) -> list[Finding]:
     return _findings(work, found, stiffnesses)
 
 
-def _drawn(found: dict[str, Range], stiffnesses: np.ndarray) -> Figure:
+def _draw(found: dict[str, Range], stiffnesses: np.ndarray) -> Figure:
     figure = empty_figure(13.0, 4.6)
     axes = figure.subplots(1, 4, sharey=True, width_ratios=(1.0, 1.0, 1.0, 1.0))
     for ax, kind in zip(axes, KINDS[1:], strict=False):
@@ -87,13 +75,13 @@ def _drawn(found: dict[str, Range], stiffnesses: np.ndarray) -> Figure:
     _marks(axes[3], found[KINDS[2]].sizes * 1e3, stiffnesses, two & ~one, COLOURS[KINDS[2]], "bidirectional only")
     _marks(axes[3], found[KINDS[2]].sizes * 1e3, stiffnesses, one & ~two, COLOURS[KINDS[3]], "unidirectional only")
     _dress(axes[3], "which inertia?", "inertia (g)", "")
-    legend(axes[3], loc="upper left", bbox_to_anchor=(0.0, 1.0), ncols=1, framealpha=0.8, edgecolor="none")
+    legend(axes[3], **UPPER_LEFT, **INSIDE)
     axes[3].set_xlim(axes[2].get_xlim())
     return figure
 
 
 def _cells(ax: Axes, one: Range, stiffnesses: np.ndarray, kind: str) -> None:
-    """Full marks for what is steady, faint ones for what was tried besides."""
+    """Draws full marks for what is steady, faint ones for what was tried besides."""
     unit, label = (1.0, "damping (N s/m)") if kind == "damping" else (1e3, "inertia (g)")
     ax.plot(*_points(unit * one.sizes, stiffnesses, ~one.steady), ".", color=FAINT, markersize=2.5)
     _marks(ax, unit * one.sizes, stiffnesses, one.steady, COLOURS[kind], "")
@@ -119,7 +107,7 @@ def _dress(ax: Axes, title: str, x_label: str, y_label: str) -> None:
 
 
 def _felt(found: dict[str, Range]) -> str:
-    """How much still moves in what is called steady."""
+    """Returns a note on how much still moves in what is called steady."""
     left = np.concatenate([one.swings_m[one.steady] for one in found.values()])
     if not len(left):
         return ""
@@ -134,7 +122,7 @@ def _felt(found: dict[str, Range]) -> str:
 def _why(setup: Setup) -> str:
     delay_s = setup.delay_s
     here_Hz = [swings_at_Hz(setup, stiffness) for stiffness in (2500.0, 7000.0)]
-    two, one = (float(of.damping) for of in felt(setup, np.array(np.mean(here_Hz))))
+    two, one = (float(of.damping) for of in felt_with(setup, np.array(np.mean(here_Hz))))
     row = int(np.argmin(abs(DELAYS_S - delay_s)))
     ideal, old = damps(0.0)[row], damps(OLD_S)[row]
     return (
@@ -142,7 +130,7 @@ def _why(setup: Setup) -> str:
         "A virtual inertia that acts late damps, and that damping steadies. Late by ψ = w (age of the reading + delay "
         "+ T/2), the bidirectional one damps m w sin ψ: nothing without lag, most at a quarter of a swing; from half a "
         "swing on it drives. The gate of eq. 9 lets 0.59 of the force through and adds a lag of atan(2/π) = 32 degrees "
-        "(where nothing else lags; `experiment/gate.py` has the formula for all else). So without lag only the "
+        "(where nothing else lags; `choi2022/gate.py` has the formula for all else). So without lag only the "
         "unidirectional one damps, m w/π; with lag both do, the bidirectional more per kilogram; and they turn from "
         "damping to driving at different frequencies. Between the two turns one damps and the other drives: there the "
         "ranges exclude each other.\n\n"
@@ -152,14 +140,14 @@ def _why(setup: Setup) -> str:
         f"the reading: with this one it never closes at {always_open_Hz(reading_s=OLD_S):.0f} Hz, where the two are "
         "the same. They are the same, too, where the velocity reads 0, since eq. 9 has ≥ 0: a swing within one encoder "
         "step meets a bidirectional inertia.\n\n"
-        f"In the nearest reading walls of 2.5 to 7 N/mm swing at {here_Hz[0]:.0f} to {here_Hz[1]:.0f} Hz where nothing "
-        f"steadies them. There the bidirectional inertia damps {two:.2f} m w and the unidirectional {one:.2f} m w. "
-        "Ranges that exclude each other ask for swings near a turn: a stiffer contact, or more lag."
+        f"In the nearest interpretation walls of 2.5 to 7 N/mm swing at {here_Hz[0]:.0f} to {here_Hz[1]:.0f} Hz where "
+        f"nothing steadies them. There the bidirectional inertia damps {two:.2f} m w and the unidirectional {one:.2f} "
+        "m w. Ranges that exclude each other ask for swings near a turn: a stiffer contact, or more lag."
     )
 
 
 def _bands(codes: np.ndarray, code: int) -> str:
-    """The frequencies at which this damps what the code says: "96 to 144 and 310 to 360 Hz"."""
+    """Returns the frequencies with a code of ``damps``: "96 to 144 and 310 to 360 Hz"."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], codes == code, [False]])))
     bands = [
         f"{FREQUENCIES_HZ[first]:.0f} to {FREQUENCIES_HZ[last - 1]:.0f}"
@@ -174,12 +162,12 @@ def _largest(found: dict[str, Range], stiffnesses: np.ndarray) -> dict[str, floa
 
 def _answer(found: dict[str, Range], stiffnesses: np.ndarray) -> str:
     most = _largest(found, stiffnesses)
-    said = ", ".join(f"{SHORT[kind]} {most[kind] / 1e3:.1f}" for kind in KINDS[1:])
+    others = ", ".join(f"{SHORT[kind]} {most[kind] / 1e3:.1f}" for kind in KINDS[1:])
     sizes = len(found[KINDS[1]].sizes)
     return (
-        f"**Inertia needs the right size.** In the reading nearest to the paper the stiffest steady wall is, in N/mm "
-        f"and with the best of {sizes} sizes of each: nothing {most['nothing'] / 1e3:.1f}, {said}. Which inertia is "
-        "better hangs on the lag: late inertia damps, and the gate of eq. 9 is a lag of its own"
+        "**Inertia needs the right size.** In the interpretation nearest to the paper the stiffest steady wall is, in "
+        f"N/mm and with the best of {sizes} sizes of each: nothing {most['nothing'] / 1e3:.1f}, {others}. Which "
+        "inertia is better hangs on the lag: late inertia damps, and the gate of eq. 9 is a lag of its own"
     )
 
 
@@ -201,12 +189,18 @@ def _findings(work: Work, found: dict[str, Range], stiffnesses: np.ndarray) -> l
     )
     is_exclusive = bool((alone > 0).all() and shared == 0)
     wider = counts[KINDS[3]].sum() > counts[KINDS[2]].sum() and most[KINDS[3]] > most[KINDS[2]]
-    cells_said = f"{numbers}; steady runs {counts[KINDS[3]].sum()} against {counts[KINDS[2]].sum()}"
+    numbers_of_runs = f"{numbers}; steady runs {counts[KINDS[3]].sum()} against {counts[KINDS[2]].sum()}"
     sizes = len(found[KINDS[1]].sizes)
     return [
-        judged(work, WIDE, shrinks, f"steady sizes of {sizes}, by N/mm: {widths or 'none'}", "10 narrows"),
-        judged(work, DAMPING, abs(most[KINDS[1]] - 4500.0) <= 500.0, numbers, "10 damping 4.5"),
-        judged(work, SIMILAR, abs(most[KINDS[2]] - 4500.0) <= 500.0, numbers, "10 bidirectional 4.5"),
-        judged(work, LARGER, wider, cells_said, "10 larger"),
-        judged(work, EXCLUSIVE, is_exclusive, exclusive, "10 exclusive"),
+        verdict_under_assumptions(
+            work, CLAIMS["wide"], shrinks, f"steady sizes of {sizes}, by N/mm: {widths or 'none'}", "10 narrows"
+        ),
+        verdict_under_assumptions(
+            work, CLAIMS["damping"], abs(most[KINDS[1]] - 4500.0) <= 500.0, numbers, "10 damping 4.5"
+        ),
+        verdict_under_assumptions(
+            work, CLAIMS["similar"], abs(most[KINDS[2]] - 4500.0) <= 500.0, numbers, "10 bidirectional 4.5"
+        ),
+        verdict_under_assumptions(work, CLAIMS["larger"], wider, numbers_of_runs, "10 larger"),
+        verdict_under_assumptions(work, CLAIMS["exclusive"], is_exclusive, exclusive, "10 exclusive"),
     ]

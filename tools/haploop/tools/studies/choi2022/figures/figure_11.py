@@ -4,29 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 
-from haploop.tools.figure.style import INK, SMALL, dress, empty_figure
-from haploop.tools.studies.choi2022.claims import Claim, Finding
-from haploop.tools.studies.choi2022.experiment.map_parallel import is_steady, runs
+from haploop.tools.figure.file import empty_figure
+from haploop.tools.figure.style import INK, SMALL, dress
+from haploop.tools.studies.choi2022.claims import Finding, claims_of
+from haploop.tools.studies.choi2022.experiment.measure import is_steady
 from haploop.tools.studies.choi2022.experiment.setup import both
-from haploop.tools.studies.choi2022.experiment.verdict_under_assumptions import judged, nearest
+from haploop.tools.studies.choi2022.experiment.verdicts import nearest, verdict_under_assumptions
 from haploop.tools.studies.choi2022.work import Work
 
 TITLE = "Largest steady stiffness of damping with unidirectional inertia"
-MOST = Claim(
-    "V.B.4, Fig. 11",
-    "The maximum stiffness that could be rendered using our setup was 6.3 N/mm [at] 0.00215 Ns/mm and 0.0090 kg",
-)
-MORE = Claim(
-    "VI",
-    "applying two dissipative elements (virtual damping and unidirectional virtual inertia) simultaneously would … "
-    "enable a larger stiffness interaction",
-)
-STEP = Claim(
-    "V.B.4, Fig. 11",
-    "The stable boundary points of the experiment with the unidirectional virtual inertia were used to render the 0.5 "
-    "N/mm increased stiffness of the VW, which was unstable without virtual damping",
-)
-CLAIMS = (MOST, MORE, STEP)
+CLAIMS = claims_of(11)
 STIFFNESSES = np.arange(2500.0, 10001.0, 500.0)
 _DAMPINGS = (0.0, 0.5, 1.0, 1.5, 2.15, 3.0, 4.0, 5.5, 7.5, 10.0)
 _MASSES = (0.0, 0.003, 0.006, 0.009, 0.014, 0.02, 0.027, 0.035, 0.045)
@@ -34,13 +21,13 @@ PAPER_N_M, PAPER_DAMPING, PAPER_MASS_KG = 6300.0, 2.15, 0.009
 
 
 def make(work: Work) -> list[Finding]:
-    """A run for every pair and stiffness."""
+    """Runs every pair at every stiffness."""
     dampings = np.array(_DAMPINGS[::3] if work.small else _DAMPINGS)
     masses = np.array(_MASSES[::4] if work.small else _MASSES)
     stiffnesses = STIFFNESSES[::3] if work.small else STIFFNESSES
     setup = nearest(work)
     cells = [(b, m, k) for b in dampings for m in masses for k in stiffnesses]
-    results = runs(work, "damping with inertia", [setup.scene(k, both(float(b), float(m))) for b, m, k in cells])
+    results = work.run_all("damping with inertia", [setup.scene(k, both(float(b), float(m))) for b, m, k in cells])
     steady = np.array([is_steady(result) for result in results]).reshape(len(dampings), len(masses), -1)
     largest = largest_steady(steady, stiffnesses)
     figure = empty_figure(8.6, 5.2)
@@ -70,7 +57,7 @@ def make(work: Work) -> list[Finding]:
 
 
 def largest_steady(steady: np.ndarray, stiffnesses: np.ndarray) -> np.ndarray:
-    """The last of a row of stiffnesses, along the last axis, before the first that is not steady; 0 if none is."""
+    """Returns the last stiffness, along the last axis, before the first that is not steady; 0 if none is."""
     count = np.where(steady.all(axis=-1), steady.shape[-1], (~steady).argmax(axis=-1))
     return np.where(count > 0, stiffnesses[np.maximum(count - 1, 0)], 0.0)
 
@@ -78,8 +65,8 @@ def largest_steady(steady: np.ndarray, stiffnesses: np.ndarray) -> np.ndarray:
 def _answer(largest: np.ndarray, dampings: np.ndarray, masses: np.ndarray) -> str:
     i, j = np.unravel_index(largest.argmax(), largest.shape)
     return (
-        "**Damping and unidirectional inertia together bear more than either alone.** In the reading nearest to the "
-        f"paper {largest[i, j] / 1e3:.1f} N/mm ({dampings[i]:g} N s/m with {1e3 * masses[j]:g} g) against "
+        "**Damping and unidirectional inertia together bear more than either alone.** In the interpretation nearest to "
+        f"the paper {largest[i, j] / 1e3:.1f} N/mm ({dampings[i]:g} N s/m with {1e3 * masses[j]:g} g) against "
         f"{largest[:, 0].max() / 1e3:.1f} of damping and {largest[0].max() / 1e3:.1f} of inertia, each the best of the "
         "sizes drawn; tune the two together"
     )
@@ -101,11 +88,11 @@ def _findings(work: Work, largest: np.ndarray, dampings: np.ndarray, masses: np.
         and 0.5 <= masses[j] / PAPER_MASS_KG <= 2.0
     )
     return [
-        judged(work, MOST, near, numbers, "11 up to 6.3"),
-        judged(work, MORE, most > max(alone, damped), numbers, "11 more"),
-        judged(
+        verdict_under_assumptions(work, CLAIMS["most"], near, numbers, "11 up to 6.3"),
+        verdict_under_assumptions(work, CLAIMS["more"], most > max(alone, damped), numbers, "11 more"),
+        verdict_under_assumptions(
             work,
-            STEP,
+            CLAIMS["step"],
             helped == len(bears),
             f"for {helped} of {len(bears)} inertias that steady a wall alone, some damping adds 0.5 N/mm or more",
         ),

@@ -6,30 +6,19 @@ from typing import Any
 
 import numpy as np
 
-from haploop.tools.figure.style import empty_figure, legend
+from haploop.tools.figure.file import empty_figure
+from haploop.tools.figure.style import legend
 from haploop.tools.render.units import amount
-from haploop.tools.studies.choi2022.claims import Claim, Finding
-from haploop.tools.studies.choi2022.experiment.press_figure import Press, draw_press
+from haploop.tools.studies.choi2022.claims import Finding, claims_of
+from haploop.tools.studies.choi2022.drawing import INSIDE, Press, draw_press
 from haploop.tools.studies.choi2022.experiment.setup import Elements, both
-from haploop.tools.studies.choi2022.experiment.tuned import Tuned, tuned
-from haploop.tools.studies.choi2022.experiment.verdict_under_assumptions import judged, nearest
-from haploop.tools.studies.choi2022.simulation.scenes import run
+from haploop.tools.studies.choi2022.experiment.tuning import Tuned, tuned
+from haploop.tools.studies.choi2022.experiment.verdicts import nearest, verdict_under_assumptions
+from haploop.tools.studies.choi2022.scenes import run
 from haploop.tools.studies.choi2022.work import Work
 
 TITLE = "Damping with unidirectional inertia at 6.3 N/mm"
-DISPLAYED = Claim(
-    "V.B.4, Fig. 12",
-    "the mean of the displayed stiffness was 6.2987 N/mm, … almost equal to the desired stiffness … of 6.3 N/mm",
-)
-VALUES = Claim(
-    "V.B.4, Fig. 12",
-    "where the values of virtual damping and unidirectional virtual inertia were 0.00215 Ns/mm and 0.0090 kg",
-)
-INSTANT = Claim(
-    "V.B.4, Fig. 12",
-    "The rate of increase of the displayed stiffness during high-stiffness wall contact was also instantaneous",
-)
-CLAIMS = (DISPLAYED, VALUES, INSTANT)
+CLAIMS = claims_of(12)
 STIFFNESS_N_M = 6300.0
 _TUNED = ", and its own best parameters"
 _PAPERS = both(2.15, 0.009)
@@ -37,7 +26,7 @@ _DAMPINGS, _MASSES = (1.0, 2.15, 3.0, 4.0, 5.5, 7.5), (0.009, 0.014, 0.02, 0.027
 
 
 def best_pair(work: Work) -> tuple[dict[str, Any], Elements]:
-    """The pair that swings least, and its scene."""
+    """Returns the scene of the pair that swings least, and its elements."""
     setup = nearest(work)
     choices = [both(b, m) for b in _DAMPINGS for m in _MASSES]
     chosen = tuned(
@@ -51,7 +40,7 @@ def best_pair(work: Work) -> tuple[dict[str, Any], Elements]:
 
 
 def make(work: Work) -> list[Finding]:
-    """The paper's values, and the best of ours."""
+    """Runs the paper's values, and the best of ours."""
     scene, elements = best_pair(work)
     b, m = elements[0]["damping"], elements[1]["mass"]
     cases = {
@@ -63,19 +52,19 @@ def make(work: Work) -> list[Finding]:
     }
     figure = empty_figure(12.0, 6.4)
     axes = figure.subplots(2, 2, sharex=True)
-    columns, told, presses = {}, {}, {}
+    columns, tried, presses = {}, {}, {}
     for column, (heading, (case, key)) in enumerate(cases.items()):
         summary, log = run(case)
-        told[key] = Tuned(case["dissipation"], summary)
-        presses[key] = press = Press.of(case, log)
+        tried[key] = Tuned(case["dissipation"], summary)
+        presses[key] = press = Press.from_log(case, log)
         draw_press(axes[0, column], axes[1, column], press, f"{heading}: {summary['verdict']}", STIFFNESS_N_M)
         columns |= press.columns(key)
         work.scene(f"figure_12_{key}", case)
-    legend(axes[0, 0], loc="upper right", ncols=3, framealpha=0.8, edgecolor="none")
+    legend(axes[0, 0], loc="upper right", ncols=3, **INSIDE)
     work.figure(figure, "figure_12")
     work.data("figure_12", columns)
     work.caption = "Above the forces as commanded, below their sum over the penetration, tick by tick."
-    return _findings(work, told["best"], told["paper"], presses["best"])
+    return _findings(work, tried["best"], tried["paper"], presses["best"])
 
 
 def _findings(work: Work, best: Tuned, papers: Tuned, press: Press) -> list[Finding]:
@@ -90,19 +79,18 @@ def _findings(work: Work, best: Tuned, papers: Tuned, press: Press) -> list[Find
         f"28.7 µm); the force still ripples by "
         f"{amount(float(np.ptp(last)), 'N', 2)} peak to peak; with {b:g} N s/m and {1e3 * m:g} g"
     )
-    theirs = f"{papers.ended}"
     return [
-        judged(work, DISPLAYED, best.steady and off < 0.01, numbers, more=_TUNED),
-        judged(
+        verdict_under_assumptions(work, CLAIMS["displayed"], best.steady and off < 0.01, numbers, more=_TUNED),
+        verdict_under_assumptions(
             work,
-            VALUES,
+            CLAIMS["values"],
             papers.steady,
-            f"with these values {theirs}; the best here: {b:g} N s/m and {1e3 * m:g} g",
+            f"with these values {papers.ended}; the best here: {b:g} N s/m and {1e3 * m:g} g",
             "12 pair",
         ),
-        judged(
+        verdict_under_assumptions(
             work,
-            INSTANT,
+            CLAIMS["instant"],
             within <= 2,
             f"within half of what is asked for {within} ms after the first force; what precedes is damping and inertia "
             f"over a penetration of a few encoder steps, {inside[0] / 1e3:.1f} N/mm at the first tick",

@@ -4,39 +4,26 @@ from __future__ import annotations
 
 import numpy as np
 
-from haploop.tools.figure.style import SMALL, WALL_FILL, dress, empty_figure
+from haploop.tools.figure.file import empty_figure
+from haploop.tools.figure.style import SMALL, WALL_FILL, dress
 from haploop.tools.render.units import amount
-from haploop.tools.studies.choi2022.claims import Claim, Finding
-from haploop.tools.studies.choi2022.colours import COLOURS
+from haploop.tools.studies.choi2022.claims import Finding, claims_of
+from haploop.tools.studies.choi2022.drawing import COLOURS
 from haploop.tools.studies.choi2022.experiment.setup import KINDS
-from haploop.tools.studies.choi2022.experiment.verdict_under_assumptions import judged
+from haploop.tools.studies.choi2022.experiment.verdicts import verdict_under_assumptions
 from haploop.tools.studies.choi2022.figures.figure_12 import best_pair
-from haploop.tools.studies.choi2022.simulation.scenes import run
+from haploop.tools.studies.choi2022.scenes import run
 from haploop.tools.studies.choi2022.work import Work
 
 TITLE = "What damping and unidirectional inertia take out of a contact with 6.3 N/mm"
-LARGER = Claim(
-    "V.B.4, Fig. 13",
-    "The unidirectional virtual inertia could dissipate a larger amount of energy than virtual damping over the entire "
-    "interaction",
-)
-ENDS = Claim(
-    "V.B.4, Fig. 13",
-    "the energy dissipation of the virtual damping was concentrated at the start and end of the contact",
-)
-MIDDLE = Claim(
-    "V.B.4, Fig. 13",
-    "the sufficiently large acceleration contribution, even during the extreme low-velocity interaction in the middle "
-    "of the contact",
-)
-CLAIMS = (LARGER, ENDS, MIDDLE)
+CLAIMS = claims_of(13)
 # The person lets go at this time, so that the contact has an end.
 _RELEASED_S, _PULL_N = 0.6, 4.0
 _EDGE_S = 0.06
 
 
 def make(work: Work) -> list[Finding]:
-    """A press of half a second with the best pair, then the hand pulls back."""
+    """Runs a press of half a second with the best pair, after which the hand pulls back."""
     scene, _ = best_pair(work)
     push = scene["hand"]["force"]["value"]
     scene["hand"]["force"] = {
@@ -91,7 +78,9 @@ def _findings(work: Work, sampled: np.ndarray, true: np.ndarray, t: np.ndarray, 
     rest = f"in between: damping {amount(float(middle[0]), 'J')}, inertia {amount(float(middle[1]), 'J')}"
     exact_only = "" if took[1] > took[0] else "; by the true books, not by the sampled ones that the paper has"
     return [
-        judged(work, LARGER, bool(took[1] > took[0] or left[1] > left[0]), both, "13 more", exact_only),
-        judged(work, ENDS, bool(shares[0] > 0.8), f"{parts}; {rest}"),
-        judged(work, MIDDLE, bool(middle[1] > abs(middle[0])), f"{rest}; {parts}"),
+        verdict_under_assumptions(
+            work, CLAIMS["larger"], bool(took[1] > took[0] or left[1] > left[0]), both, "13 more", exact_only
+        ),
+        verdict_under_assumptions(work, CLAIMS["ends"], bool(shares[0] > 0.8), f"{parts}; {rest}"),
+        verdict_under_assumptions(work, CLAIMS["middle"], bool(middle[1] > abs(middle[0])), f"{rest}; {parts}"),
     ]

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from haploop.tools.figure.style import INK, SMALL, TEXT, dress, empty_figure
+from haploop.tools.figure.file import empty_figure
+from haploop.tools.figure.style import INK, SMALL, TEXT, dress
 from haploop.tools.render.markdown import markdown_table
-from haploop.tools.studies.choi2022.claims import Claim, Finding
-from haploop.tools.studies.choi2022.colours import COLOURS, SHORT
+from haploop.tools.studies.choi2022.claims import Finding, claims_of
+from haploop.tools.studies.choi2022.drawing import COLOURS, SHORT
 from haploop.tools.studies.choi2022.experiment.limits import Best, limits
-from haploop.tools.studies.choi2022.experiment.map_parallel import many
 from haploop.tools.studies.choi2022.experiment.setup import KINDS, Setup, elements_of
 from haploop.tools.studies.choi2022.work import Work
 
@@ -21,12 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 TITLE = "Beyond the paper: which element steadies the stiffest wall"
-HIGHER = Claim(
-    "V.B.2",
-    "it can render a significantly higher stiffness in a stable manner than conventional virtual damping or "
-    "bidirectional virtual inertia",
-)
-CLAIMS = (HIGHER,)
+CLAIMS = claims_of(14)
 
 _MODES_HZ = (60.0, 90.0, 125.0, 170.0, 225.0, 300.0, 400.0, 600.0)
 _DELAYS_S = (0.0, 0.0005, 0.001, 0.0015, 0.002)
@@ -47,7 +42,7 @@ DRIVES: tuple[Drive, ...] = (
 
 
 def make(work: Work) -> list[Finding]:
-    """The limits of every cell, without a run."""
+    """Computes the limits of every cell, without a run."""
     modes, delays = (_MODES_HZ[2:7:2], _DELAYS_S[1:2]) if work.small else (_MODES_HZ, _DELAYS_S)
     drives = DRIVES[1:2] if work.small else DRIVES
     setups = [
@@ -56,12 +51,12 @@ def make(work: Work) -> list[Finding]:
         for delay in delays
         for mode in modes
     ]
-    found = many(work, "which element wins", limits, setups)
+    found = work.map_parallel("which element wins", limits, setups)
     table = np.array([[cell[kind].stiffness for kind in KINDS] for cell in found])
     sizes = np.array([[cell[kind].size for kind in KINDS] for cell in found])
     shape = len(drives), len(delays), len(modes), len(KINDS)
     stiffness = table.reshape(shape)
-    work.figure(_drawn(stiffness, modes, delays, [name for name, _ in drives]), "figure_14")
+    work.figure(_draw(stiffness, modes, delays, [name for name, _ in drives]), "figure_14")
     columns = {
         "mode_Hz": modes,
         "delay_s": delays,
@@ -86,12 +81,12 @@ def make(work: Work) -> list[Finding]:
 
 
 def winner(stiffness: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Index of the best along the last axis, and its stiffness over the second best's."""
+    """Returns the index of the best along the last axis, and its stiffness over the second best's."""
     order = np.sort(stiffness, axis=-1)
     return stiffness.argmax(axis=-1), order[..., -1] / np.maximum(order[..., -2], 1.0)
 
 
-def _drawn(stiffness: np.ndarray, modes: Any, delays: Any, names: list[str]) -> Figure:
+def _draw(stiffness: np.ndarray, modes: Any, delays: Any, names: list[str]) -> Figure:
     columns = min(len(names), 2)
     figure = empty_figure(7.6 * columns, 0.6 + 3.6 * -(-len(names) // columns))
     axes = np.atleast_1d(figure.subplots(-(-len(names) // columns), columns)).ravel()
@@ -126,7 +121,7 @@ def _panel(ax: Axes, name: str, stiffness: np.ndarray, modes: Any, delays: Any) 
 
 
 def _higher(stiffness: np.ndarray) -> tuple[Finding, str]:
-    """The verdict, and in how many cells of the map each element wins."""
+    """Returns the finding, and in how many cells of the map each element wins."""
     cells = stiffness.reshape(-1, len(KINDS))
     best, by = winner(cells)
     clear = by >= DRAW
@@ -141,23 +136,21 @@ def _higher(stiffness: np.ndarray) -> tuple[Finding, str]:
     )
     winners = f"Clear winners over {len(cells)} drives, delays and units: {shares}, nobody {np.sum(~clear)}"
     if not above.any():
-        return HIGHER.fails(numbers), winners
-    return HIGHER.assuming("a drive and a delay of the cells where it is first", numbers), winners
+        return CLAIMS["higher"].fails(numbers), winners
+    return CLAIMS["higher"].assuming("a drive and a delay of the cells where it is first", numbers), winners
 
 
 def _lead(work: Work) -> tuple[str, str]:
-    """Table and words of how a drive's softness decides, and the answer in short."""
+    """Returns a note with a table of how the softness of a drive decides, and the answer in short."""
     modes = (125.0, 450.0) if work.small else (100.0, 125.0, 170.0, 225.0, 300.0, 450.0, 600.0)
     setups = [replace(_BASE, mode_Hz=mode) for mode in modes]
-    found = many(work, "soft and stiff drives", limits, setups)
-    rows = [
-        (f"{setup.mode_Hz:g}", *(_words(one[kind]) for kind in KINDS)) for setup, one in zip(setups, found, strict=True)
-    ]
+    found = work.map_parallel("soft and stiff drives", limits, setups)
+    heads = ["mode (Hz)", *(SHORT[kind] for kind in KINDS)]
+    rows = [[f"{mode:g}", *(_describe(one[kind]) for kind in KINDS)] for mode, one in zip(modes, found, strict=True)]
     ahead = [max(one[kind].stiffness for kind in KINDS[2:]) / max(one[KINDS[1]].stiffness, 1.0) for one in found]
     first = next((mode for mode, times in zip(modes, ahead, strict=True) if times < 1.0), None)
     turns = f"up to {modes[modes.index(first) - 1]:g} Hz; from {first:g} Hz on damping does" if first else "throughout"
-    heads = ("mode (Hz)", *(SHORT[kind] for kind in KINDS))
-    table = (
+    note = (
         "#### Soft and stiff drives\n\nLargest steady stiffness in kN/m (element's size in N s/m or g), with 0.5 ms "
         "of extra delay, an ideal unit at the near mass and 0.3 of the mass there:\n\n"
         + markdown_table(heads, rows, numbers=range(len(heads)))
@@ -165,13 +158,13 @@ def _lead(work: Work) -> tuple[str, str]:
         f"The better inertia bears ×{ahead[0]:.1f} of what damping does at {modes[0]:g} Hz and ×{ahead[-1]:.1f} at "
         f"{modes[-1]:g} Hz. Inertia wins {turns}."
     )
-    return table, (
+    return note, (
         "**A soft drive asks for inertia, a stiff one for damping.** With 0.5 ms of delay inertia steadies "
         f"×{ahead[0]:.1f} the stiffness that damping does where the drive rings at {modes[0]:g} Hz, and "
         f"×{ahead[-1]:.1f} at {modes[-1]:g} Hz; it wins {turns}"
     )
 
 
-def _words(best: Best) -> str:
+def _describe(best: Best) -> str:
     size = f" ({1e3 * best.size:.1f} g)" if 0 < best.size < 0.09 else f" ({best.size:.2g})" if best.size else ""
     return f"{best.stiffness / 1e3:.1f}{size}"

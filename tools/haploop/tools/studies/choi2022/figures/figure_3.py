@@ -6,36 +6,20 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from haploop.tools.figure.style import INK, PRESSING, RELEASING, SMALL, dress, empty_figure, legend
+from haploop.tools.figure.file import empty_figure
+from haploop.tools.figure.style import INK, PRESSING, RELEASING, SMALL, dress, legend
 from haploop.tools.render.units import amount
-from haploop.tools.studies.choi2022.claims import Claim, Finding
-from haploop.tools.studies.choi2022.motion.prescribed import PERIOD_S, SPRING, STIFFNESS_N_M, forces, taken_J
-from haploop.tools.studies.choi2022.simulation.scenes import run, single_contact
+from haploop.tools.studies.choi2022.claims import Finding, claims_of
+from haploop.tools.studies.choi2022.drawing import INSIDE, UPPER_LEFT
+from haploop.tools.studies.choi2022.sampled import PERIOD_S, SPRING, STIFFNESS_N_M, forces, taken_J
+from haploop.tools.studies.choi2022.scenes import run, single_contact
 from haploop.tools.studies.choi2022.work import Work
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 TITLE = "Position against force in a single contact with a virtual spring"
-GENERATES = Claim(
-    "II, Fig. 3", "the output energy [is] greater than the input energy … generates energy in each haptic interaction"
-)
-STAIRCASE = Claim(
-    "II, Fig. 3",
-    "a staircase-shaped behavior because of … discrete-time sampling, a limited resolution of the position sensor, "
-    "and the ZOH effect",
-)
-COUNTERCLOCKWISE = Claim("II, eq. 4 and Fig. 3", "All these shifts form a counterclockwise hysteresis-like behavior")
-SUM = Claim(
-    "II, eq. 3 to 5", "In the discrete domain, the left-hand term in (2) can be interpreted as … f(k−1)(x(k)−x(k−1))"
-)
-IDEAL = Claim("II, Fig. 3", "The solid line shows the behavior of an ideal VE (a physical spring)")
-LATE = Claim(
-    "II, Fig. 3",
-    "the output force increases after the operator establishes contact with the VE. The output force decreases after "
-    "the operator intends to release the haptic probe, and it ends after the operator is no longer in contact",
-)
-CLAIMS = (GENERATES, LATE, STAIRCASE, COUNTERCLOCKWISE, SUM, IDEAL)
+CLAIMS = claims_of(3)
 
 # Coarse enough to be seen.
 _RESOLUTION_M = 1e-4
@@ -43,7 +27,7 @@ _FILL = "#E8A0A0"
 
 
 def make(work: Work) -> list[Finding]:
-    """Three contacts: sampled and held, with an encoder's steps too, with 2 ms of delay too."""
+    """Runs three contacts: sampled and held, with an encoder's steps too, with 2 ms of delay too."""
     encoder = {"encoder": {"resolution": _RESOLUTION_M, "rounding": "nearest"}}
     scenes = {
         "sampled and held": single_contact("One contact, sampled and held"),
@@ -74,16 +58,16 @@ def make(work: Work) -> list[Finding]:
         f"**A sampled spring gives more than it takes, and delay makes most of it.** One contact with 0.15 N/mm leaks "
         f"{leaks[0]} by sampling and hold, {leaks[1]} with an encoder of 0.1 mm, {leaks[2]} with 2 ms of delay as well"
     )
-    return _findings(scenes, loops, walls)
+    return _findings(loops, walls)
 
 
 def loop(scene: dict[str, Any], plant: Any) -> tuple[np.ndarray, np.ndarray]:
-    """Penetration (m, negative outside) and force out of the wall (N) at every plant step."""
+    """Returns penetration (m, negative outside) and force out of the wall (N) at every plant step."""
     return scene["wall"]["position"] - plant["x"], np.asarray(plant["force"])
 
 
 def area_J(depth_m: np.ndarray, force_N: np.ndarray) -> float:
-    """Area within the closed loop of a held force over penetration; positive where it runs counter-clockwise.
+    """Returns the area within the closed loop of a held force over penetration, positive if counter-clockwise.
 
     -sum f dx: the force points out, so what it gives on the way out is counted positive.
     """
@@ -102,26 +86,16 @@ def _draw(ax: Axes, name: str, depth: np.ndarray, force: np.ndarray, wall: dict[
     ax.plot(mm[deepest:], force[deepest:], color=RELEASING, linewidth=1.2, drawstyle="steps-post", label="releasing")
     dress(ax, name, "penetration (mm)", "force out of the wall (N)")
     ax.set_xlim(-0.45, None)
-    words = (
+    text = (
         f"took {amount(_taken(depth, force), 'J')}\ngave {amount(_given(depth, force), 'J')}\nleak "
         f"{amount(-wall['true_J'], 'J')}"
     )
-    ax.text(0.97, 0.06, words, transform=ax.transAxes, ha="right", va="bottom", fontsize=SMALL, color=INK)
-    legend(ax, loc="upper left", bbox_to_anchor=(0.0, 1.0), ncols=1, framealpha=0.8, edgecolor="none")
-
-
-def _on_edges(edges: list[tuple[float, float]]) -> Finding:
-    late = [began > 0.0 > ended for began, ended in edges]
-    numbers = "penetration at the first force, and at the last: " + "; ".join(
-        f"{1e3 * began:.2f} and {1e3 * ended:.2f} mm".replace("-", "−") for began, ended in edges
-    )
-    if late[0] and not all(late):
-        return LATE.assuming("the encoder does not round a device into the wall up to half a step early", numbers)
-    return LATE.judged(all(late), numbers)
+    ax.text(0.97, 0.06, text, transform=ax.transAxes, ha="right", va="bottom", fontsize=SMALL, color=INK)
+    legend(ax, **UPPER_LEFT, **INSIDE)
 
 
 def _edges_m(depth: np.ndarray, force: np.ndarray) -> tuple[float, float]:
-    """Penetration where the force begins, and where it ends."""
+    """Returns the penetration where the force begins, and where it ends."""
     acting = np.flatnonzero(force)
     return float(depth[acting[0]]), float(depth[acting[-1] + 1])
 
@@ -134,9 +108,9 @@ def _given(depth: np.ndarray, force: np.ndarray) -> float:
     return float(np.maximum(-force[:-1] * np.diff(depth), 0.0).sum())
 
 
-def _findings(scenes: dict[str, Any], loops: dict[str, Any], walls: dict[str, Any]) -> list[Finding]:
+def _findings(loops: dict[str, Any], walls: dict[str, Any]) -> list[Finding]:
     energies = {name: (_taken(*one), _given(*one)) for name, one in loops.items()}
-    said = "; ".join(
+    each = "; ".join(
         f"{name}: took {amount(took, 'J')}, gave {amount(gave, 'J')}" for name, (took, gave) in energies.items()
     )
     areas = [area_J(*one) for one in loops.values()]
@@ -146,48 +120,55 @@ def _findings(scenes: dict[str, Any], loops: dict[str, Any], walls: dict[str, An
     parts = {cause: -leak[f"{cause}_J"] for cause in ("sampling_and_hold", "quantisation", "delay")}
     causes = ", ".join(f"{cause.replace('_', ' ')} {amount(value, 'J')}" for cause, value in parts.items())
     edges = [_edges_m(*one) for one in loops.values()]
+    edges_mm = "; ".join(f"{1e3 * began:.2f} and {1e3 * ended:.2f} mm".replace("-", "−") for began, ended in edges)
+    late = [began > 0.0 > ended for began, ended in edges]
     levels = [len(np.unique(force)) for _, force in loops.values()]
     moving = [int(np.count_nonzero(force)) for _, force in loops.values()]
     exact, closed = _constant_speed()
     summed, formula = _telescoped()
     ideals = [abs(wall["ideal_J"]) for wall in walls.values()]
     return [
-        GENERATES.judged(
+        CLAIMS["generates"].holds_if(
             all(gave > took for took, gave in energies.values()),
-            f"{said}. At constant speed v to depth x_max and back the leak is K x_max v T: {amount(exact, 'J')} "
+            f"{each}. At constant speed v to depth x_max and back the leak is K x_max v T: {amount(exact, 'J')} "
             f"against {amount(closed, 'J')}",
         ),
-        _on_edges(edges),
-        STAIRCASE.judged(
+        CLAIMS["late"].holds_if(
+            all(late),
+            f"penetration at the first force, and at the last: {edges_mm}",
+            "the encoder does not round a device into the wall up to half a step early",
+            late[0],
+        ),
+        CLAIMS["staircase"].holds_if(
             all(level < steps / 5 for level, steps in zip(levels, moving, strict=True)) and levels[1] < levels[0],
             f"{' / '.join(map(str, levels))} force levels in {' / '.join(map(str, moving))} plant steps of contact "
             f"(the three panels). Each cause by itself gives: {causes}",
         ),
-        COUNTERCLOCKWISE.judged(
+        CLAIMS["counterclockwise"].holds_if(
             min(areas) > 0.0 and apart < 1e-9,
             f"area within the loops {', '.join(amount(area, 'J') for area in areas)}, counter-clockwise; the wall's "
             "true books say the same",
         ),
-        SUM.judged(
+        CLAIMS["sum"].holds_if(
             abs(summed / formula - 1.0) < 1e-9,
             f"for a spring over a closed path the sum is −(K/2) Σ(Δx)², never positive: {amount(summed, 'J')} "
             f"against {amount(formula, 'J')} along a random path. It sees neither delay nor hold between samples",
         ),
-        IDEAL.judged(
+        CLAIMS["ideal"].holds_if(
             max(ideals) < 1e-12, "an ideal spring along the same paths gives back all it took, but for rounding"
         ),
     ]
 
 
 def _constant_speed() -> tuple[float, float]:
-    """Leak of a press to 2 mm and back at 0.1 m/s, whole samples, and K x_max v T."""
+    """Returns the leak of a press to 2 mm and back at 0.1 m/s, whole samples, and K x_max v T."""
     depth = np.concatenate([np.linspace(0.0, 2e-3, 21), np.linspace(2e-3, 0.0, 21)[1:]])
     x = -depth[:, None]
     return float(-taken_J(x, forces(x, SPRING)).sum()), STIFFNESS_N_M * 2e-3 * 0.1 * PERIOD_S
 
 
 def _telescoped() -> tuple[float, float]:
-    """Eq. 5 along a random closed path, and -(K / 2) sum (dx)^2, which it comes to by summing by parts."""
+    """Returns eq. 5 along a random closed path, and -(K / 2) sum (dx)^2, which it comes to by summing by parts."""
     path = np.random.default_rng(3).normal(scale=1e-3, size=200).cumsum()
     x = np.append(path, path[0])[:, None]
     return float(taken_J(x, forces(x, SPRING)).sum()), float(-STIFFNESS_N_M / 2.0 * (np.diff(x, axis=0) ** 2).sum())

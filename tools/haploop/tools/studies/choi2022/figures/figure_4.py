@@ -1,58 +1,40 @@
-"""Fig. 4: velocity against momentum of virtual inertia in one contact."""
+"""Fig. 4: velocity against momentum of virtual inertia in one contact, and filters over its acceleration."""
 
 from __future__ import annotations
 
+import copy
+import math
 from typing import Any
 
 import numpy as np
 
-from haploop.tools.figure.style import INK, SMALL, empty_figure
+from haploop.tools.figure.file import empty_figure
+from haploop.tools.figure.style import INK, SMALL
+from haploop.tools.linear.one_tick import OneTickMap
 from haploop.tools.render.units import amount, fixed
-from haploop.tools.studies.choi2022.claims import Claim, Finding
-from haploop.tools.studies.choi2022.motion.acceleration import (
-    CUTOFFS_HZ,
-    errors_m_s2,
-    largest_mass_kg,
-    largest_stiffness_N_m,
-    named,
-    passive_up_to_Hz,
-    said,
-)
-from haploop.tools.studies.choi2022.motion.momentum import draw_loop, steps_J
-from haploop.tools.studies.choi2022.motion.prescribed import MASS_KG, PERIOD_S, closed_form, mean_taken
-from haploop.tools.studies.choi2022.simulation.scenes import pushed_and_braked, run, single_contact
+from haploop.tools.search.bisect import Tolerance, bisect
+from haploop.tools.studies.choi2022.claims import Finding, claims_of
+from haploop.tools.studies.choi2022.drawing import draw_loop
+from haploop.tools.studies.choi2022.sampled import MASS_KG, PERIOD_S, closed_form, mean_taken, steps_J
+from haploop.tools.studies.choi2022.scenes import fig6, pushed_and_braked, run, single_contact
 from haploop.tools.studies.choi2022.work import Work
 
 TITLE = "Velocity against momentum of virtual inertia in a single contact"
-STEP = Claim("III, eq. 7 and 8", "The above equation can be simplified as … E_step(k) = m v(k)(v(k−1) − v(k−2))")
-CLOCKWISE = Claim(
-    "III, Fig. 4", "a graph shift caused by the delay on the horizontal axis results in a clockwise hysteresis"
-)
-UNLIKE = Claim("III, Fig. 4", "the virtual inertia dissipates energy, unlike the virtual spring")
-PASSIVE = Claim("III, Fig. 4", "virtual inertia can be considered a passive element")
-FILTERED = Claim(
-    "III",
-    "rendering the virtual inertia using low-pass filtered acceleration has no effect on the passivity of the system",
-)
-RANGE = Claim("III", "[a low-pass filter] even expands the stable range of virtual inertia")
-MEASURED = Claim(
-    "III",
-    "the measured acceleration value from an accelerometer … is more accurate than filtered values from the encoder",
-)
-LAG = Claim("III", "it would be desirable to use a low-pass filter with a minimum phase lag")
-CHOOSE = Claim(
-    "III",
-    "Based on the encoder resolution of the haptic system, we may select a proper one between the filtered "
-    "acceleration from the encoder or the measured acceleration from the accelerometer",
-)
-CLAIMS = (STEP, CLOCKWISE, UNLIKE, PASSIVE, FILTERED, RANGE, LAG, MEASURED, CHOOSE)
-
+CLAIMS = claims_of(4)
+CUTOFFS_HZ = (None, 100.0, 30.0, 10.0)
+# An IMU of the class of the paper's: 300 ug/Hz^0.5, 16 bit over 8 g, 420 Hz (MPU-9250's data sheet).
+IMU = {
+    "noise_density": 2.9e-3, "range": 78.5, "resolution": 2.4e-3, "bandwidth": 420.0, "delay": 0.0014, "bias": 0.0,
+    "mount": "tip",
+}  # fmt: skip
+# PHANToM Premium 1.5, one count.
+COUNT_M = 28.7e-6
 # An encoder so fine that its step does not matter.
 _FINE_M = 1e-7
 
 
 def make(work: Work) -> list[Finding]:
-    """The schematic's motion, and a contact of the program's."""
+    """Draws the motion of the schematic and a run, and tests filters over the acceleration."""
     pulse = 0.1 * np.sin(np.pi * np.arange(-1, 15) / 12.0).clip(0.0)
     inertia = [{"kind": "bidirectional-inertia", "acts": "always", "mass": MASS_KG}]
     pushed = pushed_and_braked(dissipation=inertia)
@@ -74,79 +56,150 @@ def make(work: Work) -> list[Finding]:
         "red, and grey where both lie; the path runs clockwise, and what lies within it is kept. Left the motion of "
         "the schematic, right the paper's device and hand, pushed by hand and braked again."
     )
-    masses = [
-        f"{1e3 * largest_mass_kg(cutoff, 0.0):.0f} g {'at ' * bool(cutoff)}{named(cutoff)}" for cutoff in CUTOFFS_HZ
-    ]
+    masses_g = {cutoff: 1e3 * largest_mass_kg(cutoff, 0.0) for cutoff in CUTOFFS_HZ}
+    masses = [f"{mass:.0f} g {'at ' * bool(cutoff)}{named(cutoff)}" for cutoff, mass in masses_g.items()]
     work.answer = (
         "**A low-pass over the acceleration helps.** Largest stable bidirectional inertia of the paper's device and "
         f"hand, 2 ms late and without a wall: {', '.join(masses)}"
     )
-    return _findings(pulse, v, pushed, contact, work)
-
-
-def _findings(
-    pulse: np.ndarray, v: np.ndarray, pushed: dict[str, Any], contact: dict[str, Any], work: Work
-) -> list[Finding]:
-    summary = run(contact)[0]
-    [element] = summary["energy"]["elements"]
-    sampled_J, wall_J = element["sampled_J"], summary["energy"]["wall"]["sampled_J"]
-    free = run(pushed)[0]["energy"]["elements"][0]["sampled_J"]
-    by_steps, closed = float(steps_J(v, MASS_KG).sum()), float(steps_J(pulse, MASS_KG).sum())
-    apart = abs(by_steps / free - 1.0)
-    frequencies = np.linspace(5.3, 497.9, 160 if not work.small else 20)
-    theta = 2.0 * np.pi * frequencies * PERIOD_S
-    measured = mean_taken("bidirectional-inertia", theta, 0)
-    formula = closed_form("bidirectional-inertia", theta, 0)
-    off = float(np.abs(measured - formula).max() / np.abs(formula).max())
-    changes = {late: 1e3 / (2 * late + 3) for late in (0, 2)}
-    passive = {named(cutoff): passive_up_to_Hz(cutoff) for cutoff in CUTOFFS_HZ}
-    unchanged = min(passive.values()) >= 0.98 * passive["unfiltered"]
-    free = {named(cutoff): 1e3 * largest_mass_kg(cutoff, 0.0) for cutoff in CUTOFFS_HZ}
-    wider = all(free[named(cutoff)] > free["unfiltered"] for cutoff in CUTOFFS_HZ[1:])
-    errors = errors_m_s2()
-    best = min(value for name, value in errors.items() if name != "accelerometer")
-    fine = errors_m_s2(_FINE_M)
-    finest = min(value for name, value in fine.items() if name != "accelerometer")
-    stiffest = {named(cutoff): 1e-3 * largest_stiffness_N_m(cutoff, MASS_KG) for cutoff in CUTOFFS_HZ}
-    on_filters = f"without delay bidirectional inertia takes energy from sines up to: {said(passive, 'Hz')}"
     return [
-        STEP.judged(
+        *_on_energy(pulse, v, pushed, contact, 20 if work.small else 160),
+        *_on_filters({named(cutoff): mass for cutoff, mass in masses_g.items()}),
+    ]
+
+
+def _on_energy(
+    pulse: np.ndarray, v: np.ndarray, pushed: dict[str, Any], contact: dict[str, Any], frequencies: int
+) -> list[Finding]:
+    energy, free = run(contact)[0]["energy"], run(pushed)[0]["energy"]
+    sampled_J, wall_J = energy["elements"][0]["sampled_J"], energy["wall"]["sampled_J"]
+    apart = abs(float(steps_J(v, MASS_KG).sum()) / free["elements"][0]["sampled_J"] - 1.0)
+    closed = float(steps_J(pulse, MASS_KG).sum())
+    theta = 2.0 * np.pi * np.linspace(5.3, 497.9, frequencies) * PERIOD_S
+    formula = closed_form("bidirectional-inertia", theta, 0)
+    off = float(np.abs(mean_taken("bidirectional-inertia", theta, 0) - formula).max() / np.abs(formula).max())
+    changes = {late: 1e3 / (2 * late + 3) for late in (0, 2)}
+    return [
+        CLAIMS["step"].holds_if(
             apart < 1e-9,
             "along the run at the right the program's sampled book and eq. 8 are the same, but for rounding",
         ),
-        CLOCKWISE.judged(closed > 0.0, f"the loop of the prescribed motion encloses {amount(closed, 'J')}, clockwise"),
-        UNLIKE.judged(
+        CLAIMS["clockwise"].holds_if(
+            closed > 0.0, f"the loop of the prescribed motion encloses {amount(closed, 'J')}, clockwise"
+        ),
+        CLAIMS["unlike"].holds_if(
             sampled_J > 0.0 > wall_J,
             f"in one contact the inertia took {amount(sampled_J, 'J')} net, the wall {amount(wall_J, 'J')} (sampled "
             "books)",
         ),
-        PASSIVE.assuming(
-            "the motion is slower than a third of the sample rate, a seventh with 2 ms of delay",
+        CLAIMS["passive"].holds_if(
+            False,
             "under a sine it takes (2m/T²) sin²(θ/2)(cos (d+1)θ − cos (d+2)θ) A² a sample, d samples late: up to "
             f"{changes[0]:.0f} Hz at 1 kHz without delay, {changes[2]:.0f} Hz with 2 ms, and gives above; the "
             f"program's controller differs by {100 * off:.2g} % of the largest",
-        )
-        if off < 1e-3
-        else PASSIVE.fails(f"the closed form and the program differ by {100 * off:.2g} %"),
-        FILTERED.holds(on_filters)
-        if unchanged
-        else FILTERED.assuming(f"the motion is slower than {min(passive.values()):.0f} Hz", on_filters),
-        RANGE.judged(
-            wider, f"largest bidirectional mass of device and hand without a wall, 2 ms late: {said(free, 'g')}"
+            "the motion is slower than a third of the sample rate, a seventh with 2 ms of delay",
+            off < 1e-3,
         ),
-        LAG.judged(
+    ]
+
+
+def _on_filters(masses_g: dict[str, float]) -> list[Finding]:
+    """Tests what is said of filters and sensors of the acceleration; the largest masses are given by cutoff."""
+    passive = {named(cutoff): passive_up_to_Hz(cutoff) for cutoff in CUTOFFS_HZ}
+    stiffest = {named(cutoff): 1e-3 * largest_stiffness_N_m(cutoff, MASS_KG) for cutoff in CUTOFFS_HZ}
+    errors, fine = errors_m_s2(), errors_m_s2(_FINE_M)
+    best, finest = (min(of[name] for name in of if name != "accelerometer") for of in (errors, fine))
+    return [
+        CLAIMS["filtered"].holds_if(
+            min(passive.values()) >= 0.98 * passive["unfiltered"],
+            f"without delay bidirectional inertia takes energy from sines up to: {_listed(passive, 'Hz')}",
+            f"the motion is slower than {min(passive.values()):.0f} Hz",
+            True,
+        ),
+        CLAIMS["range"].holds_if(
+            all(masses_g[named(cutoff)] > masses_g["unfiltered"] for cutoff in CUTOFFS_HZ[1:]),
+            f"largest bidirectional mass of device and hand without a wall, 2 ms late: {_listed(masses_g, 'g')}",
+        ),
+        CLAIMS["lag"].holds_if(
             stiffest["unfiltered"] >= max(stiffest.values()),
-            f"largest stable stiffness with 10 g of bidirectional inertia, 2 ms late: {said(stiffest, 'N/mm')}. Some "
-            "lag turns the inertia into damping",
+            f"largest stable stiffness with 10 g of bidirectional inertia, 2 ms late: {_listed(stiffest, 'N/mm')}. "
+            "Some lag turns the inertia into damping",
         ),
-        MEASURED.judged(
+        CLAIMS["measured"].holds_if(
             errors["accelerometer"] < best,
-            f"RMS error in a contact, 28.7 µm encoder, IMU of 300 µg/√Hz: {said(errors, 'm/s²')}",
+            f"RMS error in a contact, 28.7 µm encoder, IMU of 300 µg/√Hz: {_listed(errors, 'm/s²')}",
         ),
-        CHOOSE.judged(
+        CLAIMS["choose"].holds_if(
             finest < fine["accelerometer"],
             f"in such a contact the accelerometer is better whatever the encoder: with steps of 0.1 µm the best "
             f"difference is {fixed(finest)} m/s² off, the accelerometer {fixed(fine['accelerometer'])} m/s²; a "
             "difference of differences is a period old",
         ),
     ]
+
+
+def named(cutoff_Hz: float | None) -> str:
+    """Returns what a row of numbers calls a cutoff."""
+    return "unfiltered" if cutoff_Hz is None else f"{cutoff_Hz:g} Hz"
+
+
+def passive_up_to_Hz(cutoff_Hz: float | None) -> float:
+    """Returns the lowest frequency at which bidirectional inertia without delay gives more than it takes, to 1 Hz."""
+    frequencies = np.arange(1.37, 500.0, 1.0)
+    taken = mean_taken("bidirectional-inertia", 2.0 * np.pi * frequencies * PERIOD_S, 0, cutoff_Hz)
+    return float(frequencies[np.argmax(taken < 0.0)]) if (taken < 0.0).any() else math.inf
+
+
+def largest_mass_kg(cutoff_Hz: float | None, stiffness_N_m: float) -> float:
+    """Returns the largest virtual mass, from 0 on, with which the paper's device and hand behind 2 ms stay stable.
+
+    It is where rho(M) = 1 of the one-tick map; 0 where the loop is unstable with the least mass already.
+    """
+
+    def is_stable(mass_kg: float) -> bool:
+        return _one_tick(mass_kg, cutoff_Hz).growth(stiffness_N_m) < 1.0
+
+    low, high = 0.0, 1e-5
+    while high < 10.0 and is_stable(high):
+        low, high = high, 1.2 * high
+    return bisect(is_stable, low, high, Tolerance(relative=1e-6))[0] if low else 0.0
+
+
+def largest_stiffness_N_m(cutoff_Hz: float | None, mass_kg: float) -> float:
+    """Returns the end of the stiffnesses, from 0 on, at which device and hand stay stable in contact; 0 for none."""
+    ranges = _one_tick(mass_kg, cutoff_Hz).stable_ranges()
+    return ranges[0][1] if ranges and ranges[0][0] == 0.0 else 0.0
+
+
+def _one_tick(mass_kg: float, cutoff_Hz: float | None) -> OneTickMap:
+    scene = copy.deepcopy(fig6("c"))
+    scene.pop("encoder")
+    scene["acceleration"] = {"source": "encoder"} | ({"cutoff": cutoff_Hz} if cutoff_Hz else {})
+    scene["dissipation"] = [{"kind": "bidirectional-inertia", "acts": "always", "mass": mass_kg}]
+    return OneTickMap.of(scene)
+
+
+def errors_m_s2(count_m: float = COUNT_M) -> dict[str, float]:
+    """Returns the RMS error of the controller's acceleration in one contact, by the source of it.
+
+    The contact is with the wall alone, so that the motion is the same whatever is made of it.
+    """
+    encoder = {"encoder": {"resolution": count_m, "rounding": "nearest"}}
+    true = _accelerations(single_contact("true", acceleration={"source": "accelerometer"}, **encoder))
+    found = {}
+    for cutoff in CUTOFFS_HZ:
+        table = {"source": "encoder"} | ({"cutoff": cutoff} if cutoff else {})
+        scene = single_contact("differenced", acceleration=table, **encoder)
+        found[f"encoder, {named(cutoff)}"] = _accelerations(scene)
+    scene = single_contact("measured", acceleration={"source": "accelerometer"}, accelerometer=IMU, **encoder)
+    found["accelerometer"] = _accelerations(scene)
+    return {name: float(np.sqrt(np.mean((a - true) ** 2))) for name, a in found.items()}
+
+
+def _accelerations(scene: dict[str, Any]) -> np.ndarray:
+    return np.asarray(run(scene)[1]["/controller"]["a"])
+
+
+def _listed(values: dict[str, float], unit: str) -> str:
+    """Returns names and numbers in a row."""
+    return ", ".join(f"{name} {fixed(value)} {unit}" for name, value in values.items())

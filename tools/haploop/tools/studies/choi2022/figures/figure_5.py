@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from haploop.tools.figure.style import ELEMENTS, GREY, WALL, dress, empty_figure, legend, plain_numbers
+from haploop.tools.figure.file import empty_figure
+from haploop.tools.figure.style import GREY, dress, legend, plain_numbers
 from haploop.tools.render.units import amount, fixed
-from haploop.tools.studies.choi2022.claims import Claim, Finding
-from haploop.tools.studies.choi2022.gate.gate_timing import returned
-from haploop.tools.studies.choi2022.motion.momentum import draw_loop, steps_J
-from haploop.tools.studies.choi2022.motion.prescribed import (
+from haploop.tools.studies.choi2022.claims import Finding, claims_of
+from haploop.tools.studies.choi2022.drawing import COLOURS, INSIDE, draw_loop
+from haploop.tools.studies.choi2022.sampled import (
     KINDS,
     MASS_KG,
     PERIOD_S,
@@ -19,6 +19,8 @@ from haploop.tools.studies.choi2022.motion.prescribed import (
     forces,
     mean_taken,
     positions,
+    returned,
+    steps_J,
     taken_J,
 )
 from haploop.tools.studies.choi2022.work import Work
@@ -27,39 +29,14 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 TITLE = "The acceleration's sign alternates: inertia generates, and unidirectional inertia may not"
-ALTERNATES = Claim("III, Fig. 5", "if … the acceleration sign changes in every sample time, the energy begins to leak")
-THREE = Claim(
-    "III, Fig. 5",
-    "If the velocity maintains its … tendency for at least three steps …, this behavior may not cause any energy leak",
-)
-ANY_VELOCITY = Claim(
-    "III, Fig. 5", "this active behavior … can occur … irrespective of whether the velocity is positive or negative"
-)
-AT_REST = Claim(
-    "III, Fig. 5", "at the equilibrium point owing to the velocity jittering near zero, which causes energy generation"
-)
-ONLY_STORED = Claim("IV, eq. 9", "the virtual inertia is only activated when the energy is stored")
-PURE = Claim("IV", "the unidirectional virtual inertia can be used as a pure energy dissipation element")
-MORE = Claim("IV", "the amount of dissipated energy can be significantly larger than that of the conventional one")
-CHATTER = Claim("IV", "to properly dissipate the generated energy (even during high-frequency chattering scenarios)")
-HIGHER = Claim(
-    "III",
-    "[inertia] can dissipate energy even in higher velocity interactions, unlike digital damping and digital springs",
-)
-BEFORE = Claim(
-    "IV, eq. 9",
-    "we use k − 1 step accelerations to calculate k-step unidirectional virtual inertia after considering the ZOH "
-    "effect",
-)
-CLAIMS = (ALTERNATES, THREE, ANY_VELOCITY, AT_REST, ONLY_STORED, BEFORE, PURE, MORE, CHATTER, HIGHER)
+CLAIMS = claims_of(5)
 
 BI, UNI = "bidirectional-inertia", "unidirectional-inertia"
 _JITTER_M_S, _DRIFT_M_S = 0.01, 0.05
-_COLOURS = dict(zip(KINDS, (WALL, *ELEMENTS), strict=False))
 
 
 def make(work: Work) -> list[Finding]:
-    """The alternating loop, its energy sample by sample, and all kinds over frequency."""
+    """Draws the alternating loop, its energy sample by sample, and all kinds over frequency."""
     frequencies = np.concatenate([np.geomspace(2.03, 60.7, 20), np.linspace(63.1, 497.3, 60)])
     if work.small:
         frequencies = frequencies[::8]
@@ -83,7 +60,7 @@ def make(work: Work) -> list[Finding]:
         "the program's controller. The paper's numbers: 0.15 N/mm, 0.8 N s/m, 10 g."
     )
     work.answer = _answer(frequencies, measured)
-    return _findings(frequencies, measured)
+    return [*_on_alternation(), *_on_unidirectional(frequencies, measured)]
 
 
 def _answer(frequencies: np.ndarray, measured: dict[tuple[str, int], np.ndarray]) -> str:
@@ -100,14 +77,14 @@ def _answer(frequencies: np.ndarray, measured: dict[tuple[str, int], np.ndarray]
 
 
 def _over_samples(ax: Axes) -> dict[str, np.ndarray]:
-    """Energy over samples of both inertias under jitter; returns what was drawn."""
+    """Draws the energy of both inertias under jitter over samples; returns what was drawn."""
     drawn: dict[str, np.ndarray] = {}
-    for kind, colour in ((BI, _COLOURS[BI]), (UNI, _COLOURS[UNI])):
+    for kind in (BI, UNI):
         for drift, style, where in ((0.0, "-", "about rest"), (_DRIFT_M_S, (0, (4, 2)), "on 50 mm/s")):
             book = np.cumsum(_taken_under_jitter(kind, drift))
             ax.plot(
                 1e6 * book,
-                color=colour,
+                color=COLOURS[kind],
                 linestyle=style,
                 linewidth=1.5,
                 marker=".",
@@ -117,17 +94,17 @@ def _over_samples(ax: Axes) -> dict[str, np.ndarray]:
             drawn[f"{kind}_{where}_J".replace("-", "_").replace(" ", "_").replace("/", "_per_")] = book
     ax.axhline(0.0, color=GREY, linewidth=0.8, zorder=0)
     dress(ax, "Energy taken by 10 g of inertia under that jitter", "sample", "energy (µJ)")
-    legend(ax, loc="lower left", bbox_to_anchor=(0.0, 0.0), ncols=1, framealpha=0.8, edgecolor="none")
+    legend(ax, loc="lower left", bbox_to_anchor=(0.0, 0.0), ncols=1, **INSIDE)
     return drawn
 
 
 def _jitter(drift_m_s: float, ticks: int) -> np.ndarray:
-    """Samples of a velocity drift +- jitter, the sign new every sample, shape (ticks, 1)."""
+    """Returns samples of a velocity drift +- jitter, the sign new every sample, shape (ticks, 1)."""
     return positions(drift_m_s + _JITTER_M_S * (-1.0) ** np.arange(ticks))[:, None]
 
 
 def _taken_under_jitter(kind: str, drift_m_s: float, ticks: int = 24) -> np.ndarray:
-    """Energy of each sample after the first few, when the jitter is what it is from then on."""
+    """Returns the energy of each sample after the first few, when the jitter is what it is from then on."""
     x = _jitter(drift_m_s, ticks + 4)
     taken = taken_J(x, forces(x, kind))[:, 0]
     return np.concatenate([[0.0], taken[4:]])
@@ -137,7 +114,7 @@ def _over_frequency(ax: Axes, frequencies: np.ndarray, measured: dict[tuple[str,
     fine = np.geomspace(2.0, 500.0, 800)
     scale = _unsampled_damper(frequencies)
     for kind in KINDS:
-        colour = _COLOURS[kind]
+        colour = COLOURS[kind]
         if kind != UNI:
             curve = closed_form(kind, 2.0 * np.pi * fine * PERIOD_S, late) / _unsampled_damper(fine)
             ax.plot(fine, curve, color=colour, linewidth=1.2)
@@ -152,12 +129,8 @@ def _over_frequency(ax: Axes, frequencies: np.ndarray, measured: dict[tuple[str,
 
 
 def _unsampled_damper(frequencies: np.ndarray) -> np.ndarray:
-    """Energy that 0.8 N s/m take in 1 ms from a sine of 1 m, b omega^2 T / 2."""
+    """Returns the energy that 0.8 N s/m take in 1 ms from a sine of 1 m, b omega^2 T / 2."""
     return 0.8 * (2.0 * np.pi * frequencies) ** 2 * PERIOD_S / 2.0
-
-
-def _findings(frequencies: np.ndarray, measured: dict[tuple[str, int], np.ndarray]) -> list[Finding]:
-    return [*_on_alternation(), *_on_unidirectional(frequencies, measured)]
 
 
 def _on_alternation() -> list[Finding]:
@@ -172,22 +145,22 @@ def _on_alternation() -> list[Finding]:
     ]
     same = max(shifts) - min(shifts) < 1e-9 * abs(shifts[1])
     return [
-        ALTERNATES.judged(
+        CLAIMS["alternates"].holds_if(
             abs(level / formula - 1.0) < 1e-9,
             f"a velocity of ±V loses 2 m V² a sample: {amount(level, 'J')} for 10 g and 10 mm/s, closed form "
             f"{amount(formula, 'J')}. Of 2000 random loops whose acceleration alternates {100 * leaking:.0f} % leak",
         ),
-        THREE.judged(
+        CLAIMS["three"].holds_if(
             least >= -1e-15,
             "over a closed loop of velocity E/m = ½ΣΔ² + ΣΔ(k)Δ(k−1), Δ the changes; where each tendency lasts two "
             "changes or more, no Δ is at two turns and E ≥ 0. The least of 2000 random ones took "
             f"{amount(least, 'J')}",
         ),
-        ANY_VELOCITY.judged(
+        CLAIMS["any_velocity"].holds_if(
             same,
             f"two samples of jitter take {', '.join(amount(one, 'J') for one in shifts)} on top of −50, 0 and 50 mm/s",
         ),
-        AT_REST.judged(
+        CLAIMS["at_rest"].holds_if(
             level < 0.0,
             f"jitter of ±10 mm/s about rest (one 10 µm count back and forth) takes {amount(level / PERIOD_S, 'W')}",
         ),
@@ -195,7 +168,7 @@ def _on_alternation() -> list[Finding]:
 
 
 def _closed(rng: np.random.Generator, shortest: int) -> np.ndarray:
-    """A random velocity that ends as it began, m/s: tendencies of ``shortest`` changes each, or one or two more if 2.
+    """Returns a random velocity that ends as it began, m/s: tendencies of ``shortest`` changes, or up to 2 more if 2.
 
     It is returned with its first three values again, so that every step of the loop has its past.
     """
@@ -211,7 +184,7 @@ def _closed(rng: np.random.Generator, shortest: int) -> np.ndarray:
 
 
 def _loop_J(v: np.ndarray) -> float:
-    """Energy taken once around a closed loop of velocity."""
+    """Returns the energy taken once around a closed loop of velocity."""
     period = len(v) - 3
     around = np.concatenate([v[:period], v[:period]])
     return float(steps_J(around, MASS_KG)[period:].sum())
@@ -229,48 +202,48 @@ def _on_unidirectional(frequencies: np.ndarray, measured: dict[tuple[str, int], 
     }
     at_once = abs(returned(50.7, before=False))
     ends = {(kind, late): _first_negative(frequencies, measured[kind, late]) for kind, late in measured}
-    said = "; ".join(
+    up_to = "; ".join(
         how + ", ".join(f" {kind.partition('-')[0]} {_hertz(ends[kind, late])}" for kind in KINDS)
         for late, how in ((0, "without delay"), (2, "with 2 ms"))
     )
     pure = f"from a sine it takes energy up to {_hertz(gives[0])} at 1 kHz without delay, {_hertz(gives[2])} with 2 ms"
     within = min(ends[BI, 0], ends[UNI, 0]), ends["damping", 0]
     return [
-        ONLY_STORED.assuming(
+        CLAIMS["only_stored"].assuming(
             "the motion is slow against the sample rate",
             "share of what it takes that it gives back, since the test looks at a(k−1) and the force is held to the "
             f"next sample: {', '.join(f'{100 * share:.2g} % at {name}' for name, share in back.items())}",
         ),
-        BEFORE.judged(
+        CLAIMS["before"].holds_if(
             at_once >= back["50 Hz"],
             f"given back of what is taken from a sine of 50 Hz: {100 * back['50 Hz']:.2g} % with a(k−1), "
             f"{100 * at_once:.2g} % with a(k): the older sample keeps the gate open past the turn",
         ),
-        PURE.holds(pure)
-        if not np.isfinite(gives[2])
-        else PURE.assuming(f"the motion is slower than {_hertz(gives[2])}", pure),
-        MORE.assuming(
-            f"the motion is slower than {_hertz(until)}",
+        CLAIMS["pure"].holds_if(
+            not np.isfinite(gives[2]), pure, f"the motion is slower than {_hertz(gives[2])}", under_it=True
+        ),
+        CLAIMS["more"].holds_if(
+            until > 0.0 and not np.isfinite(until),
             f"under a sine of {frequencies[at]:.0f} Hz, without delay, it takes {fixed(float(ratio[at]))} times what "
             f"the bidirectional one takes, at {frequencies[4]:.1f} Hz {fixed(float(ratio[4]))} times; from "
             f"{_hertz(until)} on it takes less",
-        )
-        if 0.0 < until < np.inf
-        else MORE.judged(until > 0.0, f"{fixed(float(ratio[at]))} times at {frequencies[at]:.0f} Hz"),
-        CHATTER.assuming(
-            "the velocity chatters about zero",
+            f"the motion is slower than {_hertz(until)}",
+            until > 0.0,
+        ),
+        CLAIMS["chatter"].holds_if(
+            False,
             f"under ±10 mm/s from sample to sample it takes {amount(rest, 'J') if rest else 'nothing'} about rest, "
             f"where bidirectional inertia takes −2.00 µJ; on top of 50 mm/s it takes {amount(drift, 'J')}: it acts "
             "on every other sample, the one that pushes on",
-        )
-        if rest >= 0.0
-        else CHATTER.fails(f"it takes {amount(rest, 'J')} a sample"),
-        HIGHER.judged(within[0] > within[1], f"each takes energy from a sine up to: {said}"),
+            "the velocity chatters about zero",
+            rest >= 0.0,
+        ),
+        CLAIMS["higher"].holds_if(within[0] > within[1], f"each takes energy from a sine up to: {up_to}"),
     ]
 
 
 def _first_negative(frequencies: np.ndarray, taken: np.ndarray) -> float:
-    """The frequency from which on it gives, between two that were tried; 0 if at all, infinite at none of them."""
+    """Returns the frequency from which on it gives, between two that were tried; 0 if at all, infinite if at none."""
     negative = taken < -1e-9 * np.abs(taken).max()
     if not negative.any() or negative[0]:
         return 0.0 if negative[0] else np.inf

@@ -1,49 +1,123 @@
-"""Fig. 7 shows the experiments' device: here what of it nobody published, and the reading nearest to the paper."""
+"""Fig. 7 shows the experiments' device: here what nobody published of it, and the nearest interpretation."""
 
 from __future__ import annotations
 
-from typing import Any
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
 
-from haploop.tools.studies.choi2022.claims import Claim, Finding
-from haploop.tools.studies.choi2022.colours import SHORT
-from haploop.tools.studies.choi2022.experiment.influence import influence
-from haploop.tools.studies.choi2022.experiment.reading_file import file_text
-from haploop.tools.studies.choi2022.experiment.reading_notes import notes
-from haploop.tools.studies.choi2022.experiment.reading_rows import CLAIMS as TESTED
-from haploop.tools.studies.choi2022.experiment.reading_rows import PAPER
-from haploop.tools.studies.choi2022.experiment.reading_search import Found, columns, search
-from haploop.tools.studies.choi2022.experiment.readings import SPACE
-from haploop.tools.studies.choi2022.experiment.setup import KINDS, SCENE_FILE
-from haploop.tools.studies.choi2022.experiment.verdict_under_assumptions import READING, SCENE, keep_shares
-from haploop.tools.studies.choi2022.simulation.search_figure import share_map
-from haploop.tools.studies.choi2022.simulation.shares import options, percent, share
+from haploop.tools.figure.file import empty_figure
+from haploop.tools.figure.style import GREY, INK, SMALL, dress
+from haploop.tools.studies.choi2022.claims import Finding, claims_of
+from haploop.tools.studies.choi2022.drawing import SHORT
+from haploop.tools.studies.choi2022.experiment.measure import CLAIMS as TESTED
+from haploop.tools.studies.choi2022.experiment.measure import NAMES, PAPER, largest, stiffness_ladder
+from haploop.tools.studies.choi2022.experiment.scene_file import file_text
+from haploop.tools.studies.choi2022.experiment.search import SPACE, Found, columns, notes, search
+from haploop.tools.studies.choi2022.experiment.setup import FRICTION_N, KINDS, SCENE_FILE, Setup
+from haploop.tools.studies.choi2022.experiment.verdicts import NEAREST, SCENE, keep_shares
+from haploop.tools.studies.choi2022.interpretations import options, percent, share
+from haploop.tools.studies.choi2022.search_report import share_map
 from haploop.tools.studies.choi2022.work import Work
 
-TITLE = "The device of the experiments: readings, and the one nearest to the paper"
-UNIT = Claim(
-    "V.B.1",
-    "owing to the noisy behavior of the double derivative, acceleration was obtained from an inertial measurement unit "
-    "(IMU) sensor for better accuracy",
-)
-CLAIMS = (UNIT,)
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+TITLE = "The device of the experiments: interpretations, and the one nearest to the paper"
+CLAIMS = claims_of(7)
+# Largest steady stiffness in N/m by element, and by key of a setup at a lower and an upper value of it.
+Largest = dict[str, float]
+Influences = dict[str, tuple[Largest, Largest]]
+_FACTOR, _DELAY_S = 1.4, 5e-4
+_LOWER, _UPPER = "#56B4E9", "#E69F00"
 
 
 def make(work: Work) -> list[Finding]:
-    """The search, what each value does by itself, and the nearest reading as a scene."""
+    """Searches, varies each value by itself, and writes the nearest interpretation as a scene."""
     found = search(work)
     rows = found.of("random")
     there = options(rows, SPACE)
     if there:
-        seen = "How often each claim of Figs. 8 to 13 holds, by what a reading chose; the claims are told below."
+        seen = "How often each claim of Figs. 8 to 13 holds, by what was chosen; the claims are told below."
         work.figure(share_map(there, list(TESTED), len(rows)), "figure_7", seen)
     keep_shares(work, list(TESTED), rows, there)
-    influences = influence(work, found.nearest, found.with_friction)
+    varied = _varied(found.nearest, work.small)
+    base, influences = _influences(work, found, varied)
+    work.figure(
+        _draw(base, influences, varied | {"friction_N": (0.0, FRICTION_N)}),
+        "figure_7_influence",
+        "What one value changes, all others as in the nearest interpretation (the line): the largest stiffness that "
+        f"each element steadies. Numbers are taken 1/{_FACTOR:g} (blue) and {_FACTOR:g} times (orange), the delay 0.5 "
+        "ms less and more, the friction as it was published; beside a bar the value.",
+    )
     work.data("figure_7_readings", columns(found.rows))
     work.scene(SCENE.removesuffix(".toml"), found.nearest.scene(5000.0, []))
-    work.path(SCENE_FILE).write_text(file_text(found.nearest), encoding="utf-8")
+    work.text(SCENE_FILE, file_text(found.nearest))
     work.notes = notes(found, there)
     work.answer = _answer(found)
     return [_on_the_unit(found, *influences["acceleration"])]
+
+
+def _varied(setup: Setup, small: bool) -> dict[str, tuple[Any, Any]]:
+    """Returns for each value of a setup a lower and an upper one, or two other choices."""
+    numbers = {
+        key: (float(f"{getattr(setup, key) / _FACTOR:.3g}"), float(f"{getattr(setup, key) * _FACTOR:.3g}"))
+        for key in SPACE.bounds
+    }
+    numbers["near_share"] = (numbers["near_share"][0], min(numbers["near_share"][1], 0.9))
+    delays = (round(max(setup.delay_s - _DELAY_S, 0.0), 4), round(setup.delay_s + _DELAY_S, 4))
+    units = [unit for unit in SPACE.choices["unit"] if unit != setup.unit]
+    velocities = [one for one in SPACE.choices["velocity"] if one != setup.velocity]
+    pairs = {
+        **numbers,
+        "delay_s": delays,
+        "unit": (units[0], units[-1]),
+        "mount": ("motor", "tip"),
+        "velocity": (velocities[0], velocities[-1]),
+        "acceleration": ("unit", "encoder"),
+    }
+    return {key: pairs[key] for key in ("delay_s", "acceleration")} if small else pairs
+
+
+def _influences(work: Work, found: Found, varied: dict[str, tuple[Any, Any]]) -> tuple[Largest, Influences]:
+    """Returns the largest stiffnesses of the nearest interpretation, and those at both values of each key."""
+    ends = [replace(found.nearest, **{key: value}) for key, pair in varied.items() for value in pair]
+    base, *rest = _largest(work, [found.nearest, *ends])
+    influences = {key: (rest[2 * i], rest[2 * i + 1]) for i, key in enumerate(varied)}
+    return base, influences | {"friction_N": (base, {name: found.with_friction[f"{name}_N_m"] for name in NAMES})}
+
+
+def _largest(work: Work, setups: list[Setup]) -> list[Largest]:
+    """Returns the largest stiffnesses of each setup; those of one structure run together."""
+    alike: dict[Any, list[int]] = {}
+    for i, setup in enumerate(setups):
+        structure = (*(getattr(setup, key) for key in SPACE.choices), setup.acceleration)
+        alike.setdefault(structure, []).append(i)
+    groups = [[setups[i] for i in members] for members in alike.values()]
+    ladders = work.map_parallel("what each value changes", stiffness_ladder, groups)
+    found = {
+        i: {name: largest(steady[name]) for name in NAMES}
+        for members, of_group in zip(alike.values(), ladders, strict=True)
+        for i, steady in zip(members, of_group, strict=True)
+    }
+    return [found[i] for i in range(len(setups))]
+
+
+def _draw(base: Largest, influences: Influences, varied: dict[str, tuple[Any, Any]]) -> Figure:
+    figure = empty_figure(13.0, 1.2 + 0.46 * len(varied))
+    axes = figure.subplots(1, len(NAMES) - 1, sharey=True, sharex=True)
+    for ax, name in zip(axes, NAMES[1:], strict=True):
+        for row, (key, ends) in enumerate(influences.items()):
+            for of, value, colour, side in zip(ends, varied[key], (_LOWER, _UPPER), (-0.2, 0.2), strict=True):
+                ax.barh(row + side, (of[name] - base[name]) / 1e3, 0.36, base[name] / 1e3, color=colour)
+                text = {"ha": "left" if of[name] >= base[name] else "right", "fontsize": SMALL - 1, "color": INK}
+                ax.text(of[name] / 1e3, row + side, f" {SPACE.value(key, value)} ", va="center", **text)
+        ax.axvline(base[name] / 1e3, color=GREY, linewidth=0.8)
+        dress(ax, name.replace("-", " "), "largest steady stiffness (N/mm)", "")
+        ax.margins(x=0.3)
+        ax.set_xticks(range(0, 9, 2))
+    axes[0].set_yticks(range(len(varied)), [SPACE.label(key) for key in varied])
+    axes[0].invert_yaxis()
+    return figure
 
 
 def _answer(found: Found) -> str:
@@ -53,23 +127,18 @@ def _answer(found: Found) -> str:
     return (
         "**The ranking of the paper's experiments is possible, and rare.** Unidirectional inertia steadies a stiffer "
         f"wall than damping and bidirectional inertia do in {percent(share(rows, '10 larger'))} of {len(rows)} random "
-        f"readings of the device. The nearest reading bears, in N/mm and with the best of the few sizes that the "
-        f"search tries, {here} (the paper: {papers}); of its neighbours, "
+        "interpretations of the device. The nearest interpretation bears, in N/mm and with the best of the few sizes "
+        f"that the search tries, {here} (the paper: {papers}); of its neighbours, "
         f"all numbers a few per cent off, {percent(share(found.of('neighbour'), '10 larger'))} keep that ranking"
     )
 
 
-def _on_the_unit(found: Found, unit: dict[str, float], encoder: dict[str, float]) -> Finding:
-    """Whether inertia steadies stiffer walls with the unit than with the encoder's second differences."""
-    inertias = KINDS[2:]
-    better = all(unit[kind] > encoder[kind] for kind in inertias)
-    words = "; ".join(f"{name} {_two(of)}" for name, of in (("the unit", unit), ("the encoder", encoder)))
+def _on_the_unit(found: Found, unit: Largest, encoder: Largest) -> Finding:
+    """Finds whether inertia steadies stiffer walls with the unit than with the encoder's second differences."""
+    bears = [" and ".join(f"{of[kind] / 1e3:.1f}" for kind in KINDS[2:]) for of in (unit, encoder)]
     numbers = (
-        f"largest steady stiffness with bi- and unidirectional inertia, acceleration of {words} N/mm (low-pass of the "
-        f"velocity: {found.nearest.velocity})"
+        f"largest steady stiffness with bi- and unidirectional inertia, acceleration of the unit {bears[0]}; "
+        f"the encoder {bears[1]} N/mm (low-pass of the velocity: {found.nearest.velocity})"
     )
-    return UNIT.assuming(READING, numbers) if better else UNIT.fails(numbers)
-
-
-def _two(of: dict[str, Any]) -> str:
-    return " and ".join(f"{of[kind] / 1e3:.1f}" for kind in KINDS[2:])
+    better = all(unit[kind] > encoder[kind] for kind in KINDS[2:])
+    return CLAIMS["unit"].holds_if(False, numbers, NEAREST, better)

@@ -10,38 +10,21 @@ import numpy as np
 from haploop.protocol.ticks import Timebase
 from haploop.tools.dissipate.booking import Booked, Booking
 from haploop.tools.dissipate.samples import Samples
-from haploop.tools.figure.style import GREY, dress, empty_figure, legend
+from haploop.tools.figure.file import empty_figure
+from haploop.tools.figure.style import GREY, dress, legend
 from haploop.tools.render.units import amount
-from haploop.tools.studies.choi2022.claims import Claim, Finding
-from haploop.tools.studies.choi2022.colours import COLOURS
-from haploop.tools.studies.choi2022.experiment.reading_notes import said
-from haploop.tools.studies.choi2022.experiment.reading_rows import BOOKED_AT_N_M, BOOKED_DAMPING, BOOKED_KG
+from haploop.tools.studies.choi2022.claims import Finding, claims_of
+from haploop.tools.studies.choi2022.drawing import COLOURS, INSIDE, UPPER_LEFT
+from haploop.tools.studies.choi2022.experiment.measure import BOOKED_AT_N_M, BOOKED_DAMPING, BOOKED_KG
+from haploop.tools.studies.choi2022.experiment.search import describe
 from haploop.tools.studies.choi2022.experiment.setup import FRICTION_N, KINDS, Setup, elements_of
-from haploop.tools.studies.choi2022.experiment.verdict_under_assumptions import holding, judged, nearest
-from haploop.tools.studies.choi2022.gate.booked_sines import bidirectional_J, damper_J, unidirectional_J
-from haploop.tools.studies.choi2022.motion.spectrum import strongest_Hz
-from haploop.tools.studies.choi2022.simulation.scenes import run
+from haploop.tools.studies.choi2022.experiment.verdicts import nearest, nearest_with, verdict_under_assumptions
+from haploop.tools.studies.choi2022.sampled import bidirectional_J, damper_J, unidirectional_J
+from haploop.tools.studies.choi2022.scenes import run, strongest_Hz
 from haploop.tools.studies.choi2022.work import Work
 
 TITLE = "What damping dissipated in a contact, and what inertias would have on the same motion"
-MORE = Claim(
-    "V.B.2, Fig. 8",
-    "the energy behavior associated with both virtual inertias still dissipated more energy than the damping element",
-)
-OSCILLATES = Claim(
-    "V.B.2, Fig. 8",
-    "The vertical energy oscillations due to bidirectional virtual inertia confirmed the storage and release of energy",
-)
-ALSO_GENERATES = Claim(
-    "V.B.2, Fig. 8",
-    "virtual damping not only dissipated energy but also generated it, particularly at high-frequency oscillations",
-)
-PURE = Claim(
-    "V.B.2, Fig. 8",
-    "unidirectional virtual inertia could effectively dissipate larger amounts of energy because it was a pure energy "
-    "dissipation element",
-)
-CLAIMS = (MORE, OSCILLATES, ALSO_GENERATES, PURE)
+CLAIMS = claims_of(8)
 
 LABELS = ("damping", "bidirectional inertia", "unidirectional inertia")
 # Relative to the energy moved, what rounding leaves of a sum that cancels.
@@ -63,20 +46,18 @@ class Contact:
 
     @property
     def back_J(self) -> np.ndarray:
-        """For each element what went back in the samples in which its sampled book fell."""
+        """Energy that each element gave back, in the samples in which its sampled book fell."""
         return -np.minimum(np.diff(self.booked.sampled_J, axis=-1), 0.0).sum(axis=-1)
 
 
 def make(work: Work) -> list[Finding]:
-    """Two contacts with damping; all three elements booked on the motion of each."""
+    """Runs two contacts with damping, and books all three elements on the motion of each."""
     found = contacts(nearest(work), work)
-    _picture(work, found, "figure_8", "In the nearest reading of the device.")
+    _picture(work, found, "figure_8", "In the nearest interpretation of the device.")
     _sines(work)
-    if setup := holding(work, "8 more"):
-        other = contacts(setup, work)
-        _picture(
-            work, other, "figure_8_holds", f"In the reading nearest to the paper in which it holds: {said(setup)}."
-        )
+    if setup := nearest_with(work, "8 more"):
+        seen = f"In the interpretation nearest to the paper in which it holds: {describe(setup)}."
+        _picture(work, contacts(setup, work), "figure_8_holds", seen)
     work.caption = (
         f"Damping of {BOOKED_DAMPING:g} N s/m was at work; inertias of {1e3 * BOOKED_KG:g} g are booked on its motion, "
         "as `haploop dissipate DIR --damping 2.7 --mass 0.0018` does after `haploop run` of a scene beside the figure."
@@ -88,6 +69,7 @@ def make(work: Work) -> list[Finding]:
 
 
 def contacts(setup: Setup, work: Work) -> list[Contact]:
+    """Runs a contact with the paper's damping at both of its stiffnesses."""
     found = []
     for stiffness in BOOKED_AT_N_M:
         scene = setup.scene(stiffness, elements_of("damping", BOOKED_DAMPING))
@@ -97,7 +79,7 @@ def contacts(setup: Setup, work: Work) -> list[Contact]:
 
 
 def booked_on(scene: dict[str, Any], log: Any, work: Work) -> Booked:
-    """Damping and both inertias on the motion of a run, in the order of ``LABELS``."""
+    """Books damping and both inertias on the motion of a run, in the order of ``LABELS``."""
     time = Timebase.from_clock(scene["clock"], scene["duration"])
     n, late = time.steps_per_tick, time.delay_steps % time.steps_per_tick
     elements = [
@@ -115,7 +97,7 @@ def booked_on(scene: dict[str, Any], log: Any, work: Work) -> Booked:
     return booking.add(Samples(t_s, ticks["x"], ticks["v"], ticks["a"], true, between, True))
 
 
-def _picture(work: Work, contacts: list[Contact], name: str, words: str) -> None:
+def _picture(work: Work, contacts: list[Contact], name: str, seen: str) -> None:
     figure = empty_figure(12.0, 3.8)
     axes = figure.subplots(1, len(contacts))
     columns: dict[str, Any] = {}
@@ -128,18 +110,18 @@ def _picture(work: Work, contacts: list[Contact], name: str, words: str) -> None
         dress(ax, f"{contact.stiffness_N_m / 1e3:.1f} N/mm: {verdict}", "time (s)", "energy taken (mJ)")
         columns |= {f"{key}_t_s": booked.t_s, f"{key}_sampled_J": booked.sampled_J, f"{key}_true_J": booked.true_J}
         work.scene(f"{name}_{key}", contact.scene)
-    legend(axes[0], loc="upper left", bbox_to_anchor=(0.0, 1.0), ncols=1, framealpha=0.8, edgecolor="none")
+    legend(axes[0], **UPPER_LEFT, **INSIDE)
     work.data(name, columns)
     work.figure(
         figure,
         name,
-        f"{words} Solid: sampled books, all the controller can know (eq. 4), as in the paper; dashed: what the forces, "
+        f"{seen} Solid: sampled books, all the controller can know (eq. 4), as in the paper; dashed: what the forces, "
         "which act later, really took out of the device.",
     )
 
 
 def _sines(work: Work) -> None:
-    """At which frequency how much of an inertia takes as much as the damper."""
+    """Draws what each inertia takes over what the damper takes, by frequency and by the age of the acceleration."""
     figure = empty_figure(12.0, 3.6)
     axes = figure.subplots(1, 2, sharey=True)
     for ax, kind, taken in zip(axes, KINDS[2:], (bidirectional_J, unidirectional_J), strict=True):
@@ -148,7 +130,7 @@ def _sines(work: Work) -> None:
         ax.axhline(1.0, color=GREY, linewidth=0.8)
         dress(ax, f"{kind.replace('-', ' ')} of 1.8 g over damping of 2.7 N s/m", "frequency of a swing (Hz)", "")
         ax.set_ylim(0.0, 3.0)
-        legend(ax, loc="upper left", bbox_to_anchor=(0.0, 1.0), ncols=1, frameon=False)
+        legend(ax, **UPPER_LEFT)
     axes[0].set_ylabel("energy taken, inertia / damping (sampled)")
     work.figure(
         figure,
@@ -160,27 +142,29 @@ def _sines(work: Work) -> None:
 
 
 def ahead(inertia_J: np.ndarray) -> np.ndarray:
-    """What the paper's inertia takes over what its damper does, from what 1 kg takes at ``_FREQUENCIES_HZ``."""
+    """Returns what the paper's inertia takes over what its damper does, from what 1 kg takes at 2.3 to 247.9 Hz."""
     return BOOKED_KG * inertia_J / (BOOKED_DAMPING * damper_J(_FREQUENCIES_HZ))
 
 
 def first_ahead_Hz(inertia_J: np.ndarray) -> float:
-    """The lowest frequency below 250 Hz from which the inertia is ahead; NaN if none."""
+    """Returns the lowest frequency below 250 Hz from which the inertia is ahead; NaN if none."""
     over = ahead(inertia_J) >= 1.0
     return float(_FREQUENCIES_HZ[over.argmax()]) if over.any() else float("nan")
 
 
 def _tried(rough: list[Contact]) -> str:
-    """What else might make the claim hold, and what came of it."""
+    """Returns what else might make the claim hold, and the books with friction."""
     ends = _by_wall(rough, [contact.booked.sampled_J[:, -1] for contact in rough])
     needed = max(BOOKED_KG * end[0] / end[1:].min() for end in (contact.booked.sampled_J[:, -1] for contact in rough))
     return (
         "#### What was tried for inertias to take more\n\n"
         "Motions that vibrate (drives that ring at 80 to 500 Hz), accelerations up to 1.88 ms old on either side of "
-        "the drive, velocities low-passed at 50 and 200 Hz: the readings of [figure 7](#figure-7), *8 more*. And dry "
-        f"friction: with the published 48 mN the sampled books of the nearest reading end, for {', '.join(LABELS)}, at "
-        f"{ends}; there it would take {1e3 * needed:.0f} g to be ahead of the damping. Units of the paper's 0.0018 kg "
-        "do not explain it: a reading in g taken for m/s² would make the inertia's force 9.8 times smaller, not larger."
+        "the drive, velocities low-passed at 50 and 200 Hz: the interpretations of [figure 7](#figure-7), *8 more*. "
+        "And dry friction: with the published 48 mN the sampled books of the nearest interpretation end, for "
+        f"{', '.join(LABELS)}, at {ends}; there it would take {1e3 * needed:.0f} g to be ahead of the damping. "
+        "Units of the paper's 0.0018 kg do not explain it: "
+        "a reading in g taken for m/s² would make the inertia's force 9.8 times "
+        "smaller, not larger."
     )
 
 
@@ -208,17 +192,17 @@ def _findings(contacts: list[Contact], work: Work) -> list[Finding]:
     pure = max(float(of[2] / end[2]) for of, end in zip(back, ends, strict=True))
     late = 1.0 + contacts[0].scene["clock"]["round_trip_delay"] * 1e3
     return [
-        judged(work, MORE, all_more, numbers, "8 more"),
-        judged(work, OSCILLATES, all(of[1] > of[2] > 0.0 for of in back), given),
-        judged(
+        verdict_under_assumptions(work, CLAIMS["more"], all_more, numbers, "8 more"),
+        verdict_under_assumptions(work, CLAIMS["oscillates"], all(of[1] > of[2] > 0.0 for of in back), given),
+        verdict_under_assumptions(
             work,
-            ALSO_GENERATES,
+            CLAIMS["also_generates"],
             all(of[0] > _ROUNDING for of in back),
             f"{given}. A sampled damper generates above 250 Hz, as it acts here above {250.0 / late:.0f} Hz",
         ),
-        judged(
+        verdict_under_assumptions(
             work,
-            PURE,
+            CLAIMS["pure"],
             all_more and pure < 0.01,
             f"takes less than the damping does (above), and gives back {100 * pure:.1f} % of what it keeps, since the "
             "gate of eq. 9 closes a sample late",

@@ -2,29 +2,18 @@
 
 from __future__ import annotations
 
-from haploop.tools.figure.style import empty_figure, legend
-from haploop.tools.studies.choi2022.claims import Claim, Finding
-from haploop.tools.studies.choi2022.experiment.press_figure import Press, draw_press
-from haploop.tools.studies.choi2022.experiment.ranges import DAMPINGS, MASSES
+from haploop.tools.figure.file import empty_figure
+from haploop.tools.figure.style import legend
+from haploop.tools.studies.choi2022.claims import Finding, claims_of
+from haploop.tools.studies.choi2022.drawing import INSIDE, Press, draw_press
 from haploop.tools.studies.choi2022.experiment.setup import elements_of
-from haploop.tools.studies.choi2022.experiment.tuned import Tuned, tuned
-from haploop.tools.studies.choi2022.experiment.verdict_under_assumptions import judged, nearest
-from haploop.tools.studies.choi2022.simulation.scenes import run
+from haploop.tools.studies.choi2022.experiment.tuning import DAMPINGS, MASSES, Tuned, tuned
+from haploop.tools.studies.choi2022.experiment.verdicts import nearest, verdict_under_assumptions
+from haploop.tools.studies.choi2022.scenes import run
 from haploop.tools.studies.choi2022.work import Work
 
 TITLE = "Damping alone at 5.0 N/mm, unidirectional inertia alone at 5.5 N/mm"
-DAMPING = Claim(
-    "V.B.2, Fig. 9(a)",
-    "virtual damping cannot stabilize the haptic interaction with a VW of stiffness larger than 5.0 N/mm",
-)
-INERTIA = Claim(
-    "V.B.2, Fig. 9(b)", "with the unidirectional virtual inertia, it is possible to stabilize the interaction [at 5.5]"
-)
-DISPLAYED = Claim(
-    "V.B.2, Fig. 9(b)",
-    "the mean of the displayed stiffness was 5.4968 N/mm, which was very close to the desired stiffness of 5.5 N/mm",
-)
-CLAIMS = (DAMPING, INERTIA, DISPLAYED)
+CLAIMS = claims_of(9)
 # What is drawn, and the next stiffness up, for "larger than 5.0".
 _BEYOND = ("damping", 5500.0, DAMPINGS)
 _CASES = (
@@ -34,7 +23,7 @@ _CASES = (
 
 
 def make(work: Work) -> list[Finding]:
-    """Each tuned on a grid of sizes, and the best of them."""
+    """Tunes each on a grid of sizes, and runs the best of them."""
     figure = empty_figure(12.0, 6.4)
     axes = figure.subplots(2, 2, sharex=True)
     setup, columns, best = nearest(work), {}, {}
@@ -44,13 +33,13 @@ def make(work: Work) -> list[Finding]:
         scene = setup.scene(stiffness, chosen.elements)
         summary, log = run(scene)
         best[kind] = Tuned(chosen.elements, summary)
-        press = Press.of(scene, log)
+        press = Press.from_log(scene, log)
         heading = f"{kind.replace('-', ' ')} at {stiffness / 1e3:.1f} N/mm: {summary['verdict']}"
         draw_press(axes[0, column], axes[1, column], press, heading, stiffness)
         key = kind.split("-")[0]
         columns |= press.columns(key)
         work.scene(f"figure_9_{key}", scene)
-    legend(axes[0, 0], loc="upper right", ncols=3, framealpha=0.8, edgecolor="none")
+    legend(axes[0, 0], loc="upper right", ncols=3, **INSIDE)
     work.figure(figure, "figure_9")
     work.data("figure_9", columns)
     work.caption = (
@@ -74,11 +63,11 @@ def _findings(work: Work, damping: Tuned, beyond: Tuned, inertia: Tuned) -> list
     of_inertia = f"with the best of its sizes, {1e3 * m:.3g} g: {inertia.ended}"
     off = abs(shown / 5500.0 - 1.0)
     return [
-        judged(work, DAMPING, not beyond.steady, of_damping, "9 damping ends"),
-        judged(work, INERTIA, inertia.steady, of_inertia, "9 inertia"),
-        judged(
+        verdict_under_assumptions(work, CLAIMS["damping"], not beyond.steady, of_damping, "9 damping ends"),
+        verdict_under_assumptions(work, CLAIMS["inertia"], inertia.steady, of_inertia, "9 inertia"),
+        verdict_under_assumptions(
             work,
-            DISPLAYED,
+            CLAIMS["displayed"],
             inertia.steady and off < 0.01,
             f"{shown / 1e3:.4f} N/mm, {100 * off:.2f} % off; {of_inertia}",
         ),

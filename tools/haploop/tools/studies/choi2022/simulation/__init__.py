@@ -1,1 +1,1 @@
-"""The simulation of section V.A: its readings, the search among them, and the nearest one."""
+"""The simulation of section V.A: interpretations of it, the search among them, and what the runs of Fig. 6 show."""

@@ -1,114 +1,156 @@
-"""The search for readings under which the paper's Fig. 6 comes out: at random, then around the best."""
+"""The search for interpretations under which the paper's Fig. 6 comes out, and the report of it below the figure."""
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from haploop.tools.executor.executors import Executor, make_executor, map_parallel
-from haploop.tools.render.progress import Stage
-from haploop.tools.studies.choi2022.simulation.reading import BASE, Reading, draw
-from haploop.tools.studies.choi2022.simulation.reading_runs import shortfalls
+from haploop.tools.render.markdown import markdown_table
+from haploop.tools.render.units import amount
+from haploop.tools.search.random import Effort, Point, evaluated, random_search
+from haploop.tools.studies.choi2022.interpretations import Row, holds, options, percent, share
+from haploop.tools.studies.choi2022.search_report import (
+    by_number_of_claims,
+    claims_table,
+    list_of_choices,
+    pairs_never_together,
+)
+from haploop.tools.studies.choi2022.simulation.interpretation import ABOUT, BASE, BOUNDS, SPACE, describe
+from haploop.tools.studies.choi2022.simulation.measure import ASIDE, CLAIMS, shortfalls
+from haploop.tools.studies.choi2022.work import Work
 
 SEED = 2022
-
-
-@dataclass(frozen=True)
-class Size:
-    """How much is searched.
-
-    Attributes:
-        structures, each: readings at random: so many structures, and readings of each.
-        rounds, best, children: of refinement: around so many of the best so many others, again and again.
-        neighbours: around the nearest reading, to see how robust it is.
-    """
-
-    structures: int
-    each: int
-    rounds: int
-    best: int
-    children: int
-    neighbours: int
-
-
-WHOLE = Size(structures=64, each=64, rounds=4, best=3, children=64, neighbours=64)
-SMALL = Size(structures=2, each=4, rounds=1, best=1, children=2, neighbours=2)
-# How far the refinement strays in its first and last round, and the neighbours: standard deviations of ln.
-FAR, CLOSE, NEIGHBOURLY = 0.3, 0.05, 0.05
+WHOLE = Effort(structures=64, each=64, rounds=4, best=3, children=64, finalists=3, neighbours=64)
+SMALL = Effort(structures=2, each=4, rounds=1, best=1, children=2, neighbours=2)
 
 
 @dataclass(frozen=True)
 class Found:
-    """What was found.
+    """The outcome of the search.
 
     Attributes:
-        rows: of every reading, with ``stage``: "base", "nearest", "random", "refined" or "neighbour".
-        nearest: the reading nearest to the paper, its numbers rounded to three digits.
+        rows: of every interpretation, with ``stage``: "base", "nearest", "random", "refined" or "neighbour".
+        nearest: the interpretation nearest to the paper, its numbers rounded to three digits.
     """
 
     rows: list[dict[str, Any]]
-    nearest: Reading
+    nearest: Point
 
     def of(self, stage: str) -> list[dict[str, Any]]:
-        """The rows of a stage."""
+        """Returns the rows of a stage."""
         return [row for row in self.rows if row["stage"] == stage]
 
 
-def search(size: Size, workers: int | None, stage: Stage) -> Found:
-    """Search with the fixed seed; the same sizes give the same rows, whatever the number of workers.
+def search(work: Work, effort: Effort) -> Found:
+    """Searches with the fixed seed; the same effort gives the same rows, whatever the number of workers."""
 
-    The nearest reading is that of the finalists whose distance, with the mean of its neighbours' added, is the least:
-    one that only just holds is worth less than one whose neighbours hold, too.
+    def evaluate_all(stage: str, *args: Any) -> list[Any]:
+        return work.map_parallel(f"{stage} interpretations, in groups", *args)
+
+    found = random_search(
+        SPACE, shortfalls, effort, seed=SEED, distance=lambda row: row["distance"], evaluate_all=evaluate_all
+    )
+    nearest = SPACE.rounded(found.best.point, 3)
+    ends = [
+        *evaluated("base", shortfalls, [[BASE]], evaluate_all),
+        *evaluated("nearest", shortfalls, [[nearest]], evaluate_all),
+    ]
+    return Found([trial.row for trial in [*ends, *found.trials, *found.neighbours]], nearest)
+
+
+def write_table(rows: Sequence[dict[str, Any]], path: Path) -> bool:
+    """Writes all interpretations as Parquet, one row each; returns False where pyarrow is missing.
+
+    Numbers that an interpretation does not use are NaN; swings of runs that diverged are infinite.
     """
-    rng = np.random.default_rng(SEED)
-    with make_executor(workers) as executor:
-        seen = _run(executor, draw(rng, size.structures, size.each), "random", stage)
-        for spread in np.geomspace(FAR, CLOSE, size.rounds):
-            parents = _best(seen, size.best)
-            groups = [[parent.near(rng, float(spread)) for _ in range(size.children)] for parent in parents]
-            seen += _run(executor, groups, "refined", stage)
-        finalists = _best(seen, size.best)
-        around = [[one.near(rng, NEIGHBOURLY) for _ in range(size.neighbours)] for one in finalists]
-        nearby = _run(executor, around, "neighbour", stage)
-        index = _nearest(seen, finalists, nearby)
-        nearest = finalists[index].rounded()
-        ends = _run(executor, [[BASE]], "base", stage) + _run(executor, [[nearest]], "nearest", stage)
-    kept = nearby[index * size.neighbours : (index + 1) * size.neighbours]
-    return Found([row for _, row in [*ends, *seen, *kept]], nearest)
+    try:
+        import pyarrow
+        import pyarrow.parquet
+    except ImportError:
+        return False
+    pyarrow.parquet.write_table(pyarrow.Table.from_pylist(list(rows)), path)
+    return True
 
 
-Seen = list[tuple[Reading, dict[str, Any]]]
+def notes(found: Found) -> list[str]:
+    """Returns the sections below the figure."""
+    return [*_together(found), *_alone(found), *_nearest(found), *_method(found)]
 
 
-def _run(executor: Executor, groups: Sequence[Sequence[Reading]], name: str, stage: Stage) -> Seen:
-    """Every reading with its row, in order."""
-    advance = stage(f"{name} readings, in groups", len(groups))
-    answers = map_parallel(executor, shortfalls, groups, advance)
+def fullest(found: Found) -> Row:
+    """Returns the interpretation with the most claims, of several the nearest to the paper."""
+    return max(found.rows, key=lambda row: (row["holding"], -row["distance"]))
+
+
+def _together(found: Found) -> list[str]:
+    rows, refined, most = found.of("random"), found.of("refined"), fullest(found)
+    lacks = ", ".join(f"*{name}*" for name in CLAIMS if not holds(most, name))
+    limit = f"No interpretation of any kind has more than {most['holding']}; that one lacks {lacks}. " if lacks else ""
+    never = pairs_never_together(rows, list(CLAIMS))
+    both = f"Never both at random: {never}." if never else "Every two of them hold together somewhere."
     return [
-        (reading, row | {"stage": name})
-        for group, rows in zip(groups, answers, strict=True)
-        for reading, row in zip(group, rows, strict=True)
+        "#### All claims together",
+        f"All hold for {sum(holds(row, 'all') for row in rows)} of {len(rows)} random interpretations and for "
+        f"{sum(holds(row, 'all') for row in refined)} of {len(refined)} refined ones. {limit}{both} Random "
+        f"interpretations by how many claims hold: {by_number_of_claims(rows, len(CLAIMS))}.",
     ]
 
 
-def _best(seen: Seen, count: int) -> list[Reading]:
-    """The nearest readings, no two of them of one structure as long as there are others nearly as good."""
-    order = sorted(seen, key=lambda one: one[1]["distance"])
-    picked: list[Reading] = []
-    for reading, _ in order:
-        if sum(other.choices == reading.choices for other in picked) < max(1, count // 3):
-            picked.append(reading)
-        if len(picked) == count:
-            break
-    return picked
+def _alone(found: Found) -> list[str]:
+    rows, [base], [nearest] = found.of("random"), found.of("base"), found.of("nearest")
+    return [
+        "#### Each claim alone",
+        claims_table(
+            CLAIMS | {"all": "all of the above"} | ASIDE,
+            {"our interpretation": base, "nearest": nearest},
+            {"its neighbours": found.of("neighbour"), "random interpretations": rows},
+            options(rows, SPACE),
+            "decided most by",
+        ),
+        f"Not counted in the distance of an interpretation: {', '.join(f'*{name}*' for name in ASIDE)}.",
+    ]
 
 
-def _nearest(seen: Seen, finalists: Sequence[Reading], nearby: Seen) -> int:
-    """Which of the finalists is the nearest, its neighbours considered."""
-    each = len(nearby) // len(finalists)
-    own = [next(row["distance"] for other, row in seen if other is one) for one in finalists]
-    around = np.array([row["distance"] for _, row in nearby]).reshape(len(finalists), each).mean(axis=1)
-    return int(np.argmin(own + around))
+def _nearest(found: Found) -> list[str]:
+    [row], around = found.of("nearest"), found.of("neighbour")
+    missed = ", ".join(f"*{name}* by {row[name]:.2g}" for name in CLAIMS if row[name] > 0.0)
+    swings = ", ".join(
+        f"{key.removeprefix('swing ').removesuffix('_m')} {amount(value, 'm')}"
+        for key, value in row.items()
+        if key.startswith("swing ")
+    )
+    verdict = f"It misses {missed}" if missed else "All claims hold for it"
+    return [
+        "#### The nearest interpretation",
+        f"{describe(found.nearest)}. {verdict}; its distance is {row['distance']:.3g}. Swings in the last half "
+        f"second: {swings}. Of its {len(around)} neighbours all claims hold for {percent(share(around, 'all'))}; on "
+        f"average {np.mean([one['holding'] for one in around]):.1f} of {len(CLAIMS)} hold.",
+    ]
+
+
+def _method(found: Found) -> list[str]:
+    count = Counter(row["stage"] for row in found.rows)
+    numbers = [
+        [SPACE.label(key), SPACE.value(key, low), SPACE.value(key, high), ABOUT[key][1]]
+        for key, (low, high) in BOUNDS.items()
+    ]
+    return [
+        "#### How was searched",
+        f"An interpretation chooses what the paper leaves open, and keeps all numbers that it gives. {count['random']} "
+        f"interpretations were drawn with the seed {SEED}. The search was then tuned to the distance below: around the "
+        f"best of them, and in rounds around the best of all so far, {count['refined']} more were drawn, every number "
+        f"times e^(s ξ), ξ normal, s from {WHOLE.far:g} down to {WHOLE.close:g}; {count['neighbour']} neighbours of "
+        "the nearest show how much hangs on its numbers. Shares are of the random ones alone.",
+        "The 2 ms lie between sample and force. Where in the round trip they sit changes no motion, only which book is "
+        "seen: *sampled* is what a controller in front of them reads, *true* what acts on the device behind them. A "
+        "low-pass over the position itself, as the paper's words could also mean, is not among the choices.",
+        list_of_choices(SPACE),
+        markdown_table(["number, drawn evenly in its logarithm", "from", "to", "why"], numbers, numbers=(1, 2)),
+        "The distance of an interpretation is the sum over the claims of how far each is from holding: ln of the "
+        "factor that is missing (at most 3), 1 for a yes that is a no, 3 for a run that diverged.",
+    ]

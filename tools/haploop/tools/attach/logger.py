@@ -1,0 +1,61 @@
+"""``haploop attach logger``: a second logger, with a log and a summary of its own."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Any
+
+from haploop.launch.output import make_output, write_scene
+from haploop.launch.processes import run_directory
+from haploop.launch.processes.interrupts import interrupts
+from haploop.launch.processes.run_directory import LiveRun
+from haploop.logger.books.buffers import TelemetryGap
+from haploop.logger.node import LoggerNode
+from haploop.protocol.clock_client import Aborted, ClockClient, Refused
+from haploop.protocol.processes import OBSERVER
+from haploop.protocol.transport import SecureContext
+from haploop.tools.cli.exit_codes import FAILED, WRONG_USE, leave
+from haploop.tools.render.report import print_summary
+
+
+def attach_logger(run_id: str | None, out: Path | None) -> None:
+    """Log a run from where it is; lossless, so a slow one slows the run."""
+    run = run_directory.find(run_id)
+    directory = make_output(out, Path(f"attached-{run.id}"))
+    context = run.make_context()
+    try:
+        with interrupts(usual_from=2) as received:
+            summary = _log(run, context, directory, received)
+    except Refused as error:
+        leave(str(error), WRONG_USE)
+    finally:
+        context.destroy(linger=500)
+    if summary is None:
+        leave(f"Run {run.id} ended before anything could be logged.", FAILED)
+    print_summary(summary)
+    print(directory, file=sys.stderr)
+    if summary["ended"] == "failed":
+        leave(summary["why"], FAILED)
+
+
+def _log(run: LiveRun, context: SecureContext, directory: Path, received: list[int]) -> dict[str, Any] | None:
+    """Log until the run ends or a signal comes; the summary, or None if nothing came."""
+
+    def reason_to_leave() -> str | None:
+        if received:
+            return ""
+        return None if run_directory.is_live(run) else f"The launcher of run {run.id} has ended without a word."
+
+    client = ClockClient(context, OBSERVER, run.clock, "")
+    node = LoggerNode(client, context, None, reason_to_leave)
+    try:
+        welcome = client.join({})
+        write_scene(welcome["scene"], directory)
+        node.start(welcome, directory)
+        print(f"logging run {run.id} from tick {node.session.logger.tick} on; Ctrl-C leaves", file=sys.stderr)
+        tick, summary = node.run()
+        client.leave("LEAVE", tick)
+        return summary
+    except (Aborted, TelemetryGap) as error:
+        return node.save(str(error))

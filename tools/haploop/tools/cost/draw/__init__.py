@@ -1,0 +1,1 @@
+"""Figures, screens and the page of what accuracy costs."""

@@ -1,0 +1,242 @@
+"""Random search of a space of choices and numbers: draw, refine around the best, and look at the neighbours of those.
+
+A search minimises a distance. Points of one structure (one option of every choice) are drawn and evaluated in groups,
+so that an evaluation can treat them together. The same space, effort and seed give the same points, however the groups
+are spread over processes, since all points of a stage are drawn before any of them is evaluated.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+Row = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Point:
+    """A point of a space.
+
+    Attributes:
+        choices: an option by the key of each choice.
+        numbers: a value by the key of each number.
+        seed: for what is random in the evaluation; 0 in a space that is not ``seeded``.
+    """
+
+    choices: dict[str, Any]
+    numbers: dict[str, float]
+    seed: int = 0
+
+
+Group = Sequence[Point]
+Evaluate = Callable[[Group], list[Row]]
+
+
+class Scale(NamedTuple):
+    """A choice whose options lie on a grid: neighbours may take another value of the grid within these bounds."""
+
+    step: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Space:
+    """A space of choices and numbers.
+
+    Attributes:
+        choices: options by key; each is drawn equally often.
+        bounds: least and greatest value by key, of numbers that are drawn evenly in their logarithm.
+        scales: of those choices that neighbours may change.
+        digits: significant digits to which numbers are rounded; None leaves them as they were drawn.
+        seeded: whether each point has a seed of its own.
+    """
+
+    choices: Mapping[str, tuple[Any, ...]]
+    bounds: Mapping[str, tuple[float, float]]
+    scales: Mapping[str, Scale] = field(default_factory=dict[str, Scale])
+    digits: int | None = None
+    seeded: bool = False
+
+    def draw(self, rng: np.random.Generator, structures: int, each: int) -> list[list[Point]]:
+        """Draws structures, and a group of ``each`` points for every one of them.
+
+        Every option of a choice comes up equally often, but for the remainder, since the column of its options is
+        shuffled. So what depends on one choice is not the doing of a few structures alone.
+        """
+        columns = {key: [options[i % len(options)] for i in range(structures)] for key, options in self.choices.items()}
+        for column in columns.values():
+            rng.shuffle(column)
+        drawn = [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
+        return [[self._point(rng, choices) for _ in range(each)] for choices in drawn]
+
+    def neighbours(
+        self, rng: np.random.Generator, point: Point, spread: float, count: int, *, shifted: bool = True
+    ) -> list[Point]:
+        """Draws a group of points near one.
+
+        Each number is multiplied by e^(spread xi), xi normal, and kept within its bounds.
+
+        Args:
+            shifted: whether choices with a scale are shifted by 10 spread xi steps, the same for the whole group.
+        """
+        shifts = {key: round(10.0 * spread * rng.standard_normal()) for key in self.scales} if shifted else {}
+        moved = {key: _shifted(point.choices[key], steps, self.scales[key]) for key, steps in shifts.items()}
+        near = replace(point, choices=point.choices | moved)
+        return [self._neighbour(rng, near, spread) for _ in range(count)]
+
+    def rounded(self, point: Point, digits: int) -> Point:
+        """Returns the point with numbers of so many significant digits."""
+        return replace(point, numbers={key: _round(value, digits) for key, value in point.numbers.items()})
+
+    def _point(self, rng: np.random.Generator, choices: dict[str, Any]) -> Point:
+        numbers = {
+            key: math.exp(rng.uniform(math.log(low), math.log(high))) for key, (low, high) in self.bounds.items()
+        }
+        return self._finished(rng, Point(choices, numbers))
+
+    def _neighbour(self, rng: np.random.Generator, point: Point, spread: float) -> Point:
+        numbers = {
+            key: float(np.clip(value * math.exp(spread * rng.standard_normal()), *self.bounds[key]))
+            for key, value in point.numbers.items()
+        }
+        return self._finished(rng, replace(point, numbers=numbers))
+
+    def _finished(self, rng: np.random.Generator, point: Point) -> Point:
+        point = self.rounded(point, self.digits) if self.digits else point
+        return replace(point, seed=int(rng.integers(2**31))) if self.seeded else point
+
+
+@dataclass(frozen=True, kw_only=True)
+class Effort:
+    """How much is searched, and how widely.
+
+    Attributes:
+        structures, each: points at random: so many structures, and points of each.
+        rounds, best, groups, children: of refinement: in each round, around so many of the best so far, so many groups
+            of so many points.
+        finalists, neighbours: so many of the best, and points around each of them.
+        far, close: standard deviation of the logarithm of a number in the first and the last round, geometrically
+            spaced in between; that of the neighbours is ``close``.
+    """
+
+    structures: int
+    each: int
+    rounds: int
+    best: int
+    children: int
+    neighbours: int
+    groups: int = 1
+    finalists: int = 1
+    far: float = 0.3
+    close: float = 0.05
+
+
+class Trial(NamedTuple):
+    """A point and what its evaluation returned, with the ``stage`` at which it was drawn."""
+
+    point: Point
+    row: Row
+
+
+class Found(NamedTuple):
+    """The outcome of a search.
+
+    Attributes:
+        trials: of the stages "random" and "refined", in the order in which they were drawn.
+        best: the finalist whose distance, with the mean of its neighbours' added, is the least.
+        neighbours: of the best, of the stage "neighbour".
+    """
+
+    trials: list[Trial]
+    best: Trial
+    neighbours: list[Trial]
+
+
+def evaluate_in_turn(_: str, evaluate: Evaluate, groups: Sequence[Group]) -> list[list[Row]]:
+    """Evaluates groups one after another in this process."""
+    return [evaluate(group) for group in groups]
+
+
+def random_search(
+    space: Space,
+    evaluate: Evaluate,
+    effort: Effort,
+    *,
+    seed: int,
+    distance: Callable[[Row], float],
+    tie: Callable[[Row], float] = lambda _: 0.0,
+    evaluate_all: Callable[[str, Evaluate, Sequence[Group]], list[list[Row]]] = evaluate_in_turn,
+) -> Found:
+    """Searches a space for the point with the least distance.
+
+    Of one structure no more than a third of the best are refined, so that one good structure does not hide others. A
+    point that is good only just there is worth less than one whose neighbours are good, too: ``Found.best``.
+
+    Args:
+        evaluate: returns a row for each point of a group; must be importable where processes evaluate.
+        distance: of a row, to be minimised.
+        tie: decides between finalists at the same distance.
+        evaluate_all: evaluates many groups, in parallel perhaps; its first argument is the stage.
+    """
+    rng = np.random.default_rng(seed)
+
+    def run(stage: str, groups: Sequence[Group]) -> list[Trial]:
+        return evaluated(stage, evaluate, groups, evaluate_all)
+
+    trials = run("random", space.draw(rng, effort.structures, effort.each))
+    for spread in np.geomspace(effort.far, effort.close, effort.rounds):
+        parents = _best(trials, effort.best, distance)
+        trials += run(
+            "refined",
+            [
+                space.neighbours(rng, parent.point, float(spread), effort.children)
+                for parent in parents
+                for _ in range(effort.groups)
+            ],
+        )
+    finalists = _best(trials, effort.finalists, lambda row: (distance(row), tie(row)))
+    around = [space.neighbours(rng, one.point, effort.close, effort.neighbours, shifted=False) for one in finalists]
+    near = run("neighbour", around)
+    of_each = [near[i : i + effort.neighbours] for i in range(0, len(near), effort.neighbours)]
+    means = [np.mean([distance(trial.row) for trial in group]) for group in of_each]
+    i = int(np.argmin([distance(one.row) + mean for one, mean in zip(finalists, means, strict=True)]))
+    return Found(trials, finalists[i], of_each[i])
+
+
+def evaluated(
+    stage: str,
+    evaluate: Evaluate,
+    groups: Sequence[Group],
+    evaluate_all: Callable[[str, Evaluate, Sequence[Group]], list[list[Row]]] = evaluate_in_turn,
+) -> list[Trial]:
+    """Evaluates groups of points and returns a trial for each point, in order."""
+    rows = evaluate_all(stage, evaluate, groups)
+    return [
+        Trial(point, row | {"stage": stage})
+        for group, of_group in zip(groups, rows, strict=True)
+        for point, row in zip(group, of_group, strict=True)
+    ]
+
+
+def _best(trials: Sequence[Trial], count: int, key: Callable[[Row], Any]) -> list[Trial]:
+    """Returns the best trials, of one structure no more than a third of them, but one at least."""
+    picked: list[Trial] = []
+    for trial in sorted(trials, key=lambda one: key(one.row)):
+        if sum(other.point.choices == trial.point.choices for other in picked) < max(1, count // 3):
+            picked.append(trial)
+        if len(picked) == count:
+            break
+    return picked
+
+
+def _shifted(value: float, steps: int, scale: Scale) -> float:
+    return round(min(max(value + steps * scale.step, scale.low), scale.high), 12)
+
+
+def _round(value: float, digits: int) -> float:
+    return float(f"{value:.{digits}g}")

@@ -1,0 +1,196 @@
+"""The measure of an interpretation of the experiments: how stiff a wall each element steadies under it, which of the
+paper's claims of section V.B hold, and how far it is from the paper.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from haploop.controller.dissipation import registry
+from haploop.launch.batch.run import run_array
+from haploop.tools.search.ladder import climb, rungs_held
+from haploop.tools.studies.choi2022.experiment.setup import KINDS, Elements, Setup, both, elements_of
+
+# From 2.5 N/mm in steps of 0.5 (Choi et al. 2022, V.B.3).
+STIFFNESSES = np.arange(2500.0, 7501.0, 500.0)
+NAMES = (*KINDS, "both")
+_MASSES = (0.0009, 0.0018, 0.0035, 0.006, 0.009, 0.014, 0.02, 0.03)
+# Sizes in N s/m and kg; the paper's own are among them: 2.7 N s/m, 1.8 g, and 2.15 N s/m with 9 g.
+SIZES: dict[str, tuple[tuple[float, ...], ...]] = {
+    KINDS[0]: ((0.0,),),
+    KINDS[1]: tuple((b,) for b in (0.3, 0.8, 1.5, 2.15, 2.7, 4.0, 6.0, 9.0)),
+    KINDS[2]: tuple((m,) for m in _MASSES),
+    KINDS[3]: tuple((m,) for m in _MASSES),
+    "both": tuple((b, m) for b in (0.8, 2.15, 4.0, 7.0) for m in (0.0035, 0.009, 0.02)),
+}
+# With friction no two setups run in one batch, so that batches are small.
+_FEWEST = 4
+# For each element of NAMES the steady sizes, shape (stiffnesses, sizes).
+Steady = dict[str, np.ndarray]
+
+STEP_N_M = 500.0
+# The largest stiffness in N/m that the paper steadied: Fig. 10 (damping and bidirectional inertia "also 4.5 N/mm"),
+# Fig. 9 (5.5), and section V.B.4 (6.3). Between grid points every 500 N/m, so that a step away is no disagreement.
+PAPER = {"damping": 4500.0, "bidirectional-inertia": 4500.0, "unidirectional-inertia": 5500.0, "both": 6300.0}
+# Section V.B.2 and V.B.4: what was compared in Fig. 8, and the pair of Figs. 11 to 13.
+BOOKED_DAMPING, BOOKED_KG, BOOKED_AT_N_M = 2.7, 0.0018, (4500.0, 5000.0)
+PAIR, PAIR_AT_N_M = (2.15, 0.009), 6300.0
+# "Particularly for lower values of inertia": up to the paper's largest.
+LOW_KG = 0.009
+# So small a part of an inertia is booked beside a damper without being felt.
+_UNFELT = 1e-6
+
+CLAIMS: dict[str, str] = {
+    "8 more": (
+        "on the motion with 2.7 N s/m at 4.5 and at 5.0 N/mm the damping takes energy, and each inertia of 1.8 g would "
+        "have taken more (sampled books)"
+    ),
+    "9 damping ends": "no damping steadies more than 5.0 N/mm",
+    "9 inertia": "some unidirectional inertia steadies 5.5 N/mm, and all softer walls",
+    "10 narrows": "fewer sizes of damping steady the stiffest wall that one does than 2.5 N/mm",
+    "10 damping 4.5": "damping steadies up to 4.5 N/mm, 0.5 more or less",
+    "10 bidirectional 4.5": "bidirectional inertia steadies up to 4.5 N/mm, 0.5 more or less",
+    "10 larger": "unidirectional inertia steadies a stiffer wall than damping and than bidirectional inertia",
+    "10 wider": "and has more steady pairs of size and stiffness than bidirectional inertia",
+    "10 exclusive": "up to 9 g each inertia steadies walls that the other of the same size does not, and none together",
+    "11 more": "damping with unidirectional inertia steadies a stiffer wall than either alone",
+    "11 up to 6.3": "together they steady up to 6.3 N/mm, 0.5 more or less",
+    "12 pair": "2.15 N s/m with 9 g are steady at 6.3 N/mm",
+    "13 more": "at the stiffest wall that some pair steadies its inertia takes more than its damping (sampled)",
+}
+
+
+def is_steady(result: dict[str, Any]) -> bool:
+    """Tells whether a run has no unwanted vibration: by the summary's verdict over the last 0.5 s of the press.
+
+    Less than an encoder step to either side is none (Choi et al. 2022, V.B.3, say no more than "no unwanted
+    vibration").
+    """
+    return result.get("verdict") == "steady"
+
+
+def make_elements(name: str, size: Sequence[float]) -> Elements:
+    """Makes the elements of one size."""
+    return both(*size) if name == "both" else elements_of(name, *size)
+
+
+def _run_all(scenes: Sequence[dict[str, Any]], *, energy: bool = False) -> list[dict[str, Any]]:
+    """Returns the results of scenes in this process, in their order."""
+    return run_array(scenes, registry(), energy=energy, fewest=_FEWEST)
+
+
+def stiffness_ladder(setups: Sequence[Setup], stiffnesses: np.ndarray = STIFFNESSES) -> list[Steady]:
+    """Returns for each setup and element which sizes leave which walls steady, up to the first wall that none does.
+
+    Args:
+        setups: best of one structure, so that they run in one batch.
+        stiffnesses: of the walls, N/m, upwards.
+    """
+
+    def ask(stiffness: float, going: Sequence[tuple[int, str]]) -> list[list[bool]]:
+        scenes = [setups[i].scene(stiffness, make_elements(name, size)) for i, name in going for size in SIZES[name]]
+        steady = iter(map(is_steady, _run_all(scenes)))
+        return [[next(steady) for _ in SIZES[name]] for _, name in going]
+
+    members = [(i, name) for i in range(len(setups)) for name in NAMES]
+    found = [{name: np.zeros((len(stiffnesses), len(SIZES[name])), bool) for name in NAMES} for _ in setups]
+    for (i, name), rows in climb(members, stiffnesses.tolist(), ask, passes=any).items():
+        found[i][name][: len(rows)] = rows
+    return found
+
+
+def largest(steady: np.ndarray, stiffnesses: np.ndarray = STIFFNESSES) -> float:
+    """Returns the largest stiffness that some size leaves steady, as all softer ones do; N/m, 0 where none is."""
+    count = rungs_held(sizes.any() for sizes in steady)
+    return float(stiffnesses[count - 1]) if count else 0.0
+
+
+def best_size(name: str, steady: np.ndarray) -> tuple[float, ...]:
+    """Returns the middle one of the sizes that are steady at the largest stiffness; of all where none is."""
+    rows = np.flatnonzero(steady.any(axis=1))
+    sizes = np.flatnonzero(steady[rows[-1]]) if len(rows) else np.arange(len(SIZES[name]))
+    return SIZES[name][int(sizes[len(sizes) // 2])]
+
+
+def measure(setups: Sequence[Setup]) -> list[dict[str, Any]]:
+    """Returns a row for each setup: its values, the largest stiffnesses, 0.0 for each claim that holds, its distance.
+
+    Args:
+        setups: best of one structure, so that they run in one batch.
+    """
+    climbed = stiffness_ladder(setups)
+    booked = _run_all([_booked(setup, k) for setup in setups for k in BOOKED_AT_N_M], energy=True)
+    pairs = _run_all([setup.scene(PAIR_AT_N_M, both(*PAIR)) for setup in setups])
+    stiffest = _run_all([_stiffest(*one) for one in zip(setups, climbed, strict=True)], energy=True)
+    found = zip(setups, climbed, booked[::2], booked[1::2], pairs, stiffest, strict=True)
+    return [_row(setup, steady, two, pair, most) for setup, steady, *two, pair, most in found]
+
+
+def _booked(setup: Setup, stiffness: float) -> dict[str, Any]:
+    """Makes the scene of 2.7 N s/m with a millionth of both inertias, whose books are a millionth of theirs."""
+    return setup.scene(
+        stiffness,
+        elements_of(KINDS[1], BOOKED_DAMPING)
+        + elements_of(KINDS[2], _UNFELT * BOOKED_KG)
+        + elements_of(KINDS[3], _UNFELT * BOOKED_KG),
+    )
+
+
+def _stiffest(setup: Setup, steady: Steady) -> dict[str, Any]:
+    return setup.scene(
+        max(largest(steady["both"]), STIFFNESSES[0]), make_elements("both", best_size("both", steady["both"]))
+    )
+
+
+def _taken_J(result: dict[str, Any]) -> np.ndarray:
+    """Returns the sampled books of the elements at the end; NaN for a run that failed."""
+    if "energy" not in result:
+        return np.full(3, np.nan)
+    return np.array([element["sampled_J"] for element in result["energy"]["elements"]])
+
+
+def _row(
+    setup: Setup, steady: Steady, booked: Sequence[dict[str, Any]], pair: dict[str, Any], most: dict[str, Any]
+) -> dict[str, Any]:
+    of = {name: largest(steady[name]) for name in NAMES}
+    taken = [_taken_J(result) / (1.0, _UNFELT, _UNFELT) for result in booked]
+    counts = steady[KINDS[1]].sum(axis=1)
+    counts = counts[counts > 0]
+    two, one = (steady[kind][:, [size <= (LOW_KG,) for size in SIZES[kind]]] for kind in KINDS[2:])
+    of_pair = _taken_J(most)
+    damping, two_way, one_way, together = (of[name] for name in NAMES[1:])
+    found = {
+        "8 more": all(bool((one[1:] > one[0]).all() and one[0] > 0.0) for one in taken),
+        "9 damping ends": damping <= 5000.0,
+        "9 inertia": one_way >= 5500.0,
+        "10 narrows": len(counts) > 1 and bool(counts[-1] < counts[0]),
+        "10 damping 4.5": abs(damping - 4500.0) <= STEP_N_M,
+        "10 bidirectional 4.5": abs(two_way - 4500.0) <= STEP_N_M,
+        "10 larger": one_way > max(damping, two_way),
+        "10 wider": bool(steady[KINDS[3]].sum() > steady[KINDS[2]].sum()),
+        "10 exclusive": bool((two & ~one).any() and (one & ~two).any() and not (one & two).any()),
+        "11 more": together > max(damping, one_way),
+        "11 up to 6.3": abs(together - PAPER["both"]) <= STEP_N_M,
+        "12 pair": pair.get("verdict") == "steady",
+        "13 more": together > 0.0 and bool(of_pair[1] > of_pair[0]),
+    }
+    row = setup.as_dict() | {f"{name}_N_m": stiffness for name, stiffness in of.items()}
+    row |= {
+        f"{name} {i}_J": float(one[i]) for name, one in zip(("lower", "higher"), taken, strict=True) for i in range(3)
+    }
+    row |= {name: float(not holds) for name, holds in found.items()}
+    broken = sum(not holds for holds in found.values())
+    return row | {"all": float(broken > 0), "holding": len(found) - broken, "distance": _distance(of) + broken}
+
+
+def gap_N_m(row: dict[str, Any]) -> float:
+    """Returns by how much the four largest stiffnesses differ from the paper's, summed."""
+    return sum(abs(row[f"{name}_N_m"] - stiffness) for name, stiffness in PAPER.items())
+
+
+def _distance(of: dict[str, float]) -> float:
+    """Returns by how many steps of 500 N/m, beyond one, the four stiffnesses differ from the paper's, summed."""
+    return sum(max(abs(of[name] - stiffness) / STEP_N_M - 1.0, 0.0) for name, stiffness in PAPER.items())

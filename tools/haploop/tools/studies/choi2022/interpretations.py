@@ -1,0 +1,150 @@
+"""Interpretations of a paper: one choice for everything that it leaves open, and for which of them its claims hold.
+
+A table of interpretations has a row each: its choices and numbers by key, and by name of each claim how far it falls
+short of it, 0.0 where the claim holds.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from haploop.tools.render.units import amount
+from haploop.tools.search.random import Space
+
+Row = Mapping[str, Any]
+# An option with fewer interpretations says nothing.
+_FEWEST = 20
+
+
+@dataclass(frozen=True, kw_only=True)
+class InterpretationSpace(Space):
+    """The space that interpretations are drawn from, with what people call its choices and numbers.
+
+    Attributes:
+        labels: by key; the unit, where there is one, in brackets at the end.
+    """
+
+    labels: Mapping[str, str]
+
+    def label(self, key: str) -> str:
+        """Returns what a key is called, without its unit."""
+        return self._label_and_unit(key)[0]
+
+    def value(self, key: str, value: Any) -> str:
+        """Returns a value with its unit: ``"0.6 ms"``."""
+        if not isinstance(value, float):
+            return str(value)
+        unit = self._label_and_unit(key)[1]
+        return amount(value, unit, 2).removesuffix(".0") if unit else f"{float(f'{value:.2g}'):g}"
+
+    def describe(self, values: Row, keys: Iterable[str]) -> str:
+        """Returns labels and values of some keys in one line."""
+        return ", ".join(f"{self.label(key)} {self.value(key, values[key])}" for key in keys)
+
+    def _label_and_unit(self, key: str) -> tuple[str, str]:
+        label, _, unit = self.labels.get(key, key).partition(" (")
+        return label, unit.removesuffix(")")
+
+
+def holds(row: Row, claim: str) -> bool:
+    """Tells whether a claim holds under an interpretation."""
+    return row[claim] == 0.0
+
+
+def share(rows: Sequence[Row], claim: str) -> float:
+    """Returns the share of interpretations under which a claim holds; NaN of none."""
+    return float(np.mean([holds(row, claim) for row in rows])) if rows else math.nan
+
+
+def percent(value: float) -> str:
+    """Returns a share in percent: never 0 or 100 for what is not none or all; a dash for NaN."""
+    if math.isnan(value):
+        return "–"
+    if value in (0.0, 1.0):
+        return f"{100 * value:.0f} %"
+    if value < 0.001:
+        return "<0.1 %"
+    return f"{100 * value:.1f} %" if value < 0.0995 else f"{min(99.0, 100 * value):.0f} %"
+
+
+def yes(row: Row, claim: str) -> str:
+    """Returns "yes" where a claim holds under an interpretation, else "no"."""
+    return "yes" if holds(row, claim) else "no"
+
+
+@dataclass(frozen=True)
+class Option:
+    """One option of a dimension, both by label, and the interpretations that took it."""
+
+    dimension: str
+    name: str
+    rows: Sequence[Row]
+
+    def share(self, claim: str) -> float:
+        """Returns the share of these interpretations under which a claim holds."""
+        return share(self.rows, claim)
+
+    def __str__(self) -> str:
+        return f"{self.dimension}{' ' if self.name[:1].isdigit() else ': '}{self.name}"
+
+
+def options(rows: Sequence[Row], space: InterpretationSpace) -> list[Option]:
+    """Returns all options that enough interpretations took: of the choices, and of the numbers thirds of ln range."""
+    found = [
+        Option(space.label(key), space.value(key, name), [row for row in rows if row[key] == name])
+        for key, names in space.choices.items()
+        for name in names
+    ]
+    for key, (low, high) in space.bounds.items():
+        for first, last in pairwise(np.geomspace(low, high, 4).tolist()):
+            inside = [row for row in rows if first <= row[key] <= last]
+            found.append(Option(space.label(key), f"{space.value(key, first)} to {space.value(key, last)}", inside))
+    return [option for option in found if len(option.rows) >= _FEWEST]
+
+
+@dataclass(frozen=True)
+class Decider:
+    """The best and the worst option of the dimension on which a claim hangs most."""
+
+    best: Option
+    worst: Option
+
+    def gap(self, claim: str) -> float:
+        """Returns the difference of their shares."""
+        return self.best.share(claim) - self.worst.share(claim)
+
+    def describe(self, claim: str) -> str:
+        """Returns the best option with its share and the worst with its."""
+        best, worst = percent(self.best.share(claim)), percent(self.worst.share(claim))
+        return f"{self.best} {best}, {self.worst.name} {worst}"
+
+
+def decider(found: Iterable[Option], claim: str) -> Decider | None:
+    """Returns the options of the dimension whose shares differ most; None where no shares differ."""
+    by_dimension: dict[str, list[Option]] = {}
+    for option in found:
+        by_dimension.setdefault(option.dimension, []).append(option)
+    deciders = [
+        Decider(max(one, key=lambda option: option.share(claim)), min(one, key=lambda option: option.share(claim)))
+        for one in by_dimension.values()
+    ]
+    most = max(deciders, key=lambda one: one.gap(claim), default=None)
+    return most if most and most.gap(claim) > 0.0 else None
+
+
+def never_together(rows: Sequence[Row], claims: Sequence[str]) -> list[tuple[str, str]]:
+    """Returns the pairs of claims that each hold somewhere, and nowhere both."""
+    table = np.array([[holds(row, name) for name in claims] for row in rows], bool)
+    both = table.T.astype(int) @ table.astype(int)
+    return [
+        (first, second)
+        for i, first in enumerate(claims)
+        for j, second in enumerate(claims[:i])
+        if not both[i, j] and both[i, i] and both[j, j]
+    ]

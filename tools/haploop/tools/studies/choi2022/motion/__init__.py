@@ -1,1 +1,0 @@
-"""Prescribed motions: momentum loops, acceleration, spectra."""

@@ -1,0 +1,169 @@
+"""The energy that a wall or an element takes out of prescribed samples: by the program's own controller, and in closed
+form.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from haploop.controller.controller_batch import ControllerArray
+from haploop.controller.dissipation import registry
+from haploop.protocol.ticks import Timebase
+
+PERIOD_S = 1e-3
+# What each kind is given by default: the paper's numbers.
+_PARAMETERS = {
+    "damping": {"damping": 0.8},
+    "bidirectional-inertia": {"mass": 0.01},
+    "unidirectional-inertia": {"mass": 0.01},
+}
+SPRING = "spring"
+KINDS = (SPRING, "damping", "bidirectional-inertia", "unidirectional-inertia")
+STIFFNESS_N_M, DAMPING_N_S_M, MASS_KG = 150.0, 0.8, 0.01
+_SINE_TICKS, _PHASES, _TICKS = 400, 16, 4000
+
+
+def forces(x_m: np.ndarray, kind: str, cutoff_Hz: float | None = None) -> np.ndarray:
+    """Returns the force at every sample of the wall's spring or of an element that always acts, N.
+
+    Args:
+        x_m: samples 1 ms apart, shape (ticks, loops); a spring's wall is above 0 and is never left.
+        kind: "spring", or the kind of an element, with the paper's parameter.
+        cutoff_Hz: of a low-pass over the acceleration.
+
+    Returns:
+        Shape (ticks, loops).
+    """
+    scene: dict[str, Any] = {"loops": x_m.shape[1]}
+    if kind == SPRING:
+        scene["wall"] = {"position": 1e3, "stiffness": STIFFNESS_N_M, "occupies": "below"}
+    else:
+        scene["dissipation"] = [{"kind": kind, "acts": "always", **_PARAMETERS[kind]}]
+    if cutoff_Hz:
+        scene["acceleration"] = {"source": "encoder", "cutoff": cutoff_Hz}
+    clock = {"plant_rate": 1000, "control_rate": 1000, "round_trip_delay": 0.0}
+    controller = ControllerArray(scene, Timebase.from_clock(clock, len(x_m) * PERIOD_S), registry())
+    answered = controller.answer([(row,) for row in x_m])
+    offset = STIFFNESS_N_M * 1e3 if kind == SPRING else 0.0
+    return np.array([np.broadcast_to(force, x_m.shape[1:]) for force in answered]) - offset
+
+
+def taken_J(x_m: np.ndarray, force_N: np.ndarray, late: int = 0) -> np.ndarray:
+    """Returns the energy taken in each step, -f[k-1-late] (x[k] - x[k-1]) (Choi et al. 2022, eq. 4).
+
+    It is 0 where there is no force yet. With prescribed samples it is the true book too, since the force is held from
+    sample to sample.
+
+    Returns:
+        Shape of ``x_m``.
+    """
+    acting = np.zeros_like(force_N)
+    acting[1 + late :] = force_N[: len(force_N) - 1 - late]
+    return -acting * np.diff(x_m, axis=0, prepend=x_m[:1])
+
+
+def steps_J(v_m_s: np.ndarray, mass_kg: float) -> np.ndarray:
+    """Returns the energy taken in each sample, m v[k] (v[k-1] - v[k-2]) (Choi et al. 2022, eq. 8); 0 in the first 2."""
+    taken = np.zeros_like(v_m_s)
+    taken[2:] = mass_kg * v_m_s[2:] * (v_m_s[1:-1] - v_m_s[:-2])
+    return taken
+
+
+def positions(v_m_s: np.ndarray) -> np.ndarray:
+    """Returns samples with these velocities as their backward differences, shape (velocities, ...), from 0 on."""
+    return np.cumsum(v_m_s, axis=0) * PERIOD_S
+
+
+def closed_form(kind: str, theta: np.ndarray, late: int) -> np.ndarray:
+    """Returns the mean energy taken a sample under x[k] = A sin(k theta + phase), in units of A^2 (theta = omega T).
+
+        spring   (K / 2) (cos((d+1) theta) - cos(d theta))
+        damping  (2 B / T) sin^2(theta / 2) cos((d+1) theta)
+        inertia  (2 m / T^2) sin^2(theta / 2) (cos((d+1) theta) - cos((d+2) theta))
+
+    The last from eq. 8: V = (2 A / T) sin(theta / 2) is the amplitude of v, and the mean of v[k] v[k-j] is
+    V^2 cos(j theta) / 2. So inertia takes while (2 d + 3) theta < 2 pi: below fs / (2 d + 3), 333 Hz without delay.
+    """
+    d, half = late, np.sin(theta / 2.0) ** 2
+    match kind:
+        case "spring":
+            return STIFFNESS_N_M / 2.0 * (np.cos((d + 1) * theta) - np.cos(d * theta))
+        case "damping":
+            return 2.0 * DAMPING_N_S_M / PERIOD_S * half * np.cos((d + 1) * theta)
+        case "bidirectional-inertia":
+            return 2.0 * MASS_KG / PERIOD_S**2 * half * (np.cos((d + 1) * theta) - np.cos((d + 2) * theta))
+    raise ValueError(f"There is no closed form for {kind!r}.")
+
+
+def mean_taken(
+    kind: str, theta: np.ndarray, late: int, cutoff_Hz: float | None = None, ticks: int = 4000
+) -> np.ndarray:
+    """Returns the mean energy taken a sample under a sine of A = 1 by running the program's controller.
+
+    The mean is over the second half of the samples, weighted by a Hann window, which makes little of where in its
+    swing the sine is cut. The frequencies should be ones at which the samples do not repeat soon, so that they meet
+    all phases.
+    """
+    x = np.sin(np.arange(ticks)[:, None] * theta)
+    weights = np.hanning(ticks - ticks // 2)
+    return weights @ taken_J(x, forces(x, kind, cutoff_Hz), late)[ticks // 2 :] / weights.sum()
+
+
+def damper_J(frequency_Hz: np.ndarray) -> np.ndarray:
+    """Returns the mean energy a sample that 1 N s/m takes from a sine of 1 m: (2 / T) sin^2(theta / 2) cos(theta)."""
+    theta = 2.0 * np.pi * frequency_Hz * PERIOD_S
+    return 2.0 / PERIOD_S * np.sin(theta / 2.0) ** 2 * np.cos(theta)
+
+
+def bidirectional_J(frequency_Hz: np.ndarray, age_s: float | None) -> np.ndarray:
+    """Returns the mean energy a sample that 1 kg takes from a sine of 1 m: |a| sin(theta / 2) sin(w (age + T / 2)).
+
+    |a| = w^2, and f[k-1] = -|a| sin(w (t[k] - T - age)) times x[k] - x[k-1], which goes as cos(w (t[k] - T / 2)).
+    The older the reading, the more it takes: all of what is moved at a quarter of a swing.
+
+    Args:
+        age_s: None for a difference of differences: T old, and |a| = (2 / T)^2 sin^2(theta / 2).
+    """
+    w, size, age = _reading(frequency_Hz, age_s)
+    return size * np.sin(w * PERIOD_S / 2.0) * np.sin(w * (age + PERIOD_S / 2.0))
+
+
+def unidirectional_J(frequency_Hz: np.ndarray, age_s: float | None) -> np.ndarray:
+    """Returns the mean energy a sample that 1 kg with the gate of eq. 9 takes, whatever the phase of the sine."""
+    w, size, age = _reading(frequency_Hz, age_s)
+    t = np.arange(_SINE_TICKS)[:, None, None] * PERIOD_S
+    phase = 2.0 * np.pi * np.arange(_PHASES)[:, None] / _PHASES
+    moved = np.diff(np.sin(w * t + phase), axis=0, prepend=np.nan)
+    a = -size * np.sin(w * (t - age) + phase)
+    force = np.where(moved[1:] * a[:-1] >= 0.0, a[1:], 0.0)
+    return (force[:-1] * moved[2:]).mean(axis=(0, 1))
+
+
+def _reading(frequency_Hz: np.ndarray, age_s: float | None) -> tuple[np.ndarray, np.ndarray, float]:
+    """Returns w, the amplitude of the reading, and its age."""
+    w = 2.0 * np.pi * np.asarray(frequency_Hz, float)
+    if age_s is None:
+        return w, (2.0 / PERIOD_S * np.sin(w * PERIOD_S / 2.0)) ** 2, PERIOD_S
+    return w, w**2, age_s
+
+
+def returned(frequency_Hz: float, *, before: bool = True) -> float:
+    """Returns the energy that unidirectional inertia gives back to a sine over what it takes, 0 to 1.
+
+    It is why eq. 9 looks at the acceleration of the sample before, or why it should not.
+
+    Args:
+        before: whether the gate is v[k] a[k-1] >= 0, as in eq. 9 (the program's controller), or v[k] a[k] >= 0.
+    """
+    x = np.sin(np.arange(_TICKS) * 2.0 * np.pi * frequency_Hz * PERIOD_S)[:, None]
+    taken = taken_J(x, forces(x, "unidirectional-inertia") if before else _at_once(x))[_TICKS // 2 :]
+    return float(-np.minimum(taken, 0.0).sum() / np.maximum(taken, 0.0).sum())
+
+
+def _at_once(x_m: np.ndarray) -> np.ndarray:
+    """Returns the force with the gate of the present acceleration, N."""
+    v = np.diff(x_m, axis=0, prepend=x_m[:1]) / PERIOD_S
+    a = np.diff(v, axis=0, prepend=v[:1]) / PERIOD_S
+    return np.where(v * a >= 0.0, -MASS_KG * a, 0.0)
