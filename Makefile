@@ -44,7 +44,7 @@ bench: $(READY) ## measure speed, memory, what each effect and the live page cos
 
 accuracy: $(READY) ## measure what accuracy costs and write docs/accuracy.md (an hour; stopped, it goes on where it was)
 	@$(BIN)/haploop cost --out runs/accuracy
-	@$(BIN)/python -m haploop.tools.cost.draw.page runs/accuracy docs
+	@$(BIN)/python -m haploop.tools.cost.page runs/accuracy docs
 
 paper: $(READY) ## make every figure of the paper and write docs/paper.md (within 20 minutes on two cores)
 	@$(BIN)/haploop paper --out runs/paper

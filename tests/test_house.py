@@ -81,7 +81,6 @@ STILL = {
     ("haploop.plant.line.delay", "haploop.plant.line.lossy"),
     ("haploop.plant.motion.hand_force", "haploop.plant.motion.hand_force_batch"),
     ("haploop.plant.random.streams", "haploop.plant.random.streams_batch"),
-    ("haploop.tools.advise.advice", "haploop.tools.advise.sentences"),
     ("haploop.tools.render.progress", "haploop.tools.render.report"),
 }
 

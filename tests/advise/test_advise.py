@@ -10,11 +10,11 @@ from typer.testing import CliRunner
 
 from haploop.launch.runs.in_process import run_in_process
 from haploop.launch.scene.file import load
-from haploop.tools.advise.limits.families import COARSE, DAMPING, beside, first_choices
-from haploop.tools.advise.limits.margins import rounded_down
-from haploop.tools.advise.limits.tasks import SEEDS, tasks
-from haploop.tools.advise.limits.variations import Change, corners, scaled, singles
-from haploop.tools.advise.subject import DEFAULT_HAND, WrongAsk, settled, subject
+from haploop.tools.advise.gains import COARSE, DAMPING, beside, first_choices
+from haploop.tools.advise.margins import rounded_down
+from haploop.tools.advise.subject import DEFAULT_HAND, InvalidRequest, apply_events, make_subject
+from haploop.tools.advise.tasks import SEEDS, make_tasks
+from haploop.tools.advise.variations import Change, corners, scale_quantities, single_changes
 from haploop.tools.cli.main import app
 from helpers.scenes.least import KINDS, scene
 
@@ -31,49 +31,49 @@ SCENES = Path(__file__).parents[2] / "launch" / "scenes"
 )
 def test_a_wrong_name_is_answered_with_the_nearest(arguments, words):
     device, hand, delay, estimator = arguments
-    with pytest.raises(WrongAsk, match=words.replace("?", r"\?")):
-        subject(device, hand, delay, estimator, (), KINDS)
+    with pytest.raises(InvalidRequest, match=words.replace("?", r"\?")):
+        make_subject(device, hand, delay, estimator, (), KINDS)
 
 
 @pytest.mark.parametrize("delay", ["2", "600 ms"])
 def test_a_delay_that_no_task_outlasts_is_refused_and_a_forgotten_unit_is_suspected(delay):
-    with pytest.raises(WrongAsk, match=r'advice is given up to 0.5 s.*write "[0-9.]+ ms" for milliseconds'):
-        subject("touch", None, delay, None, [], KINDS)
+    with pytest.raises(InvalidRequest, match=r'advice is given up to 0.5 s.*write "[0-9.]+ ms" for milliseconds'):
+        make_subject("touch", None, delay, None, [], KINDS)
 
 
 @given(delay_steps=st.integers(0, 5000))
 def test_a_standard_task_lasts_for_twenty_round_trips_at_least(delay_steps):
     read = scene(clock={"round_trip_delay": delay_steps / 10_000}, wall={"position": 0.0, "stiffness": 1.0})
-    for task in tasks(read, has_task=False).scenes:
+    for task in make_tasks(read, has_task=False).scenes:
         assert task["duration"] >= max(1.0, 20 * task["clock"]["round_trip_delay"])
 
 
 def test_a_scene_too_short_for_its_delay_is_judged_by_the_standard_tasks():
     fig6a = load(SCENES / "fig6a.toml")
-    assert len(tasks(fig6a, has_task=True).scenes) == 1
+    assert len(make_tasks(fig6a, has_task=True).scenes) == 1
     late = {**fig6a, "clock": {**fig6a["clock"], "round_trip_delay": 0.2}}
-    assert len(tasks(late, has_task=True).scenes) == 2
+    assert len(make_tasks(late, has_task=True).scenes) == 2
 
 
 def test_a_hasty_look_takes_the_first_task_and_one_seed():
     noisy = scene(wall={"position": 0.0, "stiffness": 1.0}, noise={"deviation": 1e-6, "cutoff": 100.0})
-    asked = tasks(noisy, has_task=False)
-    [look] = asked.of(100.0, [], thorough=False)
-    assert look == asked.of(100.0, [])[0]
+    asked = make_tasks(noisy, has_task=False)
+    [look] = asked.make_runs(100.0, [], thorough=False)
+    assert look == asked.make_runs(100.0, [])[0]
 
 
 def test_a_preset_gets_a_hand_and_standard_tasks_and_says_so():
-    asked = subject("touch", None, "1 ms", None, [], KINDS)
+    asked = make_subject("touch", None, "1 ms", None, [], KINDS)
     assert not asked.has_task
     assert DEFAULT_HAND in asked.notes[0]
     assert asked.scene["clock"]["round_trip_delay"] == 0.001
-    made = tasks(asked.scene, asked.has_task)
+    made = make_tasks(asked.scene, asked.has_task)
     assert len(made.scenes) == 2
     assert "a tap at 0.2 m/s" in made.words
 
 
 def test_another_hand_keeps_the_force_of_the_scene():
-    asked = subject(str(SCENES / "fig6a.toml"), "fu_cavusoglu_x", None, None, [], KINDS)
+    asked = make_subject(str(SCENES / "fig6a.toml"), "fu_cavusoglu_x", None, None, [], KINDS)
     assert asked.scene["hand"]["grip"]["stiffness"] == 379.5
     assert asked.scene["hand"]["force"]["value"] == -0.65
 
@@ -81,28 +81,28 @@ def test_another_hand_keeps_the_force_of_the_scene():
 def test_what_the_events_of_a_scene_change_is_changed_from_the_start():
     asked = load(SCENES / "swap.toml")
     assert asked["dissipation"][0]["kind"] == "damping"
-    done = settled(asked)
+    done = apply_events(asked)
     assert [table["kind"] for table in done["dissipation"]] == ["unidirectional-inertia"]
     assert "event" not in done
 
 
 def test_a_scene_whose_force_comes_and_goes_is_not_judged_by_it():
-    assert len(tasks(load(SCENES / "tap.toml"), True).scenes) == 2
-    assert len(tasks(load(SCENES / "fig6a.toml"), True).scenes) == 1
+    assert len(make_tasks(load(SCENES / "tap.toml"), True).scenes) == 2
+    assert len(make_tasks(load(SCENES / "fig6a.toml"), True).scenes) == 1
 
 
 def test_noise_is_judged_with_several_seeds():
     noisy = scene(wall={"position": 0.0, "stiffness": 1.0}, noise={"deviation": 1e-6, "cutoff": 100.0})
-    runs = tasks(noisy, False).of(100.0, [])
+    runs = make_tasks(noisy, False).make_runs(100.0, [])
     assert len(runs) == 2 * SEEDS
     assert len({run["seed"] for run in runs}) == SEEDS
 
 
 def test_a_delay_a_fifth_more_is_rounded_to_whole_steps_and_never_to_what_it_was():
     late = scene(clock={"round_trip_delay": 0.002}, wall={"position": 0.0, "stiffness": 1.0})
-    assert scaled(late, {"delay": 1.2})["clock"]["round_trip_delay"] == pytest.approx(0.0024)
+    assert scale_quantities(late, {"delay": 1.2})["clock"]["round_trip_delay"] == pytest.approx(0.0024)
     short = scene(clock={"round_trip_delay": 0.0001}, wall={"position": 0.0, "stiffness": 1.0})
-    assert [scaled(short, {"delay": f})["clock"]["round_trip_delay"] for f in (0.8, 1.2)] == [0.0, 0.0002]
+    assert [scale_quantities(short, {"delay": f})["clock"]["round_trip_delay"] for f in (0.8, 1.2)] == [0.0, 0.0002]
 
 
 def test_corners_take_every_quantity_both_ways():
@@ -111,7 +111,7 @@ def test_corners_take_every_quantity_both_ways():
         wall={"position": 0.0, "stiffness": 1.0},
     )  # fmt: skip
     assert len(list(corners(read))) == 2**5
-    assert len(singles(read)) == 10
+    assert len(single_changes(read)) == 10
     assert Change("delay", 1.2).words == "20 % more delay"
 
 

@@ -4,11 +4,11 @@ from typing import Any
 
 import pytest
 
-from haploop.tools.advise.buzz import Buzz, Without, why
-from haploop.tools.advise.effects_off import causes, freed
-from haploop.tools.advise.limits.largest import Limit
-from haploop.tools.advise.limits.steady import Judge
-from haploop.tools.advise.sentences import buzz_sentences
+from haploop.tools.advise.buzz import Ablation, Buzz, explain_buzz
+from haploop.tools.advise.causes import causes, without_causes
+from haploop.tools.advise.judge import Judge
+from haploop.tools.advise.largest import Limit
+from haploop.tools.advise.report import buzz_sentences
 from helpers.scenes.least import KINDS, scene
 
 HAND = {"force": {"kind": "minimum-jerk", "value": -1.0, "rise_time": 0.2}, "stiffness": 20.0, "damping": 0.3}
@@ -52,7 +52,7 @@ LAGGING = scene(
 @pytest.fixture(scope="module")
 def late() -> Buzz:
     with Judge(KINDS, workers=1) as judge:
-        return why(LATE, judge)
+        return explain_buzz(LATE, judge)
 
 
 @pytest.mark.parametrize(
@@ -66,7 +66,7 @@ def late() -> Buzz:
 )
 def test_the_one_cause_of_a_buzz_is_named_and_no_other(read, name):
     with Judge(KINDS, workers=1) as judge:
-        found = why(read, judge)
+        found = explain_buzz(read, judge)
     assert not found.steady
     assert [w.names for w in found.alone if w.steady and not w.is_element] == [(name,)]
     assert buzz_sentences(found)[0].startswith(f"It buzzes because of the {name}: without it the wall is steady up to")
@@ -89,7 +89,7 @@ def test_the_shares_of_the_leak_of_a_buzzing_wall_add_up(late):
 def test_a_wall_that_does_not_buzz_is_told_how_far_it_is_from_it():
     soft = {**LATE, "wall": {**LATE["wall"], "stiffness": 30.0}}
     with Judge(KINDS, workers=1) as judge:
-        found = why(soft, judge)
+        found = explain_buzz(soft, judge)
     assert found.steady
     assert buzz_sentences(found)[0].startswith("It does not buzz: its wall of 0.030 N/mm could be 3.0 times as stiff")
 
@@ -102,8 +102,8 @@ def test_delay_is_named_where_it_is_the_one_cause(late):
 
 def test_sampling_which_every_loop_has_is_named_after_a_cause_of_its_own_unless_it_allows_twice_as_much():
     def buzz(without_sampling_N_m: float) -> str:
-        def without(name: str, stiffness: float) -> Without:
-            return Without((name,), "", None, None, True, "steady", 0.0, Limit(stiffness, stiffness), False)
+        def without(name: str, stiffness: float) -> Ablation:
+            return Ablation((name,), "", None, None, True, "steady", 0.0, Limit(stiffness, stiffness), False)
 
         alone = without("sampling and hold", without_sampling_N_m), without("estimator lag", 1000.0)
         return buzz_sentences(Buzz(LATE, 100.0, False, "limit-cycle", 1e-3, Limit(50.0, 51.0), (), alone, (), None))[0]
@@ -119,6 +119,6 @@ def test_only_what_a_scene_has_can_be_a_cause():
 
 def test_a_rigid_transmission_keeps_mass_and_damping():
     [mode] = [cause for cause in causes(RINGING) if cause.name == "structural mode"]
-    rigid = freed(RINGING, [mode])
+    rigid = without_causes(RINGING, [mode])
     assert "transmission" not in rigid
     assert rigid["device"]["mass"] == pytest.approx(0.053)

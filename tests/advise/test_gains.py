@@ -6,9 +6,9 @@ import pytest
 
 from haploop.launch.runs.in_process import run_in_process
 from haploop.tools.advise.advice import Advice, advice
-from haploop.tools.advise.limits.steady import Judge
-from haploop.tools.advise.limits.variations import Change, corners, scaled
+from haploop.tools.advise.judge import Judge
 from haploop.tools.advise.subject import Subject
+from haploop.tools.advise.variations import Change, corners, scale_quantities
 from haploop.tools.linear.one_tick import NeverStable, OneTickMap
 from helpers.scenes.least import KINDS, scene
 
@@ -49,7 +49,7 @@ def test_where_the_exact_map_allows_more_than_is_steady_the_tap_goes_on_bouncing
     elements = inertia.family.elements(inertia.values)
     beyond = inertia.limit.not_steady_N_m
     assert inertia.limit.stiffness_N_m < beyond < 0.9 * exact_N_m(LOOP, elements)
-    windows = [run_in_process(task, KINDS)["window"] for task in found.tasks.of(beyond, elements)]
+    windows = [run_in_process(task, KINDS)["window"] for task in found.tasks.make_runs(beyond, elements)]
     endless = [window for window in windows if window["growth_1_s"] > -0.02]
     assert endless
     assert all(window["outside_fraction"] > 0.1 for window in endless)
@@ -87,11 +87,11 @@ def test_the_advised_wall_is_steady_in_every_corner_and_not_beyond_the_nearest_i
         return {run_in_process(change(task), KINDS)["verdict"] for task in placed}
 
     for corner in corners(LOOP):
-        assert verdicts(lambda task, corner=corner: scaled(task, corner)) == {"steady"}
-    assert verdicts(safe.nearest.on) != {"steady"}
+        assert verdicts(lambda task, corner=corner: scale_quantities(task, corner)) == {"steady"}
+    assert verdicts(safe.nearest.apply) != {"steady"}
     # Half as far, in the same direction, it still holds.
     nearer = Change(safe.nearest.quantity, safe.nearest.factor**0.5, safe.nearest.added_s / 2.0)
-    assert verdicts(nearer.on) == {"steady"}
+    assert verdicts(nearer.apply) == {"steady"}
 
 
 @pytest.mark.slow
@@ -99,7 +99,7 @@ def test_the_worst_single_change_takes_what_the_exact_map_says(found: Advice):
     damping = found.gains[1]
     assert damping.worst
     elements = damping.family.elements(damping.values)
-    by_map = {change: exact_N_m(change.on(LOOP), elements) for change in damping.alone}
+    by_map = {change: exact_N_m(change.apply(LOOP), elements) for change in damping.alone}
     assert by_map[damping.worst] == pytest.approx(min(by_map.values()), rel=0.03)
     assert damping.alone[damping.worst].stiffness_N_m == pytest.approx(by_map[damping.worst], rel=0.03)
     for change, limit in damping.alone.items():

@@ -6,11 +6,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from haploop.tools.advise.limits.largest import LEAST_N_M, Limit, Loops, largest
-from haploop.tools.advise.limits.pace import NEAR, WIDE, Pace
-from haploop.tools.advise.limits.steady import Judge, Judgement
-from haploop.tools.advise.limits.tasks import tasks
-from haploop.tools.advise.limits.variations import Change
+from haploop.tools.advise.judge import Judge, Judgement
+from haploop.tools.advise.largest import LEAST_N_M, NEAR, WIDE, Limit, Pace, StiffnessQuery, largest_steady
+from haploop.tools.advise.tasks import make_tasks
+from haploop.tools.advise.variations import Change
 from haploop.tools.linear.one_tick import OneTickMap
 from helpers.scenes.least import KINDS, scene
 
@@ -28,13 +27,13 @@ def limits_of(cells, start: float, pace: Pace, most: float = 1e5, **rivals: Any)
     def judged(looks, patient):
         return [Judgement(look(waits), "", 0.0, {}) for look, waits in zip(looks, patient, strict=True)]
 
-    def loops(is_steady) -> Loops:
+    def loops(is_steady) -> StiffnessQuery:
         def make(k, _) -> Any:
             return [lambda waits: is_steady(k, waits)]
 
-        return Loops(make, start, most)
+        return StiffnessQuery(make, start, most)
 
-    return largest({name: loops(is_steady) for name, is_steady in cells.items()}, judged, pace, **rivals)
+    return largest_steady({name: loops(is_steady) for name, is_steady in cells.items()}, judged, pace, **rivals)
 
 
 @pytest.mark.parametrize("pace", [*WIDE.values(), *NEAR.values()])
@@ -77,8 +76,8 @@ def test_a_rival_that_fails_a_thorough_look_gives_way_to_the_next():
     assert found["promising"].not_steady_N_m <= found["sound"].stiffness_N_m
 
 
-@pytest.mark.parametrize("are_few", [True, False])
-def test_what_one_run_tells_for_good_is_not_run_again(are_few):
+@pytest.mark.parametrize("is_one_run", [True, False])
+def test_what_one_run_tells_for_good_is_not_run_again(is_one_run):
     tried: list[float] = []
 
     def judged(looks, _):
@@ -86,9 +85,9 @@ def test_what_one_run_tells_for_good_is_not_run_again(are_few):
         return [Judgement(k < 700.0, "", 0.0, {}) for k in looks]
 
     made: Any = lambda k, _: [k]  # noqa: E731
-    found = largest({"": Loops(made, 300.0, 1e5, are_few)}, judged, QUICK)[""]
+    found = largest_steady({"": StiffnessQuery(made, 300.0, 1e5, is_one_run)}, judged, QUICK)[""]
     assert found.stiffness_N_m == pytest.approx(700.0, rel=QUICK.tolerance)
-    assert (len(set(tried)) == len(tried)) == are_few
+    assert (len(set(tried)) == len(tried)) == is_one_run
 
 
 def test_a_softer_wall_that_is_not_steady_lowers_the_limit_and_what_lies_above_is_told():
@@ -117,11 +116,13 @@ DEVICE = {
 def test_where_the_loop_is_linear_the_limit_found_by_runs_is_that_of_the_exact_map(element):
     elements = [{"acts": "in-contact", **element}] if element else []
     read = scene(**DEVICE, wall={"position": 0.0, "stiffness": 100.0})
-    asked = tasks(read, has_task=False)
+    asked = make_tasks(read, has_task=False)
     exact = OneTickMap.of({**read, "dissipation": elements}).stiffness_limit()
     with Judge(KINDS, workers=1) as judge:
-        found = largest(
-            {"": Loops(lambda k, thorough: asked.of(k, elements, None, thorough), 300.0, 1e5)}, judge.judged, QUICK
+        found = largest_steady(
+            {"": StiffnessQuery(lambda k, thorough: asked.make_runs(k, elements, None, thorough), 300.0, 1e5)},
+            judge.judge,
+            QUICK,
         )[""]
     assert found.stiffness_N_m <= exact * (1.0 + 1e-6)
     assert found.not_steady_N_m >= exact * (1.0 - QUICK.tolerance)
@@ -129,14 +130,14 @@ def test_where_the_loop_is_linear_the_limit_found_by_runs_is_that_of_the_exact_m
 
 def test_a_fifth_more_delay_takes_what_gil_et_al_2009_say():
     read = scene(**DEVICE, wall={"position": 0.0, "stiffness": 100.0})
-    asked = tasks(read, has_task=False)
+    asked = make_tasks(read, has_task=False)
     changes = {factor: Change("delay", factor) for factor in (1.0, 1.2)}
     cells = {
-        factor: Loops(lambda k, _, change=change: asked.of(k, [], change.on), 500.0, 1e5)
+        factor: StiffnessQuery(lambda k, _, change=change: asked.make_runs(k, [], change.apply), 500.0, 1e5)
         for factor, change in changes.items()
     }
     with Judge(KINDS, workers=1) as judge:
-        found = largest(cells, judge.judged, QUICK)
+        found = largest_steady(cells, judge.judge, QUICK)
     soft = {factor: 1.5 / (0.0005 + factor * 0.002) for factor in cells}
     for factor, limit in found.items():
         assert limit.stiffness_N_m == pytest.approx(soft[factor], rel=0.06)

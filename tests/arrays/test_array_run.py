@@ -115,17 +115,15 @@ def test_loops_that_have_ended_are_dropped_from_the_arrays(monkeypatch: pytest.M
 
 
 class Counting(Element):
-    """Keeps a state in a list of its own; refuses after many ticks where it is strong."""
+    """Remembers how far it went; refuses after many ticks where it is strong."""
 
     kind = "counting"
+    memory = 0.0
     force_N: Annotated[float, Quantity("N", at_least=0)] = 0.05
 
-    def __post_init__(self) -> None:
-        self.sums: list[Any] = [0.0]
-
-    def force(self, motion: Motion) -> Any:
-        self.sums[0] = self.sums[0] + abs(motion.v)
-        return where(self.sums[0] * self.force_N > 0.5, math.inf, -self.force_N * motion.v)
+    def force(self, motion: Motion, memory: Any) -> tuple[Any, Any]:
+        total = memory + abs(motion.v)
+        return where(total * self.force_N > 0.5, math.inf, -self.force_N * motion.v), total
 
 
 def test_an_element_that_takes_no_arrays_is_run_loop_by_loop() -> None:

@@ -9,11 +9,12 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 
-from haploop.controller.dissipation import Motion
-from haploop.controller.estimators.choose import estimators
+from haploop.controller.controller import make_params
+from haploop.controller.tick import StateTuple, initial_state, tick
 from haploop.launch.batch.object_state import keep
 from haploop.plant.random.streams_batch import RandomStreamArray
 from haploop.plant.sensing.noise import position_noise
+from haploop.protocol.trees import tree_select
 
 KEPT = np.array([True, False, True, True, False])
 FIVE = np.arange(5.0)
@@ -66,14 +67,6 @@ def test_everything_reached_loses_the_loops() -> None:
     assert held.deque.maxlen == 2
 
 
-def test_a_motion_with_slots_loses_the_loops() -> None:
-    motion = Motion(1e-3, -1.0)
-    motion.v = FIVE  # pyright: ignore[reportAttributeAccessIssue]
-    keep([motion], KEPT)
-    assert np.asarray(motion.v).tolist() == THREE
-    assert motion.period_s == 1e-3
-
-
 @pytest.mark.parametrize(
     "tables",
     [
@@ -85,16 +78,17 @@ def test_a_motion_with_slots_loses_the_loops() -> None:
 def test_estimators_go_on_with_the_loops_that_are_kept(tables: dict[str, Any]) -> None:
     rng = np.random.default_rng(1)
     x = rng.normal(size=(12, 5)) * 1e-3
-    whole, cut = (estimators(tables, 1e-3)((x[0],)) for _ in range(2))
-    for tick, row in enumerate(x):
-        if tick == 6:
-            keep([cut], KEPT)
-        of_cut = row[KEPT] if tick >= 6 else row
-        v = whole[0](row, (row,))
-        v_cut = cut[0](of_cut, (of_cut,))
-        assert v_cut.tolist() == (v[KEPT] if tick >= 6 else v).tolist()
-        a, a_cut = whole[1](v, (row,)), cut[1](v_cut, (of_cut,))
-        assert a_cut.tolist() == (a[KEPT] if tick >= 6 else a).tolist()
+    params = make_params({**tables, "dissipation": []}, 1e-3, {})
+    whole: StateTuple = initial_state(params, (x[0],))
+    cut, of_cut = whole, params
+    for k, row in enumerate(x):
+        if k == 6:
+            cut, of_cut = tree_select(cut, KEPT), tree_select(params, KEPT)
+        kept = KEPT if k >= 6 else np.ones(5, bool)
+        whole, (_, v, a, *_) = tick(params, whole, (row,))
+        cut, (_, v_cut, a_cut, *_) = tick(of_cut, cut, (row[kept],))
+        assert v_cut.tolist() == v[kept].tolist()
+        assert a_cut.tolist() == a[kept].tolist()
 
 
 @pytest.mark.parametrize("before", [0, 100, 128, 5000])

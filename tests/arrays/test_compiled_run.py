@@ -107,14 +107,12 @@ class Gripping(Element):
     """Written for arrays; remembers how far it went."""
 
     kind = "gripping"
+    memory = 0.0
     force_N: Annotated[float, Quantity("N", at_least=0)] = 0.05
 
-    def __post_init__(self) -> None:
-        self.sums: list[Any] = [0.0]
-
-    def force(self, motion: Motion) -> Any:
-        self.sums[0] = self.sums[0] + abs(motion.v)
-        return where(self.sums[0] > 1.0, -self.force_N * motion.v, 0.0)
+    def force(self, motion: Motion, memory: Any) -> tuple[Any, Any]:
+        total = memory + abs(motion.v)
+        return where(total > 1.0, -self.force_N * motion.v, 0.0), total
 
 
 class Counting(Element):

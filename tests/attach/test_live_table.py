@@ -11,9 +11,8 @@ from rich.console import Console
 
 from haploop.protocol.changes import describe
 from haploop.protocol.wire import Frame
-from haploop.tools.attach.live_table import ending, live_line, live_table
-from haploop.tools.attach.print import Lines
-from haploop.tools.attach.watched import Watched
+from haploop.tools.attach.live_status import LiveStatus
+from haploop.tools.attach.live_table import LinePrinter, end_sentence, live_line, live_table
 
 WELCOME = {
     "scene": {"title": "a tap on a wall [of 0.15 N/mm]"},
@@ -47,14 +46,14 @@ def frames(
     ]
 
 
-def watched(**options: Any) -> Watched:
-    subject = Watched("a1b2c3", WELCOME)
-    subject.take([], 0.0)
-    subject.take(frames(**options), 1.0)
+def live_status(**options: Any) -> LiveStatus:
+    subject = LiveStatus("a1b2c3", WELCOME)
+    subject.ingest([], 0.0)
+    subject.ingest(frames(**options), 1.0)
     return subject
 
 
-def shown(subject: Watched, width: int = 80) -> str:
+def shown(subject: LiveStatus, width: int = 80) -> str:
     terminal = Console(width=width, file=io.StringIO(), highlight=False)
     terminal.print(live_table(subject))
     return terminal.file.getvalue()  # pyright: ignore[reportAttributeAccessIssue]
@@ -68,7 +67,7 @@ def row(text: str, begins: str) -> str:
 
 @pytest.mark.parametrize("width", [60, 80, 120])
 def test_the_table_holds_the_last_value_of_everything(width: int) -> None:
-    text = shown(watched(), width)
+    text = shown(live_status(), width)
     assert text.splitlines()[0].startswith("a1b2c3  a tap on a wall [of 0.15 N/mm]")
     assert "1.250 s of 3 s, tick 1250" in text
     assert row(text, "so far").startswith("limit-cycle oscillation 4.70 mm")
@@ -81,7 +80,7 @@ def test_the_table_holds_the_last_value_of_everything(width: int) -> None:
 
 
 def test_the_force_is_told_in_its_parts() -> None:
-    text = shown(watched(elements=(DAMPING, DAMPING)), 140)
+    text = shown(live_status(elements=(DAMPING, DAMPING)), 140)
     assert row(text, "force") == "180 mN commanded: wall 150 mN, damping 30.0 mN, damping (1) 30.0 mN"
 
 
@@ -90,19 +89,19 @@ def test_the_force_is_told_in_its_parts() -> None:
     [(-0.06, -1.0, "0 m outside"), (-0.048, -1.0, "12.0 mm outside"), (-0.048, 1.0, "12.0 mm inside")],
 )
 def test_the_wall_has_its_two_sides(x: float, into_wall: float, words: str) -> None:
-    assert words in row(shown(watched(x=x, wall={**BELOW, "into_wall": into_wall})), "position")
+    assert words in row(shown(live_status(x=x, wall={**BELOW, "into_wall": into_wall})), "position")
 
 
 def test_without_a_wall_there_is_no_side_of_it_no_force_and_no_book() -> None:
-    text = shown(watched(wall={"position": 0.0, "stiffness": 0.0, "into_wall": 0.0}), 120)
+    text = shown(live_status(wall={"position": 0.0, "stiffness": 0.0, "into_wall": 0.0}), 120)
     assert "wall" not in text.partition("\n")[2]
 
 
 def test_a_run_that_stands_still_is_shown_from_what_its_publishers_say_on_joining() -> None:
-    subject = Watched("a1b2c3", WELCOME)
+    subject = LiveStatus("a1b2c3", WELCOME)
     _, (_, controller), _ = frames()
     state = {"tick": 500, "x": -0.061, "v": 0.0, "force": 0.1, "command": 499}
-    subject.take(
+    subject.ingest(
         [
             ("plant", Frame("STATE", [500, state])),
             ("controller", Frame("STATE", [500, {"history": [controller.as_dict()]}])),
@@ -110,38 +109,38 @@ def test_a_run_that_stands_still_is_shown_from_what_its_publishers_say_on_joinin
         ],
         0.0,
     )
-    subject.note(500, {"at": 0.5, "pause": True})
+    subject.note_event(500, {"at": 0.5, "pause": True})
     text = shown(subject)
     assert row(text, "paused").endswith("0.500 s of 3 s, tick 500")
     assert row(text, "position") == "−61.0 mm 1.00 mm inside the wall"
     assert row(text, "so far").startswith("limit-cycle")
-    subject.note(500, {"resume": True})
+    subject.note_event(500, {"resume": True})
     assert "paused" not in shown(subject)
 
 
 def test_before_anything_came_there_are_dashes_and_no_error() -> None:
-    text = shown(Watched("a1b2c3", WELCOME))
+    text = shown(LiveStatus("a1b2c3", WELCOME))
     assert row(text, "position") == "–"
     assert row(text, "waiting").endswith("0.000 s of 3 s, tick 0")
 
 
 def test_the_real_time_factor_is_that_of_the_last_seconds() -> None:
-    subject = Watched("a1b2c3", WELCOME)
+    subject = LiveStatus("a1b2c3", WELCOME)
     for second in range(11):
-        subject.take(frames(to=1000 + 50 * second), float(second))
+        subject.ingest(frames(to=1000 + 50 * second), float(second))
     assert subject.factor == pytest.approx(0.05)
     for second in range(11, 21):
-        subject.take(frames(to=1500 + 200 * (second - 10)), float(second))
+        subject.ingest(frames(to=1500 + 200 * (second - 10)), float(second))
     assert subject.factor == pytest.approx(0.2)
     for second in range(21, 31):
-        subject.take([], float(second))
+        subject.ingest([], float(second))
     assert subject.factor is None
 
 
 def test_a_change_is_shown_with_its_time_and_tick_whatever_is_in_its_words() -> None:
     """Square brackets are no markup."""
-    subject = watched()
-    subject.note(1200, {"refused": "swap of element 0 at tick 1200 was refused: ValueError: [red] is no number"})
+    subject = live_status()
+    subject.note_event(1200, {"refused": "swap of element 0 at tick 1200 was refused: ValueError: [red] is no number"})
     assert "[red] is no number, at 1.2 s (tick 1200)" in shown(subject, 200)
 
 
@@ -168,10 +167,10 @@ def summary(**changes: Any) -> dict[str, Any]:
 
 
 def test_at_the_end_the_verdict_is_that_of_the_summary() -> None:
-    subject = watched(to=3000)
+    subject = live_status(to=3000)
     subject.end("", summary())
     assert row(shown(subject), "verdict").startswith("steady oscillation 1.00 µm")
-    assert ending(subject) == "Run a1b2c3 ended at tick 3000, 3 s."
+    assert end_sentence(subject) == "Run a1b2c3 ended at tick 3000, 3 s."
 
 
 @pytest.mark.parametrize(
@@ -184,13 +183,13 @@ def test_at_the_end_the_verdict_is_that_of_the_summary() -> None:
     ],
 )
 def test_how_it_ended_is_a_sentence(failure: str, its_summary: dict[str, Any] | None, words: str) -> None:
-    subject = watched()
+    subject = live_status()
     subject.end(failure, its_summary)
-    assert ending(subject).endswith(words)
+    assert end_sentence(subject).endswith(words)
 
 
 def test_the_line_for_a_pipe_has_numbers_and_units_and_what_was_skipped() -> None:
-    subject = watched()
+    subject = live_status()
     words = "1.250 s  x −61.2 mm  force 180 mN  limit-cycle  4.70 mm p-p  residual 3.00e−18 J"
     assert live_line(subject).startswith(words)
     assert "skipped" not in live_line(subject)
@@ -199,12 +198,12 @@ def test_the_line_for_a_pipe_has_numbers_and_units_and_what_was_skipped() -> Non
 
 
 def test_into_a_pipe_go_lines_one_for_every_change_and_none_twice(capsys: pytest.CaptureFixture[str]) -> None:
-    lines, subject = Lines(), watched()
-    subject.note(1000, {"pause": True})
+    lines, subject = LinePrinter(), live_status()
+    subject.note_event(1000, {"pause": True})
     lines.show(subject)
     lines.show(subject)
     first = capsys.readouterr().out.splitlines()
-    subject.note(1250, {"resume": True})
+    subject.note_event(1250, {"resume": True})
     lines.show(subject)
     subject.end("", summary())
     lines.show(subject)

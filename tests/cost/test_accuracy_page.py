@@ -1,4 +1,4 @@
-"""docs/accuracy.md: five findings whose sentences and numbers all come from cost.json, and all that was measured."""
+"""docs/accuracy.md: tables of findings whose numbers all come from cost.json, and all that was measured."""
 
 from __future__ import annotations
 
@@ -13,13 +13,11 @@ from pathlib import Path
 import pytest
 
 from haploop.tools.ablation import AGAIN, NONE, WHOLE
-from haploop.tools.cost import finding_words
-from haploop.tools.cost import findings as accuracy_findings
-from haploop.tools.cost.data import Cost, CostFileError, Point, Spread, save
-from haploop.tools.cost.draw.page import page, write
-from haploop.tools.cost.findings import findings
-from haploop.tools.cost.prices import findings as price_findings
-from haploop.tools.cost.prices.data import PriceGroup, as_data, price
+from haploop.tools.cost import findings as findings_module
+from haploop.tools.cost.advice import length
+from haploop.tools.cost.data import Cost, CostFileError, Point, PriceGroup, Spread, price, save
+from haploop.tools.cost.findings import FindingTable, findings
+from haploop.tools.cost.page import page, write
 from haploop.tools.linear.stiffness_limit import StiffnessLimit
 from helpers.data.costs import METHODS, RATES, fake_cost
 
@@ -52,7 +50,7 @@ def priced(delay_us: float = 20.0, confirmed: bool = True) -> list[PriceGroup]:
 
 @pytest.fixture
 def cost() -> Cost:
-    return dataclasses.replace(fake_cost(), prices=as_data(priced()))
+    return dataclasses.replace(fake_cost(), prices=priced())
 
 
 def changed(cost: Cost, change: Callable[[Point], Point]) -> Cost:
@@ -60,20 +58,31 @@ def changed(cost: Cost, change: Callable[[Point], Point]) -> Cost:
     return dataclasses.replace(cost, scenes=scenes)
 
 
-def texts(cost: Cost) -> list[str]:
-    return [finding.text for finding in findings(cost)]
+def tables(cost: Cost) -> dict[str, FindingTable]:
+    """The tables of findings by what they are about."""
+    names = ("The cheapest setting", "Methods", "The other prices", "What stiffness costs")
+    return {name: table for table in findings(cost) for name in names if table.title.startswith(name)}
 
 
-def test_the_page_holds_five_findings_with_and_without_prices(cost: Cost) -> None:
+def rows(cost: Cost, table: str) -> dict[str, list[str]]:
+    """The rows of a table of findings by their first cell."""
+    return {cells[0]: cells[1:] for cells in tables(cost)[table].rows}
+
+
+def test_the_page_holds_every_table_of_findings_with_and_without_prices(cost: Cost) -> None:
+    assert len(findings(cost)) == len(tables(cost)) == 4
+    assert list(tables(fake_cost())) == ["The cheapest setting", "Methods"]
     for made in (cost, fake_cost()):
-        found = re.findall(r"^(\d)\. \*\*.+?\.\*\* .+\.$", page(made), re.MULTILINE)
-        assert found == ["1", "2", "3", "4", "5"]
-    assert len({finding.about for finding in findings(cost)}) == 5
+        text = page(made)
+        for table in findings(made):
+            assert f"### {table.title}" in text
+            assert all(f"| {' | '.join(cells)} |" in text for cells in table.rows)
+            assert all(note in text for note in table.notes)
 
 
 def test_no_number_of_a_finding_is_typed() -> None:
     """None of the sentences' own words has a digit, so that each digit on the page is the data's."""
-    for module in (accuracy_findings, price_findings, finding_words):
+    for module in (findings_module,):
         tree = ast.parse(Path(str(module.__file__)).read_text(encoding="utf-8"))
         documentation = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
         formats = {
@@ -93,29 +102,50 @@ def test_no_number_of_a_finding_is_typed() -> None:
 
 
 def test_numbers_are_those_of_the_data(cost: Cost) -> None:
-    cheapest, others, failures, prices, stiffness = texts(cost)
-    assert "exact is the cheapest method within 1.00 µm of the reference in 4 of 4 scenes" in cheapest
-    assert "at a plant rate of 1 kHz" in cheapest
-    assert (
-        "Left out, since the reference itself is not known that well: A wall in a limit cycle (to 3.00 µm)" in cheapest
-    )
-    # rk4 needs 5 kHz everywhere (55 us against 26): its error at 2 kHz is 1.25 um even in the easiest scene.
-    assert "rk4 2.1 times the time" in others
-    failed = sum(point.error is None for scene in cost.scenes for point in scene.points)
-    wrong = sum(bool(p.error and not p.error.verdict_right) for scene in cost.scenes for p in scene.points)
-    assert failures.startswith(f"{failed} of 210 settings did not get to the end; {wrong} of 210")
-    assert failures.endswith("exact and dop853 never did.")
-    order = [
-        "all effects at once 50.0 times",
-        "three processes without delay 7.00 times",
-        "energy books",
-        "logged 1.25",
+    settings = rows(cost, "The cheapest setting")
+    assert {cells[0] for cells in settings.values()} == {"exact at 1 kHz"}
+    steady = next(scene for scene in cost.scenes if scene.title == "A wall that steadies")
+    times = {p.plant_rate: p.us_per_tick.median for p in steady.points if p.method == "exact" and p.us_per_tick}
+    own_us, best_us = times[10_000], times[1_000]
+    assert settings[steady.title][1:] == [
+        f"{best_us:.1f}",
+        "exact at 10 kHz",
+        f"{own_us:.1f}",
+        f"{own_us / best_us:.2f}",
     ]
-    places = [prices.index(words) for words in order]
-    assert places == sorted(places)
-    assert "friction it would save 250 of 400 µs a tick" in prices
-    assert "from 220 N/m to 1100 N/m (5.0 times), and a simulated second takes 4.0 times as long" in stiffness
-    assert "from 220 N/m to 11.0 N/m, while a tick as processes takes 0.40 times as long, since delay is" in stiffness
+    assert "A wall in a limit cycle" not in settings
+    (note,) = tables(cost)["The cheapest setting"].notes
+    assert note == "Left out, since the reference itself is not known that well: A wall in a limit cycle."
+    methods = rows(cost, "Methods")
+    assert methods["exact"][:3] == ["4 of 4", "1 kHz", "1.0"]
+    # rk4 needs 5 kHz everywhere (55 us against 26): its error at 2 kHz is 1.25 um even in the easiest scene.
+    assert methods["rk4"][2].startswith("2.1")
+    for place, count in ((-2, lambda p: p.error is None), (-1, lambda p: p.error and not p.error.verdict_right)):
+        counted = [sum(bool(count(p)) for s in cost.scenes for p in s.points if p.method == m) for m in methods]
+        assert [cells[place] for cells in methods.values()] == [f"{number} of 35" for number in counted]
+        assert any(counted)
+    errors = [
+        p.error.size_m
+        for s in cost.scenes
+        if s.reference.pointwise
+        for p in s.points
+        if p.method == "euler" and p.error
+    ]
+    assert methods["euler"][3] == length(max(errors))
+    prices = rows(cost, "The other prices")
+    assert [(cells[0].split()[0], cells[2]) for cells in tables(cost)["The other prices"].rows] == [
+        ("all", "50.0"), ("three", "7.00"), ("the", "1.50"), ("every", "1.25"),
+    ]  # fmt: skip
+    assert prices["all effects at once"][0] == "the same scene without any"
+    (note,) = tables(cost)["The other prices"].notes
+    assert note == "The dearest effect is friction: without it a tick with all effects would save 250 of 400 µs."
+    stiffness = [cells[1:4] for cells in tables(cost)["What stiffness costs"].rows]
+    assert stiffness == [
+        ["0 ms", "220 N/m", "50.0"],
+        ["10 ms", "11.0 N/m", "20.0"],
+        ["1 kHz", "220 N/m", "6.00"],
+        ["5 kHz", "1100 N/m", "24.0"],
+    ]
 
 
 def test_on_a_machine_twice_as_slow_the_findings_about_methods_are_the_same(cost: Cost) -> None:
@@ -124,50 +154,50 @@ def test_on_a_machine_twice_as_slow_the_findings_about_methods_are_the_same(cost
         assert time is not None
         return dataclasses.replace(point, us_per_tick=Spread(2 * time.median, 2 * time.q1, 2 * time.q3))
 
-    assert texts(changed(cost, slower)) == texts(cost)
+    assert tables(changed(cost, slower))["Methods"] == tables(cost)["Methods"]
 
 
 def test_where_another_method_is_cheaper_it_is_named(cost: Cost) -> None:
     def rk4_for_nothing(point: Point) -> Point:
         return dataclasses.replace(point, us_per_tick=Spread(1.0, 1.0, 1.0)) if point.method == "rk4" else point
 
-    first, second, *_ = texts(changed(cost, rk4_for_nothing))
-    assert first.startswith("rk4 is the cheapest method")
-    assert second.startswith("Against rk4")
-    assert "exact 26 times the time" in second
+    made = changed(cost, rk4_for_nothing)
+    assert all(cells[0].startswith("rk4 at") for cells in rows(made, "The cheapest setting").values())
+    assert tables(made)["Methods"].notes[0].startswith("Times are over those of rk4, ")
+    assert rows(made, "Methods")["exact"][2] == "26"
 
 
-def test_where_nothing_failed_that_is_said(cost: Cost) -> None:
+def test_where_nothing_failed_no_failure_is_counted(cost: Cost) -> None:
     good = cost.scenes[0].points[0].error
 
     def right(point: Point) -> Point:
         return dataclasses.replace(point, error=good, failure=None)
 
-    assert "None of 210 settings failed, and every verdict was right." in texts(changed(cost, right))
+    assert all(cells[-2:] == ["0 of 35", "0 of 35"] for cells in rows(changed(cost, right), "Methods").values())
 
 
 def test_where_no_setting_meets_the_tolerance_that_is_said(cost: Cost) -> None:
-    first = texts(dataclasses.replace(cost, tolerance_m=1e-12, scenes=cost.scenes[:1]))[0]
-    assert first.startswith("exact")
+    strict = dataclasses.replace(cost, tolerance_m=1e-12, scenes=cost.scenes[:1])
+    assert next(iter(rows(strict, "The cheapest setting").values()))[0].startswith("exact")
     coarse = dataclasses.replace(cost.scenes[0], points=[p for p in cost.scenes[0].points if p.method == "euler"])
-    none = texts(dataclasses.replace(cost, scenes=[coarse]))[0]
-    assert none == "No setting came within 1.00 µm of the reference in 1 of 1 scene."
+    none = dataclasses.replace(cost, scenes=[coarse])
+    assert next(iter(rows(none, "The cheapest setting").values()))[0] == "none"
+    assert tables(none)["Methods"].notes == ("No setting came within the tolerance in any scene.",)
+    assert rows(none, "Methods")["euler"][:3] == ["0 of 1", "–", "–"]
 
 
-def test_delay_that_saves_nothing_is_not_praised_and_unconfirmed_limits_are_theory(cost: Cost) -> None:
-    made = dataclasses.replace(cost, prices=as_data(priced(delay_us=60.0, confirmed=False)))
-    stiffness = texts(made)[-1]
-    assert "takes 1.2 times as long." in stiffness
-    assert "lookahead" not in stiffness
-    assert "from 220 N/m in theory to 1100 N/m in theory" in stiffness
+def test_stiffness_that_runs_do_not_confirm_is_told_as_theory(cost: Cost) -> None:
+    made = dataclasses.replace(cost, prices=priced(confirmed=False))
+    limits = [cells[2] for cells in tables(made)["What stiffness costs"].rows]
+    assert limits == ["220 N/m", "11.0 N/m", "220 N/m in theory", "1100 N/m in theory"]
 
 
 def test_an_effect_that_chance_could_explain_is_not_called_dear(cost: Cost) -> None:
     groups = priced()
     groups[2] = group("effects", {WHOLE: 400.0, AGAIN: 380.0, "friction": 395.0, NONE: 8.0})
-    prices = texts(dataclasses.replace(cost, prices=as_data(groups)))[3]
-    assert "all effects at once 50.0 times" in prices
-    assert "friction" not in prices
+    prices = tables(dataclasses.replace(cost, prices=groups))["The other prices"]
+    assert prices.rows[0][0] == "all effects at once"
+    assert prices.notes == ()
 
 
 def test_the_page_shows_every_scene_point_price_and_what_it_was_measured_on(cost: Cost) -> None:
@@ -175,7 +205,8 @@ def test_the_page_shows_every_scene_point_price_and_what_it_was_measured_on(cost
     for scene in cost.scenes:
         for words in (f"### {scene.title}", scene.reference.how, scene.advice):
             assert words in text
-    rows = [line for line in text.splitlines() if line.startswith(tuple(f"| {method} |" for method in METHODS))]
+    points = text.partition("## Error against time")[2]
+    rows = [line for line in points.splitlines() if line.startswith(tuple(f"| {method} |" for method in METHODS))]
     assert len(rows) == len(METHODS) * len(cost.scenes)
     assert all(row.count("|") == len(RATES) + 2 and ", " in row for row in rows)
     assert sum(row.count("failed") for row in rows) == sum(p.error is None for s in cost.scenes for p in s.points)
@@ -199,7 +230,7 @@ def test_page_and_figures_are_written_side_by_side(cost: Cost, tmp_path: Path) -
 def test_without_measurements_the_command_says_what_to_run(tmp_path: Path) -> None:
     with pytest.raises(CostFileError, match="Run haploop cost"):
         write(tmp_path, tmp_path / "docs")
-    command = [sys.executable, "-m", "haploop.tools.cost.draw.page", str(tmp_path), str(tmp_path)]
+    command = [sys.executable, "-m", "haploop.tools.cost.page", str(tmp_path), str(tmp_path)]
     ended = subprocess.run(command, capture_output=True, text=True, check=False)
     assert ended.returncode == 2
     assert "Run haploop cost" in ended.stderr

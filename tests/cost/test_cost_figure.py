@@ -12,9 +12,8 @@ import numpy as np
 import pytest
 
 from haploop.tools.cost.data import Cost, Point, Spread
-from haploop.tools.cost.draw.figure import draw as draw_cost
-from haploop.tools.cost.draw.figure import figure_of
-from haploop.tools.cost.draw.panel import LOOKS, drawn_m
+from haploop.tools.cost.figure import LOOKS, drawn_m, figure_of
+from haploop.tools.cost.figure import draw as draw_cost
 from haploop.tools.figure.data import FigureError
 from haploop.tools.figure.labels import Label, place_labels
 from helpers.data.costs import METHODS, RATES, SCENES, fake_cost, fake_point

@@ -173,5 +173,5 @@ def test_cost_json_is_read_back_as_it_was_and_another_file_is_refused(tmp_path):
 
 
 def test_median_and_quartiles_of_few_and_many():
-    assert Spread.of([3.0]) == Spread(3.0, 3.0, 3.0)
-    assert Spread.of([1.0, 2.0, 3.0, 4.0, 100.0]) == Spread(3.0, 2.0, 4.0)
+    assert Spread.from_values([3.0]) == Spread(3.0, 3.0, 3.0)
+    assert Spread.from_values([1.0, 2.0, 3.0, 4.0, 100.0]) == Spread(3.0, 2.0, 4.0)

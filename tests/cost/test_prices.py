@@ -13,14 +13,15 @@ from typing import Any
 import pytest
 
 from haploop.controller.controller import Controller
-from haploop.launch.plan.plan import effects_of
+from haploop.launch.plan.effects import effects_of
 from haploop.launch.runs.in_process import run_in_process
 from haploop.launch.scene.file import load
 from haploop.tools.ablation import AGAIN, NONE, WHOLE, ablations
+from haploop.tools.cost.data import PriceGroup, chance_in, price, save
+from haploop.tools.cost.data import load as load_cost
 from haploop.tools.cost.prices import figure as prices_figure
 from haploop.tools.cost.prices import jobs as price_jobs
 from haploop.tools.cost.prices import prices
-from haploop.tools.cost.prices.data import PriceGroup, as_data, chance_in, price, price_groups
 from haploop.tools.cost.store import Store
 from haploop.tools.cost.times import IN_PROCESS, PROCESSES
 from haploop.tools.figure.data import FigureError
@@ -61,12 +62,13 @@ def test_chance_is_the_distance_of_two_equal_runs_or_of_the_quartiles() -> None:
         assert chance_in(PriceGroup("effects", "", "", 3, "", both)) == expected
 
 
-def test_groups_survive_cost_json() -> None:
+def test_groups_survive_cost_json(tmp_path: Path) -> None:
     limit = StiffnessLimit(220.0, "steady", "limit-cycle")
     group = PriceGroup("delay", "Delay", "µs per tick", 3, "how", [price("0 ms", [1.0], None, "", stiffness=limit)])
     made = fake_cost()
-    made.prices.extend(as_data([group]))
-    assert price_groups(made) == [group]
+    made.prices.append(group)
+    save(made, tmp_path)
+    assert load_cost(tmp_path).prices == [group]
 
 
 @pytest.fixture(scope="module")

@@ -14,8 +14,7 @@ import haploop.logger
 from haploop.launch.processes.run_directory import LiveRun
 from haploop.logger.log.recording import Recording
 from haploop.tools.attach import plotjuggler
-from haploop.tools.attach.plotjuggler import Outlet
-from haploop.tools.attach.plotjuggler_node import publish
+from haploop.tools.attach.plotjuggler import Outlet, publish
 from helpers.live.launched import command, wait_for
 from helpers.live.live_run import Going, going, undisturbed
 from oracles.plotjuggler_rules import Viewer
@@ -47,7 +46,7 @@ class Node:
 
     def heard(self) -> None:
         """Wait until it knows that a viewer listens."""
-        wait_for("the viewer", lambda: self.outlet.is_heard)
+        wait_for("the viewer", lambda: self.outlet.has_subscribers)
 
     def finish(self) -> None:
         """Wait until it has seen the run end, and mark the end of what it said."""

@@ -165,7 +165,19 @@ class Lagging(Element):
 
     kind = "lagging"
     linear = True
+    memory = 0.0
     damping: Annotated[float, Quantity("N s/m", at_least=0)]
+
+    def force(self, motion: Motion, memory: Any) -> Any:
+        v = memory + 0.2 * (motion.v - memory)
+        return -self.damping * v, v
+
+
+class Hoarding(Lagging):
+    """One that keeps its memory in an attribute of its own."""
+
+    kind = "hoarding"
+    memory = None
 
     def __post_init__(self) -> None:
         self.v = 0.0
@@ -215,9 +227,10 @@ def test_what_makes_a_loop_no_linear_map_is_named(tables: dict[str, Any], culpri
     assert is_linear(made) == (not culprits)
 
 
-def test_an_element_is_not_taken_for_linear_unless_it_says_so() -> None:
-    made = {**scene(), "dissipation": [{"kind": "capped", "damping": 0.2, "acts": "always"}]}
-    assert why_not_linear(made, KINDS | {"capped": Capped}) == ["the element capped"]
+@pytest.mark.parametrize("element", [Capped, Hoarding])
+def test_an_element_is_not_taken_for_linear_unless_it_says_so_and_declares_its_memory(element: type[Element]) -> None:
+    made = {**scene(), "dissipation": [{"kind": element.kind, "damping": 0.2, "acts": "always"}]}
+    assert why_not_linear(made, KINDS | {element.kind: element}) == [f"the element {element.kind}"]
 
 
 def test_what_the_map_leaves_out_is_named_and_gone_from_the_smooth_scene() -> None:

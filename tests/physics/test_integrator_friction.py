@@ -10,7 +10,7 @@ import pytest
 from typer.testing import CliRunner
 
 import haploop.launch.runs.start as start
-from haploop.launch.scene.combinations import notes
+from haploop.launch.plan.effects import notes
 from haploop.plant.integrators.one_step import growth
 from haploop.tools.cli.main import app
 from helpers.runs.captured import run, summarise

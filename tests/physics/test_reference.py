@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from haploop.launch.plan.plan import effects_of
+from haploop.launch.plan.effects import effects_of
 from haploop.launch.scene.file import load
 from helpers.runs.captured import Captured, run
 from helpers.scenes.random_scenes import drawn, is_comparable

@@ -10,8 +10,9 @@ from typing import Any
 import pytest
 
 import haploop.logger
-from haploop.launch.plan.effects import EFFECTS, Effect
-from haploop.launch.plan.plan import effects_of, plan
+from haploop.launch.plan.effect import Effect
+from haploop.launch.plan.effects import EFFECTS, effects_of
+from haploop.launch.plan.plan import plan
 from haploop.launch.runs.in_process import run_in_process
 from haploop.launch.scene.file import load
 from helpers.scenes.every_effect import BESIDE, EVERYTHING, METHODS, NAMING

@@ -7,7 +7,7 @@ import jsonschema
 import pytest
 from typer.testing import CliRunner
 
-from haploop.launch.scene.combinations import notes
+from haploop.launch.plan.effects import notes
 from haploop.launch.scene.file import load
 from haploop.launch.scene.layers import Layers
 from haploop.launch.scene.schema import json_schema

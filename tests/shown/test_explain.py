@@ -8,10 +8,10 @@ import pytest
 from typer.testing import CliRunner
 
 from haploop.controller.dissipation.damping import Damping
-from haploop.launch.plan.effects import EFFECTS, Effect
-from haploop.launch.plan.plan import effects_of
+from haploop.launch.plan.effect import Effect
+from haploop.launch.plan.effects import EFFECTS, effects_of
 from haploop.tools.cli.main import app
-from haploop.tools.operations import bill, operations, without
+from haploop.tools.operations import bill, operations
 from helpers.scenes.every_effect import BESIDE, EVERYTHING, NAMING
 from helpers.scenes.least import KINDS, scene
 
@@ -30,7 +30,7 @@ def test_a_scene_with_an_effect_taken_out_executes_what_one_that_never_named_it_
     rest = scene(**PRESS | NAMING[name] | {"hand": PRESS["hand"] | NAMING[name].get("hand", {})})
     assert name in [effect.name for effect in effects_of(rest)]
     while named := effects_of(rest):
-        rest = without(named[0], rest)
+        rest = named[0].without(rest)
     assert operations(rest, KINDS) == operations(scene(**PRESS), KINDS)
 
 
@@ -65,7 +65,7 @@ def test_a_short_run_is_counted_too(ticks):
 def test_a_scene_without_one_of_its_effects_is_the_scene_that_never_named_it(effect: Effect):
     """What goes with it is what cannot be there without it; the rest is left alone, and it can be run."""
     resolved = scene(**NAMING[effect.name], wall={"position": 0, "stiffness": 1})
-    rest = without(effect, resolved)
+    rest = effect.without(resolved)
     assert effect in effects_of(resolved)
     gone = {e.name for e in effects_of(resolved)} - {e.name for e in effects_of(rest)}
     dependent = {name for name, needs in BESIDE.items() if effect.name in needs}

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 
 from haploop.launch.scene.toml_writer import inline
 from haploop.tools.figure.data import FigureError
-from haploop.tools.figure.file import write_figure
+from haploop.tools.figure.style import write_figure
 from haploop.tools.linear.one_tick import OneTickMap
 from haploop.tools.linear.stiffness_limit import pressed_deep
 from haploop.tools.sweep.map.axis import Ruler

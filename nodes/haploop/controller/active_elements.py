@@ -1,35 +1,34 @@
-"""The places of the dissipation list: which element works in each, and which book its forces are written to."""
+"""Active elements: those at work in a controller, and the book that each one's forces are written to."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
-from haploop.controller.dissipation import Element, ElementError, Motion
-from haploop.protocol.arrays import where
+from haploop.controller.dissipation import Element, ElementError
 
 
-class Slot:
+@dataclass(frozen=True, slots=True)
+class ActiveElement:
     """One element at work.
 
     A book covers one element with one set of parameters: a swap and a changed parameter both open a new one.
 
     Attributes:
+        element: with its parameters.
+        acts: "always", or "in-contact": the force is 0 out of contact.
         book: number of the book, in order of opening within the run.
         from_tick: the tick at which it was opened.
-        force: from motion to force in N; 0 out of contact unless the element acts always.
     """
 
-    def __init__(self, element: Element, acts: str, book: int, from_tick: int) -> None:
-        self.element, self.acts = element, acts
-        self.book, self.from_tick = book, from_tick
-        self.force: Callable[[Motion], Any] = element.force if acts == "always" else self._in_contact
-
-    def _in_contact(self, motion: Motion) -> Any:
-        return where(motion.contact, self.element.force(motion), 0.0)
+    element: Element
+    acts: str
+    book: int
+    from_tick: int
 
     def describe(self) -> dict[str, Any]:
-        """Book, kind, parameters and first tick, as they stand in telemetry and summary."""
+        """Returns book, kind, parameters and first tick, as they stand in telemetry and summary."""
         return {
             "book": self.book,
             "kind": self.element.kind,
@@ -39,7 +38,7 @@ class Slot:
 
 
 def make_element(table: dict[str, Any], kinds: Mapping[str, type[Element]]) -> tuple[Element, str]:
-    """The element a validated ``[[dissipation]]`` table names, and when it acts.
+    """Makes the element that a validated ``[[dissipation]]`` table names; returns it, and when it acts.
 
     Raises:
         ElementError: the element's own code does not take these parameters.
@@ -54,29 +53,37 @@ def make_element(table: dict[str, Any], kinds: Mapping[str, type[Element]]) -> t
         ) from error
 
 
-class Slots:
-    """All slots of a controller, in the order in which their forces are added."""
+def keeps_attributes(element: Element) -> bool:
+    """Tells whether an element has attributes beside its parameters, or a container that its class shares."""
+    kinds = type(element).__mro__[: type(element).__mro__.index(Element)]
+    entries = [(name, value) for kind in kinds for name, value in vars(kind).items()]
+    slots = any(name == "__slots__" for name, _ in entries)
+    shared = any(_can_change(value) for name, value in entries if not name.startswith("__"))
+    return vars(element).keys() != element.values().keys() or slots or shared
 
-    def __init__(self, tables: list[dict[str, Any]], kinds: dict[str, type[Element]]) -> None:
-        self._kinds = kinds
-        self._books = 0
-        self.slots: list[Slot] = []
-        for table in tables:
-            self.slots.append(self._slot(*make_element(table, kinds), 0))
 
-    def swap(self, index: int, table: dict[str, Any], tick: int) -> None:
-        """Put a new element into slot ``index``, add one past the end, or remove it (kind "none")."""
-        if table["kind"] == "none":
-            del self.slots[index]
-            return
-        self.slots[index : index + 1] = [self._slot(*make_element(table, self._kinds), tick)]
+def _can_change(value: Any) -> bool:
+    return not isinstance(value, type) and any(hasattr(value, name) for name in ("append", "__setitem__", "add"))
 
-    def set_parameter(self, index: int, name: str, value: float, tick: int) -> None:
-        """Change one parameter of the element in slot ``index``; its state stays, its book is a new one."""
-        slot = self.slots[index]
-        setattr(slot.element, name, value)
-        self.slots[index] = self._slot(slot.element, slot.acts, tick)
 
-    def _slot(self, element: Element, acts: str, tick: int) -> Slot:
-        self._books += 1
-        return Slot(element, acts, self._books - 1, tick)
+class Unchanged:
+    """Guard of elements whose ``force`` may change nothing but the memory it returns: those of a batch.
+
+    Members share their elements, so one that keeps attributes of its own would come to other numbers than alone.
+
+    Raises:
+        ElementError: an element keeps such attributes; ``check``: it has come to, or has changed a parameter.
+    """
+
+    def __init__(self, active: tuple[ActiveElement, ...]) -> None:
+        self._elements = [each.element for each in active]
+        self._known = [[*vars(element).values()] for element in self._elements]
+        for element in filter(keeps_attributes, self._elements):
+            raise ElementError(f"The element {element.kind} keeps attributes of its own.")
+
+    def check(self) -> None:
+        """Look again, after a tick."""
+        for element, known in zip(self._elements, self._known, strict=True):
+            now = vars(element).values()
+            if len(now) != len(known) or any(new is not old for new, old in zip(now, known, strict=True)):
+                raise ElementError(f"The element {element.kind} has changed attributes of its own.")

@@ -2,39 +2,60 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
-from haploop.controller.active_elements import Slots
+from haploop.controller.active_elements import ActiveElement, make_element
 from haploop.controller.dissipation import Element, load_plugin
-from haploop.controller.wall import Wall
-from haploop.protocol.changes import Change
+from haploop.controller.tick import ControllerParams, ControllerState
+from haploop.protocol.changes import NO_ELEMENT, Change
+
+Kinds = dict[str, type[Element]]
 
 
-def apply_change(change: Change, slots: Slots, wall: Wall, kinds: dict[str, type[Element]]) -> Change | None:
-    """Carries out a change that was checked before; returns the change, refused, where that failed, else None.
+def apply_change(
+    change: Change, params: ControllerParams, state: ControllerState, kinds: Kinds
+) -> tuple[ControllerParams, ControllerState]:
+    """Returns parameters and state after a change that was checked before; whatever raises leaves both as they were.
 
-    Whatever fails leaves slots and wall as they were. A plugin is loaded first; it lies in the run's own directory,
-    put there by the launcher.
+    A plugin is loaded first; it lies in the run's own directory, put there by the launcher.
     """
-    try:
-        if change.plugin is not None:
-            kinds.update(load_plugin(Path(change.plugin)))
-        if change.swap is not None:
-            slots.swap(change.element, dict(change.swap), change.tick)
-        for key, value in change.set.items():
-            _set(key.split("."), value, change.tick, slots, wall)
-    except Exception as error:
-        return change.refuse(error)
-    return None
+    if change.plugin is not None:
+        kinds.update(load_plugin(Path(change.plugin)))
+    if change.swap is not None:
+        params, state = _swapped(params, state, change, dict(change.swap), kinds)
+    for key, value in change.set.items():
+        params = _set(params, change.tick, key.split("."), value)
+    return params, state
 
 
-def _set(path: list[str], value: float, tick: int, slots: Slots, wall: Wall) -> None:
+def _swapped(
+    params: ControllerParams, state: ControllerState, change: Change, table: dict[str, Any], kinds: Kinds
+) -> tuple[ControllerParams, ControllerState]:
+    """Both with a new element in its place, one more past the end, or one less; a new one's memory is fresh."""
+    place, elements, memories, books = change.element, list(params.elements), list(state.elements), params.books
+    if table["kind"] == NO_ELEMENT:
+        del elements[place]
+        del memories[place]
+    else:
+        active = ActiveElement(*make_element(table, kinds), books, change.tick)
+        elements[place : place + 1] = [active]
+        memories[place : place + 1] = [active.element.memory]
+        books += 1
+    return replace(params, elements=tuple(elements), books=books), state._replace(elements=tuple(memories))
+
+
+def _set(params: ControllerParams, tick: int, path: list[str], value: float) -> ControllerParams:
     match path:
         case ["wall", "stiffness" | "position" as name]:
-            setattr(wall, name, value)
+            return replace(params, wall=replace(params.wall, **{name: value}))
         case ["clock", "round_trip_delay"]:
-            pass  # the plant's to do
-        case ["dissipation", index, name]:
-            slots.set_parameter(int(index), name, value, tick)
-        case _:
-            raise KeyError(f"{'.'.join(path)} cannot be set while a loop runs")
+            return params  # the plant's to do
+        case ["dissipation", place, name]:
+            elements = list(params.elements)
+            active = elements[int(place)]
+            setattr(active.element, name, value)  # in place: what an element keeps of its own stays
+            elements[int(place)] = replace(active, book=params.books, from_tick=tick)
+            return replace(params, elements=tuple(elements), books=params.books + 1)
+    raise KeyError(f"{'.'.join(path)} cannot be set while a loop runs")

@@ -1,49 +1,76 @@
-"""The controller's core: from a sample to a force, with elements and gains that may change at a tick."""
+"""The controller of a loop: samples in, forces out, with elements and gains that may change at a tick."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from typing import Any
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
 
-from haploop.controller.active_elements import Slots
+from haploop.controller.active_elements import ActiveElement, make_element
 from haploop.controller.changes import apply_change
 from haploop.controller.dissipation import Element, ElementError, Motion
-from haploop.controller.estimators.choose import Sample, estimators
-from haploop.controller.recorder import MOTION_COLUMNS, Recorder
-from haploop.controller.wall import NoWall, Wall
+from haploop.controller.estimators.base import Sample
+from haploop.controller.estimators.choose import make_estimators
+from haploop.controller.recorder import Recorder
+from haploop.controller.tick import ControllerParams, ControllerState, NoForce, StateTuple, initial_state, tick
+from haploop.controller.wall import Wall
 from haploop.protocol.changes import Change, Event
 from haploop.protocol.ticks import DELAY, Timebase
+from haploop.protocol.trees import tree_select
+
+if TYPE_CHECKING:
+    import numpy as np
+
+# Later than any tick; compared as an int, which is quicker than infinity.
+_NEVER = 2**62
+
+
+def make_params(scene: dict[str, Any], period_s: float, kinds: dict[str, type[Element]]) -> ControllerParams:
+    """Makes the parameters of the controller of a resolved scene, or of a batch in a stacked one."""
+    elements = tuple(
+        ActiveElement(*make_element(table, kinds), book, 0) for book, table in enumerate(scene.get("dissipation", []))
+    )
+    wall = Wall.from_scene(scene)
+    motion = Motion(period_s, wall.inward)
+    return ControllerParams(*make_estimators(scene, period_s), wall, elements, len(elements), motion)
 
 
 class Controller:
-    """Estimates, wall and dissipation elements of one loop; knows nothing of sockets.
+    """Parameters and state of the controller of one loop or of a batch; knows nothing of sockets.
 
-    At tick k: f_d[k] = f_wall[k] + sum of the elements' forces[k], in the order of the scene's list.
+    Args:
+        scene: resolved, of one loop, or stacked of a batch.
+        time: of the scene.
+        kinds: element kinds at hand.
+        recorder: of a batch; one for a single loop when None.
 
     Attributes:
+        params, state: what ``tick`` is given, both replaced between ticks; the state is None before the first sample.
         tick: the next tick to be answered.
         recorder: what happened at every tick, in blocks.
     """
 
-    # What makes an element's force a number, or raises.
-    _number: Callable[[Any], Any] = float
-
-    def __init__(self, scene: dict[str, Any], time: Timebase, kinds: dict[str, type[Element]]) -> None:
+    def __init__(
+        self,
+        scene: dict[str, Any],
+        time: Timebase,
+        kinds: dict[str, type[Element]],
+        recorder: Recorder | None = None,
+    ) -> None:
         self._kinds, self._control_rate = dict(kinds), time.control_rate
-        self._start_estimates = estimators(scene, time.period_s)
-        self._wall = Wall(scene["wall"]) if "wall" in scene else NoWall()
-        self._slots = Slots(scene.get("dissipation", []), self._kinds)
-        self._motion = Motion(time.period_s, self._wall.into_wall)
-        self._changes: list[Change] = []
-        self._next_change = math.inf
-        self.recorder = Recorder(self._wall, self._slots, history_ticks=time.lookahead_ticks + 2)
+        self.params = make_params(scene, time.period_s, self._kinds)
+        self.state: StateTuple | None = None
         self.tick = 0
+        self._changes: list[Change] = []
+        self._next_change = _NEVER
+        self.recorder = recorder or Recorder(time.lookahead_ticks + 2)
+        self.recorder.open(self.params)
 
-    @property
-    def into_wall(self) -> float:
-        """Direction that leads into the wall, 0.0 without one."""
-        return self._motion.into_wall
+    def select(self, kept: np.ndarray) -> None:
+        """Keep these members of a batch, whose rows have been taken; ``kept`` is their mask, shape (members,)."""
+        self.params, self.state = tree_select(self.params, kept), tree_select(self.state, kept)
+        self._changes = tree_select(self._changes, kept)
+        self.recorder.open(self.params)
 
     def schedule(self, tick: int, event: Event) -> None:
         """Have a checked swap or set take effect at ``tick``, before that tick's force."""
@@ -53,50 +80,37 @@ class Controller:
         self._changes.append(change)
         self._next_change = self._changes[0].tick
 
-    def answer(self, samples: Sequence[Sample]) -> list[float]:
-        """The commands in N that answer the next samples, in order.
+    def answer(self, samples: Sequence[Sample]) -> list[Any]:
+        """Returns the commands in N that answer the next samples, in order.
 
         Raises:
             ElementError: an element raised, or gave something that is no number.
         """
-        if self.tick == 0:
-            self._velocity, self._acceleration = self._start_estimates(samples[0])
-        return [self._command(sample) for sample in samples]
+        state, forces = self.state, []
+        if state is None:
+            state = self.state = initial_state(self.params, samples[0])
+        for sample in samples:
+            if self.tick >= self._next_change:
+                state = self._change(ControllerState(*state))
+            try:
+                state, row = tick(self.params, state, sample)
+            except NoForce as error:
+                raise ElementError(error.sentence(self.params, self.tick)) from error.__cause__
+            self.state = state
+            self.tick += 1
+            self.recorder.add(row)
+            forces.append(row[-2])
+        return forces
 
-    def _command(self, sample: Sample) -> float:
-        if self.tick >= self._next_change:
-            self._change()
-        motion, wall = self._motion, self._wall
-        motion.a_before = motion.a
-        motion.x = x = sample[0]
-        motion.v = v = self._velocity(x, sample)
-        motion.a = a = self._acceleration(v, sample)
-        contact, total = wall.meet(x)
-        motion.contact = contact
-        row = [x, v, a, total]
-        try:
-            for slot in self._slots.slots:
-                force = self._number(slot.force(motion))
-                total = total + force
-                row.append(force)
-        except Exception as error:
-            raise self._blame(len(row) - len(MOTION_COLUMNS), error) from error
-        row += (total, contact)
-        self.recorder.add(row)
-        self.tick += 1
-        return total
-
-    def _blame(self, index: int, error: Exception) -> ElementError:
-        kind = self._slots.slots[index].element.kind
-        what = f"{type(error).__name__}: {error}"
-        return ElementError(f"Element {index} ({kind}) gave no force at tick {self.tick}: {what}.")
-
-    def _change(self) -> None:
+    def _change(self, state: ControllerState) -> ControllerState:
         """Carry out what is due; later ticks are written to a new block, since its columns may differ."""
         self.recorder.cut()
         while self._changes and self._changes[0].tick <= self.tick:
-            refusal = apply_change(self._changes.pop(0), self._slots, self._wall, self._kinds)
-            if refusal:
-                self.recorder.refused.append(refusal)
-        self._next_change = self._changes[0].tick if self._changes else math.inf
-        self.recorder.open()
+            change = self._changes.pop(0)
+            try:
+                self.params, state = apply_change(change, self.params, state, self._kinds)
+            except Exception as error:
+                self.recorder.refused.append(change.refuse(error))
+        self._next_change = self._changes[0].tick if self._changes else _NEVER
+        self.recorder.open(self.params)
+        return state

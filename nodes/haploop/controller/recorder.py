@@ -1,13 +1,12 @@
-"""What the controller saw and did at every tick, kept in blocks of like columns until it is taken."""
+"""Rows of what the controller saw and did at every tick, kept in blocks of like columns until they are taken."""
 
 from __future__ import annotations
 
 import math
 from array import array
-from typing import Any
+from typing import Any, NamedTuple
 
-from haploop.controller.active_elements import Slots
-from haploop.controller.wall import Wall
+from haploop.controller.tick import ControllerParams
 from haploop.protocol.changes import Change
 
 Block = dict[str, Any]
@@ -27,32 +26,30 @@ class Recorder:
         trouble: the element that first gave a force which is no finite number, as a sentence, or None.
     """
 
-    def __init__(self, wall: Wall, slots: Slots, history_ticks: int) -> None:
-        self._wall, self._slots = wall, slots
+    def __init__(self, history_ticks: int) -> None:
         self._history_ticks = history_ticks
         self._cut: list[Block] = []
         self.refused: list[Change] = []
         self.history: list[Block] = []
         self.trouble: str | None = None
         self._next_tick = 0
-        self.open()
 
-    def open(self) -> None:
-        """Start a block with the columns that wall and slots have now."""
-        self._rows: list[float] = []
-        self.add = self._rows.extend
-        self._elements = [slot.describe() for slot in self._slots.slots]
-        self._place = {
-            "position": self._wall.position,
-            "stiffness": self._wall.stiffness,
-            "into_wall": self._wall.into_wall,
-        }
+    def open(self, params: ControllerParams) -> None:
+        """Start a block with the columns of these elements, in which wall and elements are as they are now."""
+        wall = params.wall
+        self._begin()
+        self._elements = [active.describe() for active in params.elements]
+        self._wall = {"position": wall.position, "stiffness": wall.stiffness, "into_wall": wall.inward}
         names = [f"dissipation.{index}" for index in range(len(self._elements))]
         self._names = [*MOTION_COLUMNS, *names, "total", "in_contact"]
 
+    def _begin(self) -> None:
+        self._rows: list[float] = []
+        self.add = self._rows.extend
+
     @property
     def is_empty(self) -> bool:
-        """Whether every tick so far has been taken."""
+        """Tells whether every tick so far has been taken."""
         return not self._rows and not self._cut
 
     def cover(self, ticks: int) -> None:
@@ -75,19 +72,19 @@ class Recorder:
                 "ticks": ticks,
                 "columns": {name: column.tobytes() for name, column in columns.items()},
                 "elements": self._elements,
-                "wall": self._place,
+                "wall": self._wall,
             }
         )
         self._next_tick += ticks
 
     def take(self) -> list[Block]:
-        """All blocks since the last call, in order."""
+        """Returns all blocks since the last call, in order."""
         self.cut()
         blocks, self._cut = self._cut, []
         self.history += blocks
         while len(self.history) > 1 and self._next_tick - self.history[1]["from_tick"] >= self._history_ticks:
             del self.history[0]
-        self.open()
+        self._begin()
         return blocks
 
     def _find_trouble(self, columns: dict[str, array[float]]) -> None:
@@ -100,3 +97,45 @@ class Recorder:
         if found:
             tick, index, force = min(found)
             self.trouble = f"element {index} ({self._elements[index]['kind']}) gave {force} at tick {tick}"
+
+
+class Row(NamedTuple):
+    """One tick of a batch.
+
+    Attributes:
+        columns: x, v, a, wall, total, in_contact, wall_position, wall_stiffness; floats, or arrays of shape (members,).
+        forces: force of every book at work.
+        elements: their descriptions; parameters may be arrays.
+    """
+
+    columns: dict[str, Any]
+    forces: dict[int, Any]
+    elements: list[dict[str, Any]]
+
+
+class BatchRecorder(Recorder):
+    """Rows of the controller of a batch, kept one by one until they are taken."""
+
+    def __init__(self) -> None:
+        super().__init__(history_ticks=0)
+        self._taken: list[Row] = []
+
+    def open(self, params: ControllerParams) -> None:
+        """From now on rows have the columns of these elements and this wall."""
+        super().open(params)
+        self._shared = {"wall_position": params.wall.position, "wall_stiffness": params.wall.stiffness}
+        self._books = [active.book for active in params.elements]
+        self.add = self._add
+
+    def cut(self) -> None:
+        """Nothing: every row knows its columns."""
+
+    def _add(self, row: list[Any]) -> None:
+        motion, forces = row[: len(MOTION_COLUMNS)], row[len(MOTION_COLUMNS) : -2]
+        columns = dict(zip(MOTION_COLUMNS, motion, strict=True)) | {"total": row[-2], "in_contact": row[-1]}
+        self._taken.append(Row(columns | self._shared, dict(zip(self._books, forces, strict=True)), self._elements))
+
+    def take_rows(self) -> list[Row]:
+        """Returns all rows since the last call."""
+        rows, self._taken = self._taken, []
+        return rows

@@ -2,33 +2,36 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 from haploop.protocol.arrays import where
 
 
+@dataclass(frozen=True, slots=True)
 class Wall:
     """f_wall = k_w (x_w - x_m) while x_m is strictly inside, else 0 (Choi et al. 2022, eq. 12).
 
-    Args:
-        table: the resolved ``[wall]`` table: position in m, stiffness in N/m, occupies "below" or "above".
+    Attributes:
+        position: of its surface x_w, m.
+        stiffness: k_w, N/m.
+        inward: direction that leads into it, +1.0 or -1.0; 0.0 where there is no wall, so that nothing is inside.
     """
 
-    def __init__(self, table: dict[str, Any]) -> None:
-        self.position = table["position"]
-        self.stiffness = table["stiffness"]
-        self.into_wall = -1.0 if table["occupies"] == "below" else 1.0
+    position: Any
+    stiffness: Any
+    inward: float
 
-    def meet(self, x: Any) -> tuple[Any, Any]:
-        """Whether measured position x (m) is strictly inside, and the force on the device in N along +x."""
+    @classmethod
+    def from_scene(cls, scene: dict[str, Any]) -> Wall:
+        """Makes the wall of a resolved scene, which may have none."""
+        if "wall" not in scene:
+            return cls(0.0, 0.0, 0.0)
+        table = scene["wall"]
+        return cls(table["position"], table["stiffness"], -1.0 if table["occupies"] == "below" else 1.0)
+
+    def contact(self, x: Any) -> tuple[Any, Any]:
+        """Returns whether measured position x (m) is strictly inside, and the force on the device in N along +x."""
         out = self.position - x
-        contact = out * self.into_wall < 0.0
+        contact = out * self.inward < 0.0
         return contact, where(contact, self.stiffness * out, 0.0)
-
-
-class NoWall(Wall):
-    """A scene without ``[wall]``: no way in, so never in contact, and no force."""
-
-    def __init__(self) -> None:
-        super().__init__({"position": 0.0, "stiffness": 0.0, "occupies": "below"})
-        self.into_wall = 0.0

@@ -5,7 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from haploop.controller.estimators.choose import estimators
+from haploop.controller.controller import make_params
+from haploop.controller.tick import StateTuple, initial_state, tick
 from haploop.plant.sensing.encoder import encoder
 
 T = 1e-3
@@ -22,11 +23,11 @@ FUSED = {**KALMAN, "accelerometer": True, "accelerometer_noise": 0.5}
 def estimates(x: Sequence[Any], readings: Sequence[Any] = (), **tables: Any) -> tuple[np.ndarray, np.ndarray]:
     """v and a along sampled positions, by the tables of a scene; shape (ticks, ...) as the samples are."""
     samples = list(zip(x, readings, strict=True)) if len(readings) else [(at,) for at in x]
-    velocity, acceleration = estimators(tables, T)(samples[0])
-    rows = []
+    params, rows = make_params(tables, T, {}), []
+    state: StateTuple = initial_state(params, samples[0])
     for sample in samples:
-        v = velocity(sample[0], sample)
-        rows.append((v, acceleration(v, sample)))
+        state, row = tick(params, state, sample)
+        rows.append(row[1:3])
     v, a = zip(*rows, strict=True)
     return np.array(v), np.array(a)
 

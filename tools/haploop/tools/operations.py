@@ -1,12 +1,10 @@
-"""What a scene costs, counted and not timed: bytecode instructions of the loop, effect by effect.
+"""The cost of a scene, counted and not timed: bytecode instructions of the loop, effect by effect.
 
-A count is the same on every machine and in every hour. It sees what Python executes; a call into NumPy counts as one
-instruction, whatever the size of its arrays.
+A count is the same on every machine. A call into NumPy counts as one instruction, whatever the size of its arrays.
 """
 
 from __future__ import annotations
 
-import copy
 import statistics
 import sys
 from collections.abc import Iterable
@@ -15,7 +13,7 @@ from types import FrameType
 from typing import TYPE_CHECKING, Any
 
 from haploop.controller.controller import Controller
-from haploop.launch.plan.effects import Effect
+from haploop.launch.plan.effect import Effect
 from haploop.launch.plan.plan import multiplications
 from haploop.plant.plant import Plant
 from haploop.protocol.ticks import Timebase
@@ -24,7 +22,7 @@ if TYPE_CHECKING:
     from haploop.controller.dissipation import Element
 
 Kinds = dict[str, type["Element"]]
-# Exchanges that are left out, since they make what is used from then on, and exchanges that are counted.
+# Exchanges that are left out, since they build caches, and exchanges that are counted.
 _FIRST, _COUNTED = 20, 101
 
 
@@ -43,7 +41,7 @@ class Operations:
 
     @property
     def per_tick(self) -> float:
-        """Of both together, per tick."""
+        """Instructions of both together, per tick."""
         return (self.plant + self.controller) / self.ticks
 
 
@@ -61,15 +59,15 @@ class _Counter:
         return self
 
     def take(self) -> int:
-        """The count since the last call."""
+        """Returns the count since the last call."""
         count, self.count = self.count, 0
         return count
 
 
 def operations(scene: dict[str, Any], kinds: Kinds) -> Operations:
-    """Run the loop of a resolved scene in this process for some ticks and count; events are left out.
+    """Runs the loop of a resolved scene in this process for some ticks and counts; events are left out.
 
-    A run that ends earlier is counted over the second half of what it has.
+    A shorter run is counted over its second half.
     """
     time = Timebase.from_clock(scene["clock"], scene["duration"])
     plant, controller = Plant(scene, time), Controller(scene, time, kinds)
@@ -97,7 +95,7 @@ def operations(scene: dict[str, Any], kinds: Kinds) -> Operations:
 
 @dataclass(frozen=True)
 class Bill:
-    """What a scene costs, in bytecode instructions per tick.
+    """The cost of a scene, in bytecode instructions per tick.
 
     Attributes:
         whole: of the whole loop.
@@ -113,14 +111,14 @@ class Bill:
 
 
 def bill(scene: dict[str, Any], named: Iterable[Effect], kinds: Kinds) -> Bill:
-    """Count the loop as it is, then without each effect and each element in turn."""
+    """Counts the loop as it is, then without each effect and each element in turn."""
     whole = operations(scene, kinds)
 
     def saved(other: dict[str, Any]) -> float:
         return whole.per_tick - operations(other, kinds).per_tick
 
     elements = scene.get("dissipation", [])
-    others = {effect.name: without(effect, scene) for effect in named}
+    others = {effect.name: effect.without(scene) for effect in named}
     moving = multiplications(scene)
     return Bill(
         whole,
@@ -128,19 +126,3 @@ def bill(scene: dict[str, Any], named: Iterable[Effect], kinds: Kinds) -> Bill:
         [saved({**scene, "dissipation": elements[:i] + elements[i + 1 :]}) for i in range(len(elements))],
         (moving, {name: moving - multiplications(other) for name, other in others.items()}),
     )
-
-
-def without(effect: Effect, scene: dict[str, Any]) -> dict[str, Any]:
-    """A resolved scene without an effect, and without what cannot be there without it."""
-    scene = copy.deepcopy(scene)
-    *tables, last = effect.key.split(".")
-    table = scene
-    for name in tables:
-        table = table[name]
-    if last == "estimator":  # its other keys are its own
-        scene[tables[0]] = {key: table[key] for key in ("source", "cutoff") if key in table}
-        if scene.get("acceleration", {}).get("source") == "kalman":
-            del scene["acceleration"]["source"]
-    else:
-        del table[last]
-    return scene

@@ -10,7 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from haploop.controller.controller_batch import ControllerArray
+from haploop.controller.active_elements import Unchanged
+from haploop.controller.controller import Controller
+from haploop.controller.recorder import BatchRecorder
 from haploop.launch.batch.object_state import keep
 from haploop.launch.batch.stacking import stacked
 from haploop.launch.runs.in_process import scene_events
@@ -64,7 +66,9 @@ class LoopArray:
         self._motion, self._line = motion_of(scene, time), line_of(scene, time)
         self._quantise, self._sensor = position_sensor(scene, time), accelerometer(scene, time)
         self._feels = accelerometer_is_used(scene)
-        self._controller = ControllerArray(scene, time, kinds)
+        self._rows = BatchRecorder()
+        self._controller = Controller(scene, time, kinds, self._rows)
+        self._elements = Unchanged(self._controller.params.elements)
         self._logger = BatchLogger(scene, time, len(scenes), energy=energy, trajectories=trajectories)
         self._take = self._motion.take_record if energy or trajectories else self._motion.take_positions
         self._in_flight: deque[Any] = deque(maxlen=time.lookahead_ticks + 1)
@@ -103,7 +107,7 @@ class LoopArray:
 
     def _was_refused(self) -> bool:
         """Whether a change could not be made; for all it cannot be known that it could be for some."""
-        if self._controller.recorder.refused:
+        if self._rows.refused:
             self.results = [None] * len(self.results)
             return True
         return False
@@ -112,6 +116,7 @@ class LoopArray:
         motion, x_m = self._motion, self._quantise(self._motion.x)
         sample = (x_m, self._felt(tick)) if self._feels else (x_m,)
         forces = self._controller.answer([sample])
+        self._check_elements(tick)
         self._line.receive(forces)
         self._in_flight += forces
         motion.advance(tick, self._line.holds(tick))
@@ -119,14 +124,19 @@ class LoopArray:
         if waiting * self._time.steps_per_tick * len(self._ended) >= BLOCK:
             self._book()
 
+    def _check_elements(self, tick: int) -> None:
+        if tick in self._changes:
+            self._elements = Unchanged(self._controller.params.elements)
+        self._elements.check()
+
     def _felt(self, tick: int) -> Any:
         acceleration = self._motion.acceleration(tick)
         return self._sensor.reading(acceleration) if self._sensor else acceleration
 
     def _book(self) -> None:
-        rows = self._controller.recorder.take_rows()
+        rows = self._rows.take_rows()
         if rows:
-            self._logger.book(self._take(self._logger.tick), rows, self._controller.into_wall)
+            self._logger.book(self._take(self._logger.tick), rows, self._controller.params.wall.inward)
 
     def _look_for_ends(self, tick: int) -> None:
         inside = np.abs(self._motion.x) <= self._limit_m
@@ -161,8 +171,10 @@ class LoopArray:
 
     def _drop_ended(self) -> None:
         on = ~self._ended
-        parts = [self._motion, self._line, self._quantise, self._sensor, self._controller, self._logger]
+        parts = [self._motion, self._line, self._quantise, self._sensor, self._logger]
         keep([*parts, self._in_flight], on)
+        self._controller.select(on)
+        self._elements = Unchanged(self._controller.params.elements)
         self._limit_m = self._limit_m[on] if isinstance(self._limit_m, np.ndarray) else self._limit_m
         self._scene_of, self._ended = self._scene_of[on], self._ended[on]
 

@@ -92,4 +92,4 @@ class _Walk:
             slots = vars(kind).get("__slots__", ())
             for name in (slots,) if isinstance(slots, str) else slots:
                 if hasattr(value, name):
-                    setattr(value, name, self.visit(getattr(value, name)))
+                    object.__setattr__(value, name, self.visit(getattr(value, name)))

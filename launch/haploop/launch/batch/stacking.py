@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from haploop.launch.plan.effects import alone_perhaps
 from haploop.plant.chain.chain import Chain
-from haploop.plant.choose import integrator_of, needs_chain
-from haploop.plant.friction.substeps import goes_by_whole_steps
+from haploop.plant.choose import needs_chain
 from haploop.protocol.ticks import DELAY
 
 # What says nothing of what is simulated.
@@ -25,9 +25,7 @@ def runs_in_arrays(scene: dict[str, Any]) -> bool:
     Not so: jitter, loss, another integrator than the exact flow; a delay that changes; a chain whose damping needs the
     widest float; friction that has to be walked step by step.
     """
-    if integrator_of(scene) != "exact" or scene.keys() & {"jitter", "loss"}:
-        return False
-    if "friction" in scene and not goes_by_whole_steps(scene):
+    if any(effect.is_in(scene) and not effect.batches_in(scene) for effect in alone_perhaps()):
         return False
     if any(DELAY in event.get("set", {}) for event in scene.get("event", [])):
         return False

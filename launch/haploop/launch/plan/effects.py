@@ -6,90 +6,17 @@ An effect that is not named is not there: its modules are not imported and no in
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Any, Literal
+from functools import cache
+from importlib.metadata import entry_points
+from typing import Any
 
-# What bodies in a row, or forces that change between ticks, are moved by in place of ``haploop.plant.motion.one_mass``.
-_HISTORY = tuple(f"haploop.plant.chain.{name}" for name in ("history", "chain", "tables", "sensed_acceleration"))
-_EXACT = tuple(f"haploop.plant.chain.{name}" for name in ("motion", "transition"))
-_CHAIN = (*_EXACT, *_HISTORY)
-_EXACT_RUBBING = tuple(f"haploop.plant.friction.{name}" for name in ("motion", "substeps"))
-_RUBBING = (*_EXACT_RUBBING, "haploop.plant.friction.stick_slip")
-# And where another integrator than the exact flow moves them, with friction or without.
-_METHODS = "haploop.plant.integrators"
-_STEPWISE = (*(f"{_METHODS}.{name}" for name in ("stepwise", "one_step", "linear_rates")), *_HISTORY)
-_STEPWISE_RUBBING = tuple(f"{_METHODS}.{name}" for name in ("stepwise_friction", "friction_projection"))
-_DOP853_RUBBING = (f"{_METHODS}.dop853_friction",)
-_DRAWN = ("haploop.plant.random.streams",)
-_NOISY = ("haploop.plant.sensing.band_limited_noise", *_DRAWN)
-_COUNTED = ("haploop.plant.counters",)
-_LINE = ("haploop.plant.line.lossy", *_DRAWN, *_COUNTED, *_CHAIN)
+from haploop.launch.plan import checks, ideal
+from haploop.launch.plan.effect import Effect, Resolved, at, without_keys
+from haploop.launch.plan.modules import CHAIN, COUNTED, HISTORY, LINE, METHODS, NOISY, RUBBING, STEPWISE
+from haploop.plant.sensing.encoder import accelerometer_is_used
 
-Stage = Literal["motion", "measurement", "estimate", "line", "actuation"]
-
-
-@dataclass(frozen=True)
-class Effect:
-    """One row of the table.
-
-    Attributes:
-        key: dotted key of the scene that names it.
-        node: the process it acts in.
-        modules: what it imports beside the node's own core; the first is where it is written.
-        stage: when it acts: in the motion, at every plant step; in the measurement, the estimate, on the line to the
-            device or in the actuation, once a tick.
-        does: what it does, in one phrase.
-        value: what must stand at the key; None where being there is enough.
-        columns: what it adds to the log's ``/plant``.
-        counts: what it adds to the summary, as entry and key.
-        states: numbers it remembers from tick to tick or step to step: a count, or what counts them in a scene.
-    """
-
-    key: str
-    node: Literal["plant", "controller"]
-    modules: tuple[str, ...]
-    stage: Stage
-    does: str
-    value: str | None = None
-    columns: tuple[str, ...] = ()
-    counts: tuple[str, ...] = ()
-    states: int | Callable[[dict[str, Any]], int] = 0
-
-    @property
-    def name(self) -> str:
-        """The key, with the value where several may stand there."""
-        return f"{self.key} = {self.value}" if self.value else self.key
-
-    @property
-    def acts(self) -> str:
-        """How often: "every plant step" or "every tick"."""
-        return "every plant step" if self.stage == "motion" else "every tick"
-
-    def modules_in(self, scene: dict[str, Any]) -> tuple[str, ...]:
-        """What it imports in a scene: an integrator has its own in place of what moves bodies exactly."""
-        integrator = at(scene, "clock.integrator") or "exact"
-        if integrator == "exact":
-            return self.modules
-        rubbing = _DOP853_RUBBING if integrator == "dop853" else _STEPWISE_RUBBING
-        kept = tuple(module for module in self.modules if module not in (*_EXACT, *_EXACT_RUBBING))
-        return kept + (rubbing if self.key == "friction" else ())
-
-    def is_named(self, scene: dict[str, Any]) -> bool:
-        """Whether a resolved scene names it; a number that is 0 names nothing."""
-        found = at(scene, self.key)
-        return bool(found) if self.value is None else found == self.value
-
-    def states_in(self, scene: dict[str, Any]) -> int:
-        """How many states it adds to a scene that names it."""
-        return self.states if isinstance(self.states, int) else self.states(scene)
-
-
-def at(scene: dict[str, Any], key: str) -> Any:
-    """What stands at a dotted key of a scene; None where nothing does."""
-    found: Any = scene
-    for part in key.split("."):
-        found = found.get(part) if isinstance(found, dict) else None
-    return found
+# Other packages name theirs in this group of entry points.
+_GROUP = "haploop.effects"
 
 
 def _controller(module: str) -> tuple[str, ...]:
@@ -100,169 +27,275 @@ def _plant(module: str, *others: str) -> tuple[str, ...]:
     return f"haploop.plant.{module}", *others
 
 
-def _integrator(name: str, does: str, *modules: str) -> Effect:
-    """A method of ``clock.integrator``, written in a module of its own."""
-    own = f"{_METHODS}.{name.replace('-', '_')}"
-    return Effect("clock.integrator", "plant", (own, *modules), "motion", f"every step is {does}", value=name)
+def _integrator(name: str, does: str, *modules: str, **says: Any) -> Effect:
+    """Makes the effect of a method of ``clock.integrator``, written in a module of its own."""
+    own = (f"{METHODS}.{name.replace('-', '_')}", *modules)
+    return Effect(
+        "clock.integrator",
+        "plant",
+        own,
+        "motion",
+        f"every step is {does}",
+        value=name,
+        batches=False,
+        **says,
+    )
 
 
-def _noise_memory(scene: dict[str, Any]) -> int:
-    """An accelerometer's noise is correlated where its bandwidth is limited."""
+def _stepwise(name: str, does: str) -> Effect:
+    """Makes the effect of a method of a fixed step, whose map in a tick is its own and may be unstable."""
+    return _integrator(name, does, *STEPWISE, linear=False, note=checks.note_growth)
+
+
+def _estimator(
+    of: str, name: str, module: str, does: str, states: int | Callable[[Resolved], int], **says: Any
+) -> Effect:
+    """Makes the effect of an estimator of ``[velocity]`` or ``[acceleration]``."""
+    modules = _controller(f"estimators.{module}")
+    return Effect(
+        f"{of}.estimator",
+        "controller",
+        modules,
+        "estimate",
+        does,
+        value=name,
+        states=states,
+        takes_out=_without_estimator(of),
+        **says,
+    )
+
+
+def _without_estimator(of: str) -> Callable[[Resolved], Resolved]:
+    """Takes out an estimator with the keys that are its own, and an acceleration that comes of it."""
+
+    def out(scene: Resolved) -> Resolved:
+        kept = {key: scene[of][key] for key in ("source", "cutoff") if key in scene[of]}
+        from_kalman = at(scene, "acceleration.source") == "kalman"
+        return without_keys({**scene, of: kept}, *["acceleration.source"] * from_kalman)
+
+    return out
+
+
+def _ticks(of: str) -> Callable[[Resolved], int]:
+    return lambda scene: scene[of]["ticks"]
+
+
+def _noise_memory(scene: Resolved) -> int:
+    """Counts the memory of an accelerometer's noise, which is correlated where its bandwidth is limited."""
     table = scene["accelerometer"]
     return int(bool(table["noise_density"]) and "bandwidth" in table)
 
 
+def _goes_by_whole_steps(scene: Resolved) -> bool:
+    from haploop.plant.friction.substeps import goes_by_whole_steps
+
+    return goes_by_whole_steps(scene)
+
+
+_LINE_COUNTS = ("lost.commands_dropped", "lost.commands_lost")
+_LIMITED = {"actuator": ideal.left_out("actuator")}
+_OF_ACCELEROMETER = _plant("sensing.accelerometer", *NOISY, *COUNTED)
+
 # In the order in which they act within their stage.
 EFFECTS: tuple[Effect, ...] = (
-    _integrator("euler", "one of the explicit Euler method, order 1", *_STEPWISE),
-    _integrator("semi-implicit-euler", "one of the semi-implicit Euler method, order 1", *_STEPWISE),
-    _integrator("rk4", "one of the classical Runge-Kutta method, order 4", *_STEPWISE),
-    _integrator("implicit-midpoint", "one of the implicit midpoint rule, order 2", *_STEPWISE),
-    _integrator("dop853", "made of DOP853's own steps, order 8, from event to event", *_HISTORY),
+    _stepwise("euler", "one of the explicit Euler method, order 1"),
+    _stepwise("semi-implicit-euler", "one of the semi-implicit Euler method, order 1"),
+    _stepwise("rk4", "one of the classical Runge-Kutta method, order 4"),
+    _stepwise("implicit-midpoint", "one of the implicit midpoint rule, order 2"),
+    # Its error is near the last bits: for a linear map its steps are those of the exact flow.
+    _integrator("dop853", "made of DOP853's own steps, order 8, from event to event", *HISTORY),
     Effect(
         "transmission",
         "plant",
-        _CHAIN,
+        CHAIN,
         "motion",
         "a cable lets the tip lag behind the motor",
         columns=("tip_x", "tip_v"),
         states=2,
+        frees={"structural mode": ideal.rigid},
+        scaled_with={"device mass": "transmission.motor_mass"},
     ),
     Effect(
         "hand.grip",
         "plant",
-        _CHAIN,
+        CHAIN,
         "motion",
         "a grip lets the hand's mass lag behind the tip",
         columns=("hand_x", "hand_v"),
         states=2,
+        check=checks.check_grip,
+        scaled_with={"hand damping": "hand.grip.damping", "hand stiffness": "hand.grip.stiffness"},
     ),
     Effect(
         "actuator.bandwidth",
         "plant",
-        _CHAIN,
+        CHAIN,
         "motion",
         "the force follows the command with a lag",
         columns=("actuator",),
         states=1,
+        check=checks.check_actuator,
+        frees=_LIMITED,
     ),
     Effect(
         "friction",
         "plant",
-        ("haploop.plant.friction.law", *_RUBBING, *_CHAIN),
+        ("haploop.plant.friction.law", *RUBBING, *CHAIN),
         "motion",
         "dry friction brakes what slips and holds what has stopped",
         columns=("friction",),
+        linear=False,
+        batches=_goes_by_whole_steps,
+        check=checks.check_friction,
+        frees={"friction": ideal.left_out("friction")},
     ),
     Effect(
-        "accelerometer.bandwidth", "plant", _CHAIN, "motion", "the accelerometer feels through a low-pass", states=1
+        "accelerometer.bandwidth",
+        "plant",
+        CHAIN,
+        "motion",
+        "the accelerometer feels through a low-pass",
+        states=1,
+        used=accelerometer_is_used,
     ),
     Effect(
         "accelerometer.delay",
         "plant",
-        _CHAIN,
+        CHAIN,
         "measurement",
         "the accelerometer tells what it felt earlier",
         states=lambda scene: round(scene["accelerometer"]["delay"] * scene["clock"]["plant_rate"]),
+        used=accelerometer_is_used,
     ),
     Effect(
-        "noise", "plant", _plant("sensing.noise", *_NOISY), "measurement", "noise is added to the position", states=1
+        "noise",
+        "plant",
+        _plant("sensing.noise", *NOISY),
+        "measurement",
+        "noise is added to the position",
+        states=1,
+        left_out=("noise",),
+        frees={"noise": ideal.left_out("noise")},
     ),
-    Effect("encoder", "plant", (), "measurement", "the position is rounded to whole counts"),
+    Effect(
+        "encoder",
+        "plant",
+        (),
+        "measurement",
+        "the position is rounded to whole counts",
+        left_out=("encoder",),
+        frees={"quantisation": ideal.unrounded},
+    ),
     Effect(
         "accelerometer",
         "plant",
-        _plant("sensing.accelerometer", *_NOISY, *_COUNTED),
+        _OF_ACCELEROMETER,
         "measurement",
         "bias, noise and resolution make the reading of the acceleration",
         states=_noise_memory,
+        left_out=("accelerometer.bias", "accelerometer.noise_density", "accelerometer.resolution"),
+        used=accelerometer_is_used,
+        check=checks.check_accelerometer,
+        note=checks.note_accelerometer,
+        frees={"noise": ideal.noiseless},
     ),
     Effect(
         "accelerometer.range",
         "plant",
-        _plant("sensing.accelerometer", *_NOISY, *_COUNTED),
+        _OF_ACCELEROMETER,
         "measurement",
         "the reading is cut off beyond the range",
         counts=("accelerometer.clipped_ticks",),
+        left_out=("accelerometer.range",),
+        used=accelerometer_is_used,
     ),
-    Effect(
-        "velocity.estimator",
-        "controller",
-        _controller("estimators.window"),
-        "estimate",
-        "v is a difference over a window",
-        value="window",
-        states=lambda scene: scene["velocity"]["ticks"],
-    ),
-    Effect(
-        "velocity.estimator",
-        "controller",
-        _controller("estimators.foaw"),
-        "estimate",
+    _estimator("velocity", "window", "window", "v is a difference over a window", _ticks("velocity")),
+    _estimator(
+        "velocity",
+        "foaw",
+        "foaw",
         "v is the slope over the longest window that fits",
-        value="foaw",
-        states=lambda scene: scene["velocity"]["ticks"],
+        _ticks("velocity"),
+        linear=False,
     ),
-    Effect(
-        "velocity.estimator",
-        "controller",
-        _controller("estimators.kalman"),
-        "estimate",
-        "v is that of a Kalman filter of position, velocity and acceleration",
-        value="kalman",
-        states=3,
+    _estimator(
+        "velocity", "kalman", "kalman", "v is that of a Kalman filter of position, velocity and acceleration", 3
     ),
     Effect("velocity.cutoff", "controller", (), "estimate", "v is low-passed", states=1),
     Effect("acceleration.source", "controller", (), "estimate", "a is read, not estimated", value="accelerometer"),
     Effect("acceleration.source", "controller", (), "estimate", "a is that of the Kalman filter", value="kalman"),
-    Effect(
-        "acceleration.estimator",
-        "controller",
-        _controller("estimators.window"),
-        "estimate",
-        "a is a difference of v over a window",
-        value="window",
-        states=lambda scene: scene["acceleration"]["ticks"],
-    ),
-    Effect(
-        "acceleration.estimator",
-        "controller",
-        _controller("estimators.foaw"),
-        "estimate",
+    _estimator("acceleration", "window", "window", "a is a difference of v over a window", _ticks("acceleration")),
+    _estimator(
+        "acceleration",
+        "foaw",
+        "foaw",
         "a is the slope of v over the longest window that fits",
-        value="foaw",
-        states=lambda scene: scene["acceleration"]["ticks"],
+        _ticks("acceleration"),
+        linear=False,
     ),
     Effect("acceleration.cutoff", "controller", (), "estimate", "a is low-passed", states=1),
     Effect(
         "jitter",
         "plant",
-        _plant("line.jitter", *_LINE),
+        _plant("line.jitter", *LINE),
         "line",
         "each command is delayed by a random number of plant steps; one overtaken is dropped",
-        counts=("lost.commands_dropped", "lost.commands_lost"),
+        counts=_LINE_COUNTS,
+        linear=False,
+        batches=False,
+        check=checks.check_jitter,
+        frees={"jitter and loss": ideal.left_out("jitter")},
     ),
     Effect(
         "loss",
         "plant",
-        _plant("line.loss", *_LINE),
+        _plant("line.loss", *LINE),
         "line",
         "commands are lost at random; the device holds the last one",
-        counts=("lost.commands_dropped", "lost.commands_lost"),
+        counts=_LINE_COUNTS,
+        linear=False,
+        batches=False,
+        frees={"jitter and loss": ideal.left_out("loss")},
     ),
     Effect(
         "actuator.resolution",
         "plant",
-        _plant("line.actuator", *_COUNTED),
+        _plant("line.actuator", *COUNTED),
         "actuation",
         "the force is rounded to whole steps",
+        left_out=("actuator.resolution",),
+        frees=_LIMITED,
     ),
     Effect(
         "actuator.saturation",
         "plant",
-        _plant("line.actuator", *_COUNTED),
+        _plant("line.actuator", *COUNTED),
         "actuation",
         "the force is cut off beyond what the motor gives",
         counts=("actuator.saturated_commands",),
+        left_out=("actuator.saturation",),
+        frees=_LIMITED,
     ),
 )
+
+
+@cache
+def all_effects() -> tuple[Effect, ...]:
+    """Returns the effects of the table and, after them, those of other packages."""
+    return *EFFECTS, *(entry.load() for entry in entry_points(group=_GROUP))
+
+
+@cache
+def alone_perhaps() -> tuple[Effect, ...]:
+    """Returns the effects with which a scene cannot always be one of many that run as one."""
+    return tuple(effect for effect in all_effects() if effect.batches is not True)
+
+
+def effects_of(scene: Resolved) -> tuple[Effect, ...]:
+    """Returns the effects that a resolved scene simulates."""
+    return tuple(effect for effect in all_effects() if effect.is_in(scene))
+
+
+def notes(scene: Resolved) -> list[str]:
+    """Returns what is in order in a resolved scene, but may not be what was meant; one sentence each."""
+    return [note for effect in all_effects() if effect.is_named(scene) for note in effect.note(scene)]

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from typing import Any
 
 from haploop.controller.recorder import MOTION_COLUMNS
-from haploop.launch.plan.effects import EFFECTS, Effect, Stage, at
+from haploop.launch.plan.effect import Effect, Stage, at
+from haploop.launch.plan.effects import all_effects, effects_of
 from haploop.plant.chain.chain import Chain
 from haploop.plant.choose import integrator_of, needs_chain
-from haploop.plant.sensing.encoder import accelerometer_is_used
 from haploop.protocol.ticks import Timebase
 
 
@@ -77,7 +77,7 @@ def plan(scene: dict[str, Any]) -> Plan:
         },
         counts=_once(count for effect in named for count in effect.counts),
         named=named,
-        absent=tuple(effect for effect in EFFECTS if effect not in named),
+        absent=tuple(effect for effect in all_effects() if effect not in named),
     )
 
 
@@ -92,16 +92,6 @@ def multiplications(scene: dict[str, Any]) -> int:
         moves = {"rk4": 4 * time.steps_per_tick, "dop853": 12}.get(integrator_of(scene), time.steps_per_tick)
         return moves * size * (size + 2)
     return (time.steps_per_tick + (2 if time.delay_steps % time.steps_per_tick else 1)) * size * (size + 1)
-
-
-def effects_of(scene: dict[str, Any]) -> tuple[Effect, ...]:
-    """The effects a resolved scene names; an accelerometer that nothing reads is none."""
-    is_read = accelerometer_is_used(scene)
-    return tuple(
-        effect
-        for effect in EFFECTS
-        if effect.is_named(scene) and (is_read or effect.key.partition(".")[0] != "accelerometer")
-    )
 
 
 def _memory(scene: dict[str, Any], named: tuple[Effect, ...]) -> dict[str, int]:

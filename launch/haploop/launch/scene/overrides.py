@@ -18,13 +18,13 @@ def lay_overrides(layers: Layers, overrides: Iterable[str]) -> None:
     lists that are absent are made.
     """
     for text in overrides:
-        name, equals, value = text.partition("=")
+        name, value = split_assignment(text) or ("", None)
         path = key_path(name)
-        if not equals or not path:
+        if not path:
             expected = "It must read KEY=VALUE with a dotted key, such as dissipation.0.mass=0.02."
             layers.mistakes.append(Mistake(COMMAND_LINE, text, "cannot be read", expected))
-        elif complaint := lay_value(layers, path, _value(value)):
-            layers.mistakes.append(Mistake(COMMAND_LINE, name.strip(), "cannot be set", complaint))
+        elif complaint := lay_value(layers, path, value):
+            layers.mistakes.append(Mistake(COMMAND_LINE, name, "cannot be set", complaint))
 
 
 def lay_value(layers: Layers, path: Sequence[str], value: Any) -> str | None:
@@ -70,10 +70,13 @@ def key_path(name: str) -> tuple[str, ...]:
     return tuple(path)
 
 
-def _value(text: str) -> Any:
-    """A TOML value where the text is one, and the text itself otherwise."""
+def split_assignment(text: str) -> tuple[str, Any] | None:
+    """Splits ``KEY=VALUE``; the value is TOML where the text is, and the text itself otherwise. None without a key."""
+    name, equals, value = text.partition("=")
+    if not equals or not name.strip():
+        return None
     try:
-        table = tomllib.loads(f"value = {text}")
+        table = tomllib.loads(f"value = {value}")
     except ValueError:
-        return text.strip()
-    return table["value"] if len(table) == 1 else text.strip()
+        return name.strip(), value.strip()
+    return name.strip(), table["value"] if len(table) == 1 else value.strip()

@@ -1,4 +1,4 @@
-"""What a dissipation element is: declared parameters and one method from motion to force."""
+"""Dissipation elements: declared parameters and one method from motion to force."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ class ElementError(Exception):
 
 
 class Motion:
-    """What the controller knows of the device at tick k; one object, renewed each tick, read only for elements.
+    """Motion of the device at tick k as the controller knows it; renewed each tick, read only for elements.
 
     Attributes:
         x: measured position x_m[k], m.
@@ -22,17 +22,25 @@ class Motion:
         a: estimated or measured acceleration a[k], m/s^2.
         a_before: a[k - 1], m/s^2 (0 at the first tick).
         contact: whether x is strictly inside the wall.
-        into_wall: direction that leads into the wall, +1.0 or -1.0 (0.0 in a scene without a wall).
+        inward: direction that leads into the wall, +1.0 or -1.0 (0.0 in a scene without a wall).
         period_s: the control period T.
     """
 
-    __slots__ = ("a", "a_before", "contact", "into_wall", "period_s", "v", "x")
+    __slots__ = ("a", "a_before", "contact", "inward", "period_s", "v", "x")
 
-    def __init__(self, period_s: float, into_wall: float) -> None:
-        self.x = self.v = self.a = self.a_before = 0.0
-        self.contact = False
-        self.into_wall = into_wall
+    def __init__(self, period_s: float, inward: float) -> None:
+        self.x: Any = 0.0
+        self.v: Any = 0.0
+        self.a: Any = 0.0
+        self.a_before: Any = 0.0
+        self.contact: Any = False
+        self.inward = inward
         self.period_s = period_s
+
+    @property
+    def into_wall(self) -> float:
+        """``inward`` by its name in plugins written before."""
+        return self.inward
 
 
 @dataclass_transform(kw_only_default=True)
@@ -40,16 +48,22 @@ class Element(ABC):
     """Base of every dissipation element.
 
     A subclass names its ``kind``, declares each parameter as ``name: Annotated[float, Quantity(unit, bounds)]`` and
-    writes ``force``. It becomes a dataclass by itself. State across ticks goes into attributes set in
-    ``__post_init__``: a swap makes a new object, so state is fresh after it. ``force`` is called at every tick,
-    in contact or not, and is written with arithmetic and ``where`` so that it serves floats and arrays alike.
+    writes ``force``, with arithmetic and ``where`` so that it serves floats and arrays alike. It becomes a dataclass by
+    itself. ``force`` is called at every tick, in contact or not.
+
+    An element that remembers declares its memory at the first tick as ``memory``, a number or a NamedTuple of numbers;
+    ``force(self, motion, memory)`` then returns the force and the memory of the next tick. One that keeps attributes of
+    its own, set in ``__post_init__``, works too, but one loop at a time: it has no part in batches. A swap makes a new
+    object, so either is fresh after it.
 
     Attributes:
+        memory: the declared memory at the first tick; None where ``force`` depends on the motion alone.
         linear: whether the force is a linear function of the motion, past ticks included; a loop of such elements
             has an exact limit of stability.
     """
 
     kind: ClassVar[str]
+    memory: ClassVar[Any] = None
     linear: ClassVar[bool] = False
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
@@ -57,16 +71,16 @@ class Element(ABC):
         dataclasses.dataclass(kw_only=True, eq=False)(cls)
 
     @abstractmethod
-    def force(self, motion: Motion) -> Any:
-        """Force of the element on the device at this tick, N, positive along +x."""
+    def force(self, *args: Any, **kwargs: Any) -> Any:
+        """Force of the element on the device at this tick, N, positive along +x, and the memory where it has one."""
 
     def values(self) -> dict[str, float]:
-        """The parameters as they are now."""
+        """Returns the parameters as they are now."""
         return {name: getattr(self, name) for name in self.__dataclass_fields__}  # pyright: ignore[reportAttributeAccessIssue]
 
     @classmethod
     def parameters(cls) -> dict[str, tuple[Quantity, Any]]:
-        """Name -> (quantity, default or ``dataclasses.MISSING``) of every declared parameter.
+        """Returns name -> (quantity, default or ``dataclasses.MISSING``) of every declared parameter.
 
         Raises:
             TypeError: a parameter is not declared as ``Annotated[float, Quantity(...)]``.

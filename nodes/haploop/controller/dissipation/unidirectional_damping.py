@@ -14,4 +14,4 @@ class UnidirectionalDamping(Element):
     damping: Annotated[float, Quantity("N s/m", at_least=0)]
 
     def force(self, motion: Motion):
-        return where(motion.v * motion.into_wall > 0.0, -self.damping * motion.v, 0.0)
+        return where(motion.v * motion.inward > 0.0, -self.damping * motion.v, 0.0)

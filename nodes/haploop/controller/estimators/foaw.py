@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections import deque
 from collections.abc import Iterator
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, ClassVar
 
-from haploop.controller.estimators.choose import Estimator, Sample
+from haploop.controller.estimators.base import Estimator, Sample
 from haploop.protocol.arrays import where
 
 # A deviation of just the bound, which quantised signals make often, counts as within it however it is rounded.
 _ROUNDING = 1e-6
 
 
-def end_fit(ticks: int, bound: float, period_s: float, _first: Any) -> Estimator:
+@dataclass(frozen=True)
+class EndFit(Estimator):
     """(u[k] - u[k-i]) / (i T), i <= ``ticks`` the longest window that fits (Janabi-Sharifi et al. 2000, end-fit-FOAW).
 
     Window i fits when the line through its two ends passes within ``bound`` of every sample between:
@@ -25,50 +26,73 @@ def end_fit(ticks: int, bound: float, period_s: float, _first: Any) -> Estimator
     Delays by i T / 2, white noise sigma becomes sqrt(2) sigma / (i T), each with the i of the moment. Where the rate
     steps, noise apart, by more than 2 bound / T the window is 1 in the tick after, 2 in the next, and grows with the
     new rate. A bound below the noise leaves little but window 1.
-    """
-    recent: deque[Any] = deque(maxlen=ticks)
 
-    def estimate(u: Any, _sample: Sample) -> Any:
-        rate = u - u
-        for i, rise, fits in _windows(u, recent, bound):
+    Memory: the last n inputs, the newest first; no number (NaN) in place of those that never were, so that no window
+    that holds one fits.
+    """
+
+    name: ClassVar[str] = "foaw"
+    does: ClassVar[str] = "the slope over the longest window that fits"
+    needs: ClassVar[tuple[str, ...]] = ("ticks",)
+    takes: ClassVar[tuple[str, ...]] = ("bound", "fit")
+    linear: ClassVar[bool] = False
+    ticks: int
+    bound: Any
+    period_s: float
+
+    @classmethod
+    def from_scene(cls, scene: dict[str, Any], of: str, period_s: float) -> EndFit:
+        """Makes the one that the scene's table asks for; a velocity's bound is one count unless it is given."""
+        table = scene[of]
+        count = scene.get("encoder", {}).get("resolution", 0.0) if of == "velocity" else 0.0
+        return _FITS[table.get("fit", "end")](table["ticks"], table.get("bound", count), period_s)
+
+    def start(self, u: Any, sample: Sample) -> tuple[Any, ...]:
+        """Returns a memory without a number."""
+        return (u * math.nan,) * self.ticks
+
+    def step(self, memory: tuple[Any, ...], u: Any, sample: Sample) -> tuple[tuple[Any, ...], Any]:
+        """Returns the memory with u, and the rate over the longest window that fits."""
+        recent = (u,) + memory[:-1]  # noqa: RUF005 - in two thirds of the time
+        return recent, self.rate(u, memory)
+
+    def rate(self, u: Any, recent: tuple[Any, ...]) -> Any:
+        """Returns the slope from end to end of the longest window that fits."""
+        rate, period_s = u - u, self.period_s
+        for i, rise, fits in _windows(u, recent, self.bound):
             rate = where(fits, rise / (i * period_s), rate)
-        recent.appendleft(u)
         return rate
 
-    return estimate
 
-
-def best_fit(ticks: int, bound: float, period_s: float, _first: Any) -> Estimator:
-    """The slope of least squares over the window that ``end_fit`` finds (Janabi-Sharifi et al. 2000, best-fit-FOAW).
+@dataclass(frozen=True)
+class BestFit(EndFit):
+    """The slope of least squares over the window that ``EndFit`` finds (Janabi-Sharifi et al. 2000, best-fit-FOAW).
 
     With r[j] = u[k] - u[k-j]: 6 (sum of (2 j - i) r[j], j = 1..i) / (T i (i + 1) (i + 2)). Delays by i T / 2 as the
     end-fit does; white noise sigma becomes sqrt(12 / (i (i + 1) (i + 2))) sigma / T, less than there from i = 3 on.
     (The authors' best fit also chooses its window by its own line; here one window serves both.)
     """
-    recent: deque[Any] = deque(maxlen=ticks)
 
-    def estimate(u: Any, _sample: Sample) -> Any:
+    def rate(self, u: Any, recent: tuple[Any, ...]) -> Any:
+        """Returns the slope of least squares over the longest window that fits."""
         rate = total = moment = u - u
-        for i, rise, fits in _windows(u, recent, bound):
+        for i, rise, fits in _windows(u, recent, self.bound):
             total = total + rise
             moment = moment + i * rise
-            slope = 6.0 * (2.0 * moment - i * total) / (i * (i + 1) * (i + 2) * period_s)
+            slope = 6.0 * (2.0 * moment - i * total) / (i * (i + 1) * (i + 2) * self.period_s)
             rate = where(fits, slope, rate)
-        recent.appendleft(u)
         return rate
 
-    return estimate
+
+_FITS = {"end": EndFit, "best": BestFit}
 
 
-FITS = {"end": end_fit, "best": best_fit}
-
-
-def _windows(u: Any, recent: deque[Any], bound: float) -> Iterator[tuple[int, Any, Any]]:
-    """Every window i = 1, 2, ... with its rise u[k] - u[k-i], and whether its line fits.
+def _windows(u: Any, recent: tuple[Any, ...], bound: Any) -> Iterator[tuple[int, Any, Any]]:
+    """Yields every window i = 1, 2, ... with its rise u[k] - u[k-i], and whether its line fits.
 
     A line through u[k] passes within the bound of u[k-j] when its rise per tick is within (u[k] - u[k-j] +- bound) / j,
     so each sample narrows what the longer windows may be. All windows are tried: a longer one may fit where a shorter
-    one does not, and loops evaluated as arrays each have their own longest.
+    one does not, and the members of a batch each have their own longest.
     """
     reach = bound * (1.0 + _ROUNDING)
     least, most = -math.inf, math.inf

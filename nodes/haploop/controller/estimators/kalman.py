@@ -20,82 +20,90 @@ but as stable. An accelerometer's bias, delay and bandwidth are not in the model
 from __future__ import annotations
 
 import math
-from functools import partial
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
 
-from haploop.controller.estimators.choose import Sample
+from haploop.controller.estimators.base import Estimator, Sample
 from haploop.protocol.arrays import each
 
 Array = npt.NDArray[np.float64]
+Memory = tuple[Any, Any, Any]
 # Decimals of a gain times the least surprise it meets: LAPACK's last bits, which differ between machines, lie beyond.
 _DECIMALS = 12
 
 
-class Kalman:
-    """Estimates from positions alone; called with x_m[k] it gives v[k], and ``acceleration`` then gives a[k].
+@dataclass(frozen=True)
+class Kalman(Estimator):
+    """The velocity from positions alone; ``acceleration`` gives the a found with it.
 
     The first sample is where the prediction starts, at rest, so that v[0] = a[0] = 0.
 
-    Args:
+    Memory: (x, v as the model predicts them at the next tick; a, which it holds until then).
+
+    Attributes:
         gain: g_x (1), g_v (1/s) and g_a (1/s^2) of the position, shape (3, 1): from prediction to estimate.
-        period_s: the control period T.
-        first: the first sample.
+        period_s, half_s2: the control period T, and T^2 / 2.
     """
 
-    def __init__(self, gain: Any, period_s: float, first: Sample) -> None:
-        self._gain = gain
-        self._period_s, self._half_s2 = period_s, period_s * period_s / 2.0
-        self._x, self._v, self.a = first[0], 0.0 * first[0], 0.0 * first[0]
+    name: ClassVar[str] = "kalman"
+    does: ClassVar[str] = "that of a Kalman filter of position, velocity and acceleration"
+    needs: ClassVar[tuple[str, ...]] = ("jerk_density",)
+    takes: ClassVar[tuple[str, ...]] = ("measurement_noise", "accelerometer", "accelerometer_noise")
+    gain: tuple[tuple[Any, ...], ...]
+    period_s: float
+    half_s2: float
 
-    def __call__(self, x: Any, _sample: Sample) -> Any:
-        (g_x,), (g_v,), (g_a,) = self._gain
-        surprise = x - self._x
-        return self._predict(self._x + g_x * surprise, self._v + g_v * surprise, self.a + g_a * surprise)
-
-    def _predict(self, x: Any, v: Any, a: Any) -> Any:
-        """Remember what the model makes of this tick's estimate by the next tick; returns the velocity of this one."""
-        self._x = x + self._period_s * v + self._half_s2 * a
-        self._v = v + self._period_s * a
-        self.a = a
-        return v
-
-    def acceleration(self, _v: Any, _sample: Sample) -> Any:
-        """a[k] of the tick whose velocity was asked last; the model holds it until the next."""
-        return self.a
-
-
-class FusedKalman(Kalman):
-    """Estimates from positions and the accelerometer's readings; a starts at the first reading.
-
-    Args:
-        gain: of the position, and of the reading in s^2, s and 1, shape (3, 2).
-        period_s: the control period T.
-        first: the first sample.
-    """
-
-    def __init__(self, gain: Any, period_s: float, first: Sample) -> None:
-        super().__init__(gain, period_s, first)
-        self.a = first[1]
-
-    def __call__(self, x: Any, sample: Sample) -> Any:
-        (g_x, h_x), (g_v, h_v), (g_a, h_a) = self._gain
-        surprise, surprise_a = x - self._x, sample[1] - self.a
-        return self._predict(
-            self._x + g_x * surprise + h_x * surprise_a,
-            self._v + g_v * surprise + h_v * surprise_a,
-            self.a + g_a * surprise + h_a * surprise_a,
+    @classmethod
+    def from_scene(cls, scene: dict[str, Any], of: str, period_s: float) -> Kalman:
+        """Makes the filter of a scene's ``[velocity]`` table, fused with the accelerometer where that is asked."""
+        noises = assumed_noises(scene, period_s).values()
+        density = scene[of]["jerk_density"]
+        gain = each(lambda jerk, *noises: steady_state(jerk, list(noises), period_s)[0], density, *noises)
+        entries = gain.tolist() if gain.ndim == 2 else gain
+        return (FusedKalman if len(noises) > 1 else Kalman)(
+            tuple(map(tuple, entries)), period_s, period_s * period_s / 2.0
         )
 
+    def start(self, u: Any, sample: Sample) -> Memory:
+        """Returns the first position, at rest."""
+        return u, 0.0 * u, 0.0 * u
 
-def kalman_of(scene: dict[str, Any], period_s: float) -> partial[Kalman]:
-    """The filter of a scene's ``[velocity]`` table, to be started with the first sample."""
-    table, noises = scene["velocity"], assumed_noises(scene, period_s).values()
-    gain = each(lambda jerk, *noises: steady_state(jerk, list(noises), period_s)[0], table["jerk_density"], *noises)
-    rows = gain.tolist() if gain.ndim == 2 else [list(row) for row in gain]
-    return partial(FusedKalman if len(noises) > 1 else Kalman, rows, period_s)
+    def step(self, memory: Memory, u: Any, sample: Sample) -> tuple[Memory, Any]:
+        """Returns what is predicted of the next tick, and v[k]."""
+        (g_x,), (g_v,), (g_a,) = self.gain
+        x, v, a = memory
+        surprise = u - x
+        v, a = v + g_v * surprise, a + g_a * surprise
+        return (x + g_x * surprise + self.period_s * v + self.half_s2 * a, v + self.period_s * a, a), v
+
+    def acceleration(self, memory: Memory) -> Any:
+        """Returns a[k]; the model holds it until the next tick."""
+        return memory[2]
+
+
+@dataclass(frozen=True)
+class FusedKalman(Kalman):
+    """The velocity from positions and the accelerometer's readings; a starts at the first reading.
+
+    Attributes:
+        gain: of the position, and of the reading in s^2, s and 1, shape (3, 2).
+    """
+
+    def start(self, u: Any, sample: Sample) -> Memory:
+        """Returns the first position, at rest under the first reading."""
+        return u, 0.0 * u, sample[1]
+
+    def step(self, memory: Memory, u: Any, sample: Sample) -> tuple[Memory, Any]:
+        """Returns what is predicted of the next tick, and v[k]."""
+        (g_x, h_x), (g_v, h_v), (g_a, h_a) = self.gain
+        x, v, a = memory
+        surprise, surprise_a = u - x, sample[1] - a
+        v, a = v + g_v * surprise + h_v * surprise_a, a + g_a * surprise + h_a * surprise_a
+        x = x + g_x * surprise + h_x * surprise_a
+        return (x + self.period_s * v + self.half_s2 * a, v + self.period_s * a, a), v
 
 
 def assumed_noises(scene: dict[str, Any], period_s: float) -> dict[str, float]:

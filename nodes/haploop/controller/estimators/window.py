@@ -2,23 +2,42 @@
 
 from __future__ import annotations
 
-from collections import deque
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, ClassVar
 
-from haploop.controller.estimators.choose import Estimator, Sample
+from haploop.controller.estimators.base import Estimator, Sample
 
 
-def window_difference(ticks: int, period_s: float, _first: Any) -> Estimator:
+@dataclass(frozen=True)
+class WindowDifference(Estimator):
     """(u[k] - u[k-w]) / (w T) with w = ``ticks``, over the ticks there are as long as they are fewer; 0 at the first.
 
     Exact for a constant rate. Delays slow signals by w T / 2, as every moving average of w values does. White noise of
     standard deviation sigma in u becomes sqrt(2) sigma / (w T), and a rounding to q steps of q / (w T)
     (Brown, Schneider, Mulligan 1992).
+
+    Memory: (the last w inputs, the newest first, the first input in place of those that never were; ticks since the
+    first, at most w).
     """
-    recent: deque[Any] = deque(maxlen=ticks + 1)
 
-    def estimate(u: Any, _sample: Sample) -> Any:
-        recent.append(u)
-        return (u - recent[0]) / ((len(recent) - 1 or 1) * period_s)
+    name: ClassVar[str] = "window"
+    does: ClassVar[str] = "a difference over a window"
+    needs: ClassVar[tuple[str, ...]] = ("ticks",)
+    ticks: int
+    period_s: float
 
-    return estimate
+    @classmethod
+    def from_scene(cls, scene: dict[str, Any], of: str, period_s: float) -> WindowDifference:
+        """Makes the one of ``ticks`` in the scene's table."""
+        return cls(scene[of]["ticks"], period_s)
+
+    def start(self, u: Any, sample: Sample) -> tuple[tuple[Any, ...], int]:
+        """Returns a memory full of the first input."""
+        return (u,) * self.ticks, 0
+
+    def step(self, memory: tuple[tuple[Any, ...], Any], u: Any, sample: Sample) -> tuple[Any, Any]:
+        """Returns the memory with u, and the rate from the oldest to u."""
+        recent, age = memory
+        rate = (u - recent[-1]) / ((age + (age < 1)) * self.period_s)
+        recent = (u,) + recent[:-1]  # noqa: RUF005 - in two thirds of the time
+        return (recent, age + (age < self.ticks)), rate

@@ -1,4 +1,4 @@
-"""The whole advice on a device or a scene: what is searched, what comes out, and as data for programs."""
+"""The whole advice on a device or a scene: the searches, their results, and the results as data."""
 
 from __future__ import annotations
 
@@ -7,20 +7,19 @@ from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
-from haploop.tools.advise.buzz import STEPS_BEYOND, Buzz, Without, why
-from haploop.tools.advise.limits.gains import Gains, Search
-from haploop.tools.advise.limits.largest import Limit
-from haploop.tools.advise.limits.margins import Margins, Safe
-from haploop.tools.advise.limits.tasks import Tasks, tasks, with_wall
-from haploop.tools.advise.limits.variations import DELAY, SHARE, delay_s, quantities
-from haploop.tools.advise.sentences import buzz_sentences, gain_sentences
+from haploop.tools.advise.buzz import STEPS_BEYOND, Ablation, Buzz, explain_buzz
+from haploop.tools.advise.gains import Gains, Search
+from haploop.tools.advise.largest import Limit
+from haploop.tools.advise.margins import MarginSearch, Recommendation
+from haploop.tools.advise.tasks import Tasks, make_tasks, with_wall
+from haploop.tools.advise.variations import DELAY, SHARE, delay_s, uncertain_quantities
 from haploop.tools.linear.bounds import Bound, bounds_of
 from haploop.tools.linear.linearity import is_linear
 from haploop.tools.linear.one_tick import NeverStable, OneTickMap
 
 if TYPE_CHECKING:
     from haploop.controller.dissipation import Element
-    from haploop.tools.advise.limits.steady import Judge
+    from haploop.tools.advise.judge import Judge
     from haploop.tools.advise.subject import Subject
 
 Scene = dict[str, Any]
@@ -30,20 +29,20 @@ _LONGER = (1, 4, 16, 64)
 
 @dataclass(frozen=True)
 class Advice:
-    """What came of it all.
+    """The whole advice.
 
     Attributes:
         name: of the device or scene.
         notes: what was assumed.
-        tasks: that every loop was judged by.
+        tasks: by which every loop was judged.
         tolerance: relative, of the limits.
-        uncertain: what was taken a fifth more or less.
+        uncertain: the quantities that were taken a fifth more or less.
         gains: of each family.
         exact_N_m: of each family the exact limit, rho(M) = 1, None where the loop is not linear.
         bounds: of each family the analytic bounds.
-        safe: what to use.
+        safe: the gains to use.
         scene: that shows it, steady by its own verdict; None where nothing is safe.
-        buzz: why it buzzes; None where nothing does.
+        buzz: the causes of buzzing; None where nothing buzzes.
         runs: how many were run.
     """
 
@@ -55,7 +54,7 @@ class Advice:
     gains: list[Gains]
     exact_N_m: list[float | None]
     bounds: list[list[Bound]]
-    safe: Safe
+    safe: Recommendation
     scene: Scene | None
     buzz: Buzz | None
     runs: int
@@ -67,18 +66,18 @@ def advice(
     judge: Judge,
     stage: Callable[[str], object] = lambda name: None,
 ) -> Advice:
-    """Search, compare, and look into what buzzes."""
-    asked, notes = tasks(subject.scene, subject.has_task), list(subject.notes)
+    """Searches gains and margins, and explains what buzzes."""
+    asked, notes = make_tasks(subject.scene, subject.has_task), list(subject.notes)
     if subject.has_task and len(asked.scenes) == 1:
-        [itself] = judge.judged([subject.scene])
+        [itself] = judge.judge([subject.scene])
         if itself.verdict == "no-contact":
-            asked = tasks(subject.scene, False)
+            asked = make_tasks(subject.scene, False)
     if subject.has_task and len(asked.scenes) > 1:
         notes.append("The scene's own task does not end pressed to the wall; a tap and a press take its place.")
     scene = asked.first
     search = Search(asked, judge, stage)
     gains = search.families()
-    margins = Margins(search)
+    margins = MarginSearch(search)
     margins.uncertain(gains)
     safe = margins.safe(gains)
     placed = [_placed(scene, found) for found in gains]
@@ -88,7 +87,7 @@ def advice(
         notes=tuple(notes),
         tasks=asked,
         tolerance=search.tolerance,
-        uncertain=tuple(quantities(scene)),
+        uncertain=tuple(uncertain_quantities(scene)),
         gains=gains,
         exact_N_m=[_exact(loop, kinds) for loop in placed],
         bounds=[bounds_of(loop, kinds) for loop in placed],
@@ -104,9 +103,9 @@ def _placed(scene: Scene, found: Gains) -> Scene:
 
 
 def _rounding(scene: Scene) -> list[str]:
-    """Says so where a fifth of the delay is no whole number of plant steps."""
+    """Returns a note where a fifth of the delay is no whole number of plant steps."""
     nominal = scene["clock"]["round_trip_delay"]
-    if DELAY not in quantities(scene):
+    if DELAY not in uncertain_quantities(scene):
         return []
     less, more = delay_s(scene, 1.0 - SHARE), delay_s(scene, 1.0 + SHARE)
     if math.isclose(less, nominal * (1.0 - SHARE)) and math.isclose(more, nominal * (1.0 + SHARE)):
@@ -123,8 +122,8 @@ def _exact(scene: Scene, kinds: dict[str, type[Element]]) -> float | None:
         return 0.0
 
 
-def _shown(subject: Subject, asked: Tasks, safe: Safe, judge: Judge) -> Scene | None:
-    """The first task with the advised gains, as long as its swings take to die away."""
+def _shown(subject: Subject, asked: Tasks, safe: Recommendation, judge: Judge) -> Scene | None:
+    """Returns the first task with the advised gains, as long as its swings take to die away."""
     if not safe.stiffness_N_m:
         return None
     best = safe.gains
@@ -132,32 +131,33 @@ def _shown(subject: Subject, asked: Tasks, safe: Safe, judge: Judge) -> Scene | 
     scene["title"] = f"{subject.name}: {safe.stiffness_N_m / 1e3:g} N/mm with {best.family.phrase(best.safe_values)}"
     for factor in _LONGER:
         longer = {**scene, "duration": scene["duration"] * factor}
-        [judgement] = judge.judged([longer])
+        [judgement] = judge.judge([longer])
         if judgement.verdict == "steady" and judgement.summary["duration_s"] == longer["duration"]:
             return {**longer, "run": subject.scene["run"]}
     return {**scene, "run": subject.scene["run"]}
 
 
-def _buzz(subject: Subject, asked: Tasks, safe: Safe, judge: Judge, stage: Callable[[str], object]) -> Buzz | None:
-    """Of a scene, the scene itself; of a preset, what is advised with a wall just too stiff."""
+def _buzz(
+    subject: Subject, asked: Tasks, safe: Recommendation, judge: Judge, stage: Callable[[str], object]
+) -> Buzz | None:
+    """Explains the scene itself; of a preset, the advised gains with a wall just too stiff."""
     if subject.has_task and "wall" in subject.scene and len(asked.scenes) == 1:
-        return why(subject.scene, judge, stage)
+        return explain_buzz(subject.scene, judge, stage)
     best = safe.gains
     limit = best.tried[best.safe_values].not_steady_N_m if best.safe_values in best.tried else best.limit.not_steady_N_m
     if not math.isfinite(limit):
         return None
     elements = best.family.elements(best.safe_values)
     for factor in STEPS_BEYOND:
-        scenes = asked.of(factor * limit, elements)
-        for scene, judgement in zip(scenes, judge.judged(scenes), strict=True):
+        scenes = asked.make_runs(factor * limit, elements)
+        for scene, judgement in zip(scenes, judge.judge(scenes), strict=True):
             if not judgement.steady:
-                return why(scene, judge, stage)
+                return explain_buzz(scene, judge, stage)
     return None
 
 
-def as_data(found: Advice) -> dict[str, Any]:
-    """One JSON object."""
-    sentence, *more = gain_sentences(found)
+def as_data(found: Advice, advice_text: str, buzz_text: str) -> dict[str, Any]:
+    """Returns the advice as one JSON object; the two texts are put in as they are."""
     safe, best = found.safe, found.safe.gains
     return {
         "name": found.name,
@@ -179,8 +179,8 @@ def as_data(found: Advice) -> dict[str, Any]:
             "loops_tried": safe.corners,
             "nearest_instability": safe.nearest.words if safe.nearest else None,
         },
-        "advice": " ".join([sentence, *more]),
-        "why": _buzz_data(found.buzz) if found.buzz else None,
+        "advice": advice_text,
+        "why": _buzz_data(found.buzz, buzz_text) if found.buzz else None,
         "runs": found.runs,
     }
 
@@ -214,11 +214,11 @@ def _limit_data(limit: Limit) -> dict[str, Any]:
 
 
 def _ends_data(limit: Limit) -> dict[str, Any]:
-    """Of what was not the best, or not the worst, they are as far apart as it took to tell."""
+    """Returns both ends of a limit, as far apart as it took to tell it from the best, or the worst."""
     return {"stiffness_N_m": limit.stiffness_N_m, "not_steady_N_m": limit.not_steady_N_m}
 
 
-def _buzz_data(buzz: Buzz) -> dict[str, Any]:
+def _buzz_data(buzz: Buzz, text: str) -> dict[str, Any]:
     return {
         "title": buzz.scene["title"],
         "stiffness_N_m": buzz.stiffness_N_m,
@@ -230,11 +230,11 @@ def _buzz_data(buzz: Buzz) -> dict[str, Any]:
         "alone": [_without_data(without) for without in buzz.alone],
         "together": [_without_data(without) for without in buzz.together],
         "without_all": _without_data(buzz.all_off) if buzz.all_off else None,
-        "because": " ".join(buzz_sentences(buzz)),
+        "because": text,
     }
 
 
-def _without_data(without: Without) -> dict[str, Any]:
+def _without_data(without: Ablation) -> dict[str, Any]:
     return {
         "without": list(without.names),
         "instead": without.words,

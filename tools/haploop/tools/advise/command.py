@@ -1,4 +1,4 @@
-"""``haploop advise``: which wall a device can render safely, and why it buzzes beyond."""
+"""``haploop advise``: the stiffest wall that is safe, and the cause of buzzing beyond."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _STAGES = 9
 
 @dataclass(frozen=True)
 class Request:
-    """What is asked.
+    """The arguments of ``haploop advise``.
 
     Attributes:
         device: name of a preset, or a scene file.
@@ -44,36 +44,41 @@ class Request:
 
 
 def advise(request: Request, as_json: bool) -> None:
-    """Search, write what was found into the directory, print it."""
+    """Searches, writes the results into the directory and prints them."""
     from haploop.launch.output import make_output
     from haploop.launch.scene.elements import elements_of, try_out
     from haploop.tools.advise.advice import advice
-    from haploop.tools.advise.limits.steady import Judge
-    from haploop.tools.advise.subject import WrongAsk, subject
+    from haploop.tools.advise.judge import Judge
+    from haploop.tools.advise.subject import InvalidRequest, make_subject
 
     if request.workers is not None and request.workers < 1:
         leave(f"--workers must be at least 1, but {request.workers} was given.", WRONG_USE)
     with plain_errors():
         kinds = kinds_with(request.plugins)
         try:
-            asked = subject(request.device, request.hand, request.delay, request.estimator, request.overrides, kinds)
-        except WrongAsk as error:
+            asked = make_subject(
+                request.device, request.hand, request.delay, request.estimator, request.overrides, kinds
+            )
+        except InvalidRequest as error:
             leave(str(error), WRONG_USE)
         try_out(elements_of(asked.scene), kinds)
         print_notes(asked.scene)
         out = make_output(request.out, Path(f"advice-{asked.name}"))
         try:
-            with _progress() as (stage, told), Judge(kinds, request.plugins, request.workers, told) as judge:
+            with (
+                _progress() as (stage, on_progress),
+                Judge(kinds, request.plugins, request.workers, on_progress) as judge,
+            ):
                 found = advice(asked, kinds, judge, stage)
         except KeyboardInterrupt:
             if request.out is None:
                 out.rmdir()
             leave(f"Interrupted; nothing was written{f' to {out}' if request.out else ''}.", FAILED)
-    data = _written(found, out)
+    data = _write(found, out)
     if as_json:
         print_json(data)
     else:
-        from haploop.tools.advise.screen import report
+        from haploop.tools.advise.report import report
         from haploop.tools.render.terminal import console
 
         console().print(report(found))
@@ -81,16 +86,18 @@ def advise(request: Request, as_json: bool) -> None:
         print(path, file=sys.stderr)
 
 
-def _written(found: Advice, out: Path) -> dict:
-    """Write scene, figure and data; returns the data with the files in it."""
+def _write(found: Advice, out: Path) -> dict:
+    """Writes scene, figure and data; returns the data with the files in it."""
     from haploop.launch.scene.toml_writer import to_toml
     from haploop.logger.summary import finite
     from haploop.tools.advise.advice import as_data
-    from haploop.tools.advise.chart import draw
+    from haploop.tools.advise.figure import draw
+    from haploop.tools.advise.report import buzz_sentences, gain_sentences
     from haploop.tools.figure.data import FigureError
 
     files = {}
-    data = as_data(found)
+    because = " ".join(buzz_sentences(found.buzz)) if found.buzz else ""
+    data = as_data(found, " ".join(gain_sentences(found)), because)
     try:
         if found.scene:
             (out / SCENE).write_text(to_toml(found.scene), encoding="utf-8")
@@ -107,7 +114,7 @@ def _written(found: Advice, out: Path) -> dict:
 
 @contextlib.contextmanager
 def _progress() -> Iterator[tuple[Callable[[str], None], Callable[[int], None]]]:
-    """A bar of the stages on a terminal, with the runs so far; a line a stage elsewhere."""
+    """Shows a bar of the stages on a terminal, with the runs so far; a line a stage elsewhere."""
     from rich import progress
 
     from haploop.tools.render.terminal import console
@@ -128,7 +135,7 @@ def _progress() -> Iterator[tuple[Callable[[str], None], Callable[[int], None]]]
                 print(f"{name} ...", file=sys.stderr)
             bars.update(task, description=name, advance=1)
 
-        def told(runs: int) -> None:
+        def on_progress(runs: int) -> None:
             bars.update(task, runs=runs)
 
-        yield stage, told
+        yield stage, on_progress

@@ -1,4 +1,4 @@
-"""What is asked about: a device that comes with haploop, or a scene, with its hand, delay and estimator."""
+"""The subject of an advice: a device that comes with haploop, or a scene, with its hand, delay and estimator."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from haploop.launch.scene.file import resolved
 from haploop.launch.scene.layers import Layers, read_layers
 from haploop.launch.scene.mistakes import nearest
 from haploop.protocol.changes import at_work, changes_of
-from haploop.tools.advise.limits.tasks import MOST_DELAY_S
+from haploop.tools.advise.tasks import MOST_DELAY_S
 from haploop.tools.cost.grid import scenes_folder
 
 if TYPE_CHECKING:
@@ -29,8 +29,8 @@ ESTIMATORS: dict[str, dict[str, dict[str, Any]]] = {
 }
 
 
-class WrongAsk(ValueError):
-    """No such device, hand or estimator, or none that can be advised on; the message says what is allowed."""
+class InvalidRequest(ValueError):
+    """A device, hand or estimator that does not exist, or gets no advice; the message says what is allowed."""
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ class Subject:
     notes: tuple[str, ...]
 
 
-def subject(
+def make_subject(
     device: str,
     hand: str | None,
     delay: str | None,
@@ -58,10 +58,10 @@ def subject(
     overrides: Sequence[str],
     kinds: Mapping[str, type[Element]],
 ) -> Subject:
-    """The scene that the arguments of the command name.
+    """Makes the scene that the arguments of the command name.
 
     Raises:
-        WrongAsk: a name that is none.
+        InvalidRequest: a name that is none.
         SceneError: the scene cannot be run.
     """
     path, is_preset = _device(device)
@@ -81,24 +81,24 @@ def subject(
     scene = resolved(layers, overrides, kinds)
     _refuse_too_late(scene["clock"]["round_trip_delay"])
     if scene.get("event"):
-        scene = settled(scene)
+        scene = apply_events(scene)
         notes.append("What the scene's events change is taken as changed from the start.")
     return Subject(path.stem, scene, not is_preset, tuple(notes))
 
 
-def settled(scene: dict[str, Any]) -> dict[str, Any]:
+def apply_events(scene: dict[str, Any]) -> dict[str, Any]:
     """Returns the scene with its swaps and sets made from the start, and without events."""
     made = at_work(scene, changes_of([(0, event) for event in scene["event"]]))
     return {key: value for key, value in made.items() if key != "event" and value != []}
 
 
 def presets(folder: str) -> dict[str, Path]:
-    """The files of launch/devices, hands or scenes, by name."""
+    """Returns the files of launch/devices, hands or scenes, by name."""
     return {path.stem: path for path in sorted(scenes_folder().with_name(folder).glob("*.toml"))}
 
 
 def _device(name: str) -> tuple[Path, bool]:
-    """The file that a name means, and whether it is a device without a task."""
+    """Returns the file that a name means, and whether it is a device without a task."""
     path = Path(name)
     if path.suffix == ".toml" or path.exists():
         devices = {file.resolve() for file in presets("devices").values()}
@@ -106,11 +106,11 @@ def _device(name: str) -> tuple[Path, bool]:
     devices, scenes = presets("devices"), presets("scenes")
     if name in devices or name in scenes:
         return (devices | scenes)[name], name in devices
-    raise WrongAsk(_unknown("DEVICE", name, list(devices | scenes), "the path of a scene file"))
+    raise InvalidRequest(_unknown("DEVICE", name, list(devices | scenes), "the path of a scene file"))
 
 
 def _lay_hand(layers: Layers, name: str) -> None:
-    """Another hand in place of the one there is; the force of its muscles and its place stay."""
+    """Lays another hand in place of the one there is; the force of its muscles and its place stay."""
     before = layers.data.pop("hand", None)
     kept = {key: before[key] for key in ("force", "rest") if key in before} if isinstance(before, dict) else {}
     if name == "none":
@@ -120,17 +120,17 @@ def _lay_hand(layers: Layers, name: str) -> None:
     path, hands = Path(name), presets("hands")
     if path.suffix != ".toml":
         if name not in hands:
-            raise WrongAsk(_unknown("--hand", name, [*hands, "none"], "the path of a file with a [hand]"))
+            raise InvalidRequest(_unknown("--hand", name, [*hands, "none"], "the path of a file with a [hand]"))
         path = hands[name]
     tables = read_layers(path).data
     if not isinstance(tables.get("hand"), dict):
-        raise WrongAsk(f"--hand {name} holds no [hand] table.")
+        raise InvalidRequest(f"--hand {name} holds no [hand] table.")
     layers.lay({"hand": {**tables["hand"], **kept}}, str(path))
 
 
 def _lay_estimator(layers: Layers, name: str) -> None:
     if name not in ESTIMATORS:
-        raise WrongAsk(_unknown("--estimator", name, list(ESTIMATORS), ""))
+        raise InvalidRequest(_unknown("--estimator", name, list(ESTIMATORS), ""))
     for table in ("velocity", "acceleration"):
         if name != "accelerometer" or table == "acceleration":
             layers.data.pop(table, None)
@@ -146,7 +146,7 @@ def _number_or_text(given: str) -> float | str:
 
 def _refuse_too_late(delay_s: float) -> None:
     if delay_s > MOST_DELAY_S:
-        raise WrongAsk(
+        raise InvalidRequest(
             f"The round-trip delay is {delay_s:g} s; advice is given up to {MOST_DELAY_S:g} s. A number without a unit "
             f'is in seconds: write "{delay_s:g} ms" for milliseconds.'
         )

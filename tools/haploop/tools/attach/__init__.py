@@ -1,1 +1,1 @@
-"""Nodes that join a running loop."""
+"""Nodes that join a running simulation: a second logger, a live table, and a source for PlotJuggler."""

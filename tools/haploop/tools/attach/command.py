@@ -1,34 +1,84 @@
-"""``haploop attach``: join a running loop with a second logger, with a live table, or for PlotJuggler."""
+"""``haploop attach``: joins a running simulation with a second logger, a live table, or a node for PlotJuggler."""
 
 from __future__ import annotations
 
 import signal
+import sys
 from pathlib import Path
+from typing import Any
 
-from haploop.tools.cli.exit_codes import WRONG_USE, leave, plain_errors
+from haploop.launch.output import make_output, write_scene
+from haploop.launch.processes import run_directory
+from haploop.launch.processes.interrupts import interrupts
+from haploop.launch.processes.run_directory import LiveRun
+from haploop.logger.books.buffers import TelemetryGap
+from haploop.logger.node import LoggerNode
+from haploop.protocol.clock_client import Aborted, ClockClient, Refused
+from haploop.protocol.processes import OBSERVER
+from haploop.protocol.transport import SecureContext
+from haploop.tools.attach.live_table import attach_print
+from haploop.tools.attach.plotjuggler import PORT, attach_plotjuggler
+from haploop.tools.cli.exit_codes import FAILED, WRONG_USE, leave, plain_errors
+from haploop.tools.render.report import print_summary
 
 TARGETS = ("logger", "print", "plotjuggler")
 
 
-def attach_to(what: str, out: Path | None, run_id: str | None, port: int | None) -> None:
-    """Join the run and stay until it ends or Ctrl-C; PlotJuggler's node stays for the runs to come."""
-    if what not in TARGETS:
-        leave(f"{', '.join(TARGETS[:-1])} or {TARGETS[-1]} was expected, but {what!r} was given.", WRONG_USE)
+def attach_to(target: str, out: Path | None, run_id: str | None, port: int | None) -> None:
+    """Joins the run and stays until it ends or Ctrl-C; PlotJuggler's node stays for the runs to come."""
+    if target not in TARGETS:
+        leave(f"{', '.join(TARGETS[:-1])} or {TARGETS[-1]} was expected, but {target!r} was given.", WRONG_USE)
     for option, value, its in (("--out", out, "logger"), ("--port", port, "plotjuggler")):
-        if value is not None and what != its:
-            leave(f"{option} belongs to attach {its}, but was given to attach {what}.", WRONG_USE)
+        if value is not None and target != its:
+            leave(f"{option} belongs to attach {its}, but was given to attach {target}.", WRONG_USE)
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     with plain_errors():
-        if what == "logger":
-            from haploop.tools.attach.logger import attach_logger
+        match target:
+            case "logger":
+                attach_logger(run_id, out)
+            case "print":
+                attach_print(run_id)
+            case _:
+                attach_plotjuggler(run_id, PORT if port is None else port)
 
-            attach_logger(run_id, out)
-        elif what == "print":
-            from haploop.tools.attach.print import attach_print
 
-            attach_print(run_id)
-        else:
-            from haploop.tools.attach.plotjuggler import PORT
-            from haploop.tools.attach.plotjuggler_node import attach_plotjuggler
+def attach_logger(run_id: str | None, out: Path | None) -> None:
+    """Logs a run from its present tick on, with a log and a summary of its own; lossless, so it may slow the run."""
+    run = run_directory.find(run_id)
+    directory = make_output(out, Path(f"attached-{run.id}"))
+    context = run.make_context()
+    try:
+        with interrupts(usual_from=2) as received:
+            summary = _log(run, context, directory, received)
+    except Refused as error:
+        leave(str(error), WRONG_USE)
+    finally:
+        context.destroy(linger=500)
+    if summary is None:
+        leave(f"Run {run.id} ended before anything could be logged.", FAILED)
+    print_summary(summary)
+    print(directory, file=sys.stderr)
+    if summary["ended"] == "failed":
+        leave(summary["why"], FAILED)
 
-            attach_plotjuggler(run_id, PORT if port is None else port)
+
+def _log(run: LiveRun, context: SecureContext, directory: Path, received: list[int]) -> dict[str, Any] | None:
+    """Logs until the run ends or a signal comes; returns the summary, or None if no telemetry came."""
+
+    def reason_to_leave() -> str | None:
+        if received:
+            return ""
+        return None if run_directory.is_live(run) else f"The launcher of run {run.id} has ended without a word."
+
+    client = ClockClient(context, OBSERVER, run.clock, "")
+    node = LoggerNode(client, context, None, reason_to_leave)
+    try:
+        welcome = client.join({})
+        write_scene(welcome["scene"], directory)
+        node.start(welcome, directory)
+        print(f"logging run {run.id} from tick {node.session.logger.tick} on; Ctrl-C leaves", file=sys.stderr)
+        tick, summary = node.run()
+        client.leave("LEAVE", tick)
+        return summary
+    except (Aborted, TelemetryGap) as error:
+        return node.save(str(error))

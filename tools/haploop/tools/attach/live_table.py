@@ -1,12 +1,21 @@
-"""A running loop as a small table that stays in its place, or as a line now and then."""
+"""``haploop attach print``: a running simulation as a live table, or in a pipe as a line a second."""
 
 from __future__ import annotations
 
+import contextlib
+import sys
+import time
+from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING
 
+from haploop.launch.processes import run_directory
+from haploop.launch.processes.run_directory import LiveRun
 from haploop.protocol.changes import describe
-from haploop.tools.attach.watched import Watched
-from haploop.tools.render.terminal import make_facts, make_table, verdict_style
+from haploop.protocol.clock_client import Refused
+from haploop.tools.attach.live_status import LiveStatus
+from haploop.tools.attach.observed_run import ObservedRun, read_summary
+from haploop.tools.cli.exit_codes import FAILED, WRONG_USE, leave
+from haploop.tools.render.terminal import console, make_facts, make_table, verdict_style
 from haploop.tools.render.units import amount, fixed
 
 if TYPE_CHECKING:
@@ -14,78 +23,82 @@ if TYPE_CHECKING:
     from rich.table import Table
     from rich.text import Text
 
+# The role under which the clock lists the table.
+ROLE = "print"
+# Intervals at which the table is drawn, and at which a line is printed into a pipe, s of wall time.
+_DRAWN_S, _PRINTED_S = 0.12, 1.0
 _BAR = 20
 _TRUE, _SAMPLED = ".true", ".sampled"
 _STATES = {"paused": "bold yellow", "running": "bold green", "waiting": "bold", "failed": "bold red"}
 
 
-def live_table(watched: Watched) -> RenderableType:
-    """Everything about a run that is worth a look, in at most 80 columns."""
+def live_table(run: LiveStatus) -> RenderableType:
+    """Makes the table of a run, at most 80 columns wide."""
     from rich.console import Group
     from rich.text import Text
 
-    head = Text.assemble((watched.run_id, "bold"), "  ", watched.title, no_wrap=True, overflow="ellipsis")
-    return Group(head, _progress(watched), _figures(watched), _books(watched))
+    head = Text.assemble((run.run_id, "bold"), "  ", run.title, no_wrap=True, overflow="ellipsis")
+    return Group(head, _progress(run), _figures(run), _books(run))
 
 
-def live_line(watched: Watched) -> str:
-    """The same in one line, for a pipe."""
-    motion, status = watched.motion(), watched.status()
-    words = [f"{watched.t_s:.3f} s"]
+def live_line(run: LiveStatus) -> str:
+    """Returns the state of a run as one line, for a pipe."""
+    motion, figures = run.motion(), run.figures()
+    words = [f"{run.t_s:.3f} s"]
     if motion:
         words += [f"x {amount(motion['x'], 'm')}", f"force {amount(motion['force'], 'N')}"]
-    if status:
-        words += [status["verdict"], f"{amount(status['oscillation_m'], 'm')} p-p"]
-        words.append(f"residual {amount(status['residual_J'], 'J')}")
-    if watched.factor is not None:
-        words.append(f"{fixed(watched.factor)}x real time")
-    if watched.skipped_ticks:
-        words.append(f"skipped {watched.skipped_ticks} ticks")
+    if figures:
+        words += [figures["verdict"], f"{amount(figures['oscillation_m'], 'm')} p-p"]
+        words.append(f"residual {amount(figures['residual_J'], 'J')}")
+    if run.factor is not None:
+        words.append(f"{fixed(run.factor)}x real time")
+    if run.skipped_ticks:
+        words.append(f"skipped {run.skipped_ticks} ticks")
     return "  ".join(words)
 
 
-def ending(watched: Watched) -> str:
-    """How a run ended, as a sentence."""
-    why = f": {watched.why.rstrip('.')}" if watched.why else ""
-    word = "" if watched.ended in ("ended", "done") else f" ({watched.ended})"
-    return f"Run {watched.run_id} ended at tick {watched.tick}, {watched.t_s:g} s{word}{why}."
+def end_sentence(run: LiveStatus) -> str:
+    """Returns a sentence on how a run ended."""
+    why = f": {run.why.rstrip('.')}" if run.why else ""
+    word = "" if run.ended in ("ended", "done") else f" ({run.ended})"
+    return f"Run {run.run_id} ended at tick {run.tick}, {run.t_s:g} s{word}{why}."
 
 
-def _progress(watched: Watched) -> Text:
-    """State, bar, time and pace."""
+def _progress(run: LiveStatus) -> Text:
+    """Makes the line of state, bar, time and pace."""
     from rich.text import Text
 
-    state = watched.ended or ("paused" if watched.paused else "running" if watched.factor else "waiting")
-    end = watched.time.ticks
-    done = round(min(1.0, watched.tick / end) * _BAR)
+    state = run.ended or ("paused" if run.paused else "running" if run.factor else "waiting")
+    end = run.time.ticks
+    done = round(min(1.0, run.tick / end) * _BAR)
     text = Text.assemble(
         (f"{state:<8}", _STATES.get(state, "bold")), "  ",
         ("━" * done, "green"), ("─" * (_BAR - done), "dim"),
-        f"  {watched.t_s:.3f} s of {end / watched.time.control_rate:g} s, tick {watched.tick}",
+        f"  {run.t_s:.3f} s of {end / run.time.control_rate:g} s, tick {run.tick}",
         no_wrap=True, overflow="ellipsis",
     )  # fmt: skip
-    if watched.factor is not None and not watched.paused:
-        text.append(f"  {fixed(watched.factor)}× real time")
+    if run.factor is not None and not run.paused:
+        text.append(f"  {fixed(run.factor)}× real time")
     return text
 
 
-def _figures(watched: Watched) -> Table:
+def _figures(run: LiveStatus) -> Table:
     from rich.text import Text
 
     grid = make_facts([], least_width=12)
-    status, motion = watched.status(), watched.motion()
-    if status:
-        word = status["verdict"]
-        swing = f"  oscillation {amount(status['oscillation_m'], 'm')} peak to peak"
-        grid.add_row("verdict" if watched.ended else "so far", Text.assemble((word, verdict_style(word)), swing))
-    grid.add_row("position", amount(motion.get("x"), "m") + _where(watched.penetration_m()))
+    figures, motion = run.figures(), run.motion()
+    if figures:
+        word = figures["verdict"]
+        swing = f"  oscillation {amount(figures['oscillation_m'], 'm')} peak to peak"
+        grid.add_row("verdict" if run.ended else "so far", Text.assemble((word, verdict_style(word)), swing))
+    grid.add_row("position", amount(motion.get("x"), "m") + _where(run.penetration_m()))
     grid.add_row("velocity", amount(motion.get("v"), "m/s"))
-    parts = ", ".join(f"{name} {amount(force, 'N')}" for name, force in watched.parts().items())
+    parts = ", ".join(f"{name} {amount(force, 'N')}" for name, force in run.parts().items())
     grid.add_row("force", amount(motion.get("force"), "N") + (f"  commanded: {parts}" if parts else ""))
-    grid.add_row("skipped", Text(f"{watched.skipped_ticks} ticks", "yellow" if watched.skipped_ticks else ""))
-    if watched.changes:
-        tick, event = watched.changes[-1]
-        words = f"{describe(event)}, at {tick / watched.time.control_rate:g} s (tick {tick})"
+    grid.add_row("skipped", Text(f"{run.skipped_ticks} ticks", "yellow" if run.skipped_ticks else ""))
+    if run.changes:
+        tick, event = run.changes[-1]
+        words = f"{describe(event)}, at {tick / run.time.control_rate:g} s (tick {tick})"
         grid.add_row("last change", Text(words))
     return grid
 
@@ -98,18 +111,79 @@ def _where(penetration_m: float | None) -> str:
     return f"  {amount(-penetration_m, 'm')} outside the wall"
 
 
-def _books(watched: Watched) -> Table:
-    """Energy by wall and element, and what the books leave unexplained."""
+def _books(run: LiveStatus) -> Table:
+    """Makes the table of the energy by wall and element, and of the residual."""
     numbers = ("true", "sampled")
     table = make_table("energy taken out of the device by", *numbers, numbers=numbers, least_width=9)
-    books = watched.books()
-    no_wall = watched.penetration_m() is None
+    books = run.books()
+    no_wall = run.penetration_m() is None
     for name in (name.removesuffix(_TRUE) for name in books if name.endswith(_TRUE)):
         if not (name == "wall" and no_wall):
             table.add_row(name, *(amount(books[name + side], "J") for side in (_TRUE, _SAMPLED)))
     moved = books.get("moved")
-    residual = watched.status().get("residual_J")
+    residual = run.figures().get("residual_J")
     share = f", {residual / moved:.1e} of what moved" if residual is not None and moved else ""
     table.add_section()
     table.add_row(f"residual{share}", amount(residual, "J"), "")
     return table
+
+
+def attach_print(run_id: str | None) -> None:
+    """Shows a run until it ends or Ctrl-C; lossy, so it never holds the run up."""
+    try:
+        run = _watch(run_directory.find(run_id))
+    except Refused as error:
+        leave(str(error), WRONG_USE)
+    except KeyboardInterrupt:
+        return
+    print(end_sentence(run), file=sys.stderr)
+    if run.ended == "failed":
+        raise SystemExit(FAILED)
+
+
+def _watch(live_run: LiveRun) -> LiveStatus:
+    """Shows a run to its end; returns its last state."""
+    with ObservedRun(live_run, ROLE) as observed, _screen() as show:
+        observer = observed.observer
+        run = LiveStatus(live_run.id, observer.welcome)
+        for frames in observed.frames(_DRAWN_S):
+            run.ingest(frames, time.monotonic())
+            for tick, event in observer.take_events():
+                run.note_event(tick, event)
+            run.skipped_ticks = observed.skipped_ticks
+            show(run)
+        run.end(observed.failure, read_summary(observer.welcome))
+        show(run)
+    return run
+
+
+@contextlib.contextmanager
+def _screen() -> Iterator[Callable[[LiveStatus], None]]:
+    """Opens the display: on a terminal a table that is redrawn in its place, in a pipe lines."""
+    terminal = console()
+    if not terminal.is_terminal:
+        yield LinePrinter().show
+        return
+    from rich.live import Live
+
+    with Live(console=terminal, auto_refresh=False) as live:
+        yield lambda run: live.update(live_table(run), refresh=True)
+
+
+class LinePrinter:
+    """Prints a run into a pipe: a line a second while it moves, one for every change, and one at the end."""
+
+    def __init__(self) -> None:
+        self._due = 0.0
+        self._tick = -1
+        self._printed = 0
+
+    def show(self, run: LiveStatus) -> None:
+        """Prints the events that are new, and a line if one is due."""
+        for tick, event in run.changes[self._printed :]:
+            print(f"{tick / run.time.control_rate:.3f} s  {describe(event)}", flush=True)
+        self._printed = len(run.changes)
+        now = time.monotonic()
+        if run.ended or (run.tick != self._tick and now >= self._due):
+            self._due, self._tick = now + _PRINTED_S, run.tick
+            print(live_line(run), flush=True)

@@ -2,25 +2,51 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from haploop.tools.cli.options import At, Json, Run
+from haploop.tools.cli.exit_codes import plain_errors, print_json
+from haploop.tools.cli.options import At, Json, Run, parse_assignments, parse_pace, parse_seconds
 
 
 def status(run: Run = None, json: Json = False) -> None:
     """Show the live runs: every node, its tick, its lag, whom it waits for, what it skipped."""
-    from haploop.tools.cli.live import show_status
+    from haploop.launch.processes import run_directory
+    from haploop.launch.processes.control import ask
 
-    show_status(run, json)
+    answers = {}
+    with plain_errors():
+        for live in [run_directory.find(run)] if run else run_directory.live_runs():
+            try:
+                answers[live.id] = ask(live, "status")[1]
+            except run_directory.RunNotFound as error:  # it ended just now, or its launcher hangs
+                print(error, file=sys.stderr)
+    if json:
+        print_json(answers)
+    elif not answers:
+        print("No run is live.")
+    else:
+        from haploop.tools.render.report import status_table
+        from haploop.tools.render.terminal import console
+
+        for identity, data in answers.items():
+            console().print(status_table({**data, "run": identity}))
 
 
-def _ask(run_id: str | None, json: bool, verb: str, **arguments: Any) -> None:
-    from haploop.tools.cli.live import command
+def _ask(run_id: str | None, as_json: bool, verb: str, **arguments: Any) -> None:
+    """Has a live run do something and prints its answer."""
+    from haploop.launch.processes import run_directory
+    from haploop.launch.processes.control import ask
 
-    command(run_id, json, verb, arguments)
+    with plain_errors():
+        text, data = ask(run_directory.find(run_id), verb, **arguments)
+    if as_json:
+        print_json({"text": text, **data})
+    else:
+        print(text)
 
 
 def pause(run: Run = None, json: Json = False) -> None:
@@ -44,9 +70,7 @@ def pace(
     json: Json = False,
 ) -> None:
     """Go on at another pace."""
-    from haploop.tools.cli.live import pace_of
-
-    _ask(run, json, "pace", pace=pace_of(rate))
+    _ask(run, json, "pace", pace=parse_pace(rate))
 
 
 def stop(run: Run = None, json: Json = False) -> None:
@@ -64,10 +88,8 @@ def swap(
     json: Json = False,
 ) -> None:
     """Replace a dissipation element of a running loop."""
-    from haploop.tools.cli.live import assignments, seconds
-
-    table = {"kind": kind, **assignments(parameters or [])}
-    _ask(run, json, "swap", swap=table, element=element, at=seconds(at), reload=reload)
+    table = {"kind": kind, **parse_assignments(parameters or [])}
+    _ask(run, json, "swap", swap=table, element=element, at=parse_seconds(at), reload=reload)
 
 
 def set_(
@@ -77,9 +99,7 @@ def set_(
     json: Json = False,
 ) -> None:
     """Change numbers of a running loop: wall.stiffness, wall.position, dissipation.0.mass ..."""
-    from haploop.tools.cli.live import assignments, seconds
-
-    _ask(run, json, "set", set=assignments(parameters), at=seconds(at))
+    _ask(run, json, "set", set=parse_assignments(parameters), at=parse_seconds(at))
 
 
 def attach(

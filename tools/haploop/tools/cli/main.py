@@ -5,8 +5,7 @@ from __future__ import annotations
 import typer
 
 from haploop.tools.cli.live_commands import attach, pace, pause, resume, set_, status, step, stop, swap, view
-from haploop.tools.cli.run_commands import export, plot, replay
-from haploop.tools.cli.scene_commands import check, explain, plugins, run
+from haploop.tools.cli.scene_commands import check, explain, export, plot, plugins, replay, run
 from haploop.tools.cli.study_commands import advise, cost, dissipate, paper, sweep
 
 app = typer.Typer(

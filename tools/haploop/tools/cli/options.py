@@ -1,11 +1,14 @@
-"""Arguments and options that several commands share."""
+"""Arguments and options that several commands share, and the reading of their texts."""
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any, Literal
 
 import typer
+
+from haploop.tools.cli.exit_codes import WRONG_USE, leave
 
 Scene = Annotated[Path, typer.Argument(help="scene file (TOML)", show_default=False)]
 Directory = Annotated[Path, typer.Argument(help="directory of a run", show_default=False)]
@@ -14,3 +17,43 @@ Plugin = Annotated[list[Path] | None, typer.Option("--plugin", metavar="FILE", h
 Run = Annotated[str | None, typer.Option("--run", metavar="ID", help="which run, when several are live")]
 Json = Annotated[bool, typer.Option("--json", help="one JSON object on stdout")]
 At = Annotated[str | None, typer.Option("--at", metavar="TIME", help='simulated time, s or "1500 ms"; at once without')]
+
+
+def parse_assignments(texts: list[str]) -> dict[str, Any]:
+    """Returns ``KEY=VALUE`` words as a table; a value is TOML where it parses, else text ("0.15 N/mm")."""
+    from haploop.launch.scene.overrides import split_assignment
+
+    pairs = [split_assignment(text) for text in texts]
+    if None in pairs:
+        leave(f"KEY=VALUE was expected, but {texts[pairs.index(None)]!r} was given.", WRONG_USE)
+    return dict(pair for pair in pairs if pair)
+
+
+def parse_pace(text: str) -> float | Literal["free"]:
+    """Returns ``free``, or a positive number of simulated seconds per second."""
+    if text == "free":
+        return "free"
+    try:
+        rate = float(text.removesuffix("x"))
+    except ValueError:
+        rate = math.nan
+    if not (rate > 0 and math.isfinite(rate)):
+        leave(f"A pace must be free or a number above 0 (1 is real time), but {text!r} was given.", WRONG_USE)
+    return rate
+
+
+def parse_seconds(text: str | None, option: str = "--at") -> float | None:
+    """Returns a time in s, given in seconds or with its unit; None for none."""
+    if text is None:
+        return None
+    try:
+        return float(text)
+    except ValueError:
+        pass
+    from haploop.launch.scene.tables.number import Number
+    from haploop.protocol.quantity import Quantity
+
+    try:
+        return float(Number(Quantity("s", at_least=0, about="time")).read(text))
+    except ValueError as error:
+        leave(f"{option} must be a time such as 1.5 or '1500 ms', but {text!r} was given: {error}", WRONG_USE)

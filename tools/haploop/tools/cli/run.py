@@ -1,4 +1,4 @@
-"""``haploop run``: a scene from file to summary, with progress on the way."""
+"""Running a scene with progress on the way, and repeating a run from its log."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from haploop.tools.cli.exit_codes import FAILED, WRONG_USE, leave, plain_errors, print_json
-from haploop.tools.cli.live import pace_of
+from haploop.tools.cli.options import parse_pace
 from haploop.tools.cli.scenes import print_notes
 
 if TYPE_CHECKING:
@@ -84,9 +84,28 @@ def _transport(host: str | None, keys: Path | None, in_process: bool) -> Transpo
 
 def _pace(text: str, in_process: bool) -> float:
     """Infinite, or a positive number."""
-    rate = pace_of(text)
+    rate = parse_pace(text)
     if rate == "free":
         return math.inf
     if in_process:
         leave("--pace needs the clock of a run as processes; leave out --in-process.", WRONG_USE)
     return rate
+
+
+def replay_run(directory: Path, as_json: bool) -> None:
+    """Repeat a run from its log; exit status 1 when a bit differs."""
+    from haploop.launch.runs.replay import ReplayError, replay
+
+    with plain_errors():
+        try:
+            result = replay(directory)
+        except ReplayError as error:
+            leave(str(error), WRONG_USE)
+    if as_json:
+        print_json({"agrees": not result.differences, "differences": result.differences, **result.summary})
+    elif result.differences:
+        print("\n".join(result.differences))
+    else:
+        print(f"Every bit of {result.summary['steps']} steps agreed: {result.summary['trajectory_sha256']}")
+    if result.differences:
+        raise SystemExit(FAILED)

@@ -37,7 +37,7 @@ def check_scene(scene_path: Path, overrides: list[str], plugins: list[Path], as_
 
 def print_notes(scene: dict[str, Any]) -> None:
     """Say on stderr what in a resolved scene may not be what was meant."""
-    from haploop.launch.scene.combinations import notes
+    from haploop.launch.plan.effects import notes
 
     for note in notes(scene):
         print(f"Note: {note}", file=sys.stderr)

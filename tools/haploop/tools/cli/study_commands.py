@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from haploop.tools.cli.options import Json, Plugin, Set
+from haploop.tools.cli.options import Json, Plugin, Set, parse_seconds
 
 
 def cost(
@@ -88,7 +88,6 @@ def dissipate(
 
     One pass in flat memory. The last line names the figure's file.
     """
-    from haploop.tools.cli.live import seconds
     from haploop.tools.dissipate.command import Request
     from haploop.tools.dissipate.command import dissipate as book
     from haploop.tools.dissipate.setting import Asked
@@ -96,7 +95,7 @@ def dissipate(
 
     asked = Asked(damping or [], mass or [], element or [], wall, occupies, set or [])
     layout = Layout(position, time, rate, velocity, acceleration, unit, time_unit, velocity_unit, acceleration_unit)
-    book(Request(recording, asked, layout, seconds(delay, "--delay"), plugin or [], out), json)
+    book(Request(recording, asked, layout, parse_seconds(delay, "--delay"), plugin or [], out), json)
 
 
 def paper(

@@ -1,4 +1,4 @@
-"""``haploop cost``: what accuracy costs in time; a command that was stopped goes on where it was."""
+"""``haploop cost``: errors and times of every method at every plant rate; a stopped command goes on where it was."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Request:
-    """What to measure.
+    """The arguments of ``haploop cost``.
 
     Attributes:
         scenes: scene files; where there are none, the scenes of the folder accuracy, and the other prices with them.
@@ -42,7 +42,7 @@ class Request:
 
 
 def cost(request: Request, as_json: bool) -> None:
-    """Measure what is missing, write cost.json and the figure, and print tables and advice."""
+    """Measures what is missing, writes cost.json and the figure, and prints tables and advice."""
     from haploop.tools.cost.data import save
     from haploop.tools.cost.measure import Measurement
 
@@ -56,7 +56,7 @@ def cost(request: Request, as_json: bool) -> None:
             leave(f"The directory {request.out} cannot be used: {error.strerror}.", WRONG_USE)
         times = request.repeats if request.processes else 0
         with Measurement(grids, request.out, request.repeats, times) as measurement:
-            interrupted = _measured(measurement, with_prices=not request.scenes)
+            interrupted = _measure(measurement, with_prices=not request.scenes)
             result = measurement.cost(request.tolerance_m)
     save(result, request.out)
     if interrupted:
@@ -70,8 +70,8 @@ def _grids(scenes: list[Path], methods: list[str], rates: list[int]) -> list[Gri
     return [grid(path, methods, rates) for path in scenes or accuracy_scenes()]
 
 
-def _measured(measurement: Measurement, with_prices: bool) -> bool:
-    """Measure with progress on a terminal; whether it was interrupted."""
+def _measure(measurement: Measurement, with_prices: bool) -> bool:
+    """Measures, with progress on a terminal; returns whether it was interrupted."""
     try:
         # A thread that drew meanwhile would be measured too.
         with bars(by_itself=False) as stage:
@@ -85,22 +85,22 @@ def _measured(measurement: Measurement, with_prices: bool) -> bool:
 
 
 def _show(result: Cost, out: Path, as_json: bool) -> None:
-    """Tables and advice, or JSON, on stdout; the files on stderr."""
+    """Prints tables and advice, or JSON, on stdout and the names of the files on stderr."""
     from haploop.tools.cost.data import COST_FILE
-    from haploop.tools.cost.draw.report import report
+    from haploop.tools.cost.report import report
     from haploop.tools.render.terminal import console
 
     if as_json:
         print_json(dataclasses.asdict(result))
     else:
         console().print(report(result))
-    for path in (out / COST_FILE, *_drawn(result, out)):
+    for path in (out / COST_FILE, *_draw(result, out)):
         print(path, file=sys.stderr)
 
 
-def _drawn(result: Cost, out: Path) -> list[Path]:
-    """Draw the figures and return their files; where that cannot be done, say so."""
-    from haploop.tools.cost.draw import figure
+def _draw(result: Cost, out: Path) -> list[Path]:
+    """Draws the figures and returns their files; prints a note where that cannot be done."""
+    from haploop.tools.cost import figure
     from haploop.tools.cost.prices import figure as prices_figure
     from haploop.tools.figure.data import FigureError
 
@@ -113,7 +113,7 @@ def _drawn(result: Cost, out: Path) -> list[Path]:
 
 
 def _rates(text: str) -> list[int]:
-    """``1k,2.5k,10000`` in Hz."""
+    """Reads rates in Hz: ``1k,2.5k,10000``."""
     rates = []
     for word in text.split(","):
         factor, number = (1000.0, word.strip()[:-1]) if word.strip().endswith("k") else (1.0, word)
@@ -130,7 +130,7 @@ def _rates(text: str) -> list[int]:
 
 
 def _methods(text: str | None) -> list[str]:
-    """Names of integrators, all of them when None."""
+    """Reads names of integrators; all of them when None."""
     from haploop.tools.cost.grid import METHODS
 
     if text is None:

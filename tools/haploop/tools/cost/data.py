@@ -1,4 +1,4 @@
-"""What accuracy costs, as ``haploop cost`` measured it: the contents of cost.json."""
+"""The contents of cost.json: errors, times and prices as ``haploop cost`` measured them."""
 
 from __future__ import annotations
 
@@ -10,6 +10,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
+
+from haploop.tools.ablation import AGAIN
+from haploop.tools.linear.stiffness_limit import StiffnessLimit
 
 COST_FILE = "cost.json"
 # A machine on which nothing else runs: the calibration loop varies less, and no second process waits for a core.
@@ -29,8 +32,8 @@ class Spread:
     q3: float
 
     @classmethod
-    def of(cls, values: Sequence[float]) -> Spread:
-        """Of at least one value."""
+    def from_values(cls, values: Sequence[float]) -> Spread:
+        """Makes it of at least one value."""
         if len(values) == 1:
             return cls(values[0], values[0], values[0])
         q1, median, q3 = statistics.quantiles(values, n=4, method="inclusive")
@@ -39,7 +42,7 @@ class Spread:
 
 @dataclass(frozen=True, kw_only=True)
 class Errors:
-    """How far a run is from its reference.
+    """The distance of a run from its reference.
 
     Where the reference is pointwise the positions at the ticks and at the end are compared, and the relative entries
     are None; where it is not, it is the other way round.
@@ -98,7 +101,13 @@ class Point:
 
 @dataclass(frozen=True)
 class ReferenceNote:
-    """What the errors are against: how it was made, its own uncertainty, and whether positions can be compared."""
+    """The reference that errors are against.
+
+    Attributes:
+        how: it was made, as a sentence.
+        error_m: its own uncertainty.
+        pointwise: whether positions can be compared, or amplitudes only.
+        verdict: of the reference."""
 
     how: str
     error_m: float
@@ -128,7 +137,7 @@ class SceneCost:
 
 @dataclass(frozen=True)
 class Load:
-    """How quiet the machine was while times were taken.
+    """The load of the machine while times were taken.
 
     Attributes:
         average: median of the one-minute load averages seen, this program's own share included; None if unknown.
@@ -140,8 +149,76 @@ class Load:
 
     @property
     def busy(self) -> bool:
-        """Whether something else seems to have run."""
+        """Whether something else seems to have run meanwhile."""
         return self.calibration_spread > QUIET_SPREAD or (self.average or 0.0) > QUIET_LOAD
+
+
+@dataclass(frozen=True)
+class Price:
+    """The price of one thing that can be had or left.
+
+    Attributes:
+        what: its name.
+        time: measured, in the unit of its group.
+        ratio: the median over that of the group's baseline.
+        costs: what it adds to a run, in the unit of its group: the median less the baseline's; of an effect, the
+            baseline's, which has all of them, less the median without it.
+        buys: the gain, in words.
+        instructions_per_tick: bytecode instructions of plant and controller; None where they were not counted.
+        stiffness: up to where a wall stays steady; None where that was not asked for.
+    """
+
+    what: str
+    time: Spread
+    ratio: float
+    costs: float
+    buys: str
+    instructions_per_tick: float | None = None
+    stiffness: StiffnessLimit | None = None
+
+
+@dataclass(frozen=True)
+class PriceGroup:
+    """Prices of one kind; the first of them is the baseline.
+
+    Attributes:
+        name: "books", "log", "effects", "processes", "delay" or "control rate".
+        title: in words.
+        unit: of the times.
+        repeats: of each.
+        how: in one process or as processes, which scene, what is logged.
+    """
+
+    name: str
+    title: str
+    unit: str
+    repeats: int
+    how: str
+    prices: list[Price]
+
+    @property
+    def baseline(self) -> Price:
+        """The price that the others are held against."""
+        return self.prices[0]
+
+
+def price(
+    what: str, times: Sequence[float], baseline: Spread | None, buys: str, is_left_out: bool = False, **more: Any
+) -> Price:
+    """Makes a price from repeated times; ``baseline`` is None for the baseline itself."""
+    time = Spread.from_values(times)
+    base = baseline or time
+    added = time.median - base.median
+    return Price(what, time, time.median / base.median, -added if is_left_out else added, buys, **more)
+
+
+def chance_in(group: PriceGroup) -> float:
+    """Returns how far two equal runs of the group's baseline are apart: less than that is no difference.
+
+    The difference of the baseline measured twice, where it was, and at least the distance of its quartiles.
+    """
+    again = [abs(price.costs) for price in group.prices if price.what == AGAIN]
+    return max([*again, group.baseline.time.q3 - group.baseline.time.q1])
 
 
 @dataclass(frozen=True)
@@ -162,11 +239,11 @@ class Cost:
     tolerance_m: float
     load: Load | None
     scenes: list[SceneCost]
-    prices: list[dict[str, Any]] = field(default_factory=list)
+    prices: list[PriceGroup] = field(default_factory=list)
 
 
 def save(cost: Cost, directory: Path) -> Path:
-    """Write DIR/cost.json in one piece and return its path; numbers that are not finite become null."""
+    """Writes DIR/cost.json in one piece and returns its path; numbers that are not finite become null."""
     from haploop.logger.summary import write
 
     path = directory / COST_FILE
@@ -175,7 +252,7 @@ def save(cost: Cost, directory: Path) -> Path:
 
 
 def load(directory: Path) -> Cost:
-    """Read DIR/cost.json.
+    """Reads DIR/cost.json.
 
     Raises:
         CostFileError: there is none, or it is not one that ``haploop cost`` of this version wrote.

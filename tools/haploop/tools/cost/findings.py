@@ -1,35 +1,51 @@
-"""Five findings in plain words about what accuracy costs: data decide which sentences are said, with which numbers."""
+"""Findings about what accuracy costs: tables of scenes, methods, the other prices and the stiffness they buy."""
 
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Iterable
+from dataclasses import dataclass
 
-from haploop.tools.cost.advice import cheapest, meets, rate, setting
-from haploop.tools.cost.data import Cost, Point, SceneCost
-from haploop.tools.cost.finding_words import Finding, joined, length, name_of, of_scenes, rates, span
-from haploop.tools.cost.prices.data import price_groups
-from haploop.tools.cost.prices.findings import other_prices, stiffness
-from haploop.tools.render.units import amount
+from haploop.tools.ablation import NONE
+from haploop.tools.cost.advice import cheapest, length, meets, name_of, rate, setting
+from haploop.tools.cost.data import Cost, Point, Price, PriceGroup, SceneCost, chance_in
+from haploop.tools.render.units import amount, fixed, spring
+
+_NONE = "–"
+# Group and price -> the price in words, and what its ratio is against.
+_PRICES = {
+    ("processes", "three processes"): ("three processes without delay", "one process"),
+    ("books", "with"): ("the exact energy books of every plant step", "plant and controller alone"),
+    ("log", "steps"): ("every plant step logged", "a run as processes without a log"),
+}
 
 
-def findings(cost: Cost, count: int = 5) -> list[Finding]:
-    """The first findings for which there are data; those further down stand in for what was not measured."""
-    groups = {group.name: group for group in price_groups(cost)}
-    candidates = [
-        cheapest_setting(cost),
-        other_methods(cost),
-        failures(cost),
-        other_prices(groups),
-        stiffness(groups),
-        own_settings(cost),
-        more_steps(cost),
-        verdicts(cost),
-    ]
-    return [finding for finding in candidates if finding][:count]
+@dataclass(frozen=True)
+class FindingTable:
+    """A table of findings, with the sentences that belong to it.
+
+    Attributes:
+        title: of the table.
+        heads: of its columns.
+        rows: cells, as text.
+        notes: sentences below the table.
+    """
+
+    title: str
+    heads: tuple[str, ...]
+    rows: list[list[str]]
+    notes: tuple[str, ...] = ()
+
+
+def findings(cost: Cost) -> list[FindingTable]:
+    """Returns the tables for which there are data."""
+    groups = {group.name: group for group in cost.prices}
+    tables = (scene_table(cost), method_table(cost), price_table(groups), stiffness_table(groups))
+    return [table for table in tables if table.rows]
 
 
 def comparable(cost: Cost) -> list[SceneCost]:
-    """The scenes whose reference is known well enough for the tolerance, and of which times are known."""
+    """Returns the scenes whose reference is known to within the tolerance, and of which times are known."""
     return [
         scene
         for scene in cost.scenes
@@ -37,139 +53,149 @@ def comparable(cost: Cost) -> list[SceneCost]:
     ]
 
 
-def winner(cost: Cost) -> str | None:
-    """The method that is the cheapest within the tolerance in most scenes."""
+def cheapest_method(cost: Cost) -> str | None:
+    """Returns the method that is the cheapest within the tolerance in most scenes."""
     best = [found.method for scene in comparable(cost) if (found := cheapest(scene, cost.tolerance_m))]
     return Counter(best).most_common(1)[0][0] if best else None
 
 
-def cheapest_setting(cost: Cost) -> Finding | None:
-    """Which method meets the tolerance in the least time, where, and what does where it does not."""
-    scenes, method = comparable(cost), winner(cost)
-    if not scenes:
-        return None
-    within = f"within {amount(cost.tolerance_m, 'm')} of the reference"
-    if method is None:
-        return Finding("The cheapest setting", f"No setting came {within} in {of_scenes(len(scenes), len(scenes))}.")
-    best = {name_of(scene): cheapest(scene, cost.tolerance_m) for scene in scenes}
-    won = [point for point in best.values() if point and point.method == method]
-    at = f"{of_scenes(len(won), len(scenes))}, at a plant rate of {rates(won)}"
-    others = [f"{setting(point)} ({title})" for title, point in best.items() if point and point.method != method]
-    missed = [title for title, point in best.items() if point is None]
-    errors = [_size(point) for scene in scenes for point in _of_method(scene, method) if point.error]
-    sentences = [f"{method} is the cheapest method {within} in {at}"]
-    sentences += [f"Elsewhere it is {joined(others)}"] if others else []
-    sentences += [f"No setting is that close in {joined(missed)}"] if missed else []
-    sentences += [f"Its largest error at any plant rate is {length(max(errors))}", *_left_out(cost)]
-    return Finding("The cheapest setting", f"{'. '.join(sentences)}.")
-
-
-def _left_out(cost: Cost) -> list[str]:
-    """Which scenes nothing can be said about."""
-    unknown = [scene for scene in cost.scenes if scene.reference.error_m > cost.tolerance_m]
-    words = [f"{name_of(scene)} (to {length(scene.reference.error_m)})" for scene in unknown]
-    return [f"Left out, since the reference itself is not known that well: {joined(words)}"] if words else []
-
-
-def other_methods(cost: Cost) -> Finding | None:
-    """What the other methods take for the same tolerance, at the cheapest rate of each."""
-    scenes, method = comparable(cost), winner(cost)
-    others = dict.fromkeys(point.method for scene in scenes for point in scene.points if point.method != method)
-    if method is None or not others:
-        return None
-    said: dict[str, list[str]] = {}
-    for other in others:
-        ratios = [ratio for scene in scenes if (ratio := _against(scene, other, method, cost.tolerance_m))]
-        missed = sum(not _meeting(scene, other, cost.tolerance_m) for scene in scenes)
-        words = [f"{span(ratios)} times the time"] if ratios else []
-        words += [f"not that close at any rate in {of_scenes(missed, len(scenes))}"] if missed else []
-        said.setdefault(", but ".join(words), []).append(other)
-    lead = f"Against {method}, each at its cheapest plant rate within {amount(cost.tolerance_m, 'm')}: "
-    sentences = [f"{joined(names)} {words}" for words, names in said.items() if words]
-    return Finding("The same accuracy by other methods", f"{lead}{'; '.join(sentences)}.") if sentences else None
-
-
-def failures(cost: Cost) -> Finding | None:
-    """How many settings failed or came to the wrong verdict, and which methods never did."""
-    points = [(scene, point) for scene in cost.scenes for point in scene.points]
-    if not points:
-        return None
-    failed = [(scene, point) for scene, point in points if point.error is None]
-    wrong = [(scene, point) for scene, point in points if point.error and not point.error.verdict_right]
-    if not failed and not wrong:
-        return Finding("Failures", f"None of {len(points)} settings failed, and every verdict was right.")
-    parts = [f"{len(failed)} of {len(points)} settings did not get to the end"] if failed else []
-    parts += [f"{len(wrong)} of {len(points)} settings got there with the wrong verdict"] if wrong else []
-    parts[-1] += f" ({joined(_where([*failed, *wrong]))})"
-    bad = {point.method for _, point in [*failed, *wrong]}
-    good = list(dict.fromkeys(point.method for _, point in points if point.method not in bad))
-    never = f" {joined(good)} never did." if good else " No method is free of both."
-    return Finding("Failures", f"{'; '.join(parts)}.{never}")
-
-
-def own_settings(cost: Cost) -> Finding | None:
-    """What the scenes' own settings take beyond the cheapest within the tolerance."""
-    ratios = []
+def scene_table(cost: Cost) -> FindingTable:
+    """Makes a row a scene: its cheapest setting within the tolerance, and its own."""
+    rows = []
     for scene in comparable(cost):
-        own = next((p for p in scene.points if (p.method, p.plant_rate) == (scene.own_method, scene.own_rate)), None)
-        best = cheapest(scene, cost.tolerance_m)
-        if own and best and own.us_per_tick and best.us_per_tick and meets(own, cost.tolerance_m):
-            ratios.append(own.us_per_tick.median / best.us_per_tick.median)
-    if not ratios:
-        return None
-    text = f"As the scenes stand they take {span(ratios)} times as long as the cheapest setting within "
-    return Finding("The scenes' own settings", f"{text}{amount(cost.tolerance_m, 'm')}.")
+        best, own = cheapest(scene, cost.tolerance_m), own_point(scene)
+        rows.append([
+            name_of(scene),
+            setting(best) if best else "none",
+            _median(best),
+            setting(own) if own else _NONE,
+            _median(own) + ("" if own and meets(own, cost.tolerance_m) else ", too far off"),
+            _ratio(own, best),
+        ])  # fmt: skip
+    left_out = [name_of(scene) for scene in cost.scenes if scene.reference.error_m > cost.tolerance_m]
+    note = "Left out, since the reference itself is not known that well: {}."
+    return FindingTable(
+        f"The cheapest setting within {amount(cost.tolerance_m, 'm')} of the reference",
+        ("scene", "cheapest setting", "µs a tick", "the scene's own", "µs a tick", "own over cheapest"),
+        rows,
+        (note.format("; ".join(left_out)),) if left_out else (),
+    )
 
 
-def more_steps(cost: Cost) -> Finding | None:
-    """What more plant steps cost the method that wins."""
-    method = winner(cost)
-    ratios, steps = [], set()
-    for scene in comparable(cost):
-        timed = sorted((p for p in _of_method(scene, method) if p.us_per_tick), key=lambda p: p.plant_rate)
-        if len(timed) > 1 and timed[0].us_per_tick and timed[-1].us_per_tick:
-            ratios.append(timed[-1].us_per_tick.median / timed[0].us_per_tick.median)
-            steps.add(timed[-1].plant_rate / timed[0].plant_rate)
-    if not ratios:
-        return None
-    text = f"{span(steps)} times as many plant steps make {method} take {span(ratios)} times as long."
-    return Finding("More plant steps", text)
+def method_table(cost: Cost) -> FindingTable:
+    """Makes a row a method: where it meets the tolerance and in what time, its largest error, and its failures."""
+    scenes, least = comparable(cost), cheapest_method(cost)
+    rows = []
+    for method in dict.fromkeys(point.method for scene in cost.scenes for point in scene.points):
+        own = {scene.name: [point for point in scene.points if point.method == method] for scene in cost.scenes}
+        every = [point for points in own.values() for point in points]
+        met = [found for scene in scenes if (found := _cheapest_of(scene, method, cost.tolerance_m))]
+        pairs = [(_cheapest_of(scene, method, cost.tolerance_m), _cheapest_of(scene, least, cost.tolerance_m))
+                 for scene in scenes]  # fmt: skip
+        errors = [point.error.size_m for scene in scenes for point in own[scene.name] if point.error]
+        rows.append([
+            method,
+            f"{len(met)} of {len(scenes)}",
+            span_of_rates(met),
+            span(_us(a) / _us(b) for a, b in pairs if a and b),
+            length(max(errors)) if errors else _NONE,
+            f"{sum(point.error is None for point in every)} of {len(every)}",
+            f"{sum(bool(point.error and not point.error.verdict_right) for point in every)} of {len(every)}",
+        ])  # fmt: skip
+    note = (
+        "Times are over those of {}, the cheapest method in most scenes, each at its cheapest plant rate within the "
+        "tolerance."
+    )
+    return FindingTable(
+        "Methods",
+        (
+            "method",
+            "scenes within",
+            "at a plant rate of",
+            "time over cheapest",
+            "largest error",
+            "failed",
+            "wrong verdict",
+        ),
+        rows,
+        (note.format(least) if least else "No setting came within the tolerance in any scene.",),
+    )
 
 
-def verdicts(cost: Cost) -> Finding | None:
-    """Whether a run that is off by more than the tolerance still comes to the right verdict."""
-    off = [p for scene in cost.scenes for p in scene.points if p.error and _size(p) > cost.tolerance_m]
-    if not off:
-        return None
-    right = sum(point.error is not None and point.error.verdict_right for point in off)
-    text = f"Of {len(off)} settings off by more than {amount(cost.tolerance_m, 'm')}, {right} had the right verdict."
-    return Finding("Verdicts", text)
+def price_table(groups: dict[str, PriceGroup]) -> FindingTable:
+    """Makes a row for books, log, processes and all effects at once, the dearest first."""
+    found = [(entry.ratio, *words) for (name, what), words in _PRICES.items() if (entry := _entry(groups, name, what))]
+    notes: tuple[str, ...] = ()
+    effects = groups.get("effects")
+    if effects and (none := _entry(groups, "effects", NONE)):
+        found.append((1.0 / none.ratio, "all effects at once", "the same scene without any"))
+        dearest = max((price for price in effects.prices[1:] if price.what != NONE), key=lambda price: price.costs)
+        if dearest.costs > chance_in(effects):
+            note = "The dearest effect is {}: without it a tick with all effects would save {} of {} µs."
+            notes = (note.format(dearest.what, fixed(dearest.costs), fixed(effects.baseline.time.median)),)
+    rows = [[words, against, fixed(ratio)] for ratio, words, against in sorted(found, reverse=True)]
+    return FindingTable("The other prices", ("", "against", "ratio of times"), rows, notes)
 
 
-def _of_method(scene: SceneCost, method: str | None) -> list[Point]:
-    return [point for point in scene.points if point.method == method]
+def stiffness_table(groups: dict[str, PriceGroup]) -> FindingTable:
+    """Makes a row for every delay and control rate: the stiffest wall that stays steady, and the time it takes."""
+    rows = [
+        [group.title, price.what, _limit(price), fixed(price.time.median), group.unit]
+        for name in ("delay", "control rate")
+        if (group := groups.get(name))
+        for price in sorted(group.prices, key=lambda price: float(price.what.split()[0]))
+        if price.stiffness
+    ]
+    heads = ("", "", "stiffest steady wall", "time", "unit")
+    return FindingTable("What stiffness costs", heads, rows)
 
 
-def _meeting(scene: SceneCost, method: str, tolerance_m: float) -> list[float]:
-    """Times of a method's points within the tolerance, µs."""
-    points = [point for point in _of_method(scene, method) if meets(point, tolerance_m)]
-    return [point.us_per_tick.median for point in points if point.us_per_tick]
+def own_point(scene: SceneCost) -> Point | None:
+    """Returns the point of the method and plant rate that the scene itself names."""
+    return next((p for p in scene.points if (p.method, p.plant_rate) == (scene.own_method, scene.own_rate)), None)
 
 
-def _against(scene: SceneCost, other: str, method: str, tolerance_m: float) -> float | None:
-    """The least time of one method over that of another, both within the tolerance."""
-    theirs, ours = _meeting(scene, other, tolerance_m), _meeting(scene, method, tolerance_m)
-    return min(theirs) / min(ours) if theirs and ours else None
+def span(values: Iterable[float]) -> str:
+    """Formats the least and the largest value: ``1.2 to 6.9``; one number where they are the same, a dash for none."""
+    found = list(values)
+    if not found:
+        return _NONE
+    low, high = fixed(min(found), 2), fixed(max(found), 2)
+    return low if low == high else f"{low} to {high}"
 
 
-def _size(point: Point) -> float:
-    assert point.error is not None
-    return point.error.size_m
+def span_of_rates(points: Iterable[Point]) -> str:
+    """Formats the least and the largest plant rate; a dash for none."""
+    rates = sorted({point.plant_rate for point in points})
+    if not rates:
+        return _NONE
+    return rate(rates[0]) if len(rates) == 1 else f"{rate(rates[0])} to {rate(rates[-1])}"
 
 
-def _where(bad: list[tuple[SceneCost, Point]]) -> list[str]:
-    """``euler at up to 10 kHz``: every method once."""
-    highest: dict[str, int] = {}
-    for _, point in bad:
-        highest[point.method] = max(highest.get(point.method, 0), point.plant_rate)
-    return [f"{method} at up to {rate(hertz)}" for method, hertz in highest.items()]
+def _cheapest_of(scene: SceneCost, method: str | None, tolerance_m: float) -> Point | None:
+    """Returns the method's point of least time within the tolerance."""
+    points = [p for p in scene.points if p.method == method and p.us_per_tick and meets(p, tolerance_m)]
+    return min(points, key=_us, default=None)
+
+
+def _us(point: Point) -> float:
+    assert point.us_per_tick is not None
+    return point.us_per_tick.median
+
+
+def _median(point: Point | None) -> str:
+    return fixed(_us(point)) if point and point.us_per_tick else _NONE
+
+
+def _ratio(point: Point | None, other: Point | None) -> str:
+    timed = point and other and point.us_per_tick and other.us_per_tick
+    return fixed(_us(point) / _us(other)) if timed and point and other else _NONE
+
+
+def _entry(groups: dict[str, PriceGroup], name: str, what: str) -> Price | None:
+    return next((price for price in groups[name].prices if price.what == what), None) if name in groups else None
+
+
+def _limit(price: Price) -> str:
+    assert price.stiffness is not None
+    return spring(price.stiffness.stiffness_N_m) + ("" if price.stiffness.confirmed else " in theory")

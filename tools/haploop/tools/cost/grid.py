@@ -1,4 +1,4 @@
-"""What ``haploop cost`` compares: a scene with every method at every plant rate, and with its own setting."""
+"""The grid of ``haploop cost``: a scene with every method at every plant rate, and with its own setting."""
 
 from __future__ import annotations
 
@@ -36,11 +36,11 @@ class Candidate:
 
     @property
     def overrides(self) -> list[str]:
-        """What is laid over the scene file."""
+        """The ``KEY=VALUE`` that are laid over the scene file."""
         return [f"clock.integrator={self.method}", f"clock.plant_rate={self.plant_rate}"]
 
     def key(self, *made_with: Any) -> str:
-        """Names this candidate in the store: a hash of the resolved scene and of what it is measured with."""
+        """Returns its name in the store: a hash of the resolved scene and of what it is measured with."""
         return digest([self.method, self.plant_rate, self.scene, self.refusal, *made_with])
 
 
@@ -59,7 +59,7 @@ class Grid:
 
     @property
     def name(self) -> str:
-        """What the scene is called."""
+        """The name of the scene."""
         return self.path.stem
 
     @property
@@ -69,7 +69,7 @@ class Grid:
 
 
 def grid(path: Path, methods: Sequence[str], rates: Sequence[int]) -> Grid:
-    """Every candidate of a scene file.
+    """Makes every candidate of a scene file.
 
     Raises:
         SceneError: the scene cannot be run as it is.
@@ -97,12 +97,12 @@ def _candidate(path: Path, method: str, rate: int) -> Candidate:
 
 
 def digest(data: Any) -> str:
-    """A short hash of what JSON can hold."""
+    """Returns a short hash of what JSON can hold."""
     return hashlib.sha256(json.dumps(data, sort_keys=True).encode()).hexdigest()[:20]
 
 
 def scenes_folder() -> Path:
-    """The scenes that come with haploop: in a wheel inside haploop.launch, in a checkout beside it."""
+    """Returns the folder of haploop's own scenes: in a wheel inside haploop.launch, in a checkout beside it."""
     import haploop.launch
 
     package = Path(haploop.launch.__path__[0])
@@ -111,5 +111,5 @@ def scenes_folder() -> Path:
 
 
 def accuracy_scenes() -> list[Path]:
-    """The scenes made for this comparison."""
+    """Returns the scenes made for this comparison."""
     return sorted((scenes_folder() / "accuracy").glob("*.toml"))

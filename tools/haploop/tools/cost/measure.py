@@ -1,4 +1,4 @@
-"""Everything ``haploop cost`` measures, out of the store where it is there already, and put together for cost.json."""
+"""The measurements of ``haploop cost``: out of the store where known, else made; put together for cost.json."""
 
 from __future__ import annotations
 
@@ -14,7 +14,6 @@ from haploop.tools.cost.advice import advice
 from haploop.tools.cost.data import Cost, Errors, Load, Point, ReferenceNote, SceneCost, Spread
 from haploop.tools.cost.grid import Candidate, Grid, digest, scenes_folder
 from haploop.tools.cost.points import Outcome, outcome
-from haploop.tools.cost.prices.data import as_data
 from haploop.tools.cost.prices.prices import Prices
 from haploop.tools.cost.store import Store
 from haploop.tools.cost.times import IN_PROCESS, PROCESSES, Job
@@ -33,7 +32,7 @@ ReferenceFor = Callable[[Path, dict[str, Any]], "Reference"]
 
 
 class Measurement:
-    """A context manager: the measurements of some grids, kept in a directory.
+    """The measurements of some grids, kept in a directory; a context manager.
 
     Args:
         grids: what to compare.
@@ -72,7 +71,7 @@ class Measurement:
         return digest([grid.scene, *self._made_with])
 
     def errors(self, stage: Stage) -> None:
-        """Run every candidate of which nothing is known, and compare it.
+        """Runs every candidate of which nothing is known, and compares it.
 
         The order is random, so that the time left is told well.
         """
@@ -98,7 +97,7 @@ class Measurement:
         return reference
 
     def times(self, stage: Stage) -> None:
-        """Make every measurement of time that is missing; errors come first."""
+        """Makes every measurement of time that is missing; errors come first."""
         clocks = {IN_PROCESS: times.in_process_us, PROCESSES: times.processes_us}
         for what, clock in clocks.items():
             jobs, repeats = self._jobs(what), self._repeats[what]
@@ -106,14 +105,14 @@ class Measurement:
                 times.measure(self._store, what, clock, jobs, repeats, stage(f"times, {what}", count))
 
     def other_prices(self, stage: Stage) -> None:
-        """Measure what else is bought with time."""
+        """Measures the prices of books, log, effects, processes, delay and control rate."""
         self._prices().measure(stage)
 
     def _prices(self) -> Prices:
         return Prices(scenes_folder(), self._store, self._repeats)
 
     def _jobs(self, what: str) -> list[Job]:
-        """Every candidate whose run had at least one tick; as processes those that went to their end."""
+        """Returns a job for every candidate whose run had a tick; as processes, for those that ended as planned."""
         found = ((c, self._key(c), self._outcome(c)) for grid in self._grids for c in grid.candidates)
         jobs = [Job(c, key, came.ticks, came.error is None) for c, key, came in found if came and came.ticks]
         return jobs if what == IN_PROCESS else [job for job in jobs if not job.diverges]
@@ -126,7 +125,7 @@ class Measurement:
         return Outcome(**{**record, "error": error})
 
     def cost(self, tolerance_m: float) -> Cost:
-        """What is known so far, the prices included."""
+        """Returns all that is known so far, the prices included."""
         scenes = [self._scene_cost(grid, tolerance_m) for grid in self._grids if self._note(grid)]
         loads = [times.quiet(self._store, what, self._jobs(what), n) for what, n in self._repeats.items()]
         return Cost(
@@ -138,7 +137,7 @@ class Measurement:
             tolerance_m=tolerance_m,
             load=_worst(load for load in loads if load),
             scenes=scenes,
-            prices=as_data(self._prices().groups()),
+            prices=self._prices().groups(),
         )
 
     def _note(self, grid: Grid) -> dict[str, Any] | None:
@@ -173,7 +172,7 @@ class Measurement:
 
     def _spread(self, what: str, key: str) -> Spread | None:
         values = [value for value in self._store.all(what, key, self._repeats[what]) if value is not None]
-        return Spread.of(values) if values else None
+        return Spread.from_values(values) if values else None
 
 
 def _sources() -> str:
@@ -182,5 +181,5 @@ def _sources() -> str:
 
 
 def _worst(loads: Iterable[Load]) -> Load | None:
-    """The busiest."""
+    """Returns the busiest."""
     return max(loads, key=lambda load: (load.busy, load.calibration_spread), default=None)

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What came of one candidate, in one run that is not timed.
+    """The outcome of one candidate, in one run that is not timed.
 
     Attributes:
         error: against the reference; None where it failed.
@@ -37,7 +37,7 @@ class Outcome:
 
 
 def outcome(candidate: Candidate, reference: Reference) -> Outcome:
-    """Run a candidate and compare it. A failure is an outcome like any other."""
+    """Runs a candidate and compares it; a failure is an outcome like any other."""
     if candidate.scene is None:
         return Outcome(None, candidate.refusal, 0, None)
     try:
@@ -55,7 +55,7 @@ def outcome(candidate: Candidate, reference: Reference) -> Outcome:
 
 
 def _failure(ran: Trajectory, reference: Reference) -> str | None:
-    """Why a run cannot be compared, or None."""
+    """Returns why a run cannot be compared, or None."""
     if ran.summary["ended"] in ("diverged", "failed"):
         return f"Diverged: {ran.summary['why']}."
     if not np.isfinite(ran.x_m).all():
@@ -66,7 +66,7 @@ def _failure(ran: Trajectory, reference: Reference) -> str | None:
 
 
 def errors(ran: Trajectory, scene: dict[str, Any], reference: Reference) -> Errors:
-    """Compare a run that went to its end.
+    """Compares a run that went to its end.
 
     Positions are compared at the ticks after the start and at the end: sqrt(mean((x - x_ref)^2)) and the like. Where a
     chaotic reference forbids that, the swings in the verdict's window are: |a - a_ref| / |a_ref|.
@@ -89,13 +89,13 @@ def errors(ran: Trajectory, scene: dict[str, Any], reference: Reference) -> Erro
 
 
 def _residual(ran: Trajectory) -> float | None:
-    """The energy residual over the energy moved in total."""
+    """Returns the energy residual over the energy moved in total."""
     energy = ran.summary["energy"]
     return _share(_apart(energy["residual_J"], 0.0), energy["moved_J"])
 
 
 def _apart(value: float | None, reference: float | None) -> float | None:
-    """None where there is nothing to compare."""
+    """Returns the distance of two values; None where there is nothing to compare."""
     return None if value is None or reference is None else abs(value - reference)
 
 

@@ -1,4 +1,4 @@
-"""Everything measured so far, a line each: a command that was stopped goes on where it was."""
+"""A file of measurements, a line each: a command that was stopped goes on where it was."""
 
 from __future__ import annotations
 
@@ -39,20 +39,20 @@ class Store:
         self._file.close()
 
     def add(self, what: str, key: str, value: Any, repeat: int = 0) -> None:
-        """Keep a record, on disk at once."""
+        """Keeps a record, on disk at once."""
         self._records[what, key, repeat] = value
         record = {"what": what, "key": key, "repeat": repeat, "value": value}
         self._file.write(json.dumps(record) + "\n")
         self._file.flush()
 
     def get(self, what: str, key: str, repeat: int = 0) -> Any:
-        """A record, or None where there is none."""
+        """Returns a record, or None where there is none."""
         return self._records.get((what, key, repeat))
 
     def has(self, what: str, key: str, repeat: int = 0) -> bool:
-        """Whether there is one."""
+        """Tells whether there is a record."""
         return (what, key, repeat) in self._records
 
     def all(self, what: str, key: str, repeats: int) -> list[Any]:
-        """The records of the first ``repeats`` repeats, as far as there are any."""
+        """Returns the records of the first ``repeats`` repeats, as far as there are any."""
         return [self._records[what, key, i] for i in range(repeats) if (what, key, i) in self._records]

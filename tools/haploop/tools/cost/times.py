@@ -1,4 +1,4 @@
-"""How long a simulated tick takes: warm, interleaved in random order, repeated, the garbage collector still.
+"""Times of a simulated tick: warm, interleaved in random order, repeated, with the garbage collector off.
 
 A round times every candidate once, in an order drawn anew for each round from a fixed seed: what drifts or disturbs
 meets all of them alike. Each time is stored at once, so a round that was stopped goes on where it was.
@@ -7,11 +7,13 @@ meets all of them alike. Each time is stored at once, so a round that was stoppe
 from __future__ import annotations
 
 import gc
+import os
 import random
+import statistics
 import tempfile
 import time
 import warnings
-from collections.abc import Callable, Hashable, Iterator, Sequence
+from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -27,7 +29,6 @@ from haploop.logger.session import open_session
 from haploop.protocol.ticks import Timebase
 from haploop.tools.cost.data import Load
 from haploop.tools.cost.grid import Candidate
-from haploop.tools.cost.quiet import judged, look
 from haploop.tools.cost.store import Store
 
 IN_PROCESS, PROCESSES = "us in one process", "us as processes"
@@ -37,10 +38,11 @@ _FAR_M = 1e40
 # Shorter blocks cost more than what is in them.
 _LEAST_BLOCK = 20
 _QUIET = "quiet for "
+_STEPS = 100_000
 
 
 class Timed(Protocol):
-    """What can be timed, again and again.
+    """A thing that can be timed again and again.
 
     Attributes:
         key: its name in the store.
@@ -74,12 +76,12 @@ class Job:
 
     @property
     def family(self) -> Hashable:
-        """The same scene with the same method."""
+        """Scene and method."""
         return self.candidate.path, self.candidate.method
 
 
 def in_process_us(job: Job) -> float | None:
-    """Time of a tick of a candidate in this process, µs.
+    """Returns the time of a tick of a candidate in this process, µs.
 
     One that diverges has but a few ticks: it is let go on far beyond where it is stopped otherwise, in blocks so short
     that there is more than the first one where it can be.
@@ -93,7 +95,7 @@ def in_process_us(job: Job) -> float | None:
 
 
 def loop_us(scene: dict[str, Any]) -> float | None:
-    """Time of a tick in this process, with the books and without a log, µs; None where the run could not go on.
+    """Returns the time of a tick in this process, with books, without log, µs; None where the run could not go on.
 
     Neither building plant and controller nor the first block is counted, which makes what later ones only use; a run of
     a single block is counted whole. A method that blows up overflows: its warnings are kept back by the caller.
@@ -120,7 +122,7 @@ def _finish(loop: Loop) -> None:
 
 
 def timed_s(work: Callable[[], object]) -> float:
-    """How long some work takes, s, the garbage collector still."""
+    """Returns how long some work takes, s, with the garbage collector off."""
     gc.collect()
     gc.disable()
     try:
@@ -132,12 +134,12 @@ def timed_s(work: Callable[[], object]) -> float:
 
 
 def processes_us(job: Job) -> float | None:
-    """Time of a tick of a candidate as processes, every plant step logged, µs; None where the run failed."""
+    """Returns the time of a tick as processes, every plant step logged, µs; None where the run failed."""
     return run_us(job.candidate.path, [*job.candidate.overrides, "run.log=steps"], job.ticks)
 
 
 def run_us(path: Path, overrides: Sequence[str], ticks: int) -> float | None:
-    """Time of a tick as processes, starting up not included, µs; None where the run failed.
+    """Returns the time of a tick as processes, starting up not included, µs; None where the run failed.
 
     Raises:
         KeyboardInterrupt: a signal ended the run.
@@ -153,7 +155,7 @@ def run_us(path: Path, overrides: Sequence[str], ticks: int) -> float | None:
 
 
 def missing(store: Store, what: str, jobs: Sequence[Timed], repeats: int) -> int:
-    """How many measurements are still to be made."""
+    """Returns how many measurements are still to be made."""
     return sum(not store.has(what, job.key, repeat) for job in jobs for repeat in range(repeats))
 
 
@@ -165,16 +167,16 @@ def measure(
     repeats: int,
     advance: Callable[[], None],
 ) -> None:
-    """Make every measurement that is missing; ``advance`` is called after each.
+    """Makes every measurement that is missing; ``advance`` is called after each.
 
-    With each goes into the store how quiet the machine was in its round.
+    With each goes into the store the load of the machine in its round.
     """
     if not missing(store, what, jobs, repeats):
         return
     with _still():
         _warm(store, what, clock, jobs, repeats)
         for repeat in range(repeats):
-            seen = look(alone=what == IN_PROCESS)
+            seen = observe_machine(alone=what == IN_PROCESS)
             for job in random.Random(_SEED + repeat).sample(jobs, len(jobs)):
                 if not store.has(what, job.key, repeat):
                     took = clock(job)
@@ -185,7 +187,7 @@ def measure(
 
 @contextmanager
 def _still() -> Iterator[None]:
-    """What is alive now is left alone by the garbage collector, and what blows up does so in silence."""
+    """Keeps the garbage collector off what is alive now, and silences the warnings of runs that blow up."""
     gc.collect()
     gc.freeze()
     try:
@@ -199,7 +201,7 @@ def _still() -> Iterator[None]:
 def _warm(
     store: Store, what: str, clock: Callable[[TimedType], float | None], jobs: Sequence[TimedType], repeats: int
 ) -> None:
-    """Run every method of this process once untimed: imports, first calls, the interpreter's adaptive code."""
+    """Runs every family once untimed: imports, first calls, the interpreter's adaptive code."""
     if what == PROCESSES:
         return
     first = {j.family: j for j in jobs if missing(store, what, [j], repeats)}
@@ -208,5 +210,38 @@ def _warm(
 
 
 def quiet(store: Store, what: str, jobs: Sequence[Timed], repeats: int) -> Load | None:
-    """How quiet the machine was in the rounds of these jobs; None where nothing was measured."""
-    return judged(seen for job in jobs for seen in store.all(_QUIET + what, job.key, repeats))
+    """Returns the load of the machine in the rounds of these jobs; None where nothing was measured."""
+    return machine_load(seen for job in jobs for seen in store.all(_QUIET + what, job.key, repeats))
+
+
+def observe_machine(alone: bool) -> dict[str, Any]:
+    """Returns the time of a fixed calibration loop, s, and the load average.
+
+    Args:
+        alone: this process is all that should run; otherwise the load average tells nothing.
+    """
+    return {"loop_s": _loop_s(), "load": _load_average() if alone else None}
+
+
+def _loop_s() -> float:
+    value = 1.0
+    began = time.perf_counter()
+    for _ in range(_STEPS):
+        value = 0.5 * value + 0.25
+    return time.perf_counter() - began
+
+
+def _load_average() -> float | None:
+    """Returns the processes running or waiting for a core in the last minute, where the system tells."""
+    return os.getloadavg()[0] if hasattr(os, "getloadavg") else None
+
+
+def machine_load(observations: Iterable[dict[str, Any]]) -> Load | None:
+    """Returns the load that several observations come to; None for none."""
+    seen = list(observations)
+    if not seen:
+        return None
+    loops = [one["loop_s"] for one in seen]
+    loads = [one["load"] for one in seen if one["load"] is not None]
+    q1, middle, q3 = statistics.quantiles(loops, n=4, method="inclusive") if len(loops) > 1 else loops * 3
+    return Load(statistics.median(loads) if loads else None, (q3 - q1) / middle)

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from haploop.controller.controller import Controller
 from haploop.controller.dissipation import ElementError
-from haploop.controller.estimators.choose import Estimator, Sample
+from haploop.controller.estimators.base import Sample, Unchanged
 from haploop.logger.books.buffers import as_float64
 from haploop.logger.books.sums import add_columns, no_sums
 from haploop.logger.books.work import sampled_work
@@ -120,7 +120,7 @@ class Booking:
         return (self._sums.sums + self._sums.errors)[self._count :]
 
     def _begin(self) -> None:
-        self._controller = RecordedController(self._scene, self._time, self._kinds, self._recorded)
+        self._controller = _recorded_controller(self._scene, self._time, self._kinds, self._recorded)
         for tick, event in self._events:
             self._controller.schedule(tick, event)
         self._forces = np.zeros((self._count, self._lookahead + 2))
@@ -193,20 +193,26 @@ class MeasuredTime(Timebase):
         return self.measured_s
 
 
-class RecordedController(Controller):
+@dataclass(frozen=True)
+class Recorded(Unchanged):
+    """An estimate that comes with the sample.
+
+    Attributes:
+        place: in the sample.
+    """
+
+    place: int
+
+    def step(self, memory: Any, u: Any, sample: Sample) -> tuple[Any, Any]:
+        """Returns no memory and what was recorded."""
+        return None, sample[self.place]
+
+
+def _recorded_controller(
+    scene: dict[str, Any], time: Timebase, kinds: dict[str, type[Element]], recorded: frozenset[str]
+) -> Controller:
     """A controller that is given samples (x, acceleration, velocity) and takes what was recorded for an estimate."""
-
-    def __init__(
-        self, scene: dict[str, Any], time: Timebase, kinds: dict[str, type[Element]], recorded: frozenset[str]
-    ) -> None:
-        super().__init__(scene, time, kinds)
-        computed = self._start_estimates
-
-        def start(first: Sample) -> tuple[Estimator, Estimator]:
-            velocity, acceleration = computed(first)
-            return (
-                (lambda _x, sample: sample[2]) if "velocity" in recorded else velocity,
-                (lambda _v, sample: sample[1]) if "acceleration" in recorded else acceleration,
-            )
-
-        self._start_estimates = start
+    controller = Controller(scene, time, kinds)
+    places = {"acceleration": 1, "velocity": 2}
+    controller.params = replace(controller.params, **{of: Recorded(places[of]) for of in recorded})
+    return controller

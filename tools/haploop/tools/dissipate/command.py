@@ -132,7 +132,7 @@ def _draw(outcome: Outcome, request: Request) -> Path | None:
     """The figure's file; None, and a word on it, where there is no matplotlib."""
     from haploop.tools.dissipate.figure import figure_of
     from haploop.tools.figure.data import FigureError
-    from haploop.tools.figure.file import write_figure
+    from haploop.tools.figure.style import write_figure
 
     path = request.path
     beside = path / "dissipate.png" if path.is_dir() else path.with_name(f"{path.stem}-dissipate.png")

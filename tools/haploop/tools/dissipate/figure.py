@@ -10,7 +10,6 @@ import numpy as np
 from haploop.tools.dissipate.outcome import Outcome, in_words
 from haploop.tools.dissipate.report import answer, row_of
 from haploop.tools.dissipate.samples import Floats
-from haploop.tools.figure.file import empty_figure
 from haploop.tools.figure.style import (
     CLOSE,
     ELEMENTS,
@@ -24,6 +23,7 @@ from haploop.tools.figure.style import (
     WALL_FILL,
     dress,
     element_colour,
+    empty_figure,
     few_ticks,
     legend,
 )

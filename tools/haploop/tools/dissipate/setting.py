@@ -12,7 +12,7 @@ from haploop.launch.scene.file import resolved
 from haploop.launch.scene.layers import Layers
 from haploop.launch.scene.overrides import key_path
 from haploop.plant.sensing.encoder import accelerometer_is_used
-from haploop.tools.cli.live import assignments
+from haploop.tools.cli.options import parse_assignments
 from haploop.tools.dissipate.samples import RecordingError
 
 if TYPE_CHECKING:
@@ -107,7 +107,7 @@ def holds_readings(scene: dict[str, Any]) -> bool:
 
 def _setting(data: dict[str, Any], asked: Asked, path: Path, kinds: Kinds) -> dict[str, Any]:
     if asked.wall is not None:
-        position = next(iter(assignments([f"wall={asked.wall}"]).values()))
+        position = next(iter(parse_assignments([f"wall={asked.wall}"]).values()))
         data["wall"] = {"position": position, "stiffness": 0.0, "occupies": asked.occupies}
     tables = _elements(asked)
     if "wall" not in data:
@@ -123,14 +123,14 @@ def _elements(asked: Asked) -> list[dict[str, Any]]:
         tables += [{"kind": kind, "mass": _value(text)} for text in asked.masses]
     for text in asked.elements:
         kind, *parameters = shlex.split(text) or [""]
-        tables.append({"kind": kind, **assignments(parameters)})
+        tables.append({"kind": kind, **parse_assignments(parameters)})
     if not tables:
         raise RecordingError("Say which elements: --damping 2.7, --mass 0.0018, or --element KIND KEY=VALUE in quotes.")
     return tables
 
 
 def _value(text: str) -> Any:
-    return assignments([f"value={text}"])["value"]
+    return parse_assignments([f"value={text}"])["value"]
 
 
 def _refuse_what_needs_a_wall(tables: list[dict[str, Any]]) -> None:

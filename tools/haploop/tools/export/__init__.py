@@ -1,1 +1,1 @@
-"""Logs in the formats of other programs."""
+"""The log of a run in the formats of other programs: ``haploop export``."""

@@ -4,25 +4,34 @@ from __future__ import annotations
 
 import contextlib
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import IO
 from urllib.parse import quote
 
+from haploop.launch.output import OutputError
+from haploop.logger.log.stream import LogStream, survey
 from haploop.tools.cli.exit_codes import FAILED, WRONG_USE, leave, plain_errors
+from haploop.tools.export.archives import JsonMcapWriter, NpzWriter
+from haploop.tools.export.tables import CsvWriter, ParquetWriter
+from haploop.tools.export.writer import ExportWriter
+from haploop.tools.render.terminal import console
 
-if TYPE_CHECKING:
-    from haploop.logger.log.stream import LogStream
-    from haploop.tools.export.writer import ExportWriter
+WRITERS: dict[str, type[ExportWriter]] = {
+    "csv": CsvWriter,
+    "npz": NpzWriter,
+    "parquet": ParquetWriter,
+    "json-mcap": JsonMcapWriter,
+}
+FORMATS = tuple(WRITERS)
 
-FORMATS = ("csv", "npz", "parquet", "json-mcap")
+
+class ExportFailed(Exception):
+    """Raised where the files could not be written to their end; the message says why, and none of them is left."""
 
 
 def export_run(path: Path, to: str, out: Path | None, topics: str | None, force: bool) -> None:
-    """Write a run's log in another format and name the files."""
-    from haploop.logger.log.stream import survey
-    from haploop.tools.export.files import ExportFailed
-
+    """Writes a run's log in another format and names the files."""
     with plain_errors():
         try:
             writer = _writer(to)
@@ -40,23 +49,13 @@ def export_run(path: Path, to: str, out: Path | None, topics: str | None, force:
 
 
 def _writer(to: str) -> type[ExportWriter]:
-    """The writer of a format; only the libraries of this one are imported."""
-    match to:
-        case "csv":
-            from haploop.tools.export.csv import CsvWriter as Writer
-        case "npz":
-            from haploop.tools.export.npz import NpzWriter as Writer
-        case "parquet":
-            from haploop.tools.export.parquet import ParquetWriter as Writer
-        case "json-mcap":
-            from haploop.tools.export.json_mcap import JsonMcapWriter as Writer
-        case _:
-            leave(f"--to must be one of {', '.join(FORMATS)}, but {to!r} was given.", WRONG_USE)
-    return Writer
+    if to not in WRITERS:
+        leave(f"--to must be one of {', '.join(FORMATS)}, but {to!r} was given.", WRONG_USE)
+    return WRITERS[to]
 
 
 def _chosen(contents: LogStream, topics: str | None) -> dict[str, dict[str, str]]:
-    """Unit by column of the topics asked for, by topic."""
+    """Returns the unit by column of the topics asked for, by topic."""
     if not contents.units:
         leave(f"The log {contents.path} holds no channel yet, so there is nothing to export.", FAILED)
     if topics is None:
@@ -70,7 +69,7 @@ def _chosen(contents: LogStream, topics: str | None) -> dict[str, dict[str, str]
 
 
 def _targets(log: Path, out: Path | None, writer: type[ExportWriter], topics: list[str]) -> list[Path]:
-    """The files to write: beside the log, or where ``out`` says."""
+    """Returns the files to write: beside the log, or where ``out`` says."""
     if writer.file_per_topic:
         names = [quote(topic.strip("/"), safe="") for topic in topics]
         return [(out or log.parent) / f"{name}{writer.suffix}" for name in names]
@@ -86,10 +85,7 @@ def _export(
     targets: list[Path],
     force: bool,
 ) -> None:
-    """Go through the log a second time, now that all its columns are known, and write it."""
-    from haploop.logger.log.stream import LogStream
-    from haploop.tools.export.files import new_files
-
+    """Reads the log a second time, now that all its columns are known, and writes it."""
     log = LogStream(contents.path, units.keys(), until=contents.read_bytes)
     with (
         new_files(targets, force) as files,
@@ -104,12 +100,57 @@ def _export(
 
 @contextlib.contextmanager
 def _progress(total_bytes: int) -> Iterator[Callable[[int], None]]:
-    """A bar on a terminal, fed with how much of the log is done; nothing elsewhere."""
+    """Shows a bar on a terminal, fed with the bytes of the log that are done; nothing elsewhere."""
     from rich.progress import Progress
-
-    from haploop.tools.render.terminal import console
 
     shown = console(stderr=True)
     with Progress(console=shown, transient=True, disable=not shown.is_terminal) as bar:
         task = bar.add_task("exporting", total=total_bytes)
         yield lambda done_bytes: bar.update(task, completed=done_bytes)
+
+
+@contextlib.contextmanager
+def new_files(targets: Sequence[Path], replace: bool) -> Iterator[list[IO[bytes]]]:
+    """Opens a file for each target, under the target's name with ``.part`` after it; they take their names at the end.
+
+    When something raises on the way, no part is left and the files that had the names stay.
+
+    Raises:
+        OutputError: a target exists already and ``replace`` is not set, or a file cannot be made.
+        ExportFailed: the operating system refuses to write on.
+    """
+    for target in targets:
+        if target.is_dir() or (target.exists() and not replace):
+            hint = "" if target.is_dir() else ", or write over it with --force"
+            raise OutputError(f"{target} exists already; name another place with --out{hint}.")
+    parts = [target.with_name(f"{target.name}.part") for target in targets]
+    opened: list[IO[bytes]] = []
+    try:
+        for part in parts:
+            opened.append(_open(part))
+        try:
+            yield opened
+            for file in opened:
+                file.close()
+            for part, target in zip(parts, targets, strict=True):
+                part.replace(target)
+        except OSError as error:
+            raise ExportFailed(
+                f"Writing to {targets[0].parent} failed ({error.strerror or error}); nothing was exported. "
+                "Make room there or name another place with --out."
+            ) from error
+    finally:
+        for file, part in zip(opened, parts, strict=False):
+            with contextlib.suppress(OSError):
+                file.close()
+            part.unlink(missing_ok=True)
+
+
+def _open(part: Path) -> IO[bytes]:
+    try:
+        part.parent.mkdir(parents=True, exist_ok=True)
+        return part.open("wb")
+    except OSError as error:
+        raise OutputError(
+            f"{part} cannot be made ({error.strerror}); name a place that is writable with --out."
+        ) from error

@@ -6,9 +6,18 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from haploop.tools.figure.data import TOGETHER, FigureError, RunData
-from haploop.tools.figure.file import empty_figure, write_figure
 from haploop.tools.figure.loops import draw_force_position, draw_momentum
-from haploop.tools.figure.style import CLOSE, INK, OF_THE_PLANT, WALL, element_colour, few_ticks, legend
+from haploop.tools.figure.style import (
+    CLOSE,
+    INK,
+    OF_THE_PLANT,
+    WALL,
+    element_colour,
+    empty_figure,
+    few_ticks,
+    legend,
+    write_figure,
+)
 from haploop.tools.figure.text_panels import draw_books, draw_events, draw_header, event_lines
 from haploop.tools.figure.time import energy_panel, force_panel, mark_events, position_panel
 

@@ -1,12 +1,16 @@
-"""Colours that the colour-blind tell apart (Okabe and Ito 2008), and axes without clutter."""
+"""Figures: an empty one, its file, colours told apart by the colour-blind (Okabe and Ito 2008), plain axes."""
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+from haploop.tools.figure.data import FigureError
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.axis import Axis
+    from matplotlib.figure import Figure
 
 INK, GREY, FAINT = "#222222", "#666666", "#BBBBBB"
 WALL, WALL_FILL, CLOSE = "#0072B2", "#D6E6F2", "#EBD9A8"
@@ -75,3 +79,38 @@ def corner_legend(ax: Axes) -> None:
     """A legend in the upper left corner, which loops of springs and inertias leave free."""
     few_ticks(ax)
     legend(ax, loc="upper left", bbox_to_anchor=(0.0, 1.0), ncols=1, framealpha=0.8, edgecolor="none")
+
+
+_DPI = 110
+
+
+def empty_figure(width_in: float, height_in: float) -> Figure:
+    """A white figure of this size in inches that makes room for what it holds.
+
+    Raises:
+        FigureError: matplotlib is missing.
+    """
+    try:
+        from matplotlib.figure import Figure
+    except ImportError as error:
+        raise FigureError("Figures need matplotlib; install it with: pip install 'haploop[plot]'") from error
+    return Figure(figsize=(width_in, height_in), dpi=_DPI, facecolor="white", layout="constrained")
+
+
+def write_figure(figure: Figure, target: Path) -> Path:
+    """Write a figure in the format of the file's suffix; returns the file.
+
+    Raises:
+        FigureError: it cannot be written.
+    """
+    try:
+        figure.savefig(target, dpi=_DPI)
+    except (ValueError, OSError) as error:
+        raise FigureError(f"The figure {target} cannot be written: {error}.") from error
+    return target
+
+
+def fix_layout(figure: Figure) -> None:
+    """Give everything its place and keep it there, so that labels can be placed among what is drawn."""
+    figure.draw_without_rendering()
+    figure.set_layout_engine("none")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from haploop.protocol.changes import describe
 from haploop.tools.figure.data import Book, RunData
 from haploop.tools.figure.style import GREY, INK, LARGE, SMALL, TEXT, VERDICTS
-from haploop.tools.render.sentences import count_losses, plant_books
+from haploop.tools.render.report import count_losses, plant_books
 from haploop.tools.render.units import amount, parameters, spring
 
 if TYPE_CHECKING:

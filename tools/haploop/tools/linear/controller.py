@@ -6,10 +6,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from haploop.controller.controller_batch import ControllerArray
-from haploop.launch.batch.object_state import replace_arrays
+from haploop.controller.controller import make_params
+from haploop.controller.tick import ControllerParams, StateTuple, initial_state, tick
 from haploop.plant.sensing.encoder import accelerometer_is_used
-from haploop.protocol.ticks import Timebase
+from haploop.protocol.trees import tree_leaves, tree_unflatten
 from haploop.tools.linear.linearity import Kinds
 
 # A wall without stiffness that is never left: the elements act, and its own force is added where it is known.
@@ -30,24 +30,27 @@ class LinearController(NamedTuple):
     force: np.ndarray
 
     @classmethod
-    def of(cls, scene: dict[str, Any], kinds: Kinds) -> LinearController:
-        """That of a resolved scene of which ``why_not_linear`` has nothing to say.
+    def from_scene(cls, scene: dict[str, Any], kinds: Kinds) -> LinearController:
+        """Finds that of a resolved scene of which ``why_not_linear`` has nothing to say.
 
-        By superposition: a controller for many loops is run until its memory has its full size. Then loop i is given
-        a memory, or a sample, of 1 in place i and 0 elsewhere. One tick later the memory is A and B, row by row.
+        By superposition: a batch is ticked whose member i has a state, or a sample, of 1 in place i and 0 elsewhere.
+        Its next state is A and B, row by row. Whole numbers of the state count ticks; they are run to where they stay.
         """
-        time, inputs = Timebase.from_clock(scene["clock"], scene["duration"]), 1 + accelerometer_is_used(scene)
-        controller = ControllerArray({**scene, "wall": _ALWAYS_INSIDE}, time, dict(kinds))
-        places = -1
-        while places != (places := len(_memory(controller))):
-            _tick(controller, np.zeros((inputs, 1)))
-        units = np.eye(places + inputs)
-        _remember(controller, list(units[:places]))
-        force = _tick(controller, units[places:])
-        return cls(np.array(_memory(controller)).reshape(places, -1), force)._without_what_is_not_used()
+        period_s, inputs = 1.0 / scene["clock"]["control_rate"], 1 + accelerometer_is_used(scene)
+        params = make_params({**scene, "wall": _ALWAYS_INSIDE}, period_s, dict(kinds))
+        state = _settled(params, (0.0,) * inputs)
+        leaves = tree_leaves(state)
+        numbers = [place for place, leaf in enumerate(leaves) if isinstance(leaf, float)]
+        units = np.eye(len(numbers) + inputs)
+        for row, place in zip(units, numbers, strict=False):
+            leaves[place] = row
+        after, row = tick(params, tree_unflatten(state, leaves), tuple(units[len(numbers) :]))
+        found = tree_leaves(after)
+        moved = np.array([np.broadcast_to(found[place], len(units)) for place in numbers]).reshape(-1, len(units))
+        return cls(moved, np.broadcast_to(row[-2], len(units)))._without_what_is_not_used()
 
     def _without_what_is_not_used(self) -> LinearController:
-        """What neither the force nor any other memory depends on is left out, until nothing of the kind remains."""
+        """The system without what neither the force nor any other memory depends on, until none of that is left."""
         moved, force = self
         memory = len(moved)
         used = (np.vstack([moved, force]) != 0.0).any(axis=0)[:memory]
@@ -57,26 +60,11 @@ class LinearController(NamedTuple):
         return LinearController(moved[used][:, columns], force[columns])._without_what_is_not_used()
 
 
-def _tick(controller: ControllerArray, sample: np.ndarray) -> np.ndarray:
-    """The force that answers a sample, a row for each of its inputs, a column for each loop."""
-    force = controller.answer([tuple(sample)])[0]
-    controller.recorder.take_rows()
-    return np.asarray(force)
-
-
-def _memory(controller: ControllerArray) -> list[np.ndarray]:
-    """All that it remembers: its arrays of numbers over the loops, always in the same order."""
-    found: list[np.ndarray] = []
-
-    def take(array: np.ndarray) -> np.ndarray:
-        if array.dtype == float:
-            found.append(array)
-        return array
-
-    replace_arrays(controller, take)
-    return found
-
-
-def _remember(controller: ControllerArray, rows: list[np.ndarray]) -> None:
-    left = iter(rows)
-    replace_arrays(controller, lambda array: next(left) if array.dtype == float else array)
+def _settled(params: ControllerParams, at_rest: tuple[float, ...]) -> StateTuple:
+    """The state at rest once no whole number in it changes any more."""
+    state: StateTuple = initial_state(params, at_rest)
+    while True:
+        after, _ = tick(params, state, at_rest)
+        if tree_leaves(after) == tree_leaves(state):
+            return state
+        state = after

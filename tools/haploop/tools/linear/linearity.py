@@ -6,15 +6,15 @@ from collections.abc import Mapping
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
+from haploop.controller.active_elements import keeps_attributes, make_element
 from haploop.controller.dissipation import registry
-from haploop.plant.choose import integrator_of
+from haploop.launch.plan.effect import as_written, at
+from haploop.launch.plan.effects import all_effects
 
 if TYPE_CHECKING:
     from haploop.controller.dissipation import Element
 
 Kinds = Mapping[str, "type[Element]"]
-# DOP853 keeps its error near the last bits: its steps are those of the exact flow for all that is asked here.
-_EXACT = ("exact", "dop853")
 
 
 @cache
@@ -35,20 +35,12 @@ def why_not_linear(scene: dict[str, Any], kinds: Kinds | None = None) -> list[st
         kinds: element kinds at hand; the installed ones when None.
     """
     kinds = installed_kinds() if kinds is None else kinds
-    curved = [f"[{table}]" for table in ("friction", "jitter", "loss") if scene.get(table)]
-    for table in ("velocity", "acceleration"):
-        if scene.get(table, {}).get("estimator") == "foaw":
-            curved.append(f'{table}.estimator = "foaw"')
-    if (integrator := integrator_of(scene)) not in _EXACT:
-        curved.append(f'clock.integrator = "{integrator}"')
-    elements = dict.fromkeys(table["kind"] for table in scene.get("dissipation", []))
-    return curved + [f"the element {kind}" for kind in elements if not kinds[kind].linear]
+    curved = [effect.written for effect in all_effects() if not effect.linear and effect.is_named(scene)]
+    elements = {table["kind"]: make_element(table, kinds)[0] for table in scene.get("dissipation", [])}
+    return curved + [f"the element {kind}" for kind, one in elements.items() if not one.linear or keeps_attributes(one)]
 
 
 def left_out(scene: dict[str, Any]) -> list[str]:
     """What a resolved scene has, and the map of small and smooth swings in a contact that is never left has not."""
-    tables = [f"[{table}]" for table in ("encoder", "noise") if scene.get(table)]
-    found = [("accelerometer", key) for key in ("bias", "noise_density", "range", "resolution")]
-    found += [("actuator", key) for key in ("resolution", "saturation")]
-    keys = [f"{table}.{key}" for table, key in found if scene.get(table, {}).get(key)]
-    return tables + keys + (["[[event]]"] if scene.get("event") else [])
+    keys = [key for effect in all_effects() for key in effect.left_out if at(scene, key)]
+    return [as_written(key) for key in keys] + (["[[event]]"] if scene.get("event") else [])

@@ -68,7 +68,7 @@ class OneTickMap:
                 "The stiffness limit is that of a linear loop: held forces on masses, springs and dampers. "
                 f"{scene['title']!r} also has {', '.join(curved)}; take it out to ask for the limit."
             )
-        after = _after_a_tick(scene, LinearController.of(scene, kinds))
+        after = _after_a_tick(scene, LinearController.from_scene(scene, kinds))
         return cls(after[:, :-1], after[:, -1])
 
     def matrix(self, stiffness: float) -> np.ndarray:

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from haploop.controller.estimators.kalman import assumed_noises
+from haploop.launch.plan.effect import without_keys
+from haploop.launch.plan.effects import all_effects
 from haploop.launch.runs.in_process import run_in_process
 from haploop.logger.verdict.measures import WINDOW_S
 from haploop.plant.chain.chain import Chain
@@ -19,6 +21,8 @@ if TYPE_CHECKING:
 BELOW, ABOVE = 0.97, 1.03
 # The surface is this far from where the loop rests inside the wall; its swings start with this and must change by this.
 _DEPTH_M, _START_M, _CHANGE = 2e-3, 3e-6, 100.0
+# Keys that every [accelerometer] has; they are 0 where there is none of it.
+_NOT_ABSENT = ("accelerometer.noise_density", "accelerometer.bias")
 # Links that are stretched and an actuator that lags start with swings of up to the depth: it is then less.
 _DEPTH_OF_MORE_STATES_M = 6e-5
 
@@ -85,12 +89,8 @@ def smooth(scene: dict[str, Any]) -> dict[str, Any]:
     period_s = 1.0 / scene["clock"]["control_rate"]
     if scene.get("velocity", {}).get("estimator") == "kalman":
         smoothed["velocity"] |= assumed_noises(scene, period_s)
-    for table in ("encoder", "noise", "event"):
-        smoothed.pop(table, None)
-    for key in ("noise_density", "bias", "range", "resolution"):
-        smoothed.get("accelerometer", {}).pop(key, None)
+    rough = [key for effect in all_effects() for key in effect.left_out if key not in _NOT_ABSENT]
+    smoothed = without_keys(smoothed, "event", *rough)
     if "accelerometer" in smoothed:
-        smoothed["accelerometer"] |= {"noise_density": 0.0, "bias": 0.0}
-    for key in ("resolution", "saturation"):
-        smoothed.get("actuator", {}).pop(key, None)
+        smoothed["accelerometer"] |= dict.fromkeys((key.partition(".")[2] for key in _NOT_ABSENT), 0.0)
     return smoothed

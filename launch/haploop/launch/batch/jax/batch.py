@@ -109,7 +109,7 @@ class CompiledLoops(LoopArray):
         motion, books = self._motion, self._logger.books.plant if self._logger.books else None
         if not isinstance(motion, LinearMotionArray) or isinstance(books, ChainBooks):
             raise NoTick("there are several bodies")
-        return Tick(tick, motion, self._line, self._quantise, self._feels, self._controller, books)
+        return Tick(tick, motion, self._line, self._quantise, self._feels, self._controller, self._rows, books)
 
     def _by_program(self, first: int, until: int) -> None:
         tick = self._tick(first)
@@ -220,7 +220,7 @@ class CompiledLoops(LoopArray):
 
     def _note_wall_position(self, first: int, end: int) -> None:
         ring = self._window.state.rows["wall_position"]
-        ring[np.arange(first, end) % len(ring)] = self._controller.recorder._place["position"]
+        ring[np.arange(first, end) % len(ring)] = self._controller.params.wall.position
 
     def _fetch(self, carry: Carry, rings: Rings, *, writable: bool) -> None:
         """Let the logger have what the program has kept."""

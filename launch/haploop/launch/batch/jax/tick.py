@@ -8,7 +8,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from haploop.controller.controller_batch import ControllerArray
+from haploop.controller.controller import Controller
+from haploop.controller.recorder import BatchRecorder
 from haploop.launch.batch.jax.rows import Rows
 from haploop.launch.batch.jax.stand_ins import Drawn, Given, Outside, rounded
 from haploop.launch.batch.jax.state import Leaves
@@ -57,11 +58,11 @@ class Tick:
     """
 
     def __init__(
-        self, at: int, motion: LinearMotionArray, line: Any, quantise: Any, feels: bool, controller: ControllerArray,
-        books: OneMassBooks | None,
+        self, at: int, motion: LinearMotionArray, line: Any, quantise: Any, feels: bool, controller: Controller,
+        rows: BatchRecorder, books: OneMassBooks | None,
     ) -> None:  # fmt: skip
         self.at, self._motion, self._line, self._quantise, self._feels = at, motion, line, quantise, feels
-        self._controller = controller
+        self._controller, self._rows = controller, rows
         self.steps = motion._steps
         self.draws: list[Draw] = []
         self._drawn: list[Drawn] = []
@@ -79,7 +80,7 @@ class Tick:
             line = line._line
         self._forces: list[Any] = line._forces
         self.commands, self._forces[:] = list(self._forces), [None] * len(self._forces)
-        self._by_itself = [quantise, *controller.carried, self.books]
+        self._by_itself = [quantise, controller, self.books]
         self._root = [motion, self._line, *self._by_itself]
         self.leaves = Leaves(self._root)
 
@@ -134,7 +135,7 @@ class Tick:
         forces = self._controller.answer([(x_m, motion.acceleration(tick)) if self._feels else (x_m,)])
         self._line.receive(forces)
         motion.advance(tick, self._line.holds(tick))
-        (row,) = self._controller.recorder.take_rows()
+        (row,) = self._rows.take_rows()
         told = self._told(*start, row)
         reported = report(told)
         self._end(tick)
@@ -181,8 +182,8 @@ class Tick:
             x_low_rows += [x_low] * known + (dx - (at_x - x)).rows
             held_forces.append((count, force))
         x, v, x_low = Rows([*x_rows, motion.x]), Rows([*v_rows, motion.v]), Rows([*x_low_rows, motion._x_low])
-        wall = self._controller._wall
-        place = wall.position, wall.stiffness, wall.into_wall
+        wall = self._controller.params.wall
+        place = wall.position, wall.stiffness, wall.inward
         return Ticked(x, v, x_low, held_forces, row.columns, row.forces, place, tau)
 
     def _end(self, tick: int) -> None:

@@ -1,1 +1,1 @@
-"""The prices of books, log, effects, processes, delay and control rate."""
+"""Prices of books, log, effects, processes, delay and control rate: jobs to time, measurements, figure."""

@@ -1,4 +1,4 @@
-"""The figure of the other prices: bars for what can be had or left, and stiffness against time where that is bought."""
+"""The figure of the other prices: bars of times, and stiffness against time for delay and control rate."""
 
 from __future__ import annotations
 
@@ -8,13 +8,24 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from haploop.tools.ablation import AGAIN, NONE
-from haploop.tools.cost.data import Cost
-from haploop.tools.cost.draw.panel import UNCERTAIN
-from haploop.tools.cost.prices.data import Price, PriceGroup, chance_in, price_groups
+from haploop.tools.cost.data import Cost, Price, PriceGroup, chance_in
+from haploop.tools.cost.figure import UNCERTAIN
 from haploop.tools.figure.data import FigureError
-from haploop.tools.figure.file import empty_figure, fix_layout, write_figure
 from haploop.tools.figure.labels import Label, place_labels
-from haploop.tools.figure.style import ELEMENTS, FAINT, GREY, INK, SMALL, TEXT, WALL, dress, plain_numbers
+from haploop.tools.figure.style import (
+    ELEMENTS,
+    FAINT,
+    GREY,
+    INK,
+    SMALL,
+    TEXT,
+    WALL,
+    dress,
+    empty_figure,
+    fix_layout,
+    plain_numbers,
+    write_figure,
+)
 from haploop.tools.render.units import fixed
 
 if TYPE_CHECKING:
@@ -28,16 +39,16 @@ _CURVES = {"delay": (0, 3, 2), "control rate": (3, 3, 2)}
 
 
 def draw(cost: Cost, target: Path) -> Path:
-    """Draw the prices into a file, in the format of its suffix.
+    """Draws the prices into a file, in the format of its suffix.
 
     Raises:
         FigureError: matplotlib is missing, no price was measured, or the file cannot be written.
     """
-    return write_figure(figure_of(price_groups(cost)), target)
+    return write_figure(figure_of(cost.prices), target)
 
 
 def figure_of(groups: list[PriceGroup]) -> Figure:
-    """A panel a group; the place of a group that was not measured stays empty.
+    """Makes a panel a group; the place of a group that was not measured stays empty.
 
     Raises:
         FigureError: matplotlib is missing, or there is no group.
@@ -64,7 +75,7 @@ def figure_of(groups: list[PriceGroup]) -> Figure:
 
 
 def _bars(ax: Axes, group: PriceGroup) -> None:
-    """Time of each, from the baseline down, with quartiles."""
+    """Draws the time of each price, from the baseline down, with quartiles."""
     prices = group.prices
     colours = [GREY, *[WALL] * (len(prices) - 1)]
     _rows(ax, [price.what for price in prices], [price.time.median for price in prices], colours, group.title)
@@ -75,7 +86,7 @@ def _bars(ax: Axes, group: PriceGroup) -> None:
 
 
 def _effects(ax: Axes, group: PriceGroup) -> None:
-    """What each effect adds, the dearest first; within the shaded band it is chance."""
+    """Draws the time that each effect adds, the dearest first; the shaded band is chance."""
     chance = chance_in(group)
     named = [price for price in group.prices[1:] if price.what not in (AGAIN, NONE)]
     named.sort(key=lambda price: -price.costs)
@@ -89,12 +100,12 @@ def _effects(ax: Axes, group: PriceGroup) -> None:
 
 
 def _about(group: PriceGroup) -> str:
-    """Below the axes: what is measured, and how."""
+    """Returns the label of the axis: unit, and how it was measured."""
     return f"{group.unit}\n{group.how}"
 
 
 def _counted(price: Price, group: PriceGroup) -> str:
-    """Its time, and its instructions where they were counted."""
+    """Formats the time of an effect, and its instructions where they were counted."""
     words = fixed(price.costs, 2)
     whole, without = group.baseline.instructions_per_tick, price.instructions_per_tick
     return words if whole is None or without is None else f"{words}; {fixed(whole - without)} instructions"
@@ -111,7 +122,7 @@ def _rows(ax: Axes, names: list[str], values: list[float], colours: list[str], t
 
 
 def _write(ax: Axes, ends: list[tuple[float, str]]) -> None:
-    """Words at the ends of the bars, and room for them."""
+    """Writes words at the ends of the bars, and makes room for them."""
     low, high = ax.get_xlim()
     ax.set_xlim(min(low, 0.0), high + 0.42 * (high - low))
     gap = 0.015 * (high - low)
@@ -120,7 +131,7 @@ def _write(ax: Axes, ends: list[tuple[float, str]]) -> None:
 
 
 def _curve(ax: Axes, group: PriceGroup) -> None:
-    """The stiffness that stays steady against time; hollow where runs did not agree with it."""
+    """Draws the largest steady stiffness against time; hollow where runs did not agree with it."""
     dress(ax, group.title, _about(group), "largest steady stiffness (N/m)")
     ax.xaxis.label.set_fontsize(SMALL)
     ax.set_xscale("log")
@@ -143,7 +154,7 @@ def _curve(ax: Axes, group: PriceGroup) -> None:
 
 
 def _with_limit(group: PriceGroup) -> list[Price]:
-    """In the order of the stiffness."""
+    """Returns the prices that have a stiffness, in its order."""
     prices = [price for price in group.prices if price.stiffness]
     return sorted(prices, key=lambda price: price.stiffness.stiffness_N_m if price.stiffness else 0.0)
 

@@ -1,4 +1,4 @@
-"""What is timed for the other prices: the same loop with one thing more or less, or one number changed."""
+"""Jobs that are timed for the prices: one loop with one thing more or less, or one number changed."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ _FREE = "diverged_beyond=1e9"
 
 @dataclass(frozen=True)
 class PriceJob:
-    """A way to run a scene.
+    """A scene and a way to run it.
 
     Attributes:
         way: ``IN_PROCESS`` or ``PROCESSES``.
-        family: what is warmed up together.
+        family: jobs that are warmed up together.
         key: its name in the store.
         scene: resolved.
         clock: runs it once and returns the time of a tick, µs; None where the run failed.
@@ -44,7 +44,7 @@ class PriceJob:
     clock: Callable[[], float | None]
 
     def measure(self) -> float | None:
-        """The time of a tick, µs."""
+        """Runs it once and returns the time of a tick, µs."""
         return self.clock()
 
 
@@ -53,7 +53,7 @@ Jobs = dict[str, dict[str, PriceJob]]
 
 
 def price_jobs(scenes: Path, made_with: Sequence[Any]) -> Jobs:
-    """Every job of every group, baselines first.
+    """Makes every job of every group, baselines first.
 
     Args:
         scenes: the folder of the scenes: the paper's wall, fig6a.toml, without delay, and all_effects.toml.
@@ -84,7 +84,7 @@ def _prompt(delay_s: float = 0.0) -> str:
 
 
 def _keyed(jobs: Mapping[str, PriceJob], made_with: Sequence[Any]) -> dict[str, PriceJob]:
-    """The same jobs, named by all that their times depend on."""
+    """Returns the same jobs, with keys made of all that their times depend on."""
     return {
         what: PriceJob(job.way, job.family, digest([job.key, job.scene, *made_with]), job.scene, job.clock)
         for what, job in jobs.items()
@@ -92,7 +92,7 @@ def _keyed(jobs: Mapping[str, PriceJob], made_with: Sequence[Any]) -> dict[str, 
 
 
 def _in_process(scene: dict[str, Any], name: str = "") -> PriceJob:
-    """Plant, controller and books in one process; a name keeps what is otherwise the same apart."""
+    """Makes a job of plant, controller and books in one process; a name keeps equal jobs apart."""
     return PriceJob(IN_PROCESS, f"books {name}", f"books {name}", scene, lambda: loop_us(scene))
 
 
@@ -102,12 +102,12 @@ def _as_processes(path: Path, overrides: Sequence[str]) -> PriceJob:
 
 
 def _bare(scene: dict[str, Any]) -> PriceJob:
-    """Plant and controller alone: their telemetry is made and thrown away."""
+    """Makes a job of plant and controller alone: their telemetry is made and thrown away."""
     return PriceJob(IN_PROCESS, "bare", "bare", scene, lambda: bare_us(scene))
 
 
 def bare_us(scene: dict[str, Any]) -> float:
-    """Time of a tick of plant and controller in this process without any books, µs.
+    """Returns the time of a tick of plant and controller in this process without any books, µs.
 
     In blocks as in a run, the first of them not counted either where there are more.
     """

@@ -1,4 +1,4 @@
-"""The other prices of accuracy: books, log, effects, processes, delay, control rate; measured, and what each buys."""
+"""Measurement of the prices: books, log, effects, processes, delay and control rate, and the gain of each in words."""
 
 from __future__ import annotations
 
@@ -11,8 +11,7 @@ from haploop.controller.dissipation import registry
 from haploop.launch.plan.effects import EFFECTS
 from haploop.tools.ablation import AGAIN, NONE, WHOLE
 from haploop.tools.cost import times
-from haploop.tools.cost.data import Spread
-from haploop.tools.cost.prices.data import Price, PriceGroup, price
+from haploop.tools.cost.data import Price, PriceGroup, Spread, price
 from haploop.tools.cost.prices.jobs import PriceJob, price_jobs
 from haploop.tools.cost.store import Store
 from haploop.tools.cost.times import IN_PROCESS, PROCESSES
@@ -76,7 +75,7 @@ class Prices:
         }
 
     def measure(self, stage: Stage) -> None:
-        """Make every measurement that is missing: limits and counts first, since they do not depend on the hour."""
+        """Makes every measurement that is missing: limits and counts first, since they do not depend on the hour."""
         self._limits_and_counts(stage)
         every = {job.key: job for members in self._jobs.values() for job in members.values()}
         for way, repeats in self._repeats.items():
@@ -101,11 +100,11 @@ class Prices:
                     advance()
 
     def groups(self) -> list[PriceGroup]:
-        """The groups of which every time is known."""
+        """Returns the groups of which every time is known."""
         return [self._group(name) for name, jobs in self._jobs.items() if all(map(self._times, jobs.values()))]
 
     def _times(self, job: PriceJob) -> list[float]:
-        """Its times in µs per tick, as far as there are any; none for a run that failed."""
+        """Returns the times of a job in µs per tick, as far as there are any; none for a run that failed."""
         values = self._store.all(job.way, job.key, self._repeats[job.way])
         return [] if None in values else values
 
@@ -130,7 +129,7 @@ class Prices:
 
 
 def _steady_up_to(limit: StiffnessLimit) -> str:
-    """What a delay or a control rate leaves of stiffness."""
+    """Returns the stiffness that a delay or a control rate allows, in words."""
     if limit.confirmed:
         return f"a wall of up to {spring(limit.stiffness_N_m)} stays steady"
     ran = f"but runs at 0.97 and 1.03 of it were {limit.below} and {limit.above}"
@@ -138,5 +137,5 @@ def _steady_up_to(limit: StiffnessLimit) -> str:
 
 
 def _does(effect: str) -> str:
-    """What an effect does, as the table of effects has it."""
+    """Returns what an effect does, as the table of effects says it."""
     return next(found.does for found in EFFECTS if found.name == effect)

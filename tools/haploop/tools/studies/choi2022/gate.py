@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from haploop.tools.figure.file import empty_figure
-from haploop.tools.figure.style import ELEMENTS, GREY, dress, legend
+from haploop.tools.figure.style import ELEMENTS, GREY, dress, empty_figure, legend
 from haploop.tools.studies.choi2022.drawing import COLOURS
 from haploop.tools.studies.choi2022.experiment.setup import UNITS, VELOCITIES, Setup
 

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from haploop.tools.figure.file import empty_figure
-from haploop.tools.figure.style import INK, SMALL, TEXT
+from haploop.tools.figure.style import INK, SMALL, TEXT, empty_figure
 from haploop.tools.render.markdown import markdown_table
 from haploop.tools.studies.choi2022.interpretations import (
     InterpretationSpace,

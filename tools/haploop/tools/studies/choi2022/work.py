@@ -13,7 +13,7 @@ from haploop.controller.dissipation import registry
 from haploop.launch.scene.toml_writer import to_toml
 from haploop.tools.executor.executors import make_executor, map_parallel
 from haploop.tools.executor.pool import Pool
-from haploop.tools.figure.file import write_figure
+from haploop.tools.figure.style import write_figure
 from haploop.tools.render.progress import Stage, silent
 from haploop.tools.studies.choi2022.claims import Finding
 

@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from haploop.tools.figure.file import fix_layout
 from haploop.tools.figure.labels import LabelRoom
-from haploop.tools.figure.style import ELEMENTS, FAINT, INK, WALL
+from haploop.tools.figure.style import ELEMENTS, FAINT, INK, WALL, fix_layout
 from haploop.tools.sweep.map.axis import Ruler
 from haploop.tools.sweep.map.boundaries import Over, over_scene
 from haploop.tools.sweep.map.curves import draw_boundary, styles_of

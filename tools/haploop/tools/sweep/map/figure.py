@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from haploop.tools.figure.data import FigureError
-from haploop.tools.figure.file import fix_layout, write_figure
 from haploop.tools.figure.labels import LabelRoom
+from haploop.tools.figure.style import fix_layout, write_figure
 from haploop.tools.sweep.map.axis import Ruler
 from haploop.tools.sweep.map.bisect_figure import bisect_figure
 from haploop.tools.sweep.map.boundaries import Over, over_scene

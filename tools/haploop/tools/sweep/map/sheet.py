@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from haploop.tools.figure.file import empty_figure
-from haploop.tools.figure.style import GREY, INK, LARGE, SMALL, TEXT
+from haploop.tools.figure.style import GREY, INK, LARGE, SMALL, TEXT, empty_figure
 from haploop.tools.sweep.map.data import STIFFNESS, Axis, Cells, MapData
 
 if TYPE_CHECKING:

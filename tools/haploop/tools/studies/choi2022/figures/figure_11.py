@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from haploop.tools.figure.file import empty_figure
-from haploop.tools.figure.style import INK, SMALL, dress
+from haploop.tools.figure.style import INK, SMALL, dress, empty_figure
 from haploop.tools.studies.choi2022.claims import Finding, claims_of
 from haploop.tools.studies.choi2022.experiment.measure import is_steady
 from haploop.tools.studies.choi2022.experiment.setup import both

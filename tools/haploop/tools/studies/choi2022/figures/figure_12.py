@@ -6,8 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from haploop.tools.figure.file import empty_figure
-from haploop.tools.figure.style import legend
+from haploop.tools.figure.style import empty_figure, legend
 from haploop.tools.render.units import amount
 from haploop.tools.studies.choi2022.claims import Finding, claims_of
 from haploop.tools.studies.choi2022.drawing import INSIDE, Press, draw_press

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from haploop.tools.figure.file import empty_figure
-from haploop.tools.figure.style import SMALL, WALL_FILL, dress
+from haploop.tools.figure.style import SMALL, WALL_FILL, dress, empty_figure
 from haploop.tools.render.units import amount
 from haploop.tools.studies.choi2022.claims import Finding, claims_of
 from haploop.tools.studies.choi2022.drawing import COLOURS

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from haploop.tools.figure.file import empty_figure
-from haploop.tools.figure.style import INK, SMALL, TEXT, dress
+from haploop.tools.figure.style import INK, SMALL, TEXT, dress, empty_figure
 from haploop.tools.render.markdown import markdown_table
 from haploop.tools.studies.choi2022.claims import Finding, claims_of
 from haploop.tools.studies.choi2022.drawing import COLOURS, SHORT

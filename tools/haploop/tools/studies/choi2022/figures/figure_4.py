@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from haploop.tools.figure.file import empty_figure
-from haploop.tools.figure.style import INK, SMALL
+from haploop.tools.figure.style import INK, SMALL, empty_figure
 from haploop.tools.linear.one_tick import OneTickMap
 from haploop.tools.render.units import amount, fixed
 from haploop.tools.search.bisect import Tolerance, bisect

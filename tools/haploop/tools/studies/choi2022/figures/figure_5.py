@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from haploop.tools.figure.file import empty_figure
-from haploop.tools.figure.style import GREY, dress, legend, plain_numbers
+from haploop.tools.figure.style import GREY, dress, empty_figure, legend, plain_numbers
 from haploop.tools.render.units import amount, fixed
 from haploop.tools.studies.choi2022.claims import Finding, claims_of
 from haploop.tools.studies.choi2022.drawing import COLOURS, INSIDE, draw_loop

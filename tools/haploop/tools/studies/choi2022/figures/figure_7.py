@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from haploop.tools.figure.file import empty_figure
-from haploop.tools.figure.style import GREY, INK, SMALL, dress
+from haploop.tools.figure.style import GREY, INK, SMALL, dress, empty_figure
 from haploop.tools.studies.choi2022.claims import Finding, claims_of
 from haploop.tools.studies.choi2022.drawing import SHORT
 from haploop.tools.studies.choi2022.experiment.measure import CLAIMS as TESTED

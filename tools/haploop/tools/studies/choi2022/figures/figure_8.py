@@ -10,8 +10,7 @@ import numpy as np
 from haploop.protocol.ticks import Timebase
 from haploop.tools.dissipate.booking import Booked, Booking
 from haploop.tools.dissipate.samples import Samples
-from haploop.tools.figure.file import empty_figure
-from haploop.tools.figure.style import GREY, dress, legend
+from haploop.tools.figure.style import GREY, dress, empty_figure, legend
 from haploop.tools.render.units import amount
 from haploop.tools.studies.choi2022.claims import Finding, claims_of
 from haploop.tools.studies.choi2022.drawing import COLOURS, INSIDE, UPPER_LEFT

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from haploop.tools.figure.file import empty_figure
-from haploop.tools.figure.style import legend
+from haploop.tools.figure.style import empty_figure, legend
 from haploop.tools.studies.choi2022.claims import Finding, claims_of
 from haploop.tools.studies.choi2022.drawing import INSIDE, Press, draw_press
 from haploop.tools.studies.choi2022.experiment.setup import elements_of

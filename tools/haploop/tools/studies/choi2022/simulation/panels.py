@@ -7,8 +7,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from haploop.tools.figure.file import empty_figure
-from haploop.tools.figure.style import GREY, INK, OF_THE_PLANT, SMALL, WALL, WALL_FILL, dress, element_colour, legend
+from haploop.tools.figure.style import (
+    GREY,
+    INK,
+    OF_THE_PLANT,
+    SMALL,
+    WALL,
+    WALL_FILL,
+    dress,
+    element_colour,
+    empty_figure,
+    legend,
+)
 from haploop.tools.figure.time import extremes
 from haploop.tools.render.units import amount
 from haploop.tools.studies.choi2022.claims import Claim, Finding

@@ -1,0 +1,121 @@
+"""The mistakes that no single key of an effect can show, and notes on scenes that are in order."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from haploop.launch.plan.effect import Draft, at
+from haploop.protocol.scene.effects import Accelerometer, Actuator, Friction, UniformJitter
+from haploop.protocol.scene.scene import Clock, Hand
+from haploop.protocol.ticks import whole_count
+
+# What rounding adds to the factor 1 of a body that drifts.
+_ROUNDING = 1e-7
+
+
+def check_friction(draft: Draft) -> None:
+    """Refuses a Stribeck law that does not fall, and a plant rate too low for friction.
+
+    Too low is one at which thousands of parts of a step would have to be followed, or at which a method's step does
+    not brake.
+    """
+    friction = draft.table("friction", Friction)
+    if friction is None:
+        return
+    if friction.breakaway is not None and friction.breakaway < friction.kinetic:
+        draft.complain(("friction", "breakaway"), f"It must be at least friction.kinetic, {friction.kinetic:g} N.")
+    if friction.stribeck_velocity is not None and friction.breakaway is None:
+        expected = "It says how breakaway falls towards kinetic, so friction.breakaway must be given too."
+        draft.complain(("friction", "stribeck_velocity"), expected)
+    if draft.scene and draft.scene.clock.integrator != "dop853":
+        _check_rate(draft, draft.scene.as_dict())
+
+
+def _check_rate(draft: Draft, scene: dict[str, Any]) -> None:
+    rate, integrator = scene["clock"]["plant_rate"], scene["clock"]["integrator"]
+    if integrator == "exact":
+        from haploop.plant.chain.chain import Chain
+        from haploop.plant.friction.substeps import MOST_PARTS, parts_of_a_step
+
+        parts = parts_of_a_step(Chain.of(scene), 1.0 / rate)
+        if parts > MOST_PARTS:
+            least = rate * parts // MOST_PARTS
+            expected = f"With friction on bodies that swing this fast it must be at least {least} Hz."
+            draft.complain(("clock", "plant_rate"), expected, f"is {rate} Hz")
+        return
+    from haploop.plant.integrators.one_step import friction_brakes
+
+    if not friction_brakes(scene):
+        expected = f"Friction on bodies that swing this fast does not brake them by {integrator}; raise it."
+        draft.complain(("clock", "plant_rate"), expected, f"is {rate} Hz")
+
+
+def check_grip(draft: Draft) -> None:
+    """Refuses a grip that holds no mass; the mass is read alone, whatever else is wrong with ``[hand]``."""
+    hand = draft.data.get("hand")
+    if not isinstance(hand, dict) or "grip" not in hand:
+        return
+    mass = draft.valid({"mass": hand.get("mass", 0.0)}, Hand)
+    if mass and not mass.mass:
+        expected = "The grip lies between the device and the hand's mass, so hand.mass must be above 0 kg."
+        draft.complain(("hand", "grip"), expected, "holds no mass")
+
+
+def check_actuator(draft: Draft) -> None:
+    """Refuses an ``[actuator]`` without a limit."""
+    if draft.table("actuator", Actuator) == Actuator():
+        draft.complain(("actuator",), "It must have at least one of saturation, bandwidth and resolution.", "is empty")
+
+
+def check_accelerometer(draft: Draft) -> None:
+    """Refuses counts larger than the range, and an age of readings of no whole number of plant steps."""
+    table = draft.table("accelerometer", Accelerometer)
+    if table is None:
+        return
+    if table.range is not None and table.resolution is not None and table.resolution > table.range:
+        expected = f"It must be at most accelerometer.range, {table.range:g} m/s^2; else every reading is 0."
+        draft.complain(("accelerometer", "resolution"), expected)
+    _whole_steps(draft, ("accelerometer", "delay"), "delay of a reading", table.delay)
+
+
+def check_jitter(draft: Draft) -> None:
+    """Refuses a longest delay of no whole number of plant steps."""
+    if (jitter := draft.data.get("jitter")) and (uniform := draft.valid(jitter, UniformJitter)):
+        _whole_steps(draft, ("jitter", "most"), "longest additional delay", uniform.most)
+
+
+def _whole_steps(draft: Draft, key: tuple[str, ...], name: str, seconds: float) -> None:
+    clock = Clock() if "clock" not in draft.data else draft.table("clock", Clock)
+    if clock:
+        complaints: list[str] = []
+        whole_count(seconds, clock.plant_rate, f"The {name}", "plant steps", complaints)
+        for sentence in complaints:
+            draft.complain(key, sentence)
+
+
+def note_accelerometer(scene: dict[str, Any]) -> list[str]:
+    """Says that nothing reads the accelerometer, or that there is no motor to mount it on."""
+    from haploop.plant.sensing.encoder import accelerometer_is_used
+
+    if not accelerometer_is_used(scene):
+        return [
+            "[accelerometer] is not simulated, since no estimate reads it; "
+            'acceleration.source = "accelerometer" would, or velocity.accelerometer with the Kalman filter.'
+        ]
+    if at(scene, "accelerometer.mount") == "motor" and "transmission" not in scene:
+        return ['accelerometer.mount = "motor" means the one mass there is without a [transmission].']
+    return []
+
+
+def note_growth(scene: dict[str, Any]) -> list[str]:
+    """Says where a method of a fixed step makes the bodies swing ever wider by itself."""
+    from haploop.plant.integrators.one_step import growth
+
+    factor = growth(scene)
+    if factor <= 1.0 + _ROUNDING:
+        return []
+    clock = scene["clock"]
+    return [
+        f'clock.integrator = "{clock["integrator"]}" is unstable by itself at {clock["plant_rate"]} Hz: it multiplies '
+        f"the fastest growing swing of the bodies by {factor:.7g} in every plant step, whatever the controller does."
+    ]

@@ -1,0 +1,164 @@
+"""An effect: the one object that says all there is to say of something that a scene may name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal, Protocol, TypeVar
+
+from haploop.launch.plan.modules import moved_by
+from haploop.protocol.scene.scene import Scene
+from haploop.protocol.scene.table import Table
+
+TableType = TypeVar("TableType", bound=Table)
+Resolved = dict[str, Any]
+Stage = Literal["motion", "measurement", "estimate", "line", "actuation"]
+
+
+class Draft(Protocol):
+    """A scene that is being checked; any part of it may be wrong in itself, which is reported elsewhere."""
+
+    @property
+    def data(self) -> dict[str, Any]:
+        """The merged tables as they were given."""
+        ...
+
+    @property
+    def scene(self) -> Scene | None:
+        """The whole scene; None where some value of it is wrong."""
+        ...
+
+    def table(self, name: str, kind: type[TableType]) -> TableType | None:
+        """Returns a table, None where it is absent or wrong."""
+        ...
+
+    def valid(self, data: Any, kind: type[TableType]) -> TableType | None:
+        """Returns some data as a table, None where they are none of this kind."""
+        ...
+
+    def complain(self, key: tuple[str, ...], expected: str, given: str | None = None) -> None:
+        """Adds a mistake about a key, whose value is quoted unless ``given`` says what was found."""
+        ...
+
+
+def _nothing(_of: Any) -> Any:
+    return []
+
+
+def _always(_scene: Resolved) -> bool:
+    return True
+
+
+@dataclass(frozen=True)
+class Effect:
+    """What a scene may name beside device, hand, wall and elements.
+
+    Plan, checks, JSON Schema, ``explain``, ablation, advice, the linear map and batches all ask this object alone.
+
+    Attributes:
+        key: dotted key of the scene that names it.
+        node: the process it acts in.
+        modules: imported for it beside the node's own core; it is written in the first.
+        stage: when it acts: in the motion, at every plant step; in the measurement, the estimate, on the line to the
+            device or in the actuation, once a tick.
+        does: its doing, in one phrase.
+        value: what must stand at the key; None where being there is enough.
+        columns: columns it adds to the log's ``/plant``.
+        counts: numbers it adds to the summary, as entry and key.
+        states: numbers it remembers from tick to tick or step to step: a count, or what counts them in a scene.
+        linear: whether a loop in contact stays a linear map with it.
+        left_out: keys of it that the map of small and smooth swings in contact has not.
+        batches: whether it takes the same way in every tick whatever its numbers, so that many scenes run as one.
+        used: whether a scene that names it simulates it.
+        takes_out: makes of a resolved scene one without it; None where deleting the key does.
+        check: adds the mistakes that no single key of it can show; it is asked of every scene.
+        note: sentences on what is in order in a resolved scene that names it, but may not have been meant.
+        frees: cause of a buzzing contact, such as "friction" -> makes of a resolved scene that simulates the effect one
+            with the ideal in its place, or gives back the scene itself where its values are ideal.
+        scaled_with: quantity that may be uncertain, such as "device mass" -> key of the effect that goes with it.
+        table: declaration of its table, for an effect of another package; the scene itself declares the others.
+    """
+
+    key: str
+    node: Literal["plant", "controller"]
+    modules: tuple[str, ...]
+    stage: Stage
+    does: str
+    value: str | None = None
+    columns: tuple[str, ...] = ()
+    counts: tuple[str, ...] = ()
+    states: int | Callable[[Resolved], int] = 0
+    linear: bool = True
+    left_out: tuple[str, ...] = ()
+    batches: bool | Callable[[Resolved], bool] = True
+    used: Callable[[Resolved], bool] = _always
+    takes_out: Callable[[Resolved], Resolved] | None = None
+    check: Callable[[Draft], Any] = _nothing
+    note: Callable[[Resolved], list[str]] = _nothing
+    frees: Mapping[str, Callable[[Resolved], Resolved]] = field(default_factory=dict)
+    scaled_with: Mapping[str, str] = field(default_factory=dict)
+    table: type[Table] | None = None
+
+    @property
+    def name(self) -> str:
+        """The key, with the value where several may stand there."""
+        return f"{self.key} = {self.value}" if self.value else self.key
+
+    @property
+    def written(self) -> str:
+        """The name as a scene file writes it: ``[friction]``, ``actuator.saturation``, ``jitter.kind = "gamma"``."""
+        return f'{self.key} = "{self.value}"' if self.value else as_written(self.key)
+
+    @property
+    def acts(self) -> str:
+        """How often: "every plant step" or "every tick"."""
+        return "every plant step" if self.stage == "motion" else "every tick"
+
+    def modules_in(self, scene: Resolved) -> tuple[str, ...]:
+        """Returns what it imports in a scene: another integrator has its own in place of what moves bodies exactly."""
+        return moved_by(at(scene, "clock.integrator") or "exact", self.modules, self.key == "friction")
+
+    def is_named(self, scene: Resolved) -> bool:
+        """Returns whether a resolved scene names it; a number that is 0 names nothing."""
+        found = at(scene, self.key)
+        return bool(found) if self.value is None else found == self.value
+
+    def is_in(self, scene: Resolved) -> bool:
+        """Returns whether a resolved scene simulates it."""
+        return self.is_named(scene) and self.used(scene)
+
+    def batches_in(self, scene: Resolved) -> bool:
+        """Returns whether a scene that names it can be one of many that run as one."""
+        return self.batches if isinstance(self.batches, bool) else self.batches(scene)
+
+    def states_in(self, scene: Resolved) -> int:
+        """Returns how many states it adds to a scene that names it."""
+        return self.states if isinstance(self.states, int) else self.states(scene)
+
+    def without(self, scene: Resolved) -> Resolved:
+        """Returns a resolved scene that names it without it, and without what cannot be there without it."""
+        return self.takes_out(scene) if self.takes_out else without_keys(scene, self.key)
+
+
+def at(scene: Resolved, key: str) -> Any:
+    """Returns what stands at a dotted key of a scene; None where nothing does."""
+    found: Any = scene
+    for part in key.split("."):
+        found = found.get(part) if isinstance(found, dict) else None
+    return found
+
+
+def as_written(key: str) -> str:
+    """Returns a key as a scene file writes it: a table in brackets."""
+    return key if "." in key else f"[{key}]"
+
+
+def without_keys(scene: Resolved, *keys: str) -> Resolved:
+    """Returns a scene without some dotted keys; it shares what stays, and an absent key changes nothing."""
+    for key in keys:
+        first, _, rest = key.partition(".")
+        if first not in scene:
+            continue
+        left = {name: value for name, value in scene.items() if name != first}
+        scene = {**left, first: without_keys(scene[first], rest)} if rest else left
+    return scene

@@ -1,0 +1,141 @@
+"""Estimators as parameters alone: their memory is handed in and out, so one object serves floats and arrays."""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+from haploop.protocol.arrays import each
+
+# (x_m,) or (x_m, acceleration) of a tick; floats, or arrays of shape (members,).
+Sample = Sequence[Any]
+
+
+class Estimator(ABC):
+    """Base of every estimator: frozen parameters, and two functions that make and renew its memory.
+
+    A subclass is a frozen dataclass. Its memory is a tree (``haploop.protocol.trees``) whose structure never changes,
+    written with arithmetic and ``where``, so that it serves floats, NumPy and JAX alike.
+
+    Attributes:
+        name: what ``velocity.estimator`` and ``acceleration.estimator`` say to ask for it.
+        does: what the estimate is, in one phrase.
+        needs, takes: keys of the scene's table that it must have, and that it may have besides.
+        linear: whether the estimate is a linear function of the samples.
+    """
+
+    name: ClassVar[str]
+    does: ClassVar[str]
+    needs: ClassVar[tuple[str, ...]] = ()
+    takes: ClassVar[tuple[str, ...]] = ()
+    linear: ClassVar[bool] = True
+
+    @classmethod
+    @abstractmethod
+    def from_scene(cls, scene: dict[str, Any], of: str, period_s: float) -> Estimator:
+        """Makes the one that a scene's table ``of`` ("velocity" or "acceleration") names, for the control period T."""
+
+    @abstractmethod
+    def start(self, u: Any, sample: Sample) -> Any:
+        """Returns the memory before the first tick, whose input and sample are given."""
+
+    @abstractmethod
+    def step(self, memory: Any, u: Any, sample: Sample) -> tuple[Any, Any]:
+        """Returns the memory after a tick, and the estimate from its input u and sample."""
+
+    def acceleration(self, memory: Any) -> Any:
+        """Returns the acceleration that the velocity estimator itself has found, m/s^2.
+
+        Raises:
+            TypeError: it finds none.
+        """
+        raise TypeError(f"The estimator {self.name} finds no acceleration.")
+
+
+@dataclass(frozen=True)
+class Difference(Estimator):
+    """Backward difference (u[k] - u[k-1]) / T, 0 at the first input. Memory: u[k-1].
+
+    Delays slow signals by T / 2; white noise of standard deviation sigma in u becomes sqrt(2) sigma / T.
+    """
+
+    name: ClassVar[str] = "difference"
+    does: ClassVar[str] = "a backward difference"
+    period_s: float
+
+    @classmethod
+    def from_scene(cls, scene: dict[str, Any], of: str, period_s: float) -> Difference:
+        """Makes it; no key of the scene is asked."""
+        return cls(period_s)
+
+    def start(self, u: Any, sample: Sample) -> Any:
+        """Returns the first input."""
+        return u
+
+    def step(self, memory: Any, u: Any, sample: Sample) -> tuple[Any, Any]:
+        """Returns u and the difference to the input before."""
+        return u, (u - memory) / self.period_s
+
+
+@dataclass(frozen=True)
+class Unchanged(Estimator):
+    """The input itself: an accelerometer's reading, or what another estimator has found. No memory."""
+
+    name: ClassVar[str] = "unchanged"
+    does: ClassVar[str] = "the input itself"
+
+    @classmethod
+    def from_scene(cls, scene: dict[str, Any], of: str, period_s: float) -> Unchanged:
+        """Makes it; no key of the scene is asked."""
+        return cls()
+
+    def start(self, u: Any, sample: Sample) -> Any:
+        """Returns no memory."""
+        return None
+
+    def step(self, memory: Any, u: Any, sample: Sample) -> tuple[Any, Any]:
+        """Returns no memory and the input."""
+        return None, u
+
+
+@dataclass(frozen=True)
+class LowPass(Estimator):
+    """First-order low-pass y += gain (u - y), gain = 1 - exp(-2 pi fc T), of another estimator's estimate.
+
+    y starts at the first one. Memory: (that of the other, y). Delays slow signals by T / gain - T, about 1 / (2 pi fc);
+    white noise of standard deviation sigma in u becomes sqrt(gain / (2 - gain)) sigma.
+    """
+
+    name: ClassVar[str] = "low-pass"
+    does: ClassVar[str] = "low-passed"
+    raw: Estimator
+    gain: Any
+
+    @classmethod
+    def from_scene(cls, scene: dict[str, Any], of: str, period_s: float) -> LowPass:
+        """Raises TypeError: it is made of another by ``over``."""
+        raise TypeError("A low-pass is made over another estimator.")
+
+    @classmethod
+    def over(cls, raw: Estimator, cutoff_hz: Any, period_s: float) -> LowPass:
+        """Makes one of cutoff fc in Hz over another estimator."""
+        return cls(raw, 1.0 - each(math.exp, -2.0 * math.pi * cutoff_hz * period_s))
+
+    def start(self, u: Any, sample: Sample) -> Any:
+        """Returns the memory of the other, and its first estimate."""
+        memory = self.raw.start(u, sample)
+        return memory, self.raw.step(memory, u, sample)[1]
+
+    def step(self, memory: Any, u: Any, sample: Sample) -> tuple[Any, Any]:
+        """Returns both memories and y."""
+        raw, y = memory
+        raw, estimate = self.raw.step(raw, u, sample)
+        y = y + self.gain * (estimate - y)
+        return (raw, y), y
+
+    def acceleration(self, memory: Any) -> Any:
+        """Returns what the other has found, as it is."""
+        return self.raw.acceleration(memory[0])

@@ -1,0 +1,127 @@
+"""One tick of a controller: a function of its parameters, its state and a sample, for floats, NumPy and JAX alike."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+from haploop.controller.active_elements import ActiveElement
+from haploop.controller.dissipation import Motion
+from haploop.controller.estimators.base import Estimator, Sample
+from haploop.controller.wall import Wall
+from haploop.protocol.arrays import where
+
+
+@dataclass(frozen=True, slots=True)
+class ControllerParams:
+    """Everything that a tick depends on but state and sample; another one takes its place where something changes.
+
+    Attributes:
+        velocity: from x_m[k] to v[k].
+        acceleration: from its input to a[k].
+        input: that input: "encoder": v[k]; "accelerometer": the reading; "kalman": what the velocity's filter found.
+        wall: the virtual wall.
+        elements: the active elements, in the order in which their forces are added.
+        books: how many books of elements have been opened so far.
+        motion: what elements are given; written anew at every tick.
+    """
+
+    velocity: Estimator
+    acceleration: Estimator
+    input: str
+    wall: Wall
+    elements: tuple[ActiveElement, ...]
+    books: int
+    motion: Motion
+
+
+class ControllerState(NamedTuple):
+    """Everything that a controller remembers from tick to tick; a tree of numbers (``haploop.protocol.trees``).
+
+    Attributes:
+        velocity, acceleration: memories of the estimators.
+        a_before: a of the tick before, m/s^2; 0 before the first.
+        elements: memory of every active element; None where it has none.
+    """
+
+    velocity: Any
+    acceleration: Any
+    a_before: Any
+    elements: tuple[Any, ...]
+
+
+# A ControllerState without the names of its fields: giving them at every tick would take a fifth of its time.
+StateTuple = tuple[Any, Any, Any, tuple[Any, ...]]
+
+
+class NoForce(Exception):
+    """An element that gave no force; raised from what it raised.
+
+    Attributes:
+        index: its place among the active elements.
+    """
+
+    def __init__(self, index: int) -> None:
+        super().__init__(f"Element {index} gave no force.")
+        self.index = index
+
+    def sentence(self, params: ControllerParams, tick: int) -> str:
+        """Returns what happened at this tick, with the element's kind and what it raised."""
+        kind, cause = params.elements[self.index].element.kind, self.__cause__
+        return f"Element {self.index} ({kind}) gave no force at tick {tick}: {type(cause).__name__}: {cause}."
+
+
+def initial_state(params: ControllerParams, sample: Sample) -> ControllerState:
+    """Returns the state before the first tick, whose sample is given: at rest there."""
+    velocity, x = params.velocity, sample[0]
+    memory = velocity.start(x, sample)
+    if params.input == "encoder":
+        u = 0.0 * x
+    else:
+        u = sample[1] if params.input == "accelerometer" else velocity.acceleration(velocity.step(memory, x, sample)[0])
+    elements = tuple([active.element.memory for active in params.elements])
+    return ControllerState(memory, params.acceleration.start(u, sample), 0.0, elements)
+
+
+def tick(params: ControllerParams, state: StateTuple, sample: Sample) -> tuple[StateTuple, list[Any]]:
+    """Returns the next state, and the row of this tick: x, v, a, the wall's force, every element's, total, contact.
+
+    f_d[k] = f_wall[k] + sum of the elements' forces[k], in the order of the scene's list. The state is not changed.
+
+    Args:
+        sample: (x_m,) or (x_m, acceleration); floats, or arrays of shape (members,).
+
+    Raises:
+        NoForce: an element raised, or gave something that is no number.
+    """
+    of_velocity, of_acceleration, a_before, memories = state
+    x = sample[0]
+    of_velocity, v = params.velocity.step(of_velocity, x, sample)
+    u = v
+    if params.input != "encoder":
+        u = sample[1] if params.input == "accelerometer" else params.velocity.acceleration(of_velocity)
+    of_acceleration, a = params.acceleration.step(of_acceleration, u, sample)
+    contact, total = params.wall.contact(x)
+    row = [x, v, a, total]
+    motion, index = params.motion, 0
+    motion.x, motion.v, motion.a, motion.a_before, motion.contact = x, v, a, a_before, contact
+    one_loop = contact is False or contact is True
+    try:
+        for active in params.elements:
+            memory = memories[index]
+            if memory is None:
+                force = active.element.force(motion)
+            else:
+                force, memory = active.element.force(motion, memory)
+                memories = (*memories[:index], memory, *memories[index + 1 :])
+            if one_loop:
+                force = float(force) if contact or active.acts == "always" else 0.0
+            else:
+                force = 1.0 * (force if active.acts == "always" else where(contact, force, 0.0))
+            row.append(force)
+            total = total + force
+            index += 1
+    except Exception as error:
+        raise NoForce(index) from error
+    row += (total, contact)
+    return (of_velocity, of_acceleration, a, memories), row

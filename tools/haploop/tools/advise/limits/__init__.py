@@ -1,1 +1,0 @@
-"""The largest stable gains, searched over elements, tasks and variations of the device."""

@@ -1,0 +1,136 @@
+"""The present state of an observed run: the newest of everything that was received of it."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+
+from haploop.protocol.ticks import Timebase
+from haploop.protocol.wire import Frame
+
+# Wall time over which the real-time factor is taken.
+_FACTOR_OVER_S = 2.0
+
+
+class LiveStatus:
+    """Keeps the newest message of each kind, and decodes it only when asked.
+
+    Args:
+        run_id: identifier of the run.
+        welcome: fields of the clock's WELCOME.
+
+    Attributes:
+        time: the integers of the run.
+        title: of the run.
+        tick: every tick before this one has been received.
+        paused: whether the run is paused.
+        factor: simulated over wall time of the last 2 s; None while nothing moves.
+        changes: every event so far, (tick, event) in order.
+        skipped_ticks: telemetry that never came.
+        ended: how the run ended, in a word; "" while it goes on.
+        why: a sentence on that; "" for none.
+    """
+
+    def __init__(self, run_id: str, welcome: dict[str, Any]) -> None:
+        self.run_id = run_id
+        self.time = Timebase(**welcome["timebase"])
+        self.title: str = welcome["scene"]["title"]
+        self.tick = 0
+        self.paused = False
+        self.factor: float | None = None
+        self.changes: list[tuple[int, dict[str, Any]]] = []
+        self.skipped_ticks = 0
+        self.ended = self.why = ""
+        self._newest: dict[str, dict[str, Any]] = {}
+        self._figures: dict[str, Any] = {}
+        self._motion_at_start: dict[str, float] = {}
+        self._marks: deque[tuple[float, int]] = deque()
+
+    @property
+    def t_s(self) -> float:
+        """Returns the simulated time, s."""
+        return self.tick / self.time.control_rate
+
+    def ingest(self, frames: Iterable[tuple[str, Frame]], now: float) -> None:
+        """Takes messages, (role, message); ``now`` is wall time, s."""
+        for role, frame in frames:
+            if frame.name == "STATE":
+                self._note_state(role, *frame.fields)
+            elif frame.name.endswith("_BLOCK"):
+                self._newest[frame.name] = frame.as_dict()
+                self.tick = max(self.tick, frame.fields[0] + frame.fields[1])
+        self._figures = self._newest.get("ENERGY_BLOCK", {}).get("status") or self._figures
+        self._count_time(now)
+
+    def _note_state(self, role: str, tick: int, state: dict[str, Any]) -> None:
+        """Notes the STATE of a publisher, all there is to see of a run that stands still."""
+        self.tick = max(self.tick, tick)
+        if role == "plant":
+            self._motion_at_start = {name: state[name] for name in ("x", "v", "force")}
+        elif role == "controller" and state["history"]:
+            self._newest["CONTROLLER_BLOCK"] = state["history"][-1]
+        elif role == "logger":
+            self._figures = state
+
+    def _count_time(self, now: float) -> None:
+        self._marks.append((now, self.tick))
+        while len(self._marks) > 2 and now - self._marks[1][0] >= _FACTOR_OVER_S:
+            self._marks.popleft()
+        began, tick = self._marks[0]
+        moved = self.tick - tick
+        self.factor = moved / self.time.control_rate / (now - began) if moved and now > began else None
+
+    def note_event(self, tick: int, event: dict[str, Any]) -> None:
+        """Notes an event."""
+        self.changes.append((tick, event))
+        if "pause" in event or "step" in event:
+            self.paused = True
+        elif "resume" in event:
+            self.paused = False
+
+    def end(self, failure: str, summary: dict[str, Any] | None) -> None:
+        """Ends the run, with the figures of its summary if there is one; ``failure`` says why it ended early."""
+        self.paused, self.factor = False, None
+        if summary is None:  # on another machine, or never written
+            self.ended, self.why = ("failed" if failure else "ended"), failure
+            return
+        self.ended, self.why = summary["ended"], summary["why"] or failure
+        self._figures = {
+            "verdict": summary["verdict"],
+            "oscillation_m": summary["window"]["oscillation_m"],
+            "residual_J": summary["energy"]["residual_J"],
+        }
+
+    def _last(self, frame: str) -> dict[str, float]:
+        """Returns the last row of the newest block's columns; empty before the first."""
+        columns = self._newest.get(frame, {}).get("columns", {})
+        return {name: float(np.frombuffer(data, "<f8")[-1]) for name, data in columns.items() if data}
+
+    def motion(self) -> dict[str, float]:
+        """Returns x (m), v (m/s) and force (N) of the device at the end of the last block."""
+        return self._last("PLANT_BLOCK") or self._motion_at_start
+
+    def penetration_m(self) -> float | None:
+        """Returns the penetration of the wall, negative outside; None without a wall, or before any telemetry."""
+        wall, x = self._newest.get("CONTROLLER_BLOCK", {}).get("wall"), self.motion().get("x")
+        return (x - wall["position"]) * wall["into_wall"] if wall and wall["into_wall"] and x is not None else None
+
+    def parts(self) -> dict[str, float]:
+        """Returns the commanded force of the wall and of each element at the last tick, N, by name in their order."""
+        forces = self._last("CONTROLLER_BLOCK")
+        names = {"wall": "wall"} if self.penetration_m() is not None else {}
+        for index, element in enumerate(self._newest.get("CONTROLLER_BLOCK", {}).get("elements", [])):
+            kind = element["kind"]
+            names[f"dissipation.{index}"] = kind if kind not in names.values() else f"{kind} ({index})"
+        return {name: forces[column] for column, name in names.items() if column in forces}
+
+    def books(self) -> dict[str, float]:
+        """Returns the energy books at present, J, by the names of the log."""
+        return self._last("ENERGY_BLOCK")
+
+    def figures(self) -> dict[str, Any]:
+        """Returns verdict, oscillation_m and residual_J so far, in the end those of the summary; empty before any."""
+        return self._figures

@@ -1,1 +1,0 @@
-"""Figures, screens and the page of what accuracy costs."""

@@ -1,0 +1,236 @@
+"""The work-precision figure: error of every method against its time, one panel a scene."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from textwrap import wrap
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from haploop.tools.cost.advice import name_of
+from haploop.tools.cost.data import Cost, Point, SceneCost
+from haploop.tools.figure.data import FigureError
+from haploop.tools.figure.labels import Label, place_labels
+from haploop.tools.figure.style import (
+    ELEMENTS,
+    FAINT,
+    GREY,
+    INK,
+    SMALL,
+    TEXT,
+    WALL,
+    dress,
+    empty_figure,
+    fix_layout,
+    plain_numbers,
+    write_figure,
+)
+from haploop.tools.render.units import amount
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+_PANEL_IN = 5.0, 4.4
+_MARKED_HZ = 10_000
+UNCERTAIN = "#E4E4E4"
+_TITLE_LETTERS = 58
+# Colours that the colour-blind tell apart, and a marker each, for those who see none; others begin anew.
+LOOKS: dict[str, tuple[str, str]] = {
+    "exact": (WALL, "o"),
+    "semi-implicit-euler": (ELEMENTS[0], "s"),
+    "euler": (ELEMENTS[2], "v"),
+    "rk4": (ELEMENTS[1], "D"),
+    "implicit-midpoint": (ELEMENTS[3], "^"),
+    "dop853": (ELEMENTS[5], "P"),
+}
+# Below a reference's uncertainty there is nothing to see: what is smaller than this share of it is drawn there.
+_WITHIN = 0.3
+# The share of a panel's height that the failures of one method take at its top edge.
+_ROW = 0.045
+
+
+def draw(cost: Cost, target: Path) -> Path:
+    """Draws all measurements into a file, in the format of its suffix.
+
+    Raises:
+        FigureError: matplotlib is missing, nothing was measured, or the file cannot be written.
+    """
+    return write_figure(figure_of(cost), target)
+
+
+def figure_of(cost: Cost) -> Figure:
+    """Makes the figure: one panel a scene, and one that says how to read them.
+
+    Raises:
+        FigureError: matplotlib is missing, or no scene has a point with a time.
+    """
+    scenes = [scene for scene in cost.scenes if any(point.us_per_tick for point in scene.points)]
+    if not scenes:
+        raise FigureError("No scene has a point with a time, so there is nothing to draw.")
+    columns = min(3, len(scenes) + 1)
+    rows = -(-(len(scenes) + 1) // columns)
+    figure = empty_figure(columns * _PANEL_IN[0], rows * _PANEL_IN[1])
+    panels = figure.subplots(rows, columns, squeeze=False).ravel()
+    for ax, scene in zip(panels, scenes, strict=False):
+        draw_panel(ax, scene, cost.tolerance_m)
+    _how_to_read(panels[len(scenes)], cost, scenes)
+    for ax in panels[len(scenes) + 1 :]:
+        ax.set_axis_off()
+    fix_layout(figure)
+    for ax, scene in zip(panels, scenes, strict=False):
+        label_points(ax, scene)
+    return figure
+
+
+def _how_to_read(ax: Axes, cost: Cost, scenes: list[SceneCost]) -> None:
+    """Draws the legend of methods and signs, and names the machine."""
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
+
+    ax.set_axis_off()
+    handles: list[Any] = []
+    for method in methods_of(scenes):
+        colour, marker = method_look(method)
+        handles.append(Line2D([], [], color=colour, marker=marker, linewidth=1.6, label=method))
+    sign: dict[str, Any] = {"linestyle": "none", "color": GREY}
+    black: dict[str, Any] = sign | {"color": INK}
+    handles += [
+        Line2D([], [], marker="o", markersize=11, markerfacecolor="none", label="at 10 kHz", **black),
+        Line2D([], [], marker="o", markerfacecolor="white", label="wrong verdict", **sign),
+        Line2D([], [], marker="x", markersize=7, markeredgewidth=1.8, label="failed: no error to draw", **sign),
+        Line2D([], [], color=GREY, dashes=(4, 3), linewidth=0.9, label=f"tolerance {amount(cost.tolerance_m, 'm')}"),
+        Patch(facecolor=UNCERTAIN, label="the reference's own uncertainty"),
+    ]
+    ax.legend(handles=handles, loc="upper left", bbox_to_anchor=(0.0, 1.0), frameon=False, fontsize=TEXT, ncols=1)
+    words = [
+        "Numbers: plant rate in kHz. Lower is more exact, further left is cheaper.",
+        f"Times: medians of {cost.repeats} repeats, interleaved in random order; bars: quartiles.",
+        cost.machine + (", which was busy meanwhile" if cost.load and cost.load.busy else ""),
+    ]
+    ax.text(0.02, 0.0, "\n".join(words), fontsize=SMALL, color=GREY, va="bottom", transform=ax.transAxes, gid="words")
+
+
+def method_look(method: str) -> tuple[str, str]:
+    """Returns colour and marker of a method."""
+    return LOOKS.get(method, (GREY, "X"))
+
+
+def draw_panel(ax: Axes, scene: SceneCost, tolerance_m: float) -> None:
+    """Draws every point of a scene that has a time; labels come once the panel has its place."""
+    reference = scene.reference
+    what = "RMS error of the position (m)" if reference.pointwise else "error of the amplitude (m)"
+    dress(ax, _title(scene), "time per simulated tick, in one process (µs)", what)
+    low, high = _limits(scene, tolerance_m)
+    ax.set_xscale("log")
+    ax.set_yscale("log")
+    plain_numbers(ax.xaxis)
+    ax.set_ylim(low, high)
+    ax.axhspan(low, max(reference.error_m, low), color=UNCERTAIN, zorder=0, linewidth=0, gid="uncertainty")
+    ax.axhline(tolerance_m, color=GREY, linewidth=0.9, dashes=(4, 3), zorder=1, gid="tolerance")
+    for method in methods_of([scene]):
+        _curve(ax, [point for point in scene.points if point.method == method], scene)
+    _mark_failures(ax, scene)
+    times = [edge for p in scene.points if (t := p.us_per_tick) for edge in (t.q1, t.median, t.q3)]
+    ax.set_xlim(min(times) / 1.25, max(times) * 1.25)
+
+
+def _title(scene: SceneCost) -> str:
+    """Returns the scene's name, in two lines where it is long."""
+    return "\n".join(wrap(name_of(scene), _TITLE_LETTERS))
+
+
+def _limits(scene: SceneCost, tolerance_m: float) -> tuple[float, float]:
+    """Returns whole decades around all errors, the reference's and the tolerance, with room for crosses above."""
+    sizes = [drawn_m(point, scene) for point in scene.points if point.error]
+    sizes = [size for size in [*sizes, scene.reference.error_m, tolerance_m] if 0.0 < size < math.inf]
+    low, high = math.floor(math.log10(min(sizes)) - 0.3), math.ceil(math.log10(max(sizes)) + 0.2)
+    rows = 1 + len(_failing(scene))
+    return 10.0**low, 10.0 ** (low + (high - low) / (1.0 - _ROW * rows))
+
+
+def drawn_m(point: Point, scene: SceneCost) -> float:
+    """Returns the error of a point as drawn: no less than a share of the reference's uncertainty."""
+    size = point.error.size_m if point.error else math.inf
+    return max(size, _WITHIN * scene.reference.error_m, 1e-18)
+
+
+def _failed(point: Point) -> bool:
+    return point.error is None or not math.isfinite(point.error.size_m)
+
+
+def _failing(scene: SceneCost) -> list[str]:
+    """Returns the methods that fail at some rate, in the order of their rows."""
+    failing = {point.method for point in scene.points if point.us_per_tick and _failed(point)}
+    return [method for method in methods_of([scene]) if method in failing]
+
+
+def _mark_failures(ax: Axes, scene: SceneCost) -> None:
+    """Draws the line above which points are failures, without an error."""
+    if not (rows := len(_failing(scene))):
+        return
+    low, high = np.log10(ax.get_ylim())
+    edge = 10.0 ** (high - _ROW * rows * (high - low))
+    ax.axhline(edge, color=FAINT, linewidth=0.8, zorder=1)
+    ax.set_yticks([tick for tick in ax.get_yticks() if 10.0**low <= tick < edge])
+    place = {"ha": "right", "va": "center", "transform": ax.transAxes}
+    ax.text(0.995, 1.0 - _ROW * rows / 2.0, "failed", fontsize=SMALL, color=GREY, **place)
+
+
+def _position(ax: Axes, point: Point, scene: SceneCost) -> tuple[float, float]:
+    """Returns where a point is drawn: its time and its error; without one, in the row of its method at the top edge."""
+    assert point.us_per_tick is not None
+    if not _failed(point):
+        return point.us_per_tick.median, drawn_m(point, scene)
+    low, high = np.log10(ax.get_ylim())
+    row = 0.5 + _failing(scene).index(point.method)
+    return point.us_per_tick.median, float(10.0 ** (high - _ROW * row * (high - low)))
+
+
+def _curve(ax: Axes, points: list[Point], scene: SceneCost) -> None:
+    """Draws a method's line, broken where it failed, the quartiles of its times, and marks of wrong verdicts."""
+    points = sorted((point for point in points if point.us_per_tick), key=lambda point: point.plant_rate)
+    if not points:
+        return
+    method = points[0].method
+    colour, marker = method_look(method)
+    xy = np.array([_position(ax, point, scene) for point in points])
+    failed = np.array([_failed(point) for point in points])
+    wide = 2.2 if method == "exact" else 1.2
+    ax.plot(xy[:, 0], np.where(failed, np.nan, xy[:, 1]), color=colour, linewidth=wide, zorder=3, gid=f"line {method}")
+    for point, (x, y) in zip(points, xy, strict=True):
+        wrong = point.error is not None and not point.error.verdict_right
+        style: dict[str, Any] = {"color": colour, "marker": marker, "markersize": 5.5, "zorder": 4, "linestyle": "none"}
+        if _failed(point):
+            style |= {"marker": "x", "markersize": 7.0, "markeredgewidth": 1.8, "clip_on": False, "gid": "failure"}
+        elif wrong:
+            style |= {"markerfacecolor": "white", "gid": "wrong verdict"}
+        else:
+            style |= {"gid": "point"}
+        ax.plot([x], [y], **style)
+        spread = point.us_per_tick
+        assert spread is not None
+        ax.plot([spread.q1, spread.q3], [y, y], color=colour, linewidth=0.9, alpha=0.7, zorder=2, gid="quartiles")
+        if point.plant_rate == _MARKED_HZ:
+            ax.plot([x], [y], marker="o", markersize=11, markerfacecolor="none", markeredgecolor=INK, gid="10 kHz")
+
+
+def label_points(ax: Axes, scene: SceneCost) -> None:
+    """Writes the plant rate in kHz beside the points: of the scene's own method first, then where there is room."""
+    timed = [point for point in scene.points if point.us_per_tick]
+    labels = []
+    for point in sorted(timed, key=lambda point: (point.method != scene.own_method, _failed(point))):
+        in_kHz, colour = f"{point.plant_rate / 1000:g}", method_look(point.method)[0]
+        half_px = 9.0 if point.plant_rate == _MARKED_HZ else 5.0
+        labels.append(Label(*_position(ax, point, scene), in_kHz, colour, in_kHz, half_px))
+    lines = [line.get_xydata() for line in ax.lines if (line.get_gid() or "").startswith("line ")]
+    whole = [line[np.isfinite(line).all(axis=1)] for line in map(np.asarray, lines)]
+    place_labels(ax, labels, whole)
+
+
+def methods_of(scenes: list[SceneCost]) -> list[str]:
+    """Returns all methods, in the order of their looks, others after."""
+    found = dict.fromkeys(point.method for scene in scenes for point in scene.points)
+    return [method for method in LOOKS if method in found] + [method for method in found if method not in LOOKS]

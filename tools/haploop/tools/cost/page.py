@@ -1,0 +1,160 @@
+"""Writer of docs/accuracy.md and its figures from a cost.json: ``make accuracy``."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+from haploop.tools.cli.exit_codes import WRONG_USE, leave
+from haploop.tools.cost import figure
+from haploop.tools.cost.advice import length, name_of, rate
+from haploop.tools.cost.data import Cost, CostFileError, Point, Price, PriceGroup, SceneCost, load
+from haploop.tools.cost.findings import FindingTable, findings
+from haploop.tools.cost.prices import figure as prices_figure
+from haploop.tools.cost.report import made_with
+from haploop.tools.figure.data import FigureError
+from haploop.tools.render.markdown import markdown_table
+from haploop.tools.render.units import amount, fixed
+
+PAGE, FIGURE, PRICES_FIGURE = "accuracy.md", "accuracy.png", "accuracy_prices.png"
+_INTRO = """\
+How much time a run takes depends on how accurate it is to be. Every number here was measured by `haploop cost` and
+written by `make accuracy`; none was typed. An *error* is the root mean square, over the ticks of a run, of the
+position's distance from a reference solved far more accurately; in a chaotic limit cycle, where positions cannot be
+compared, it is that of the amplitude. A *time* is the median of a simulated tick in one process, all energy books kept;
+in bold, the scene's own setting."""
+
+
+def write(directory: Path, docs: Path) -> Path:
+    """Writes page and figures from DIRECTORY/cost.json into ``docs``; returns the page's file.
+
+    Raises:
+        CostFileError: there is no cost.json.
+        FigureError: matplotlib is missing, or there is nothing to draw.
+    """
+    cost = load(directory)
+    docs.mkdir(parents=True, exist_ok=True)
+    figure.draw(cost, docs / FIGURE)
+    if cost.prices:
+        prices_figure.draw(cost, docs / PRICES_FIGURE)
+    target = docs / PAGE
+    target.write_text(page(cost), encoding="utf-8")
+    return target
+
+
+def page(cost: Cost) -> str:
+    """Makes the page in Markdown."""
+    parts = [
+        "# What accuracy costs",
+        _INTRO,
+        "## Findings",
+        *(part for table in findings(cost) for part in _finding(table)),
+        "## Error against time",
+        f"![Error of each method against the time of a tick, scene by scene]({FIGURE})",
+        *(part for scene in cost.scenes for part in _scene(scene)),
+        *_prices(cost.prices),
+        "## Measured on",
+        f"{made_with(cost)} {_quiet(cost)}".strip(),
+    ]
+    return "\n\n".join(parts) + "\n"
+
+
+def _finding(table: FindingTable) -> list[str]:
+    """Formats a table of findings with its title and sentences."""
+    return [f"### {table.title}", markdown_table(table.heads, table.rows), *table.notes]
+
+
+def _scene(scene: SceneCost) -> list[str]:
+    """Makes the section of a scene: reference, table and advice."""
+    reference = scene.reference
+    rates = sorted({point.plant_rate for point in scene.points})
+    methods = dict.fromkeys(point.method for point in scene.points)
+    rows = [[method, *(_cell(scene, method, hertz) for hertz in rates)] for method in methods]
+    swings = "" if reference.pointwise else " It is chaotic: compared by its swings, not by positions."
+    about = f"*Reference:* {reference.how} It is known to {length(reference.error_m)}.{swings}"
+    parts = [f"### {name_of(scene)}", about, _table(["error, µs", *map(rate, rates)], rows)]
+    return [*parts, *([_failures(scene)] if any(p.failure for p in scene.points) else []), scene.advice]
+
+
+def _cell(scene: SceneCost, method: str, hertz: int) -> str:
+    """Formats error, wrong verdict and time of a point; the scene's own setting in bold."""
+    point = next((p for p in scene.points if (p.method, p.plant_rate) == (method, hertz)), None)
+    if point is None:
+        return ""
+    words = "failed" if point.error is None else _power(point.error.size_m)
+    if point.error and not point.error.verdict_right:
+        words += f" ({point.error.verdict})"
+    words += f", {fixed(point.us_per_tick.median)}" if point.us_per_tick else ""
+    return f"**{words}**" if (method, hertz) == (scene.own_method, scene.own_rate) else words
+
+
+def _power(metres: float) -> str:
+    return f"{metres:.1e} m".replace("-", "−") if metres else "0 m"
+
+
+def _failures(scene: SceneCost) -> str:
+    """Returns why points failed: for each method one reason, that of its highest rate."""
+    last: dict[str, Point] = {point.method: point for point in scene.points if point.failure}
+    reasons = [f"{method} at {rate(point.plant_rate)}: {point.failure}" for method, point in last.items()]
+    return "\n".join(f"- Failed: {reason}" for reason in reasons)
+
+
+def _prices(groups: list[PriceGroup]) -> list[str]:
+    """Makes the section of the prices: the figure and a table a group."""
+    if not groups:
+        return []
+    parts = ["## The other prices", f"![What books, log, effects, processes, delay and rate cost]({PRICES_FIGURE})"]
+    for group in groups:
+        about = f"Medians of {group.repeats} repeats, {group.unit}: {group.how}. The first row is the baseline."
+        heads = [
+            "left out" if group.name == "effects" else "",
+            "median",
+            "quartiles",
+            "ratio",
+            "costs",
+            "instructions",
+            "buys",
+        ]
+        parts += [f"### {group.title}", about, _table(heads, [_price(price) for price in group.prices])]
+    return parts
+
+
+def _price(price: Price) -> list[str]:
+    count, time = price.instructions_per_tick, price.time
+    return [
+        price.what,
+        fixed(time.median),
+        f"{fixed(time.q1)}–{fixed(time.q3)}",
+        fixed(price.ratio),
+        fixed(price.costs),
+        "" if count is None else f"{count:.0f}",
+        price.buys,
+    ]
+
+
+def _table(heads: list[str], rows: list[list[str]]) -> str:
+    return markdown_table(heads, rows, numbers=range(1, len(heads) - (heads[-1] == "buys")))
+
+
+def _quiet(cost: Cost) -> str:
+    """Returns the load of the machine as sentences."""
+    if cost.load is None:
+        return ""
+    spread = f"a fixed loop timed once a round varied by {100 * cost.load.calibration_spread:.1f} %"
+    load_average = f" and the load average was {cost.load.average:.1f}" if cost.load.average is not None else ""
+    quiet = "The machine was busy meanwhile" if cost.load.busy else "The machine was quiet"
+    return f"{quiet}: {spread}{load_average}. The tolerance is {amount(cost.tolerance_m, 'm')}."
+
+
+def main() -> None:
+    """Runs ``python -m haploop.tools.cost.page DIRECTORY DOCS``."""
+    if len(sys.argv) != 3:
+        leave("Two directories were expected: that of a haploop cost, and where the page goes.", WRONG_USE)
+    try:
+        print(write(Path(sys.argv[1]), Path(sys.argv[2])))
+    except (CostFileError, FigureError) as error:
+        leave(str(error), WRONG_USE)
+
+
+if __name__ == "__main__":
+    main()

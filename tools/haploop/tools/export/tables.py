@@ -1,0 +1,134 @@
+"""CSV and Apache Parquet: a file for every topic, a column for every quantity.
+
+CSV: UTF-8, one header line, ``timestamp (s),x (m)``; a pure number has its name alone. Numbers have as many digits as
+it takes to read back the same float64, a NaN is an empty cell, an infinite number is ``inf`` or ``-inf``. So one call
+of ``pandas.read_csv``, or a double click on the file, does.
+
+Parquet: float64 columns; ``pyarrow.parquet.read_schema(file).field("x").metadata[b"unit"]`` is the unit of a column;
+pandas and polars read the files as they are.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import csv
+import io
+from collections.abc import Iterable, Mapping, Sequence
+from itertools import chain
+from typing import IO, Any
+
+import numpy as np
+
+from haploop.logger.log.recording import TIMESTAMP
+from haploop.logger.log.stream import Batch
+from haploop.logger.log.table import Floats
+from haploop.tools.export.writer import ExportWriter, Units, read_column, to_json
+
+# A topic of free maps becomes a table of these two columns: time, and the map as JSON.
+MESSAGE = "message"
+MAP_UNITS = {TIMESTAMP: "s", MESSAGE: ""}
+# Rows of a group of a Parquet file, which a reader can read by itself.
+_GROUP_ROWS = 1 << 16
+
+
+class CsvWriter(ExportWriter):
+    """Writes a CSV file for each topic."""
+
+    suffix, file_per_topic = ".csv", True
+
+    def __init__(self, files: Sequence[IO[bytes]], units: Units, attachments: Mapping[str, bytes]) -> None:
+        self._units = units
+        self._files = dict(zip(units, files, strict=True))
+        for topic, file in self._files.items():
+            columns = units[topic] or MAP_UNITS
+            file.write(_line(f"{name} ({unit})" if unit else name for name, unit in columns.items()))
+
+    def add(self, batch: Batch) -> None:
+        file = self._files[batch.topic]
+        if names := self._units[batch.topic]:
+            cells = [numbers(read_column(batch, name)) for name in names]
+            file.writelines(f"{','.join(row)}\n".encode() for row in zip(*cells, strict=True))
+        else:
+            file.writelines(_line([repr(time), message]) for time, message in zip(*map_rows(batch), strict=True))
+
+    def finish(self) -> None:
+        pass
+
+
+def numbers(values: Floats) -> list[str]:
+    """Returns each number as the shortest text that reads back as it; "" for NaN."""
+    texts = list(map(repr, values.tolist()))
+    for row in np.flatnonzero(np.isnan(values)).tolist():
+        texts[row] = ""
+    return texts
+
+
+def _line(cells: Iterable[str]) -> bytes:
+    text = io.StringIO()
+    csv.writer(text, lineterminator="\n").writerow(cells)
+    return text.getvalue().encode()
+
+
+class ParquetWriter(ExportWriter):
+    """Writes a Parquet file for each topic."""
+
+    suffix, file_per_topic = ".parquet", True
+
+    def __init__(self, files: Sequence[IO[bytes]], units: Units, attachments: Mapping[str, bytes]) -> None:
+        try:
+            import pyarrow
+            from pyarrow import parquet
+        except ImportError as error:
+            raise ImportError("Parquet files need pyarrow; install it with: pip install 'haploop[parquet]'") from error
+        self._arrow: Any = pyarrow
+        self._units = units
+        self._schemas = {topic: self._schema(columns or MAP_UNITS) for topic, columns in units.items()}
+        self._files = {
+            topic: parquet.ParquetWriter(file, self._schemas[topic]) for topic, file in zip(units, files, strict=True)
+        }
+        self._held: dict[str, list[Batch]] = {topic: [] for topic in units}
+
+    def _schema(self, units: Mapping[str, str]) -> Any:
+        arrow = self._arrow
+        return arrow.schema(
+            arrow.field(name, arrow.string() if name == MESSAGE else arrow.float64(), metadata={"unit": unit})
+            for name, unit in units.items()
+        )
+
+    def add(self, batch: Batch) -> None:
+        held = self._held[batch.topic]
+        held.append(batch)
+        if sum(len(one.log_times_ns) for one in held) >= _GROUP_ROWS:
+            self._write(batch.topic)
+
+    def _write(self, topic: str) -> None:
+        """Writes the rows held back as a group."""
+        held, self._held[topic] = self._held[topic], []
+        if not held:
+            return
+        if names := self._units[topic]:
+            columns = [np.concatenate([read_column(batch, name) for batch in held]) for name in names]
+        else:
+            columns = [[*chain(*parts)] for parts in zip(*map(map_rows, held), strict=True)]
+        schema = self._schemas[topic]
+        arrays = [self._arrow.array(values, type=field.type) for values, field in zip(columns, schema, strict=True)]
+        group = self._arrow.Table.from_arrays(arrays, schema=schema)
+        self._files[topic].write_table(group, row_group_size=group.num_rows)
+
+    def finish(self) -> None:
+        for topic, file in self._files.items():
+            self._write(topic)
+            file.close()
+
+    def __exit__(self, *_: object) -> None:
+        for file in self._files.values():
+            with contextlib.suppress(OSError):  # that it could not write has been reported
+                file.close()
+
+
+def map_rows(batch: Batch) -> tuple[list[float], list[str]]:
+    """Returns time in s and JSON text of each of a batch's free maps."""
+    maps: list[dict[str, Any]] = list(batch.rows)  # type: ignore[arg-type]
+    nanoseconds = batch.log_times_ns.tolist()
+    times = [float(one.get(TIMESTAMP, ns / 1e9)) for one, ns in zip(maps, nanoseconds, strict=True)]
+    return times, [to_json(one) for one in maps]
