@@ -5,22 +5,21 @@ An effect that is not named is not there: its modules are not imported and no in
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import cache
+from collections.abc import Iterator
+from functools import cache, partial
 from importlib.metadata import entry_points
 from typing import Any
 
+from haploop.controller.estimators.choose import estimator_class, estimators_for
 from haploop.launch.plan import checks, ideal
 from haploop.launch.plan.effect import Effect, Resolved, at, without_keys
 from haploop.launch.plan.modules import CHAIN, COUNTED, HISTORY, LINE, METHODS, NOISY, RUBBING, STEPWISE
 from haploop.plant.sensing.encoder import accelerometer_is_used
+from haploop.protocol.ticks import Timebase
+from haploop.protocol.trees import tree_leaves
 
 # Other packages name theirs in this group of entry points.
 _GROUP = "haploop.effects"
-
-
-def _controller(module: str) -> tuple[str, ...]:
-    return (f"haploop.controller.{module}",)
 
 
 def _plant(module: str, *others: str) -> tuple[str, ...]:
@@ -47,37 +46,35 @@ def _stepwise(name: str, does: str) -> Effect:
     return _integrator(name, does, *STEPWISE, linear=False, note=checks.note_growth)
 
 
-def _estimator(
-    of: str, name: str, module: str, does: str, states: int | Callable[[Resolved], int], **says: Any
-) -> Effect:
-    """Makes the effect of an estimator of ``[velocity]`` or ``[acceleration]``."""
-    modules = _controller(f"estimators.{module}")
-    return Effect(
-        f"{of}.estimator",
-        "controller",
-        modules,
-        "estimate",
-        does,
-        value=name,
-        states=states,
-        takes_out=_without_estimator(of),
-        **says,
-    )
+def _estimators(of: str) -> Iterator[Effect]:
+    """Makes the effects of all estimators that ``[velocity]`` or ``[acceleration]`` may name but the difference."""
+    for name, kind in estimators_for(of).items():
+        if name != "difference":
+            yield Effect(
+                f"{of}.estimator",
+                "controller",
+                (kind.__module__,),
+                "estimate",
+                f"{of[0]} is {kind.does}",
+                value=name,
+                states=partial(_memory_of, of),
+                linear=kind.linear,
+                takes_out=partial(_without_estimator, of),
+            )
 
 
-def _without_estimator(of: str) -> Callable[[Resolved], Resolved]:
+def _memory_of(of: str, scene: Resolved) -> int:
+    """Counts the numbers that an estimator remembers; counts of ticks are none of them."""
+    clock = Timebase.from_clock(scene["clock"], scene["duration"])
+    estimator = estimator_class(scene[of]["estimator"]).from_scene(scene, of, clock.period_s)
+    return sum(isinstance(leaf, float) for leaf in tree_leaves(estimator.start(0.0, (0.0, 0.0))))
+
+
+def _without_estimator(of: str, scene: Resolved) -> Resolved:
     """Takes out an estimator with the keys that are its own, and an acceleration that comes of it."""
-
-    def out(scene: Resolved) -> Resolved:
-        kept = {key: scene[of][key] for key in ("source", "cutoff") if key in scene[of]}
-        from_kalman = at(scene, "acceleration.source") == "kalman"
-        return without_keys({**scene, of: kept}, *["acceleration.source"] * from_kalman)
-
-    return out
-
-
-def _ticks(of: str) -> Callable[[Resolved], int]:
-    return lambda scene: scene[of]["ticks"]
+    kept = {key: scene[of][key] for key in ("source", "cutoff") if key in scene[of]}
+    from_kalman = at(scene, "acceleration.source") == "kalman"
+    return without_keys({**scene, of: kept}, *["acceleration.source"] * from_kalman)
 
 
 def _noise_memory(scene: Resolved) -> int:
@@ -209,30 +206,11 @@ EFFECTS: tuple[Effect, ...] = (
         left_out=("accelerometer.range",),
         used=accelerometer_is_used,
     ),
-    _estimator("velocity", "window", "window", "v is a difference over a window", _ticks("velocity")),
-    _estimator(
-        "velocity",
-        "foaw",
-        "foaw",
-        "v is the slope over the longest window that fits",
-        _ticks("velocity"),
-        linear=False,
-    ),
-    _estimator(
-        "velocity", "kalman", "kalman", "v is that of a Kalman filter of position, velocity and acceleration", 3
-    ),
+    *_estimators("velocity"),
     Effect("velocity.cutoff", "controller", (), "estimate", "v is low-passed", states=1),
     Effect("acceleration.source", "controller", (), "estimate", "a is read, not estimated", value="accelerometer"),
     Effect("acceleration.source", "controller", (), "estimate", "a is that of the Kalman filter", value="kalman"),
-    _estimator("acceleration", "window", "window", "a is a difference of v over a window", _ticks("acceleration")),
-    _estimator(
-        "acceleration",
-        "foaw",
-        "foaw",
-        "a is the slope of v over the longest window that fits",
-        _ticks("acceleration"),
-        linear=False,
-    ),
+    *_estimators("acceleration"),
     Effect("acceleration.cutoff", "controller", (), "estimate", "a is low-passed", states=1),
     Effect(
         "jitter",

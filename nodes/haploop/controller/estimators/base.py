@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from haploop.protocol.arrays import each
+from haploop.protocol.quantity import Quantity
 
 # (x_m,) or (x_m, acceleration) of a tick; floats, or arrays of shape (members,).
 Sample = Sequence[Any]
@@ -23,14 +24,21 @@ class Estimator(ABC):
     Attributes:
         name: what ``velocity.estimator`` and ``acceleration.estimator`` say to ask for it.
         does: what the estimate is, in one phrase.
+        tables: the tables of the scene that may name it.
         needs, takes: keys of the scene's table that it must have, and that it may have besides.
+        keys: declaration of those that are its own; the scene declares the keys that come with haploop.
+        needs_without: key that ``[velocity]`` must have too unless the scene has one of these tables to take the value
+            from; ``[acceleration]`` must always have it.
         linear: whether the estimate is a linear function of the samples.
     """
 
     name: ClassVar[str]
     does: ClassVar[str]
+    tables: ClassVar[tuple[str, ...]] = ("velocity", "acceleration")
     needs: ClassVar[tuple[str, ...]] = ()
     takes: ClassVar[tuple[str, ...]] = ()
+    keys: ClassVar[Mapping[str, Quantity]] = {}
+    needs_without: ClassVar[Mapping[str, tuple[str, ...]]] = {}
     linear: ClassVar[bool] = True
 
     @classmethod

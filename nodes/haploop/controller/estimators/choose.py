@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from importlib import import_module
+from importlib.metadata import entry_points
 from typing import Any
 
 from haploop.controller.estimators.base import Difference, Estimator, LowPass, Unchanged
@@ -14,6 +15,13 @@ ESTIMATORS: dict[str, str | type[Estimator]] = {
     "foaw": "haploop.controller.estimators.foaw:EndFit",
     "kalman": "haploop.controller.estimators.kalman:Kalman",
 }
+# Other packages name theirs in this group of entry points.
+_GROUP = "haploop.estimators"
+
+
+def estimator_names() -> tuple[str, ...]:
+    """Returns the names of all estimators, those of other packages last."""
+    return *ESTIMATORS, *(entry.name for entry in entry_points(group=_GROUP) if entry.name not in ESTIMATORS)
 
 
 def estimator_class(name: str) -> type[Estimator]:
@@ -22,11 +30,19 @@ def estimator_class(name: str) -> type[Estimator]:
     Raises:
         KeyError: there is none of this name.
     """
+    if name not in ESTIMATORS:
+        return {entry.name: entry for entry in entry_points(group=_GROUP)}[name].load()
     found = ESTIMATORS[name]
     if isinstance(found, str):
         module, _, attribute = found.partition(":")
         return getattr(import_module(module), attribute)
     return found
+
+
+def estimators_for(table: str) -> dict[str, type[Estimator]]:
+    """Returns the estimators that a table of the scene ("velocity", "acceleration") may name; all are imported."""
+    classes = {name: estimator_class(name) for name in estimator_names()}
+    return {name: kind for name, kind in classes.items() if table in kind.tables}
 
 
 def make_estimators(scene: dict[str, Any], period_s: float) -> tuple[Estimator, Estimator, str]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -35,6 +35,7 @@ class EndFit(Estimator):
     does: ClassVar[str] = "the slope over the longest window that fits"
     needs: ClassVar[tuple[str, ...]] = ("ticks",)
     takes: ClassVar[tuple[str, ...]] = ("bound", "fit")
+    needs_without: ClassVar[Mapping[str, tuple[str, ...]]] = {"bound": ("encoder",)}
     linear: ClassVar[bool] = False
     ticks: int
     bound: Any

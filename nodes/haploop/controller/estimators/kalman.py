@@ -20,6 +20,7 @@ but as stable. An accelerometer's bias, delay and bandwidth are not in the model
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -50,8 +51,10 @@ class Kalman(Estimator):
 
     name: ClassVar[str] = "kalman"
     does: ClassVar[str] = "that of a Kalman filter of position, velocity and acceleration"
+    tables: ClassVar[tuple[str, ...]] = ("velocity",)
     needs: ClassVar[tuple[str, ...]] = ("jerk_density",)
     takes: ClassVar[tuple[str, ...]] = ("measurement_noise", "accelerometer", "accelerometer_noise")
+    needs_without: ClassVar[Mapping[str, tuple[str, ...]]] = {"measurement_noise": ("encoder", "noise")}
     gain: tuple[tuple[Any, ...], ...]
     period_s: float
     half_s2: float

@@ -5,17 +5,17 @@ from __future__ import annotations
 from typing import Annotated, Literal
 
 from haploop.protocol.quantity import si
-from haploop.protocol.scene.table import Table
+from haploop.protocol.scene.table import OpenTable
 
 Cutoff = Annotated[float, si("Hz", "cutoff of a first-order low-pass", above=0)]
 Ticks = Annotated[int | None, si("", "ticks of the window, the longest one for foaw", whole=True, at_least=1)]
 Fit = Literal["end", "best"]
 
 
-class Velocity(Table):
+class Velocity(OpenTable):
     """The velocity estimate: a backward difference unless an estimator is named; low-passed when a cutoff is given."""
 
-    estimator: Literal["difference", "window", "foaw", "kalman"] | None = None
+    estimator: str | None = None
     ticks: Ticks = None
     bound: Annotated[
         float | None, si("m", "how far samples may lie off a line; one count of the encoder without it", above=0)
@@ -33,11 +33,11 @@ class Velocity(Table):
     cutoff: Cutoff | None = None
 
 
-class Acceleration(Table):
+class Acceleration(OpenTable):
     """The acceleration estimate: a rate of the velocity, an accelerometer's reading, or the Kalman filter's."""
 
     source: Literal["encoder", "accelerometer", "kalman"] = "encoder"
-    estimator: Literal["difference", "window", "foaw"] | None = None
+    estimator: str | None = None
     ticks: Ticks = None
     bound: Annotated[float | None, si("m/s", "how far velocities may lie off a line", above=0)] = None
     fit: Fit | None = None

@@ -19,7 +19,7 @@ from haploop.protocol.scene.effects import (
 )
 from haploop.protocol.scene.estimators import Acceleration, Velocity
 from haploop.protocol.scene.hand_force import HandForce
-from haploop.protocol.scene.table import Table
+from haploop.protocol.scene.table import OpenTable, Table
 
 Integrator = Literal["exact", "semi-implicit-euler", "euler", "rk4", "implicit-midpoint", "dop853"]
 
@@ -96,7 +96,7 @@ class ElementTable(Table):
         return {"kind": self.name, "acts": self.acts, **self.parameters}
 
 
-class Scene(Table):
+class Scene(OpenTable):
     """A scene: one sampled haptic loop."""
 
     title: str

@@ -53,6 +53,29 @@ class Table:
         return written
 
 
+class OpenTable(Table):
+    """Base of a table to which other packages may add keys.
+
+    Attributes:
+        others: the keys they have added, with their values in SI units.
+    """
+
+    others: dict[str, Any] = dataclasses.field(default_factory=dict)
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> Self:
+        """Makes the table as ``Table.from_dict`` does; keys that it does not declare are those of others."""
+        declared = {field.name for field in cls.fields()}
+        others = {key: value for key, value in data.items() if key not in declared and not (cls.kind and key == "kind")}
+        made = super().from_dict({key: value for key, value in data.items() if key not in others})
+        return dataclasses.replace(made, others=others) if others else made
+
+    def as_dict(self) -> dict[str, Any]:
+        """Returns the table as ``Table.as_dict`` does, the keys of others last."""
+        written = super().as_dict()
+        return written | written.pop("others")
+
+
 @cache
 def _tables_of(cls: type[Table]) -> dict[str, tuple[type[Table], ...]]:
     """The table classes that may stand at each key that holds tables."""

@@ -6,25 +6,24 @@ from typing import Any
 
 from pydantic_core import PydanticCustomError
 
+from haploop.controller.estimators.choose import estimators_for
 from haploop.launch.scene.layers import Layers
-from haploop.launch.scene.tables.models import keys_of, number_of
+from haploop.launch.scene.tables.models import number_of
 from haploop.protocol.scene.effects import Noise
 from haploop.protocol.scene.estimators import Acceleration, Velocity
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.scene.table import Table
 
-# The keys an estimator must have, and those it may have beside what all take.
-_NEEDS = {"difference": (), "window": ("ticks",), "foaw": ("ticks",), "kalman": ("jerk_density",)}
-_TAKES = {"foaw": ("bound", "fit"), "kalman": ("measurement_noise", "accelerometer", "accelerometer_noise")}
-_ALL = {estimator: (*needs, *_TAKES.get(estimator, ())) for estimator, needs in _NEEDS.items()}
+_TABLES: dict[str, type[Table]] = {"velocity": Velocity, "acceleration": Acceleration}
 
 
 def check_estimators(layers: Layers) -> None:
     """Add keys an estimator lacks or does not take to the mistakes; values wrong in themselves are passed over."""
     velocity, acceleration = _table(layers, "velocity"), _table(layers, "acceleration")
-    _keys(layers, "velocity", Velocity, velocity)
-    _keys(layers, "acceleration", Acceleration, acceleration)
-    _velocity(layers, velocity)
+    _keys(layers, "velocity", velocity)
+    _keys(layers, "acceleration", acceleration)
+    if "accelerometer_noise" in velocity and velocity.get("accelerometer") is not True:
+        layers.complain(("velocity", "accelerometer_noise"), "It goes with accelerometer = true alone.")
     _acceleration(layers, acceleration, velocity)
 
 
@@ -43,35 +42,35 @@ def check_filter(layers: Layers, scene: Scene) -> None:
         layers.complain(("velocity", "jerk_density"), expected)
 
 
-def _keys(layers: Layers, name: str, model: type[Table], table: dict[str, Any]) -> None:
-    estimator = table.get("estimator", "difference")
-    if not isinstance(estimator, str) or estimator not in _ALL:
+def _keys(layers: Layers, name: str, table: dict[str, Any]) -> None:
+    """Compares the keys of a table with those that the estimators declare that may stand in it."""
+    kinds, estimator = estimators_for(name), table.get("estimator", "difference")
+    if not isinstance(estimator, str) or (kind := kinds.get(estimator)) is None:
         return
-    for key in _NEEDS[estimator]:
-        if key in keys_of(model) and key not in table:
-            _missing(layers, name, model, key, f"The {estimator} estimator needs")
+    for key in kind.needs:
+        if key not in table:
+            _missing(layers, name, key, f"The {estimator} estimator needs")
     for key in table:
-        takers = [other for other, keys in _ALL.items() if key in keys and key in keys_of(model)]
+        takers = [other for other, one in kinds.items() if key in (*one.needs, *one.takes)]
         if takers and estimator not in takers:
             layers.complain((name, key), f"It goes with the estimator {' or '.join(takers)} alone.")
+    for key, sources in kind.needs_without.items():
+        if key in table:
+            continue
+        if name == "acceleration":
+            _missing(layers, name, key, f"The {estimator} estimator needs")
+        elif not any(_gives(layers, source) for source in sources):
+            tables = " or ".join(f"[{source}]" for source in sources)
+            _missing(layers, name, key, f"Without an {tables} to take it from it must be")
 
 
-def _velocity(layers: Layers, velocity: dict[str, Any]) -> None:
-    """What the defaults of bound and noise are taken from has to be there."""
-    encoder = "encoder" in layers.data
-    match velocity.get("estimator"):
-        case "foaw" if "bound" not in velocity and not encoder:
-            why = "Without an [encoder] to take it from it must be"
-            _missing(layers, "velocity", Velocity, "bound", why)
-        case "kalman" if "measurement_noise" not in velocity and not encoder and not _is_noisy(layers):
-            why = "Without an [encoder] or [noise] to take it from it must be"
-            _missing(layers, "velocity", Velocity, "measurement_noise", why)
-    if "accelerometer_noise" in velocity and velocity.get("accelerometer") is not True:
-        layers.complain(("velocity", "accelerometer_noise"), "It goes with accelerometer = true alone.")
+def _gives(layers: Layers, source: str) -> bool:
+    """Tells whether a default can be taken from a table; from one of noise only where there is some.
 
-
-def _is_noisy(layers: Layers) -> bool:
-    """Whether there is noise on the position; a deviation that is wrong is a mistake reported elsewhere."""
+    A deviation that is wrong is a mistake reported elsewhere.
+    """
+    if source != "noise":
+        return source in layers.data
     try:
         return number_of(Noise, "deviation").read(_table(layers, "noise").get("deviation", 0.0)) > 0.0
     except PydanticCustomError:
@@ -85,12 +84,10 @@ def _acceleration(layers: Layers, acceleration: dict[str, Any], velocity: dict[s
     if source == "kalman" and velocity.get("estimator") != "kalman":
         expected = 'The filter that gives it is the velocity\'s, so velocity.estimator must be "kalman" too.'
         layers.complain(("acceleration", "source"), expected)
-    if estimator == "foaw" and "bound" not in acceleration:
-        _missing(layers, "acceleration", Acceleration, "bound", "The foaw estimator needs")
 
 
-def _missing(layers: Layers, name: str, model: type[Table], key: str, why: str) -> None:
-    layers.complain((name, key), f"{why} {number_of(model, key).form}.", "is missing")
+def _missing(layers: Layers, name: str, key: str, why: str) -> None:
+    layers.complain((name, key), f"{why} {number_of(_TABLES[name], key).form}.", "is missing")
 
 
 def _table(layers: Layers, name: str) -> dict[str, Any]:

@@ -12,10 +12,13 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar, Union, get_a
 from pydantic import Field, ValidationError, create_model, model_validator
 from pydantic_core import PydanticCustomError
 
+from haploop.controller.estimators.choose import estimators_for
+from haploop.launch.plan.effects import all_effects
 from haploop.launch.scene.force_csv import fault
 from haploop.launch.scene.tables.base import Model
 from haploop.launch.scene.tables.number import Number
 from haploop.protocol.quantity import Quantity
+from haploop.protocol.scene.estimators import Acceleration, Velocity
 from haploop.protocol.scene.hand_force import Trace
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.scene.table import Table
@@ -63,7 +66,22 @@ def _keys_of(table: type[Table]) -> dict[str, Any]:
     keys: dict[str, Any] = {"kind": (Literal[table.kind], ...)} if table.kind else {}
     hints = get_type_hints(table, include_extras=True)
     for field in table.fields():
-        keys[field.name] = _validated(hints[field.name]), _default(field)
+        if field.name != "others":
+            keys[field.name] = _validated(hints[field.name]), _default(field)
+    return keys | _registered(table)
+
+
+def _registered(table: type[Table]) -> dict[str, Any]:
+    """The keys that registries give: names of estimators with the keys of their own, tables of others' effects."""
+    if table is Scene:
+        return {effect.key: (model_of(effect.table) | None, None) for effect in all_effects() if effect.table}
+    if table not in (Velocity, Acceleration):
+        return {}
+    kinds = estimators_for(table.__name__.lower())
+    names: Any = Literal[tuple(kinds)]  # pyright: ignore[reportInvalidTypeForm]
+    keys: dict[str, Any] = {"estimator": (names | None, None)}
+    for kind in kinds.values():
+        keys |= {key: (Annotated[float | None, Number(quantity)], None) for key, quantity in kind.keys.items()}
     return keys
 
 
