@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from haploop.logger.books.sums import add_columns, add_columns_of_batch, no_sums, sum_in_order, sum_steps, with_rows
+from haploop.logger.books.sums import add_columns, add_ticks_of_batch, no_sums, sum_in_order, sum_steps, with_rows
 from haploop.protocol.trees import tree_select, tree_take
 
 amounts = st.floats(-1e6, 1e6, allow_subnormal=False)
@@ -76,7 +76,7 @@ def test_sums_and_running_sums_of_a_batch_have_every_bit_of_those_of_one_run(n, 
     rng = np.random.default_rng(n)
     flows = rng.normal(size=(3, 4, n, members)) * 10.0 ** rng.integers(-8, 8, (3, 4, n, members))
     together = np.stack([sum_steps(flow) for flow in flows])
-    batch = add_columns_of_batch(no_sums(3, members), together)
+    batch = add_ticks_of_batch(no_sums(3, members), together.swapaxes(0, 1))
     for member in range(members):
         alone = np.stack([sum_steps(flow[..., member]) for flow in flows])
         assert alone.tolist() == sum_in_order(flows[..., member]).tolist()
@@ -91,10 +91,10 @@ def test_sums_and_running_sums_of_a_batch_have_every_bit_of_those_of_one_run(n, 
 
 def test_dropping_members_of_a_batch_leaves_the_sums_of_the_others_to_the_bit():
     rng = np.random.default_rng(0)
-    kept, pieces = rng.random(50) > 0.4, rng.normal(size=(2, 3, 6, 50)) * 10.0 ** rng.integers(-8, 8, (2, 3, 6, 50))
-    all_of_them = dropped = add_columns_of_batch(no_sums(3, 50), pieces[0])
-    all_of_them = add_columns_of_batch(all_of_them, pieces[1])
-    dropped = add_columns_of_batch(tree_select(dropped, kept), pieces[1][..., kept])
+    kept, pieces = rng.random(50) > 0.4, rng.normal(size=(2, 6, 3, 50)) * 10.0 ** rng.integers(-8, 8, (2, 6, 3, 50))
+    all_of_them = dropped = add_ticks_of_batch(no_sums(3, 50), pieces[0])
+    all_of_them = add_ticks_of_batch(all_of_them, pieces[1])
+    dropped = add_ticks_of_batch(tree_select(dropped, kept), pieces[1][..., kept])
     assert 10 < np.count_nonzero(kept) < 50
     assert dropped.sums.tolist() == all_of_them.sums[:, kept].tolist()
     assert dropped.errors.tolist() == all_of_them.errors[:, kept].tolist()

@@ -9,8 +9,7 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from haploop.logger.books.books import Books
-from haploop.logger.books.buffers import ControllerBuffer
+from haploop.logger.books.books import Books, Commanded
 from haploop.logger.summary import energy, finite, outcome
 from haploop.logger.verdict.window import CONTROLLER_COLUMNS, Window
 from haploop.protocol.arrays import rows_of
@@ -19,7 +18,6 @@ from haploop.protocol.trees import tree_by_member, tree_select, tree_take
 
 # Steps of a trajectory that are hashed together.
 _HASHED_STEPS = 320
-_BOOKED_COLUMNS = ("x", "wall", "wall_position", "wall_stiffness")
 
 
 class Row(Protocol):
@@ -71,7 +69,7 @@ class BatchLogger:
     Attributes:
         books: None where there are none.
         window: the last half second.
-        buffer: controller rows that books still need.
+        rows: the last controller rows, which books still need; the latest is of tick ``tick - 1``.
         tick: every interval before it is booked.
     """
 
@@ -81,7 +79,7 @@ class BatchLogger:
         self._time = time
         self.books = Books(scene, time, members) if energy else None
         self.window = Window(time, scene.get("encoder", {}).get("resolution", 0.0), members)
-        self.buffer = ControllerBuffer()
+        self.rows: list[Row] = []
         self._accounts: dict[int, dict[str, Any]] = {}
         self._trajectories = Trajectories(members) if trajectories else None
         self.tick = 0
@@ -96,21 +94,31 @@ class BatchLogger:
         """
         first, ticks, x = self.tick, len(rows), plant["x"]
         members = x.shape[1]
-        names = {*CONTROLLER_COLUMNS, *(_BOOKED_COLUMNS if self.books else ())}
-        columns = {name: rows_of([row.columns[name] for row in rows], members) for name in names}
+        columns = {name: _column([row.columns[name] for row in rows], members) for name in CONTROLLER_COLUMNS}
         if self.books:
-            at_work = sorted({book for row in rows for book in row.forces})
-            forces = {book: rows_of([row.forces.get(book, 0.0) for row in rows], members) for book in at_work}
-            self.buffer.add({name: columns[name] for name in _BOOKED_COLUMNS}, forces)
+            self.rows += rows
             if first == 0:
                 self.books.start(plant)
-            self.books.book_batch(first, plant, self.buffer, into_wall)
-            self.buffer.forget_before(first + ticks, int(plant["command"][-1]))
+            now = rows[0].columns
+            wall = now["wall_position"], now["wall_stiffness"], into_wall
+            self.books.book_batch(first, plant, self._commanded(first + ticks, wall, members))
+            # Commands that are still in effect, and the last row, are needed once more.
+            needed = first + ticks - min(first + ticks - 1, int(plant["command"][-1]))
+            del self.rows[: max(0, len(self.rows) - needed)]
         self.window.add(x, plant["held_N"], columns)
         if self._trajectories:
             self._trajectories.add(x[first > 0 :], plant["v"][first > 0 :])
         self.tick += ticks
         self.note_accounts(rows[-1].elements)
+
+    def _commanded(self, end: int, wall: tuple[Any, Any, float], members: int) -> Commanded:
+        """What books need of the rows kept, the latest of tick ``end - 1``."""
+        rows = self.rows
+        forces = {"wall": rows_of([row.columns["wall"] for row in rows], members)}
+        for book in sorted({book for row in rows for book in row.forces}):
+            forces[str(book)] = rows_of([row.forces.get(book, 0.0) for row in rows], members)
+        x_m = rows_of([row.columns["x"] for row in rows], members)
+        return Commanded(end - len(rows), x_m, forces, wall)
 
     def note_accounts(self, elements: Sequence[dict[str, Any]]) -> None:
         """Takes note that these elements have been at work up to ``tick``."""
@@ -157,6 +165,12 @@ class BatchLogger:
         entry = energy(tree_take(self.books.state, places), accounts, "wall" in ends[0].scene)
         entries = tree_by_member({"energy": entry}, len(places))
         return entries if _is_finite(entry) else [finite(entry) for entry in entries]
+
+
+def _column(values: list[Any], members: int) -> np.ndarray:
+    """A number for all members, or one for each, in every row; shape (rows, members), or (rows, 1)."""
+    is_shared = not any(getattr(value, "shape", ()) for value in values)
+    return np.array(values)[:, None] if is_shared else rows_of(values, members)
 
 
 def _is_finite(value: Any) -> bool:

@@ -61,7 +61,7 @@ class Logger:
         self._plant = PlantBuffer(self.time.steps_per_tick, int(plant["tick"]))
         self._controller = ControllerBuffer(history[0]["from_tick"] if history else self.tick)
         for block in history:
-            self._controller.add_block(block)
+            self._controller.add(block)
             self._note_accounts(block)
         self._end_state = {name: np.array([plant[name]]) for name in ("x", "v", "force")}
         self._started = False
@@ -73,7 +73,7 @@ class Logger:
 
     def controller_block(self, block: Block) -> None:
         """Takes a block of the controller."""
-        self._controller.add_block(block)
+        self._controller.add(block)
         self._note_accounts(block)
         if self._channels:
             self._channels.controller(block)
@@ -119,9 +119,9 @@ class Logger:
             self.books.start(plant)
             self._digest.update(np.stack([x[:1], v[:1]], axis=1).tobytes())
             self._started = True
-        rows = self.books.book(self.tick, plant, self._controller, self._into_wall)
-        at = self.tick - self._controller.first
-        columns = {name: self._controller.columns[name][at : at + end - self.tick, None] for name in CONTROLLER_COLUMNS}
+        controller = self._controller
+        rows = self.books.book(self.tick, plant, controller.commanded(self.tick, end, self._into_wall))
+        columns = {name: controller.rows(name, self.tick, end)[:, None] for name in CONTROLLER_COLUMNS}
         self.window.add(x[:, None], force[:-1, None], columns)
         self._measures = None
         self._digest.update(np.stack([x[1:], v[1:]], axis=1).tobytes())
@@ -135,7 +135,7 @@ class Logger:
             self._channels.energy(first, books)
         self.tick = end
         self.booked(first, books)
-        self._controller.forget_before(end, int(plant["command"][-1]))
+        controller.forget_before(end, int(plant["command"][-1]))
         self._log_events()
 
     def _named(self, rows: np.ndarray) -> dict[str, np.ndarray]:

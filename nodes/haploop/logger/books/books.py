@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -12,7 +12,7 @@ from haploop.logger.books.one_mass import OneMassBooks
 from haploop.logger.books.sums import (
     Sums,
     add_columns,
-    add_columns_of_batch,
+    add_ticks_of_batch,
     no_sums,
     sum_in_order,
     sum_rows,
@@ -33,7 +33,6 @@ from haploop.protocol.arrays import first_row
 from haploop.protocol.ticks import Timebase
 
 if TYPE_CHECKING:
-    from haploop.logger.books.buffers import ControllerBuffer
     from haploop.logger.books.chain import ChainBooks
 
 
@@ -54,6 +53,22 @@ class BooksState(NamedTuple):
     stored_at_start_J: Any
     wall: tuple[Any, Any] | None
     wall_changes_J: Any
+
+
+class Commanded(NamedTuple):
+    """Controller rows of some ticks and of all commands in effect in them; columns may have a last axis for a batch.
+
+    Attributes:
+        first: tick of the first row.
+        x_m: positions as measured, shape (rows,), m.
+        forces: of the wall, by the name "wall", and of every element's book, shape (rows,) each, N.
+        wall: position in m, stiffness in N/m and direction into it, +1 or -1, as they stand in all intervals booked.
+    """
+
+    first: int
+    x_m: np.ndarray
+    forces: dict[str, np.ndarray]
+    wall: tuple[Any, Any, float]
 
 
 class Books:
@@ -96,63 +111,54 @@ class Books:
         """Begins with the plant in the first state of its first columns."""
         self.state = self.state._replace(stored_at_start_J=self.plant.stored_J(plant))
 
-    def book(self, tick: int, plant: dict[str, np.ndarray], buffer: ControllerBuffer, into_wall: float) -> np.ndarray:
+    def book(self, tick: int, plant: dict[str, np.ndarray], commanded: Commanded) -> np.ndarray:
         """Books the intervals of one run from ``tick`` on that ``plant`` covers.
 
         Args:
-            tick: first interval; in all of them the wall is the same.
+            tick: first interval.
             plant: telemetry columns of the plant, shape (ticks * n + 1,) each.
-            buffer: controller rows of these ticks and of all commands in effect in them.
-            into_wall: direction into the wall, +1 or -1.
+            commanded: by the controller.
 
         Returns:
             The books as they stand at each of these ticks, shape (rows, ticks), rows as ``names``: true and plant books
             up to the tick's step, sampled books with the tick's sample.
         """
-        added, sampled = self._added(tick, plant, buffer, into_wall)
-        sums, totals = add_columns(self.state.sums, added)
+        flows = self._flows(tick, plant, commanded)
+        sums, totals = add_columns(self.state.sums, np.stack(flows))
         self.state = self.state._replace(sums=sums)
         at_ticks = totals[:, :-1]
+        sampled = [row for row, name in enumerate(self.state.names) if name.endswith(".sampled")]
         at_ticks[sampled] = totals[sampled, 1:]
         return at_ticks
 
-    def book_batch(self, tick: int, plant: dict[str, np.ndarray], buffer: ControllerBuffer, into_wall: float) -> None:
+    def book_batch(self, tick: int, plant: dict[str, np.ndarray], commanded: Commanded) -> None:
         """Books the intervals of a batch from ``tick`` on; columns have a last axis for the members."""
-        added, _ = self._added(tick, plant, buffer, into_wall)
-        self.state = self.state._replace(sums=add_columns_of_batch(self.state.sums, added))
+        flows = self._flows(tick, plant, commanded)
+        self.state = self.state._replace(sums=add_ticks_of_batch(self.state.sums, np.stack(flows, axis=1)))
 
-    def _added(
-        self, tick: int, plant: dict[str, np.ndarray], buffer: ControllerBuffer, into_wall: float
-    ) -> tuple[np.ndarray, list[int]]:
-        """What each tick adds to each book, shape (rows, ticks), and which rows are of sampled books."""
-        n = self._time.steps_per_tick
-        ticks = (len(plant["x"]) - 1) // n
-        forces = {"wall": buffer.columns["wall"]}
-        for book, force in buffer.forces_opened_before(tick + ticks).items():
-            forces[str(book)] = force
-            if f"{book}.true" not in self.state.names:
-                self._open(_of_account(str(book)))
-        row_of = {name: row for row, name in enumerate(self.state.names)}
-
-        added = np.zeros((len(row_of), ticks, *plant["x"].shape[1:]))
-        moved, magnitude = added[row_of["moved"]], np.empty(added.shape[1:])
+    def _flows(self, tick: int, plant: dict[str, np.ndarray], commanded: Commanded) -> list[np.ndarray]:
+        """What each tick adds to each book, shape (ticks,), or (ticks, batch), in the order of ``names``."""
+        n, forces, before = self._time.steps_per_tick, commanded.forces, tick - commanded.first
+        for account in forces:
+            if f"{account}.true" not in self.state.names:
+                self._open(_of_account(account))
         way = displacement(plant["x"], plant["x_low"], n, sum_steps)
-        for name, flow in self._exchanged(tick, plant, way, buffer.first, forces):
-            added[row_of[name]] = flow
-            moved += np.abs(flow, out=magnitude)
-        moved *= 0.5
+        ticks = len(way.by_tick)
+        flows: dict[str, np.ndarray] = dict(self._exchanged(tick, plant, way, commanded.first, forces))
+        flows["moved"] = _half_of_magnitudes(flows.values())
         if self._has_wall:
-            at_ticks, computed = plant["x"][::n], forces["wall"][tick - buffer.first :][:ticks]
-            self._note_wall(first_row(at_ticks), wall := _wall_at(tick, buffer), into_wall)
-            springs = ideal_springs(at_ticks, way.by_tick, computed, wall, into_wall)
-            for name, flow in zip(CAUSES, springs, strict=True):
-                added[row_of[name]] = flow
-        sampled = [row_of[f"{account}.sampled"] for account in forces]
-        first = max(tick - 1, buffer.first)  # nothing is sampled at the first tick there is
-        x_m, known = buffer.rows("x", first, tick + ticks), slice(first - buffer.first, tick + ticks - 1 - buffer.first)
-        for row, force in zip(sampled, forces.values(), strict=True):
-            added[row, ticks + 1 - len(x_m) :] = sampled_work(x_m, force[known])
-        return added, sampled
+            at_ticks, (position, stiffness, into_wall) = plant["x"][::n], commanded.wall
+            self._note_wall(first_row(at_ticks), (position, stiffness), into_wall)
+            computed = forces["wall"][before : before + ticks]
+            springs = ideal_springs(at_ticks, way.by_tick, computed, (position, stiffness), into_wall)
+            flows |= zip(CAUSES, springs, strict=True)
+        known = slice(max(before - 1, 0), before + ticks)
+        none: np.ndarray = np.zeros_like(way.by_tick)
+        for account, force in forces.items():
+            work = sampled_work(commanded.x_m[known], force[known][:-1])
+            # Nothing is sampled at the first tick there is.
+            flows[f"{account}.sampled"] = work if len(work) == ticks else np.concatenate([none[:1], work])
+        return [flows.get(name, none) for name in self.state.names]
 
     def _exchanged(
         self,
@@ -165,8 +171,8 @@ class Books:
         """What every interval adds to each book of the balance, by name; shape (ticks,)."""
         n = self._time.steps_per_tick
         command = plant["command"][:-1].astype(np.intp)
-        commanded = (in_effect(force, command, first_command) for force in forces.values())
-        yield from zip(self.plant.names, self.plant.increments(tick * n, plant, moved, commanded), strict=True)
+        asked = (in_effect(force, command, first_command) for force in forces.values())
+        yield from zip(self.plant.names, self.plant.increments(tick * n, plant, moved, asked), strict=True)
         ways, late = [(0, moved.by_tick)], self._time.delay_steps % n
         if late:
             ways = [(first, sum_steps(moved.by_step, first, end)) for first, end in ((0, late), (late, n))]
@@ -184,7 +190,7 @@ class Books:
 
     def _note_wall(self, x: Any, wall: tuple[Any, Any], into_wall: float) -> None:
         before = self.state.wall
-        if before and not np.array_equal(wall, before):
+        if before and not all(map(np.array_equal, wall, before)):
             change_J = held_J(x, wall, into_wall) - held_J(x, before, into_wall)
             self.state = self.state._replace(wall_changes_J=self.state.wall_changes_J + change_J)
         self.state = self.state._replace(wall=wall)
@@ -209,14 +215,18 @@ def plant_books(scene: dict[str, Any], time: Timebase, members: int | None = Non
     return OneMassBooks(scene, time, members)
 
 
+def _half_of_magnitudes(flows: Iterable[np.ndarray]) -> np.ndarray:
+    """Half of the sum of all flows in magnitude, first to last."""
+    first, *others = flows
+    total, magnitude = np.abs(first), np.empty_like(first)
+    for flow in others:
+        total += np.abs(flow, out=magnitude)
+    total *= 0.5
+    return total
+
+
 def _of_account(name: str) -> tuple[str, str]:
     return f"{name}.sampled", f"{name}.true"
-
-
-def _wall_at(tick: int, buffer: ControllerBuffer) -> tuple[Any, Any]:
-    """Position of the wall at a tick, m, and its stiffness, N/m."""
-    position, stiffness = (first_row(buffer.rows(f"wall_{of}", tick, tick + 1)) for of in ("position", "stiffness"))
-    return position, stiffness
 
 
 # How books count in the balance: what the hand gave less what is elsewhere.

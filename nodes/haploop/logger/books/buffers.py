@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from haploop.logger.books.books import Commanded
 from haploop.logger.books.segments import PIECES
-from haploop.protocol.trees import tree_select
 
 
 def as_float64(data: bytes) -> np.ndarray:
@@ -67,25 +67,24 @@ class PlantBuffer:
 
 
 class ControllerBuffer:
-    """Controller rows by tick, with every book's force and the wall as it stood.
+    """Controller rows of one run by tick, with every book's force and the wall as it stood.
 
     Attributes:
         first: tick of the first row kept.
         end: tick after the last row.
-        columns: x, v, a, wall, total, in_contact, wall_position, wall_stiffness, of which a batch has those that are
-            read; shape (end - first,), or (end - first, batch), each.
+        columns: x, v, a, wall, total, in_contact, wall_position, wall_stiffness; shape (end - first,) each.
         forces: force of every book that has acted within these ticks, 0 where it was not at work.
     """
 
-    def __init__(self, tick: int = 0) -> None:
+    def __init__(self, tick: int) -> None:
         self.first = self.end = tick
         self.columns: dict[str, np.ndarray] = {}
         self.forces: dict[int, np.ndarray] = {}
         self._opened: dict[int, int] = {}
         self._part_ends: list[int] = []
 
-    def add_block(self, block: dict[str, Any]) -> None:
-        """Appends a block of one run.
+    def add(self, block: dict[str, Any]) -> None:
+        """Appends a block.
 
         Raises:
             TelemetryGap: it does not start where the last one ended.
@@ -94,30 +93,20 @@ class ControllerBuffer:
             raise TelemetryGap(
                 f"A controller block from tick {self.end} was expected, but one from {block['from_tick']} came."
             )
-        columns = {name: as_float64(data) for name, data in block["columns"].items()}
-        forces = {e["book"]: columns.pop(f"dissipation.{i}") for i, e in enumerate(block["elements"])}
+        new = {name: as_float64(data) for name, data in block["columns"].items()}
+        books = {e["book"]: new.pop(f"dissipation.{i}") for i, e in enumerate(block["elements"])}
+        ticks, kept = block["ticks"], self.end - self.first
         for name in ("position", "stiffness"):
-            columns[f"wall_{name}"] = np.full(block["ticks"], block["wall"][name])
-        self.add(columns, forces)
+            new[f"wall_{name}"] = np.full(ticks, block["wall"][name])
+        self.columns = {name: np.concatenate([self.columns.get(name, new[name][:0]), new[name]]) for name in new}
+        self.forces = {
+            book: np.concatenate([self.forces.get(book, np.zeros(kept)), books.get(book, np.zeros(ticks))])
+            for book in sorted(self.forces.keys() | books.keys())
+        }
         for element in block["elements"]:
             self._opened[element["book"]] = element["from_tick"]
+        self.end += ticks
         self._part_ends.append(self.end)
-
-    def add(self, columns: dict[str, np.ndarray], forces: dict[int, np.ndarray]) -> None:
-        """Appends the next ticks.
-
-        Args:
-            columns: shape (ticks,), or (ticks, batch), each.
-            forces: of every book at work, likewise.
-        """
-        kept, none = self.end - self.first, np.zeros_like(columns["x"])
-        self.columns = {name: np.concatenate([self.columns.get(name, new[:0]), new]) for name, new in columns.items()}
-        before = np.zeros((kept, *none.shape[1:]))
-        self.forces = {
-            book: np.concatenate([self.forces.get(book, before), forces.get(book, none)])
-            for book in sorted(self.forces.keys() | forces.keys())
-        }
-        self.end += len(none)
 
     def part_end(self, tick: int) -> int:
         """Returns where the block that holds ``tick`` ends: up to there the elements are the same."""
@@ -127,9 +116,12 @@ class ControllerBuffer:
         """Returns a column at the ticks first ... end - 1."""
         return self.columns[name][first - self.first : end - self.first]
 
-    def forces_opened_before(self, tick: int) -> dict[int, np.ndarray]:
-        """Returns ``forces`` without the books that open at ``tick`` or later."""
-        return {book: force for book, force in self.forces.items() if self._opened.get(book, tick - 1) < tick}
+    def commanded(self, tick: int, end: int, into_wall: float) -> Commanded:
+        """Returns what books need of the intervals ``tick`` ... ``end - 1``, without elements that come later."""
+        forces = {str(book): force for book, force in self.forces.items() if self._opened[book] < end}
+        position, stiffness = (float(self.rows(f"wall_{of}", tick, end)[0]) for of in ("position", "stiffness"))
+        wall = position, stiffness, into_wall
+        return Commanded(self.first, self.columns["x"], {"wall": self.columns["wall"]} | forces, wall)
 
     def forget_before(self, tick: int, command: int) -> None:
         """Drops the rows before the last tick and before ``command``, in effect then, and books with no force left."""
@@ -139,7 +131,3 @@ class ControllerBuffer:
             self.forces = {book: force[drop:] for book, force in self.forces.items() if force[drop:].any()}
             self.first += drop
         self._part_ends = [end for end in self._part_ends if end > tick]
-
-    def select(self, kept: np.ndarray) -> None:
-        """Drops the members of a batch for which ``kept``, shape (members,), is false."""
-        self.columns, self.forces = tree_select((self.columns, self.forces), kept)

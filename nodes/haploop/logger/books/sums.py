@@ -94,15 +94,15 @@ def add_columns(state: Sums, increments: np.ndarray) -> tuple[Sums, np.ndarray]:
     return Sums(sums[:, -1].copy(), errors[:, -1].copy()), sums + errors
 
 
-def add_columns_of_batch(state: Sums, increments: np.ndarray) -> Sums:
-    """Adds column after column for every member of a batch, to the same bits as :func:`add_columns`.
+def add_ticks_of_batch(state: Sums, increments: np.ndarray) -> Sums:
+    """Adds tick after tick for every member of a batch, to the same bits as :func:`add_columns`.
 
     Args:
-        increments: shape (rows, columns, batch).
+        increments: shape (ticks, rows, batch).
     """
     sums, errors = (part.copy() for part in state)
     after, added, lost = (np.empty_like(sums) for _ in range(3))
-    for increment in increments.swapaxes(0, 1):
+    for increment in increments:
         np.add(sums, increment, out=after)
         np.subtract(after, sums, out=added)
         np.subtract(increment, added, out=lost)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import jax
 import numpy as np
 
+from haploop.controller.recorder import Row
 from haploop.launch.batch.batch import LoopArray
 from haploop.launch.batch.jax.block import RINGS, Block, Carry, Given, Rings
 from haploop.launch.batch.jax.books import Forces
@@ -17,7 +18,6 @@ from haploop.launch.batch.jax.stand_ins import Outside
 from haploop.launch.batch.jax.tick import NoTick, Tick
 from haploop.launch.batch.jax.window import CompiledWindow
 from haploop.launch.batch.stacking import structure
-from haploop.logger.books.buffers import ControllerBuffer
 from haploop.logger.books.chain import ChainBooks
 from haploop.logger.books.sums import Sums
 from haploop.plant.motion.one_mass_batch import LinearMotionArray
@@ -189,7 +189,7 @@ class CompiledLoops(LoopArray):
         if books:
             sums = dict(zip(books.names, zip(*books.state.sums, strict=True), strict=True))
         extremes = window.state.x_min_m, window.state.x_max_m, window.state.force_max_N
-        x_m = self._logger.buffer.columns["x"][-1] if books else np.zeros(loops)
+        x_m = np.broadcast_to(self._logger.rows[-1].columns["x"], loops) if books else np.zeros(loops)
         return Carry([], ~self._ended, np.zeros(loops, np.int64), extremes, sums, x_m, self._past(tick))
 
     def _past(self, tick: Tick) -> Forces:
@@ -197,10 +197,9 @@ class CompiledLoops(LoopArray):
         loops = len(self._ended)
         columns: dict[str, list[Any]] = {"command": tick.commands}
         if self._logger.books:
-            buffer = self._logger.buffer
-            columns["wall"] = wall = list(buffer.columns["wall"])
-            for element in self._controller.recorder._elements:
-                columns[str(element["book"])] = list(buffer.forces.get(element["book"], [0.0] * len(wall)))
+            rows = self._logger.rows
+            columns["wall"] = [row.columns["wall"] for row in rows]
+            columns |= {str(book): [row.forces[book] for row in rows] for book in rows[-1].forces}
         past = {}
         for name, column in columns.items():
             past[name] = np.zeros((len(column) + 1, loops))
@@ -251,12 +250,9 @@ class CompiledLoops(LoopArray):
         """Have the logger go on from here by itself."""
         self._log_stands_at(tick)
         if self._logger.books:
-            last = self._last(carry, tick)
-            forces = {name: np.stack([row[name] for row in last]) for name in last[0] if name != "command"}
-            wall = forces.pop("wall")
-            x, unread = np.broadcast_to(np.array(carry.x_m), wall.shape), np.zeros_like(wall)
-            buffer = self._logger.buffer = ControllerBuffer(tick - len(last))
-            buffer.add(
-                {"x": x, "wall": wall, "wall_position": unread, "wall_stiffness": unread},
-                {int(book): force for book, force in forces.items()},
-            )
+            elements, self._logger.rows = self._controller.recorder._elements, []
+            for forces in self._last(carry, tick):
+                columns = {"x": np.array(carry.x_m), "wall": forces.pop("wall")}
+                del forces["command"]
+                of_books = {int(book): force for book, force in forces.items()}
+                self._logger.rows.append(Row(columns, of_books, elements))
