@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from mpmath import mp, mpf
 
-from haploop.tools.reference.plant import roots
+from haploop.tools.reference.bodies import sign_changes
 
 
 def series_of(places: list[Fraction]) -> list:
@@ -22,7 +22,7 @@ def series_of(places: list[Fraction]) -> list:
 @given(st.sets(st.integers(1, 999), min_size=1, max_size=5), st.sets(st.integers(1001, 1500), max_size=2))
 def test_all_places_within_the_length_are_found_and_none_beyond(inside, beyond):
     with mp.workdps(50):
-        found = roots(series_of([Fraction(place, 1000) for place in inside | beyond]), mpf(1))
+        found = sign_changes(series_of([Fraction(place, 1000) for place in inside | beyond]), mpf(1))
         assert len(found) == len(inside)
         for t, place in zip(found, sorted(inside), strict=True):
             assert abs(t - mpf(place) / 1000) < mpf("1e-30")
@@ -31,7 +31,7 @@ def test_all_places_within_the_length_are_found_and_none_beyond(inside, beyond):
 def test_two_places_closer_than_a_float_can_tell_are_two():
     with mp.workdps(50):
         near = Fraction(3, 10)
-        found = roots(series_of([near, near + Fraction(1, 10**18)]), mpf(1))
+        found = sign_changes(series_of([near, near + Fraction(1, 10**18)]), mpf(1))
         assert len(found) == 2
         assert 0.9e-18 < found[1] - found[0] < 1.1e-18
 
@@ -40,9 +40,9 @@ def test_what_only_comes_near_zero_has_none():
     with mp.workdps(50):
         touching = series_of([Fraction(3, 10), Fraction(3, 10)])
         touching[0] += mpf("1e-20")
-        assert roots(touching, mpf(1)) == []
+        assert sign_changes(touching, mpf(1)) == []
 
 
 @pytest.mark.parametrize("series", [[mpf(1)], [mpf(2), mpf(-1)], [mpf(0)]])
 def test_what_is_constant_or_ends_before_has_none(series):
-    assert roots(series, mpf(1)) == []
+    assert sign_changes(series, mpf(1)) == []

@@ -1,1 +1,1 @@
-"""What a scene's motion truly is, in as many digits as asked for."""
+"""Reference motions of scenes, in as many digits as asked for, and where they are stored."""

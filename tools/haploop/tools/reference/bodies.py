@@ -1,4 +1,4 @@
-"""Device and hand as one linear system in as many digits as asked for, and its flow.
+"""Device and hand as one linear system in as many digits as asked for, its flow, and the roots of its power series.
 
 Only for making references: it needs mpmath, and it is slow.
 """
@@ -6,6 +6,7 @@ Only for making references: it needs mpmath, and it is slow.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -101,11 +102,11 @@ class Flow:
         self._over = mp.expm(mp.matrix(rates) * length_s).tolist()
 
     def whole(self, w: Row) -> Row:
-        """w after the fixed length."""
+        """Returns w after the fixed length."""
         return _times(self._over, w)
 
     def part(self, w: Row, t: Any) -> Row:
-        """w after t, by its series sum (A t)^k w / k!, until the terms are below the last digit."""
+        """Returns w after t, by its series sum (A t)^k w / k!, until the terms are below the last digit."""
         total, term, order = list(w), list(w), 0
         while any(abs(part) > mp.eps * mpf(1e-10) * abs(whole) for part, whole in zip(term, total, strict=True)):
             order += 1
@@ -114,7 +115,7 @@ class Flow:
         return total
 
     def taylor(self, row: Row, terms: int) -> Matrix:
-        """Rows r_k = row A^k / k!: row . w(t) = sum r_k . w(0) t^k."""
+        """Returns the rows r_k = row A^k / k!: row . w(t) = sum r_k . w(0) t^k."""
         columns, rows = [list(column) for column in zip(*self._rates, strict=True)], [row]
         for order in range(1, terms):
             rows.append([entry / order for entry in _times(columns, rows[-1])])
@@ -122,10 +123,59 @@ class Flow:
 
 
 def fastest_rate(bodies: Bodies) -> float:
-    """The largest magnitude of an eigenvalue of both modes, 1/s."""
+    """Returns the largest magnitude of an eigenvalue of both modes, 1/s."""
     both = (np.array([[float(entry) for entry in row] for row in rates]) for rates in (bodies.free, bodies.stuck))
     return max(float(np.abs(np.linalg.eigvals(rates)).max()) for rates in both)
 
 
 def _times(rows: Matrix, w: Sequence[Any]) -> Row:
     return [mp.fdot((a, b) for a, b in zip(row, w, strict=True) if a and b) for row in rows]
+
+
+def sign_changes(series: Row, length: Any) -> Row:
+    """Returns all t in [0, length] at which the polynomial sum series[k] t^k changes its sign, in order.
+
+    Where the constant outweighs all other terms there is none. Else the roots of the derivative cut the interval into
+    pieces in which it only rises or only falls, and each holds one at most.
+    """
+    rest, power = mpf(0), mpf(1)
+    for coefficient in series[1:]:
+        power *= length
+        rest += abs(coefficient) * power
+    if abs(series[0]) > rest or not rest:
+        return []
+    turns = sign_changes([k * coefficient for k, coefficient in enumerate(series)][1:], length)
+    ends = [mpf(0), *turns, length]
+    found = []
+    for begin, end in pairwise(ends):
+        at_begin, at_end = _value(series, begin), _value(series, end)
+        if at_begin == 0:
+            found.append(begin)
+        elif at_begin * at_end < 0:
+            found.append(_between(series, begin, end, at_begin))
+    return found
+
+
+def _between(series: Row, begin: Any, end: Any, at_begin: Any) -> Any:
+    """Finds the one root between by Newton's steps, and a bisection wherever they would leave the bracket."""
+    slope_series = [k * coefficient for k, coefficient in enumerate(series)][1:]
+    t = (begin + end) / 2
+    while end - begin > mp.eps * end:
+        value, slope = _value(series, t), _value(slope_series, t)
+        if value == 0:
+            return t
+        begin, end = (t, end) if value * at_begin > 0 else (begin, t)
+        step = value / slope if slope else mp.inf
+        t, before = t - step, t
+        if not begin < t < end:
+            t = (begin + end) / 2
+        if abs(t - before) < mp.eps * abs(end):
+            break
+    return t
+
+
+def _value(series: Row, t: Any) -> Any:
+    total = mpf(0)
+    for coefficient in reversed(series):
+        total = total * t + coefficient
+    return total

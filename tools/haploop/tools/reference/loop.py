@@ -1,4 +1,4 @@
-"""The sampled loop closed around a continuous plant: the program's own controller, sensors and line."""
+"""The sampled loop closed around a continuous plant, with the program's own controller, sensors and line."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class Continuous(Protocol):
 
 @dataclass(frozen=True)
 class Closed:
-    """What came of it: x in m and v in m/s of body 0 at every tick and at the end, and the verdict's word."""
+    """The outcome of a loop: x in m and v in m/s of body 0 at every tick and at the end, and the verdict."""
 
     x_m: list[float]
     v_m_s: list[float]
@@ -41,7 +41,7 @@ class Closed:
 
 
 def ticks_of(scene: dict[str, Any]) -> Timebase:
-    """The integers of a scene whose only steps are ticks.
+    """Makes the time base of a scene whose only steps are ticks.
 
     Raises:
         ValueError: something in it falls between ticks, depends on the plant rate, or is not linear.
@@ -61,7 +61,7 @@ def ticks_of(scene: dict[str, Any]) -> Timebase:
 
 
 def _points(scene: dict[str, Any]) -> list[tuple[Fraction, Fraction]]:
-    """(s, N) of tau, straight between them and held outside; times are the decimal numbers of the scene."""
+    """Returns corners (s, N) of tau, straight between them, held outside; times are the scene's decimal numbers."""
     force = scene.get("hand", {}).get("force", {"kind": "constant", "value": 0.0})
     match force["kind"]:
         case "constant":
@@ -76,7 +76,7 @@ def _points(scene: dict[str, Any]) -> list[tuple[Fraction, Fraction]]:
 
 
 def loads(scene: dict[str, Any], time: Timebase) -> Iterator[Fraction]:
-    """tau + k_h rest at every tick and at the end, N, as exact fractions."""
+    """Yields tau + k_h rest at every tick and at the end, N, as exact fractions."""
     hand, points = scene.get("hand", {}), _points(scene)
     rest = Fraction(hand.get("stiffness", 0.0)) * Fraction(hand.get("rest", 0.0))
     for tick in range(time.ticks + 1):
@@ -95,7 +95,7 @@ def _straight(points: list[tuple[Fraction, Fraction]], t: Fraction) -> Fraction:
 def close_loop(
     scene: dict[str, Any], plant: Continuous, exact: Callable[[Fraction], Any], tick_done: Callable[[], None]
 ) -> Closed:
-    """Run a scene with a continuous plant; ``exact`` turns a load into the plant's kind of number."""
+    """Runs a scene with a continuous plant; ``exact`` turns a load into the plant's kind of number."""
     time = ticks_of(scene)
     measure, meter, line = position_sensor(scene, time), accelerometer(scene, time), line_of(scene, time)
     controller = Controller(scene, time, registry())
@@ -120,7 +120,7 @@ def close_loop(
 
 
 def _verdict(scene: dict[str, Any], time: Timebase, controller: Controller, x: list[float], forces: list[float]) -> str:
-    """By the program's own rule."""
+    """Returns the verdict by the program's own rule."""
     [block] = controller.recorder.take()
     rows = {name: np.frombuffer(column) for name, column in block["columns"].items()}
     rows["wall_position"] = np.full(time.ticks, block["wall"]["position"])

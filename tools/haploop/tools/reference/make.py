@@ -1,4 +1,4 @@
-"""Make the stored references of the accuracy scenes anew: python -m haploop.tools.reference.make [SCENE...]
+"""Makes the stored references of the accuracy scenes anew: python -m haploop.tools.reference.make [SCENE...]
 
 The continuous plant in 50 decimal digits, the controller in the floats it has. Needs mpmath, of the dev extra.
 """
@@ -16,7 +16,6 @@ import numpy as np
 from mpmath import mp, mpf
 
 from haploop.launch.scene.file import load
-from haploop.tools.reference.check import IntegratedPlant
 from haploop.tools.reference.loop import Closed, close_loop
 from haploop.tools.reference.nearest import (
     REFERENCES,
@@ -27,7 +26,7 @@ from haploop.tools.reference.nearest import (
     problem_hash,
     statistics,
 )
-from haploop.tools.reference.plant import ContinuousPlant
+from haploop.tools.reference.plant import ContinuousPlant, IntegratedPlant
 from haploop.tools.trajectory import trajectory
 
 SCENES = Path(__file__).parents[4] / "launch/scenes/accuracy"
@@ -38,7 +37,7 @@ Done = Callable[[], None]
 
 
 def in_digits(scene: dict[str, Any], digits: int, tick_done: Done = lambda: None) -> Closed:
-    """The loop around the continuous plant, computed in so many decimal digits."""
+    """Runs the loop around the continuous plant in so many decimal digits."""
     with mp.workdps(digits):
         plant = ContinuousPlant(scene, mpf(1) / scene["clock"]["control_rate"])
         return close_loop(scene, plant, _in_digits, tick_done)
@@ -49,14 +48,19 @@ def _in_digits(load: Fraction) -> Any:
 
 
 def integrated(scene: dict[str, Any], tick_done: Done = lambda: None) -> Closed:
-    """The same by DOP853, in floats."""
+    """Runs the loop around the plant integrated by DOP853, in floats."""
     with mp.workdps(FEWER_DIGITS):
         plant = IntegratedPlant(scene, 1.0 / scene["clock"]["control_rate"])
     return close_loop(scene, plant, float, tick_done)
 
 
 def reference(name: str, scene: dict[str, Any], say: Callable[[str], Done]) -> dict[str, Any]:
-    """What is stored of a resolved scene; ``say`` names what is done next and gives what counts its ticks."""
+    """Makes the reference of a resolved scene as it is stored.
+
+    Args:
+        name, scene: of the reference.
+        say: names the next step of the work; what it returns is called after each tick.
+    """
     truth = in_digits(scene, DIGITS, say(f"{name}: {DIGITS} digits"))
     fewer = in_digits(scene, FEWER_DIGITS, say(f"{name}: {FEWER_DIGITS} digits"))
     numerical = integrated(scene, say(f"{name}: DOP853"))
@@ -91,7 +95,7 @@ def reference(name: str, scene: dict[str, Any], say: Callable[[str], Done]) -> d
 
 
 def main(names: list[str]) -> None:
-    """Make some references, or all, and show how far it is."""
+    """Makes some references, or all, with progress."""
     from rich.progress import Progress
 
     from haploop.tools.render.terminal import console

@@ -1,4 +1,4 @@
-"""What a scene's motion truly is, as near as it is known: a stored reference, or one made on the spot."""
+"""The reference motion of a scene: a stored one, or one made on the spot by the exact method."""
 
 from __future__ import annotations
 
@@ -54,13 +54,13 @@ class Reference:
 
 
 def reference_for(scene_path: Path, scene: dict[str, Any]) -> Reference:
-    """The stored reference of the problem that a resolved scene poses, whatever its plant rate, or one made now."""
+    """Returns the stored reference of the problem that a resolved scene poses at any plant rate, or makes one."""
     stored = _stored().get(problem_hash(scene))
     return stored or made_now(scene_path.stem, scene)
 
 
 def problem_hash(scene: dict[str, Any]) -> str:
-    """SHA-256 of a resolved scene but for its plant rate, its integrator and what changes no bit of a run."""
+    """Returns the SHA-256 of a resolved scene without plant rate, integrator, title and ``[run]``."""
     problem = {key: value for key, value in scene.items() if key not in _OF_THE_RUN}
     problem["clock"] = {key: value for key, value in scene["clock"].items() if key not in _OF_THE_METHOD}
     return hashlib.sha256(json.dumps(problem, sort_keys=True).encode()).hexdigest()
@@ -82,7 +82,7 @@ def _read(data: dict[str, Any]) -> Reference:
 
 
 def made_now(name: str, scene: dict[str, Any]) -> Reference:
-    """The exact method at 100 kHz or above, with its distance from half that rate as its error."""
+    """Runs the exact method at 100 kHz or above; its distance from half that rate is the error."""
     rate = scene["clock"]["plant_rate"]
     half = rate * max(1, math.ceil(_LEAST_RATE / 2 / rate))
     fine, coarse = (trajectory(exactly(scene, r)) for r in (2 * half, half))
@@ -100,19 +100,19 @@ def made_now(name: str, scene: dict[str, Any]) -> Reference:
 
 
 def exactly(scene: dict[str, Any], plant_rate: int) -> dict[str, Any]:
-    """The same scene by the exact method at a plant rate."""
+    """Returns the scene with the exact method at a plant rate."""
     return {**scene, "clock": {**scene["clock"], "plant_rate": plant_rate, "integrator": "exact"}}
 
 
 def difference_m(x: Any, other: Any) -> float:
-    """The largest distance at any tick that both reached; infinite where only one got to the end."""
+    """Returns the largest distance at any tick that both reached; infinite where only one got to the end."""
     if len(x) != len(other):
         return math.inf
     return float(np.abs(np.asarray(x) - np.asarray(other)).max())
 
 
 def growths(scene: dict[str, Any], plant_rate: int) -> dict[str, float]:
-    """How many times as far apart two runs get at most, by how far apart they start (m, as text)."""
+    """Returns by each move of the start (m, as text) how many times as far apart the runs get at most."""
     start = trajectory(exactly(scene, plant_rate))
     found = {}
     for move in MOVES_M:
@@ -124,12 +124,12 @@ def growths(scene: dict[str, Any], plant_rate: int) -> dict[str, float]:
 
 
 def compares_pointwise(growth: dict[str, float]) -> bool:
-    """Whether positions at a time mean anything, by ``growths``."""
+    """Tells by ``growths`` whether positions at a time can be compared."""
     return max(growth.values()) <= MOST_GROWTH
 
 
 def statistics(scene: dict[str, Any], x_m: np.ndarray, v_m_s: np.ndarray) -> dict[str, float | None]:
-    """How a motion swings over the verdict's window: the last half second, or the second half of a shorter run.
+    """Measures the swings over the verdict's window: the last half second, or the second half of a shorter run.
 
     ``amplitude_m`` is half of peak to peak. ``frequency_Hz`` counts upward crossings of the mean, and
     ``energy_per_cycle_J`` is what the dampers and the dry friction between body 0 and ground turn into heat in the same
@@ -157,7 +157,7 @@ def statistics(scene: dict[str, Any], x_m: np.ndarray, v_m_s: np.ndarray) -> dic
 
 
 def _damping(scene: dict[str, Any]) -> float:
-    """Between body 0 and ground, N s/m."""
+    """Returns the damping between body 0 and ground, N s/m."""
     if "transmission" in scene:
         return scene["transmission"]["motor_damping"]
     hand = scene.get("hand", {})

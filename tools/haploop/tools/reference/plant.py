@@ -1,54 +1,53 @@
-"""The continuous plant moved tick by tick, every instant at which friction switches found to 1e-30 s."""
+"""The continuous plant tick by tick: in as many digits as asked for, and by DOP853 to check it."""
 
 from __future__ import annotations
 
-from itertools import pairwise
-from typing import Any
+from abc import ABC, abstractmethod
+from typing import Any, Generic, TypeVar
 
+import numpy as np
 from mpmath import mp, mpf
+from scipy.integrate import solve_ivp
 
-from haploop.tools.reference.bodies import COMMAND, FRICTION, LOAD, SLOPE, Bodies, Flow, Row, fastest_rate
+from haploop.tools.reference.bodies import COMMAND, FRICTION, LOAD, SLOPE, Bodies, Flow, Row, fastest_rate, sign_changes
 
 # Pieces in which a switch is looked for are no longer than this part of the fastest time constant or radian ...
 _PART = 0.25
 # ... so that this many terms of a series are good for sixty digits: 0.25^40 / 40! = 1e-72.
 _TERMS = 40
 _INSTANT_S = "1e-30"
+# Tolerances of DOP853.
+_RELATIVE, _ABSOLUTE = 1e-13, 1e-17
+Vector = TypeVar("Vector", bound=Any)
 
 
-class ContinuousPlant:
-    """The plant of a scene under held commands and a load that is linear between ticks.
-
-    Without friction a tick is one matrix exponential. With friction it is cut into pieces; in each the margin of the
-    mode (the speed in its direction, or what friction could hold beyond the forces) is a power series in t, whose
-    first root, if there is one, is where the mode ends. None is missed: see ``roots``.
+class StickSlipPlant(ABC, Generic[Vector]):
+    """w' = A w with body 0 free or held: what friction decides where its velocity is 0.
 
     Args:
         scene: resolved; friction without a Stribeck velocity, since that is not linear.
-        period_s: one tick, as an exact number.
+        bodies: of the scene.
+        w: states at t = 0.
+        number: converts a float of the scene to the numbers of w.
+
+    Attributes:
+        w: states, as of ``Bodies``.
+        is_stuck: whether body 0 is held by friction.
     """
 
-    def __init__(self, scene: dict[str, Any], period_s: Any) -> None:
-        self._bodies = bodies = Bodies(scene)
-        self._period_s, self.w = period_s, list(bodies.begin)
+    def __init__(self, scene: dict[str, Any], bodies: Bodies, w: Vector, number: Any) -> None:
         friction = scene.get("friction")
-        self._v = bodies.count
-        self.is_stuck, self._direction, self.switches = False, 0, 0
-        self._parts = 1
-        if friction:
-            self._kinetic = mpf(friction["kinetic"])
-            self._breakaway = mpf(friction.get("breakaway", friction["kinetic"]))
-            while fastest_rate(bodies) * float(period_s) / self._parts > _PART:
-                self._parts *= 2
-        length = period_s / self._parts
-        self._flows = {False: Flow(bodies.free, length)}
-        if friction:
-            self._flows[True] = Flow(bodies.stuck, length)
-            speed = [mpf(j == self._v) for j in range(len(self.w))]
-            self._margins = {
-                stuck: self._flows[stuck].taylor(row, _TERMS) for stuck, row in ((False, speed), (True, bodies.force))
-            }
+        self.w: Vector = w
+        self.is_stuck = False
+        self._bodies, self._v, self._direction = bodies, bodies.count, 0
         self._has_friction = bool(friction)
+        if friction:
+            self._kinetic = number(friction["kinetic"])
+            self._breakaway = number(friction.get("breakaway", friction["kinetic"]))
+
+    @abstractmethod
+    def _force(self) -> Any:
+        """Returns the force on body 0 without friction, N."""
 
     @property
     def x(self) -> float:
@@ -60,65 +59,177 @@ class ContinuousPlant:
         """Velocity of body 0, m/s."""
         return float(self.w[self._v])
 
-    def felt(self) -> float:
-        """What an accelerometer feels under the force held until now, m/s^2."""
-        return float(_product(self._bodies.felt[self.is_stuck], self.w))
-
     def begin(self, load: Any) -> None:
-        """The load at t = 0, N, under which body 0 sticks or slips."""
+        """Sets the load at t = 0, N, under which body 0 sticks or slips."""
         self.w[LOAD] = load
         if self._has_friction:
             self._direction = _sign(self.w[self._v])
             self._decide()
 
-    def advance(self, command: float, load: Any, next_load: Any) -> None:
-        """Over one tick under a held command; load in N at its start and end."""
-        self.w[COMMAND], self.w[LOAD] = mpf(command), load
-        self.w[SLOPE] = (next_load - load) / self._period_s
-        if self._has_friction:
-            self._decide()
-        for _ in range(self._parts):
-            if self._has_friction:
-                self._through(self._period_s / self._parts)
-            else:
-                self.w = self._flows[False].whole(self.w)
-
-    def _force(self) -> Any:
-        """On body 0 without friction, N."""
-        return _product(self._bodies.force, self.w)
-
     def _decide(self) -> None:
-        """Where v is 0: stick if friction can hold the other forces, else slip where they pull."""
-        w = self.w
-        if w[self._v] == 0:
+        """Lets body 0 stick at v = 0 if friction can hold the other forces, else slip where they pull."""
+        if self.w[self._v] == 0:
             force = self._force()
             self.is_stuck = abs(force) <= self._breakaway
             if not self.is_stuck:
                 self._direction = _sign(force)
-        w[FRICTION] = mpf(0) if self.is_stuck else -self._direction * self._kinetic
+        self.w[FRICTION] = 0 * self._kinetic if self.is_stuck else -self._direction * self._kinetic
+
+    def _switch(self) -> None:
+        """Ends the present mode: what stuck slips where the force pulls, what slipped has come to v = 0."""
+        if self.is_stuck:
+            self.is_stuck, self._direction = False, _sign(self._force())
+            self.w[FRICTION] = -self._direction * self._kinetic
+        else:
+            self.w[self._v] = 0 * self.w[self._v]
+            self._decide()
+
+
+class ContinuousPlant(StickSlipPlant[Row]):
+    """The plant of a scene under held commands and a load that is linear between ticks, in mpmath's digits.
+
+    Without friction a tick is one matrix exponential. With friction it is cut into pieces; in each the margin of the
+    mode (the speed in its direction, or what friction could hold beyond the forces) is a power series in t, whose
+    first root, if there is one, is where the mode ends, known to 1e-30 s. None is missed: see ``sign_changes``.
+
+    Args:
+        scene: as of ``StickSlipPlant``.
+        period_s: one tick, as an exact number.
+    """
+
+    def __init__(self, scene: dict[str, Any], period_s: Any) -> None:
+        bodies = Bodies(scene)
+        super().__init__(scene, bodies, list(bodies.begin), mpf)
+        self._period_s, self._parts, self.switches = period_s, 1, 0
+        while self._has_friction and fastest_rate(bodies) * float(period_s) / self._parts > _PART:
+            self._parts *= 2
+        length = period_s / self._parts
+        self._flows = {False: Flow(bodies.free, length)}
+        if self._has_friction:
+            self._flows[True] = Flow(bodies.stuck, length)
+            speed = [mpf(j == self._v) for j in range(len(self.w))]
+            self._margins = {
+                stuck: self._flows[stuck].taylor(row, _TERMS) for stuck, row in ((False, speed), (True, bodies.force))
+            }
+
+    def felt(self) -> float:
+        """Returns the acceleration an accelerometer feels under the force held until now, m/s^2."""
+        return float(_product(self._bodies.felt[self.is_stuck], self.w))
+
+    def advance(self, command: float, load: Any, next_load: Any) -> None:
+        """Advances one tick under a held command; load in N at its start and end."""
+        self.w[COMMAND], self.w[LOAD] = mpf(command), load
+        self.w[SLOPE] = (next_load - load) / self._period_s
+        if not self._has_friction:
+            self.w = self._flows[False].whole(self.w)
+            return
+        self._decide()
+        for _ in range(self._parts):
+            self._through(self._period_s / self._parts)
+
+    def _force(self) -> Any:
+        return _product(self._bodies.force, self.w)
 
     def _through(self, length: Any) -> None:
-        """Through one piece, from switch to switch."""
+        """Advances one piece, from switch to switch."""
         left = length
         while (at := self._mode_ends(left)) is not None:
             self.w = self._flows[self.is_stuck].part(self.w, at)
             left -= at
             self.switches += 1
-            if self.is_stuck:
-                self.is_stuck, self._direction = False, _sign(self._force())
-                self.w[FRICTION] = -self._direction * self._kinetic
-            else:
-                self.w[self._v] = mpf(0)
-                self._decide()
+            self._switch()
         flow = self._flows[self.is_stuck]
         self.w = flow.whole(self.w) if left == length else flow.part(self.w, left)
 
     def _mode_ends(self, length: Any) -> Any:
-        """When the present mode ends, s, or None if it lasts for ``length``."""
+        """Returns when the present mode ends, s; None if it lasts for ``length``."""
         series = [_product(row, self.w) for row in self._margins[self.is_stuck]]
         levels = (self._breakaway, -self._breakaway) if self.is_stuck else (mpf(0),)
-        found = [t for level in levels for t in roots([series[0] - level, *series[1:]], length)]
+        found = [t for level in levels for t in sign_changes([series[0] - level, *series[1:]], length)]
         return min((t for t in found if t > mpf(_INSTANT_S)), default=None)
+
+
+class IntegratedPlant(StickSlipPlant[np.ndarray]):
+    """The plant of a scene by scipy's DOP853 in floats (Dormand and Prince), with events where friction switches.
+
+    In relative coordinates, each body's from the one before: a stiff cable's force is no difference of two positions.
+
+    Args:
+        scene, period_s: as of ``ContinuousPlant``.
+    """
+
+    def __init__(self, scene: dict[str, Any], period_s: Any) -> None:
+        bodies = Bodies(scene)
+        relative, absolute = _coordinates(bodies.count, len(bodies.begin))
+        super().__init__(scene, bodies, _floats(relative * mp.matrix(bodies.begin))[:, 0], float)
+        self._period_s = float(period_s)
+        self._rates = {
+            stuck: _floats(relative * mp.matrix(rates) * absolute)
+            for stuck, rates in ((False, bodies.free), (True, bodies.stuck))
+        }
+        self._felt = {stuck: _floats(mp.matrix([row]) * absolute)[0] for stuck, row in bodies.felt.items()}
+        self._row = _floats(mp.matrix([bodies.force]) * absolute)[0]
+
+    def felt(self) -> float:
+        """Returns the acceleration an accelerometer feels under the force held until now, m/s^2."""
+        return float(self._felt[self.is_stuck] @ self.w)
+
+    def advance(self, command: float, load: float, next_load: float) -> None:
+        """Advances one tick under a held command; load in N at its start and end."""
+        self.w[[COMMAND, LOAD, SLOPE]] = command, load, (next_load - load) / self._period_s
+        if not self._has_friction:
+            self.w = self._solved(self._period_s, None).y[:, -1].copy()
+            return
+        self._decide()
+        left = self._period_s
+        while left > 0.0:
+            left -= self._to_switch(left)
+
+    def _force(self) -> float:
+        return float(self._row @ self.w)
+
+    def _to_switch(self, length: float) -> float:
+        """Advances until friction switches, at most so long; returns how long it was."""
+        v, stuck, direction = self._v, self.is_stuck, self._direction
+
+        def margin(_t: float, w: np.ndarray) -> float:
+            return self._breakaway - abs(float(self._row @ w)) if stuck else direction * float(w[v])
+
+        margin.terminal, margin.direction = True, -1.0  # pyright: ignore[reportFunctionMemberAccess]
+        solved = self._solved(length, margin)
+        if not solved.t_events[0].size:
+            self.w = solved.y[:, -1].copy()
+            return length
+        at = float(solved.t_events[0][0])
+        if at > 0.0:  # once more up to there, without interpolation
+            self.w = self._solved(at, None).y[:, -1].copy()
+        self._switch()
+        return at
+
+    def _solved(self, length: float, event: Any) -> Any:
+        rates = self._rates[self.is_stuck]
+        solved = solve_ivp(
+            lambda _t, w: rates @ w, (0.0, length), self.w, "DOP853", events=event, rtol=_RELATIVE, atol=_ABSOLUTE,
+            max_step=length / 4.0,
+        )  # fmt: skip
+        if not solved.success:
+            raise ArithmeticError(f"DOP853 did not get through a tick: {solved.message}")
+        return solved
+
+
+def _coordinates(bodies: int, size: int) -> tuple[Any, Any]:
+    """Returns relative coordinates from absolute ones, and back; what is neither position nor velocity stays."""
+    relative, absolute = mp.eye(size), mp.eye(size)
+    for first in (0, bodies):
+        for i in range(1, bodies):
+            relative[first + i, first + i - 1] = -1
+            for j in range(i):
+                absolute[first + i, first + j] = 1
+    return relative, absolute
+
+
+def _floats(matrix: Any) -> np.ndarray:
+    return np.array(matrix.tolist(), float)
 
 
 def _product(row: Row, w: Row) -> Any:
@@ -126,56 +237,4 @@ def _product(row: Row, w: Row) -> Any:
 
 
 def _sign(value: Any) -> int:
-    return (value > 0) - (value < 0)
-
-
-Series = list[Any]
-
-
-def roots(series: Series, length: Any) -> Series:
-    """All t in [0, length] at which the polynomial sum series[k] t^k changes its sign, in order.
-
-    Where the constant outweighs all other terms there is none. Else the roots of the derivative cut the interval into
-    pieces in which it only rises or only falls, and each holds one at most.
-    """
-    rest, power = mpf(0), mpf(1)
-    for coefficient in series[1:]:
-        power *= length
-        rest += abs(coefficient) * power
-    if abs(series[0]) > rest or not rest:
-        return []
-    turns = roots([k * coefficient for k, coefficient in enumerate(series)][1:], length)
-    ends = [mpf(0), *turns, length]
-    found = []
-    for begin, end in pairwise(ends):
-        at_begin, at_end = _value(series, begin), _value(series, end)
-        if at_begin == 0:
-            found.append(begin)
-        elif at_begin * at_end < 0:
-            found.append(_between(series, begin, end, at_begin))
-    return found
-
-
-def _between(series: Series, begin: Any, end: Any, at_begin: Any) -> Any:
-    """The one root between: Newton's steps, and a bisection wherever they would leave the bracket."""
-    slope_series = [k * coefficient for k, coefficient in enumerate(series)][1:]
-    t = (begin + end) / 2
-    while end - begin > mp.eps * end:
-        value, slope = _value(series, t), _value(slope_series, t)
-        if value == 0:
-            return t
-        begin, end = (t, end) if value * at_begin > 0 else (begin, t)
-        step = value / slope if slope else mp.inf
-        t, before = t - step, t
-        if not begin < t < end:
-            t = (begin + end) / 2
-        if abs(t - before) < mp.eps * abs(end):
-            break
-    return t
-
-
-def _value(series: Series, t: Any) -> Any:
-    total = mpf(0)
-    for coefficient in reversed(series):
-        total = total * t + coefficient
-    return total
+    return int(value > 0) - int(value < 0)
