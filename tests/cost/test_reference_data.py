@@ -10,7 +10,7 @@ import pytest
 from mpmath import mpf
 
 from haploop.launch.scene.file import load
-from haploop.tools.reference.loop import close_loop, ticks_of
+from haploop.tools.reference.loop import close_loop, make_timebase
 from haploop.tools.reference.make import SCENES, in_digits
 from haploop.tools.reference.nearest import (
     MOST_GROWTH,
@@ -58,7 +58,7 @@ def test_the_same_problem_is_posed_at_every_plant_rate(name):
         posed = accuracy_scene(name, f"clock.plant_rate={rate}", "title=another", "run.log=none")
         reference = reference_for(Path("somewhere.toml"), posed)
         assert reference.scene == name
-        assert len(reference.x_m) == len(reference.v_m_s) == ticks_of(posed).ticks + 1
+        assert len(reference.x_m) == len(reference.v_m_s) == make_timebase(posed).ticks + 1
 
 
 @pytest.mark.parametrize("change", ["device.mass=0.051", "clock.round_trip_delay=0", "seed=7", "duration=0.2"])
@@ -142,7 +142,7 @@ class Independent:
     def v(self) -> float:
         return float(self.bodies.z[self.bodies.count])
 
-    def felt(self) -> float:
+    def sensed(self) -> float:
         return self.bodies.reading(self.force, self.tau)
 
     def begin(self, load: float) -> None:
@@ -185,7 +185,7 @@ def test_a_sliding_mass_comes_to_rest_where_the_closed_form_says():
 )
 def test_what_a_continuous_plant_cannot_follow_is_refused(tables, said):
     with pytest.raises(ValueError, match=said):
-        ticks_of(scene(**tables))
+        make_timebase(scene(**tables))
 
 
 def test_a_reference_made_on_the_spot_says_how_and_how_good_it_is():

@@ -12,7 +12,7 @@ import haploop.logger
 from haploop.launch.runs.start import prepare, run
 from haploop.logger.log.columns import motion_columns
 from haploop.tools.figure.data import RunData
-from haploop.tools.figure.run_figure import figure_of
+from haploop.tools.figure.run_figure import make_figure
 from haploop.tools.figure.text_panels import book_rows
 from haploop.tools.render.report import summary_table
 from haploop.tools.render.units import amount
@@ -114,8 +114,8 @@ def test_the_terminal_shows_heats_what_the_actuator_kept_back_and_what_was_lost(
 
 
 def test_the_figure_draws_all_bodies_and_forces_of_the_plant_and_counts_what_was_lost(poor, plain):
-    data = RunData.of(poor[0])
-    figure = figure_of(data)
+    data = RunData.from_directory(poor[0])
+    figure = make_figure(data)
     (position, _), (friction, _) = artists(figure, "hand"), artists(figure, "friction")
     assert position.get_ydata()[-1] == data.bodies_m["hand"][-1] * 1e3
     assert set(np.abs(friction.get_ydata())) == {0.0, 0.2}
@@ -124,14 +124,14 @@ def test_the_figure_draws_all_bodies_and_forces_of_the_plant_and_counts_what_was
     assert marked["heat of friction"].book == "friction"
     assert marked["kept back by the actuator's limits"].true == amount(poor[1]["energy"]["actuator_J"], "J")
     assert marked["commands lost"].true == str(poor[1]["lost"]["commands_lost"])
-    none = figure_of(RunData.of(plain[0]))
+    none = make_figure(RunData.from_directory(plain[0]))
     assert not any(artists(none, name) for name in ("tip", "hand", "friction", "actuator", "saturation"))
 
 
 def test_a_log_without_plant_steps_draws_and_its_books_are_the_same(poor, tmp_path):
     summary = made(tmp_path / "ticks", POOR_LOOP, 'run.log="ticks"')
     assert summary["energy"] == poor[1]["energy"]
-    figure_of(RunData.of(tmp_path / "ticks"))
+    make_figure(RunData.from_directory(tmp_path / "ticks"))
 
 
 def test_as_processes_in_small_blocks_the_books_have_the_same_bits(poor, tmp_path):

@@ -18,7 +18,7 @@ from haploop.logger import read
 from haploop.tools.figure.data import TOGETHER, RunData
 from haploop.tools.figure.history import History
 from haploop.tools.figure.loops import force_position_loop, momentum_loop
-from haploop.tools.figure.run_figure import FigureError, draw, figure_of
+from haploop.tools.figure.run_figure import FigureError, draw, make_figure
 from haploop.tools.figure.text_panels import event_lines, key_numbers
 from haploop.tools.figure.time import extremes
 from helpers.shown import artists
@@ -82,7 +82,7 @@ def axes(figure: Any) -> list[Any]:
 
 @pytest.mark.parametrize("name", ["swap", "tap", "busy", "no-wall", "diverged", "no-hand", "ticks", "never-there"])
 def test_every_kind_of_run_draws_and_every_axis_has_its_unit(runs: dict[str, Path], name: str) -> None:
-    figure = figure_of(RunData.of(runs[name]))
+    figure = make_figure(RunData.from_directory(runs[name]))
     assert len(axes(figure)) >= 6
     for ax in axes(figure):
         for label in (ax.get_xlabel(), ax.get_ylabel()):
@@ -100,8 +100,8 @@ def test_the_figure_is_written_where_it_is_asked_for(runs: dict[str, Path], tmp_
 
 @pytest.mark.parametrize("name", ["swap", "tap", "busy", "no-wall"])
 def test_every_energy_ends_with_the_value_of_its_true_book(runs: dict[str, Path], name: str) -> None:
-    data = RunData.of(runs[name])
-    figure = figure_of(data)
+    data = RunData.from_directory(runs[name])
+    figure = make_figure(data)
     energy = json.loads((runs[name] / "summary.json").read_text())["energy"]
     ends = {"wall": energy["wall"]} if data.history.walls else {}
     ends |= dict(zip([span.name for span in data.history.elements], energy["elements"], strict=True))
@@ -119,7 +119,7 @@ def test_history_covers_the_ticks_of_the_summary_and_finds_the_forces_that_add_u
     runs: dict[str, Path], name: str
 ) -> None:
     """The forces found by following the events add up, with the wall's, to the total that was logged."""
-    data = RunData.of(runs[name])
+    data = RunData.from_directory(runs[name])
     elements = json.loads((runs[name] / "summary.json").read_text())["energy"]["elements"]
     total = data.controller["wall"].copy()
     for span, element in zip(data.history.elements, elements, strict=True):
@@ -131,7 +131,7 @@ def test_history_covers_the_ticks_of_the_summary_and_finds_the_forces_that_add_u
 
 
 def test_the_energies_of_wall_and_elements_add_up_to_the_line_together(runs: dict[str, Path]) -> None:
-    *parts, together = RunData.of(runs["busy"]).books()
+    *parts, together = RunData.from_directory(runs["busy"]).books()
     assert together.name == TOGETHER
     assert together.ends_J[0] == pytest.approx(sum(book.ends_J[0] for book in parts), rel=1e-12)
     at = int(np.searchsorted(together.t_s, 1.25))
@@ -142,7 +142,7 @@ def test_the_energies_of_wall_and_elements_add_up_to_the_line_together(runs: dic
 
 def test_the_force_position_loop_is_the_log_and_its_area_the_true_books(runs: dict[str, Path]) -> None:
     """Choi et al. 2022, Fig. 3: on a tap the loop is closed and encloses what the wall gave."""
-    data, log = RunData.of(runs["tap"]), read(runs["tap"])["/plant"]
+    data, log = RunData.from_directory(runs["tap"]), read(runs["tap"])["/plant"]
     depth, force = force_position_loop(data, data.span_s)
     np.testing.assert_array_equal(depth, -(log["x"] + 0.005))
     np.testing.assert_array_equal(force, log["force"])
@@ -152,9 +152,9 @@ def test_the_force_position_loop_is_the_log_and_its_area_the_true_books(runs: di
 
 
 def test_the_drawn_loop_is_the_loop_of_the_close_view(runs: dict[str, Path]) -> None:
-    data = RunData.of(runs["tap"])
+    data = RunData.from_directory(runs["tap"])
     depth, force = force_position_loop(data, data.close_s())
-    figure = figure_of(data)
+    figure = make_figure(data)
     drawn = [line.get_xydata() for name in ("pressing", "releasing") for line in artists(figure, name)]
     points = {tuple(point) for line in drawn for point in line if np.isfinite(point).all()}
     assert points == set(zip(depth * 1e3, force, strict=True))
@@ -162,7 +162,7 @@ def test_the_drawn_loop_is_the_loop_of_the_close_view(runs: dict[str, Path]) -> 
 
 def test_the_area_of_the_momentum_loop_is_the_sampled_book_of_the_inertia(runs: dict[str, Path]) -> None:
     """Choi et al. 2022, eq. 8: E = sum of m v[k] (v[k-1] - v[k-2]), with backward differences for v and a."""
-    data = RunData.of(runs["swap"])
+    data = RunData.from_directory(runs["swap"])
     span = data.history.elements[1]
     _, velocity, momentum = momentum_loop(data, span)
     area = np.sum(momentum[1:] * np.diff(velocity))
@@ -170,9 +170,9 @@ def test_the_area_of_the_momentum_loop_is_the_sampled_book_of_the_inertia(runs: 
 
 
 def test_events_are_marked_at_their_times_and_named(runs: dict[str, Path]) -> None:
-    data = RunData.of(runs["busy"])
+    data = RunData.from_directory(runs["busy"])
     times = {0.95, 1.0, 1.1, 1.2, 1.3}
-    figure = figure_of(data)
+    figure = make_figure(data)
     marks = [line.get_xdata()[0] for line in artists(figure, "event")]
     assert set(marks) == times
     assert len(marks) == 3 * len(times)
@@ -197,22 +197,22 @@ def test_a_change_that_was_refused_leaves_history_as_it_was() -> None:
 
 
 def test_the_wall_is_drawn_where_it_stood(runs: dict[str, Path]) -> None:
-    data = RunData.of(runs["busy"])
+    data = RunData.from_directory(runs["busy"])
     position, stiffness = data.wall_at(np.array([0.0, 0.999, 1.0, 1.4]))
     assert position.tolist() == [-0.06, -0.06, -0.0601, -0.0601]
     assert stiffness.tolist() == [150.0, 150.0, 120.0, 120.0]
 
 
 def test_the_approach_is_left_out_and_said_so_where_it_dwarfs_the_contact(runs: dict[str, Path]) -> None:
-    swap, tap = (axes(figure_of(RunData.of(runs[name])))[0] for name in ("swap", "tap"))
+    swap, tap = (axes(make_figure(RunData.from_directory(runs[name])))[0] for name in ("swap", "tap"))
     assert "approach from 0 mm not shown" in swap.get_title(loc="left")
     assert max(swap.get_ylim()) < -50
     assert tap.get_title(loc="left") == "Position"
 
 
 def test_the_header_tells_verdict_and_numbers(runs: dict[str, Path]) -> None:
-    data = RunData.of(runs["swap"])
-    figure = figure_of(data)
+    data = RunData.from_directory(runs["swap"])
+    figure = make_figure(data)
     assert [text.get_text() for text in artists(figure, "verdict")] == [data.summary["verdict"]]
     assert [text.get_text() for text in artists(figure, "title")] == [data.scene["title"]]
     assert any("residual" in words for words in key_numbers(data))
@@ -224,15 +224,15 @@ def test_a_run_that_was_killed_still_draws(runs: dict[str, Path], tmp_path: Path
     """With half a log and no summary; even without the scene file, which the log holds too."""
     log = (runs["swap"] / "log.mcap").read_bytes()
     (tmp_path / "log.mcap").write_bytes(log[: int(len(log) * share)])
-    data = RunData.of(tmp_path)
+    data = RunData.from_directory(tmp_path)
     assert data.cut
-    assert data.scene["title"] == RunData.of(runs["swap"]).scene["title"]
+    assert data.scene["title"] == RunData.from_directory(runs["swap"]).scene["title"]
     assert draw(tmp_path).read_bytes().startswith(PNG)
     assert key_numbers(data)[0].startswith("log cut off")
 
 
 def test_a_log_of_ticks_alone_shows_what_the_controller_measured(runs: dict[str, Path]) -> None:
-    data = RunData.of(runs["ticks"])
+    data = RunData.from_directory(runs["ticks"])
     assert not data.every_step
     np.testing.assert_array_equal(data.x_m, read(runs["ticks"])["/controller"]["x"])
 

@@ -20,9 +20,9 @@ from haploop.tools.figure.style import write_figure
 from haploop.tools.linear.one_tick import OneTickMap
 from haploop.tools.linear.stiffness_limit import pressed_deep
 from haploop.tools.sweep.map.axis import Ruler
-from haploop.tools.sweep.map.data import AMPLITUDE, NOT_RUN, VERDICTS, Axis, MapData, data_of
+from haploop.tools.sweep.map.data import AMPLITUDE, NOT_RUN, VERDICTS, Axis, MapData, make_map_data
 from haploop.tools.sweep.map.edges import stiffest_steady
-from haploop.tools.sweep.map.figure import figure_of
+from haploop.tools.sweep.map.figure import make_figure
 from haploop.tools.sweep.map.legend import LOOKS
 from helpers.data.sweep_tables import cells_of, ran, said, table
 from helpers.scenes.least import scene
@@ -60,7 +60,7 @@ def data() -> MapData:
 
 @pytest.fixture(scope="module")
 def figure(data: MapData) -> Any:
-    return figure_of(data)
+    return make_figure(data)
 
 
 def words(figure: Any, gid: str) -> list[str]:
@@ -171,7 +171,7 @@ def test_a_cell_shows_its_worst_seed_and_how_many_agree_where_they_do_not() -> N
         return said("steady", 1e-7)
 
     data = table(axes, cells, [result(cell) for cell in cells], [None] * len(cells))
-    drawn = figure_of(data)
+    drawn = make_figure(data)
     assert sorted(words(drawn, "seeds disagree")) == ["1/3", "2/3"]
     shown = [VERDICTS[number] for number in artists(drawn, "verdicts")[0].get_array().ravel()]
     assert shown == ["steady", "steady", "limit-cycle", "limit-cycle"]
@@ -182,12 +182,12 @@ def test_a_cell_shows_its_worst_seed_and_how_many_agree_where_they_do_not() -> N
 def test_rows_in_any_order_and_a_sweep_that_still_runs_give_the_cells_that_are_there(data: MapData) -> None:
     order = np.random.default_rng(1).permutation(20)[:13]
     columns = {name: [column[row] for row in order] for name, column in data.columns.items()}
-    part = data_of(columns, {K: "N/m"}, data.sweep)
+    part = make_map_data(columns, {K: "N/m"}, data.sweep)
     whole, some = data.cells(), part.cells()
     there = some.verdict != NOT_RUN
     assert there.sum() == 13
     assert (some.verdict[there] == whole.verdict[there]).all()
-    drawn = figure_of(part)
+    drawn = make_figure(part)
     assert np.ma.count_masked(artists(drawn, "verdicts")[0].get_array()) == 7
     assert "7 not run yet" in words(drawn, "description")[0]
 
@@ -197,7 +197,7 @@ def test_names_and_third_axes_make_panels_with_one_scale() -> None:
     axes = {"dissipation.0.kind": kinds, K: STIFFNESSES, B: DAMPINGS}
     cells = cells_of(axes)
     results = [said("limit-cycle", 1e-6 * cell[K] * (1 + kinds.index(cell["dissipation.0.kind"]))) for cell in cells]
-    drawn = figure_of(table(axes, cells, results, [None] * len(cells)))
+    drawn = make_figure(table(axes, cells, results, [None] * len(cells)))
     meshes = artists(drawn, "amplitudes")
     assert len(meshes) == 3
     assert len({(mesh.norm.vmin, mesh.norm.vmax) for mesh in meshes}) == 1
@@ -210,14 +210,14 @@ def test_names_and_third_axes_make_panels_with_one_scale() -> None:
 def test_more_panels_than_have_room_are_left_out_and_counted() -> None:
     axes = {K: STIFFNESSES[:2], B: DAMPINGS[:2], "dissipation.0.kind": [f"kind-{number}" for number in range(14)]}
     cells = cells_of(axes)
-    drawn = figure_of(table(axes, cells, [said("steady", 1e-7)] * len(cells), [None] * len(cells)))
+    drawn = make_figure(table(axes, cells, [said("steady", 1e-7)] * len(cells), [None] * len(cells)))
     assert len(artists(drawn, "verdicts")) == 12
     assert "The first 12 of 14 panels are drawn." in legend(drawn)
 
 
 def test_one_axis_shows_the_amplitude_of_every_cell_with_the_sign_of_its_verdict() -> None:
     results = [said("steady", 1e-6), said("limit-cycle", 1e-4), said("diverged", math.inf), said(None)]
-    drawn = figure_of(table({K: STIFFNESSES}, cells_of({K: STIFFNESSES}), results, [None] * 4))
+    drawn = make_figure(table({K: STIFFNESSES}, cells_of({K: STIFFNESSES}), results, [None] * 4))
     seen = {}
     for verdict in VERDICTS:
         for line in artists(drawn, f"cells {verdict}"):
@@ -236,7 +236,7 @@ def test_a_single_cell_or_column_and_cells_without_a_number_are_drawn(
     axes: dict[str, list[float]], result: dict[str, Any]
 ) -> None:
     cells = cells_of(axes)
-    drawn = figure_of(table(axes, cells, [result] * len(cells), [WITH_DAMPING] * len(cells)))
+    drawn = make_figure(table(axes, cells, [result] * len(cells), [WITH_DAMPING] * len(cells)))
     drawn.draw_without_rendering()
     assert not artists(drawn, "amplitudes")
     verdict = result.get("verdict", "failed").replace("-", " ")
@@ -245,7 +245,7 @@ def test_a_single_cell_or_column_and_cells_without_a_number_are_drawn(
 
 def test_all_failed_says_so_and_marks_no_answer() -> None:
     axes = {K: STIFFNESSES, B: DAMPINGS}
-    drawn = figure_of(table(axes, cells_of(axes), [said(None)] * 20, [None] * 20))
+    drawn = make_figure(table(axes, cells_of(axes), [said(None)] * 20, [None] * 20))
     assert not artists(drawn, "star")
     assert "20 failed: A plugin raised." in legend(drawn)
     assert "No wall is steady" in legend(drawn)
@@ -255,7 +255,7 @@ def test_forty_thousand_cells_are_one_mesh() -> None:
     axes = {K: np.linspace(1.0, 200.0, 200).tolist(), B: np.geomspace(0.01, 10.0, 200).tolist()}
     cells = cells_of(axes)
     results = [said("steady" if cell[K] < 100.0 * cell[B] else "limit-cycle", 1e-3) for cell in cells]
-    drawn = figure_of(table(axes, cells, results, [None] * len(cells)))
+    drawn = make_figure(table(axes, cells, results, [None] * len(cells)))
     (mesh,) = artists(drawn, "verdicts")
     shown = mesh.get_array().reshape(200, 200)
     expected = np.greater.outer(axes[K], 0) & (np.array(axes[K])[:, None] < 100.0 * np.array(axes[B]))
@@ -281,17 +281,17 @@ def test_without_verdicts_or_rows_or_matplotlib_there_is_no_map_and_a_reason(
 ) -> None:
     without = {name: column for name, column in data.columns.items() if name != "verdict"}
     with pytest.raises(FigureError, match='add "verdict" to its record'):
-        data_of(without, {}, data.sweep)
+        make_map_data(without, {}, data.sweep)
     with pytest.raises(FigureError, match="no finished cell"):
-        data_of({name: [] for name in data.columns}, {}, data.sweep)
+        make_map_data({name: [] for name in data.columns}, {}, data.sweep)
     monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
     with pytest.raises(FigureError, match=r"pip install 'haploop\[plot\]'"):
-        figure_of(data)
+        make_figure(data)
 
 
 def test_amplitudes_that_were_not_recorded_are_missed_aloud(data: MapData) -> None:
     columns = {name: column for name, column in data.columns.items() if name != AMPLITUDE}
-    drawn = figure_of(dataclasses.replace(data, columns=columns))
+    drawn = make_figure(dataclasses.replace(data, columns=columns))
     assert not artists(drawn, "amplitudes")
     assert "How far limit cycles swing was not recorded." in legend(drawn)
 
@@ -308,14 +308,14 @@ def test_amplitudes_that_were_not_recorded_are_missed_aloud(data: MapData) -> No
     ],
 )
 def test_the_scale_follows_the_values(values: list[float], scale: str) -> None:
-    ruler = Ruler.of(Axis.of("wall.stiffness", "N/m", values))
+    ruler = Ruler.from_axis(Axis.from_column("wall.stiffness", "N/m", values))
     assert ruler.scale == scale
     assert (np.diff(ruler.edges) > 0).all()
     assert all(low < at < high for low, at, high in zip(ruler.edges, ruler.coordinates, ruler.edges[1:], strict=False))
 
 
 def test_short_times_are_written_in_milliseconds_where_they_belong() -> None:
-    ruler = Ruler.of(Axis.of("clock.round_trip_delay", "s", [0.0, 0.001, 0.002]))
+    ruler = Ruler.from_axis(Axis.from_column("clock.round_trip_delay", "s", [0.0, 0.001, 0.002]))
     assert ruler.label == "clock.round_trip_delay (ms)"
     assert ruler.coordinates.tolist() == pytest.approx([0.0, 1.0, 2.0])
     assert ruler.axis.word(2) == "2 ms"
@@ -323,24 +323,24 @@ def test_short_times_are_written_in_milliseconds_where_they_belong() -> None:
 
 def test_lists_of_elements_make_panels_with_names_that_can_be_read() -> None:
     lists = [[], [{"kind": "damping", "damping": 0.8}], [{"kind": "brake"}, {"kind": "damping", "damping": 0.25}]]
-    axis = Axis.of("dissipation", "", [inline(one) for one in lists[:2]], lists)
+    axis = Axis.from_column("dissipation", "", [inline(one) for one in lists[:2]], lists)
     assert [axis.word(number) for number in range(3)] == ["none", "damping 0.8", "brake + damping 0.25"]
     assert axis.indices([inline(lists[1])]).tolist() == [1]
 
 
 def test_switches_and_great_numbers_are_written_as_scenes_have_them() -> None:
-    assert Axis.of("run.pin", "", [np.bool_(True), np.bool_(False)], [True, False]).names == ("true", "false")
-    assert Axis.of(K, "N/m", [20_000.0]).word(0) == "20000 N/m"
+    assert Axis.from_column("run.pin", "", [np.bool_(True), np.bool_(False)], [True, False]).names == ("true", "false")
+    assert Axis.from_column(K, "N/m", [20_000.0]).word(0) == "20000 N/m"
 
 
 def test_values_that_were_planned_but_not_run_have_their_place() -> None:
-    axis = Axis.of(K, "N/m", [200.0], [100.0, 200.0, 300.0])
+    axis = Axis.from_column(K, "N/m", [200.0], [100.0, 200.0, 300.0])
     assert axis.values.tolist() == [100.0, 200.0, 300.0]
     assert axis.indices([200.0]).tolist() == [1]
 
 
 def test_the_file_of_a_map_is_a_picture(data: MapData, tmp_path: Path) -> None:
-    assert write_figure(figure_of(data), tmp_path / "map.png").read_bytes().startswith(b"\x89PNG")
+    assert write_figure(make_figure(data), tmp_path / "map.png").read_bytes().startswith(b"\x89PNG")
 
 
 def test_runs_of_the_program_make_a_map_that_the_exact_limit_divides() -> None:

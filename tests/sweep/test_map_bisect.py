@@ -15,8 +15,8 @@ from typer.testing import CliRunner
 from haploop.tools.cli.main import app
 from haploop.tools.figure.data import FigureError
 from haploop.tools.sweep.map.bisect_figure import MOST_LINES, bisect_figure
-from haploop.tools.sweep.map.data import AMPLITUDE, MapData, data_of
-from haploop.tools.sweep.map.edges import ALL_HOLD, FOUND, NONE_HOLDS, UNKNOWN, edges_of
+from haploop.tools.sweep.map.data import AMPLITUDE, MapData, make_map_data
+from haploop.tools.sweep.map.edges import ALL_HOLD, FOUND, NONE_HOLDS, UNKNOWN, find_edges
 from haploop.tools.sweep.map.figure import draw_map
 from haploop.tools.sweep.table import read
 from helpers.data.sweep_tables import UNITS, said
@@ -54,7 +54,7 @@ def bisected(others: dict[str, list[Any]], boundary: Ends, points: list[float] |
     found = {name: [edge[name] for edge in edges] for name in edges[0]}
     axes = {**others, K: points}
     sweep = {"title": "bisected", "base": {"title": "a base"}, "axes": axes, "bisect": {"axis": K, "holds": "steady"}}
-    return data_of(columns, UNITS, sweep, found)
+    return make_map_data(columns, UNITS, sweep, found)
 
 
 def words(drawn: Any, gid: str) -> str:
@@ -75,7 +75,7 @@ def test_every_boundary_stands_at_its_place_with_its_bracket() -> None:
 
 def test_where_there_is_no_boundary_the_edge_of_the_panel_says_on_which_side() -> None:
     data = bisected({B: [0.1, 0.2, 0.4, 0.8]}, {(0.1,): "none", (0.2,): 300.0, (0.4,): "all", (0.8,): "failed"})
-    assert edges_of(data).state.tolist() == [NONE_HOLDS, FOUND, ALL_HOLD, UNKNOWN]
+    assert find_edges(data).state.tolist() == [NONE_HOLDS, FOUND, ALL_HOLD, UNKNOWN]
     drawn = bisect_figure(data)
     for state, x in ((NONE_HOLDS, 0.1), (ALL_HOLD, 0.4), (UNKNOWN, 0.8)):
         [line] = artists(drawn, f"state {state}")
@@ -104,11 +104,11 @@ def test_a_line_for_every_value_of_the_second_axis_each_with_a_look_of_its_own()
 
 def test_of_several_seeds_the_one_that_holds_least_far_is_drawn_and_the_bar_covers_all() -> None:
     given: Ends = {(0.1, 1): 300.0, (0.1, 2): 200.0, (0.2, 1): 500.0, (0.2, 2): "none"}
-    edges = edges_of(bisected({B: [0.1, 0.2]}, given))
+    edges = find_edges(bisected({B: [0.1, 0.2]}, given))
     assert edges.nearest[0] == 200.0
     assert (edges.low[0], edges.high[0]) == (pytest.approx(198.0), pytest.approx(303.0))
     assert edges.state.tolist() == [FOUND, NONE_HOLDS]
-    downwards = edges_of(bisected({B: [0.1]}, {(0.1, 1): 300.0, (0.1, 2): 200.0}, POINTS[::-1]))
+    downwards = find_edges(bisected({B: [0.1]}, {(0.1, 1): 300.0, (0.1, 2): 200.0}, POINTS[::-1]))
     assert not downwards.rising
     assert downwards.nearest[0] == 300.0
 
@@ -126,7 +126,7 @@ def test_a_search_that_goes_on_is_drawn_as_the_map_of_its_planned_points() -> No
     columns = {name: [*column] for name, column in data.columns.items()}
     for name, column in columns.items():
         column.append(173.2 if name == K else column[-1])
-    running = data_of(columns, UNITS, data.sweep)
+    running = make_map_data(columns, UNITS, data.sweep)
     assert not running.has_edges
     assert running.cells().verdict.shape == (2, 4)
 
@@ -166,7 +166,7 @@ def test_haploop_plot_draws_a_sweep_of_haploop_sweep(swept: dict[str, Path], nam
 
 def test_the_boundaries_drawn_are_those_of_the_program_s_table(swept: dict[str, Path]) -> None:
     found = read(swept["search"])
-    data = data_of(found.columns, found.units, found.sweep, found.boundary)
+    data = make_map_data(found.columns, found.units, found.sweep, found.boundary)
     [line] = artists(bisect_figure(data), "boundary")
     assert np.array_equal(line.get_ydata(), found.boundary["boundary"], equal_nan=True)
 
@@ -191,7 +191,7 @@ def test_a_boundary_of_a_delay_is_told_in_milliseconds() -> None:
     data = bisected({B: [0.1, 0.2]}, {(0.1,): 0.0015, (0.2,): 0.0034}, [0.0, 0.002, 0.004])
     columns = {DELAY if name == K else name: column for name, column in data.columns.items()}
     sweep = {**data.sweep, "axes": {B: [0.1, 0.2], DELAY: [0.0, 0.002, 0.004]}, "bisect": {"axis": DELAY}}
-    drawn = bisect_figure(data_of(columns, UNITS, sweep, data.boundary))
+    drawn = bisect_figure(make_map_data(columns, UNITS, sweep, data.boundary))
     assert words(drawn, "star words") == "steady up to 3.4 ms"
     assert drawn.axes[0].get_ylabel() == "clock.round_trip_delay (ms)"
     assert artists(drawn, "boundary")[0].get_ydata().tolist() == pytest.approx([1.5, 3.4])

@@ -15,7 +15,7 @@ from haploop.tools.sweep.map.axis import Ruler
 from haploop.tools.sweep.map.boundaries import EXACT, bound_boundaries, exact_boundary
 from haploop.tools.sweep.map.contour import zero_lines
 from haploop.tools.sweep.map.data import Axis
-from haploop.tools.sweep.map.figure import figure_of
+from haploop.tools.sweep.map.figure import make_figure
 from haploop.tools.sweep.map.plane import Plane, set_key
 from helpers.data.sweep_tables import UNITS, cells_of, said, table
 from helpers.scenes.least import scene
@@ -32,7 +32,7 @@ def loop(**tables: Any) -> dict[str, Any]:
 
 
 def ruler(key: str, values: list[float]) -> Ruler:
-    return Ruler.of(Axis.of(key, UNITS.get(key, ""), values))
+    return Ruler.from_axis(Axis.from_column(key, UNITS.get(key, ""), values))
 
 
 def plane(made: dict[str, Any], **axes: list[float]) -> Plane:
@@ -146,7 +146,7 @@ def test_a_scene_without_a_wall_or_of_a_plugin_has_no_lines() -> None:
 
 def figure_over(made: dict[str, Any], axes: dict[str, list[float]]) -> Any:
     cells = cells_of(axes)
-    return figure_of(table(axes, cells, [said("steady", 1e-7)] * len(cells), [made] * len(cells)))
+    return make_figure(table(axes, cells, [said("steady", 1e-7)] * len(cells), [made] * len(cells)))
 
 
 def legend(drawn: Any) -> str:

@@ -18,9 +18,9 @@ from haploop.tools.linear.one_tick import OneTickMap
 from haploop.tools.sweep.run.boundary import Boundary
 from haploop.tools.sweep.run.command import Request, sweep
 from haploop.tools.sweep.run.engine import Engine, Stopped
-from haploop.tools.sweep.run.shown import SweepProgress
+from haploop.tools.sweep.run.progress import SweepProgress
 from haploop.tools.sweep.run.store import Store
-from haploop.tools.sweep.table import TableError, read, schema_of
+from haploop.tools.sweep.table import TableError, make_schema, read
 from helpers.scenes.least import KINDS
 from helpers.scenes.sweep_files import GRID, PRESS, loaded, sweep_file, swept
 
@@ -39,7 +39,7 @@ class Quiet:
     def expect(self, cells: int) -> None:
         self.expected += cells
 
-    def came(self, rows: Any, stored: bool = False) -> None:
+    def add_rows(self, rows: Any, stored: bool = False) -> None:
         self.stored += len(rows) if stored else 0
         self.ran += [] if stored else [row["cell"] for row in rows]
 
@@ -49,7 +49,7 @@ def engine_run(made: Any, out: Path, stop_after: int | None = None, workers: int
     out.mkdir(exist_ok=True)
     (out / "sweep.toml").write_text(made.toml())
     told = Quiet()
-    with Store(out, schema_of(made.columns(), made.toml())) as store, Pool(workers) as pool:
+    with Store(out, make_schema(made.columns(), made.toml())) as store, Pool(workers) as pool:
         stop = lambda: stop_after is not None and len(told.ran) >= stop_after  # noqa: E731
         try:
             return told, Engine(made, store, pool, told, stop).run()
@@ -319,8 +319,8 @@ def test_progress_shows_cells_rate_and_verdicts_on_a_terminal_and_nothing_elsewh
         screen = Console(file=StringIO(), force_terminal=terminal, width=140)
         with SweepProgress("a sweep", screen) as progress:
             progress.expect(4)
-            progress.came([{"cell": 0, "verdict": "steady", "ended": "done"}] * 2)
-            progress.came([{"cell": 0, "verdict": None, "ended": "failed", "why": "broken"}])
+            progress.add_rows([{"cell": 0, "verdict": "steady", "ended": "done"}] * 2)
+            progress.add_rows([{"cell": 0, "verdict": None, "ended": "failed", "why": "broken"}])
             progress._bars.refresh()
         shown = screen.file.getvalue()  # type: ignore[attr-defined]
         if terminal:

@@ -8,7 +8,7 @@ from typing import Any
 
 from haploop.launch.batch.run import run_array
 from haploop.launch.scene.toml_writer import to_toml
-from haploop.tools.sweep.map.data import AMPLITUDE, MapData, data_of
+from haploop.tools.sweep.map.data import AMPLITUDE, MapData, make_map_data
 from helpers.scenes.least import KINDS
 
 UNITS = {
@@ -55,7 +55,7 @@ def table(
     columns["scene"] = [None if scene is None else to_toml(scene) for scene in scenes]
     base = next((scene for scene in scenes if scene is not None), {"title": "none"})
     sweep = {"title": title, "base": base, "axes": {key: [*values] for key, values in axes.items()}}
-    return data_of(columns, UNITS, sweep)
+    return make_map_data(columns, UNITS, sweep)
 
 
 def said(verdict: str | None, oscillation_m: float | None = None) -> Result:

@@ -1,4 +1,4 @@
-"""What a figure was measured on and with: the machine, the versions, the sources."""
+"""The machine, the versions and the sources with which something was measured."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _ROOTS = ("protocol", "nodes", "launch", "tools")
 
 
 def machine() -> str:
-    """Processor and cores, for the record."""
+    """Returns processor, cores and operating system, for the record."""
     cpu = next(
         (line.partition(":")[2].strip() for line in _cpuinfo() if line.startswith("model name")), platform.processor()
     )
@@ -23,7 +23,7 @@ def machine() -> str:
 
 
 def cores() -> int:
-    """How many cores this process may use."""
+    """Counts the cores this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
@@ -33,14 +33,14 @@ def _cpuinfo() -> list[str]:
 
 
 def versions() -> dict[str, str]:
-    """What a run is made with, and what integrates."""
+    """Returns the versions of haploop, of Python and of the libraries that a run is computed with."""
     from haploop.logger.summary import versions
 
     return {**versions(), "scipy": version("scipy")}
 
 
 def commit() -> str:
-    """The commit of the checkout these sources lie in, ``+changes`` where they differ from it; "" outside of one."""
+    """Returns the commit of these sources' checkout, ``+changes`` where they differ from it; "" outside of one."""
     try:
         _git("ls-files", "--error-unmatch", Path(__file__).name)
         changed = _git("status", "--porcelain", "--untracked-files=no", "--", *(f":/{root}" for root in _ROOTS))
@@ -55,7 +55,7 @@ def _git(*words: str) -> str:
 
 
 def source_digest(packages: Iterable[str], files: Iterable[Path] = ()) -> str:
-    """A hash of the Python sources of some packages and of some files: another one whenever what is measured changes.
+    """Returns a hash of the Python sources of some packages, and of some files.
 
     Unlike the commit it stands still when only the documentation changes, and moves when sources are edited.
     """

@@ -1,4 +1,4 @@
-"""Runs the code of a notebook and puts into it what comes out: ``python -m haploop.tools.notebook FILE``.
+"""Runs the code of a notebook and stores its outputs in it: ``python -m haploop.tools.notebook FILE``.
 
 The cells run in order, in one namespace and in the notebook's directory, as Jupyter would run them; Jupyter itself is
 not needed. What a cell prints, the value of its last line and the figures it draws become its outputs.
@@ -20,7 +20,7 @@ Notebook = dict[str, Any]
 
 
 def run_cells(notebook: Notebook) -> None:
-    """Run every code cell and replace its outputs.
+    """Runs every code cell and replace its outputs.
 
     Raises:
         Exception: whatever a cell raises; the notebook is then to be thrown away.
@@ -35,7 +35,7 @@ def run_cells(notebook: Notebook) -> None:
 
 
 def _outputs(source: str, names: dict[str, Any], number: int) -> list[dict[str, Any]]:
-    """Run the code of cell ``number`` and return what it gave."""
+    """Runs the code of cell ``number`` and return what it gave."""
     tree, file = ast.parse(source), f"cell {number}"
     shows = bool(tree.body) and isinstance(tree.body[-1], ast.Expr) and not source.rstrip().endswith(";")
     last = tree.body.pop() if shows else None
@@ -52,7 +52,7 @@ def _outputs(source: str, names: dict[str, Any], number: int) -> list[dict[str, 
 
 
 def _figures() -> list[str]:
-    """The figures that stand open, as PNG in base64; they are closed."""
+    """Returns the figures that stand open, as PNG in base64; they are closed."""
     if "matplotlib.pyplot" not in sys.modules:
         return []
     from matplotlib import pyplot
@@ -67,7 +67,7 @@ def _figures() -> list[str]:
 
 
 def main(path: Path) -> None:
-    """Run a notebook and write it back."""
+    """Runs a notebook and write it back."""
     path = path.resolve()
     notebook = json.loads(path.read_text(encoding="utf-8"))
     os.chdir(path.parent)

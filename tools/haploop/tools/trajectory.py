@@ -16,7 +16,7 @@ from haploop.protocol.ticks import Timebase
 
 @dataclass(frozen=True)
 class Trajectory:
-    """Where body 0 was.
+    """The motion of body 0.
 
     Attributes:
         x_m, v_m_s: at every tick and at the end, shape (ticks + 1,); fewer where the run diverged.
@@ -43,7 +43,7 @@ class _Remembering(Logger):
 
 
 def trajectory(scene: dict[str, Any]) -> Trajectory:
-    """Run a resolved scene of installed elements to its end; nothing is written.
+    """Runs a resolved scene of installed elements to its end; nothing is written.
 
     Raises:
         ElementError: an element raised, or gave something that is no number.

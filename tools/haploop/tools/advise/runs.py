@@ -13,7 +13,7 @@ from typing import Any, Self
 from haploop.launch.batch.run import groups
 from haploop.launch.batch.stacking import runs_in_arrays
 from haploop.tools.executor.parts import Group
-from haploop.tools.executor.pool import Pool, sources_of
+from haploop.tools.executor.pool import Pool, read_sources
 from haploop.tools.executor.work import Result, Results, Scene, Work, load_kinds
 
 # Without energy books, so many loops of one structure are already sooner run in an array; more than so many with
@@ -61,7 +61,7 @@ class Runs:
     """
 
     def __init__(self, plugins: Sequence[Path], workers: int | None, on_progress: Callable[[int], object]) -> None:
-        self._sources, self._workers, self._told = sources_of(plugins), workers, on_progress
+        self._sources, self._workers, self._told = read_sources(plugins), workers, on_progress
         self._here = Pool(1)
         self._pool: Pool | None = None
         self.count = 0

@@ -1,4 +1,4 @@
-"""How a command ends: errors a person can mend become one message on stderr and an exit status."""
+"""Exit statuses: errors a person can mend become one message on stderr and a status."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ FAILED, WRONG_USE = 1, 2
 
 
 def leave(message: str, status: int) -> NoReturn:
-    """Print a message for people and exit."""
+    """Prints a message for people and exit."""
     print(message, file=sys.stderr)
     raise SystemExit(status)
 
 
 def print_json(data: Any) -> None:
-    """One JSON object on stdout; numbers that are not finite become null."""
+    """Prints one JSON object on stdout; numbers that are not finite become null."""
     from haploop.logger.summary import finite
 
     print(json.dumps(finite(data)), flush=True)
@@ -26,7 +26,7 @@ def print_json(data: Any) -> None:
 
 @contextlib.contextmanager
 def plain_errors() -> Iterator[None]:
-    """Turn the errors of the packages below into messages: 2 for wrong use, 1 for a run that failed."""
+    """Turns the errors of the packages below into messages: 2 for wrong use, 1 for a run that failed."""
     from haploop.controller.dissipation import ElementError, PluginError
     from haploop.launch.output import OutputError
     from haploop.launch.processes.control import CommandRefused

@@ -1,4 +1,4 @@
-"""``haploop explain``: what a scene comes to, in which order things happen, and what every effect costs."""
+"""``haploop explain``: bodies and states of a scene, the order of its steps, and the cost of every effect."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _READING = (
 
 
 def explain_scene(scene_path: Path, overrides: list[str], plugins: list[Path], as_json: bool) -> None:
-    """Print the plan of a scene and count what it costs; no process is started."""
+    """Prints the plan of a scene and count what it costs; no process is started."""
     from haploop.launch.plan.plan import plan
     from haploop.launch.scene.elements import elements_of, try_out
     from haploop.launch.scene.file import load
@@ -44,7 +44,7 @@ def explain_scene(scene_path: Path, overrides: list[str], plugins: list[Path], a
 
 
 def as_data(scene: dict[str, Any], planned: Plan, costs: Bill) -> dict[str, Any]:
-    """The plan and its costs as one JSON object."""
+    """Returns the plan and its costs as one JSON object."""
     whole = costs.whole
     return {
         "title": scene["title"],
@@ -85,7 +85,7 @@ def as_data(scene: dict[str, Any], planned: Plan, costs: Bill) -> dict[str, Any]
 
 
 def explanation(scene: dict[str, Any], planned: Plan, costs: Bill) -> RenderableType:
-    """The same for people."""
+    """Returns the same for people."""
     from rich.console import Group
     from rich.text import Text
 
@@ -132,7 +132,7 @@ def _order(title: str, steps: tuple[Step, ...]) -> Table:
 
 
 def _costs(scene: dict[str, Any], planned: Plan, costs: Bill) -> Table:
-    """What each effect and each element adds."""
+    """Makes the table of what each effect and each element adds."""
     numbers = ("states", "multiplications", "instructions")
     table = make_table("what is named", "written in", "every", *numbers, numbers=numbers)
     for effect in planned.named:

@@ -24,5 +24,5 @@ for command in (
 
 
 def main() -> None:
-    """Entry point. Exit status: 0 done, 1 the run failed, 2 wrong usage or scene."""
+    """Runs the command line. Exit status: 0 done, 1 the run failed, 2 wrong usage or scene."""
     app()

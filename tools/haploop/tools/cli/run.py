@@ -28,7 +28,7 @@ def run_scene(
     as_json: bool,
     viewing: Viewing,
 ) -> None:
-    """Run a scene, show how it goes and what came of it."""
+    """Runs a scene, show how it goes and what came of it."""
     from haploop.launch.runs.start import prepare, run
     from haploop.tools.render.progress import ProgressLine
     from haploop.tools.render.report import print_summary
@@ -71,7 +71,7 @@ def run_scene(
 
 
 def _transport(host: str | None, keys: Path | None, in_process: bool) -> Transport:
-    """Local sockets, or TCP where an address was given."""
+    """Returns the transport: local sockets, or TCP where an address was given."""
     from haploop.protocol.transport import Transport, TransportError
 
     if host and in_process:
@@ -83,7 +83,7 @@ def _transport(host: str | None, keys: Path | None, in_process: bool) -> Transpo
 
 
 def _pace(text: str, in_process: bool) -> float:
-    """Infinite, or a positive number."""
+    """Returns the pace: infinite, or a positive number."""
     rate = parse_pace(text)
     if rate == "free":
         return math.inf
@@ -93,7 +93,7 @@ def _pace(text: str, in_process: bool) -> float:
 
 
 def replay_run(directory: Path, as_json: bool) -> None:
-    """Repeat a run from its log; exit status 1 when a bit differs."""
+    """Repeats a run from its log; exit status 1 when a bit differs."""
     from haploop.launch.runs.replay import ReplayError, replay
 
     with plain_errors():

@@ -14,14 +14,14 @@ if TYPE_CHECKING:
 
 
 def kinds_with(plugins: list[Path]) -> dict[str, type[Element]]:
-    """The installed elements and those of some files."""
+    """Returns the installed elements and those of some files."""
     from haploop.controller.dissipation import registry
 
     return registry(plugins)
 
 
 def check_scene(scene_path: Path, overrides: list[str], plugins: list[Path], as_json: bool) -> None:
-    """Say whether a scene can be run; print the resolved scene."""
+    """Says whether a scene can be run; print the resolved scene."""
     from haploop.launch.scene.file import load
     from haploop.launch.scene.toml_writer import to_toml
 
@@ -36,7 +36,7 @@ def check_scene(scene_path: Path, overrides: list[str], plugins: list[Path], as_
 
 
 def print_notes(scene: dict[str, Any]) -> None:
-    """Say on stderr what in a resolved scene may not be what was meant."""
+    """Says on stderr what in a resolved scene may not be what was meant."""
     from haploop.launch.plan.effects import notes
 
     for note in notes(scene):
@@ -44,7 +44,7 @@ def print_notes(scene: dict[str, Any]) -> None:
 
 
 def print_schema(plugins: list[Path]) -> None:
-    """The JSON Schema of scene files, for editors."""
+    """Prints the JSON Schema of scene files, for editors."""
     from haploop.launch.scene.schema import json_schema
 
     with plain_errors():
@@ -52,7 +52,7 @@ def print_schema(plugins: list[Path]) -> None:
 
 
 def list_plugins(plugins: list[Path], as_json: bool) -> None:
-    """Every kind of element with its parameters."""
+    """Prints every kind of element with its parameters."""
     with plain_errors():
         kinds = kinds_with(plugins)
     if as_json:
@@ -74,7 +74,7 @@ def _parameters(element: type[Element]) -> dict[str, Any]:
 
 
 def plot_directory(directory: Path) -> None:
-    """Draw the figure of a run, or the map of a sweep, and name its file."""
+    """Draws the figure of a run, or the map of a sweep, and name its file."""
     from haploop.tools.figure.data import FigureError
     from haploop.tools.sweep.table import is_sweep
 

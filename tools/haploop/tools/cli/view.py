@@ -29,13 +29,13 @@ class LiveRuns:
     """The live runs of this user, as a viewer finds and steers them."""
 
     def live(self) -> Sequence[LiveRun]:
-        """Those that live now, the oldest first."""
+        """Returns those that live now, the oldest first."""
         from haploop.launch.processes import run_directory
 
         return run_directory.live_runs()
 
     def ask(self, run: LiveRun, verb: str, arguments: dict[str, Any]) -> tuple[str, dict[str, Any]]:
-        """Have a run carry out a command."""
+        """Has a run carry out a command."""
         from haploop.launch.processes.control import CommandRefused, ask
         from haploop.launch.processes.run_directory import RunNotFound
         from haploop.view.receive.runs import CommandFailed
@@ -49,7 +49,7 @@ class LiveRuns:
 
 
 def view(run_id: str | None, port: int, since: str, browser: bool, led: bool) -> None:
-    """Serve the page until Ctrl-C; one led by another process gives it the link on stdout and ends with stdin."""
+    """Serves the page until Ctrl-C; one led by another process gives it the link on stdout and ends with stdin."""
     if since not in SINCE:
         leave(f"--since must be {' or '.join(SINCE)}, but {since!r} was given.", WRONG_USE)
     check_extra()
@@ -84,7 +84,7 @@ def view(run_id: str | None, port: int, since: str, browser: bool, led: bool) ->
 
 
 def check_extra() -> None:
-    """Leave with a sentence where something the page needs is not installed."""
+    """Leaves with a sentence where something the page needs is not installed."""
     from haploop.view.serve.assets import MissingExtra, check_installed
 
     try:
@@ -94,7 +94,7 @@ def check_extra() -> None:
 
 
 def _open(address: str) -> None:
-    """Open the page where there is a screen to open it on; a browser in the terminal could not draw it."""
+    """Opens the page where there is a screen to open it on; a browser in the terminal could not draw it."""
     import webbrowser
 
     screen = sys.platform == "darwin" or any(name in os.environ for name in ("DISPLAY", "WAYLAND_DISPLAY", "BROWSER"))
@@ -103,7 +103,7 @@ def _open(address: str) -> None:
 
 
 def _at_eof(loop: asyncio.AbstractEventLoop, act: Callable[[], None]) -> None:
-    """Act once nothing can come from stdin any more: whoever started this process has ended."""
+    """Acts once nothing can come from stdin any more: whoever started this process has ended."""
 
     def wait() -> None:
         sys.stdin.buffer.read()
@@ -114,22 +114,22 @@ def _at_eof(loop: asyncio.AbstractEventLoop, act: Callable[[], None]) -> None:
 
 
 class Viewing:
-    """What a run has to do with whoever shows it: nothing, where nobody does."""
+    """The viewer of a run, which does nothing where nobody looks."""
 
     def on_started(self, run_id: str) -> None:
-        """The run can be found by this id."""
+        """Takes the id by which the run can be found from now on."""
 
     def may_start(self, ready: set[int]) -> bool:
         """Returns whether the run may begin, given the pids of all nodes that are ready."""
         return True
 
     def stay(self) -> None:
-        """The run is over."""
+        """Keeps showing the run, which is over, as long as its viewer stays."""
 
 
 @contextlib.contextmanager
 def viewing(wanted: bool, in_process: bool) -> Iterator[Viewing]:
-    """Show what is run meanwhile from its first tick on; when it is over, keep the page until Ctrl-C.
+    """Shows what is run meanwhile from its first tick on; when it is over, keep the page until Ctrl-C.
 
     The viewer is a process of its own; what becomes of it is no matter to the run.
     """
@@ -175,7 +175,7 @@ class _Viewer(Viewing):
             print(f"The page is at {self._link}", file=sys.stderr, flush=True)
 
     def stay(self) -> None:
-        """Keep the page until Ctrl-C, or until it ends by itself; leave no process behind."""
+        """Keeps the page until Ctrl-C, or until it ends by itself; leave no process behind."""
         if not (process := self._process):
             return
         with contextlib.suppress(KeyboardInterrupt):

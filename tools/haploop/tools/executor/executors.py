@@ -101,7 +101,7 @@ def map_parallel(
 
 
 class InlineExecutor(Executor):
-    """This process: a call is done when it has been submitted."""
+    """Runs calls in this process, when they are submitted."""
 
     count = room = 1
     worker_died: tuple[type[BaseException], ...] = ()

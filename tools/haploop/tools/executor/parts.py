@@ -30,7 +30,7 @@ class Group(NamedTuple):
 
 @dataclass
 class _Pace:
-    """What is known of parts of one sort: how long the next may be, how long it should be, what an item took."""
+    """Sizes of parts of one sort: the most and the least the next may have, and the seconds an item took."""
 
     largest: int
     least: int
@@ -38,7 +38,7 @@ class _Pace:
 
 
 class Sizes:
-    """How many items the next part should have.
+    """Finds the number of items the next part should have.
 
     Args:
         workers: that share the parts.
@@ -52,7 +52,7 @@ class Sizes:
         self._began = time.monotonic()
 
     def next(self, together: bool) -> int:
-        """At least 1."""
+        """Returns the size of the next part, at least 1."""
         pace = self._paces[together]
         size = min(self._most, pace.largest)
         target_s = min(LONG_S, max(SHORT_S, FRACTION * (time.monotonic() - self._began)))
@@ -64,19 +64,19 @@ class Sizes:
         return max(1, size)
 
     def taken(self, items: int) -> None:
-        """A part of so many items has been cut."""
+        """Notes that a part of so many items has been cut."""
         if self._left is not None:
             self._left = max(0, self._left - items)
 
     def took(self, part: Group, seconds: float) -> None:
-        """What a part took; the next may be longer."""
+        """Notes the seconds a part took; the next may be longer."""
         pace = self._paces[part.together]
         pace.each_s = seconds / len(part.items)
         pace.largest = max(pace.largest, len(part.items) * GROWTH)
 
 
 def cut(groups: Iterable[Group], sizes: Sizes) -> Iterator[Group]:
-    """Parts of each group, none of two."""
+    """Yields parts of each group, none of two."""
     for items, together in groups:
         together = together and len(items) >= FEWEST
         first = 0
@@ -90,7 +90,7 @@ def cut(groups: Iterable[Group], sizes: Sizes) -> Iterator[Group]:
 def grouped(
     items: Iterable[Any], key: Callable[[Any], Hashable], window: int = 4 * MOST
 ) -> Iterator[tuple[Any, list[Any]]]:
-    """Each key with its items, looking so many items ahead."""
+    """Yields each key with its items, looking so many items ahead."""
     source = iter(items)
     while block := list(itertools.islice(source, window)):
         groups: dict[Hashable, list[Any]] = {}

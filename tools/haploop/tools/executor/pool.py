@@ -14,7 +14,7 @@ from haploop.tools.executor.executors import make_executor
 from haploop.tools.executor.parts import Group, Sizes, cut, grouped
 from haploop.tools.executor.work import Result, Scene, Work
 
-_LOOK_S = 0.3
+_POLL_S = 0.3
 DIED = "The process that ran it died: it was killed, ran out of memory or crashed in compiled code."
 
 
@@ -26,7 +26,7 @@ def results(
     energy: bool = True,
     trajectories: bool = False,
 ) -> Iterator[tuple[int, Result]]:
-    """The results of ``haploop.launch.batch.run.results_of``, from as many processes, in the order they come in.
+    """Yields the results of ``haploop.launch.batch.run.results_of``, from as many processes, in the order they come in.
 
     Args:
         scenes: resolved; taken a few thousand at a time.
@@ -75,8 +75,8 @@ class Pool:
     def results(
         self, scenes: Iterable[Scene], plugins: Sequence[Path] = (), *, energy: bool = True, trajectories: bool = False
     ) -> Iterator[tuple[int, Result]]:
-        """As the function ``results``."""
-        work = Work(make=_second, sources=sources_of(plugins), energy=energy, trajectories=trajectories)
+        """Yields the index of each scene and its result; for the arguments see the function ``results``."""
+        work = Work(make=_second, sources=read_sources(plugins), energy=energy, trajectories=trajectories)
         count = len(scenes) if isinstance(scenes, Sequence) else None
         by_structure = grouped(enumerate(scenes), _structure)
         groups = (Group(items, together=shape is not None) for shape, items in by_structure)
@@ -87,7 +87,7 @@ class Pool:
     def parts(
         self, work: Work, groups: Iterable[Group], count: int | None = None, stop: Callable[[], bool] = lambda: False
     ) -> Generator[list[tuple[Any, Any]]]:
-        """Do some work on items, part by part; no more than two parts a worker are under way.
+        """Does some work on items, part by part; no more than two parts a worker are under way.
 
         When a worker dies, nobody knows which of the parts under way killed it. So each of them is then run by
         itself, and one that kills its worker again is halved until the culprit stands alone.
@@ -114,7 +114,7 @@ class Pool:
                     flying[self._submitted(work, part.items)] = part
                 if not flying:
                     return
-                done = wait(flying, _LOOK_S, FIRST_COMPLETED).done  # now and then to ask whether to stop
+                done = wait(flying, _POLL_S, FIRST_COMPLETED).done  # now and then to ask whether to stop
                 if not all(map(self._outcome, done)):
                     done = wait(flying).done  # what else is under way has died with it, or will soon be done
                 suspects: list[Group] = []
@@ -154,15 +154,15 @@ class Pool:
             return future
 
     def _outcome(self, future: Future[Any]) -> tuple[float, list[Any]] | None:
-        """What a part came to, None if its worker died; waits for it."""
+        """Waits for a part; returns its seconds and answers, None if its worker died."""
         try:
             return future.result()
         except self._executor.worker_died:
             return None
 
 
-def sources_of(plugins: Iterable[Path]) -> tuple[tuple[str, str], ...]:
-    """Plugin files as workers take them.
+def read_sources(plugins: Iterable[Path]) -> tuple[tuple[str, str], ...]:
+    """Reads plugin files for workers, which have none of their own, as (path, text).
 
     Raises:
         PluginError: one cannot be read, or does not load.
@@ -177,5 +177,5 @@ def _second(item: tuple[int, Scene]) -> Scene:
 
 
 def _structure(item: tuple[int, Scene]) -> Hashable:
-    """What scenes in one array share; all that run alone are alike."""
+    """Returns the structure that scenes in one array share; None for all that run alone."""
     return structure(item[1]) if runs_in_arrays(item[1]) else None

@@ -1,4 +1,4 @@
-"""A run as its figure needs it: read from the run's directory, whatever is there of it."""
+"""The data of a run's figure, read from the run's directory as far as they are there."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class Book:
 
 @dataclass
 class RunData:
-    """What a run left behind.
+    """The scene, summary and log of a run.
 
     Attributes:
         scene, summary: empty when they are not there.
@@ -71,8 +71,8 @@ class RunData:
     cut: str
 
     @classmethod
-    def of(cls, directory: Path) -> RunData:
-        """Read a run's directory.
+    def from_directory(cls, directory: Path) -> RunData:
+        """Reads a run's directory.
 
         Raises:
             FigureError: there is nothing that could be drawn.
@@ -123,15 +123,15 @@ class RunData:
 
     @property
     def span_s(self) -> tuple[float, float]:
-        """Where the log begins and ends, s; its last tick lasts as long as the others."""
+        """Begin and end of the log, s; its last tick lasts as long as the others."""
         return float(self.t_s[0]), float(max(self.t_s[-1], self.ticks_s[-1] + 1 / self.control_rate))
 
     def contact_s(self) -> Floats:
-        """Times of the ticks in contact, s."""
+        """Returns the times of the ticks in contact, s."""
         return self.ticks_s[self.controller["in_contact"] > 0]
 
     def close_s(self) -> tuple[float, float]:
-        """The time of the close view: the last contact, or the end of a run without any."""
+        """Returns the time of the close view: the last contact, or the end of a run without any."""
         first, last = self.span_s
         contact = self.contact_s()
         if not len(contact):
@@ -141,14 +141,14 @@ class RunData:
         return max(first, float(recent[0]) - margin), min(last, float(recent[-1]) + margin)
 
     def early_s(self, from_tick: int = 0) -> tuple[float, float]:
-        """The first second of contact from a tick on, or of a run without any."""
+        """Returns the first second of contact from a tick on, or of a run without any."""
         contact = self.contact_s()
         contact = contact[contact >= from_tick / self.control_rate]
         first = float(contact[0]) if len(contact) else self.span_s[0]
         return first, first + _EARLY_S
 
     def wall_at(self, t_s: Floats) -> tuple[Floats, Floats]:
-        """Position (m) and stiffness (N/m) of the wall at some times."""
+        """Returns position (m) and stiffness (N/m) of the wall at some times."""
         walls = self.history.walls
         index = np.searchsorted([wall.from_tick / self.control_rate for wall in walls], t_s, side="right") - 1
         index = np.maximum(index, 0)
@@ -156,7 +156,7 @@ class RunData:
         return positions[index], np.array([wall.stiffness_N_m for wall in walls])[index]
 
     def element_force(self, span: ElementSpan) -> tuple[Floats, Floats]:
-        """Times (s) and force (N) of an element at the ticks it covers."""
+        """Returns times (s) and force (N) of an element at the ticks it covers."""
         ticks = np.rint(self.ticks_s * self.control_rate)
         times, forces = [], []
         for slot, first, end in span.slots:
@@ -168,7 +168,7 @@ class RunData:
         return np.concatenate([*times, np.empty(0)]), np.concatenate([*forces, np.empty(0)])
 
     def books(self) -> list[Book]:
-        """The book of the wall and of every element that has one, then their sum; each ends with the end state."""
+        """Returns the books of the wall and of the elements, then their sum; each ends with the end state."""
         ended = {} if self.cut else self.summary.get("energy", {})
         accounts = [("wall", 0, ended.get("wall"))] if self.history.walls else []
         ends = [*ended.get("elements", []), *[None] * len(self.history.elements)]
@@ -194,7 +194,7 @@ class RunData:
 
 
 def _sum(name: str, t_s: Floats, books: list[Book]) -> Book:
-    """The sum of books that end together, each counting from its first tick on."""
+    """Returns the sum of books that end together, each counting from its first tick on."""
     true, sampled = np.zeros(len(t_s)), np.zeros(len(t_s))
     for book in books:
         true[len(t_s) - len(book.t_s) :] += book.true_J

@@ -1,4 +1,4 @@
-"""What was at work when: the wall and every element, from the scene and the events of a run."""
+"""The history of the wall and of every element, from the scene and the events of a run."""
 
 from __future__ import annotations
 

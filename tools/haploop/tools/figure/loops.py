@@ -30,7 +30,7 @@ GRAMS = 1e3
 
 
 def force_position_loop(run: RunData, span_s: tuple[float, float]) -> tuple[Floats, Floats]:
-    """Penetration (m, positive inside) and force out of the wall (N) at every plant step of a stretch of time.
+    """Returns penetration (m, positive inside) and force out of the wall (N) at the plant steps of a stretch of time.
 
     The force is the one applied, total of wall and elements, held while the position moves on. Where it runs
     counter-clockwise, the area within is energy given to the device (Choi et al. 2022, Fig. 3).
@@ -41,7 +41,7 @@ def force_position_loop(run: RunData, span_s: tuple[float, float]) -> tuple[Floa
 
 
 def momentum_loop(run: RunData, span: ElementSpan) -> tuple[Floats, Floats, Floats]:
-    """Time, velocity v[k-1] and momentum m[k-1] v[k] of a virtual inertia at the ticks it covers.
+    """Returns time, velocity v[k-1] and momentum m[k-1] v[k] of a virtual inertia at the ticks it covers.
 
     m[k] is the mass while it is at work and 0 while it is not. The rectangles of width v[k-1] - v[k-2] and height
     m v[k] are the energy it takes in a step (Choi et al. 2022, eq. 8 and Fig. 4), so clockwise is dissipation.
@@ -54,12 +54,12 @@ def momentum_loop(run: RunData, span: ElementSpan) -> tuple[Floats, Floats, Floa
 
 
 def is_inertia(span: ElementSpan) -> bool:
-    """Whether an element has a virtual momentum."""
+    """Tells whether an element has a virtual momentum."""
     return "inertia" in span.kind and "mass" in span.parameters
 
 
 def draw_force_position(ax: Axes, run: RunData, span_s: tuple[float, float]) -> None:
-    """The loop of Fig. 3, pressing and releasing told apart, beside the spring it should be."""
+    """Draws force against penetration, pressing and releasing told apart, beside the spring it should be."""
     title = "Force against penetration"
     if not run.history.walls:
         dress(ax, title, "", "")
@@ -75,26 +75,26 @@ def draw_force_position(ax: Axes, run: RunData, span_s: tuple[float, float]) -> 
     for part, colour, label in ((pressing, PRESSING, "pressing"), (~pressing, RELEASING, "releasing")):
         ax.plot(*_stretches(depth * MM, force, part), color=colour, linewidth=1.1, label=label, gid=label)
     _, stiffness = run.wall_at(np.array([span_s[1]]))
-    felt = np.concatenate([d[(f != 0.0) | (d > 0.0)] for d, f in ((early_depth, early_force), (depth, force))])
-    felt = felt[np.isfinite(felt)]
-    deepest = felt.max(initial=0.0)
+    in_contact = np.concatenate([d[(f != 0.0) | (d > 0.0)] for d, f in ((early_depth, early_force), (depth, force))])
+    in_contact = in_contact[np.isfinite(in_contact)]
+    deepest = in_contact.max(initial=0.0)
     line = np.array([0.0, deepest])
     ax.plot(line * MM, stiffness[0] * line, color=INK, linewidth=1.0, dashes=(4, 2), label="ideal spring", gid="spring")
-    low, high = felt.min(initial=0.0) * MM, deepest * MM
+    low, high = in_contact.min(initial=0.0) * MM, deepest * MM
     margin = 0.06 * (high - low) or 0.01
     ax.set_xlim(low - margin, high + margin)
     corner_legend(ax)
 
 
 def _stretches(x: Floats, y: Floats, part: Floats) -> tuple[Floats, Floats]:
-    """The line through all points, broken where ``part`` is False: each stretch goes on to the point after it."""
+    """Returns the line broken where ``part`` is False; each stretch goes on to the point after it."""
     drawn = part.copy()
     drawn[1:] |= part[:-1]
     return np.where(drawn, x, np.nan), np.where(drawn, y, np.nan)
 
 
 def draw_momentum(ax: Axes, run: RunData, span_s: tuple[float, float]) -> None:
-    """The loop of Fig. 4 for the virtual inertias at work in a stretch of time; the motion where there is none."""
+    """Draws momentum against velocity of the virtual inertias at work in a stretch of time, or the motion."""
     spans = [(number, span) for number, span in enumerate(run.history.elements) if is_inertia(span)]
     loops = [(number, span, within(span_s, *momentum_loop(run, span))) for number, span in spans]
     loops = [loop for loop in loops if len(loop[2][0])]
@@ -117,7 +117,7 @@ def draw_momentum(ax: Axes, run: RunData, span_s: tuple[float, float]) -> None:
 
 
 def within(span_s: tuple[float, float], t_s: Floats, *series: Floats) -> list[Floats]:
-    """Those samples of some series that lie in a stretch of time."""
+    """Returns those samples of some series that lie in a stretch of time."""
     inside = (t_s >= span_s[0]) & (t_s <= span_s[1])
     return [values[inside] for values in series]
 

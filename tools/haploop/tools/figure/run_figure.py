@@ -24,11 +24,11 @@ from haploop.tools.figure.time import energy_panel, force_panel, mark_events, po
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["FigureError", "draw", "figure_of"]
+__all__ = ["FigureError", "draw", "make_figure"]
 
 
 def draw(run_directory: Path, target: Path | None = None) -> Path:
-    """Draw a run.
+    """Draws a run.
 
     Args:
         run_directory: what ``haploop run`` made; the log of a run that was killed serves as well.
@@ -42,11 +42,11 @@ def draw(run_directory: Path, target: Path | None = None) -> Path:
         LogError: the log is no log.
     """
     target = target or run_directory / "figure.png"
-    return write_figure(figure_of(RunData.of(run_directory)), target)
+    return write_figure(make_figure(RunData.from_directory(run_directory)), target)
 
 
-def figure_of(run: RunData) -> Figure:
-    """All panels, as a matplotlib figure.
+def make_figure(run: RunData) -> Figure:
+    """Returns all panels, as a matplotlib figure.
 
     Raises:
         FigureError: matplotlib is missing.

@@ -25,12 +25,12 @@ _ROOM_LETTERS, _HANDLE_LETTERS = 76, 9
 
 
 def element_colour(number: int) -> str:
-    """The colour of the element with this number, by the order of their books."""
+    """Returns the colour of the element with this number, by the order of their books."""
     return ELEMENTS[number % len(ELEMENTS)]
 
 
 def dress(ax: Axes, title: str, x_label: str, y_label: str) -> None:
-    """Title to the left, labels with units, a light grid, no box."""
+    """Sets title and labels, a light grid, and no box."""
     ax.set_title(title, loc="left", fontsize=TEXT + 1, fontweight="bold", color=INK)
     ax.set_xlabel(x_label, fontsize=TEXT, color=INK)
     ax.set_ylabel(y_label, fontsize=TEXT, color=INK)
@@ -45,12 +45,12 @@ def dress(ax: Axes, title: str, x_label: str, y_label: str) -> None:
 
 
 def few_ticks(ax: Axes) -> None:
-    """So few numbers below the axes that long ones have room in a narrow panel."""
+    """Limits the numbers below the axes, so that long ones have room in a narrow panel."""
     ax.locator_params(axis="x", nbins=5)
 
 
 def plain_numbers(axis: Axis) -> None:
-    """Numbers at 1, 2, 5 and without powers of ten on a logarithmic axis."""
+    """Puts numbers at 1, 2, 5 and without powers of ten on a logarithmic axis."""
     from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
     axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
@@ -60,7 +60,7 @@ def plain_numbers(axis: Axis) -> None:
 
 
 def legend(ax: Axes, only: tuple[str, ...] = (), **where: Any) -> None:
-    """A small legend above the axes' right end, where no line can run through it, or where told to.
+    """Draws a small legend above the axes' right end, where no line can run through it, or where told to.
 
     Entries that do not fit beside the title are left out; the colours are explained beside the books, too.
     """
@@ -76,7 +76,7 @@ def legend(ax: Axes, only: tuple[str, ...] = (), **where: Any) -> None:
 
 
 def corner_legend(ax: Axes) -> None:
-    """A legend in the upper left corner, which loops of springs and inertias leave free."""
+    """Draws a legend in the upper left corner, which loops of springs and inertias leave free."""
     few_ticks(ax)
     legend(ax, loc="upper left", bbox_to_anchor=(0.0, 1.0), ncols=1, framealpha=0.8, edgecolor="none")
 
@@ -85,7 +85,7 @@ _DPI = 110
 
 
 def empty_figure(width_in: float, height_in: float) -> Figure:
-    """A white figure of this size in inches that makes room for what it holds.
+    """Returns a white figure of this size in inches that makes room for what it holds.
 
     Raises:
         FigureError: matplotlib is missing.
@@ -98,7 +98,7 @@ def empty_figure(width_in: float, height_in: float) -> Figure:
 
 
 def write_figure(figure: Figure, target: Path) -> Path:
-    """Write a figure in the format of the file's suffix; returns the file.
+    """Writes a figure in the format of the file's suffix; returns the file.
 
     Raises:
         FigureError: it cannot be written.
@@ -111,6 +111,6 @@ def write_figure(figure: Figure, target: Path) -> Path:
 
 
 def fix_layout(figure: Figure) -> None:
-    """Give everything its place and keep it there, so that labels can be placed among what is drawn."""
+    """Gives everything its place and keep it there, so that labels can be placed among what is drawn."""
     figure.draw_without_rendering()
     figure.set_layout_engine("none")

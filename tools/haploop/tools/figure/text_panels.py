@@ -1,4 +1,4 @@
-"""The words of the figure: title, verdict and key numbers above, the table of books, the events below."""
+"""The text of a run's figure: title, verdict and key numbers above, the table of books, the events below."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _LINES = {"friction_heat_J": "friction", "actuator_J": "actuator"}
 
 
 def draw_header(figure: Figure | SubFigure, run: RunData) -> None:
-    """The verdict as a coloured sign, the title, and the numbers that tell how the run went."""
+    """Writes the verdict as a coloured sign, the title, and the key numbers."""
     word = run.summary.get("verdict", "no verdict")
     sign = figure.text(
         0.012, 0.66, word, fontsize=LARGE, fontweight="bold", color="white", va="center", gid="verdict",
@@ -39,7 +39,7 @@ def draw_header(figure: Figure | SubFigure, run: RunData) -> None:
 
 
 def key_numbers(run: RunData) -> list[str]:
-    """Oscillation, stiffness, contact and residual of the summary; of a run without one, how far its log goes."""
+    """Returns oscillation, stiffness, contact and residual; of a run without a summary, how far its log goes."""
     if not run.summary:
         first, last = run.span_s
         why = "log cut off" if run.cut else "no summary"
@@ -56,7 +56,7 @@ def key_numbers(run: RunData) -> list[str]:
 
 
 def draw_books(ax: Axes, run: RunData, books: list[Book], colours: dict[str, str]) -> None:
-    """What every book ends with; the colours are those of the lines."""
+    """Draws the table of the books at the end, in the colours of their lines."""
     ax.set_axis_off()
     ax.set_xlim(0, 1)
     rows = book_rows(run, books)
@@ -88,7 +88,7 @@ class Row:
 
 
 def book_rows(run: RunData, books: list[Book]) -> list[Row]:
-    """Wall, its leak by cause, elements, then what the plant moved and what was lost or limited."""
+    """Returns wall, its leak by cause, elements, then the books of the plant and the counts."""
     spans = {span.name: span for span in run.history.elements}
     energy = run.summary.get("energy", {})
     rows = []
@@ -122,7 +122,7 @@ def _leak_rows(wall: dict[str, Any]) -> list[Row]:
 
 
 def event_lines(run: RunData) -> list[str]:
-    """What the numbers at the events stand for, as lines that fit below the figure."""
+    """Returns the numbered events as lines that fit below the figure."""
     lines = [""]
     for number, event in enumerate(run.events, start=1):
         words = f"{number} at {event['timestamp']:g} s: {describe(event)}"
@@ -136,5 +136,5 @@ def event_lines(run: RunData) -> list[str]:
 
 
 def draw_events(figure: Figure | SubFigure, lines: list[str]) -> None:
-    """The events below the panels."""
+    """Writes the events below the panels."""
     figure.text(0.012, 0.5, "\n".join(lines), fontsize=SMALL + 0.5, color=GREY, va="center", gid="events")

@@ -32,7 +32,7 @@ _NEAR = 0.025
 
 
 def line(ax: Axes, t: Floats, y: Floats, label: str, colour: str, held: bool = False, **style: object) -> None:
-    """A line over time, reduced to what can be seen; ``held`` for a value that holds until the next."""
+    """Draws a line over time, reduced to its extremes; ``held`` for a value that holds until the next."""
     keep = extremes(y)
     steps = "steps-post" if held else "default"
     look = {"linewidth": 1.2, "label": label, "color": colour, "drawstyle": steps} | style
@@ -40,7 +40,7 @@ def line(ax: Axes, t: Floats, y: Floats, label: str, colour: str, held: bool = F
 
 
 def position_panel(ax: Axes, run: RunData, span_s: tuple[float, float], title: str) -> None:
-    """Position over time with the wall shaded; fitted to the motion in contact if the approach dwarfs it."""
+    """Draws position over time with the wall shaded, fitted to the motion in contact if the approach dwarfs it."""
     inside = (run.t_s >= span_s[0]) & (run.t_s <= span_s[1])
     t, x = run.t_s[inside], run.x_m[inside] * MM
     name = ("motor" if "tip" in run.bodies_m else "device") + ("" if run.every_step else " as measured")
@@ -56,7 +56,7 @@ def position_panel(ax: Axes, run: RunData, span_s: tuple[float, float], title: s
 
 
 def view_mm(run: RunData, t: Floats, x_mm: Floats) -> tuple[float, float, str]:
-    """Lower and upper limit of the position axis, and a note in brackets on what lies outside of it.
+    """Returns the limits of the position axis, and a note in brackets on what lies outside of them.
 
     Args:
         t, x_mm: times in s, and positions of all bodies in mm, shape (bodies, times).
@@ -86,7 +86,7 @@ def _shade_wall(ax: Axes, run: RunData, span_s: tuple[float, float], low: float,
 
 
 def force_panel(ax: Axes, run: RunData, span_s: tuple[float, float], title: str) -> None:
-    """What wall and elements ask for at every tick, and their sum; held from tick to tick."""
+    """Draws the forces of wall and elements at every tick, and their sum, held from tick to tick."""
     dress(ax, title, "time (s)", "force on the device (N)")
     inside = (run.ticks_s >= span_s[0]) & (run.ticks_s <= span_s[1])
     t = run.ticks_s[inside]
@@ -112,7 +112,7 @@ def force_panel(ax: Axes, run: RunData, span_s: tuple[float, float], title: str)
 
 
 def energy_panel(ax: Axes, run: RunData, books: list[Book], colours: dict[str, str]) -> None:
-    """Energy taken out of the device: true books drawn through, sampled ones dashed."""
+    """Draws the energy taken out of the device: true books drawn through, sampled ones dashed."""
     factor, letter = prefix_for(value for book in books for value in (*_finite(book.true_J), *_finite(book.sampled_J)))
     dress(ax, "Energy taken out of the device (given to it below 0)", "time (s)", f"energy ({letter}J)")
     for book in books:
@@ -134,7 +134,7 @@ def _finite(values: Floats) -> Floats:
 
 
 def mark_events(axes: list[Axes], run: RunData) -> None:
-    """A dotted line at each event, numbered from 1 at the top of the first panel."""
+    """Draws a dotted line at each event, numbered from 1 at the top of the first panel."""
     first, last = run.span_s
     groups: list[tuple[float, list[int]]] = []
     for number, event in enumerate(run.events, start=1):
@@ -155,7 +155,7 @@ def mark_events(axes: list[Axes], run: RunData) -> None:
 
 
 def extremes(y: np.ndarray, buckets: int = 1500) -> np.ndarray:
-    """Which samples to draw so that the line looks like the whole series: of each bucket the smallest and the largest.
+    """Finds the samples with which a line looks like the whole series: of each bucket the smallest and the largest.
 
     Args:
         y: shape (samples,); samples that are no finite number are passed over where others are at hand.

@@ -31,7 +31,7 @@ class Bodies:
         count: bodies.
         free, stuck: A, with body 0 free, and held where it is.
         force: the row of w that gives the force on body 0 without friction, N.
-        felt: by whether body 0 is stuck, the row of w that an accelerometer feels.
+        sensed: by whether body 0 is stuck, the row of w that an accelerometer feels.
         begin: w at t = 0, with nothing acting.
     """
 
@@ -70,7 +70,7 @@ class Bodies:
         forces[0][FRICTION] += 1
         free = [[entry / mass for entry in row] for row, mass in zip(forces, masses, strict=True)]
         held = [[mpf(0)] * size, *free[1:]]
-        self.felt = {False: free[sensor], True: held[sensor]}
+        self.sensed = {False: free[sensor], True: held[sensor]}
 
         def rates(accelerations: Matrix, stuck: bool) -> Matrix:
             moving = [[mpf(j == n + i and not (stuck and i == 0)) for j in range(size)] for i in range(n)]
@@ -81,7 +81,7 @@ class Bodies:
             if output:
                 rate, y = 2 * mp.pi * mpf(output), len(rows)
                 rows.append([rate * (a - (j == y)) for j, a in enumerate(accelerations[sensor])])
-                self.felt = {mode: [mpf(j == y) for j in range(size)] for mode in (False, True)}
+                self.sensed = {mode: [mpf(j == y) for j in range(size)] for mode in (False, True)}
             zero = [mpf(0)] * size
             return [*rows, zero, zero, [mpf(j == size + SLOPE) for j in range(size)], zero]
 

@@ -26,7 +26,7 @@ class Continuous(Protocol):
     def x(self) -> float: ...
     @property
     def v(self) -> float: ...
-    def felt(self) -> float: ...
+    def sensed(self) -> float: ...
     def begin(self, load: Any, /) -> None: ...
     def advance(self, command: float, load: Any, next_load: Any, /) -> None: ...
 
@@ -40,7 +40,7 @@ class Closed:
     verdict: str
 
 
-def ticks_of(scene: dict[str, Any]) -> Timebase:
+def make_timebase(scene: dict[str, Any]) -> Timebase:
     """Makes the time base of a scene whose only steps are ticks.
 
     Raises:
@@ -96,19 +96,19 @@ def close_loop(
     scene: dict[str, Any], plant: Continuous, exact: Callable[[Fraction], Any], tick_done: Callable[[], None]
 ) -> Closed:
     """Runs a scene with a continuous plant; ``exact`` turns a load into the plant's kind of number."""
-    time = ticks_of(scene)
+    time = make_timebase(scene)
     measure, meter, line = position_sensor(scene, time), accelerometer(scene, time), line_of(scene, time)
     controller = Controller(scene, time, registry())
     late = round(scene.get("accelerometer", {}).get("delay", 0.0) * time.control_rate)
-    felt = deque([0.0] * (late + 1), maxlen=late + 1)
+    sensed = deque([0.0] * (late + 1), maxlen=late + 1)
     load = [exact(f) for f in loads(scene, time)]
     plant.begin(load[0])
     x, v, forces = [plant.x], [plant.v], []
     for tick in range(time.ticks):
         sample: tuple[float, ...] = (measure(plant.x),)
         if accelerometer_is_used(scene):
-            felt.append(plant.felt())
-            sample += (meter.reading(felt[0]) if meter else felt[0],)
+            sensed.append(plant.sensed())
+            sample += (meter.reading(sensed[0]) if meter else sensed[0],)
         line.receive(controller.answer([sample]))
         [(_, force, _)] = line.holds(tick)
         plant.advance(force, load[tick], load[tick + 1])

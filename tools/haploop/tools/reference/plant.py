@@ -22,7 +22,7 @@ Vector = TypeVar("Vector", bound=Any)
 
 
 class StickSlipPlant(ABC, Generic[Vector]):
-    """w' = A w with body 0 free or held: what friction decides where its velocity is 0.
+    """Motion w' = A w with body 0 free or held; friction decides which where its velocity is 0.
 
     Args:
         scene: resolved; friction without a Stribeck velocity, since that is not linear.
@@ -112,9 +112,9 @@ class ContinuousPlant(StickSlipPlant[Row]):
                 stuck: self._flows[stuck].taylor(row, _TERMS) for stuck, row in ((False, speed), (True, bodies.force))
             }
 
-    def felt(self) -> float:
+    def sensed(self) -> float:
         """Returns the acceleration an accelerometer feels under the force held until now, m/s^2."""
-        return float(_product(self._bodies.felt[self.is_stuck], self.w))
+        return float(_product(self._bodies.sensed[self.is_stuck], self.w))
 
     def advance(self, command: float, load: Any, next_load: Any) -> None:
         """Advances one tick under a held command; load in N at its start and end."""
@@ -167,12 +167,12 @@ class IntegratedPlant(StickSlipPlant[np.ndarray]):
             stuck: _floats(relative * mp.matrix(rates) * absolute)
             for stuck, rates in ((False, bodies.free), (True, bodies.stuck))
         }
-        self._felt = {stuck: _floats(mp.matrix([row]) * absolute)[0] for stuck, row in bodies.felt.items()}
+        self._sensed = {stuck: _floats(mp.matrix([row]) * absolute)[0] for stuck, row in bodies.sensed.items()}
         self._row = _floats(mp.matrix([bodies.force]) * absolute)[0]
 
-    def felt(self) -> float:
+    def sensed(self) -> float:
         """Returns the acceleration an accelerometer feels under the force held until now, m/s^2."""
-        return float(self._felt[self.is_stuck] @ self.w)
+        return float(self._sensed[self.is_stuck] @ self.w)
 
     def advance(self, command: float, load: float, next_load: float) -> None:
         """Advances one tick under a held command; load in N at its start and end."""

@@ -24,7 +24,7 @@ class NeedsPyarrow(ImportError):
 
 
 def pyarrow() -> Any:
-    """The module, with its Parquet.
+    """Returns the module, with its Parquet.
 
     Raises:
         NeedsPyarrow: it is not installed.
@@ -48,8 +48,8 @@ class Column:
     unit: str = ""
 
 
-def schema_of(columns: Iterable[Column], sweep: str) -> Any:
-    """The schema; units stand in the metadata of the fields, the resolved sweep and the versions in its own."""
+def make_schema(columns: Iterable[Column], sweep: str) -> Any:
+    """Returns the schema; units stand in the metadata of the fields, the resolved sweep and the versions in its own."""
     arrow = pyarrow()
     fields = [
         arrow.field(
@@ -60,7 +60,7 @@ def schema_of(columns: Iterable[Column], sweep: str) -> Any:
     return arrow.schema(fields, metadata={"sweep": sweep, "versions": json.dumps(versions())})
 
 
-def table_of(rows: Sequence[Mapping[str, Any]], schema: Any) -> Any:
+def make_table(rows: Sequence[Mapping[str, Any]], schema: Any) -> Any:
     """Rows as an Arrow table; what a row does not have is null."""
     arrow = pyarrow()
     arrays = [arrow.array([row.get(field.name) for row in rows], type=field.type) for field in schema]
@@ -76,7 +76,7 @@ class TableError(Exception):
 
 @dataclass(frozen=True)
 class SweepTable:
-    """What came of a sweep so far; ``table["wall.stiffness"]`` is a column.
+    """The results of a sweep so far; ``table["wall.stiffness"]`` is a column.
 
     Attributes:
         columns: by name, equally long, in the order of the cells: float64 (NaN where there is nothing), int64, bool,
@@ -103,12 +103,12 @@ class SweepTable:
 
 
 def is_sweep(directory: Path) -> bool:
-    """Whether a directory is that of a sweep."""
+    """Tells whether a directory is that of a sweep."""
     return (Path(directory) / SWEEP).is_file()
 
 
 def read(directory: str | Path, *, scenes: bool = True) -> SweepTable:
-    """The table of a sweep, of a running or interrupted one as far as it is written.
+    """Returns the table of a sweep, of a running or interrupted one as far as it is written.
 
     Args:
         directory: that the sweep writes to.

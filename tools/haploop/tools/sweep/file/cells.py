@@ -27,7 +27,7 @@ _APART = ("clock", "duration", "event")
 
 @dataclass(frozen=True)
 class Axis:
-    """What is varied.
+    """An axis of a sweep: a key of the scene and its values.
 
     Attributes:
         key: dotted key of the scene.
@@ -43,17 +43,17 @@ class Axis:
 
     @property
     def apart(self) -> bool:
-        """Whether scenes of two values are of two structures, which are run in different arrays."""
+        """Tells whether scenes of two values are of two structures, which are run in different arrays."""
         return self.unit is None or (self.whole and self.key != "seed") or key_path(self.key)[0] in _APART
 
     def entry(self, value: Any) -> Any:
-        """A value as the table holds it: a number, a name, or TOML."""
+        """Returns a value as the table holds it: a number, a name, or TOML."""
         return value if self.unit is not None or isinstance(value, str) else inline(value)
 
 
 @dataclass(frozen=True)
 class Bisect:
-    """Along which axis a boundary is sought, to which tolerance, and the verdict on its near side."""
+    """The search for a boundary: its axis, its tolerance, and the verdict on its near side."""
 
     axis: str
     holds: str
@@ -102,31 +102,31 @@ class Sweep:
 
     @cached_property
     def count(self) -> int:
-        """How many cells the grid has."""
+        """Number of cells of the grid."""
         return math.prod(len(axis.values) for axis in self.axes) * self.repeat
 
     def groups(self) -> Iterator[Group]:
-        """Cells whose scenes go into one array, if they go into any."""
+        """Yields the cells whose scenes go into one array, if they go into any."""
         length = self.count // math.prod(len(axis.values) for axis in self.axes if axis.apart)
         for first in range(0, self.count, length):
             yield Group(range(first, first + length), self.together(first))
 
     def together(self, item: Item) -> bool:
-        """Whether the scene of a cell, and those like it, go into an array."""
+        """Tells whether the scene of a cell, and those like it, go into an array."""
         try:
             return runs_in_arrays(self.scene(item))
         except Exception:  # it will be a row with its reason
             return False
 
     def number(self, places: dict[str, int], repeat: int) -> int:
-        """The cell at a place on each axis."""
+        """Returns the cell at a place on each axis."""
         cell = 0
         for axis in self.order:
             cell = cell * len(axis.values) + places[axis.key]
         return cell * self.repeat + repeat
 
     def values(self, item: Item) -> tuple[dict[str, Any], int]:
-        """The value of each axis, by key, and the seed."""
+        """Returns the value of each axis, by key, and the seed."""
         cell, repeat = divmod(item.beside if isinstance(item, Extra) else item, self.repeat)
         found = {}
         for axis in reversed(self.order):
@@ -137,7 +137,7 @@ class Sweep:
         return {axis.key: found[axis.key] for axis in self.axes}, self.base["seed"] + repeat
 
     def scene(self, item: Item) -> dict[str, Any]:
-        """The resolved scene of a cell.
+        """Returns the resolved scene of a cell.
 
         Raises:
             ValueError: its values make no scene that can be run; the message says why.
@@ -150,7 +150,7 @@ class Sweep:
         return scene
 
     def row(self, item: Item, scene: dict[str, Any] | None, result: dict[str, Any]) -> dict[str, Any]:
-        """What the table keeps of a cell."""
+        """Makes the row of a cell in the table."""
         values, seed = self.values(item)
         recorded = {column.name: _entry(result, column) for column in self.record}
         ended = result["ended"]
@@ -166,11 +166,11 @@ class Sweep:
 
     @cached_property
     def _lines(self) -> Lines:
-        """What cells share with the base scene, as TOML."""
+        """Lines of TOML that cells share with the base scene."""
         return lines_of(self.base)
 
     def columns(self) -> list[Column]:
-        """Of the table."""
+        """Returns the columns of the table."""
         return [
             Column(CELL, WHOLE),
             *self.axis_columns(),
@@ -180,7 +180,7 @@ class Sweep:
         ]
 
     def axis_columns(self) -> list[Column]:
-        """One an axis; the seed, where it is one, is a whole number."""
+        """Returns one an axis; the seed, where it is one, is a whole number."""
         kinds = {True: TEXT, False: NUMBER}
         return [
             Column(axis.key, WHOLE if axis.key == SEED else kinds[axis.unit is None], axis.unit or "")
@@ -188,7 +188,7 @@ class Sweep:
         ]
 
     def toml(self) -> str:
-        """The sweep as a file that runs by itself."""
+        """Returns the sweep as a file that runs by itself."""
         bisect = self.bisect
         tolerances = {"tolerance": bisect.tolerance, "relative": bisect.relative} if bisect else {}
         return to_toml(
@@ -214,7 +214,7 @@ class Sweep:
 
 
 def resolved(values: dict[str, Any], base: dict[str, Any], kinds: dict[str, Any]) -> dict[str, Any]:
-    """A resolved scene with other values at some dotted keys, resolved; it shares with it what they leave alone.
+    """Resolves a scene with other values at some dotted keys; it shares with the base what they leave alone.
 
     Raises:
         SceneError: there is no such scene; its mistakes name no file.
@@ -241,7 +241,7 @@ class Refused(SceneError):
 
 
 def _entry(result: dict[str, Any], column: Column) -> Any:
-    """What a result holds at a dotted key; None where it holds nothing."""
+    """Returns the value of a result at a dotted key; None where there is none."""
     value: Any = result
     for part in column.name.split("."):
         if isinstance(value, list):

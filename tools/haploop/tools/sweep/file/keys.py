@@ -1,4 +1,4 @@
-"""What a dotted key of a scene means: the number it holds, with unit and bounds, or that there is no such key."""
+"""Lookup of a dotted key in the scene model: the number it holds, with unit and bounds, or that there is none."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class NoSuchKey(ValueError):
 
 
 def number_at(path: Sequence[str], scene: dict[str, Any], kinds: Mapping[str, type[Element]]) -> Number | None:
-    """How the number at a key is read; None where the key holds something else than a number.
+    """Returns the reader of the number at a key; None where the key holds something else than a number.
 
     Args:
         path: parts of the dotted key.
@@ -60,7 +60,7 @@ def number_at(path: Sequence[str], scene: dict[str, Any], kinds: Mapping[str, ty
 
 
 def _field(table: type[Model], name: str, place: str) -> list[Any]:
-    """What may stand at a key of a table."""
+    """Returns the annotations of a key of a table."""
     if name not in table.model_fields:
         names = list(table.model_fields)
         where = f"[{place}]" if place else "a scene"
@@ -70,7 +70,7 @@ def _field(table: type[Model], name: str, place: str) -> list[Any]:
 
 
 def _chosen(tables: Sequence[type[Model]], value: Any, place: str) -> type[Model]:
-    """Of tables of several kinds the one that the scene names."""
+    """Returns of tables of several kinds the one that the scene names."""
     kinds = {get_args(table.model_fields["kind"].annotation)[0]: table for table in tables if len(tables) > 1}
     if not kinds:
         return tables[0]
@@ -83,7 +83,7 @@ def _chosen(tables: Sequence[type[Model]], value: Any, place: str) -> type[Model
 
 
 def _alternatives(annotation: Any) -> Iterator[Any]:
-    """Numbers, tables, lists and names among what a type admits."""
+    """Yields the numbers, tables, lists and names among the alternatives of a type."""
     origin = get_origin(annotation)
     if origin is Annotated:
         inner, *marks = get_args(annotation)

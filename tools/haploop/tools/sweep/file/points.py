@@ -20,7 +20,7 @@ _ROUNDING = Decimal("1e-9")
 
 
 class Span(Model):
-    """From one value to another, both ends included."""
+    """A range from one value to another, both ends included."""
 
     model_config = ConfigDict(title="span")
 
@@ -55,8 +55,8 @@ class PointsError(ValueError):
         self.key = key
 
 
-def points_of(span: Span, number: Number) -> list[float]:
-    """The values of a span in SI units.
+def make_points(span: Span, number: Number) -> list[float]:
+    """Returns the values of a span in SI units.
 
     Raises:
         PointsError: an end or the step is no such number, or they do not go together.
@@ -77,7 +77,7 @@ def points_of(span: Span, number: Number) -> list[float]:
 
 
 def listed(values: list[Any], number: Number | None) -> list[Any]:
-    """The values of a list, numbers in SI units.
+    """Returns the values of a list, numbers in SI units.
 
     Raises:
         PointsError: there are none, one is no such number, or stands there twice.
@@ -101,7 +101,7 @@ def _read(number: Number, key: str | int, value: Any) -> float:
 
 
 def _steps(first: float, last: float, step: float) -> int:
-    """How many steps lie between the ends."""
+    """Counts the steps between the ends."""
     ratio = abs(Decimal(repr(last)) - Decimal(repr(first))) / Decimal(repr(step))
     count = round(ratio)
     if count > MOST_POINTS:
@@ -116,12 +116,12 @@ def _steps(first: float, last: float, step: float) -> int:
 
 
 def _even(first: Decimal, last: Decimal, steps: int) -> Iterator[float]:
-    """In decimal, so that 0.1, 0.2, 0.3 are the numbers that a person would write."""
+    """Yields even steps, computed in decimal, so that 0.1, 0.2, 0.3 are the numbers that a person would write."""
     return (float(first + (last - first) * k / steps) for k in range(steps + 1))
 
 
 def _in_ratio(first: float, last: float, count: int) -> list[float]:
-    """The ends as they are."""
+    """Returns the ends as they are."""
     if not first * last > 0.0:
         raise PointsError("scale", "A log scale needs two ends of one sign, neither of them 0.")
     inner = (first * (last / first) ** (k / (count - 1)) for k in range(1, count - 1))

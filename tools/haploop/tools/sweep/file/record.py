@@ -1,4 +1,4 @@
-"""What a sweep records: dotted keys of a run's summary, checked on a run of two ticks."""
+"""The columns that a sweep records: dotted keys of a run's summary, checked on a run of two ticks."""
 
 from __future__ import annotations
 
@@ -34,8 +34,8 @@ class RecordError(ValueError):
         self.wrong = list(wrong)
 
 
-def columns_of(names: Sequence[str], sweep: Sweep, kinds: dict[str, type[Element]]) -> list[Column]:
-    """A column each; the verdict is always among them.
+def make_columns(names: Sequence[str], sweep: Sweep, kinds: dict[str, type[Element]]) -> list[Column]:
+    """Returns a column each; the verdict is always among them.
 
     Args:
         names: dotted keys.
@@ -64,12 +64,12 @@ def columns_of(names: Sequence[str], sweep: Sweep, kinds: dict[str, type[Element
 
 
 def wants_energy(columns: Sequence[Column]) -> bool:
-    """Whether the books must be kept."""
+    """Tells whether the books must be kept."""
     return any(column.name.split(".")[0] == "energy" for column in columns)
 
 
 def wants_trajectories(columns: Sequence[Column]) -> bool:
-    """Whether every trajectory must be hashed."""
+    """Tells whether every trajectory must be hashed."""
     return any(column.name == "trajectory_sha256" for column in columns)
 
 
@@ -94,7 +94,7 @@ def _short_run(scene: dict[str, Any], kinds: dict[str, type[Element]]) -> dict[s
 
 
 def _leaves(value: Any, key: str = "") -> dict[str, Any]:
-    """The values that are no tables, by dotted key."""
+    """Returns the values that are no tables, by dotted key."""
     inner = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else None
     if inner is None:
         return {key: value}
@@ -105,7 +105,7 @@ def _leaves(value: Any, key: str = "") -> dict[str, Any]:
 
 
 def _without_places(name: str) -> str:
-    """An element may be swapped in later, so that the list of elements is longer than it is at first."""
+    """Returns an element may be swapped in later, so that the list of elements is longer than it is at first."""
     return ".".join("0" if part.isdecimal() else part for part in name.split("."))
 
 

@@ -1,4 +1,4 @@
-"""Reading a sweep file: everything it says, resolved, or everything that is wrong with it."""
+"""The sweep file, read into a resolved sweep, or into every mistake in it."""
 
 from __future__ import annotations
 
@@ -24,15 +24,15 @@ from haploop.protocol.quantity import Quantity
 from haploop.tools.executor.work import Sources, load_kinds
 from haploop.tools.sweep.file.cells import Axis, Bisect, Refused, Sweep, resolved
 from haploop.tools.sweep.file.keys import NoSuchKey, number_at
-from haploop.tools.sweep.file.points import PointsError, Span, listed, points_of
-from haploop.tools.sweep.file.record import USUAL, RecordError, columns_of
+from haploop.tools.sweep.file.points import PointsError, Span, listed, make_points
+from haploop.tools.sweep.file.record import USUAL, RecordError, make_columns
 
 MOST_AXES = 3
 Verdict = Literal["steady", "limit-cycle", "diverged", "no-contact"]
 
 
 class BisectTable(Model):
-    """Where on an axis the verdict changes."""
+    """Table ``[bisect]``: the axis on which the change of the verdict is sought."""
 
     axis: Annotated[str, Field(description="key of the axis")]
     tolerance: Any = None
@@ -54,7 +54,7 @@ class SweepFile(Model):
 
 
 def load(path: Path, overrides: Sequence[str] = (), sources: Sources = ()) -> Sweep:
-    """The resolved sweep of a TOML file.
+    """Returns the resolved sweep of a TOML file.
 
     Args:
         path: the sweep file.
@@ -79,7 +79,7 @@ class _Reader:
         self._data = data
 
     def sweep(self, overrides: Sequence[str]) -> Sweep:
-        """The sweep, or every mistake."""
+        """Returns the sweep, or every mistake."""
         table = self._table()
         base = self._base(overrides)
         shape = base or self._unchanged()
@@ -92,7 +92,7 @@ class _Reader:
         return Sweep(title, base, tuple(axes), table.repeat, tuple(record), bisect, self._sources)
 
     def _table(self) -> SweepFile | None:
-        """The shape of the file."""
+        """Returns the shape of the file."""
         table = None
         try:
             table = SweepFile.model_validate(self._data)
@@ -107,7 +107,7 @@ class _Reader:
         return table
 
     def _base(self, overrides: Sequence[str]) -> dict[str, Any] | None:
-        """The scene that is varied; its mistakes are added."""
+        """Returns the scene that is varied; its mistakes are added."""
         changes = self._data.get("set")
         changes = changes if isinstance(changes, dict) else {}
         try:
@@ -128,20 +128,20 @@ class _Reader:
         return None
 
     def _unchanged(self) -> dict[str, Any] | None:
-        """The scene without what is laid over it, where that is all that is wrong with it."""
+        """Returns the scene without what is laid over it, where that is all that is wrong with it."""
         try:
             return scene_file.load(self._layers.path.parent / self._data["scene"], (), self._kinds)
         except (SceneError, LookupError, TypeError):
             return None
 
     def _placed(self, mistake: Mistake, changes: Mapping[str, Any]) -> Mistake:
-        """A mistake in what ``[set]`` laid over the scene is one of this file."""
+        """Returns a mistake in what ``[set]`` laid over the scene is one of this file."""
         if mistake.file == COMMAND_LINE and mistake.key in changes:
             return replace(mistake, file=shown(self._layers.path), key=f"set.{mistake.key}")
         return mistake
 
     def _axes(self, base: dict[str, Any] | None) -> list[Axis]:
-        """The axes that can be used; of the others the mistakes are added."""
+        """Returns the axes that can be used; of the others the mistakes are added."""
         given = self._data.get("axes")
         if not isinstance(given, dict):
             return []
@@ -151,7 +151,7 @@ class _Reader:
         return [axis for key, values in given.items() if whole and (axis := self._axis(key, values, whole))]
 
     def _with_first_names(self, base: dict[str, Any], given: Mapping[str, Any]) -> dict[str, Any]:
-        """The base with the first name, or table, of each axis of such, which may bring the keys of another axis."""
+        """Returns the base with the first name or table of each such axis, which may bring the keys of another axis."""
         firsts = {key: values[0] for key, values in given.items() if isinstance(values, list) and values}
         names = {key: value for key, value in firsts.items() if not isinstance(value, int | float) and key_path(key)}
         layers = Layers(self._layers.path)
@@ -203,7 +203,7 @@ class _Reader:
             for detail in error.errors(include_url=False):
                 self._complain_of_span(at, detail["type"], detail["msg"], detail["loc"], schema)
             return None
-        return points_of(span, number)
+        return make_points(span, number)
 
     def _complain_of_span(self, at: KeyPath, what: str, message: str, key: KeyPath, schema: dict[str, Any]) -> None:
         """Its keys are those of the span; they are told as those of the file."""
@@ -218,7 +218,7 @@ class _Reader:
         ]
 
     def _names_fit(self, at: KeyPath, key: str, values: Sequence[Any], scene: dict[str, Any]) -> bool:
-        """Whether the key takes each value; what the rest of a scene says to it is known cell by cell."""
+        """Tells whether the key takes each value; what the rest of a scene says to it is known cell by cell."""
         count = len(self._layers.mistakes)
         for place, value in enumerate(values):
             try:
@@ -238,7 +238,7 @@ class _Reader:
             return []  # what can be recorded depends on what runs
         sample = Sweep("", base, tuple(axes), sources=self._sources)
         try:
-            return columns_of(names, sample, self._kinds)
+            return make_columns(names, sample, self._kinds)
         except RecordError as error:
             for place, sentence, hint in error.wrong:
                 self._layers.complain(("record", place), sentence, None, hint)

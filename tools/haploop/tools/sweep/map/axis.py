@@ -26,7 +26,7 @@ _DECADES = 1000.0
 
 @dataclass(frozen=True)
 class Ruler:
-    """How the values of an axis become coordinates.
+    """Converts the values of an axis to coordinates.
 
     Attributes:
         axis: the axis.
@@ -41,14 +41,14 @@ class Ruler:
     unit: str
 
     @classmethod
-    def of(cls, axis: Axis) -> Ruler:
-        """The ruler that suits an axis' values."""
+    def from_axis(cls, axis: Axis) -> Ruler:
+        """Returns the ruler that suits an axis' values."""
         if axis.names:
             return cls(axis, "even", 1.0, "")
         return cls(axis, _scale(axis.planned), *with_prefix(axis.values, axis.unit))
 
     def place(self, values: Iterable[float]) -> np.ndarray:
-        """The coordinates of some values; between the values of an even axis, in proportion."""
+        """Returns the coordinates of some values; between the values of an even axis, in proportion."""
         given = np.asarray(list(values), dtype=float)
         if self.scale == "even":
             return np.interp(given, self.axis.values, np.arange(len(self.axis.values), dtype=float))
@@ -56,12 +56,12 @@ class Ruler:
 
     @property
     def coordinates(self) -> np.ndarray:
-        """Where the axis' own values stand."""
+        """Coordinates of the axis' own values."""
         return self.place(self.axis.values)
 
     @property
     def edges(self) -> np.ndarray:
-        """Where the cells end, half way to their neighbours; shape (values + 1,)."""
+        """Ends of the cells, half way to their neighbours; shape (values + 1,)."""
         at = self.coordinates
         if self.scale == "log":
             return np.exp(_halfway(np.log(at), alone=np.log(3.0)))
@@ -73,7 +73,7 @@ class Ruler:
         return f"{self.axis.key} ({self.unit})" if self.unit else self.axis.key
 
     def dress(self, ax: Axes, which: Literal["x", "y"], label: bool = True) -> None:
-        """Scale, limits, numbers and words along one side of a panel; ``which`` is "x" or "y"."""
+        """Sets scale, limits, numbers and label along one side of a panel; ``which`` is "x" or "y"."""
         axis = ax.xaxis if which == "x" else ax.yaxis
         edges = self.edges
         if self.scale == "log":
@@ -98,7 +98,7 @@ class Ruler:
             spine.set_color(FAINT)
 
     def _names(self) -> tuple[list[float], list[str]]:
-        """Places and words along an even axis; every so manieth where there are many."""
+        """Returns places and names along an even axis; only some where there are many."""
         words = [self.axis.word(i) for i in range(len(self.axis.names))] or [
             short(value / self.factor) for value in self.axis.values
         ]

@@ -10,10 +10,10 @@ import numpy as np
 from haploop.tools.figure.labels import LabelRoom
 from haploop.tools.figure.style import ELEMENTS, FAINT, INK, WALL, fix_layout
 from haploop.tools.sweep.map.axis import Ruler
-from haploop.tools.sweep.map.boundaries import Over, over_scene
-from haploop.tools.sweep.map.curves import draw_boundary, styles_of
+from haploop.tools.sweep.map.boundaries import PanelLines, find_lines
+from haploop.tools.sweep.map.curves import draw_boundary, line_styles
 from haploop.tools.sweep.map.data import Axis, MapData
-from haploop.tools.sweep.map.edges import ALL_HOLD, FOUND, NONE_HOLDS, UNKNOWN, Edges, edges_of
+from haploop.tools.sweep.map.edges import ALL_HOLD, FOUND, NONE_HOLDS, UNKNOWN, Edges, find_edges
 from haploop.tools.sweep.map.legend import LOOKS, Legend
 from haploop.tools.sweep.map.sentences import edge_description, edge_notes, furthest
 from haploop.tools.sweep.map.sheet import Sheet
@@ -33,13 +33,13 @@ _STRIP = 0.024
 
 
 def bisect_figure(data: MapData) -> Figure:
-    """The boundaries of a finished bisecting sweep with two or three axes.
+    """Returns the boundaries of a finished bisecting sweep with two or three axes.
 
     Raises:
         FigureError: matplotlib is missing.
     """
-    edges = edges_of(data)
-    x, y = Ruler.of(edges.others[0]), Ruler.of(edges.along)
+    edges = find_edges(data)
+    x, y = Ruler.from_axis(edges.others[0]), Ruler.from_axis(edges.along)
     second = edges.others[1] if len(edges.others) > 1 else None
     count = min(MOST_LINES, len(second.values)) if second else 1
     overs = [_over(data, (x, y), second, number) for number in range(count)]
@@ -66,18 +66,18 @@ def bisect_figure(data: MapData) -> Figure:
     return sheet.figure
 
 
-def _over(data: MapData, rulers: Sequence[Ruler], second: Axis | None, number: int) -> Over:
-    """What needs no run, for one line."""
+def _over(data: MapData, rulers: Sequence[Ruler], second: Axis | None, number: int) -> PanelLines:
+    """Returns the limit and the bounds for one line."""
     rows: Any = range(len(data.columns["verdict"]))
     if second:
         rows = np.flatnonzero(second.indices(data.columns[second.key]) == number).tolist()
-    return over_scene((data.columns["scene"][row] for row in rows), rulers, bounds=second is None)
+    return find_lines((data.columns["scene"][row] for row in rows), rulers, bounds=second is None)
 
 
-def _draw_over(ax: Axes, overs: Sequence[Over], rulers: Sequence[Ruler]) -> dict[str, dict[str, Any]]:
-    """The exact limit of every line in its colour, and the bounds where there is one line."""
+def _draw_over(ax: Axes, overs: Sequence[PanelLines], rulers: Sequence[Ruler]) -> dict[str, dict[str, Any]]:
+    """Returns the exact limit of every line in its colour, and the bounds where there is one line."""
     names = [boundary.name for over in overs for boundary in over.boundaries if boundary.lines]
-    styles = styles_of(list(dict.fromkeys(names)))
+    styles = line_styles(list(dict.fromkeys(names)))
     for number, over in enumerate(overs):
         for boundary in over.boundaries:
             if boundary.lines:
@@ -87,7 +87,7 @@ def _draw_over(ax: Axes, overs: Sequence[Over], rulers: Sequence[Ruler]) -> dict
 
 
 def _line(ax: Axes, x: Ruler, y: Ruler, edges: Edges, part: tuple[Any, ...], number: int, look: dict[str, Any]) -> None:
-    """The boundaries of one line with their brackets; arrows at the edge where there is none."""
+    """Draws the boundaries of one line with their brackets; arrows at the edge where there is none."""
     from matplotlib.transforms import offset_copy
 
     state, at = edges.state[part], x.coordinates
@@ -110,7 +110,7 @@ def _line(ax: Axes, x: Ruler, y: Ruler, edges: Edges, part: tuple[Any, ...], num
 
 
 def _make_room(ax: Axes, y: Ruler, edges: Edges, lines: int) -> None:
-    """A strip at either end for the signs of combinations without a boundary, one line's above the other's."""
+    """Adds a strip at either end for the signs of combinations without a boundary, one line's above the other's."""
     none, throughout = np.isin(edges.state, (NONE_HOLDS, UNKNOWN)).any(), (edges.state == ALL_HOLD).any()
     below, above = (none, throughout) if edges.rising else (throughout, none)
     bottom, top = y.edges[0], y.edges[-1]
@@ -124,7 +124,7 @@ def _make_room(ax: Axes, y: Ruler, edges: Edges, lines: int) -> None:
 
 
 def _fill(ax: Axes, x: Ruler, y: Ruler, edges: Edges) -> None:
-    """The side on which it holds, column by column."""
+    """Fills the side on which it holds, column by column."""
     bottom, top = y.edges[0], y.edges[-1]
     near, far = (bottom, top) if edges.rising else (top, bottom)
     borders = x.edges
@@ -136,9 +136,9 @@ def _fill(ax: Axes, x: Ruler, y: Ruler, edges: Edges) -> None:
 
 
 def _names(
-    ax: Axes, x: Ruler, y: Ruler, edges: Edges, overs: Sequence[Over], styles: dict[str, dict[str, Any]]
+    ax: Axes, x: Ruler, y: Ruler, edges: Edges, overs: Sequence[PanelLines], styles: dict[str, dict[str, Any]]
 ) -> None:
-    """The furthest boundary, and the names of the lines where there is one line of cells."""
+    """Writes the furthest boundary, and the names of the lines where there is one line of cells."""
     room = LabelRoom(ax)
     room.avoid_markers()
     room.avoid_lines(line for over in overs for lines in over.drawn.values() for line in lines)

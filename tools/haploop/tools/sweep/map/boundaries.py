@@ -35,7 +35,7 @@ class Boundary:
 
 
 def exact_boundary(plane: Plane) -> Boundary:
-    """Where rho(M) = 1 for the linear loop at every place; without lines where it grows nowhere or everywhere.
+    """Finds where rho(M) = 1 for the linear loop; without lines where it grows nowhere or everywhere.
 
     Raises:
         NotLinear: the loop of some place is no linear map; the message names what makes it none, in a few words.
@@ -62,7 +62,7 @@ _MOST_LOG = 50.0
 
 
 def bound_boundaries(plane: Plane) -> list[Boundary]:
-    """Every known bound that applies at some place of a panel, as the line on which the wall is as stiff as it allows.
+    """Finds for every bound that applies at some place of a panel the line on which the wall is as stiff as it allows.
 
     A bound that applies but allows no wall of the panel, or every one, has no lines.
     """
@@ -83,7 +83,7 @@ def bound_boundaries(plane: Plane) -> list[Boundary]:
 
 
 def _level(plane: Plane, at: Callable[[float, float], dict[str, Bound]], name: str) -> Callable[[float, float], float]:
-    """How far the wall is beyond what a bound allows, as a logarithm; NaN where the bound does not apply."""
+    """Returns the logarithm of the wall's stiffness over what a bound allows; NaN where the bound does not apply."""
 
     def level(x: float, y: float) -> float:
         allowed = at(x, y)[name].stiffness_N_m
@@ -98,28 +98,28 @@ def _level(plane: Plane, at: Callable[[float, float], dict[str, Bound]], name: s
 
 
 @dataclass
-class Over:
-    """The boundaries of a panel, and where they run on the paper by name; ``why_none`` where there is no exact one."""
+class PanelLines:
+    """The lines over a panel, and their pieces as drawn by name; ``why_none`` where there is no exact limit."""
 
     boundaries: list[Boundary] = field(default_factory=list)
     why_none: str = ""
     drawn: dict[str, list[np.ndarray]] = field(default_factory=dict)
 
 
-def over_scene(texts: Iterable[str | None], rulers: Sequence[Ruler], bounds: bool = True) -> Over:
-    """The boundaries of the first scene there is among some of a panel, as TOML; none over names."""
+def find_lines(texts: Iterable[str | None], rulers: Sequence[Ruler], bounds: bool = True) -> PanelLines:
+    """Finds the lines for the first scene there is among some of a panel, as TOML; none over names."""
     text = next((text for text in texts if text), None)
     if text is None:
-        return Over(why_none="none of its cells has a scene")
+        return PanelLines(why_none="none of its cells has a scene")
     if any(ruler.axis.names for ruler in rulers):
-        return Over()
+        return PanelLines()
     scene = tomllib.loads(text)
     elements = {table["kind"] for table in scene.get("dissipation", [])}
     if foreign := sorted(elements - set(installed_kinds())):
-        return Over(why_none=f"the element {foreign[0]} comes from a plugin")
+        return PanelLines(why_none=f"the element {foreign[0]} comes from a plugin")
     plane = Plane(scene, rulers)
     known = bound_boundaries(plane) if bounds else []
     try:
-        return Over([exact_boundary(plane), *known])
+        return PanelLines([exact_boundary(plane), *known])
     except NotLinear as error:
-        return Over(known, str(error))
+        return PanelLines(known, str(error))

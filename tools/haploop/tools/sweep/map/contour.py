@@ -1,4 +1,4 @@
-"""Where a function of two numbers is zero: lines through a grid, every point of them exact."""
+"""Lines on which a function of two numbers is zero: contours of a grid, every point of them exact."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def fine_values(ruler: Ruler, points: int, own: bool) -> np.ndarray:
 
 
 def zero_lines(level: Level, xs: np.ndarray, ys: np.ndarray, exact: tuple[bool, bool]) -> list[np.ndarray]:
-    """The lines on which ``level`` is zero.
+    """Returns the lines on which ``level`` is zero.
 
     A contour of the grid meets its edges where interpolation has it; along the edge, Brent's method puts the point
     where the level itself is zero, so that only the way from one edge to the next is a guess.
@@ -70,7 +70,7 @@ def zero_lines(level: Level, xs: np.ndarray, ys: np.ndarray, exact: tuple[bool, 
 
 
 def _at_scenes(places: np.ndarray, exact: tuple[bool, bool]) -> np.ndarray:
-    """The places that do not lie between the values of an axis of which there are no others, where any are left."""
+    """Returns the places that lie on the values of an axis that has no others between; all where none do."""
     whole = np.abs(places - np.rint(places)) == 0.0
     kept = places[(whole | np.array(exact)).all(axis=1)]
     return kept if len(kept) else places
@@ -88,7 +88,7 @@ def _along_one(level: Level, xs: np.ndarray, ys: np.ndarray, exact: tuple[bool, 
 
 
 def _exact(level: Level, place: np.ndarray, xs: np.ndarray, ys: np.ndarray, exact: tuple[bool, bool]) -> np.ndarray:
-    """The zero on the edge of the grid on which ``place`` (counted in grid lines) lies."""
+    """Returns the zero on the edge of the grid on which ``place`` (count_verdicts in grid lines) lies."""
     grid = (xs, ys)
     whole = np.rint(place)
     off = np.abs(place - whole)
@@ -109,7 +109,7 @@ def _exact(level: Level, place: np.ndarray, xs: np.ndarray, ys: np.ndarray, exac
 
 
 def _rounded(level: Level, line: np.ndarray, xs: np.ndarray, ys: np.ndarray, exact: tuple[bool, bool]) -> np.ndarray:
-    """The line with a point more on either side of each sharp bend, looked for across the line."""
+    """Returns the line with a point more on either side of each sharp bend, looked for across the line."""
     cells = np.column_stack([np.interp(line[:, i], grid, np.arange(len(grid))) for i, grid in enumerate((xs, ys))])
     steps = np.diff(cells, axis=0)
     angles = np.abs(np.diff(np.unwrap(np.arctan2(steps[:, 1], steps[:, 0]))))
@@ -124,7 +124,7 @@ def _rounded(level: Level, line: np.ndarray, xs: np.ndarray, ys: np.ndarray, exa
 
 
 def _across(level: Level, ends: np.ndarray, moving: int, grid: np.ndarray) -> np.ndarray:
-    """The zero half way between two points, moved along one axis within a cell of the grid."""
+    """Returns the zero half way between two points, moved along one axis within a cell of the grid."""
     point = ends.mean(axis=0)
     place = int(np.clip(np.searchsorted(grid, point[moving]), 1, len(grid) - 1))
     reach = grid[place] - grid[place - 1]
@@ -140,7 +140,7 @@ def _across(level: Level, ends: np.ndarray, moving: int, grid: np.ndarray) -> np
 
 
 def _root(along: Callable[[float], float], low: float, high: float, guess: float) -> float:
-    """The zero between two values by Brent's method; the guess where the ends do not enclose one."""
+    """Returns the zero between two values by Brent's method; the guess where the ends do not enclose one."""
     from scipy.optimize import brentq
 
     if not along(low) * along(high) < 0.0:

@@ -21,8 +21,8 @@ _DASHES = ((5, 2), (2, 1.5), (7, 2, 1.5, 2), (1, 1), (9, 3), (4, 1.5, 1, 1.5, 1,
 _COLOURS = ("#0B5FA5", "#7A1FA2", "#00664A", "#5B3A29", "#8A0F3C", "#3C3C8F")
 
 
-def styles_of(names: Sequence[str]) -> dict[str, dict[str, Any]]:
-    """Colour and dashes of every line by its name; the exact limit is solid and black."""
+def line_styles(names: Sequence[str]) -> dict[str, dict[str, Any]]:
+    """Returns colour and dashes of every line by its name; the exact limit is solid and black."""
     styles: dict[str, dict[str, Any]] = {}
     bounds = [name for name in names if name != EXACT]
     for number, name in enumerate(bounds):
@@ -32,7 +32,7 @@ def styles_of(names: Sequence[str]) -> dict[str, dict[str, Any]]:
 
 
 def draw_boundary(ax: Axes, boundary: Boundary, rulers: Sequence[Ruler], style: dict[str, Any]) -> list[np.ndarray]:
-    """Draw all pieces of a line; a piece that is one value of the only axis stands upright.
+    """Draws all pieces of a line; a piece that is one value of the only axis stands upright.
 
     Returns:
         The pieces in the coordinates of the panel.
@@ -64,7 +64,7 @@ def draw_boundary(ax: Axes, boundary: Boundary, rulers: Sequence[Ruler], style: 
 
 
 def _across(place: np.ndarray, rulers: Sequence[Ruler]) -> np.ndarray:
-    """A point as a line across the only cell there is along an axis."""
+    """Returns a point as a line across the only cell there is along an axis."""
     points = np.tile(place, (_POINTS, 1))
     for number, ruler in enumerate(rulers):
         if len(ruler.axis.values) == 1:

@@ -1,4 +1,4 @@
-"""A sweep as its map needs it: its axes, and what came of every cell over all seeds."""
+"""The data of a map: the axes of a sweep, and the verdict of every cell over all seeds."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ _WITH_PREFIX = ("m", "s", "N", "Hz")
 
 
 def with_prefix(values: Iterable[float], unit: str) -> tuple[float, str]:
-    """The factor that suits some values, and the unit of what is left of them."""
+    """Returns the factor that suits some values, and the unit of what is left of them."""
     factor, letter = prefix_for(values) if unit in _WITH_PREFIX else (1.0, "")
     return factor, f"{letter}{unit}"
 
 
 @dataclass(frozen=True)
 class Axis:
-    """What was varied.
+    """An axis of a map.
 
     Attributes:
         key: dotted key of the scene.
@@ -50,8 +50,8 @@ class Axis:
     planned: np.ndarray = field(default_factory=lambda: np.empty(0))
 
     @classmethod
-    def of(cls, key: str, unit: str, column: Sequence[Any], planned: Sequence[Any] = ()) -> Axis:
-        """The axis of a column of the table; ``planned`` are values the sweep has, run or not."""
+    def from_column(cls, key: str, unit: str, column: Sequence[Any], planned: Sequence[Any] = ()) -> Axis:
+        """Returns the axis of a column of the table; ``planned`` are values the sweep has, run or not."""
         given = [*planned, *column]
         if any(isinstance(value, str | bool | np.bool_ | list | dict) for value in given):
             names = tuple(dict.fromkeys(_name(value) for value in given))
@@ -60,17 +60,17 @@ class Axis:
         return cls(key, unit, values, (), np.unique(np.asarray(planned, dtype=float)) if len(planned) else values)
 
     def as_planned(self) -> Axis:
-        """The axis without what a search ran in between."""
+        """Returns the axis without what a search ran in between."""
         return replace(self, values=self.planned)
 
     def indices(self, column: Sequence[Any]) -> np.ndarray:
-        """Which of the values each entry of a column is."""
+        """Returns the place of each entry of a column among the values."""
         if self.names:
             return np.array([self.names.index(_name(value)) for value in column], dtype=int)
         return np.searchsorted(self.values, np.asarray(column, dtype=float))
 
     def word(self, index: int) -> str:
-        """One value with its unit."""
+        """Returns one value with its unit."""
         if self.names:
             return short_name(self.names[index])
         factor, unit = with_prefix([self.values[index]], self.unit)
@@ -79,7 +79,7 @@ class Axis:
 
 @dataclass(frozen=True)
 class Cells:
-    """What came of every combination of the axes' values; all arrays have an axis of their own for each axis.
+    """The outcome of every combination of the axes' values; arrays have a dimension for each axis.
 
     Attributes:
         verdict: number of the worst verdict in ``VERDICTS``; NOT_RUN where there is none yet.
@@ -128,16 +128,16 @@ class MapData:
 
     @property
     def has_edges(self) -> bool:
-        """Whether this is a bisecting sweep that is finished, over more than the axis of the search."""
+        """Tells whether this is a bisecting sweep that is finished, over more than the axis of the search."""
         return bool(self.boundary) and len(self.axes) > 1
 
     @property
     def has_amplitudes(self) -> bool:
-        """Whether the sweep recorded how far everything swings."""
+        """Tells whether the sweep recorded how far everything swings."""
         return AMPLITUDE in self.columns
 
     def cells(self) -> Cells:
-        """All cells, the seeds of each taken together."""
+        """Returns all cells, the seeds of each taken together."""
         shape = tuple(len(axis.values) for axis in self.axes)
         worst = np.full(shape, NOT_RUN)
         amplitude, least = np.full(shape, math.nan), np.full(shape, math.inf)
@@ -155,26 +155,26 @@ class MapData:
         return Cells(worst, amplitude, np.where(np.isinf(least), math.nan, least), agree, seeds, first)
 
     def amplitudes_m(self) -> np.ndarray:
-        """The oscillation of every row; NaN where it is not known."""
+        """Returns the oscillation of every row; NaN where it is not known."""
         if not self.has_amplitudes:
             return np.full(len(self.columns["verdict"]), math.nan)
         return np.array([math.nan if value is None else value for value in self.columns[AMPLITUDE]], dtype=float)
 
 
 def short(value: float) -> str:
-    """Four digits or more, as many as a number has before its point."""
+    """Returns four digits or more, as many as a number has before its point."""
     return f"{value:.4g}" if abs(value) < 1e4 else f"{value:.7g}"
 
 
 def _name(value: Any) -> str:
-    """A value that is no number as the table has it: text as it is, all else as TOML writes it."""
+    """Returns a value that is no number as the table has it: text as it is, all else as TOML writes it."""
     if isinstance(value, str):
         return value
     return inline(bool(value) if isinstance(value, np.bool_) else value)
 
 
 def short_name(name: str) -> str:
-    """A name as people read it: a list of elements without its punctuation, ``"damping 0.8 + brake 0.1"``."""
+    """Returns a name as people read it: a list of elements without its punctuation, ``"damping 0.8 + brake 0.1"``."""
     if not name.startswith("["):
         return name
     try:
@@ -186,7 +186,7 @@ def short_name(name: str) -> str:
 
 
 def is_number(value: Any) -> bool:
-    """Whether a value of a scene is a number."""
+    """Tells whether a value of a scene is a number."""
     return isinstance(value, int | float) and not isinstance(value, bool)
 
 
@@ -195,13 +195,13 @@ def verdict_number(word: str | None) -> int:
     return VERDICTS.index(word) if word in VERDICTS else FAILED
 
 
-def data_of(
+def make_map_data(
     columns: Columns,
     units: Mapping[str, str],
     sweep: dict[str, Any],
     boundary: Columns | None = None,
 ) -> MapData:
-    """A sweep's table as data of a map.
+    """Returns a sweep's table as data of a map.
 
     Args:
         columns: of the table, equally long; axes by their dotted keys.
@@ -219,7 +219,7 @@ def data_of(
     if "bisect" in sweep and not boundary and len(sweep["axes"]) > 1:
         columns = _planned_alone(columns, sweep)
     axes = tuple(
-        Axis.of(key, units.get(key, ""), columns[key], given if isinstance(given, list) else [])
+        Axis.from_column(key, units.get(key, ""), columns[key], given if isinstance(given, list) else [])
         for key, given in sweep["axes"].items()
     )
     base = sweep.get("base", {}).get("title", "untitled scene")
@@ -227,7 +227,7 @@ def data_of(
 
 
 def _planned_alone(columns: Columns, sweep: dict[str, Any]) -> Columns:
-    """The rows at the planned points of the axis of a search that goes on; those in between are no cells of a map."""
+    """Returns the rows at the planned points of a search that goes on; those in between are no cells of a map."""
     key = sweep["bisect"]["axis"]
     rows = np.flatnonzero(np.isin(np.asarray(columns[key], dtype=float), sweep["axes"][key])).tolist()
     return {name: [column[row] for row in rows] for name, column in columns.items()}

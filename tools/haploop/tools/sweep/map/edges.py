@@ -16,7 +16,7 @@ FOUND, ALL_HOLD, NONE_HOLDS, UNKNOWN = range(4)
 
 @dataclass(frozen=True)
 class Edges:
-    """The boundaries along ``along``; all arrays have an axis of their own for each of the ``others``.
+    """The boundaries along one axis; arrays have a dimension for each of the ``others``.
 
     Attributes:
         along: the axis that was bisected, with its planned points.
@@ -40,8 +40,8 @@ class Edges:
     more: int
 
 
-def edges_of(data: MapData) -> Edges:
-    """The boundaries of a bisecting sweep that is finished."""
+def find_edges(data: MapData) -> Edges:
+    """Returns the boundaries of a bisecting sweep that is finished."""
     key, holds = data.sweep["bisect"]["axis"], data.sweep["bisect"].get("holds", "steady")
     along = next(axis for axis in data.axes if axis.key == key).as_planned()
     others = [axis for axis in data.axes if axis.key != key]
@@ -80,7 +80,7 @@ def _state(data: MapData, row: int, first: str | None, holds: str) -> int:
 
 
 def _starts(data: MapData, key: str, first: float, others: list[Axis]) -> dict[tuple[int, ...], str | None]:
-    """The verdict where the search begins, by the indices of the other axes and the seed."""
+    """Returns the verdict where the search begins, by the indices of the other axes and the seed."""
     columns = data.columns
     indices = [axis.indices(columns[axis.key]) for axis in others]
     begin = np.flatnonzero(np.asarray(columns[key], dtype=float) == first).tolist()
@@ -105,7 +105,7 @@ class StiffestSteady:
 
 
 def stiffest_steady(axes: tuple[Axis, ...], cells: Cells) -> StiffestSteady | None:
-    """The stiffest steady wall below which every wall that was tried with the same other values is steady, too.
+    """Returns the stiffest steady wall below which every wall that was tried with the same other values is steady, too.
 
     Where several cells share it, the one in the middle of them is taken. None where the wall was not swept, or no
     softest wall is steady.

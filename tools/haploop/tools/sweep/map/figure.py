@@ -11,9 +11,9 @@ from haploop.tools.figure.labels import LabelRoom
 from haploop.tools.figure.style import fix_layout, write_figure
 from haploop.tools.sweep.map.axis import Ruler
 from haploop.tools.sweep.map.bisect_figure import bisect_figure
-from haploop.tools.sweep.map.boundaries import Over, over_scene
-from haploop.tools.sweep.map.curves import draw_boundary, styles_of
-from haploop.tools.sweep.map.data import LIMIT_CYCLE, Axis, Cells, MapData, data_of
+from haploop.tools.sweep.map.boundaries import PanelLines, find_lines
+from haploop.tools.sweep.map.curves import draw_boundary, line_styles
+from haploop.tools.sweep.map.data import LIMIT_CYCLE, Axis, Cells, MapData, make_map_data
 from haploop.tools.sweep.map.edges import stiffest_steady
 from haploop.tools.sweep.map.legend import Legend, amplitude_scale
 from haploop.tools.sweep.map.panels import (
@@ -24,7 +24,14 @@ from haploop.tools.sweep.map.panels import (
     label_swings,
     mark_disagreement,
 )
-from haploop.tools.sweep.map.sentences import answer, counted, description, failures, star_words, unknown_amplitudes
+from haploop.tools.sweep.map.sentences import (
+    answer,
+    count_verdicts,
+    description,
+    failures,
+    star_words,
+    unknown_amplitudes,
+)
 from haploop.tools.sweep.map.sheet import MOST_PANELS, Layout, Panel, Sheet, fit_title, panel_title
 from haploop.tools.sweep.table import NeedsPyarrow, TableError, read
 
@@ -37,20 +44,20 @@ _STAR = "#C00000"
 _SIDES: tuple[Literal["x", "y"], ...] = ("x", "y")
 
 
-def figure_of(data: MapData) -> Figure:
-    """The map of a sweep's cells, a panel for each combination of the axes that do not lie along it.
+def make_figure(data: MapData) -> Figure:
+    """Returns the map of a sweep's cells, a panel for each combination of the axes that do not lie along it.
 
     Raises:
         FigureError: matplotlib is missing.
     """
-    cells, layout = data.cells(), Layout.of(data.axes)
+    cells, layout = data.cells(), Layout.from_axes(data.axes)
     along = [data.axes[layout.x]] + ([] if layout.y is None else [data.axes[layout.y]])
-    rulers = [Ruler.of(axis) for axis in along]
+    rulers = [Ruler.from_axis(axis) for axis in along]
     panels = list(layout.panels(data, cells))
     scenes = data.columns["scene"]
-    overs = [over_scene((scenes[row] for row in panel.cells.row.flat if row >= 0), rulers) for panel in panels]
+    overs = [find_lines((scenes[row] for row in panel.cells.row.flat if row >= 0), rulers) for panel in panels]
     words = {boundary.name: boundary.words for over in overs for boundary in over.boundaries if boundary.lines}
-    styles = styles_of(list(words))
+    styles = line_styles(list(words))
     swings, scale = SwingScale(cells), _limit_cycles(cells) if layout.y is not None else None
     sheet = Sheet(len(panels), data.title, description(data, cells))
     for number, (ax, panel, over) in enumerate(zip(sheet.axes, panels, overs, strict=True)):
@@ -64,7 +71,7 @@ def figure_of(data: MapData) -> Figure:
         panel_title(ax, panel.titles[0])
         over.drawn = {b.name: draw_boundary(ax, b, rulers, styles[b.name]) for b in over.boundaries if b.lines}
     legend = Legend(sheet.side, *sheet.side_in)
-    legend.verdicts(counted(cells), as_points=layout.y is None)
+    legend.verdicts(count_verdicts(cells), as_points=layout.y is None)
     if scale:
         legend.amplitudes(scale)
     legend.boundaries(styles, words)
@@ -89,11 +96,11 @@ def _label(
     along: Sequence[Axis],
     rulers: Sequence[Ruler],
     panel: Panel,
-    over: Over,
+    over: PanelLines,
     swings: SwingScale,
     colours: dict[str, str],
 ) -> None:
-    """Star and names, once the panel has its place."""
+    """Writes star and names, once the panel has its place."""
     room = LabelRoom(ax)
     found = stiffest_steady(tuple(along), panel.cells)
     room.avoid_texts(ax.texts)
@@ -110,8 +117,8 @@ def _label(
             room.on_line(line, name, colours[name], "name of a line")
 
 
-def _notes(data: MapData, cells: Cells, layout: Layout, overs: Sequence[Over]) -> list[str]:
-    """What else there is to say; the answer first."""
+def _notes(data: MapData, cells: Cells, layout: Layout, overs: Sequence[PanelLines]) -> list[str]:
+    """Returns the notes, the answer first."""
     notes = [answer(data.axes, stiffest_steady(data.axes, cells))]
     if (count := layout.count(data.axes)) > MOST_PANELS:
         notes.append(f"The first {MOST_PANELS} of {count} panels are drawn.")
@@ -134,7 +141,7 @@ def _notes(data: MapData, cells: Cells, layout: Layout, overs: Sequence[Over]) -
 
 
 def draw_map(directory: Path, target: Path | None = None) -> Path:
-    """Draw a sweep, finished or not.
+    """Draws a sweep, finished or not.
 
     Args:
         directory: that ``haploop sweep`` writes to.
@@ -150,6 +157,6 @@ def draw_map(directory: Path, target: Path | None = None) -> Path:
         table = read(directory)
     except (TableError, NeedsPyarrow) as error:
         raise FigureError(str(error)) from error
-    data = data_of(table.columns, table.units, table.sweep, table.boundary)
-    figure = bisect_figure(data) if data.has_edges else figure_of(data)
+    data = make_map_data(table.columns, table.units, table.sweep, table.boundary)
+    figure = bisect_figure(data) if data.has_edges else make_figure(data)
     return write_figure(figure, target or directory / "figure.png")

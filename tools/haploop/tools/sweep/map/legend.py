@@ -43,13 +43,13 @@ _RANGE = 1e-5
 WORDS = {LIMIT_CYCLE: "limit cycle", NO_CONTACT: "no contact"}
 
 
-def words_of(verdict: int) -> str:
-    """A verdict as people write it."""
+def verdict_words(verdict: int) -> str:
+    """Returns a verdict as people write it."""
     return WORDS.get(verdict, VERDICTS[verdict])
 
 
 def amplitude_colours() -> Colormap:
-    """From yellow to brown, without the ends that could be taken for a steady or a diverged cell."""
+    """Makes the colours from yellow to brown, without ends that could be taken for a steady or a diverged cell."""
     from matplotlib import colormaps
     from matplotlib.colors import ListedColormap
 
@@ -57,7 +57,7 @@ def amplitude_colours() -> Colormap:
 
 
 def amplitude_scale(amplitudes_m: np.ndarray) -> LogNorm | None:
-    """One logarithmic scale for some amplitudes, of a great range for its upper end; None where none is known."""
+    """Makes one logarithmic scale for some amplitudes, a great range cut at its lower end; None where none is known."""
     from matplotlib.colors import LogNorm
 
     known = amplitudes_m[np.isfinite(amplitudes_m) & (amplitudes_m > 0.0)]
@@ -68,7 +68,7 @@ def amplitude_scale(amplitudes_m: np.ndarray) -> LogNorm | None:
 
 
 def metres_along(axis: MatplotlibAxis, ratio: float) -> None:
-    """Numbers with their own unit along a logarithmic axis of metres that reaches over a ratio."""
+    """Puts numbers with their own unit along a logarithmic axis of metres that reaches over a ratio."""
     from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 
     log = LogLocator(subs=(1.0,) if ratio > 60.0 else (1.0, 3.0), numticks=7)
@@ -82,7 +82,7 @@ _SIGN_IN, _LETTERS = 0.34, 42
 
 
 class Legend:
-    """Writes from the top down; lengths in inches.
+    """Writes the column beside a map from the top down; lengths in inches.
 
     Args:
         side: the column.
@@ -97,7 +97,7 @@ class Legend:
         self._y = 0.36
 
     def verdicts(self, counts: Mapping[int, int], as_points: bool) -> None:
-        """A sign for every verdict, as in the map, and how many cells came to it."""
+        """Writes the sign of every verdict and how many cells came to it."""
         from matplotlib.patches import Rectangle
 
         for number, count in counts.items():
@@ -109,15 +109,15 @@ class Legend:
                 box.set(facecolor=look.fill, edgecolor=look.hatch_colour or GREY, hatch=look.hatch, linewidth=0.6)
                 self._ax.add_patch(box)
             unit = "cell" if count == 1 else "cells"
-            self._write(f"{words_of(number)}: {count} {unit}", middle)
+            self._write(f"{verdict_words(number)}: {count} {unit}", middle)
             self._y += _ROW_IN
         self._y += _GAP_IN
 
     def amplitudes(self, scale: LogNorm) -> None:
-        """The colours of the limit cycles."""
+        """Draws the colours of the limit cycles."""
         from matplotlib.cm import ScalarMappable
 
-        self._heading(f"{words_of(LIMIT_CYCLE)}: oscillation, peak to peak")
+        self._heading(f"{verdict_words(LIMIT_CYCLE)}: oscillation, peak to peak")
         bottom = self._height - self._y - 0.14
         bar = self._side.add_axes((0.05, bottom / self._height, 0.86, 0.14 / self._height))
         shown = ScalarMappable(scale, amplitude_colours())
@@ -128,7 +128,7 @@ class Legend:
         self._y += 0.14 + 0.28 + _GAP_IN
 
     def boundaries(self, styles: Mapping[str, dict[str, Any]], words: Mapping[str, str]) -> None:
-        """What the lines over the map are."""
+        """Writes the names of the lines over the map and what they say."""
         for name, style in styles.items():
             middle = self._y + _LINE_IN / 2
             self._ax.plot([0.0, _SIGN_IN], [middle, middle], **style)
@@ -139,7 +139,7 @@ class Legend:
         self._y += _GAP_IN if styles else 0.0
 
     def lines(self, heading: str, signs: Sequence[tuple[str, dict[str, Any]]]) -> None:
-        """What the lines through cells stand for."""
+        """Writes the values that the lines through cells stand for."""
         if heading:
             self._heading(heading)
         for words, look in signs:
@@ -150,7 +150,7 @@ class Legend:
         self._y += _GAP_IN
 
     def notes(self, sentences: Sequence[str]) -> None:
-        """What else there is to say, a paragraph each."""
+        """Writes sentences, a paragraph each."""
         for number, sentence in enumerate(sentences):
             self._lines(sentence, 0.0, INK if number == 0 else GREY)
             self._y += 0.1

@@ -21,7 +21,7 @@ _COUNT_PX, _DOT_PX = (26.0, 15.0), 4.0
 
 
 def draw_cells(ax: Axes, x: Ruler, y: Ruler, cells: Cells, scale: LogNorm | None) -> None:
-    """Fill the panel; ``cells`` have the shape (values of x, values of y)."""
+    """Fills the panel; ``cells`` have the shape (values of x, values of y)."""
     from matplotlib.colors import BoundaryNorm, ListedColormap
 
     verdict = cells.verdict.T
@@ -44,7 +44,7 @@ def draw_cells(ax: Axes, x: Ruler, y: Ruler, cells: Cells, scale: LogNorm | None
 def _hatch(
     ax: Axes, edges: tuple[np.ndarray, np.ndarray], where: np.ndarray, hatch: str, colour: str, name: str
 ) -> None:
-    """One hatched patch of all cells of a verdict, row by row, so that the hatching runs through."""
+    """Draws one hatched patch of all cells of a verdict, row by row, so that the hatching runs through."""
     from matplotlib.patches import PathPatch
     from matplotlib.path import Path
 
@@ -56,7 +56,7 @@ def _hatch(
 
 
 def _runs(where: np.ndarray) -> Iterator[tuple[int, int, int]]:
-    """Row, first and one past the last cell of every unbroken run."""
+    """Yields row, first and one past the last cell of every unbroken run."""
     for row, marked in enumerate(where):
         ends = np.flatnonzero(np.diff(np.concatenate([[0], marked.astype(int), [0]])))
         for first, last in zip(ends[::2], ends[1::2], strict=True):
@@ -69,7 +69,7 @@ def _box(edges: tuple[np.ndarray, np.ndarray], row: int, first: int, last: int) 
 
 
 def _outline(ax: Axes, edges: tuple[np.ndarray, np.ndarray], verdict: np.ndarray) -> None:
-    """The border between steady cells and others that ran, as the runs have it."""
+    """Draws the border between steady cells and others that ran."""
     from matplotlib.collections import LineCollection
 
     steady, ran = verdict == STEADY, verdict != NOT_RUN
@@ -85,7 +85,7 @@ def _outline(ax: Axes, edges: tuple[np.ndarray, np.ndarray], verdict: np.ndarray
 
 
 def mark_disagreement(ax: Axes, x: Ruler, y: Ruler, cells: Cells) -> None:
-    """How many of the seeds came to the verdict shown, where not all did: a count, or a dot in a small cell.
+    """Marks where not all seeds came to the verdict shown: by their count, or by a dot in a small cell.
 
     Call when the panel has its place and limits.
     """
@@ -131,13 +131,13 @@ class SwingScale:
         self.shelf = self.high / np.sqrt(_ABOVE)
 
     def place(self, amplitudes_m: np.ndarray) -> np.ndarray:
-        """Where amplitudes stand: none at all on the floor, unknown and boundless ones on the shelf."""
+        """Returns coordinates of amplitudes: none at all on the floor, unknown and boundless ones on the shelf."""
         at = np.maximum(amplitudes_m, self.floor)
         return np.where(np.isfinite(at), at, self.shelf)
 
 
 def draw_swings(ax: Axes, x: Ruler, cells: Cells, scale: SwingScale) -> None:
-    """Draw a panel; ``cells`` have the shape (values of x,)."""
+    """Draws a panel; ``cells`` have the shape (values of x,)."""
     ran = cells.verdict != NOT_RUN
     at, places = x.coordinates, scale.place(cells.amplitude_m)
     _shade(ax, x, cells.verdict)
@@ -162,21 +162,21 @@ def draw_swings(ax: Axes, x: Ruler, cells: Cells, scale: SwingScale) -> None:
 
 
 def label_swings(ax: Axes, label: bool) -> None:
-    """What stands along y, in the first panel of a row."""
+    """Writes the label along y, in the first panel of a row."""
     ax.tick_params(axis="y", which="both", labelleft=label)
     if label:
         ax.set_ylabel("oscillation, peak to peak", fontsize=TEXT, color=INK)
 
 
 def _shade(ax: Axes, x: Ruler, verdict: np.ndarray) -> None:
-    """The steady cells have a ground of their own."""
+    """Shades the ground of steady cells."""
     edges = x.edges
     for index in np.flatnonzero(verdict == STEADY):
         ax.axvspan(edges[index], edges[index + 1], color=LOOKS[STEADY].fill, linewidth=0, zorder=0.2, gid="steady")
 
 
 def count_disagreement(ax: Axes, x: Ruler, cells: Cells, scale: SwingScale) -> None:
-    """How many seeds came to the verdict shown, above the marker, where not all did."""
+    """Writes how many seeds came to the verdict shown, above the marker, where not all did."""
     split = np.flatnonzero((cells.agree < cells.seeds) & (cells.verdict != NOT_RUN))
     at, places = x.coordinates, scale.place(cells.amplitude_m)
     for i in split if len(split) <= 25 else ():

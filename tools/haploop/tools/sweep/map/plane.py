@@ -32,29 +32,29 @@ class Plane:
     rulers: Sequence[Ruler]
 
     def at(self, x: float, y: float) -> dict[str, Any]:
-        """The resolved scene at a place."""
+        """Returns the resolved scene at a place."""
         scene = copy.deepcopy(self.scene)
         for ruler, value in zip(self.rulers, (x, y), strict=False):
             set_key(scene, ruler.axis.key, value)
         return scene
 
     def but_for_stiffness(self, x: float, y: float) -> tuple[float, ...]:
-        """The values at a place without the wall's stiffness."""
+        """Returns the values at a place without the wall's stiffness."""
         return tuple(v for r, v in zip(self.rulers, (x, y), strict=False) if r.axis.key != STIFFNESS)
 
     def stiffness(self, x: float, y: float) -> float:
-        """The wall's stiffness at a place, in N/m."""
+        """Returns the wall's stiffness at a place, in N/m."""
         here = [v for r, v in zip(self.rulers, (x, y), strict=False) if r.axis.key == STIFFNESS]
         return here[0] if here else self.scene["wall"]["stiffness"]
 
     def own_scenes(self) -> list[dict[str, Any]]:
-        """The scenes along the axes' own values, one axis after the other: all that may differ in kind."""
+        """Returns the scenes along the axes' own values, one axis after the other: all that may differ in kind."""
         ends = [ruler.axis.values for ruler in self.rulers] + [np.zeros(1)]
         along_x = [self.at(x, ends[1][0]) for x in ends[0]]
         return along_x + [self.at(ends[0][-1], y) for y in ends[1]]
 
     def zero_lines(self, level: Level, whole_ticks: bool = False) -> list[np.ndarray]:
-        """Where a function of the axes' values is zero; points of each line in SI, shape (n, axes).
+        """Finds where a function of the axes' values is zero; points of each line in SI, shape (n, axes).
 
         Args:
             level: NaN where there is none.
@@ -95,7 +95,7 @@ class Plane:
 
 
 def _where_it_runs(level: Level) -> Level:
-    """The level, NaN where the clock's numbers make no scene."""
+    """Returns the level, NaN where the clock's numbers make no scene."""
 
     def known(x: float, y: float) -> float:
         try:
@@ -107,7 +107,7 @@ def _where_it_runs(level: Level) -> Level:
 
 
 def set_key(scene: dict[str, Any], key: str, value: float) -> None:
-    """Set a number of a resolved scene by its dotted key; a whole number where the scene has one."""
+    """Sets a number of a resolved scene by its dotted key; a whole number where the scene has one."""
     *path, last = key.split(".")
     node: Any = scene
     for part in path:
@@ -117,7 +117,7 @@ def set_key(scene: dict[str, Any], key: str, value: float) -> None:
 
 
 def value_at(scene: dict[str, Any], key: str) -> Any:
-    """The value at a dotted key of a resolved scene; None where there is none."""
+    """Returns the value at a dotted key of a resolved scene; None where there is none."""
     node: Any = scene
     for part in key.split("."):
         if isinstance(node, list):

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from haploop.tools.render.units import spring
-from haploop.tools.sweep.map.boundaries import Over
+from haploop.tools.sweep.map.boundaries import PanelLines
 from haploop.tools.sweep.map.data import (
     FAILED,
     LIMIT_CYCLE,
@@ -23,7 +23,7 @@ from haploop.tools.sweep.map.data import (
     with_prefix,
 )
 from haploop.tools.sweep.map.edges import ALL_HOLD, FOUND, NONE_HOLDS, UNKNOWN, Edges, StiffestSteady
-from haploop.tools.sweep.map.legend import words_of
+from haploop.tools.sweep.map.legend import verdict_words
 
 # What fits into the line below the title; the base scene's title is cut short before anything else is.
 _BETWEEN, _LETTERS, _LEAST_LETTERS = "   ·   ", 185, 12
@@ -31,12 +31,12 @@ _REASON_LETTERS = 160
 
 
 def description(data: MapData, cells: Cells) -> str:
-    """One line: the base scene, what was swept, the seeds, and how many cells came to which verdict."""
-    return about(data, tally(cells))
+    """Returns one line: the base scene, what was swept, the seeds, and how many cells came to which verdict."""
+    return about(data, describe_counts(cells))
 
 
 def about(data: MapData, came: str) -> str:
-    """One line: the base scene, what was swept, the seeds, and what came of it."""
+    """Returns one line: the base scene, what was swept, the seeds, and what came of it."""
     swept = " × ".join(f"{axis.key} {_span(axis)}" for axis in data.axes)
     seeds = f"{len(data.seeds)} seeds" if len(data.seeds) > 1 else f"seed {data.seeds[0]}" if data.seeds else ""
     rest = _BETWEEN.join(part for part in (swept, seeds, came) if part)
@@ -45,23 +45,23 @@ def about(data: MapData, came: str) -> str:
     return f"from “{base}”{_BETWEEN}{rest}"
 
 
-def tally(cells: Cells) -> str:
-    """How many cells came to which verdict, and how many are still to come."""
-    counts = counted(cells)
+def describe_counts(cells: Cells) -> str:
+    """Returns how many cells came to which verdict, and how many are still to come."""
+    counts = count_verdicts(cells)
     missing = int((cells.verdict == NOT_RUN).sum())
-    words = [f"{count} {words_of(number)}" for number, count in counts.items()]
+    words = [f"{count} {verdict_words(number)}" for number, count in counts.items()]
     words += [f"{missing} not run yet"] if missing else []
     return f"{cells.verdict.size} cells: {', '.join(words)}" if cells.verdict.size > 1 else ", ".join(words)
 
 
-def counted(cells: Cells) -> dict[int, int]:
-    """How many cells came to each verdict that any came to, the mildest first."""
+def count_verdicts(cells: Cells) -> dict[int, int]:
+    """Counts the cells of each verdict that any came to, the mildest first."""
     counts = {number: int((cells.verdict == number).sum()) for number in range(len(VERDICTS))}
     return {number: count for number, count in counts.items() if count}
 
 
 def _span(axis: Axis) -> str:
-    """First and last value and how many: ``"500–8000 N/m (16)"``."""
+    """Returns first and last value and how many: ``"500–8000 N/m (16)"``."""
     if axis.names:
         return f"({len(axis.names)})"
     values = axis.planned
@@ -72,7 +72,7 @@ def _span(axis: Axis) -> str:
 
 
 def star_words(axes: Sequence[Axis], found: StiffestSteady) -> tuple[str, ...]:
-    """The label of the stiffest steady wall, and a shorter one: ``"steady up to 300 N/m"``, ``"300 N/m"``."""
+    """Returns the label of the stiffest steady wall, and a shorter one: ``"steady up to 300 N/m"``, ``"300 N/m"``."""
     stiffness = next(axis.values[i] for axis, i in zip(axes, found.index, strict=True) if axis.key == STIFFNESS)
     words = spring(float(stiffness))
     if found.open_end:
@@ -81,7 +81,7 @@ def star_words(axes: Sequence[Axis], found: StiffestSteady) -> tuple[str, ...]:
 
 
 def answer(axes: Sequence[Axis], found: StiffestSteady | None) -> str:
-    """A sentence or two about the stiffest steady wall; empty where the wall was not swept."""
+    """Returns a sentence or two about the stiffest steady wall; empty where the wall was not swept."""
     if not any(axis.key == STIFFNESS for axis in axes):
         return ""
     if found is None:
@@ -94,7 +94,7 @@ def answer(axes: Sequence[Axis], found: StiffestSteady | None) -> str:
 
 
 def failures(data: MapData) -> str:
-    """How many runs failed, and the commonest reason; empty if none did."""
+    """Returns how many runs failed, and the commonest reason; empty if none did."""
     failed = np.flatnonzero(data.verdicts == FAILED)
     if not len(failed):
         return ""
@@ -106,7 +106,7 @@ def failures(data: MapData) -> str:
 
 
 def unknown_amplitudes(data: MapData, cells: Cells) -> str:
-    """Why limit cycles have one colour, where they have."""
+    """Returns why limit cycles have one colour, where they have."""
     swinging = cells.verdict == LIMIT_CYCLE
     if not swinging.any() or (swinging & np.isfinite(cells.amplitude_m)).any():
         return ""
@@ -123,7 +123,7 @@ class Furthest:
 
 
 def furthest(edges: Edges) -> Furthest | None:
-    """What holds furthest from where the search begins; None where no boundary was found and nothing holds."""
+    """Finds what holds furthest from where the search begins; None where no boundary was found and nothing holds."""
     found = edges.state == FOUND
     if (throughout := np.argwhere(edges.state == ALL_HOLD)).size:
         end = -1 if edges.rising else 0
@@ -139,7 +139,7 @@ def furthest(edges: Edges) -> Furthest | None:
 
 
 def edge_description(data: MapData, edges: Edges) -> str:
-    """One line: the base scene, what was swept and bisected, the seeds, and what was found."""
+    """Returns one line: the base scene, what was swept and bisected, the seeds, and what was found."""
     words = {
         FOUND: "found",
         ALL_HOLD: f"{edges.holds} throughout",
@@ -151,8 +151,8 @@ def edge_description(data: MapData, edges: Edges) -> str:
     return about(data, f"boundaries: {came}")
 
 
-def edge_notes(data: MapData, edges: Edges, overs: Sequence[Over], lines: int) -> list[str]:
-    """What there is to say; the answer first."""
+def edge_notes(data: MapData, edges: Edges, overs: Sequence[PanelLines], lines: int) -> list[str]:
+    """Returns the notes of a search, the answer first."""
     notes = []
     if best := furthest(edges):
         at = ", ".join(f"{axis.key} {axis.word(i)}" for axis, i in zip(edges.others, best.index, strict=True))

@@ -30,8 +30,8 @@ class Layout:
     others: tuple[int, ...]
 
     @classmethod
-    def of(cls, axes: Sequence[Axis]) -> Layout:
-        """Numbers go along the map, the wall's stiffness upwards; names, or the shortest of three, make panels."""
+    def from_axes(cls, axes: Sequence[Axis]) -> Layout:
+        """Lays numbers along the map, the wall's stiffness upwards; names, or the shortest of three, make panels."""
         numeric = [number for number, axis in enumerate(axes) if not axis.names]
         if len(numeric) == 3:
             free = [number for number in numeric if axes[number].key != STIFFNESS]
@@ -43,11 +43,11 @@ class Layout:
         return cls(along[0], along[1] if len(along) == 2 else None, others)
 
     def count(self, axes: Sequence[Axis]) -> int:
-        """How many panels there are."""
+        """Counts the panels."""
         return prod(len(axes[number].values) for number in self.others)
 
     def panels(self, data: MapData, cells: Cells) -> Iterator[Panel]:
-        """The first panels, as many as are drawn."""
+        """Yields the first panels, as many as are drawn."""
         lengths = [range(len(data.axes[number].values)) for number in self.others]
         for fixed in islice(product(*lengths), MOST_PANELS):
             where: list[int | slice] = [slice(None)] * len(data.axes)
@@ -60,7 +60,7 @@ class Layout:
             yield Panel(titles, self._taken(cells, tuple(where)))
 
     def _taken(self, cells: Cells, where: tuple[int | slice, ...]) -> Cells:
-        """The cells of a panel, x first."""
+        """Returns the cells of a panel, x first."""
         turned = self.y is not None and self.y < self.x
         taken = [array[where] for array in vars(cells).values()]
         return Cells(*(np.ascontiguousarray(array.T) if turned else array for array in taken))
@@ -122,16 +122,16 @@ class Sheet:
         _write(header, line, 0.24, SMALL, GREY, "description")
 
     def is_left(self, number: int) -> bool:
-        """Whether a panel is the first of its row."""
+        """Tells whether a panel is the first of its row."""
         return number % self.columns == 0
 
     def is_low(self, number: int) -> bool:
-        """Whether there is no panel below a panel."""
+        """Tells whether there is no panel below a panel."""
         return number + self.columns >= len(self.axes)
 
 
 def _write(header: SubFigure, words: str, y: float, size: float, colour: str, gid: str, bold: bool = False) -> None:
-    """One line, smaller if it has to be, cut off if that does not do."""
+    """Writes one line, smaller if it has to be, cut off if that does not do."""
     weight = "bold" if bold else "normal"
     text = header.text(0.008, y, words, fontsize=size, color=colour, va="center", fontweight=weight, gid=gid)
     room = header.figure.bbox.width * 0.984
@@ -145,12 +145,12 @@ def _write(header: SubFigure, words: str, y: float, size: float, colour: str, gi
 
 
 def panel_title(ax: Axes, words: str) -> Text:
-    """What a panel's cells have in common, above it."""
+    """Writes the title of a panel, which its cells have in common."""
     return ax.set_title(words, loc="left", fontsize=TEXT, fontweight="bold", color=INK)
 
 
 def fit_title(ax: Axes, titles: Sequence[str]) -> None:
-    """The first of some titles that is no wider than its panel, which has its place; the last, cut off, if need be."""
+    """Writes the first of some titles that is no wider than its panel; the last, cut off, if need be."""
     room, width = ax.get_window_extent().width * _BEYOND, 0.0
     for words in titles:
         width = panel_title(ax, words).get_window_extent().width

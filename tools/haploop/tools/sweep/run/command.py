@@ -15,14 +15,14 @@ from haploop.launch.processes.interrupts import interrupts
 from haploop.logger.summary import write
 from haploop.tools.cli.exit_codes import FAILED, WRONG_USE, leave, plain_errors, print_json
 from haploop.tools.executor.executors import ExecutorError
-from haploop.tools.executor.pool import Pool, sources_of
+from haploop.tools.executor.pool import Pool, read_sources
 from haploop.tools.machine import machine, versions
 from haploop.tools.sweep.file.record import wants_trajectories
 from haploop.tools.sweep.file.sweep_file import load
 from haploop.tools.sweep.run.engine import Engine, Stopped
-from haploop.tools.sweep.run.shown import SweepProgress, counted
+from haploop.tools.sweep.run.progress import SweepProgress, describe_counts
 from haploop.tools.sweep.run.store import Store, StoreError
-from haploop.tools.sweep.table import SWEEP, NeedsPyarrow, pyarrow, schema_of
+from haploop.tools.sweep.table import SWEEP, NeedsPyarrow, make_schema, pyarrow
 
 if TYPE_CHECKING:
     from haploop.tools.sweep.file.cells import Sweep
@@ -33,7 +33,7 @@ SUMMARY = "summary.json"
 
 @dataclass(frozen=True)
 class Request:
-    """What was asked for on the command line.
+    """The arguments of the command.
 
     Attributes:
         path: the sweep file.
@@ -55,13 +55,13 @@ class Request:
 
 
 def sweep(request: Request, as_json: bool) -> None:
-    """Run what is missing of a sweep and say what came of it."""
+    """Runs what is missing of a sweep and say what came of it."""
     if request.workers is not None and request.workers < 1:
         leave(f"--workers must be at least 1, but {request.workers} was given.", WRONG_USE)
     with plain_errors():
         try:
             pyarrow()
-            made = load(request.path, request.overrides, sources_of(request.plugins))
+            made = load(request.path, request.overrides, read_sources(request.plugins))
             if request.compiled:
                 _demand_compiler(made)
             directory = _directory(request, made)
@@ -78,16 +78,16 @@ def sweep(request: Request, as_json: bool) -> None:
     if as_json:
         print_json({**summary, "directory": str(directory)})
     else:
-        print(_said(summary))
+        print(_summary_sentences(summary))
     print(directory, file=sys.stderr)
     if summary["ended"] != "done":
         leave(f"Stopped; to go on: haploop sweep {directory / SWEEP} --out {directory}", FAILED)
 
 
 def _run(request: Request, made: Sweep, directory: Path) -> dict[str, Any]:
-    """Run with progress; returns the summary, which is written too."""
+    """Runs with progress; returns the summary, which is written too."""
     began, before_s = time.monotonic(), _earlier_s(directory)
-    schema = schema_of(made.columns(), made.toml())
+    schema = make_schema(made.columns(), made.toml())
     with interrupts(usual_from=2) as received, Store(directory, schema) as store:
         if store.finished:
             print("Every cell of this sweep is there already; nothing was run.", file=sys.stderr)
@@ -129,7 +129,7 @@ def _run(request: Request, made: Sweep, directory: Path) -> dict[str, Any]:
 
 
 def _directory(request: Request, made: Sweep) -> Path:
-    """The directory: a new one, or that of this very sweep, which then goes on.
+    """Returns the directory: a new one, or that of this very sweep, which then goes on.
 
     Raises:
         OutputError: it holds something else.
@@ -163,7 +163,7 @@ def _first_difference(there: str, here: str) -> str:
 
 
 def _earlier_s(directory: Path) -> float:
-    """Wall time of earlier calls that ended in order."""
+    """Returns the wall time of earlier calls that ended in order."""
     try:
         return float(json.loads((directory / SUMMARY).read_text(encoding="utf-8"))["wall_s"])
     except (OSError, ValueError, LookupError):
@@ -175,10 +175,10 @@ def _boundaries(found: Sequence[Boundary]) -> dict[str, int]:
     return {"found": known, "missing": len(found) - known}
 
 
-def _said(summary: dict[str, Any]) -> str:
-    """What came of it, in a line or two."""
+def _summary_sentences(summary: dict[str, Any]) -> str:
+    """Returns the outcome in a line or two."""
     rate = summary["rate_1_s"]
-    lines = [f"{summary['title']}: {summary['cells']} cells, {counted(summary['counts'])}, {rate:.3g} cells/s"]
+    lines = [f"{summary['title']}: {summary['cells']} cells, {describe_counts(summary['counts'])}, {rate:.3g} cells/s"]
     if bounds := summary.get("boundaries"):
         lines.append(f"boundaries: {bounds['found']} found, {bounds['missing']} missing")
     if summary["first_reason"]:
@@ -187,7 +187,7 @@ def _said(summary: dict[str, Any]) -> str:
 
 
 def _demand_compiler(made: Sweep) -> None:
-    """Before anything is started.
+    """Demands JAX before anything is started.
 
     Raises:
         ExecutorError: JAX is not there, or bits are asked for.

@@ -1,4 +1,4 @@
-"""Running a sweep: every cell that is not stored yet, then the boundaries, then one table of all."""
+"""Runs a sweep: every cell that is not stored yet, then the boundaries, then one table of all."""
 
 from __future__ import annotations
 
@@ -15,20 +15,20 @@ from haploop.tools.sweep.file.cells import Axis, Bisect, Extra, Item, Sweep
 from haploop.tools.sweep.file.record import VERDICT, wants_energy, wants_trajectories
 from haploop.tools.sweep.run.boundary import Boundary, Candidate, find_boundaries, verdict_is
 from haploop.tools.sweep.run.store import Store
-from haploop.tools.sweep.table import CELL, ENDED, NUMBER, SEED, TEXT, WHOLE, WHY, Column, schema_of, table_of
+from haploop.tools.sweep.table import CELL, ENDED, NUMBER, SEED, TEXT, WHOLE, WHY, Column, make_schema, make_table
 
 Row = dict[str, Any]
 
 
 class Watcher(Protocol):
-    """Who is told how a sweep goes."""
+    """Observes the progress of a sweep."""
 
     def expect(self, cells: int) -> None:
-        """So many cells more are to be run."""
+        """Adds cells that are to be run."""
         ...
 
-    def came(self, rows: Sequence[Row], stored: bool = False) -> None:
-        """Cells are done; ``stored`` are those of an earlier call."""
+    def add_rows(self, rows: Sequence[Row], stored: bool = False) -> None:
+        """Takes cells that are done; ``stored`` are those of an earlier call."""
         ...
 
 
@@ -62,7 +62,7 @@ class Engine:
         )
 
     def run(self) -> list[Boundary]:
-        """Run what is missing and write the table; the boundaries, where they are sought.
+        """Runs what is missing and write the table; the boundaries, where they are sought.
 
         Raises:
             Stopped: before all was done.
@@ -72,7 +72,7 @@ class Engine:
         """
         if self._sweep.bisect is None:
             stored = self._store.done((CELL, ENDED, VERDICT))
-            self._watcher.came(stored, stored=True)
+            self._watcher.add_rows(stored, stored=True)
             done = {row[CELL] for row in stored}
             self._watcher.expect(self._sweep.count - len(done))
             for _ in self._rows(_without(self._sweep.groups(), done), self._sweep.count - len(done)):
@@ -84,26 +84,26 @@ class Engine:
         return found
 
     def _rows(self, groups: Iterable[Group], count: int) -> Iterator[tuple[Item, Row]]:
-        """Cells that are run and stored."""
+        """Runs and stores cells; yields them."""
         done = 0
         for part in self._pool.parts(self._work, groups, count, self._stop):
             rows = [row for _, row in part]
             self._store.add(rows)
-            self._watcher.came(rows)
+            self._watcher.add_rows(rows)
             done += len(rows)
             yield from part
         if done < count:
             raise Stopped
 
     def _bisected(self, bisect: Bisect) -> list[Boundary]:
-        """The boundary of every combination of the other axes and the seed, in that order."""
+        """Returns the boundary of every combination of the other axes and the seed, in that order."""
         axis = next(axis for axis in self._sweep.axes if axis.key == bisect.axis)
         stored = {row[CELL]: row for row in self._store.done((CELL, ENDED, WHY, VERDICT))}
-        self._watcher.came(list(stored.values()), stored=True)
+        self._watcher.add_rows(list(stored.values()), stored=True)
         rows, next_cell = list(_rows_of(self._sweep, axis)), 0
 
         def run(candidates: Sequence[Candidate]) -> Iterator[tuple[int, Row]]:
-            """A round: the grid at first, then one cell between its values in some of the rows."""
+            """Yields a round: the grid at first, then one cell between its values in some of the rows."""
             nonlocal next_cell
             at_points = next_cell == 0
             items = [
@@ -131,7 +131,7 @@ class Engine:
 
 
 def _without(groups: Iterable[Group], done: set[int]) -> Iterator[Group]:
-    """What is left of the groups, in stretches without a gap."""
+    """Yields what is left of the groups, in stretches without a gap."""
     for group in groups:
         first = group.items[0]
         for cell in group.items if done else ():
@@ -144,7 +144,7 @@ def _without(groups: Iterable[Group], done: set[int]) -> Iterator[Group]:
 
 
 def _rows_of(sweep: Sweep, axis: Axis) -> Iterator[tuple[dict[str, int], int]]:
-    """A place on each other axis and a repeat for every row that is bisected."""
+    """Yields a place on each other axis and a repeat for every row that is bisected."""
     others = [other for other in sweep.axes if other is not axis]
     for *places, repeat in product(*(range(len(other.values)) for other in others), range(sweep.repeat)):
         yield {other.key: place for other, place in zip(others, places, strict=True)}, repeat
@@ -162,7 +162,7 @@ def _cell(item: Item) -> int:
 
 
 def _boundary_table(sweep: Sweep, bisect: Bisect, found: Sequence[Boundary]) -> Any:
-    """One row a combination: the other axes, the seed, and what is known of the boundary."""
+    """Returns one row a combination: the other axes, the seed, and what is known of the boundary."""
     axis = next(axis for axis in sweep.axes if axis.key == bisect.axis)
     others = [column for column in sweep.axis_columns() if column.name != axis.key]
     numbers = [Column(name, NUMBER, axis.unit or "") for name in ("low", "high", "boundary")]
@@ -178,4 +178,4 @@ def _boundary_table(sweep: Sweep, bisect: Bisect, found: Sequence[Boundary]) -> 
         }  # fmt: skip
         seed = {SEED: sweep.base["seed"] + repeat} if seeds else {}
         rows.append({**values, **seed, **known, "changes": one.changes, WHY: one.why})
-    return table_of(rows, schema_of(columns, sweep.toml()))
+    return make_table(rows, make_schema(columns, sweep.toml()))

@@ -13,7 +13,7 @@ from types import TracebackType
 from typing import Any, Self
 
 from haploop.launch.output import OutputError
-from haploop.tools.sweep.table import BOUNDARY, CELL, PARTS, TABLE, pyarrow, table_of
+from haploop.tools.sweep.table import BOUNDARY, CELL, PARTS, TABLE, make_table, pyarrow
 
 LOCK = ".lock"
 # Rows that are merged into a group of the table, which a reader can read by itself.
@@ -60,11 +60,11 @@ class Store:
 
     @property
     def finished(self) -> bool:
-        """Whether the table is there."""
+        """Tells whether the table is there."""
         return (self.directory / TABLE).exists()
 
     def done(self, columns: Sequence[str] = (CELL,)) -> list[dict[str, Any]]:
-        """Some columns of all rows that are stored; a part that cannot be read is given up, to be run again."""
+        """Returns some columns of all rows that are stored; a part that cannot be read is given up, to be run again."""
         arrow, rows = pyarrow(), []
         for file in self._files():
             try:
@@ -75,17 +75,17 @@ class Store:
         return rows
 
     def add(self, rows: Sequence[Mapping[str, Any]]) -> None:
-        """Keep the rows of a part that is done.
+        """Keeps the rows of a part that is done.
 
         Raises:
             StoreError: they cannot be written; what was written before is safe.
         """
         path = self._parts / f"{rows[0][CELL]:012d}.parquet"
-        self._write(path, lambda file: pyarrow().parquet.write_table(table_of(rows, self._schema), file))
+        self._write(path, lambda file: pyarrow().parquet.write_table(make_table(rows, self._schema), file))
         self.rows += len(rows)
 
     def finish(self, boundaries: Any = None) -> None:
-        """Merge all parts into the table, in the order of the cells; write the table of the boundaries, if any.
+        """Merges all parts into the table, in the order of the cells; write the table of the boundaries, if any.
 
         Raises:
             StoreError: as for ``add``.
@@ -101,7 +101,7 @@ class Store:
         shutil.rmtree(self._parts, ignore_errors=True)
 
     def _in_order(self) -> Iterator[Any]:
-        """All rows in groups in the order of their cells, with no more parts in memory than overlap."""
+        """Yields all rows in groups in the order of their cells, with no more parts in memory than overlap."""
         arrow = pyarrow()
         held, last = [], -1
         for first, file in sorted((self._first(file), file) for file in self._files()):
@@ -143,7 +143,7 @@ class Store:
 
 
 def lock(directory: Path) -> int:
-    """Keep other sweeps out of a directory as long as the file descriptor is open; a killed program leaves no trace.
+    """Keeps other sweeps out of a directory as long as the file descriptor is open; a killed program leaves no trace.
 
     Raises:
         OutputError: another one is at work there.

@@ -1,4 +1,4 @@
-"""How a sweep shows itself while it goes, and in the end."""
+"""Progress of a sweep on the terminal."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class SweepProgress:
         reason: of the first cell that failed.
     """
 
-    def __init__(self, title: str, screen: Console | None = None) -> None:
+    def __init__(self, title: str, terminal: Console | None = None) -> None:
         from rich import progress
 
         from haploop.tools.render.terminal import console
@@ -37,7 +37,7 @@ class SweepProgress:
         self.ran, self.reason = 0, ""
         self._total, self._stopping = 0, False
         self._began = time.monotonic()
-        screen = screen or console(stderr=True)
+        terminal = terminal or console(stderr=True)
         columns = (
             progress.TextColumn("{task.description}"),
             progress.BarColumn(bar_width=20),
@@ -47,7 +47,11 @@ class SweepProgress:
             progress.TextColumn("{task.fields[counts]}"),
         )
         self._bars = progress.Progress(
-            *columns, console=screen, disable=not screen.is_terminal, transient=True, refresh_per_second=_REFRESH_PER_S
+            *columns,
+            console=terminal,
+            disable=not terminal.is_terminal,
+            transient=True,
+            refresh_per_second=_REFRESH_PER_S,
         )
         self._task = self._bars.add_task(title, total=None, rate="", counts="")
 
@@ -61,12 +65,12 @@ class SweepProgress:
         self._bars.stop()
 
     def expect(self, cells: int) -> None:
-        """So many cells more are to be run."""
+        """Adds cells that are to be run."""
         self._total += cells
         self._bars.update(self._task, total=self._total)
 
-    def came(self, rows: Sequence[Mapping[str, Any]], stored: bool = False) -> None:
-        """Cells are done; ``stored`` are those of an earlier call."""
+    def add_rows(self, rows: Sequence[Mapping[str, Any]], stored: bool = False) -> None:
+        """Takes cells that are done; ``stored`` are those of an earlier call."""
         self.counts.update(outcome(row) for row in rows)
         if not stored:
             self.ran += len(rows)
@@ -75,10 +79,12 @@ class SweepProgress:
             self._total += len(rows)
         elapsed_s = time.monotonic() - self._began
         rate = f"{self.ran / elapsed_s:.3g} cells/s" if self.ran else ""
-        self._bars.update(self._task, completed=sum(self.counts.values()), rate=rate, counts=counted(self.counts))
+        self._bars.update(
+            self._task, completed=sum(self.counts.values()), rate=rate, counts=describe_counts(self.counts)
+        )
 
     def stopping(self, asked: bool) -> bool:
-        """Whether the sweep has been asked to stop; says so once, on a terminal or not."""
+        """Tells whether the sweep has been asked to stop; says so once, on a terminal or not."""
         if asked and not self._stopping:
             self._stopping = True
             self._bars.console.print("Stopping after the cells under way; once more ends at once.", highlight=False)
@@ -86,10 +92,10 @@ class SweepProgress:
 
 
 def outcome(row: Mapping[str, Any]) -> str:
-    """A row in one word."""
+    """Returns a row in one word."""
     return row.get(VERDICT) or row[ENDED]
 
 
-def counted(counts: Mapping[str, int]) -> str:
-    """``12 steady, 3 limit-cycle``: the most frequent first."""
+def describe_counts(counts: Mapping[str, int]) -> str:
+    """Returns counts such as ``12 steady, 3 limit-cycle``, the most frequent first."""
     return ", ".join(f"{count} {word}" for word, count in sorted(counts.items(), key=lambda pair: (-pair[1], pair[0])))
