@@ -75,12 +75,6 @@ STILL = {
     ("haploop.controller.estimators.choose", "haploop.controller.estimators.window"),
     ("haploop.logger.books.one_mass", "haploop.logger.books.chain"),
     ("haploop.logger.books.one_mass", "haploop.logger.books.friction_batch"),
-    ("haploop.plant.chain.history", "haploop.plant.chain.sensed_acceleration"),
-    ("haploop.plant.line.delay", "haploop.plant.line.actuator"),
-    ("haploop.plant.line.delay", "haploop.plant.line.actuator_batch"),
-    ("haploop.plant.line.delay", "haploop.plant.line.lossy"),
-    ("haploop.plant.motion.hand_force", "haploop.plant.motion.hand_force_batch"),
-    ("haploop.plant.random.streams", "haploop.plant.random.streams_batch"),
     ("haploop.tools.render.progress", "haploop.tools.render.report"),
 }
 

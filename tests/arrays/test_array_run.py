@@ -17,8 +17,8 @@ from haploop.launch.batch.run import run_array
 from haploop.launch.batch.stacking import runs_in_arrays, stacked, structure, structures
 from haploop.logger.batch import BatchLogger
 from haploop.logger.verdict.window import Window
-from haploop.plant import choose_batch
-from haploop.plant.motion.one_mass_batch import LinearMotionArray
+from haploop.plant import choose
+from haploop.plant.motion.one_mass import OneMassMotion
 from helpers.runs.batches import PUSH, Stiffening, alone, diverging, pressed, together
 from helpers.scenes.least import KINDS, WALL
 from helpers.scenes.varied_scenes import drawn_base, varied
@@ -102,12 +102,12 @@ def test_what_all_loops_share_stays_whole_when_some_are_dropped() -> None:
 def test_loops_that_have_ended_are_dropped_from_the_arrays(monkeypatch: pytest.MonkeyPatch) -> None:
     sizes = []
 
-    class Spy(LinearMotionArray):
-        def advance(self, tick: int, holds: Any) -> None:
-            super().advance(tick, holds)
+    class Spy(OneMassMotion):
+        def advance(self, tick: int, holds: Any) -> Any:
             sizes.append(len(self.x))
+            return super().advance(tick, holds)
 
-    monkeypatch.setattr(choose_batch, "LinearMotionArray", Spy)
+    monkeypatch.setattr(choose, "OneMassMotion", Spy)
     scenes = diverging()
     together(scenes)
     assert sizes[0] == len(scenes)

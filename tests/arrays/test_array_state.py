@@ -12,8 +12,8 @@ import pytest
 from haploop.controller.controller import make_params
 from haploop.controller.tick import StateTuple, initial_state, tick
 from haploop.launch.batch.object_state import keep
-from haploop.plant.random.streams_batch import RandomStreamArray
-from haploop.plant.sensing.noise import position_noise
+from haploop.plant.random.streams import RandomStream, make_normal
+from haploop.plant.sensing.noise import NoisyPositionSensor
 from haploop.protocol.trees import tree_select
 
 KEPT = np.array([True, False, True, True, False])
@@ -94,21 +94,19 @@ def test_estimators_go_on_with_the_loops_that_are_kept(tables: dict[str, Any]) -
 @pytest.mark.parametrize("before", [0, 100, 128, 5000])
 def test_each_loop_draws_what_it_draws_alone_also_after_others_have_left(before: int) -> None:
     seeds, table = np.array([3, 1, 4, 1, 5]), {"deviation": 2.0, "cutoff": np.linspace(10, 50, 5)}
-    noise = position_noise(table, seeds, 1e-3)
+    noise = NoisyPositionSensor(None, table, seeds, 1e-3)
     alone = [
-        position_noise({"deviation": 2.0, "cutoff": cutoff}, int(seed), 1e-3)
+        NoisyPositionSensor(None, {"deviation": 2.0, "cutoff": cutoff}, int(seed), 1e-3)
         for seed, cutoff in zip(seeds, table["cutoff"].tolist(), strict=True)
     ]
     for _ in range(before):
-        assert noise().tolist() == [draw() for draw in alone]
-    keep([noise], KEPT)
-    kept = [draw for draw, stays in zip(alone, KEPT, strict=True) if stays]
+        assert noise.reading(0.0).tolist() == [one.reading(0.0) for one in alone]
+    noise.select(KEPT)
+    kept = [one for one, stays in zip(alone, KEPT, strict=True) if stays]
     for _ in range(300):
-        assert noise().tolist() == [draw() for draw in kept]
+        assert noise.reading(0.0).tolist() == [one.reading(0.0) for one in kept]
 
 
 def test_draws_cross_the_pieces_of_a_stream_as_those_of_one_loop_do() -> None:
-    from haploop.plant.random.streams import RandomStream
-
-    many, one = RandomStreamArray(np.array([7, 8]), "noise").normal(), RandomStream(8, "noise").normal()
+    many, one = make_normal(np.array([7, 8]), "noise"), RandomStream(8, "noise").normal()
     assert [many()[1] for _ in range(9000)] == [one() for _ in range(9000)]

@@ -12,7 +12,7 @@ import msgpack
 import zmq
 
 from haploop.launch.processes.children import share_cores
-from haploop.plant.motion.transition import StepFlow
+from haploop.plant.motion.transition import make_foh_transition
 
 _pack = msgpack.Packer(autoreset=True).pack
 
@@ -60,7 +60,7 @@ def ping_pong_us(ticks: int = 10_000) -> float:
 
 def plain_loop_us(ticks: int = 20_000) -> float:
     """µs per tick of figure 6c's arithmetic in one plain Python function: no classes, no books, no log, no checks."""
-    flow = StepFlow.of(0.02, 0.11, 10.0, 1e-4)
+    flow = make_foh_transition(0.02, 0.11, 10.0, 1e-4)
     a, b, f, g = 1.0 + flow.x_x, flow.x_v, flow.x_force, flow.x_slope
     c, d, h, i = flow.v_x, 1.0 + flow.v_v, flow.v_force, flow.v_slope
     period, resolution = 1e-3, 1e-5

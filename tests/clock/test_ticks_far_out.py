@@ -8,7 +8,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from haploop.plant.line.delay import CommandLine
+from haploop.plant.line.delay import DelayLine
 from haploop.protocol.ticks import Timebase
 
 RATE, CONTROL = 10_000, 1_000
@@ -41,7 +41,7 @@ def test_a_tick_far_out_is_found_from_its_time_and_has_its_whole_nanoseconds(tic
 
 def test_the_line_delays_the_two_hundred_thousandth_command_as_it_does_the_first():
     """Command k from step k n + 13 on: three steps of the one before the last, seven of the last but one tick ago."""
-    line = CommandLine(Timebase.from_clock(LONG, FAR / RATE))
+    line = DelayLine(Timebase.from_clock(LONG, FAR / RATE))
     line.receive([0.0])
     for tick in range(199_999):
         line.receive([float(tick + 1)])

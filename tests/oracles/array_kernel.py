@@ -9,8 +9,8 @@ import numpy as np
 
 from haploop.logger.books.one_mass import as_squares
 from haploop.plant.motion.mechanics import Mechanics
-from haploop.plant.motion.one_mass import LinearMotion
-from haploop.plant.motion.transition import HeldFlow, motion_integrals, natural_rate
+from haploop.plant.motion.one_mass import OneMassMotion
+from haploop.plant.motion.transition import make_zoh_transitions, motion_integrals, natural_rate
 from haploop.protocol.ticks import Timebase
 
 BOOKS: tuple[str, ...] = (
@@ -151,10 +151,9 @@ def run_kernel(scenes: list[dict[str, Any]], energy: bool) -> np.ndarray:
     """Extremes, what the window shows and ``BOOKS``, as ``results_of`` tells them; shape (scenes, FIGURES + books)."""
     first = scenes[0]
     time = Timebase.from_clock(first["clock"], first["duration"])
-    m, n = Mechanics.of(first), time.steps_per_tick
-    motion = LinearMotion(first, time)
-    held = HeldFlow.of(m.mass_kg, m.damping, m.stiffness, time.step_s, n).coefficients
-    pieces = [motion._responses(piece) for piece in range(-(-time.ticks // 256))]
+    m, n = Mechanics.from_scene(first), time.steps_per_tick
+    motion = OneMassMotion(first, time)
+    held = make_zoh_transitions(m.mass_kg, m.damping, m.stiffness, time.step_s, n)
     square, lag = motion_integrals(m.mass_kg, m.damping, m.stiffness, time.step_s)
     push = 1.0 / (m.mass_kg * natural_rate(m.mass_kg, m.stiffness, time.step_s))
     scales = np.array([1.0, push, push])
@@ -168,8 +167,8 @@ def run_kernel(scenes: list[dict[str, Any]], energy: bool) -> np.ndarray:
         time.ticks,
         time.lookahead_ticks,
         held,
-        np.concatenate(pieces),
-        motion._tau.at_steps(0, time.ticks * n + 1),
+        np.moveaxis(motion.response.between(0, time.ticks), 0, -1).copy(),
+        motion.response.tau.at_steps(0, time.ticks * n + 1),
         as_squares(square * np.outer(scales, scales)).astype(float),
         (lag * scales).astype(float),
         m.mass_kg,

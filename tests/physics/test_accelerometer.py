@@ -29,7 +29,7 @@ def readings(accelerations, seed: int = 1, **table: Any) -> tuple[np.ndarray, fl
     """What is read of each, and how many were clipped."""
     sensor = Accelerometer({**IDEAL, **table}, seed, TIME)
     read = np.array([sensor.reading(a) for a in accelerations])
-    return read, sensor.tallies[CLIPPED].column(0, 10 * len(read))[-1] if "range" in table else 0
+    return read, sensor.counters[CLIPPED].column(0, 10 * len(read))[-1] if "range" in table else 0
 
 
 @pytest.mark.parametrize("bandwidth", [1.0, 50.0, 400.0])

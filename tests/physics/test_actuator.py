@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from haploop.plant.counters import SATURATED
-from haploop.plant.line.actuator import Actuator
-from haploop.plant.line.delay import CommandLine, line_of
+from haploop.plant.line.actuator import ActuatedLine
+from haploop.plant.line.delay import DelayLine, make_line
 from haploop.plant.plant import Plant
 from haploop.protocol.ticks import Timebase
 from helpers.runs.captured import in_blocks, of_the_scene, run
@@ -23,10 +23,10 @@ FORCES = st.floats(-1e3, 1e3)
 def driven(forces: list[float], table: dict[str, float], delay: int = 3) -> tuple[list[float], float]:
     """Force at the step at which each command takes effect, and how many were clipped."""
     time = Timebase(plant_rate=10_000, control_rate=1000, delay_steps=delay, ticks=len(forces) + 1)
-    line = Actuator(CommandLine(time), table, time)
+    line = ActuatedLine(DelayLine(time), table, time)
     line.receive([*forces, 0.0])
     by_step = [force for tick in range(time.ticks) for count, force, _ in line.holds(tick) for _ in range(count)]
-    clipped = line.tallies[SATURATED].column(0, 10 * time.ticks)[-1] if "saturation" in table else 0
+    clipped = line.counters[SATURATED].column(0, 10 * time.ticks)[-1] if "saturation" in table else 0
     return by_step[delay : delay + 10 * len(forces) : 10], clipped
 
 
@@ -113,7 +113,7 @@ def test_counts_are_the_same_for_blocks_of_any_size_also_when_the_run_is_stopped
 
 def test_a_command_that_never_acts_is_never_clipped():
     time = Timebase(plant_rate=10_000, control_rate=1000, delay_steps=0, ticks=10)
-    line = line_of({"seed": 1, "loss": {"probability": 1.0}, "actuator": {"saturation": 1.0}}, time)
+    line = make_line({"seed": 1, "loss": {"probability": 1.0}, "actuator": {"saturation": 1.0}}, time)
     line.receive([5.0] * 10)
     assert [line.holds(tick) for tick in range(10)] == [[(10, 0.0, -1)]] * 10
-    assert not line.tallies[SATURATED].column(0, 100).any()
+    assert not line.counters[SATURATED].column(0, 100).any()

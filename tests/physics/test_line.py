@@ -13,10 +13,9 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from haploop.plant.counters import DROPPED, LOST
-from haploop.plant.line.delay import CommandLine, Line, line_of
-from haploop.plant.line.jitter import additional_delays
-from haploop.plant.line.loss import losses
-from haploop.plant.line.lossy import UncertainLine
+from haploop.plant.line.base import Line
+from haploop.plant.line.delay import DelayLine, make_line
+from haploop.plant.line.lossy import LossyLine, make_jitter, make_loss
 from haploop.protocol.ticks import Timebase
 from helpers.runs.captured import in_blocks, run
 from helpers.scenes.least import WALL, scene
@@ -45,6 +44,13 @@ def by_the_rule(time: Timebase, additional_steps: list[int], lost: list[bool]) -
     return Fate(command, dropped, sum(lost[k] and effects[k] < end for k in range(time.ticks)))
 
 
+def with_fates(time: Timebase, additional_steps: list[int], lost: list[bool]) -> LossyLine:
+    """Makes a line with given delays and losses."""
+    line = LossyLine(time)
+    line.additional_steps, line.is_lost = iter(additional_steps).__next__, iter(lost).__next__
+    return line
+
+
 def by_the_line(line: Line, time: Timebase, ahead: list[int]) -> Fate:
     """Feeds a line command by command and empties it interval by interval.
 
@@ -62,7 +68,7 @@ def by_the_line(line: Line, time: Timebase, ahead: list[int]) -> Fate:
         assert len({k for _, _, k in holds}) == len(holds)  # two holds in a row of the same command are one
         command += [k for count, _, k in holds for _ in range(count)]
     end = time.ticks * time.steps_per_tick
-    dropped, lost = (int(line.tallies[name].column(0, end)[-1]) for name in (DROPPED, LOST))
+    dropped, lost = (int(line.counters[name].column(0, end)[-1]) for name in (DROPPED, LOST))
     return Fate(command, dropped, lost)
 
 
@@ -81,7 +87,7 @@ def lines(draw) -> tuple[Timebase, list[int], list[bool], list[int]]:
 @given(lines())
 def test_holds_and_counts_are_those_of_the_rule_whatever_comes_late_overtakes_or_is_lost(drawn):
     time, delays, lost, ahead = drawn
-    line = UncertainLine(time, iter(delays).__next__, iter(lost).__next__)
+    line = with_fates(time, delays, lost)
     assert by_the_line(line, time, ahead) == by_the_rule(time, delays, lost)
 
 
@@ -92,44 +98,44 @@ def test_counts_do_not_depend_on_how_far_ahead_commands_came_when_a_run_ends(dra
     ended = min(ended, time.ticks)
     counts = []
     for more in (ahead, [0] * time.ticks, [time.ticks] * time.ticks):
-        line, received = UncertainLine(time, iter(delays).__next__, iter(lost).__next__), 0
+        line, received = with_fates(time, delays, lost), 0
         for tick in range(ended):
             needed = min(time.ticks, max(received, tick - time.lookahead_ticks + 1 + more[tick]))
             line.receive([0.0] * (needed - received))
             received = needed
             line.holds(tick)
-        counts.append([line.tallies[name].column(0, ended * time.steps_per_tick)[-1] for name in (DROPPED, LOST)])
+        counts.append([line.counters[name].column(0, ended * time.steps_per_tick)[-1] for name in (DROPPED, LOST)])
     assert counts[0] == counts[1] == counts[2]
 
 
 def test_of_two_commands_for_the_same_step_the_later_acts_and_none_is_dropped():
     time = Timebase(plant_rate=10_000, control_rate=1000, delay_steps=0, ticks=3)
-    line = UncertainLine(time, iter([10, 0, 0]).__next__, iter([False] * 3).__next__)
+    line = with_fates(time, [10, 0, 0], [False] * 3)
     line.receive([1.0, 2.0, 3.0])
     assert [line.holds(tick) for tick in range(3)] == [[(10, 0.0, -1)], [(10, 2.0, 1)], [(10, 3.0, 2)]]
-    assert not line.tallies[DROPPED].column(0, 30).any()
+    assert not line.counters[DROPPED].column(0, 30).any()
 
 
 def test_a_command_for_the_same_step_as_a_later_one_is_dropped_by_a_third_that_acts_before():
     time = Timebase(plant_rate=10_000, control_rate=1000, delay_steps=0, ticks=4)
-    line = UncertainLine(time, iter([25, 15, 0, 0]).__next__, iter([False] * 4).__next__)
+    line = with_fates(time, [25, 15, 0, 0], [False] * 4)
     line.receive([1.0, 2.0, 3.0, 4.0])
     holds = [line.holds(tick) for tick in range(4)]
     assert holds[2:] == [[(10, 3.0, 2)], [(10, 4.0, 3)]]
-    assert line.tallies[DROPPED].column(0, 40).tolist() == [0.0] * 26 + [2.0] * 15
+    assert line.counters[DROPPED].column(0, 40).tolist() == [0.0] * 26 + [2.0] * 15
 
 
 @pytest.mark.parametrize("delay", [0, 3, 10, 13, 50])
 @pytest.mark.parametrize("effect", [{"jitter": {"kind": "uniform", "most": 0.0}}, {"loss": {"probability": 0.0}}])
 def test_neutral_jitter_and_loss_hold_what_a_plain_line_holds(delay, effect):
     time = Timebase(plant_rate=10_000, control_rate=1000, delay_steps=delay, ticks=300)
-    plain, neutral = CommandLine(time), line_of({"seed": 1, **effect}, time)
-    assert isinstance(neutral, UncertainLine)
+    plain, neutral = DelayLine(time), make_line({"seed": 1, **effect}, time)
+    assert isinstance(neutral, LossyLine)
     for tick in range(time.ticks):
         for line in (plain, neutral):
             line.receive([float(tick)])
         assert neutral.holds(tick) == merged(plain.holds(tick))
-    assert not any(tally.column(0, 3000).any() for tally in neutral.tallies.values())
+    assert not any(tally.column(0, 3000).any() for tally in neutral.counters.values())
 
 
 def merged(holds: list[Any]) -> list[Any]:
@@ -143,7 +149,7 @@ def test_a_delay_beyond_the_run_and_the_loss_of_all_leave_the_device_alone():
     never = {"jitter": {"kind": "gamma", "mean": 1e3, "deviation": 1e-3}}
     all_lost = {"loss": {"probability": 1.0}}
     for effect, lost in ((never, 0), (all_lost, 50), ({**never, **all_lost}, 0)):
-        fate = by_the_line(line_of({"seed": 1, **effect}, time), time, [0] * 50)
+        fate = by_the_line(make_line({"seed": 1, **effect}, time), time, [0] * 50)
         assert fate == Fate([-1] * 500, 0, lost)
 
 
@@ -151,16 +157,16 @@ def test_a_delay_beyond_the_run_and_the_loss_of_all_leave_the_device_alone():
 def test_a_line_remembers_no_more_than_is_on_its_way(mean, deviation, way):
     """Over half a minute: what is overtaken waits to be counted alone, what would come after the run is forgotten."""
     time = Timebase(plant_rate=10_000, control_rate=1000, delay_steps=0, ticks=30_000)
-    line = line_of({"seed": 1, "jitter": {"kind": "gamma", "mean": mean, "deviation": deviation}}, time)
-    assert isinstance(line, UncertainLine)
+    line = make_line({"seed": 1, "jitter": {"kind": "gamma", "mean": mean, "deviation": deviation}}, time)
+    assert isinstance(line, LossyLine)
     coming = counted = uncounted = 0
     for tick in range(time.ticks):
         line.receive([0.0])
         line.holds(tick)
-        coming = max(coming, len(line._coming))
+        coming = max(coming, len(line.state[2]))
         if tick % 1000 == 999:
-            uncounted = max(uncounted, len(line._dropped._steps))
-            counted = line.tallies[DROPPED].column((tick - 999) * 10, (tick + 1) * 10)[-1]
+            uncounted = max(uncounted, len(line.counters[DROPPED].state[1]))
+            counted = line.counters[DROPPED].column((tick - 999) * 10, (tick + 1) * 10)[-1]
     assert coming <= min(50, way)
     assert uncounted <= way  # commands that have a few mean delays yet to go
     assert counted > 1000 or not way
@@ -171,7 +177,7 @@ def taken(draw) -> np.ndarray:
 
 
 def test_uniform_jitter_is_every_step_up_to_the_most_equally_often():
-    delays = taken(additional_delays({"kind": "uniform", "most": 0.0012}, 1, 10_000))
+    delays = taken(make_jitter({"kind": "uniform", "most": 0.0012}, 1, 10_000))
     counts = np.bincount(delays)
     assert len(counts) == 13
     assert stats.chisquare(counts).pvalue > 1e-6
@@ -180,7 +186,7 @@ def test_uniform_jitter_is_every_step_up_to_the_most_equally_often():
 @pytest.mark.parametrize(("mean", "deviation"), [(0.002, 0.001), (0.001, 0.003), (0.01, 1e-5)])
 def test_gamma_jitter_has_its_mean_and_deviation_and_is_rounded_to_the_nearest_step(mean, deviation):
     """Every step against the integral of the density over half a step to either side."""
-    delays = taken(additional_delays({"kind": "gamma", "mean": mean, "deviation": deviation}, 1, 10_000))
+    delays = taken(make_jitter({"kind": "gamma", "mean": mean, "deviation": deviation}, 1, 10_000))
     gamma = stats.gamma((mean / deviation) ** 2, scale=deviation**2 / mean * 10_000)
     steps = np.arange(delays.max() + 2)
     expected = MANY * (gamma.cdf(steps + 0.5) - gamma.cdf(np.maximum(steps - 0.5, 0.0)))
@@ -195,7 +201,7 @@ def test_gamma_jitter_has_its_mean_and_deviation_and_is_rounded_to_the_nearest_s
 
 @pytest.mark.parametrize("probability", [0.0, 0.01, 0.9, 1.0])
 def test_each_command_is_lost_by_itself_with_its_probability(probability):
-    lost = taken(losses({"probability": probability}, 1))
+    lost = taken(make_loss({"probability": probability}, 1))
     assert stats.binomtest(int(lost.sum()), MANY, probability).pvalue > 1e-6
     after_a_loss = lost[1:][lost[:-1]]
     if len(after_a_loss):
@@ -215,7 +221,7 @@ LATE = {"jitter": {"kind": "gamma", "mean": 0.002, "deviation": 0.002}, "loss": 
 
 def expected_fate(delays: int, seed: int, jitter: dict[str, Any], probability: float, ticks: int) -> Fate:
     time = Timebase(plant_rate=10_000, control_rate=1000, delay_steps=delays, ticks=ticks)
-    late, lost = additional_delays(jitter, seed, 10_000), losses({"probability": probability}, seed)
+    late, lost = make_jitter(jitter, seed, 10_000), make_loss({"probability": probability}, seed)
     return by_the_rule(time, [late() for _ in range(ticks)], [lost() for _ in range(ticks)])
 
 

@@ -11,7 +11,7 @@ from haploop.logger.books.one_mass import OneMassBooks
 from haploop.logger.books.sums import sum_steps
 from haploop.logger.books.work import Displacement, by_interval
 from haploop.plant.motion.mechanics import Mechanics
-from haploop.plant.motion.transition import StepFlow
+from haploop.plant.motion.transition import make_foh_transition
 from haploop.protocol.ticks import Timebase
 from helpers.runs.captured import run
 from helpers.scenes.least import scene
@@ -27,8 +27,8 @@ SWINGING = {
 
 def plainly_added(resolved) -> tuple[np.ndarray, np.ndarray]:
     """The motion without forces by the same flow, x + dx and v + dv rounded at every step."""
-    m, time = Mechanics.of(resolved), Timebase.from_clock(resolved["clock"], resolved["duration"])
-    flow = StepFlow.of(m.mass_kg, m.damping, m.stiffness, time.step_s)
+    m, time = Mechanics.from_scene(resolved), Timebase.from_clock(resolved["clock"], resolved["duration"])
+    flow = make_foh_transition(m.mass_kg, m.damping, m.stiffness, time.step_s)
     x, v = m.start
     states = [(x, v)]
     for _ in range(time.ticks * time.steps_per_tick):
@@ -50,7 +50,7 @@ def relative_residual(resolved, x: np.ndarray, v: np.ndarray) -> float:
 
 
 def energies(resolved, x: np.ndarray, v: np.ndarray) -> np.ndarray:
-    m = Mechanics.of(resolved)
+    m = Mechanics.from_scene(resolved)
     return m.kinetic_J(v) + m.spring_J(x)
 
 

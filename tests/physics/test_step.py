@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.integrate import quad_vec
 from scipy.linalg import expm
 
-from haploop.plant.motion.transition import StepFlow, gramian, motion_integrals, natural_rate
+from haploop.plant.motion.transition import FohTransition, gramian, make_foh_transition, motion_integrals, natural_rate
 from oracles.decimal_flow import flow_minus_identity
 
 H = 1e-4
@@ -31,7 +31,7 @@ POSITIVE = st.floats(1e-3, 10.0)
 systems = st.tuples(POSITIVE, st.floats(0.0, 20.0), st.floats(0.0, 2e4), st.sampled_from([1e-3, H, 1e-5]))
 
 
-def coefficients(flow: StepFlow) -> np.ndarray:
+def coefficients(flow: FohTransition) -> np.ndarray:
     """Rows dx, dv over x, v, F(0), F(h) - F(0)."""
     f = flow
     return np.array([[f.x_x, f.x_v, f.x_force, f.x_slope], [f.v_x, f.v_v, f.v_force, f.v_slope]])
@@ -41,7 +41,7 @@ def coefficients(flow: StepFlow) -> np.ndarray:
 def test_every_coefficient_of_a_step_is_right_to_the_last_bits(case):
     """Against fifty digits; a coefficient is small beside others at times, and right all the same."""
     expected = flow_minus_identity(*CASES[case])
-    flow = StepFlow.of(*CASES[case])
+    flow = make_foh_transition(*CASES[case])
     for name, value in expected.items():
         assert getattr(flow, name) == pytest.approx(value, rel=4e-15, abs=0), name
 
@@ -52,34 +52,34 @@ def test_a_step_is_what_the_matrix_exponential_says(system):
     scaled = np.array([[0, h, 0, 0], [-stiffness / mass * h, -damping / mass * h, h / mass, 0], [0, 0, 0, 1], [0] * 4])
     expected = expm(scaled)[:2] - np.eye(4)[:2]
     scale = np.abs(expm(scaled)[:2])
-    assert np.abs(coefficients(StepFlow.of(*system)) - expected).max() <= 1e-12 * scale.max()
+    assert np.abs(coefficients(make_foh_transition(*system)) - expected).max() <= 1e-12 * scale.max()
 
 
 @given(systems, st.tuples(*[st.floats(-1.0, 1.0)] * 4))
 def test_two_half_steps_are_one_step_where_the_force_is_a_straight_line(system, start):
     mass, damping, stiffness, h = system
     x, v, force, rise = start
-    whole = coefficients(StepFlow.of(*system)) @ start
-    half = coefficients(StepFlow.of(mass, damping, stiffness, h / 2))
+    whole = coefficients(make_foh_transition(*system)) @ start
+    half = coefficients(make_foh_transition(mass, damping, stiffness, h / 2))
     middle = np.array([x, v]) + half @ [x, v, force, rise / 2]
     end = middle + half @ [*middle, force + rise / 2, rise / 2]
-    largest = np.abs(coefficients(StepFlow.of(*system))).sum(axis=1) + np.abs([x, v])
+    largest = np.abs(coefficients(make_foh_transition(*system))).sum(axis=1) + np.abs([x, v])
     assert np.all(np.abs(end - [x, v] - whole) <= 1e-14 * (largest + 1))
 
 
 def test_simple_systems_step_as_their_textbook_solutions():
     """No forces at all; a damper alone; an undamped swing; the critical one."""
-    free = StepFlow.of(0.02, 0.0, 0.0, H)
+    free = make_foh_transition(0.02, 0.0, 0.0, H)
     assert (free.x_x, free.x_v, free.v_x, free.v_v) == (0.0, H, 0.0, 0.0)
     assert free.x_force == pytest.approx(H**2 / 0.04, rel=1e-15)
     assert free.x_slope == pytest.approx(H**2 / 0.12, rel=1e-15)
-    damper = StepFlow.of(0.02, 0.11, 0.0, H)
+    damper = make_foh_transition(0.02, 0.11, 0.0, H)
     assert damper.v_v == pytest.approx(np.expm1(-0.11 * H / 0.02), rel=1e-15)
-    swing = StepFlow.of(0.02, 0.0, 10.0, H)
+    swing = make_foh_transition(0.02, 0.0, 10.0, H)
     w = np.sqrt(500.0)
     assert swing.x_x == pytest.approx(-2 * np.sin(w * H / 2) ** 2, rel=1e-14)
     assert swing.x_v == pytest.approx(np.sin(w * H) / w, rel=1e-14)
-    critical = StepFlow.of(0.02, CRITICAL, 10.0, H)
+    critical = make_foh_transition(0.02, CRITICAL, 10.0, H)
     assert critical.x_x == pytest.approx(np.expm1(-w * H) + w * H * np.exp(-w * H), rel=1e-11)
     assert critical.x_v == pytest.approx(H * np.exp(-w * H), rel=1e-14)
 

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from haploop.logger.books import books, one_mass
-from haploop.plant.motion.transition import HeldFlow, StepFlow
+from haploop.plant.motion import one_mass as of_plant
+from haploop.plant.motion.transition import FohTransition
 from helpers.runs.captured import run
 from helpers.scenes.least import scene
 from helpers.scenes.random_scenes import is_comparable
@@ -82,30 +83,30 @@ def test_the_work_of_a_straight_line_force_is_not_its_mean_times_the_way(monkeyp
     assert run(busy()).relative_residual > 1e-12
 
 
-def euler(mass: float, damping: float, stiffness: float, step_s: float) -> StepFlow:
+def euler(mass: float, damping: float, stiffness: float, step_s: float) -> FohTransition:
     """x+ = x + h v, v+ = v + h a: explicit Euler."""
     h, m = step_s, mass
-    return StepFlow(0.0, h, 0.0, 0.0, -stiffness / m * h, -damping / m * h, h / m, 0.0)
+    return FohTransition(0.0, h, 0.0, 0.0, -stiffness / m * h, -damping / m * h, h / m, 0.0)
 
 
-def semi_implicit_euler(mass: float, damping: float, stiffness: float, step_s: float) -> StepFlow:
+def semi_implicit_euler(mass: float, damping: float, stiffness: float, step_s: float) -> FohTransition:
     """v+ = v + h a, x+ = x + h v+."""
     e = euler(mass, damping, stiffness, step_s)
     h = step_s
-    return StepFlow(h * e.v_x, h * (1 + e.v_v), h * e.v_force, 0.0, e.v_x, e.v_v, e.v_force, 0.0)
+    return FohTransition(h * e.v_x, h * (1 + e.v_v), h * e.v_force, 0.0, e.v_x, e.v_v, e.v_force, 0.0)
 
 
 def step_by(method: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     """Have the plant step by another method, over any number of steps."""
 
-    def held(mass: float, damping: float, stiffness: float, step_s: float, steps: int) -> HeldFlow:
+    def held(mass: float, damping: float, stiffness: float, step_s: float, steps: int) -> np.ndarray:
         s = method(mass, damping, stiffness, step_s)
         one = np.array([[s.x_x, s.x_v, s.x_force], [s.v_x, s.v_v, s.v_force], [0.0, 0.0, 0.0]])
         powers = [np.linalg.matrix_power(np.eye(3) + one, count) - np.eye(3) for count in range(steps + 1)]
-        return HeldFlow(np.array([power[:2].ravel() for power in powers]))
+        return np.array([power[:2].ravel() for power in powers])
 
-    monkeypatch.setattr(StepFlow, "of", method)
-    monkeypatch.setattr(HeldFlow, "of", held)
+    monkeypatch.setattr(of_plant, "make_foh_transition", method)
+    monkeypatch.setattr(of_plant, "make_zoh_transitions", held)
 
 
 def swinging() -> dict:

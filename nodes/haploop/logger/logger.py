@@ -16,7 +16,7 @@ from haploop.logger.log.columns import motion_columns
 from haploop.logger.summary import summary
 from haploop.logger.verdict.verdict import RunMeasures
 from haploop.logger.verdict.window import CONTROLLER_COLUMNS, Window
-from haploop.plant.counters import TALLIES
+from haploop.plant.counters import COUNTERS
 from haploop.protocol.ticks import Timebase
 
 Block = dict[str, Any]
@@ -125,7 +125,7 @@ class Logger:
         self.window.add(x[:, None], force[:-1, None], columns)
         self._measures = None
         self._digest.update(np.stack([x[1:], v[1:]], axis=1).tobytes())
-        for name in plant.keys() & TALLIES:
+        for name in plant.keys() & COUNTERS:
             self._counted[name] = self._counted.get(name, 0) + int(plant[name][-1] - plant[name][0])
         motion = motion_columns(plant)
         first, books = self.tick, self._named(rows)
@@ -178,7 +178,7 @@ class Logger:
     def _counts(self, telemetry_gaps: int) -> dict[str, dict[str, int]]:
         """Counts of what was lost, and of the scene's effects, by entry of the summary."""
         entries = {"lost": {"commands_dropped": 0, "commands_lost": 0, "telemetry_gaps": telemetry_gaps}}
-        for name in TALLIES:
+        for name in COUNTERS:
             if name in self._counted:
                 entry, _, what = name.partition(".")
                 entries.setdefault(entry, {})[what] = self._counted[name]

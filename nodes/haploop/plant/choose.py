@@ -1,30 +1,28 @@
-"""Which motion a scene asks for."""
+"""The choice of the motion and the position sensor that a scene asks for."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from haploop.plant.motion.one_mass import LinearMotion
-from haploop.plant.sensing.encoder import accelerometer_is_used
+from haploop.plant.integrators.registry import find_integrator
+from haploop.plant.motion.one_mass import OneMassMotion
+from haploop.plant.sensing.encoder import PositionSensor, accelerometer_is_used
 from haploop.protocol.ticks import Timebase
 
-if TYPE_CHECKING:
-    from haploop.plant.chain.history import ChainHistory
 
-
-def integrator_of(scene: dict[str, Any]) -> str:
-    """What moves the bodies from one plant step to the next."""
+def integrator_name(scene: dict[str, Any]) -> str:
+    """Returns the name of the integrator that moves the bodies of a resolved scene."""
     return scene["clock"].get("integrator", "exact")
 
 
 def needs_chain(scene: dict[str, Any]) -> bool:
-    """Whether there is more than one mass under held forces that change at the same steps of every interval.
+    """Tells whether there is more than one mass under held forces that change at the same steps of every interval.
 
-    All integrators but the exact flow move a chain of bodies, be it of one.
+    All integrators but the exact transition move a chain of bodies, be it of one.
     """
     sensor = scene.get("accelerometer", {}) if accelerometer_is_used(scene) else {}
     return (
-        integrator_of(scene) != "exact"
+        integrator_name(scene) != "exact"
         or any(table in scene for table in ("friction", "transmission", "jitter", "loss"))
         or "grip" in scene.get("hand", {})
         or "bandwidth" in scene.get("actuator", {})
@@ -33,36 +31,31 @@ def needs_chain(scene: dict[str, Any]) -> bool:
     )
 
 
-def motion_of(scene: dict[str, Any], time: Timebase) -> LinearMotion | ChainHistory:
-    """The least that moves this scene; nothing else is even imported."""
-    integrator = integrator_of(scene)
-    if integrator != "exact":
-        return _integrated(integrator, scene, time)
+def make_motion(scene: dict[str, Any], time: Timebase, members: int | None = None) -> Any:
+    """Makes the least motion that moves a scene; nothing else is even imported.
+
+    Args:
+        scene: a resolved scene; in a batch a stacked one, whose numbers are floats, or arrays of shape (members,).
+        time: the integers of the run.
+        members: of the batch, whose integrator is exact; None for one run.
+    """
+    if not needs_chain(scene):
+        return OneMassMotion(scene, time, members)
+    if members is None:
+        return find_integrator(integrator_name(scene)).make_motion(scene, time)
     if "friction" in scene:
-        from haploop.plant.friction.motion import FrictionMotion
+        from haploop.plant.friction.batch import BatchFrictionMotion
 
-        return FrictionMotion(scene, time)
-    if needs_chain(scene):
-        from haploop.plant.chain.motion import ChainMotion
+        return BatchFrictionMotion(scene, time, members)
+    from haploop.plant.chain.motion import ChainMotion
 
-        return ChainMotion(scene, time)
-    return LinearMotion(scene, time)
+    return ChainMotion(scene, time, members)
 
 
-def _integrated(integrator: str, scene: dict[str, Any], time: Timebase) -> ChainHistory:
-    """The motion by another method than the exact flow."""
-    if integrator == "dop853":
-        if "friction" in scene:
-            from haploop.plant.integrators.dop853_friction import Dop853FrictionMotion
+def make_position_sensor(scene: dict[str, Any], time: Timebase) -> PositionSensor:
+    """Makes the position sensor of a resolved scene, or of the stacked scene of a batch."""
+    if "noise" not in scene:
+        return PositionSensor(scene.get("encoder"))
+    from haploop.plant.sensing.noise import NoisyPositionSensor
 
-            return Dop853FrictionMotion(scene, time)
-        from haploop.plant.integrators.dop853 import Dop853Motion
-
-        return Dop853Motion(scene, time)
-    if "friction" in scene:
-        from haploop.plant.integrators.stepwise_friction import StepwiseFrictionMotion
-
-        return StepwiseFrictionMotion(scene, time)
-    from haploop.plant.integrators.stepwise import StepwiseMotion
-
-    return StepwiseMotion(scene, time)
+    return NoisyPositionSensor(scene.get("encoder"), scene["noise"], scene["seed"], time.period_s)

@@ -1,6 +1,8 @@
-"""How often something happened, step by step."""
+"""Counters of what happens to commands and readings."""
 
 from __future__ import annotations
+
+from typing import Any
 
 import numpy as np
 
@@ -8,25 +10,37 @@ import numpy as np
 DROPPED, LOST = "lost.commands_dropped", "lost.commands_lost"
 SATURATED = "actuator.saturated_commands"
 CLIPPED = "accelerometer.clipped_ticks"
-TALLIES = (DROPPED, LOST, SATURATED, CLIPPED)
+COUNTERS = (DROPPED, LOST, SATURATED, CLIPPED)
 
 
-class Tally:
-    """Counts what happens at plant steps, noted in any order and possibly before the plant gets there.
+class Counter:
+    """Counter of events at plant steps, noted in any order and possibly before the plant gets there.
 
     What is counted so depends on the steps done alone, not on how far ahead commands or samples have come.
 
     Attributes:
-        note: takes the step of something that happens.
+        state: (events before the steps told last, steps of the others).
     """
 
     def __init__(self) -> None:
         self._steps: list[int] = []
         self._before = 0
-        self.note = self._steps.append
+
+    def note(self, step: int, happened: Any = True) -> None:
+        """Counts an event at a step, if it happened."""
+        if happened:
+            self._steps.append(step)
+
+    @property
+    def state(self) -> Any:
+        return self._before, tuple(self._steps)
+
+    def restore(self, state: Any) -> None:
+        """Goes on from a state."""
+        self._before, self._steps = state[0], list(state[1])
 
     def column(self, first: int, end: int) -> np.ndarray:
-        """How often it happened before each of the steps first ... end; forgets what lies before ``end``.
+        """Returns the number of events before each of the steps first ... end; forgets those before ``end``.
 
         Returns:
             Shape (end - first + 1,), float64.
@@ -34,5 +48,40 @@ class Tally:
         steps = np.sort(np.array(self._steps, np.int64))
         counts = self._before + np.searchsorted(steps, np.arange(first, end + 1))
         self._before = int(counts[-1])
-        self._steps[:] = [step for step in self._steps if step >= end]
+        self._steps = [step for step in self._steps if step >= end]
         return counts.astype(float)
+
+    def select(self, kept: np.ndarray) -> None:
+        """A counter of one run has no members to drop."""
+
+
+class BatchCounter(Counter):
+    """Counter of the events of every member of a batch, whatever their steps.
+
+    Attributes:
+        state: the number of events so far, shape (members,).
+    """
+
+    def __init__(self, members: int) -> None:
+        self._count: Any = np.zeros(members, np.int64)
+
+    def note(self, step: int, happened: Any = True) -> None:
+        """Counts an event of the members it happened to, shape (members,) or one truth value for all."""
+        self._count = self._count + happened
+
+    @property
+    def state(self) -> Any:
+        return self._count
+
+    def restore(self, state: Any) -> None:
+        """Goes on from a state."""
+        self._count = state
+
+    def select(self, kept: np.ndarray) -> None:
+        """Drops the members that are not kept, shape (members,)."""
+        self._count = self._count[kept]
+
+
+def make_counter(members: int | None) -> Counter:
+    """Makes the counter of one run (None), or of a batch of so many members."""
+    return Counter() if members is None else BatchCounter(members)

@@ -6,11 +6,10 @@ import math
 from collections.abc import Callable
 from typing import Any
 
-from haploop.plant.choose import motion_of
-from haploop.plant.line.delay import Hold, line_of
-from haploop.plant.line.retimed import RetimedLine
-from haploop.plant.motion.one_mass import LinearMotion
-from haploop.plant.sensing.encoder import accelerometer, accelerometer_is_used, position_sensor
+from haploop.plant.choose import make_motion, make_position_sensor
+from haploop.plant.line.base import Hold
+from haploop.plant.line.delay import make_line
+from haploop.plant.sensing.encoder import accelerometer_is_used
 from haploop.protocol.ticks import DELAY, Timebase
 
 # From the first tick and its samples to the commands that answer them.
@@ -26,37 +25,40 @@ class Plant:
     """
 
     def __init__(self, scene: dict[str, Any], time: Timebase) -> None:
-        self._motion = motion_of(scene, time)
+        self._motion = make_motion(scene, time)
         self._steps, self._most = time.steps_per_tick, time.lookahead_ticks + 1
         self._control_rate = time.control_rate
-        self._line = line_of(scene, time)
-        self._tallies = dict(self._line.tallies)
+        self._line = make_line(scene, time)
+        self._counters = dict(self._line.counters)
         self._limit_m = scene["diverged_beyond"]
-        self._quantise = position_sensor(scene, time)
-        feel = self._acceleration = self._motion.acceleration
-        if sensor := accelerometer(scene, time):
-            self._acceleration = lambda tick: sensor.reading(feel(tick))
-            self._tallies |= sensor.tallies
+        self._position, self._sensor = make_position_sensor(scene, time), None
+        if accelerometer_is_used(scene) and "accelerometer" in scene:
+            from haploop.plant.sensing.accelerometer import Accelerometer
+
+            self._sensor = Accelerometer(scene["accelerometer"], scene["seed"], time)
+            self._counters |= self._sensor.counters
         self._measure = self._measure_both if accelerometer_is_used(scene) else self._measure_position
         self._interval_due = self._unusable = False
         self._block_first = 0
         self._delays: list[tuple[int, int]] = []
+        self._delay_now: int | None = None
         self.tick = 0
         self.stop_reason: str | None = None
 
-    def _measure_position(self) -> tuple[float, ...]:
-        return (self._quantise(self._motion.x),)
+    def _measure_position(self, x: float) -> tuple[float, ...]:
+        return (self._position.reading(x),)
 
-    def _measure_both(self) -> tuple[float, ...]:
-        return self._quantise(self._motion.x), self._acceleration(self.tick)
+    def _measure_both(self, x: float) -> tuple[float, ...]:
+        acceleration, sensor = self._motion.acceleration(self.tick), self._sensor
+        return self._position.reading(x), sensor.reading(acceleration) if sensor else acceleration
 
     def schedule(self, tick: int, change: dict[str, Any]) -> None:
-        """Have a change take effect at ``tick``, if it is one of the line's delay: command ``tick`` is the first."""
+        """Has a change take effect at ``tick``, if it is one of the line's delay: command ``tick`` is the first."""
         if DELAY in (values := change.get("set", {})):
             self._delays.append((tick, round(values[DELAY] * self._steps * self._control_rate)))
 
     def run_until(self, end: int, exchange: Exchange) -> None:
-        """Work up to tick ``end``, or to where the plant stops by itself; delays change on the way.
+        """Works up to tick ``end``, or to where the plant stops by itself; delays change on the way.
 
         ``exchange`` is given the first tick of at most L + 1 samples and returns the forces in N that answer them.
         """
@@ -68,14 +70,12 @@ class Plant:
         self._work_until(end, exchange)
 
     def _retime(self, delay_steps: int) -> None:
-        line = self._line.retimed(delay_steps, self.tick)
-        if isinstance(self._motion, LinearMotion) and not isinstance(line, RetimedLine):
-            line = RetimedLine(line, self._motion)
-        self._line, self._most = line, delay_steps // self._steps + 1
-        self._tallies |= line.tallies
+        self._line = self._line.retimed(delay_steps, self.tick)
+        self._delay_now, self._most = delay_steps, delay_steps // self._steps + 1
+        self._counters |= self._line.counters
 
     def _work_until(self, end: int, exchange: Exchange) -> None:
-        """The same with one delay."""
+        """Works up to tick ``end`` with one delay."""
         most = self._most
         while (tick := self.tick) < end and self.stop_reason is None:
             samples = self.samples(min(most, end - tick))
@@ -85,7 +85,7 @@ class Plant:
             self._advance()
 
     def samples(self, count: int) -> list[tuple[float, ...]]:
-        """The next ``count`` samples, (x_m,) or (x_m, acceleration) each; fewer when the plant diverged.
+        """Returns the next ``count`` samples, (x_m,) or (x_m, acceleration) each; fewer when the plant diverged.
 
         Commands up to ``tick + count - 2 - L`` must have been received.
         """
@@ -93,13 +93,13 @@ class Plant:
         for _ in range(count):
             if self._interval_due and not self._advance():
                 break
-            samples.append(self._measure())
+            samples.append(self._measure(self._motion.x))
             self.tick += 1
             self._interval_due = True
         return samples
 
     def receive(self, forces: list[float]) -> None:
-        """Take the next commands, in order of their ticks."""
+        """Takes the next commands, in order of their ticks."""
         self._line.receive(forces)
         total = sum(forces)
         if total - total != 0.0:  # infinite or not a number
@@ -111,20 +111,20 @@ class Plant:
         return self.tick - self._interval_due
 
     def _advance(self) -> bool:
-        """Step through interval ``tick - 1``; False when the run has to end where the plant now is."""
-        tick, motion = self.tick - 1, self._motion
+        """Steps through interval ``tick - 1``; False when the run has to end where the plant now is."""
+        tick = self.tick - 1
         holds = self._line.holds(tick)
         if self._unusable and self._refuse(tick, holds):
             return False
-        motion.advance(tick, holds)
+        x = self._motion.advance(tick, holds)
         self._interval_due = False
-        if not -self._limit_m <= motion.x <= self._limit_m:
-            self._stop(tick + 1, beyond(motion.x, self._limit_m))
+        if not -self._limit_m <= x <= self._limit_m:
+            self._stop(tick + 1, beyond(x, self._limit_m))
             return False
         return True
 
     def _refuse(self, tick: int, holds: list[Hold]) -> bool:
-        """End the run before interval ``tick`` if a force in it is no finite number."""
+        """Ends the run before interval ``tick`` if a force in it is no finite number."""
         for _, force, command in holds:
             if not math.isfinite(force):
                 self._stop(tick, f"command {command} was {force}, which no device can apply")
@@ -135,12 +135,13 @@ class Plant:
         self.stop_reason = f"{what}, at tick {tick}"
 
     def state(self) -> dict[str, float]:
-        """Where the plant is now: tick reached, x, v, force and command last in effect."""
+        """Returns where the plant is now: tick reached, x, v, force and command last in effect."""
         motion = self._motion
-        return {"tick": self.reached, "x": motion.x, "v": motion.v, "force": motion.force, "command": motion.command}
+        _, force, command = motion.last
+        return {"tick": self.reached, "x": motion.x, "v": motion.v, "force": force, "command": command}
 
     def take_block(self) -> tuple[int, int, dict[str, bytes]]:
-        """(first tick, ticks, columns) of what was stepped since the last block; empties it.
+        """Returns (first tick, ticks, columns) of what was stepped since the last block; empties it.
 
         Columns x, v, x_low (what rounding to a float left of x), force and command are little-endian float64 with
         ``ticks * n + 1`` rows: every step of the block and its end state, whose force and command are the last
@@ -149,13 +150,13 @@ class Plant:
         first, reached = self._block_first, self.reached
         record = self._motion.take_record(first)
         steps = first * self._steps, reached * self._steps
-        record |= {name: tally.column(*steps) for name, tally in self._tallies.items()}
+        record |= {name: counter.column(*steps) for name, counter in self._counters.items()}
         self._block_first = reached
         return first, reached - first, {name: column.tobytes() for name, column in record.items()}
 
 
 def beyond(x: float, limit_m: float) -> str:
-    """Why a run ends with the device at x, not within ``limit_m`` of 0."""
+    """Returns why a run ends with the device at x, not within ``limit_m`` of 0."""
     if math.isfinite(x):
         return f"the device was at {x:g} m, beyond the limit of {limit_m:g} m"
     return f"the arithmetic failed, not the device: its position came out as {x}"

@@ -7,7 +7,7 @@ import numpy as np
 
 from haploop.controller.controller import make_params
 from haploop.controller.tick import StateTuple, initial_state, tick
-from haploop.plant.sensing.encoder import encoder
+from haploop.plant.sensing.encoder import make_encoder
 
 T = 1e-3
 COUNT = 1e-5
@@ -37,5 +37,5 @@ def floats(values: np.ndarray) -> list[float]:
 
 
 def measured(x: np.ndarray, rounding: str = "nearest") -> list[float]:
-    measure = encoder({"resolution": COUNT, "rounding": rounding})
+    measure = make_encoder({"resolution": COUNT, "rounding": rounding})
     return [measure(at) for at in floats(x)]

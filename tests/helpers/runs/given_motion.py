@@ -9,7 +9,7 @@ import numpy as np
 from haploop.controller.controller import Controller
 from haploop.logger.logger import Logger
 from haploop.logger.summary import energy
-from haploop.plant.sensing.encoder import encoder
+from haploop.plant.sensing.encoder import make_encoder
 from haploop.protocol.ticks import Timebase
 from helpers.scenes.least import KINDS
 
@@ -28,7 +28,7 @@ def books_along(scene: dict[str, Any], x: np.ndarray) -> tuple[dict[str, np.ndar
     time = Timebase.from_clock(scene["clock"], scene["duration"])
     n, steps = time.steps_per_tick, time.ticks * time.steps_per_tick
     assert len(x) == steps + 1
-    measure = encoder(scene.get("encoder"))
+    measure = make_encoder(scene.get("encoder"))
     controller = Controller(scene, time, KINDS)
     commands = controller.answer([(measure(float(at)),) for at in x[:-1:n]])
     in_effect = np.maximum((np.arange(steps + 1) - time.delay_steps) // n, -1)

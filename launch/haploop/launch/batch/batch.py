@@ -17,10 +17,11 @@ from haploop.launch.batch.object_state import keep
 from haploop.launch.batch.stacking import stacked
 from haploop.launch.runs.in_process import scene_events
 from haploop.logger.batch import BatchLogger, MemberEnd
-from haploop.plant.choose_batch import motion_of
-from haploop.plant.line.delay import line_of
+from haploop.plant.choose import make_motion, make_position_sensor
+from haploop.plant.line.delay import make_line
 from haploop.plant.plant import beyond
-from haploop.plant.sensing.encoder import accelerometer, accelerometer_is_used, position_sensor
+from haploop.plant.sensing.accelerometer import make_accelerometer
+from haploop.plant.sensing.encoder import accelerometer_is_used
 from haploop.protocol.ticks import Timebase
 
 if TYPE_CHECKING:
@@ -63,14 +64,15 @@ class LoopArray:
     ) -> None:
         self._scenes, scene = scenes, stacked(scenes)
         self._time = time = Timebase.from_clock(scene["clock"], scene["duration"])
-        self._motion, self._line = motion_of(scene, time), line_of(scene, time)
-        self._quantise, self._sensor = position_sensor(scene, time), accelerometer(scene, time)
+        members = len(scenes)
+        self._motion, self._line = make_motion(scene, time, members), make_line(scene, time, members)
+        self._position, self._sensor = make_position_sensor(scene, time), make_accelerometer(scene, time, members)
         self._feels = accelerometer_is_used(scene)
         self._rows = BatchRecorder()
         self._controller = Controller(scene, time, kinds, self._rows)
         self._elements = Unchanged(self._controller.params.elements)
         self._logger = BatchLogger(scene, time, len(scenes), energy=energy, trajectories=trajectories)
-        self._take = self._motion.take_record if energy or trajectories else self._motion.take_positions
+        self._positions_only = not (energy or trajectories)
         self._in_flight: deque[Any] = deque(maxlen=time.lookahead_ticks + 1)
         self._limit_m, self._usual_buffer = scene["diverged_beyond"], np.getbufsize()
         self._scene_of = np.arange(len(scenes))
@@ -113,7 +115,7 @@ class LoopArray:
         return False
 
     def _work(self, tick: int) -> None:
-        motion, x_m = self._motion, self._quantise(self._motion.x)
+        motion, x_m = self._motion, self._position.reading(self._motion.x)
         sample = (x_m, self._felt(tick)) if self._feels else (x_m,)
         forces = self._controller.answer([sample])
         self._check_elements(tick)
@@ -136,7 +138,8 @@ class LoopArray:
     def _book(self) -> None:
         rows = self._rows.take_rows()
         if rows:
-            self._logger.book(self._take(self._logger.tick), rows, self._controller.params.wall.inward)
+            plant = self._motion.take_record(self._logger.tick, positions_only=self._positions_only)
+            self._logger.book(plant, rows, self._controller.params.wall.inward)
 
     def _look_for_ends(self, tick: int) -> None:
         inside = np.abs(self._motion.x) <= self._limit_m
@@ -161,9 +164,8 @@ class LoopArray:
             if sound[place]:
                 index = int(self._scene_of[place])
                 ends[index] = MemberEnd(place, self._scenes[index], float(x[place]), float(v[place]), reason)
-        counted = dict.fromkeys(self._line.tallies, getattr(self._line, "saturated", 0))
-        if self._sensor:
-            counted |= dict.fromkeys(self._sensor.tallies, getattr(self._sensor, "clipped", 0))
+        counters = self._line.counters | (self._sensor.counters if self._sensor else {})
+        counted = {name: counter.state for name, counter in counters.items()}
         with _collector_at_rest(), _buffers_of(self._usual_buffer):
             outcomes = self._logger.outcomes(list(ends.values()), ended, counted)
             for index, outcome in zip(ends, outcomes, strict=True):
@@ -171,8 +173,9 @@ class LoopArray:
 
     def _drop_ended(self) -> None:
         on = ~self._ended
-        parts = [self._motion, self._line, self._quantise, self._sensor, self._logger]
-        keep([*parts, self._in_flight], on)
+        for part in (self._motion, self._line, self._position, *([self._sensor] if self._sensor else [])):
+            part.select(on)
+        keep([self._logger, self._in_flight], on)
         self._controller.select(on)
         self._elements = Unchanged(self._controller.params.elements)
         self._limit_m = self._limit_m[on] if isinstance(self._limit_m, np.ndarray) else self._limit_m

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from haploop.plant.motion.hand_force_batch import HandForceArray
+from haploop.plant.motion.hand_force import HandForce
 from haploop.protocol.arrays import Shared
 
 
@@ -76,7 +76,7 @@ class _Walk:
             case FunctionType():
                 for cell in value.__closure__ or ():
                     cell.cell_contents = self.visit(cell.cell_contents)
-            case HandForceArray() if value.is_shared:
+            case HandForce() if value.is_shared:
                 pass
             case Shared():
                 pass

@@ -29,7 +29,7 @@ def runs_in_arrays(scene: dict[str, Any]) -> bool:
         return False
     if any(DELAY in event.get("set", {}) for event in scene.get("event", [])):
         return False
-    return not needs_chain(scene) or Chain.of(scene).real_for(1.0 / scene["clock"]["plant_rate"]) is np.float64
+    return not needs_chain(scene) or Chain.from_scene(scene).real_for(1.0 / scene["clock"]["plant_rate"]) is np.float64
 
 
 def structure(scene: dict[str, Any]) -> Hashable:

@@ -37,13 +37,13 @@ def _check_rate(draft: Draft, scene: dict[str, Any]) -> None:
         from haploop.plant.chain.chain import Chain
         from haploop.plant.friction.substeps import MOST_PARTS, parts_of_a_step
 
-        parts = parts_of_a_step(Chain.of(scene), 1.0 / rate)
+        parts = parts_of_a_step(Chain.from_scene(scene), 1.0 / rate)
         if parts > MOST_PARTS:
             least = rate * parts // MOST_PARTS
             expected = f"With friction on bodies that swing this fast it must be at least {least} Hz."
             draft.complain(("clock", "plant_rate"), expected, f"is {rate} Hz")
         return
-    from haploop.plant.integrators.one_step import friction_brakes
+    from haploop.plant.integrators.stability import friction_brakes
 
     if not friction_brakes(scene):
         expected = f"Friction on bodies that swing this fast does not brake them by {integrator}; raise it."
@@ -109,7 +109,7 @@ def note_accelerometer(scene: dict[str, Any]) -> list[str]:
 
 def note_growth(scene: dict[str, Any]) -> list[str]:
     """Says where a method of a fixed step makes the bodies swing ever wider by itself."""
-    from haploop.plant.integrators.one_step import growth
+    from haploop.plant.integrators.stability import growth
 
     factor = growth(scene)
     if factor <= 1.0 + _ROUNDING:

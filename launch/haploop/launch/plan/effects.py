@@ -13,7 +13,8 @@ from typing import Any
 from haploop.controller.estimators.choose import estimator_class, estimators_for
 from haploop.launch.plan import checks, ideal
 from haploop.launch.plan.effect import Effect, Resolved, at, without_keys
-from haploop.launch.plan.modules import CHAIN, COUNTED, HISTORY, LINE, METHODS, NOISY, RUBBING, STEPWISE
+from haploop.launch.plan.modules import CHAIN, COUNTED, HISTORY, LINE, NOISY, RUBBING, STEPWISE
+from haploop.plant.integrators.registry import integrator_module
 from haploop.plant.sensing.encoder import accelerometer_is_used
 from haploop.protocol.ticks import Timebase
 from haploop.protocol.trees import tree_leaves
@@ -28,7 +29,7 @@ def _plant(module: str, *others: str) -> tuple[str, ...]:
 
 def _integrator(name: str, does: str, *modules: str, **says: Any) -> Effect:
     """Makes the effect of a method of ``clock.integrator``, written in a module of its own."""
-    own = (f"{METHODS}.{name.replace('-', '_')}", *modules)
+    own = (integrator_module(name), *modules)
     return Effect(
         "clock.integrator",
         "plant",
@@ -137,7 +138,7 @@ EFFECTS: tuple[Effect, ...] = (
     Effect(
         "friction",
         "plant",
-        ("haploop.plant.friction.law", *RUBBING, *CHAIN),
+        ("haploop.plant.friction.stick_slip", *RUBBING, *CHAIN),
         "motion",
         "dry friction brakes what slips and holds what has stopped",
         columns=("friction",),
@@ -167,7 +168,7 @@ EFFECTS: tuple[Effect, ...] = (
     Effect(
         "noise",
         "plant",
-        _plant("sensing.noise", *NOISY),
+        NOISY,
         "measurement",
         "noise is added to the position",
         states=1,
@@ -215,7 +216,7 @@ EFFECTS: tuple[Effect, ...] = (
     Effect(
         "jitter",
         "plant",
-        _plant("line.jitter", *LINE),
+        LINE,
         "line",
         "each command is delayed by a random number of plant steps; one overtaken is dropped",
         counts=_LINE_COUNTS,
@@ -227,7 +228,7 @@ EFFECTS: tuple[Effect, ...] = (
     Effect(
         "loss",
         "plant",
-        _plant("line.loss", *LINE),
+        LINE,
         "line",
         "commands are lost at random; the device holds the last one",
         counts=_LINE_COUNTS,

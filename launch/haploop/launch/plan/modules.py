@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 # What moves bodies in a row, or one under forces that change between ticks, in place of ``plant.motion.one_mass``.
-HISTORY = tuple(f"haploop.plant.chain.{name}" for name in ("history", "chain", "tables", "sensed_acceleration"))
-_EXACT = tuple(f"haploop.plant.chain.{name}" for name in ("motion", "transition"))
+HISTORY = tuple(f"haploop.plant.chain.{name}" for name in ("history", "chain", "sensed_acceleration", "transition"))
+_EXACT = tuple(f"haploop.plant.chain.{name}" for name in ("motion",))
 CHAIN = (*_EXACT, *HISTORY)
 _EXACT_RUBBING = tuple(f"haploop.plant.friction.{name}" for name in ("motion", "substeps"))
-RUBBING = (*_EXACT_RUBBING, "haploop.plant.friction.stick_slip")
+RUBBING = _EXACT_RUBBING
 # And where another integrator than the exact flow moves them, with friction or without.
 METHODS = "haploop.plant.integrators"
-STEPWISE = (*(f"{METHODS}.{name}" for name in ("stepwise", "one_step", "linear_rates")), *HISTORY)
-_STEPWISE_RUBBING = tuple(f"{METHODS}.{name}" for name in ("stepwise_friction", "friction_projection"))
+STEPWISE = (*(f"{METHODS}.{name}" for name in ("stepwise", "linear_rates")), *HISTORY)
+_STEPWISE_RUBBING = (f"{METHODS}.stepwise_friction",)
 _DOP853_RUBBING = (f"{METHODS}.dop853_friction",)
 DRAWN = ("haploop.plant.random.streams",)
-NOISY = ("haploop.plant.sensing.band_limited_noise", *DRAWN)
+NOISY = ("haploop.plant.sensing.noise", *DRAWN)
 COUNTED = ("haploop.plant.counters",)
 LINE = ("haploop.plant.line.lossy", *DRAWN, *COUNTED, *CHAIN)
 

@@ -10,7 +10,7 @@ from haploop.controller.recorder import MOTION_COLUMNS
 from haploop.launch.plan.effect import Effect, Stage, at
 from haploop.launch.plan.effects import all_effects, effects_of
 from haploop.plant.chain.chain import Chain
-from haploop.plant.choose import integrator_of, needs_chain
+from haploop.plant.choose import integrator_name, needs_chain
 from haploop.protocol.ticks import Timebase
 
 
@@ -60,7 +60,7 @@ class Plan:
 def plan(scene: dict[str, Any]) -> Plan:
     """The plan of a resolved scene."""
     named = effects_of(scene)
-    chain = Chain.of(scene)
+    chain = Chain.from_scene(scene)
     return Plan(
         bodies=dict(zip(chain.bodies, chain.masses_kg, strict=True)),
         states=chain.states,
@@ -87,9 +87,9 @@ def multiplications(scene: dict[str, Any]) -> int:
     One mass is moved once a hold and filled in at the plant steps; bodies in a row are moved to every plant step. The
     classical Runge-Kutta method moves them four times; of DOP853 twelve times a tick are counted, the least there is.
     """
-    time, size = Timebase.from_clock(scene["clock"], scene["duration"]), len(Chain.of(scene).states)
+    time, size = Timebase.from_clock(scene["clock"], scene["duration"]), len(Chain.from_scene(scene).states)
     if needs_chain(scene):
-        moves = {"rk4": 4 * time.steps_per_tick, "dop853": 12}.get(integrator_of(scene), time.steps_per_tick)
+        moves = {"rk4": 4 * time.steps_per_tick, "dop853": 12}.get(integrator_name(scene), time.steps_per_tick)
         return moves * size * (size + 2)
     return (time.steps_per_tick + (2 if time.delay_steps % time.steps_per_tick else 1)) * size * (size + 1)
 
@@ -102,7 +102,7 @@ def _memory(scene: dict[str, Any], named: tuple[Effect, ...]) -> dict[str, int]:
 
 def _plant_step(chain: Chain, named: tuple[Effect, ...], scene: dict[str, Any]) -> tuple[Step, ...]:
     bodies = " - ".join(chain.bodies)
-    method = "exact flow" if integrator_of(scene) == "exact" else integrator_of(scene)
+    method = "exact flow" if integrator_name(scene) == "exact" else integrator_name(scene)
     what = f"{method} of {len(chain.states)} states ({bodies}), the command held, the force of the hand linear"
     return Step("plant", what), *_stage("motion", named, scene)
 

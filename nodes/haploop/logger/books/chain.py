@@ -17,7 +17,7 @@ from haploop.logger.books.segments import Columns, Segments, end_to_end
 from haploop.logger.books.sums import sum_rows, sum_steps
 from haploop.logger.books.work import Displacement, by_interval
 from haploop.plant.chain.chain import Chain
-from haploop.plant.motion.hand_force import hand_force
+from haploop.plant.motion.hand_force import make_hand_force
 from haploop.protocol.arrays import first_row
 from haploop.protocol.ticks import Timebase
 
@@ -45,8 +45,8 @@ class ChainBooks:
 
     def __init__(self, scene: dict[str, Any], time: Timebase, members: int | None = None) -> None:
         # A sensor takes no energy.
-        self._chain = replace(Chain.of(scene), sensor=None)
-        self._n, self._tau = time.steps_per_tick, hand_force(scene, time.plant_rate)
+        self._chain = replace(Chain.from_scene(scene), sensor=None)
+        self._n, self._tau = time.steps_per_tick, make_hand_force(scene, time.plant_rate, members)
         self._rubs, self._is_limited = "friction" in scene, "actuator" in scene
         self._forms = ChainForms(self._chain, time.step_s, of_batch=members is not None and not self._rubs)
         self._heats = [name for name in self._forms.names if name.endswith("_heat")]

@@ -9,8 +9,7 @@ import numpy as np
 
 from haploop.logger.books.segments import Segments
 from haploop.plant.chain.chain import Chain
-from haploop.plant.chain.tables import tables_of
-from haploop.plant.chain.transition import ChainIntegrals
+from haploop.plant.chain.transition import ChainIntegrals, make_tables
 
 
 class ChainForms:
@@ -33,7 +32,7 @@ class ChainForms:
         self.names = [*heats, *["lag"] * (chain.actuator_rate is not None), "lag_integral"]
         self._made: dict[tuple[int, bool], tuple[np.ndarray, np.ndarray]] = {}
         if of_batch:
-            rates, *forms = tables_of(lambda one: _tables(one, step_s), chain)
+            rates, *forms = make_tables(lambda one: _tables(one, step_s), chain)
             self._real: Any = np.float64
             self._rates, self._made[0, False] = {False: rates}, (forms[0], forms[1])
             return

@@ -9,7 +9,7 @@ import numpy as np
 
 from haploop.logger.books.sums import sum_rows, sum_steps
 from haploop.logger.books.work import Displacement, SumSteps, by_interval
-from haploop.plant.motion.hand_force import hand_force
+from haploop.plant.motion.hand_force import make_hand_force
 from haploop.plant.motion.mechanics import Mechanics
 from haploop.plant.motion.transition import motion_integrals, natural_rate
 from haploop.protocol.arrays import each, first_row
@@ -59,7 +59,7 @@ class Ticks(NamedTuple):
 
 def one_mass_params(scene: dict[str, Any], time: Timebase, members: int | None = None) -> OneMassParams:
     """Returns the parameters of a resolved scene, or of a batch of so many in a stacked scene."""
-    m, step_s = Mechanics.of(scene), time.step_s
+    m, step_s = Mechanics.from_scene(scene), time.step_s
 
     def forms(mass: float, damping: float, stiffness: float) -> tuple[np.ndarray, np.ndarray]:
         square, lag = motion_integrals(mass, damping, stiffness, step_s)
@@ -176,7 +176,7 @@ class OneMassBooks:
 
     def __init__(self, scene: dict[str, Any], time: Timebase, members: int | None = None) -> None:
         self.params = one_mass_params(scene, time, members)
-        self._n, self._tau = time.steps_per_tick, hand_force(scene, time.plant_rate)
+        self._n, self._tau = time.steps_per_tick, make_hand_force(scene, time.plant_rate, members)
         self.is_limited = "actuator" in scene
         dampers = self.params.mechanics.dampers
         self.names = ["hand_work", *(f"{name}_heat" for name in dampers), "kinetic", "spring"]

@@ -60,7 +60,7 @@ class Chain:
     start: tuple[float, float]
 
     @classmethod
-    def of(cls, scene: dict[str, Any]) -> Chain:
+    def from_scene(cls, scene: dict[str, Any]) -> Chain:
         """Read ``[device]``, ``[transmission]``, ``[hand]`` and the bandwidths of a resolved scene."""
         device, hand, cable = scene["device"], scene.get("hand"), scene.get("transmission")
         bodies, masses, links = ["device"], [device["mass"]], []
@@ -109,9 +109,9 @@ class Chain:
         actuator = ["actuator"] if self.actuator_rate is not None else []
         return *self.positions, *rates, *actuator, *(["accelerometer"] if self.sensor else [])
 
-    def start_state(self, *loops: int) -> np.ndarray:
-        """All states at t = 0, shape (states,); of so many loops (states, loops)."""
-        z = np.zeros((len(self.states), *loops))
+    def start_state(self, *members: int) -> np.ndarray:
+        """Returns all states at t = 0, shape (states,); of a batch of so many members (states, members)."""
+        z = np.zeros((len(self.states), *members))
         z[0], z[self.count] = self.start
         return z
 

@@ -1,112 +1,179 @@
-"""The states of a chain of bodies from one plant step to the next, and what is told of them."""
+"""The states of a chain of bodies from one plant step to the next, and their record."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import Any, NamedTuple
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from haploop.plant.chain.chain import Chain
-from haploop.plant.chain.sensed_acceleration import felt_acceleration
-from haploop.plant.line.delay import Hold
-from haploop.plant.motion.hand_force import hand_force
+from haploop.plant.chain.sensed_acceleration import make_sensed_acceleration
+from haploop.plant.line.base import Hold
+from haploop.plant.motion.hand_force import make_hand_force
+from haploop.protocol.arrays import first_row, rows_of
 from haploop.protocol.ticks import Timebase
+from haploop.protocol.trees import tree_select
+
+if TYPE_CHECKING:
+    from haploop.plant.friction.stick_slip import StickSlipState
 
 HELD = ("force", "command")
 
 
-class Interval(NamedTuple):
-    """How an interval went.
+class ChainState(NamedTuple):
+    """State of a chain at a tick; in a batch every array has one more axis, the last, for the members.
 
     Attributes:
-        states, lows: at every plant step and at the end, shape (n + 1, states); what rounding left of the states.
+        z: all states of the chain, shape (states,).
+        z_comp: what rounding left of them (compensated addition), shape (states,).
+        held: force in N and command tick (and whatever else) held last, shape (columns,).
+        sensed: accelerations at the last plant steps that a delayed sensor has yet to tell, m/s^2, the oldest first.
+        mode: whether body 0 sticks or slips; None without friction.
+    """
+
+    z: np.ndarray
+    z_comp: np.ndarray
+    held: np.ndarray
+    sensed: tuple[Any, ...]
+    mode: StickSlipState | None = None
+
+
+class Interval(NamedTuple):
+    """Course of an interval; in a batch every array has one more axis, the last, for the members.
+
+    Attributes:
+        states, comps: at every plant step and at the end, shape (n + 1, states); what rounding left of the states.
         held: force and command tick (and whatever else) held over every step, shape (n, columns).
         at_ends: friction in N and whether body 0 is stuck at the end of every step, shape (n, 2).
-
-    Of many loops at once all have one more axis, the last.
     """
 
     states: np.ndarray
-    lows: np.ndarray
+    comps: np.ndarray
     held: np.ndarray
     at_ends: np.ndarray
 
 
 class ChainHistory(ABC):
-    """Where a chain has come to, and its record; what moves it is written in what builds on this.
+    """State and record of a chain; what moves it is written in the classes that build on this.
+
+    Args:
+        scene: a resolved scene; in a batch a stacked one, whose numbers are floats, or arrays of shape (members,).
+        time: the integers of the run; in a batch those all members share, whose delay does not change.
+        members: of a batch; None for one run.
 
     Attributes:
-        x, v: position in m and velocity in m/s of body 0 at the end of the last interval.
-        force, command: what is held last, N, and the tick of its command; 0 and -1 before the first.
-        last_held: force and command and whatever else is held last, shape (columns,).
-        z, low: all states and what rounding left of them.
+        chain: the bodies.
+        state: at the end of the last interval.
     """
 
     held_names = HELD
 
-    def __init__(self, scene: dict[str, Any], time: Timebase) -> None:
-        self._chain = chain = Chain.of(scene)
-        self._n, self._v, self._step_s = time.steps_per_tick, chain.count, time.step_s
-        self._tau = hand_force(scene, time.plant_rate)
+    def __init__(self, scene: dict[str, Any], time: Timebase, members: int | None = None) -> None:
+        self.chain = chain = Chain.from_scene(scene)
+        self._n, self._v, self._step_s, self._members = time.steps_per_tick, chain.count, time.step_s, members
+        self._tau = make_hand_force(scene, time.plant_rate, members)
         self._rest_N = chain.spring[0] * chain.spring[1]
-        self._intervals: list[Interval] = []
-        self.z = chain.start_state(*([scene["loops"]] if "loops" in scene else []))
-        self.low = np.zeros_like(self.z)
-        self.last_held = self._held_before()
-        self._publish()
-        self._feel, self._felt = felt_acceleration(scene, chain, time, self.loads)
-        begun = np.append(self.last_held[2:], (0.0, 0.0))[None, :2]
-        self._feel(Interval(np.stack([self.z, self.z]), np.zeros(0), self.last_held[None], begun), 0)
+        self._done: list[Interval] = []
+        self._forces: list[Any] = []
+        tail = [] if members is None else [members]
+        z = chain.start_state(*tail)
+        held, mode = self._begun(z)
+        held = held if members is None else np.multiply.outer(held, np.ones(members))
+        self._sensor = make_sensed_acceleration(scene, chain, time, self.loads, members)
+        at_end = np.append(held[2:], np.zeros((2, *tail)), axis=0)[None, :2]
+        sensed = self._sensor.after(self._sensor.none, np.stack([z, z]), held[:1], at_end, 0)
+        self.state = ChainState(z, np.zeros_like(z), held, sensed, mode)
 
-    def _held_before(self) -> np.ndarray:
-        """What is held at the start, before any command has come."""
-        return np.array([0.0, -1.0])
+    def _begun(self, z: np.ndarray) -> tuple[np.ndarray, StickSlipState | None]:
+        """Returns (what is held at the start of one run, before any command has come; the mode of friction)."""
+        return np.array([0.0, -1.0]), None
 
-    def _publish(self) -> None:
-        self.x, self.v = float(self.z[0]), float(self.z[self._v])
-        self.force, self.command = float(self.last_held[0]), int(self.last_held[1])
+    @property
+    def x(self) -> Any:
+        """Position of body 0 at the end of the last interval, m."""
+        return first_row(self.state.z)
+
+    @property
+    def v(self) -> Any:
+        """Velocity of body 0 at the end of the last interval, m/s."""
+        return first_row(self.state.z[self._v :])
+
+    @property
+    def last(self) -> Hold:
+        """Hold in effect last, its steps left out (0)."""
+        return 0, first_row(self.state.held), int(self.state.held[1].flat[0])
 
     def loads(self, first: int, last: int) -> np.ndarray:
-        """Load on the last body at the steps first ... last - 1, N."""
+        """Returns the load on the last body at the steps first ... last - 1, N."""
         return self._tau.at_steps(first, last) + self._rest_N
 
     def _begin(self, holds: list[Hold]) -> Interval:
-        """An interval of which the start is known, and what is held in it."""
-        states, lows = np.empty((2, self._n + 1, *self.z.shape))
-        states[0], lows[0] = self.z, self.low
-        held = np.empty((self._n, len(self.held_names), *self.z.shape[1:]))
+        """Returns an interval of which the start is known, and what is held in it."""
+        z, z_comp, *_ = self.state
+        states, comps = np.empty((2, self._n + 1, *z.shape))
+        states[0], comps[0] = z, z_comp
+        held = np.empty((self._n, len(self.held_names), *z.shape[1:]))
         first = 0
         for count, force, command in holds:
             held[first : first + count, 0], held[first : first + count, 1] = force, command
             first += count
-        return Interval(states, lows, held, np.zeros((self._n, 2, *[1] * (self.z.ndim - 1))))
+        if self._members is not None:
+            self._forces += [force for _, force, _ in holds]
+        return Interval(states, comps, held, np.zeros((self._n, 2, *[1] * (z.ndim - 1))))
 
     @abstractmethod
-    def advance(self, tick: int, holds: list[Hold]) -> None:
-        """Move through interval ``tick`` under the forces held in it."""
+    def advance(self, tick: int, holds: list[Hold]) -> Any:
+        """Moves through interval ``tick`` under the forces held in it; returns x at its end, m."""
 
-    def _accept(self, tick: int, interval: Interval) -> None:
-        """The interval went this way."""
-        self._intervals.append(interval)
-        self.z, self.low, self.last_held = interval.states[-1], interval.lows[-1], interval.held[-1]
-        self._publish()
-        self._feel(interval, tick * self._n + 1)
+    def _accept(self, tick: int, interval: Interval, mode: StickSlipState | None = None) -> Any:
+        """Takes the interval for what happened; returns x at its end, m."""
+        self._done.append(interval)
+        states, comps, held, at_ends = interval
+        sensed = self._sensor.after(self.state.sensed, states, held[:, 0], at_ends, tick * self._n + 1)
+        self.state = ChainState(states[-1], comps[-1], held[-1], sensed, mode)
+        return self.x
 
-    def acceleration(self, _tick: int) -> float:
-        """What a sensor with the scene's bandwidth and delay feels now, m/s^2."""
-        return self._felt()
+    def acceleration(self, _tick: int) -> Any:
+        """Returns what a sensor with the scene's bandwidth and delay feels at the present tick, m/s^2."""
+        return self.state.sensed[0] if self.state.sensed else 0.0
 
-    def take_record(self, tick: int) -> dict[str, np.ndarray]:
-        """Every state, what rounding left of each length, and what was held, by name; starts anew.
+    def take_record(self, tick: int, *, positions_only: bool = False) -> dict[str, Any]:
+        """Returns the record from interval ``tick`` on, and starts a new one: every plant step and the present state.
 
-        At every plant step since the last call, and at the end, whose held columns are the last ones.
+        Its columns are every state, what rounding left of each length (``*_low``), and what was held, by name.
+
+        Args:
+            tick: the first interval of the record.
+            positions_only: leave out all but x and what was held.
+
+        Returns:
+            Shape (steps + 1,) each; in a batch (steps + 1, members), but for ``command``, which all members share,
+            and beside them ``held_N``, the force of every hold, shape (holds, members).
         """
-        chain, done = self._chain, self._intervals
-        states = np.vstack([*(interval.states[:-1] for interval in done), self.z])
-        lows = np.vstack([*(interval.lows[:-1] for interval in done), self.low])
-        held = np.vstack([*(interval.held for interval in done), self.last_held])
-        self._intervals = []
-        record = dict(zip(chain.states, states.T, strict=True))
-        record |= {f"{name}_low": low for name, low in zip(chain.positions, lows.T, strict=False)}
-        return record | dict(zip(self.held_names, held.T, strict=True))
+        done, self._done = self._done, []
+        chain, (z, z_comp, held, *_) = self.chain, self.state
+        states = ("x",) if positions_only else chain.states
+        record = {name: _joined([one.states[:-1, at] for one in done], z[at]) for at, name in enumerate(states)}
+        lows = () if positions_only else chain.positions
+        for at, name in enumerate(lows):
+            record[f"{name}_low"] = _joined([one.comps[:-1, at] for one in done], z_comp[at])
+        for at, name in enumerate(self.held_names):
+            if not positions_only or name == "command":
+                record[name] = _joined([one.held[:, at] for one in done], held[at])
+        if self._members is not None:
+            record["command"] = record["command"][:, 0]
+            record["held_N"] = rows_of(self._forces, z.shape[-1])
+            self._forces = []
+        return record
+
+    def select(self, kept: np.ndarray) -> None:
+        """Drops the members of a batch that are not kept, shape (members,); the record must have been taken."""
+        self.state, self._rest_N = tree_select((self.state, self._rest_N), kept)
+        self._tau.select(kept)
+        self._sensor.select(kept)
+
+
+def _joined(parts: Iterable[np.ndarray], end: np.ndarray) -> np.ndarray:
+    return np.concatenate([*parts, end[None]])

@@ -1,4 +1,4 @@
-"""The motion of a chain of bodies, moved by its exact flow from one change of force to the next."""
+"""The motion of a chain of bodies, moved by its exact transition from one change of force to the next."""
 
 from __future__ import annotations
 
@@ -7,60 +7,74 @@ from typing import Any
 import numpy as np
 
 from haploop.plant.chain.history import ChainHistory, Interval
-from haploop.plant.chain.transition import ChainFlow, Responses
-from haploop.plant.line.delay import Hold
+from haploop.plant.chain.transition import ChainResponse, make_chain_tables
+from haploop.plant.line.base import Hold
 from haploop.protocol.ticks import Timebase
 
 
 class ChainMotion(ChainHistory):
     """z' = A z + B (command, friction, load): command and friction held, load = tau + k_h rest linear in a plant step.
 
-    As in ``LinearMotion`` the motion is a sum z = y + D: D, the response to the load from zero at the start of an
-    interval, is made beforehand; y starts as z and follows the held forces, all plant steps of a hold at once. States
-    are floats with the rounding they left over (compensated addition). Sums run over the first axis, term by term.
+    The motion is a sum z = y + D: D, the forced response to the load from zero at the start of an interval, is made
+    beforehand; y starts as z and follows the held forces, all plant steps of a hold at once. States are floats with
+    the rounding they left over (compensated addition). Sums run over the first axis, term by term.
     """
 
-    def __init__(self, scene: dict[str, Any], time: Timebase) -> None:
-        super().__init__(scene, time)
-        self._free = self._responses(time, stuck=False)
-        self._acting = np.zeros((len(self.z) + 2, *self.z.shape[1:]))
+    def __init__(self, scene: dict[str, Any], time: Timebase, members: int | None = None) -> None:
+        super().__init__(scene, time, members)
+        self._free = self._response(stuck=False)
 
-    def _responses(self, time: Timebase, stuck: bool) -> Responses:
-        return Responses(ChainFlow(self._chain, time.step_s, self._n, stuck), self.loads, self._n)
+    def _response(self, *, stuck: bool) -> ChainResponse:
+        tables = make_chain_tables(self.chain, self._step_s, self._n, stuck=stuck, members=self._members)
+        return ChainResponse(tables, self.loads, self._n)
 
-    def advance(self, tick: int, holds: list[Hold]) -> None:
-        """Move through interval ``tick`` under the forces held in it."""
+    def advance(self, tick: int, holds: list[Hold]) -> Any:
+        """Moves through interval ``tick`` under the forces held in it; returns x at its end, m."""
         interval = self._begin(holds)
-        self._follow(interval, 0, holds, self._free, tick, 0.0)
-        self._accept(tick, interval)
+        follow(self._free, interval, 0, holds, tick, 0.0)
+        return self._accept(tick, interval)
 
-    def _follow(
-        self, interval: Interval, begin: int, holds: list[Hold], mode: Responses, tick: int, friction: float
-    ) -> None:
-        """Fill in the states from step ``begin`` on, under one flow and one friction force.
+    def select(self, kept: np.ndarray) -> None:
+        """Drops the members of a batch that are not kept, shape (members,); the record must have been taken."""
+        super().select(kept)
+        self._free.select(kept)
 
-        Two motions under the same load differ by a motion without any: y = z - D at any step.
-        """
-        states, lows = interval.states, interval.lows
-        response, acting = mode.of_interval(tick), self._acting
-        y, low = states[begin], lows[begin]
-        if begin:
-            y = states[begin] - response[begin]
-            low = low + _lost_in(states[begin], -response[begin], y)
-        first = 0
-        for count, force, _ in holds:
-            at, first = max(first, begin), first + count
-            if at < first:
-                acting[:-2], acting[-2], acting[-1] = y, force, friction
-                moved = np.add.reduce(mode.flow.held[:, : first - at] * acting[:, None, None]) + low
-                change = moved + response[at + 1 : first + 1]
-                states[at + 1 : first + 1] = after = y + change
-                lows[at + 1 : first + 1] = change - (after - y)
-                y, before = y + moved[-1], y
-                low = moved[-1] - (y - before)
+
+def follow(
+    response: ChainResponse, interval: Interval, begin: int, holds: list[Hold], tick: int, friction: Any
+) -> None:
+    """Fills in the states of an interval from step ``begin`` on, under one transition and one friction force.
+
+    Two motions under the same load differ by a motion without any: y = z - D at any step.
+
+    Args:
+        response: transitions and forced response.
+        interval: its states are known at step ``begin``.
+        begin: plant step.
+        holds: forces held in interval ``tick``.
+        friction: N.
+    """
+    states, comps = interval.states, interval.comps
+    forced, held = response.of_interval(tick), response.tables.held
+    acting = np.empty((states.shape[1] + 2, *states.shape[2:]))
+    y, comp = states[begin], comps[begin]
+    if begin:
+        y = states[begin] - forced[begin]
+        comp = comp + _lost_in(states[begin], -forced[begin], y)
+    first = 0
+    for count, force, _ in holds:
+        at, first = max(first, begin), first + count
+        if at < first:
+            acting[:-2], acting[-2], acting[-1] = y, force, friction
+            moved = np.add.reduce(held[:, : first - at] * acting[:, None, None]) + comp
+            change = moved + forced[at + 1 : first + 1]
+            states[at + 1 : first + 1] = after = y + change
+            comps[at + 1 : first + 1] = change - (after - y)
+            y, before = y + moved[-1], y
+            comp = moved[-1] - (y - before)
 
 
 def _lost_in(a: np.ndarray, b: np.ndarray, total: np.ndarray) -> np.ndarray:
-    """What rounding has taken from ``total`` = a + b (Knuth's two-sum)."""
+    """Returns what rounding has taken from ``total`` = a + b (Knuth's two-sum)."""
     of_b = total - a
     return (a - (total - of_b)) + (b - of_b)

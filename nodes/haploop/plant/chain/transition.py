@@ -1,20 +1,24 @@
-"""Exact flow of a chain of bodies over plant steps, and over a plant step halved again and again."""
+"""Exact transition of a chain of bodies over plant steps, and over a plant step halved again and again."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from haploop.plant.chain.chain import Chain, Matrix
-from haploop.plant.motion.transition import flow_minus_identity, gramian
+from haploop.plant.chain.chain import Chain, Link, Matrix
+from haploop.plant.motion.transition import gramian, transition_minus_identity
+from haploop.protocol.arrays import each
+from haploop.protocol.trees import tree_select
 
 _wide = np.longdouble
-# Responses to the load are made for this many intervals at a time, on a fixed grid.
-_PIECE_TICKS = 64
+# Responses to the load are made for this many intervals at a time, on a fixed grid; in a batch for fewer.
+_PIECE_TICKS, _PIECE_TICKS_OF_A_BATCH = 64, 8
 
 
-class ChainFlow:
+class ChainTransition:
     """e^{A t} - I of z' = A z + B (command, friction, load), command and friction held, load linear in a plant step.
 
     The augmented state is (z, command, friction, load, rise), load' = rise / h: one exponential gives the response to
@@ -34,7 +38,7 @@ class ChainFlow:
         self._scales = np.append(chain.scales(step_s), chain.scales(step_s)[-1])
         self._rates = scaled_rates(chain, step_s, stuck)
         self._step_s = _wide(step_s)
-        one = flow_minus_identity(self._rates, self._step_s)
+        one = transition_minus_identity(self._rates, self._step_s)
         self.step = self._unscaled(one)
         flow, held = one, []
         for _ in range(steps):
@@ -44,7 +48,7 @@ class ChainFlow:
 
     def halves(self, levels: int) -> list[Matrix]:
         """Over h, h/2, ... h/2^levels, each of shape (states + 4, states); the rise is that of a whole step."""
-        flow = flow_minus_identity(self._rates, self._step_s / _wide(2) ** levels)
+        flow = transition_minus_identity(self._rates, self._step_s / _wide(2) ** levels)
         table = [self._unscaled(flow)]
         for _ in range(levels):
             flow = 2.0 * flow + flow @ flow
@@ -67,36 +71,54 @@ def scaled_rates(chain: Chain, step_s: float, stuck: bool) -> Matrix:
     return scales[:, None] * rates / scales
 
 
-class Responses:
-    """A flow, and D: what the load alone does from zero within each interval.
+class ChainTables(NamedTuple):
+    """Transitions over one plant step and over 1 ... steps of them; see ``ChainTransition``.
 
-    Args:
-        flow: of many loops, too: its tables then have a last axis for them.
-        loads: load in N at the steps first ... last - 1.
-        steps: plant steps an interval has.
-        piece_ticks: D is made for so many intervals at a time, on a fixed grid.
+    In a batch both have a last axis for the members, of length 1 where all share them.
     """
 
-    def __init__(
-        self,
-        flow: ChainFlow,
-        loads: Callable[[int, int], np.ndarray],
-        steps: int,
-        piece_ticks: int = _PIECE_TICKS,
-    ) -> None:
-        self.flow = flow
-        self._loads, self._n, self._piece_ticks = loads, steps, piece_ticks
+    step: np.ndarray
+    held: np.ndarray
+
+
+def make_chain_tables(
+    chain: Chain, step_s: float, steps: int, *, stuck: bool, members: int | None = None
+) -> ChainTables:
+    """Makes the transitions of a chain, or of the chains of a batch of so many members."""
+
+    def made(chain: Chain) -> tuple[np.ndarray, ...]:
+        transition = ChainTransition(chain, step_s, steps, stuck)
+        return transition.step, transition.held
+
+    return ChainTables(*make_tables(made, chain, has_members=members is not None))
+
+
+class ChainResponse:
+    """Transitions, and the forced (zero-state) response to the load alone within each interval: a cache, no state.
+
+    Args:
+        tables: of one chain or of a batch.
+        loads: load in N at the steps first ... last - 1.
+        steps: plant steps an interval has.
+
+    Attributes:
+        tables: as given.
+    """
+
+    def __init__(self, tables: ChainTables, loads: Callable[[int, int], np.ndarray], steps: int) -> None:
+        self.tables, self._loads, self._n = tables, loads, steps
+        self._piece_ticks = _PIECE_TICKS if tables.step.ndim == 2 else _PIECE_TICKS_OF_A_BATCH
         self._pieces: dict[int, np.ndarray] = {}
 
     def of_interval(self, tick: int) -> np.ndarray:
-        """D at the steps of interval ``tick`` and at its end, shape (n + 1, states)."""
+        """Returns the response at the steps of interval ``tick`` and at its end, shape (n + 1, states)."""
         piece, at = divmod(tick, self._piece_ticks)
         if piece not in self._pieces:
             self._pieces = {piece: self._made(piece)}
         return self._pieces[piece][at]
 
     def _made(self, piece: int) -> np.ndarray:
-        n, table = self._n, self.flow.step
+        n, table = self._n, self.tables.step
         size = table.shape[1]
         ticks, loads = self._piece_ticks, self._loads
         first = piece * ticks * n
@@ -109,6 +131,10 @@ class Responses:
             acting[:size], acting[-2], acting[-1] = response[i], start[:, i], rise[:, i]
             response[i + 1] = response[i] + np.add.reduce(table[:, :, None] * acting[:, None])
         return np.ascontiguousarray(np.moveaxis(response, 2, 0))
+
+    def select(self, kept: np.ndarray) -> None:
+        """Drops the members of a batch that are not kept, shape (members,)."""
+        self.tables, self._pieces = tree_select((self.tables, self._pieces), kept)
 
 
 class ChainIntegrals:
@@ -142,5 +168,50 @@ class ChainIntegrals:
         extended[:n, :n] = self._rates
         extended[n, :n] = np.append(velocity, 0.0) / self._scales
         extended[n + 1, n] = 1.0 / end
-        increment = flow_minus_identity(extended, end)
+        increment = transition_minus_identity(extended, end)
         return (increment[n, :n] / 2.0 - increment[n + 1, :n]) * self._scales
+
+
+def make_tables(
+    make: Callable[[Chain], tuple[np.ndarray, ...]], chain: Chain, *, has_members: bool = True
+) -> tuple[np.ndarray, ...]:
+    """Makes tables of a chain; of the chains of a batch those of each, side by side.
+
+    Args:
+        make: from a chain of floats to tables; it may not look at the start and the rest.
+        chain: of a scene, or of a stacked one, whose numbers may be arrays of shape (members,).
+        has_members: whether it is of a batch: the tables then have a last axis for the members, of length 1 where all
+            share them.
+    """
+
+    def of(*numbers: float) -> tuple[np.ndarray, ...]:
+        return make(_with(chain, numbers))
+
+    numbers = _numbers(chain)
+    tables = each(of, *numbers)
+    is_shared = not any(getattr(number, "shape", ()) for number in numbers)
+    return tuple(table[..., None] for table in tables) if has_members and is_shared else tables
+
+
+def _numbers(chain: Chain) -> list[Any]:
+    numbers = [*chain.masses_kg, *(damping for _, damping in chain.grounded.values())]
+    for link in chain.links:
+        numbers += (link.stiffness, link.damping)
+    numbers.append(chain.spring[0])
+    if chain.actuator_rate is not None:
+        numbers.append(chain.actuator_rate)
+    return numbers if chain.sensor is None else [*numbers, chain.sensor[1]]
+
+
+def _with(chain: Chain, numbers: tuple[float, ...]) -> Chain:
+    left = iter(numbers)
+    return replace(
+        chain,
+        masses_kg=tuple(next(left) for _ in chain.masses_kg),
+        grounded={name: (body, next(left)) for name, (body, _) in chain.grounded.items()},
+        links=tuple(Link(link.name, next(left), next(left)) for link in chain.links),
+        spring=(next(left), 0.0),
+        actuator_rate=None if chain.actuator_rate is None else next(left),
+        sensor=None if chain.sensor is None else (chain.sensor[0], next(left)),
+        start=(0.0, 0.0),
+    )

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.integrate import solve_ivp
 
 from haploop.plant.chain.chain import Chain
 from haploop.plant.chain.history import ChainHistory, Interval
-from haploop.plant.line.delay import Hold
+from haploop.plant.integrators.registry import Integrator
+from haploop.plant.line.base import Hold
 from haploop.protocol.ticks import Timebase
+
+if TYPE_CHECKING:
+    from haploop.plant.friction.stick_slip import StickSlipState
 
 Rates = Callable[[float, np.ndarray], np.ndarray]
 # Relative tolerance of a step, and the speed that is none to it, m/s.
@@ -28,23 +32,27 @@ class Dop853Motion(ChainHistory):
 
     def __init__(self, scene: dict[str, Any], time: Timebase) -> None:
         super().__init__(scene, time)
-        self._free = System(self._chain, stuck=False)
-        self._absolute = (_TOLERANCE * _STILL_M_S / self._chain.scales(self._step_s)[: len(self.z)]).astype(float)
+        self._free = System(self.chain, stuck=False)
+        self._absolute = (_TOLERANCE * _STILL_M_S / self.chain.scales(self._step_s)[: len(self.state.z)]).astype(float)
 
-    def advance(self, tick: int, holds: list[Hold]) -> None:
-        """Move through interval ``tick`` under the forces held in it."""
+    def advance(self, tick: int, holds: list[Hold]) -> float:
+        """Moves through interval ``tick`` under the forces held in it; returns x at its end, m."""
         interval = self._begin(holds)
-        interval.lows[:] = 0.0
+        interval.comps[:] = 0.0
         loads = self.loads(tick * self._n, (tick + 1) * self._n + 1)
         bends = np.abs(np.diff(loads, 2)) > 1e-12 * np.abs(loads).max()
         cuts = np.flatnonzero(bends | (np.diff(interval.held[:, 0]) != 0.0)) + 1
         for first, last in zip([0, *cuts.tolist()], [*cuts.tolist(), self._n], strict=True):
             slope = float(loads[last] - loads[first]) / ((last - first) * self._step_s)
             self._through(interval, first, last, float(loads[first]), slope)
-        self._accept(tick, interval)
+        return self._accept(tick, interval, self._mode_after())
+
+    def _mode_after(self) -> StickSlipState | None:
+        """Returns the mode of friction after the interval gone through."""
+        return None
 
     def _through(self, interval: Interval, first: int, last: int, load: float, slope: float) -> None:
-        """Through steps ``first`` ... ``last`` under one command, the load (N) rising by ``slope`` N/s."""
+        """Goes through steps ``first`` ... ``last`` under one command, the load (N) rising by ``slope`` N/s."""
         rates = self._free.under(float(interval.held[first, 0]), load, slope, first * self._step_s)
         ends = np.arange(first + 1, last + 1) * self._step_s
         found = self._solved(rates, (first * self._step_s, ends[-1]), interval.states[first], ends)
@@ -58,7 +66,7 @@ class Dop853Motion(ChainHistory):
         ends: np.ndarray,
         events: Sequence[Callable[[float, np.ndarray], float]] = (),
     ) -> Any:
-        """The motion over a span of time in s; states at ``ends``.
+        """Returns the motion over a span of time in s; states at ``ends``.
 
         Raises:
             ArithmeticError: the steps became too small to go on.
@@ -80,7 +88,20 @@ class System:
         self._of_command, self.of_friction, self._of_load = rates[:, size:].T.copy()
 
     def under(self, command: float, load: float, slope: float, start: float) -> Rates:
-        """z' of (t, z) under a command held and load + slope (t - start)."""
+        """Returns z' of (t, z) under a command held and load + slope (t - start)."""
         matrix, rise = self._matrix, slope * self._of_load
         push = command * self._of_command + load * self._of_load - start * rise
         return lambda t, z: matrix @ z + push + t * rise
+
+
+DOP853 = Integrator(
+    "dop853",
+    "made of DOP853's own steps, order 8, from event to event",
+    order=None,
+    evaluations=12,
+    chooses_steps=True,
+    motions=(
+        "haploop.plant.integrators.dop853:Dop853Motion",
+        "haploop.plant.integrators.dop853_friction:Dop853FrictionMotion",
+    ),
+)

@@ -9,9 +9,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from haploop.plant.chain.history import HELD, Interval
-from haploop.plant.friction.law import Friction
-from haploop.plant.friction.stick_slip import Mode
+from haploop.plant.friction.stick_slip import Friction, StickSlip, StickSlipState
 from haploop.plant.integrators.dop853 import Dop853Motion, Rates, System
+from haploop.plant.line.base import Hold
 from haploop.protocol.ticks import Timebase
 
 _MOST_SWITCHES = 1000
@@ -42,51 +42,60 @@ class Dop853FrictionMotion(Dop853Motion):
     def __init__(self, scene: dict[str, Any], time: Timebase) -> None:
         self._friction = Friction(scene["friction"])
         super().__init__(scene, time)
-        self._clamped = System(self._chain, stuck=True)
-        self._pull = (self._chain.accelerations()[0] * self._chain.masses_kg[0]).astype(float)
+        self._clamped = System(self.chain, stuck=True)
+        self._pull = (self.chain.accelerations()[0] * self.chain.masses_kg[0]).astype(float)
 
-    def _held_before(self) -> np.ndarray:
-        mode = self._mode = Mode(self._chain, self._friction, self._step_s)
-        mode.start(self.z, float(self.loads(0, 1)[0]))
-        return np.array([0.0, -1.0, mode.friction_at(self.z[self._v]), float(mode.is_stuck)])
+    def _begun(self, z: np.ndarray) -> tuple[np.ndarray, StickSlipState | None]:
+        self._stick_slip = StickSlip(self.chain, self._friction, self._step_s)
+        mode = self._stick_slip.begin(z, float(self.loads(0, 1)[0]))
+        return np.array([0.0, -1.0, self._stick_slip.friction_at(mode, z[self._v]), float(mode.is_stuck)]), mode
+
+    def advance(self, tick: int, holds: list[Hold]) -> float:
+        """Moves through interval ``tick`` under the forces held in it; returns x at its end, m."""
+        assert self.state.mode
+        self._mode = self.state.mode
+        return super().advance(tick, holds)
+
+    def _mode_after(self) -> StickSlipState | None:
+        return self._mode
 
     def _through(self, interval: Interval, first: int, last: int, load: float, slope: float) -> None:
-        """Through steps ``first`` ... ``last``, from one switch of friction to the next.
+        """Goes through steps ``first`` ... ``last``, from one switch of friction to the next.
 
         Raises:
             ArithmeticError: friction switches again and again, with no time between.
         """
-        mode, v, end = self._mode, self._v, last * self._step_s
+        v, end = self._v, last * self._step_s
         forces = _Forces(float(interval.held[first, 0]), load, slope, first * self._step_s)
         z, t = interval.states[first].copy(), forces.start
         interval.held[first:last, 2:] = 0.0, 1.0
-        mode.decide_at_rest(z, forces.command, load)
+        self._mode = self._stick_slip.decide_at_rest(self._mode, z, forces.command, load)
         for _ in range(_MOST_SWITCHES):
             begun = t
             z, t, has_ceased = self._piece(interval, z, t, last, forces)
             if has_ceased:
                 z[v] = 0.0
-                self._switch(z, t, forces, moved=t > begun)
+                self._mode = self._after_switch(z, t, forces, moved=t > begun)
             if t >= end:
                 break
         else:
             raise ArithmeticError(f"Friction switched {_MOST_SWITCHES} times in a plant step; raise clock.plant_rate.")
-        interval.states[last], interval.at_ends[last - 1] = z, (mode.friction_at(z[v]), mode.is_stuck)
+        friction = self._stick_slip.friction_at(self._mode, z[v])
+        interval.states[last], interval.at_ends[last - 1] = z, (friction, self._mode.is_stuck)
 
-    def _switch(self, z: np.ndarray, t: float, forces: _Forces, moved: bool) -> None:
-        """The mode after the present one has ceased; a slip that led nowhere is none."""
+    def _after_switch(self, z: np.ndarray, t: float, forces: _Forces, moved: bool) -> StickSlipState:
+        """Returns the mode after the present one has ceased; a slip that led nowhere is none."""
         mode = self._mode
         if mode.is_stuck:
-            mode.is_stuck, mode.direction = False, math.copysign(1.0, self._other_forces(t, z, forces))
-        elif moved:
-            mode.decide_at_rest(z, forces.command, forces.load_at(t))
-        else:
-            mode.is_stuck = True
+            return StickSlipState(False, math.copysign(1.0, self._other_forces(t, z, forces)))
+        if moved:
+            return self._stick_slip.decide_at_rest(mode, z, forces.command, forces.load_at(t))
+        return StickSlipState(True, mode.direction)
 
     def _piece(
         self, interval: Interval, z: np.ndarray, t: float, last: int, forces: _Forces
     ) -> tuple[np.ndarray, float, bool]:
-        """From time t in s to step ``last``, or to where the mode ceases: the state there, the time, whether it did."""
+        """Goes from time t in s to step ``last``, or to where the mode ceases; returns state, time, whether it did."""
         mode, h = self._mode, self._step_s
         steps = np.arange(int(t / h), last + 1)
         steps = steps[steps * h > t]
@@ -96,7 +105,7 @@ class Dop853FrictionMotion(Dop853Motion):
         reached = steps[: states.shape[1]]
         interval.states[reached] = states.T
         for step, v in zip(reached.tolist(), states[self._v].tolist(), strict=True):
-            interval.at_ends[step - 1] = mode.friction_at(v), mode.is_stuck
+            interval.at_ends[step - 1] = self._stick_slip.friction_at(mode, v), mode.is_stuck
         has_ceased = found.status == 1
         end = float(found.t_events[0][0]) if has_ceased else last * h
         if not mode.is_stuck:
@@ -104,29 +113,29 @@ class Dop853FrictionMotion(Dop853Motion):
         return (found.y_events[0][0] if has_ceased else states[:, -1]).copy(), end, has_ceased
 
     def _tell_friction(self, interval: Interval, first: int, last: int, v: float) -> None:
-        """Friction in the steps in which the body slips, as at their beginning; ``v`` at that of the first."""
+        """Notes friction in the steps in which the body slips, as at their beginning; ``v`` at that of the first."""
         speeds = [v, *interval.states[first + 1 : last, self._v].tolist()]
         for step, speed in zip(range(first, last), speeds, strict=False):
             interval.held[step, 2:] = -self._mode.direction * self._friction.at(speed), 0.0
 
     def _slipping(self, forces: _Forces) -> tuple[Rates, Callable[[float, np.ndarray], float]]:
-        """z' while body 0 slips, and what falls below 0 when it no longer does: the speed in its direction."""
+        """Returns z' while body 0 slips, and what falls below 0 when it no longer does: the speed in its direction."""
         law, v, direction = self._friction, self._v, self._mode.direction
         smooth, unit = self._free.under(*forces), -direction * self._free.of_friction
         return (lambda t, z: smooth(t, z) + law.at(z[v]) * unit), _event(lambda _t, z: direction * z[v])
 
     def _sticking(self, forces: _Forces) -> tuple[Rates, Callable[[float, np.ndarray], float]]:
-        """z' while body 0 is held, and what falls below 0 when it no longer is: what more could be held."""
+        """Returns z' while body 0 is held, and what falls below 0 when it no longer is: what more could be held."""
         most = self._friction.holds_N
         return self._clamped.under(*forces), _event(lambda t, z: most - abs(self._other_forces(t, z, forces)))
 
     def _other_forces(self, t: float, z: np.ndarray, forces: _Forces) -> float:
-        """All forces on body 0 but friction, N."""
+        """Returns all forces on body 0 but friction, N."""
         pull, size = self._pull, len(z)
         return float(pull[:size] @ z + pull[size] * forces.command + pull[size + 2] * forces.load_at(t))
 
 
 def _event(function: Callable[[float, np.ndarray], float]) -> Callable[[float, np.ndarray], float]:
-    """An event of ``solve_ivp`` that ends the motion where the function falls below 0."""
+    """Makes an event of ``solve_ivp`` that ends the motion where the function falls below 0."""
     function.terminal, function.direction = True, -1.0  # pyright: ignore[reportFunctionMemberAccess]
     return function

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from haploop.plant.integrators.linear_rates import LinearRates, Rows, moved
+from haploop.plant.integrators.registry import Integrator
 
 
 class ImplicitMidpoint:
@@ -26,3 +27,6 @@ class ImplicitMidpoint:
         pushed = moved(z, self._half, middle)
         means = [sum(factor * a for factor, a in zip(row, pushed, strict=True)) for row in self._inverse]
         return [2.0 * mean - a for mean, a in zip(means, z, strict=True)]
+
+
+IMPLICIT_MIDPOINT = Integrator("implicit-midpoint", "one of the implicit midpoint rule, order 2", 2, ImplicitMidpoint)

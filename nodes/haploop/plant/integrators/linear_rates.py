@@ -32,7 +32,7 @@ class LinearRates:
         self._rows = [[(i, factor) for i, factor in enumerate(row) if factor] for row in rows]
 
     def at(self, z: Rows, push: Rows) -> Rows:
-        """A z + p, term by term."""
+        """Returns A z + p, term by term."""
         rates = []
         for row, rate in zip(self._rows, push, strict=True):
             for i, factor in row:
@@ -42,24 +42,26 @@ class LinearRates:
 
 
 class OneStep(Protocol):
-    """A method that goes from one plant step to the next by a formula."""
+    """A method that goes from one plant step to the next by a formula, linear in z and the pushes."""
+
+    def __init__(self, rates: LinearRates, step_s: float, /) -> None: ...
 
     def step(self, z: Rows, begin: Rows, middle: Rows, end: Rows, /) -> Rows:
-        """z at the end of a plant step; the pushes are those at its beginning, middle and end."""
+        """Returns z at the end of a plant step; the pushes p are those at its beginning, middle and end."""
         ...
 
 
 def moved(z: Rows, h: float, rates: Rows) -> Rows:
-    """z + h z'."""
+    """Returns z + h z'."""
     return [a + h * rate for a, rate in zip(z, rates, strict=True)]
 
 
 def one_step_matrix(method: OneStep, size: int) -> np.ndarray:
-    """M of z+ = M z without inputs, shape (states, states): a method of linear rates is linear."""
+    """Returns M of z+ = M z without inputs, shape (states, states)."""
     still = [0.0] * size
     return np.stack(method.step(list(np.eye(size)), still, still, still))
 
 
 def response_to(push: Rows, method: OneStep) -> Rows:
-    """z at the end of a plant step that began with none, under a push held over it."""
+    """Returns z at the end of a plant step that began with none, under a push held over it."""
     return method.step([0.0] * len(push), push, push, push)

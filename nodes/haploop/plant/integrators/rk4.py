@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from haploop.plant.integrators.linear_rates import LinearRates, Rows, moved
+from haploop.plant.integrators.registry import Integrator
 
 
 class RungeKutta4:
@@ -23,3 +24,6 @@ class RungeKutta4:
         k4 = rates.at(moved(z, h, k3), end)
         mean = [(a + 2.0 * (b + c) + d) / 6.0 for a, b, c, d in zip(k1, k2, k3, k4, strict=True)]
         return moved(z, h, mean)
+
+
+RK4 = Integrator("rk4", "one of the classical Runge-Kutta method, order 4", 4, RungeKutta4, evaluations=4)

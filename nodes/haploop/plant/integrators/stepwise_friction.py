@@ -7,17 +7,64 @@ from typing import Any
 import numpy as np
 
 from haploop.plant.chain.history import HELD, Interval
-from haploop.plant.friction.law import Friction
-from haploop.plant.friction.stick_slip import Mode
-from haploop.plant.integrators.friction_projection import FrictionProjection
-from haploop.plant.integrators.linear_rates import LinearRates
-from haploop.plant.integrators.one_step import one_step
+from haploop.plant.friction.stick_slip import Friction, StickSlip, StickSlipState
+from haploop.plant.integrators.linear_rates import LinearRates, OneStep, Rows, moved, response_to
 from haploop.plant.integrators.stepwise import StepwiseMotion
 from haploop.protocol.ticks import Timebase
 
 
+class FrictionProjection:
+    """Friction held over the step, f = -clip(v_free / g, -most, most), as a one-step method round another.
+
+    v_free is v of body 0 at the end of the step without friction, g what a unit of it does to that v by the method's
+    own formula, so that the step is the method's own under f. ``most`` is F(v) by Stribeck's law at the beginning, the
+    breakaway force at rest. Where f is enough, v is 0.0 exactly; a body that was at rest stays, its x to the bit, and
+    the rest of the chain follows the rates of the clamped system. Stops and starts fall on plant steps, which leaves
+    every method, whatever its order, an error of order h in their times.
+
+    Args:
+        free, clamped: the method for the rates of the free system, and with body 0 held.
+        rates: of the free system.
+    """
+
+    def __init__(self, friction: Friction, free: OneStep, clamped: OneStep, rates: LinearRates) -> None:
+        self._friction, self._free, self._clamped, self._v = friction, free, clamped, rates.count
+        self._unit = unit = rates.of_inputs[1].tolist()
+        self._response = response_to(unit, free)
+        self._rows: list[tuple[float, float, float, float]] = []
+
+    def step(self, z: Rows, begin: Rows, middle: Rows, end: Rows) -> Rows:
+        v, law = self._v, self._friction
+        after = self._free.step(z, begin, middle, end)
+        stopping = after[v] / self._response[v]
+        most = law.at(z[v])
+        if z[v] == 0.0:
+            if law.holds(stopping):
+                self._rows.append((0.0, 1.0, 0.0, 1.0))
+                return self._clamped.step(z, self._held(begin), self._held(middle), self._held(end))
+            most = law.holds_N
+        friction = -max(-most, min(most, stopping))
+        after = moved(after, friction, self._response)
+        if stops := abs(stopping) <= most:
+            after[v] = 0.0
+        self._rows.append((friction, 0.0, 0.0 if stops else friction, float(stops)))
+        return after
+
+    def _held(self, push: Rows) -> Rows:
+        """Returns the push together with the force that keeps body 0 from accelerating."""
+        push = moved(push, -push[self._v] / self._unit[self._v], self._unit)
+        push[self._v] = 0.0
+        return push
+
+    def take_rows(self) -> np.ndarray:
+        """Returns friction in N and stuck (1.0 or 0.0) over every step since the last call, then at its end."""
+        rows = np.array(self._rows).reshape(-1, 4)
+        self._rows = []
+        return rows
+
+
 class StepwiseFrictionMotion(StepwiseMotion):
-    """As without friction, every step projected onto what friction allows; see ``FrictionProjection``."""
+    """One-step motion, every step projected onto what friction allows; see ``FrictionProjection``."""
 
     held_names = (*HELD, "friction", "stuck")
 
@@ -25,18 +72,18 @@ class StepwiseFrictionMotion(StepwiseMotion):
         self._friction = Friction(scene["friction"])
         super().__init__(scene, time)
         free, clamped = (
-            one_step(self._name, rates, self._step_s) for rates in (self._rates, LinearRates(self._chain, stuck=True))
+            self._method(rates, self._step_s) for rates in (self._rates, LinearRates(self.chain, stuck=True))
         )
         self._projection = FrictionProjection(self._friction, free, clamped, self._rates)
         self._step = self._projection.step
 
-    def _held_before(self) -> np.ndarray:
-        mode = Mode(self._chain, self._friction, self._step_s)
-        mode.start(self.z, float(self.loads(0, 1)[0]))
-        return np.array([0.0, -1.0, mode.friction_at(self.z[self._v]), float(mode.is_stuck)])
+    def _begun(self, z: np.ndarray) -> tuple[np.ndarray, StickSlipState | None]:
+        stick_slip = StickSlip(self.chain, self._friction, self._step_s)
+        mode = stick_slip.begin(z, float(self.loads(0, 1)[0]))
+        return np.array([0.0, -1.0, stick_slip.friction_at(mode, z[self._v]), float(mode.is_stuck)]), None
 
-    def _walk(self, interval: Interval, loads: np.ndarray) -> None:
-        super()._walk(interval, loads)
+    def _fill_in(self, interval: Interval, loads: np.ndarray) -> None:
+        super()._fill_in(interval, loads)
         rows = self._projection.take_rows()
         interval.held[:, 2:] = 0.0
         interval.held[: len(rows), 2:], interval.at_ends[: len(rows)] = rows[:, :2], rows[:, 2:]

@@ -1,68 +1,99 @@
-"""What the actuator makes of a command at once: steps of force and saturation."""
+"""The actuator: steps of force and saturation of every command that takes effect."""
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
-from haploop.plant.counters import SATURATED, Tally
-from haploop.plant.line.delay import Hold, Line
-from haploop.protocol.arrays import nearest_multiple
+import numpy as np
+
+from haploop.plant.counters import SATURATED, make_counter
+from haploop.plant.line.base import Hold, Line
+from haploop.protocol.arrays import clipped, nearest_multiple, where
 from haploop.protocol.ticks import Timebase
+from haploop.protocol.trees import tree_select
 
 
-class Actuator:
-    """Force = q rint(command / q), clipped to +-saturation, at the end of the line: of the commands that arrive.
+class Actuator(NamedTuple):
+    """Force = q rint(command / q), clipped to +-saturation.
 
     A command that is no finite number passes unchanged; it ends the run.
+
+    Attributes:
+        resolution: q in N, or None; in a batch a number for all members or an array of shape (members,).
+        saturation: N, or None; as q.
+    """
+
+    resolution: Any
+    saturation: Any
+
+    def drive(self, command: Any) -> tuple[Any, Any]:
+        """Returns (force of a command in N, whether it was clipped)."""
+        force = command if self.resolution is None else nearest_multiple(command, self.resolution)
+        if self.saturation is None:
+            return force, False
+        limited, is_finite = clipped(force, self.saturation), force - force == 0.0
+        return where(is_finite, limited, force), is_finite & (limited != force)
+
+
+class ActuatedLine:
+    """Line with an actuator at its end, which sees the commands that arrive.
 
     Args:
         line: brings the commands.
         table: the resolved ``[actuator]`` table; its bandwidth is the motion's.
         time: the integers of the run.
+        members: of a batch; None for one run.
 
     Attributes:
+        line: as given.
+        actuator: its parameters.
         receive: takes the next commands, a list in order of their ticks.
-        tallies: those of the line and, where there is a saturation, the commands it clipped, each at its first step.
+        state: (of the line, tick of the command in effect last, its force in N, saturated commands).
+        counters: those of the line and, where there is a saturation, the commands it clipped, each at its first step.
     """
 
-    def __init__(self, line: Line, table: dict[str, Any], time: Timebase) -> None:
+    def __init__(self, line: Line, table: dict[str, Any], time: Timebase, members: int | None = None) -> None:
         self._steps = time.steps_per_tick
-        self._resolution, self._most = table.get("resolution"), table.get("saturation")
+        self.actuator = Actuator(table.get("resolution"), table.get("saturation"))
         self._command, self._force = -1, 0.0
-        self._saturated = Tally()
+        self._saturated = make_counter(members)
         self._take(line)
 
     def _take(self, line: Line) -> None:
-        self._line, self.receive = line, line.receive
-        self.tallies = line.tallies | ({SATURATED: self._saturated} if self._most is not None else {})
+        self.line, self.receive = line, line.receive
+        is_counted = self.actuator.saturation is not None
+        self.counters = line.counters | ({SATURATED: self._saturated} if is_counted else {})
 
-    def retimed(self, delay_steps: int, tick: int) -> Actuator:
-        """The same with another delay of the commands from ``tick`` on."""
-        self._take(self._line.retimed(delay_steps, tick))
+    @property
+    def state(self) -> tuple[Any, int, Any, Any]:
+        return self.line.state, self._command, self._force, self._saturated.state
+
+    def restore(self, state: tuple[Any, int, Any, Any]) -> None:
+        """Goes on from a state."""
+        line, self._command, self._force, saturated = state
+        self.line.restore(line)
+        self._saturated.restore(saturated)
+
+    def retimed(self, delay_steps: int, tick: int) -> ActuatedLine:
+        """Returns the line with another delay of the commands from ``tick`` on."""
+        self._take(self.line.retimed(delay_steps, tick))
         return self
 
-    def forget_before(self, tick: int) -> None:
-        """As a ``CommandLine`` does, if the line is one."""
-        self._line.forget_before(tick)  # pyright: ignore[reportAttributeAccessIssue]
-
     def holds(self, tick: int) -> list[Hold]:
-        """The forces the device feels in interval ``tick``, in order."""
+        """Returns the forces the device feels in interval ``tick``, in order."""
         step = tick * self._steps
         holds: list[Hold] = []
-        for count, force, command in self._line.holds(tick):
+        for count, force, command in self.line.holds(tick):
             if command > self._command:
-                self._command, self._force = command, self._driven(force, step)
+                self._command = command
+                self._force, is_saturated = self.actuator.drive(force)
+                self._saturated.note(step, is_saturated)
             holds.append((count, self._force, command))
             step += count
         return holds
 
-    def _driven(self, force: float, step: int) -> float:
-        if self._resolution is not None:
-            force = nearest_multiple(force, self._resolution)
-        if self._most is None or force - force != 0.0:
-            return force
-        clipped = max(-self._most, min(self._most, force))
-        if clipped == force:
-            return force
-        self._saturated.note(step)
-        return clipped
+    def select(self, kept: np.ndarray) -> None:
+        """Drops the members of a batch that are not kept, shape (members,)."""
+        self.line.select(kept)
+        self.actuator, self._force = tree_select((self.actuator, self._force), kept)
+        self._saturated.select(kept)

@@ -6,13 +6,15 @@ from collections import deque
 from itertools import repeat
 from typing import Any
 
-from haploop.plant.counters import DROPPED, LOST, Tally
-from haploop.plant.line.delay import Hold
-from haploop.plant.random.streams import Draw
+import numpy as np
+
+from haploop.plant.counters import DROPPED, LOST, Counter
+from haploop.plant.line.base import Hold
+from haploop.plant.random.streams import Draw, RandomStream
 from haploop.protocol.ticks import Timebase
 
 
-class UncertainLine:
+class LossyLine:
     """Command k takes effect at step e_k = k n + d + j_k, unless it is lost; the device holds the last one.
 
     Of two commands the later one has the last word: command k is dropped if a later one has begun to act before e_k,
@@ -24,41 +26,67 @@ class UncertainLine:
 
     Args:
         time: the integers of the run.
-        additional_steps: j of the next command, whole plant steps, >= 0.
-        is_lost: whether the next command is lost.
+        jitter: the resolved ``[jitter]`` table, or None.
+        loss: the resolved ``[loss]`` table, or None.
+        seed: the scene's.
 
     Attributes:
-        tallies: commands dropped and lost, each at the step at which it would have taken effect.
+        delay_steps: of the commands still to come.
+        additional_steps: returns j of the next command, whole plant steps, >= 0.
+        is_lost: tells whether the next command is lost.
+        state: (commands received, delay of those to come, those on their way as (step of effect, force, tick), the
+            force and the tick of the one in effect, dropped commands, lost commands).
+        counters: commands dropped and lost, each at the step at which it would have taken effect.
     """
 
-    def __init__(self, time: Timebase, additional_steps: Draw, is_lost: Draw) -> None:
-        self._additional_steps, self._is_lost = additional_steps, is_lost
-        self._steps, self._delay = time.steps_per_tick, time.delay_steps
+    def __init__(
+        self, time: Timebase, jitter: dict[str, Any] | None = None, loss: dict[str, Any] | None = None, seed: int = 0
+    ) -> None:
+        self._time, self._jitter, self._loss, self._seed = time, jitter, loss, seed
+        self._steps, self.delay_steps = time.steps_per_tick, time.delay_steps
         self._end = time.ticks * time.steps_per_tick
         self._received = 0
         self._coming: deque[tuple[int, float, int]] = deque()
         self._acting = 0.0, -1
-        self._dropped, self._lost = Tally(), Tally()
-        self.tallies = {DROPPED: self._dropped, LOST: self._lost}
+        self._dropped, self._lost = Counter(), Counter()
+        self.counters = {DROPPED: self._dropped, LOST: self._lost}
+        self._draw_from(0)
 
-    def take_over(self, force: float, command: int, coming: list[tuple[int, float, int]], received: int) -> None:
-        """Go on for another line: what acts now, what is on its way as (step of effect, force, command), and how many
-        commands have come."""
-        self._acting, self._received = (force, command), received
-        self._coming.extend(coming)
+    def _draw_from(self, command: int) -> None:
+        self.additional_steps = make_jitter(self._jitter, self._seed, self._time.plant_rate, command)
+        self.is_lost = make_loss(self._loss, self._seed, command)
 
-    def retimed(self, delay_steps: int, _tick: int) -> UncertainLine:
-        """The same line with another delay of the commands still to come."""
-        self._delay = delay_steps
+    @property
+    def state(self) -> tuple[Any, ...]:
+        counts = self._dropped.state, self._lost.state
+        return self._received, self.delay_steps, tuple(self._coming), *self._acting, *counts
+
+    def restore(self, state: tuple[Any, ...]) -> None:
+        """Goes on from a state."""
+        self._received, self.delay_steps, coming, force, command, dropped, lost = state
+        self._coming, self._acting = deque(tuple(one) for one in coming), (force, command)
+        self._dropped.restore(dropped)
+        self._lost.restore(lost)
+        self._draw_from(self._received)
+
+    def taking_over(self, delay_steps: int, force: float, command: int, coming: Any, received: int) -> LossyLine:
+        """Returns this line at the place of another one: its force and command in effect, those on their way and how
+        many have come; further commands have the delay given."""
+        nothing = 0, ()
+        self.restore((received, delay_steps, coming, force, command, nothing, nothing))
+        return self
+
+    def retimed(self, delay_steps: int, _tick: int) -> LossyLine:
+        """Returns the line with another delay of the commands still to come."""
+        self.delay_steps = delay_steps
         return self
 
     def receive(self, forces: list[float]) -> None:
-        """Take the next commands, in order of their ticks."""
+        """Takes the next commands, in order of their ticks."""
         for command, force in enumerate(forces, self._received):
-            effect = command * self._steps + self._delay + self._additional_steps()
-            if self._is_lost():
-                if effect < self._end:
-                    self._lost.note(effect)
+            effect = command * self._steps + self.delay_steps + self.additional_steps()
+            if self.is_lost():
+                self._lost.note(effect, effect < self._end)
             elif effect < self._end:
                 self._overtake(effect)
                 self._coming.append((effect, force, command))
@@ -69,7 +97,7 @@ class UncertainLine:
             self._dropped.note(self._coming.pop()[0])
 
     def holds(self, tick: int) -> list[Hold]:
-        """The forces held in interval ``tick``, in order; to be called for every interval, once, from 0 on.
+        """Returns the forces held in interval ``tick``, in order; to be called for every interval, once, from 0 on.
 
         Commands up to tick - L must have been received.
         """
@@ -86,23 +114,49 @@ class UncertainLine:
         self._acting = force, command
         return holds
 
+    def select(self, kept: np.ndarray) -> None:
+        """Refuses: such a line runs alone.
 
-def uncertain_line(scene: dict[str, Any], time: Timebase) -> UncertainLine:
-    """The line of a resolved scene with ``[jitter]``, ``[loss]`` or both."""
-    return UncertainLine(time, _jitter(scene, time), _loss(scene))
+        Raises:
+            TypeError: always.
+        """
+        raise TypeError("A line with jitter, loss or a changed delay is not run in batches.")
 
 
-def _jitter(scene: dict[str, Any], time: Timebase) -> Draw:
-    if "jitter" not in scene:
+def make_lossy_line(scene: dict[str, Any], time: Timebase) -> LossyLine:
+    """Makes the line of a resolved scene with ``[jitter]``, ``[loss]`` or both."""
+    return LossyLine(time, scene.get("jitter"), scene.get("loss"), scene["seed"])
+
+
+def make_jitter(table: dict[str, Any] | None, seed: int, plant_rate: int, first: int = 0) -> Draw:
+    """Makes the additional delays of the commands from ``first`` on, in whole plant steps, j_k >= 0.
+
+        uniform   0, 1, ... most, equally likely
+        gamma     shape (mean / deviation)^2, scale deviation^2 / mean, rounded to the nearest step
+
+    Args:
+        table: the resolved ``[jitter]`` table: kind, then most, or mean and deviation, in s; None for no jitter.
+        seed: the scene's.
+        plant_rate: plant steps per second.
+    """
+    if table is None:
         return repeat(0).__next__
-    from haploop.plant.line.jitter import additional_delays
+    stream = RandomStream(seed, "jitter")
+    if table["kind"] == "uniform":
+        return stream.whole(round(table["most"] * plant_rate) + 1, first)
+    mean, deviation = table["mean"], table["deviation"]
+    gamma, scale_steps = stream.gamma((mean / deviation) ** 2, first), deviation / mean * deviation * plant_rate
+    return lambda: round(scale_steps * gamma())
 
-    return additional_delays(scene["jitter"], scene["seed"], time.plant_rate)
 
+def make_loss(table: dict[str, Any] | None, seed: int, first: int = 0) -> Draw:
+    """Makes the losses of the commands from ``first`` on, each by itself with the same probability.
 
-def _loss(scene: dict[str, Any]) -> Draw:
-    if "loss" not in scene:
+    Args:
+        table: the resolved ``[loss]`` table: probability; None for no loss.
+        seed: the scene's.
+    """
+    if table is None:
         return repeat(False).__next__
-    from haploop.plant.line.loss import losses
-
-    return losses(scene["loss"], scene["seed"])
+    uniform, probability = RandomStream(seed, "loss").uniform(first), table["probability"]
+    return lambda: uniform() < probability

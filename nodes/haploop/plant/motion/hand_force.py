@@ -7,8 +7,12 @@ from typing import Any
 
 import numpy as np
 
+from haploop.protocol.trees import tree_select
+
 # The force is made in pieces on a fixed grid, so that how a run is cut into messages cannot change a bit of it.
 _PIECE_STEPS = 4096
+# Where every member of a batch has a force of its own, fewer steps of it are made at a time.
+_PIECE_STEPS_OF_EACH = 256
 
 Profile = Callable[[np.ndarray], np.ndarray]
 
@@ -16,18 +20,31 @@ Profile = Callable[[np.ndarray], np.ndarray]
 class HandForce:
     """The hand force of a scene at plant steps, in N.
 
+    In a batch it has a last axis for the members, of length 1 where all have the same force.
+
     Args:
-        table: the resolved ``[hand.force]`` table, or None for no force.
+        table: the resolved ``[hand.force]`` table, or None for no force; a stacked one in a batch.
         plant_rate: plant steps per second; step s is at ``s / plant_rate``.
+        members: of a batch; None for one run.
+
+    Attributes:
+        is_shared: whether all members have the same force.
     """
 
-    def __init__(self, table: dict[str, Any] | None, plant_rate: int) -> None:
+    def __init__(self, table: dict[str, Any] | None, plant_rate: int, members: int | None = None) -> None:
+        self._table, self._plant_rate = table, plant_rate
+        self._has_members = members is not None
+        self.is_shared = not any(getattr(value, "shape", ()) for value in (table or {}).values())
+        self._piece_steps = _PIECE_STEPS if self.is_shared else _PIECE_STEPS_OF_EACH
+        self._prepare()
+
+    def _prepare(self) -> None:
+        table = self._table
         self._profile = PROFILES[table["kind"]](table) if table else np.zeros_like
-        self._plant_rate, self._piece_steps = plant_rate, _PIECE_STEPS
         self._pieces: dict[int, np.ndarray] = {}
 
     def at_steps(self, first: int, last: int) -> np.ndarray:
-        """tau at the steps first ... last - 1, shape (last - first,)."""
+        """Returns tau at the steps first ... last - 1, shape (last - first,) or (last - first, 1 or members)."""
         size = self._piece_steps
         pieces = range(first // size, (last - 1) // size + 1)
         joined = np.concatenate([self._piece(index) for index in pieces])
@@ -38,22 +55,20 @@ class HandForce:
         if index not in self._pieces:
             if len(self._pieces) > 2:
                 self._pieces.clear()
-            self._pieces[index] = self._profile(self._times(index))
+            times = np.arange(index * self._piece_steps, (index + 1) * self._piece_steps) / self._plant_rate
+            self._pieces[index] = self._profile(times[:, None] if self._has_members else times)
         return self._pieces[index]
 
-    def _times(self, index: int) -> np.ndarray:
-        """The times of the steps of a piece, s."""
-        return np.arange(index * self._piece_steps, (index + 1) * self._piece_steps) / self._plant_rate
+    def select(self, kept: np.ndarray) -> None:
+        """Drops the members of a batch that are not kept, shape (members,)."""
+        if not self.is_shared:
+            self._table = tree_select(self._table, kept)
+            self._prepare()
 
 
-def hand_force(scene: dict[str, Any], plant_rate: int) -> HandForce:
-    """The hand force of a resolved scene, or of many in a stacked one."""
-    table = scene.get("hand", {}).get("force")
-    if "loops" in scene:
-        from haploop.plant.motion.hand_force_batch import HandForceArray
-
-        return HandForceArray(table, plant_rate)
-    return HandForce(table, plant_rate)
+def make_hand_force(scene: dict[str, Any], plant_rate: int, members: int | None = None) -> HandForce:
+    """Makes the hand force of a resolved scene, or of the stacked scene of a batch."""
+    return HandForce(scene.get("hand", {}).get("force"), plant_rate, members)
 
 
 def _constant(table: dict[str, Any]) -> Profile:

@@ -25,7 +25,7 @@ class Mechanics:
     start: tuple[float, float]
 
     @classmethod
-    def of(cls, scene: dict[str, Any]) -> Mechanics:
+    def from_scene(cls, scene: dict[str, Any]) -> Mechanics:
         """Read the ``[device]`` and, where present, ``[hand]`` tables of a resolved scene."""
         device = scene["device"]
         start = device["position"], device["velocity"]

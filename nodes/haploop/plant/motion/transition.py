@@ -1,11 +1,10 @@
-"""Exact flow of a linear mechanical system over one plant step, and the exact integrals that its books need."""
+"""Exact transition of a linear mechanical system over a plant step, and the exact integrals its books need."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -18,8 +17,8 @@ Real = float | np.floating
 _wide = np.longdouble
 
 
-def flow_minus_identity(rates: Matrix, duration: Real) -> Matrix:
-    """e^{A t} - I, accurate in every entry however small A t is.
+def transition_minus_identity(rates: Matrix, duration: Real) -> Matrix:
+    """Returns e^{A t} - I, accurate in every entry however small A t is.
 
     With E = e^{A h} - I on a step so short that |A h| <= 1/2, the Taylor series converges in a few terms and loses
     nothing; the step is then doubled by e^{2 A h} - I = 2 E + E^2, which never subtracts the identity
@@ -43,8 +42,9 @@ def flow_minus_identity(rates: Matrix, duration: Real) -> Matrix:
 
 
 def gramian(rates: Matrix, weight: Matrix, duration: Real) -> Matrix:
-    """W = integral over [0, t] of e^{A' s} Q e^{A s} ds, by halving the step until |A h| <= 1/2 and doubling back.
+    """Returns W = integral over [0, t] of e^{A' s} Q e^{A s} ds.
 
+    The step is halved until |A h| <= 1/2, and the result doubled back.
     On the short step W is a Taylor series in h: the k-th derivative of e^{A's} Q e^{As} at 0 is D_k with
     D_0 = Q, D_{k+1} = A' D_k + D_k A. Then W(2h) = W(h) + P' W(h) P with P = e^{A h}, P(2h) = P(h)^2. Each term added
     is positive semidefinite where Q is, so nothing cancels; the block exponential (Van Loan 1978) overflows instead.
@@ -63,7 +63,7 @@ def gramian(rates: Matrix, weight: Matrix, duration: Real) -> Matrix:
     for order in range(2, 34):
         derivative = (scaled.T @ derivative + derivative @ scaled) / order
         total = total + derivative * step
-    increment = flow_minus_identity(rates, step)
+    increment = transition_minus_identity(rates, step)
     for _ in range(doublings):
         moved = total @ increment
         total = 2.0 * total + moved + moved.T + increment.T @ moved
@@ -77,76 +77,71 @@ def _short_step(rates: Matrix, duration: Real) -> tuple[Matrix, int]:
     return rates * (duration / _wide(2) ** doublings), doublings
 
 
-@dataclass(frozen=True)
-class StepFlow:
-    """One plant step of m a + b v + k x = F, F linear over the step: what is added to x and v.
+class FohTransition(NamedTuple):
+    """First-order-hold transition over one plant step of m a + b v + k x = F: F is linear over the step.
 
         dx = x_x x + x_v v + x_force F(0) + x_slope (F(h) - F(0))
         dv = v_x x + v_v v + v_force F(0) + v_slope (F(h) - F(0))
 
-    The flow minus the identity, so that a small change keeps all its digits beside a large state.
+    The transition minus the identity, so that a small change keeps all its digits beside a large state. Every
+    coefficient is a float; in a batch of members that differ an array of shape (members,).
     """
 
-    x_x: float
-    x_v: float
-    x_force: float
-    x_slope: float
-    v_x: float
-    v_v: float
-    v_force: float
-    v_slope: float
-
-    @classmethod
-    def of(cls, mass: float, damping: float, stiffness: float, step_s: float) -> StepFlow:
-        """The exact flow over ``step_s`` seconds for mass in kg (> 0), damping in N s/m, stiffness in N/m."""
-
-        def entries(mass: float, damping: float, stiffness: float) -> tuple[float, ...]:
-            increment = _over_a_step(mass, damping, stiffness, step_s)
-            return tuple(float(entry) for entry in _to_state(increment, mass, stiffness, step_s).ravel())
-
-        return cls(*each(entries, mass, damping, stiffness))
+    x_x: Any
+    x_v: Any
+    x_force: Any
+    x_slope: Any
+    v_x: Any
+    v_v: Any
+    v_force: Any
+    v_slope: Any
 
 
-@dataclass(frozen=True)
-class HeldFlow:
-    """The same over 0, 1, 2 ... steps under a force that is held: columns x_x, x_v, x_force, v_x, v_v, v_force.
+def make_foh_transition(mass: Any, damping: Any, stiffness: Any, step_s: float) -> FohTransition:
+    """Makes the exact transition over ``step_s`` seconds for mass in kg (> 0), damping in N s/m, stiffness in N/m."""
+
+    def entries(mass: float, damping: float, stiffness: float) -> tuple[float, ...]:
+        increment = _over_a_step(mass, damping, stiffness, step_s)
+        return tuple(float(entry) for entry in _to_state(increment, mass, stiffness, step_s).ravel())
+
+    return FohTransition(*each(entries, mass, damping, stiffness))
+
+
+def make_zoh_transitions(mass: Any, damping: Any, stiffness: Any, step_s: float, steps: int) -> np.ndarray:
+    """Makes the zero-order-hold transitions over 0, 1, 2 ... ``steps`` plant steps under a force that is held.
 
     E(i + 1) = E(i) + E(1) + E(1) E(i) for E = e^{A i h} - I, which never subtracts the identity.
 
-    Attributes:
-        coefficients: shape (steps + 1, 6), row i for i steps; of many loops at once (steps + 1, 6, loops).
+    Args:
+        mass: kg, > 0.
+        damping: N s/m.
+        stiffness: N/m.
+        step_s: h, s.
+
+    Returns:
+        Shape (steps + 1, 6), row i for i steps, columns x_x, x_v, x_force, v_x, v_v, v_force; of a batch of members
+        that differ shape (steps + 1, 6, members).
     """
 
-    coefficients: np.ndarray
+    def rows(mass: float, damping: float, stiffness: float) -> np.ndarray:
+        one = _over_a_step(mass, damping, stiffness, step_s)
+        increment, rows = np.zeros_like(one), []
+        for _ in range(steps + 1):
+            rows.append(_to_state(increment, mass, stiffness, step_s)[:, :3].ravel().astype(float))
+            increment = increment + one + one @ increment
+        return np.array(rows)
 
-    @classmethod
-    def of(cls, mass: float, damping: float, stiffness: float, step_s: float, steps: int) -> HeldFlow:
-        """For up to ``steps`` steps of ``step_s`` seconds; mass in kg (> 0), damping in N s/m, stiffness in N/m."""
-
-        def rows(mass: float, damping: float, stiffness: float) -> np.ndarray:
-            one = _over_a_step(mass, damping, stiffness, step_s)
-            flow, rows = np.zeros_like(one), []
-            for _ in range(steps + 1):
-                rows.append(_to_state(flow, mass, stiffness, step_s)[:, :3].ravel().astype(float))
-                flow = flow + one + one @ flow
-            return np.array(rows)
-
-        return cls(each(rows, mass, damping, stiffness))
-
-    def by_count(self) -> list[tuple[Any, ...]]:
-        """The coefficients, one tuple for each number of steps: plain floats, or arrays over many loops."""
-        rows = self.coefficients
-        return [tuple(row) for row in (rows.tolist() if rows.ndim == 2 else rows)]
+    return each(rows, mass, damping, stiffness)
 
 
 @lru_cache(maxsize=4096)
 def _over_a_step(mass: float, damping: float, stiffness: float, step_s: float) -> Matrix:
-    """e^{A h} - I in the coordinates of ``_rates``."""
-    return flow_minus_identity(_rates(mass, damping, stiffness, step_s), _wide(step_s))
+    """Returns e^{A h} - I in the coordinates of ``_rates``."""
+    return transition_minus_identity(_rates(mass, damping, stiffness, step_s), _wide(step_s))
 
 
 def _rates(mass: float, damping: float, stiffness: float, step_s: float) -> Matrix:
-    """A for the state (c x, v, F h / m, rise of F over a step * h / m) with c = ``natural_rate``.
+    """Returns A for the state (c x, v, F h / m, rise of F over a step * h / m) with c = ``natural_rate``.
 
     In these coordinates every rate is at most about |A| and an undamped oscillation is a pure rotation.
     """
@@ -158,20 +153,21 @@ def _rates(mass: float, damping: float, stiffness: float, step_s: float) -> Matr
     return rates
 
 
-def _to_state(flow: Matrix, mass: float, stiffness: float, step_s: float) -> Matrix:
-    """The rows of x and v in the coordinates (x, v, F, rise of F); shape (2, 4)."""
+def _to_state(increment: Matrix, mass: float, stiffness: float, step_s: float) -> Matrix:
+    """Returns the rows of x and v in the coordinates (x, v, F, rise of F); shape (2, 4)."""
     h, c = _wide(step_s), _wide(natural_rate(mass, stiffness, step_s))
-    return flow[:2] * np.array([c, _wide(1), h / mass, h / mass]) / np.array([[c], [_wide(1)]])
+    return increment[:2] * np.array([c, _wide(1), h / mass, h / mass]) / np.array([[c], [_wide(1)]])
 
 
 def natural_rate(mass: float, stiffness: float, step_s: float) -> float:
-    """c in 1/s, which makes c x comparable to v: the natural frequency, but at least one over the step."""
+    """Returns c in 1/s, which makes c x comparable to v: the natural frequency, but at least one over the step."""
     return max(math.sqrt(stiffness / mass), 1.0 / step_s)
 
 
 def motion_integrals(mass: float, damping: float, stiffness: float, step_s: float) -> tuple[Matrix, Matrix]:
-    """Exact integrals over one step from its rates w = (v(0), a(0) / c, F' h / (m c)): heat and lagged displacement.
+    """Returns the exact integrals over one step for heat and lagged displacement, from its rates at the start.
 
+    The rates are w = (v(0), a(0) / c, F' h / (m c)).
     Differentiating m a + b v + k x = F once gives w its own linear system, w' = R w with v = w_0; F' is constant
     within a step and c is ``natural_rate``. In rates nothing cancels when a large force holds the device at rest.
 
@@ -189,10 +185,10 @@ def motion_integrals(mass: float, damping: float, stiffness: float, step_s: floa
     extended[:3, :3] = rates
     extended[3, 0] = 1.0
     extended[4, 3] = 1.0 / h
-    increment = flow_minus_identity(extended, h)
+    increment = transition_minus_identity(extended, h)
     return square, increment[3, :3] / 2.0 - increment[4, :3]
 
 
 def real_for(damping_rate: float, step_s: float) -> type[np.floating]:
-    """The float in which forms of rates are to be summed: their terms cancel in the ratio of step to time constant."""
+    """Returns the float type in which to sum forms of rates, whose terms cancel as the step to the time constant."""
     return np.longdouble if damping_rate * step_s > 100.0 else np.float64

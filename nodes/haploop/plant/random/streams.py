@@ -5,29 +5,30 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from itertools import chain, count
-from typing import TYPE_CHECKING, Any
+from itertools import chain, count, islice
+from typing import Any
 
 import numpy as np
 from numpy.random import Generator, Philox
 
-if TYPE_CHECKING:
-    from haploop.plant.random.streams_batch import RandomStreamArray
-
-# The next number of a stream, of one run; of many runs at once it would be an array with a number for each.
+# Returns the next number of a stream; in a batch, an array with a number for each member.
 Draw = Callable[[], Any]
 
 # Draws are made in pieces on a fixed grid, so that how a run is cut into messages cannot change a bit of them.
 PIECE = 4096
+# Rows drawn at a time in a batch; divides a piece. A generator goes on where it stopped.
+_ROWS = 128
 
 
-def stream_of(seed: Any, name: str) -> RandomStream | RandomStreamArray:
-    """The stream of a name, of one seed or of an array of them."""
-    if not getattr(seed, "shape", ()):
-        return RandomStream(seed, name)
-    from haploop.plant.random.streams_batch import RandomStreamArray
+def make_normal(seed: Any, name: str, first: int = 0) -> Draw:
+    """Returns the standard normal numbers of a named stream from draw ``first`` on.
 
-    return RandomStreamArray(seed, name)
+    Args:
+        seed: a whole number, or an array of shape (members,) with the seed of every member of a batch.
+    """
+    if getattr(seed, "shape", ()):
+        return NormalRows(np.asarray(seed), name, first)
+    return RandomStream(int(seed), name).normal(first)
 
 
 @dataclass(frozen=True)
@@ -35,34 +36,80 @@ class RandomStream:
     """A named stream of a seed: draw i depends on (seed, name, i) only, so that no effect disturbs another's numbers.
 
     Counter-based: Philox 4x64 (Salmon et al. 2011) under a key made of seed and name by SHA-256; each piece of draws
-    starts at a counter of its own. A stream is meant for draws of one kind, and each method starts it anew.
+    starts at a counter of its own. A stream is meant for draws of one kind; each method starts it at draw ``first``.
     """
 
     seed: int
     name: str
 
-    def normal(self) -> Draw:
-        """Standard normal numbers."""
-        return self._draws(lambda generator: generator.standard_normal(PIECE))
+    def normal(self, first: int = 0) -> Draw:
+        """Returns standard normal numbers."""
+        return self._draws(lambda generator: generator.standard_normal(PIECE), first)
 
-    def uniform(self) -> Draw:
-        """Numbers in [0, 1)."""
-        return self._draws(lambda generator: generator.random(PIECE))
+    def uniform(self, first: int = 0) -> Draw:
+        """Returns numbers in [0, 1)."""
+        return self._draws(lambda generator: generator.random(PIECE), first)
 
-    def whole(self, below: int) -> Draw:
-        """Whole numbers 0 ... ``below`` - 1, equally likely."""
-        return self._draws(lambda generator: generator.integers(below, size=PIECE))
+    def whole(self, below: int, first: int = 0) -> Draw:
+        """Returns whole numbers 0 ... ``below`` - 1, equally likely."""
+        return self._draws(lambda generator: generator.integers(below, size=PIECE), first)
 
-    def gamma(self, shape: float) -> Draw:
-        """Gamma-distributed numbers of unit scale: mean and variance are ``shape``."""
-        return self._draws(lambda generator: generator.standard_gamma(shape, PIECE))
+    def gamma(self, shape: float, first: int = 0) -> Draw:
+        """Returns gamma-distributed numbers of unit scale: mean and variance are ``shape``."""
+        return self._draws(lambda generator: generator.standard_gamma(shape, PIECE), first)
 
-    def _draws(self, make: Callable[[Generator], np.ndarray]) -> Draw:
-        pieces = (make(self.generator(piece)).tolist() for piece in count())
-        draws: Iterator[Any] = chain.from_iterable(pieces)
+    def _draws(self, make: Callable[[Generator], np.ndarray], first: int) -> Draw:
+        piece, within = divmod(first, PIECE)
+        pieces = (make(self.generator(index)).tolist() for index in count(piece))
+        draws: Iterator[Any] = islice(chain.from_iterable(pieces), within, None)
         return draws.__next__
 
     def generator(self, piece: int) -> Generator:
-        """What makes the draws of a piece, from its first one on."""
+        """Returns what makes the draws of a piece, from its first one on."""
         digest = hashlib.sha256(f"{self.seed}/{self.name}".encode()).digest()
         return Generator(Philox(key=int.from_bytes(digest[:16], "little"), counter=piece << 128))
+
+
+class NormalRows:
+    """Standard normal numbers of a named stream for every seed of a batch, a row of shape (members,) a draw.
+
+    Every member draws what it would draw alone.
+
+    Args:
+        seeds: shape (members,), whole numbers.
+        name: what is random.
+        first: the draw to begin with.
+    """
+
+    def __init__(self, seeds: np.ndarray, name: str, first: int = 0) -> None:
+        self._seeds, self._name = seeds, name
+        self._drawn = first // PIECE * PIECE
+        self._generators: list[Generator] = []
+        self._rows, self._at = np.empty((0, len(seeds))), 0
+        for _ in range(first - self._drawn):
+            self()
+
+    def select(self, kept: np.ndarray) -> None:
+        """Drops the members that are not kept, shape (members,)."""
+        self._seeds, self._rows = self._seeds[kept], self._rows[:, kept]
+        self._generators = [one for one, stays in zip(self._generators, kept, strict=False) if stays]
+
+    def __call__(self) -> np.ndarray:
+        if self._at == len(self._rows):
+            self._draw()
+        row = self._rows[self._at]
+        self._at += 1
+        return row
+
+    def _draw(self) -> None:
+        piece, within = divmod(self._drawn, PIECE)
+        if not within:
+            self._generators = [RandomStream(int(seed), self._name).generator(piece) for seed in self._seeds]
+        self._rows = np.stack([one.standard_normal(_ROWS) for one in self._generators], axis=-1)
+        self._drawn, self._at = self._drawn + _ROWS, 0
+
+
+def select_draws(draw: Draw | None, kept: np.ndarray) -> None:
+    """Drops members from a stream that has numbers for each; one that all share stays as it is."""
+    if isinstance(draw, NormalRows):
+        draw.select(kept)

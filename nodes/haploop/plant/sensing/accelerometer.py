@@ -1,83 +1,135 @@
-"""What an accelerometer makes of the acceleration it feels."""
+"""The reading of an accelerometer: bias, noise, range and resolution."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from haploop.plant.counters import CLIPPED, Tally
-from haploop.plant.random.streams import Draw, stream_of
-from haploop.plant.sensing.band_limited_noise import band_limited_noise
+from haploop.plant.counters import CLIPPED, Counter, make_counter
+from haploop.plant.random.streams import make_normal, select_draws
+from haploop.plant.sensing.encoder import accelerometer_is_used
+from haploop.plant.sensing.noise import Noise, make_noise
 from haploop.protocol.arrays import clipped, each, nearest_multiple
 from haploop.protocol.ticks import Timebase
+from haploop.protocol.trees import tree_select
+
+
+class Reading(NamedTuple):
+    """Parameters of a reading: (a + bias + noise), clipped to +-range, rounded to the nearest count within the range.
+
+    Attributes:
+        bias: m/s^2, or None; in a batch a number for all members or an array of shape (members,), as the others.
+        noise: or None.
+        range: m/s^2, or None.
+        resolution: m/s^2, or None.
+        last_count: the last whole count within the range, m/s^2.
+    """
+
+    bias: Any
+    noise: Noise | None
+    range: Any
+    resolution: Any
+    last_count: Any
+
+    def of(self, acceleration: Any, noise: Any) -> tuple[Any, Any]:
+        """Returns (reading in m/s^2, whether the range clipped it).
+
+        Args:
+            acceleration: what the sensor feels, m/s^2.
+            noise: of this tick, m/s^2; not read where there is none.
+        """
+        value = acceleration if self.bias is None else acceleration + self.bias
+        if self.noise is not None:
+            value = value + noise
+        is_clipped: Any = False
+        if self.range is not None:
+            inside = (value >= -self.range) & (value <= self.range)
+            is_clipped = not inside if inside.__class__ is bool else ~inside
+            value = clipped(value, self.range)
+        if self.resolution is not None:
+            value = clipped(nearest_multiple(value, self.resolution), self.last_count)
+        return value, is_clipped
 
 
 class Accelerometer:
-    """Reading = (a + bias + noise), clipped to +-range, rounded to the nearest whole count within the range.
+    """An accelerometer read once a tick. The effect of its bandwidth on the acceleration, and its delay, are the
+    motion's.
 
     The noise is white with one-sided density D (m/s^2/sqrt(Hz)). Through a first-order bandwidth B its deviation is
     D sqrt(pi / 2 B), and it is correlated from tick to tick; without a bandwidth the sensor passes what the tick rate
-    can tell, D sqrt(rate / 2), and it is white. The bandwidth's effect on the acceleration itself, and the delay,
-    are the motion's.
+    can tell, D sqrt(rate / 2), and it is white.
 
     Args:
-        table: the resolved ``[accelerometer]`` table.
-        seed: the scene's.
+        table: the resolved ``[accelerometer]`` table, or a stacked one of a batch.
+        seed: the scene's, or an array of shape (members,).
         time: the integers of the run.
+        members: of a batch; None for one run.
 
     Attributes:
-        tallies: the ticks at which the range clipped the reading, where there is a range.
+        parameters: of the reading.
+        draw: returns the next standard normal number of the noise, or a row of them; None without noise.
+        state: (ticks read so far, noise at the last one or None, clipped readings).
+        counters: the ticks at which the range clipped the reading, where there is a range.
     """
 
-    def __init__(self, table: dict[str, Any], seed: int, time: Timebase) -> None:
-        self._tick, self._steps = 0, time.steps_per_tick
-        self._most = table.get("range", math.inf)
-        self._clipped = Tally()
-        self.tallies: dict[str, Tally] = {}
-        self._stages: list[Callable[[float], float]] = []
-        bias = table["bias"]
-        if np.any(bias):
-            self._stages.append(lambda a: a + bias)
-        if np.any(table["noise_density"]):
-            noise = _noise(table, seed, time)
-            self._stages.append(lambda a: a + noise())
-        if "range" in table:
-            self.tallies[CLIPPED] = self._clipped
-            self._stages.append(self._clip)
-        if "resolution" in table:
-            self._stages.append(_rounded(table["resolution"], self._most))
+    def __init__(self, table: dict[str, Any], seed: Any, time: Timebase, members: int | None = None) -> None:
+        self._seed, self._steps = seed, time.steps_per_tick
+        self._read, self._noise = 0, None
+        noise = _noise(table, time) if np.any(table["noise_density"]) else None
+        self.draw = make_normal(seed, "accelerometer") if noise else None
+        most, resolution = table.get("range"), table.get("resolution")
+        last_count = (
+            each(_last_count, resolution, math.inf if most is None else most) if resolution is not None else None
+        )
+        bias = table["bias"] if np.any(table["bias"]) else None
+        self.parameters = Reading(bias, noise, most, resolution, last_count)
+        self._clipped = make_counter(members)
+        self.counters: dict[str, Counter] = {} if most is None else {CLIPPED: self._clipped}
 
-    def reading(self, acceleration: float) -> float:
-        """What is read at the next tick, m/s^2; to be called at every tick from tick 0 on."""
-        for stage in self._stages:
-            acceleration = stage(acceleration)
-        return acceleration
+    def reading(self, acceleration: Any) -> Any:
+        """Returns the reading of the next tick, m/s^2; to be called at every tick from tick 0 on."""
+        if self.draw:
+            assert self.parameters.noise
+            self._noise = self.parameters.noise.after(self._noise, self.draw())
+        value, is_clipped = self.parameters.of(acceleration, self._noise)
+        if is_clipped is not False:
+            self._clipped.note(self._read * self._steps, is_clipped)
+        self._read += 1
+        return value
 
-    def _clip(self, reading: float) -> float:
-        most, tick = self._most, self._tick
-        self._tick += 1
-        if -most <= reading <= most:
-            return reading
-        self._clipped.note(tick * self._steps)
-        return clipped(reading, most)
+    @property
+    def state(self) -> tuple[int, Any, Any]:
+        return self._read, self._noise, self._clipped.state
+
+    def restore(self, state: tuple[int, Any, Any]) -> None:
+        """Goes on from a state."""
+        self._read, self._noise, clipped = state
+        self._clipped.restore(clipped)
+        if self.draw:
+            self.draw = make_normal(self._seed, "accelerometer", self._read)
+
+    def select(self, kept: np.ndarray) -> None:
+        """Drops the members of a batch that are not kept, shape (members,)."""
+        self.parameters, self._noise, self._seed = tree_select((self.parameters, self._noise, self._seed), kept)
+        self._clipped.select(kept)
+        select_draws(self.draw, kept)
 
 
-def _noise(table: dict[str, Any], seed: Any, time: Timebase) -> Draw:
-    normal, density = stream_of(seed, "accelerometer").normal(), table["noise_density"]
+def make_accelerometer(scene: dict[str, Any], time: Timebase, members: int | None = None) -> Accelerometer | None:
+    """Makes what reads the true acceleration; None where it is read as it is, or not at all."""
+    if "accelerometer" not in scene or not accelerometer_is_used(scene):
+        return None
+    return Accelerometer(scene["accelerometer"], scene["seed"], time, members)
+
+
+def _noise(table: dict[str, Any], time: Timebase) -> Noise:
+    density = table["noise_density"]
     if "bandwidth" not in table:
-        deviation = density * math.sqrt(time.control_rate / 2.0)
-        return lambda: deviation * normal()
+        return Noise(density * math.sqrt(time.control_rate / 2.0))
     deviation = density * each(math.sqrt, math.pi / 2.0 * table["bandwidth"])
-    return band_limited_noise(normal, deviation, table["bandwidth"], time.period_s)
-
-
-def _rounded(resolution: Any, most: Any) -> Callable[[Any], Any]:
-    """Rounding to whole counts that keeps to the last count within the range."""
-    most = each(_last_count, resolution, most)
-    return lambda reading: clipped(nearest_multiple(reading, resolution), most)
+    return make_noise(deviation, table["bandwidth"], time.period_s)
 
 
 def _last_count(resolution: float, most: float) -> float:

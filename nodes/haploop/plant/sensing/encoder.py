@@ -1,52 +1,57 @@
-"""What the controller gets to see of the plant at a tick."""
+"""The encoder: the measured position at a tick."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import numpy as np
 
 from haploop.protocol.arrays import floor, rint
-from haploop.protocol.ticks import Timebase
-
-if TYPE_CHECKING:
-    from haploop.plant.sensing.accelerometer import Accelerometer
+from haploop.protocol.trees import tree_select
 
 ROUNDINGS = {"nearest": rint, "floor": floor}
 
 
-def position_sensor(scene: dict[str, Any], time: Timebase) -> Callable[[Any], Any]:
-    """From true to measured position, to be called once a tick: what the encoder makes of x, noise added before."""
-    quantise = encoder(scene.get("encoder"))
-    if "noise" not in scene:
-        return quantise
-    from haploop.plant.sensing.noise import position_noise
+def make_encoder(table: dict[str, Any] | None) -> Callable[[Any], Any]:
+    """Makes the function from true to measured position: q rint(x / q) or q floor(x / q); without a table x itself.
 
-    noise = position_noise(scene["noise"], scene["seed"], time.period_s)
-    return lambda x: quantise(x + noise())
-
-
-def accelerometer(scene: dict[str, Any], time: Timebase) -> Accelerometer | None:
-    """What reads the true acceleration; None where it is read as it is, or not at all."""
-    if "accelerometer" not in scene or not accelerometer_is_used(scene):
-        return None
-    if "loops" in scene:
-        from haploop.plant.sensing.accelerometer_batch import AccelerometerArray
-
-        return AccelerometerArray(scene["accelerometer"], scene["seed"], time)
-    from haploop.plant.sensing.accelerometer import Accelerometer
-
-    return Accelerometer(scene["accelerometer"], scene["seed"], time)
-
-
-def encoder(table: dict[str, Any] | None) -> Callable[[Any], Any]:
-    """From true to measured position: q rint(x / q) or q floor(x / q); x itself in a scene without ``[encoder]``."""
+    Args:
+        table: the resolved ``[encoder]`` table: resolution q in m, rounding; in a batch q may be of shape (members,).
+    """
     if table is None:
         return lambda x: x
     resolution, whole = table["resolution"], ROUNDINGS[table["rounding"]]
     return lambda x: resolution * whole(x / resolution)
 
 
+class PositionSensor:
+    """Measured position of the device, as the encoder rounds it.
+
+    Attributes:
+        encoder: the resolved ``[encoder]`` table, or None.
+        reading: returns the measured position of x in m at the next tick; to be called at every tick from tick 0 on.
+        state: none, for a sensor without noise.
+    """
+
+    def __init__(self, encoder: dict[str, Any] | None) -> None:
+        self.encoder = encoder
+        self.reading = make_encoder(encoder)
+
+    @property
+    def state(self) -> Any:
+        return ()
+
+    def restore(self, state: Any) -> None:
+        """Goes on from a state."""
+
+    def select(self, kept: np.ndarray) -> None:
+        """Drops the members of a batch that are not kept, shape (members,)."""
+        self.encoder = tree_select(self.encoder, kept)
+        self.reading = make_encoder(self.encoder)
+
+
 def accelerometer_is_used(scene: dict[str, Any]) -> bool:
-    """Whether samples carry the plant's acceleration beside the position."""
+    """Tells whether samples carry the plant's acceleration beside the position."""
     by_itself = scene.get("acceleration", {}).get("source") == "accelerometer"
     return by_itself or scene.get("velocity", {}).get("accelerometer", False)

@@ -1,19 +1,103 @@
-"""Noise on the measured position."""
+"""Noise of sensors at ticks: white, or white through a first-order low-pass."""
 
 from __future__ import annotations
 
-from typing import Any
+import math
+from typing import Any, NamedTuple
 
-from haploop.plant.random.streams import Draw, stream_of
-from haploop.plant.sensing.band_limited_noise import band_limited_noise
+import numpy as np
+
+from haploop.plant.random.streams import make_normal, select_draws
+from haploop.plant.sensing.encoder import PositionSensor, make_encoder
+from haploop.protocol.arrays import each
+from haploop.protocol.trees import tree_select
 
 
-def position_noise(table: dict[str, Any], seed: Any, period_s: float) -> Draw:
-    """Noise in m at the next tick, to be added before the encoder rounds; stationary from tick 0 on.
+class Noise(NamedTuple):
+    """Samples of a stationary Ornstein-Uhlenbeck process, exact at ticks.
+
+        n[0] = sigma xi[0],  n[k+1] = rho n[k] + sigma sqrt(1 - rho^2) xi[k+1],  rho = exp(-2 pi cutoff T)
+
+    Its deviation is sigma at every tick and its autocorrelation sigma^2 rho^|j| at a distance of j ticks: those of
+    white noise of density D through 1 / (1 + s / (2 pi cutoff)) with sigma = D sqrt(pi / 2 cutoff) (one-sided).
+    What lies above half the tick rate is folded back, as by any sampler (Uhlenbeck and Ornstein 1930).
+
+    Attributes:
+        deviation: sigma; in a batch a number for all members or an array of shape (members,), as the others.
+        keep: rho, or None for white noise.
+        fresh: sigma sqrt(1 - rho^2), or None for white noise.
+    """
+
+    deviation: Any
+    keep: Any = None
+    fresh: Any = None
+
+    def after(self, before: Any, draw: Any) -> Any:
+        """Returns the noise at a tick, in the unit of ``deviation``.
+
+        Args:
+            before: the noise at the tick before; None at tick 0.
+            draw: a standard normal number xi, or an array of shape (members,).
+        """
+        if before is None or self.keep is None:
+            return self.deviation * draw
+        return self.keep * before + self.fresh * draw
+
+
+def make_noise(deviation: Any, cutoff_Hz: Any, period_s: float) -> Noise:
+    """Makes band-limited noise of a deviation, a cutoff at which the spectrum has fallen to half, and a tick."""
+    decay = -math.tau * cutoff_Hz * period_s
+    keep, fresh = each(math.exp, decay), deviation * each(math.sqrt, -each(math.expm1, 2.0 * decay))
+    return Noise(deviation, keep, fresh)
+
+
+class NoisyPositionSensor(PositionSensor):
+    """Measured position of the device plus band-limited noise, as the encoder rounds it; stationary from tick 0 on.
 
     Args:
+        encoder: the resolved ``[encoder]`` table, or None.
         table: the resolved ``[noise]`` table: deviation in m, cutoff in Hz.
-        seed: the scene's, or one for each of many scenes.
+        seed: the scene's; in a batch a number for all members or an array of shape (members,).
         period_s: one tick.
+
+    Attributes:
+        noise: its parameters.
+        draw: returns the standard normal number of the next tick, or a row of shape (members,).
+        state: (ticks measured so far, noise at the last one or None).
     """
-    return band_limited_noise(stream_of(seed, "noise").normal(), table["deviation"], table["cutoff"], period_s)
+
+    def __init__(self, encoder: dict[str, Any] | None, table: dict[str, Any], seed: Any, period_s: float) -> None:
+        super().__init__(encoder)
+        self.noise = make_noise(table["deviation"], table["cutoff"], period_s)
+        self._seed, self.draw = seed, make_normal(seed, "noise")
+        self._measured, self._last = 0, None
+        self._prepare()
+
+    def _prepare(self) -> None:
+        self._encode, self.reading = make_encoder(self.encoder), self._noisy
+
+    def _noisy(self, x: Any) -> Any:
+        self._last = noise = self.noise.after(self._last, self.draw())
+        self._measured += 1
+        return self._encode(x + noise)
+
+    @property
+    def state(self) -> Any:
+        return self._measured, self._last
+
+    def go_on(self, measured: int, noise: Any) -> None:
+        """Goes on from a noise after so many ticks, whose numbers have all been drawn."""
+        self._measured, self._last = measured, noise
+
+    def restore(self, state: Any) -> None:
+        """Goes on from a state."""
+        self._measured, self._last = state
+        self.draw = make_normal(self._seed, "noise", self._measured)
+
+    def select(self, kept: np.ndarray) -> None:
+        """Drops the members of a batch that are not kept, shape (members,)."""
+        self.encoder, self.noise, self._last, self._seed = tree_select(
+            (self.encoder, self.noise, self._last, self._seed), kept
+        )
+        select_draws(self.draw, kept)
+        self._prepare()

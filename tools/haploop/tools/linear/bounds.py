@@ -88,7 +88,7 @@ def _soft(scene: Scene, kinds: Kinds | None) -> float:
     virtual = sum(table["damping"] for table in elements)
     if virtual and scene.get("velocity"):
         raise _DoesNotApply("The velocity is no plain backward difference.")
-    mechanics, late_s = Mechanics.of(scene), _half_period_s(scene) + scene["clock"]["round_trip_delay"]
+    mechanics, late_s = Mechanics.from_scene(scene), _half_period_s(scene) + scene["clock"]["round_trip_delay"]
     bound = (mechanics.damping + virtual) / late_s
     angle = math.sqrt((bound + mechanics.stiffness) / mechanics.mass_kg) * late_s
     if angle > _SMALL_ANGLE:
@@ -104,7 +104,7 @@ def _at_once(scene: Scene, kinds: Kinds | None) -> float:
     _refuse_lagging_force(scene)
     _refuse_bodies_in_a_row(scene)
     _refuse_more_than_a_wall(scene)
-    mechanics = Mechanics.of(scene)
+    mechanics = Mechanics.from_scene(scene)
     if mechanics.stiffness:
         raise _DoesNotApply("The hand has a spring.")
     return _jury(mechanics.mass_kg, mechanics.damping, 2.0 * _half_period_s(scene))

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from haploop.plant.chain.chain import Chain, sensor_body
-from haploop.plant.chain.transition import ChainFlow
+from haploop.plant.chain.transition import ChainTransition
 from haploop.plant.sensing.encoder import accelerometer_is_used
 from haploop.protocol.ticks import Timebase
 from haploop.tools.linear.controller import LinearController
@@ -129,7 +129,7 @@ class OneTickMap:
 
 def _after_a_tick(scene: dict[str, Any], controller: LinearController) -> np.ndarray:
     """w after a tick from w and a force added to u[k], shape (w, w + 1); every quantity is its row over these."""
-    time, chain = Timebase.from_clock(scene["clock"], scene["duration"]), Chain.of(scene)
+    time, chain = Timebase.from_clock(scene["clock"], scene["duration"]), Chain.from_scene(scene)
     states, felt = len(chain.states), _felt_steps(scene, time)
     sizes = states, felt, len(controller.moved), time.lookahead_ticks + 1, 1
     z, y, c, in_flight, added = np.split(np.eye(sum(sizes)), np.cumsum(sizes)[:-1])
@@ -145,7 +145,7 @@ def _course(chain: Chain, time: Timebase, z: np.ndarray, commands: np.ndarray) -
     """z at every plant step of a tick and at its end, shape (n + 1, states, w + 1), and the command held over each."""
     n, size = time.steps_per_tick, len(z)
     lookahead, late = divmod(time.delay_steps, n)
-    flow = ChainFlow(chain, time.step_s, n, stuck=False)
+    flow = ChainTransition(chain, time.step_s, n, stuck=False)
     course, held = [z], []
     for steps, command in ((late, commands[lookahead + 1]), (n - late, commands[lookahead])):
         begin = np.vstack([course[-1], command])

@@ -27,7 +27,7 @@ def largest_passive_stiffness(scene: dict[str, Any], delay_ticks: int, kinds: Ki
         scene: resolved, linear but for friction; its controller reads positions alone.
     """
     controller = LinearController.from_scene(scene, installed_kinds() if kinds is None else kinds)
-    damping = next(b for name, (body, b) in Chain.of(scene).grounded.items() if body == 0 and name != "hand")
+    damping = next(b for name, (body, b) in Chain.from_scene(scene).grounded.items() if body == 0 and name != "hand")
     period_s = 1.0 / scene["clock"]["control_rate"]
 
     def allowed(theta: np.ndarray) -> np.ndarray:

@@ -70,7 +70,7 @@ def pressed_deep(
     pressed = smooth(scene)
     clock = pressed["clock"]
     at = clock["round_trip_delay"]
-    depth_m = _DEPTH_M if len(Chain.of(scene).states) == 2 else _DEPTH_OF_MORE_STATES_M
+    depth_m = _DEPTH_M if len(Chain.from_scene(scene).states) == 2 else _DEPTH_OF_MORE_STATES_M
     push = {"kind": "step", "value": -stiffness * depth_m, "at": at}
     hand = pressed.get("hand", {"mass": 0.0, "damping": 0.0, "stiffness": 0.0})
     pressed["hand"] = {**hand, "rest": 0.0, "force": push}

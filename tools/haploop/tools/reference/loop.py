@@ -14,8 +14,10 @@ import numpy as np
 from haploop.controller.controller import Controller
 from haploop.controller.dissipation import registry
 from haploop.logger.verdict.window import CONTROLLER_COLUMNS, Window
-from haploop.plant.line.delay import line_of
-from haploop.plant.sensing.encoder import accelerometer, accelerometer_is_used, position_sensor
+from haploop.plant.choose import make_position_sensor
+from haploop.plant.line.delay import make_line
+from haploop.plant.sensing.accelerometer import make_accelerometer
+from haploop.plant.sensing.encoder import accelerometer_is_used
 from haploop.protocol.ticks import Timebase
 
 
@@ -97,7 +99,7 @@ def close_loop(
 ) -> Closed:
     """Runs a scene with a continuous plant; ``exact`` turns a load into the plant's kind of number."""
     time = make_timebase(scene)
-    measure, meter, line = position_sensor(scene, time), accelerometer(scene, time), line_of(scene, time)
+    position, meter, line = make_position_sensor(scene, time), make_accelerometer(scene, time), make_line(scene, time)
     controller = Controller(scene, time, registry())
     late = round(scene.get("accelerometer", {}).get("delay", 0.0) * time.control_rate)
     sensed = deque([0.0] * (late + 1), maxlen=late + 1)
@@ -105,7 +107,7 @@ def close_loop(
     plant.begin(load[0])
     x, v, forces = [plant.x], [plant.v], []
     for tick in range(time.ticks):
-        sample: tuple[float, ...] = (measure(plant.x),)
+        sample: tuple[float, ...] = (position.reading(plant.x),)
         if accelerometer_is_used(scene):
             sensed.append(plant.sensed())
             sample += (meter.reading(sensed[0]) if meter else sensed[0],)

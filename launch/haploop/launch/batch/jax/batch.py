@@ -20,10 +20,9 @@ from haploop.launch.batch.jax.window import CompiledWindow
 from haploop.launch.batch.stacking import structure
 from haploop.logger.books.chain import ChainBooks
 from haploop.logger.books.sums import Sums
-from haploop.plant.motion.one_mass_batch import LinearMotionArray
+from haploop.plant.motion.one_mass import OneMassMotion
 from haploop.plant.plant import beyond
-from haploop.plant.random.streams import Draw
-from haploop.plant.random.streams_batch import Draws
+from haploop.plant.random.streams import Draw, NormalRows
 from haploop.protocol.arrays import rows_of
 
 if TYPE_CHECKING:
@@ -107,9 +106,9 @@ class CompiledLoops(LoopArray):
 
     def _tick(self, tick: int) -> Tick:
         motion, books = self._motion, self._logger.books.plant if self._logger.books else None
-        if not isinstance(motion, LinearMotionArray) or isinstance(books, ChainBooks):
+        if not isinstance(motion, OneMassMotion) or isinstance(books, ChainBooks):
             raise NoTick("there are several bodies")
-        return Tick(tick, motion, self._line, self._quantise, self._feels, self._controller, self._rows, books)
+        return Tick(tick, motion, self._line, self._position, self._feels, self._controller, self._rows, books)
 
     def _by_program(self, first: int, until: int) -> None:
         tick = self._tick(first)
@@ -144,7 +143,7 @@ class CompiledLoops(LoopArray):
                 carry, rings = self._again(program, before, rings)
             if new.any() or done == until:
                 data = block.join([np.array(leaf) for leaf in carry.changing], constant)
-                tick.leaves.put(data, tick.leaves.whole)
+                tick.put(data, [row["command"] for row in self._last(carry, done)], done - first)
                 self._in_flight.extend(row["command"] for row in self._last(carry, done))
                 self._fetch(carry, rings, writable=done == until < self._end)
                 self._report_ends(new, first + np.asarray(carry.ticks))
@@ -176,7 +175,7 @@ class CompiledLoops(LoopArray):
 
     def _rows_of(self, draw: Draw, ticks: int) -> np.ndarray:
         """The next random numbers, shape (BLOCK_TICKS,) or (BLOCK_TICKS, loops)."""
-        one_for_all = not isinstance(draw, Draws)
+        one_for_all = not isinstance(draw, NormalRows)
         rows = np.zeros((BLOCK_TICKS, *([] if one_for_all else [len(self._ended)])))
         for row in range(ticks):
             rows[row] = draw()

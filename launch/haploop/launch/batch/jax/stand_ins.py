@@ -18,15 +18,6 @@ class Given:
         return self._force[first - self._first : last - self._first]
 
 
-class Drawn:
-    """A row of random numbers, drawn before; stands in for ``Draws``."""
-
-    row: Any = None
-
-    def __call__(self) -> Any:
-        return self.row
-
-
 class Outside(NamedTuple):
     """What comes to a tick from outside.
 

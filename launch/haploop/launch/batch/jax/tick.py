@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from types import MethodWrapperType, SimpleNamespace
+from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,19 +11,45 @@ import numpy as np
 from haploop.controller.controller import Controller
 from haploop.controller.recorder import BatchRecorder
 from haploop.launch.batch.jax.rows import Rows
-from haploop.launch.batch.jax.stand_ins import Drawn, Given, Outside, rounded
+from haploop.launch.batch.jax.stand_ins import Outside, rounded
 from haploop.launch.batch.jax.state import Leaves
-from haploop.launch.batch.object_state import replace
 from haploop.logger.books.one_mass import OneMassBooks
-from haploop.plant.motion.one_mass import change_over
-from haploop.plant.motion.one_mass_batch import LinearMotionArray
-from haploop.plant.motion.transition import HeldFlow
+from haploop.plant.line.actuator import ActuatedLine
+from haploop.plant.motion.forced_response import forced_response
+from haploop.plant.motion.one_mass import OneMassMotion, OneMassState, advance, change_over, sensed_acceleration
 from haploop.plant.random.streams import Draw
-from haploop.plant.random.streams_batch import Draws
+from haploop.plant.sensing.encoder import PositionSensor, make_encoder
+from haploop.plant.sensing.noise import NoisyPositionSensor
 
 
 class NoTick(Exception):
     """The loop's objects are no function that could be compiled."""
+
+
+class PlantTree(NamedTuple):
+    """Numbers of the plants of a batch that a tick reads and changes.
+
+    Attributes:
+        state: of the motion.
+        acting: force in effect at the start of an interval, N.
+        held, mechanics, transition, rest_N: parameters of the motion.
+        actuator: its parameters, or None.
+        saturated: commands clipped so far, or None.
+        encoder: the resolved ``[encoder]`` table, or None.
+        noise, last_noise: parameters of the noise of the position, and the noise at the last tick; or None.
+    """
+
+    state: OneMassState
+    acting: Any
+    held: Any
+    mechanics: Any
+    transition: Any
+    rest_N: Any
+    actuator: Any
+    saturated: Any
+    encoder: Any
+    noise: Any
+    last_noise: Any
 
 
 class Ticked(NamedTuple):
@@ -58,61 +84,56 @@ class Tick:
     """
 
     def __init__(
-        self, at: int, motion: LinearMotionArray, line: Any, quantise: Any, feels: bool, controller: Controller,
-        rows: BatchRecorder, books: OneMassBooks | None,
+        self, at: int, motion: OneMassMotion, line: Any, position: PositionSensor, feels: bool,
+        controller: Controller, rows: BatchRecorder, books: OneMassBooks | None,
     ) -> None:  # fmt: skip
-        self.at, self._motion, self._line, self._quantise, self._feels = at, motion, line, quantise, feels
+        self.at, self._motion, self._line, self._position, self._feels = at, motion, line, position, feels
         self._controller, self._rows = controller, rows
-        self.steps = motion._steps
-        self.draws: list[Draw] = []
-        self._drawn: list[Drawn] = []
-        self._stand_in_for_draws(quantise)
-        self.tau, motion._tau = motion._tau, None  # pyright: ignore[reportAttributeAccessIssue]
-        self._pieces, motion._pieces = motion._pieces, {}
-        self._span = motion._response_first, motion._response_end
-        motion._response, motion._over = [], []
-        load = np.shape(self.tau.at_steps(0, 1) + motion._spring_at_origin_N)
-        self.is_shared = motion._held.coefficients.shape[-1] == load[-1] == 1
-        self._line.forget_before(at)
+        self.steps = motion.held.shape[0] - 1
+        is_noisy = isinstance(position, NoisyPositionSensor)
+        self.draws: list[Draw] = [position.draw] if is_noisy else []
+        self._measured = position.state[0] if is_noisy else 0
+        self.tau, self.is_shared = motion.response.tau, motion.response.is_shared and motion.held.shape[-1] == 1
         # Apart from the force of the hand, which comes from outside.
         self.books: Any = books and SimpleNamespace(params=books.params, names=books.names, is_limited=books.is_limited)
-        while hasattr(line, "_line"):
-            line = line._line
-        self._forces: list[Any] = line._forces
-        self.commands, self._forces[:] = list(self._forces), [None] * len(self._forces)
-        self._by_itself = [quantise, controller, self.books]
-        self._root = [motion, self._line, *self._by_itself]
+        self._actuator = line if isinstance(line, ActuatedLine) else None
+        self._delay: Any = self._actuator.line if self._actuator else line
+        self.commands: list[Any] = self._delay.in_flight(at)
+        self._by_itself = [controller, self.books]
+        response, actuator = motion.response, self._actuator
+        self._plant = [
+            PlantTree(
+                motion.state, motion.last[1], motion.held, motion.mechanics, response.transition, response.rest_N,
+                actuator.actuator if actuator else None, actuator.state[3] if actuator else None, position.encoder,
+                position.noise if is_noisy else None, position.state[1] if is_noisy else None,
+            )
+        ]  # fmt: skip
+        self._root = [self._plant, *self._by_itself]
         self.leaves = Leaves(self._root)
-
-    def _stand_in_for_draws(self, quantise: Any) -> None:
-        def stand_in(draws: Draw) -> Drawn:
-            self.draws.append(draws)
-            self._drawn.append(Drawn())
-            return self._drawn[-1]
-
-        replace(quantise, (Draws, MethodWrapperType), stand_in)
 
     def responses(self, first: int, ticks: int) -> np.ndarray:
         """What the hand does to all loops in these intervals, as ``Outside`` has it."""
-        motion = self._motion
-        motion._tau, motion._pieces = self.tau, self._pieces
-        size = motion._piece_ticks
-        pieces = range(first // size, (first + ticks - 1) // size + 1)
-        joined = np.concatenate([motion._responses(piece) for piece in pieces])
-        motion._tau, motion._pieces = None, {}  # pyright: ignore[reportAttributeAccessIssue]
-        start = first - pieces.start * size
-        return joined[start : start + ticks]
+        return np.moveaxis(self._motion.response.between(first, ticks), 0, 2)
+
+    def put(self, data: list[Any], commands: list[Any], ticks: int) -> None:
+        """Have the objects of the plant stand where so many ticks more have brought them."""
+        self.leaves.put(data, self.leaves.whole)
+        plant, end, cut = self._plant[0], self.at + ticks, self._delay.cut
+        self._motion.state, newest = plant.state, end - 1 - cut.lookahead
+        self._motion.last = (cut.prompt_steps, plant.acting, newest)
+        line = end - cut.lookahead - 1, tuple(commands)
+        if self._actuator:
+            self._actuator.restore((line, newest, plant.acting, plant.saturated))
+        else:
+            self._line.restore(line)
 
     def release(self, data: list[Any], whole: list[int], commands: list[Any], ticks: int) -> None:
         """Give the objects back, after so many ticks more, with these leaves and with these commands on the line."""
-        motion, draws = self._motion, iter(self.draws)
+        self.put(data, commands, ticks)
         self.leaves.put(data, whole)
-        self._forces[:] = commands
         self._controller.tick += ticks
-        motion._over = motion._held.by_count()
-        motion._tau, motion._pieces = self.tau, self._pieces
-        motion._response_first = motion._response_end = 0
-        replace(self._quantise, Drawn, lambda _: next(draws))
+        if isinstance(self._position, NoisyPositionSensor):
+            self._position.go_on(self._measured + ticks, self._plant[0].last_noise)
 
     def run(
         self, data: list[Any], outside: Outside, report: Callable[[Ticked], Any]
@@ -127,16 +148,28 @@ class Tick:
         Raises:
             NoTick: the structure of the objects is another after the tick.
         """
-        tick, motion, whole = self.at, self._motion, list(self.leaves.whole)
+        tick, whole = self.at, list(self.leaves.whole)
         self.leaves.put(data, whole)
         counted = Leaves(self._by_itself).whole
-        start = self._begin(tick, outside)
-        x_m = rounded(self._quantise(motion.x), outside.zero)
-        forces = self._controller.answer([(x_m, motion.acceleration(tick)) if self._feels else (x_m,)])
-        self._line.receive(forces)
-        motion.advance(tick, self._line.holds(tick))
+        plant, response, tau = self._begin(outside)
+        x, noise = plant.state.x, plant.last_noise
+        if plant.noise:
+            noise = plant.noise.after(noise, outside.noise[0])
+            x = x + noise
+        x_m = rounded(make_encoder(plant.encoder)(x), outside.zero)
+        sample = (x_m,)
+        if self._feels:
+            sample += (sensed_acceleration(plant.mechanics, plant.state, plant.acting, outside.tau[0]),)
+        forces = self._controller.answer([sample])
+        newer, saturated = outside.commands[1] if len(self.commands) > 1 else forces[0], plant.saturated
+        if plant.actuator:
+            newer, is_saturated = plant.actuator.drive(newer)
+            saturated = saturated + is_saturated
+        holds = self._delay.cut.holds(tick, plant.acting, newer)
+        state, noted = advance(plant.held, plant.state, holds, response[-1])
+        self._plant[0] = plant._replace(state=state, acting=newer, saturated=saturated, last_noise=noise)
         (row,) = self._rows.take_rows()
-        told = self._told(*start, row)
+        told = self._told(plant, state, noted, response, tau, row)
         reported = report(told)
         self._end(tick)
         if Leaves(self._by_itself).whole != counted:
@@ -147,51 +180,34 @@ class Tick:
         self.leaves.put(self.leaves.data, whole)
         return after.data, after.whole, reported
 
-    def _begin(self, tick: int, outside: Outside) -> tuple[Any, Rows]:
-        motion = self._motion
-        n = motion._steps
-        tau = Rows(list(outside.tau))
-        given = Given(tick * n, tau)
-        motion._tau = given  # pyright: ignore[reportAttributeAccessIssue]
-        self._forces[:2] = outside.commands[: len(self._forces)]
-        for drawn, row in zip(self._drawn, outside.noise, strict=True):
-            drawn.row = row
-        motion._over = HeldFlow(motion._held.coefficients).by_count()
-        if outside.response is None:
-            load = tau + motion._spring_at_origin_N
-            steps = list(motion._driven(load[:-1], load[1:] - load[:-1]))
-            response = Rows([(0.0 * steps[0][0], 0.0 * steps[0][1]), *steps])
-        else:
-            response = Rows(list(outside.response))
-        motion._response, motion._response_first, motion._response_end = [response[-1]], tick, tick + 1
-        return response, tau
+    def _begin(self, outside: Outside) -> tuple[PlantTree, Rows, Rows]:
+        plant, tau = self._plant[0], Rows(list(outside.tau))
+        if outside.response is not None:
+            return plant, Rows(list(outside.response)), tau
+        load = tau + plant.rest_N
+        steps = list(forced_response(plant.transition, load[:-1], load[1:] - load[:-1]))
+        return plant, Rows([(0.0 * steps[0][0], 0.0 * steps[0][1]), *steps]), tau
 
-    def _told(self, response: Any, tau: Rows, row: Any) -> Ticked:
-        motion = self._motion
-        starts, motion._starts = motion._starts, []
-        x_rows, v_rows, x_low_rows, held_forces = [], [], [], []
-        for index, (first, count) in enumerate(motion._cuts):
-            x, x_low, v, v_low, force, _ = starts[6 * index : 6 * index + 6]
+    def _told(
+        self, plant: PlantTree, end: OneMassState, noted: list[Any], response: Any, tau: Rows, row: Any
+    ) -> Ticked:
+        x_rows, v_rows, x_low_rows, held_forces, first = [], [], [], [], 0
+        for at in range(0, len(noted), 7):
+            count, x, v, x_comp, v_comp, force, _ = noted[at : at + 7]
             known = int(not first)
-            held, during = Rows(list(motion._held.coefficients[known:count])), slice(first + known, first + count)
-            dx = change_over(held[:, :3], response[during, 0], x, v, force, x_low)
-            dv = change_over(held[:, 3:], response[during, 1], x, v, force, v_low)
+            held, during = Rows(list(plant.held[known:count])), slice(first + known, first + count)
+            dx = change_over(held[:, :3], response[during, 0], x, v, force, x_comp)
+            dv = change_over(held[:, 3:], response[during, 1], x, v, force, v_comp)
             at_x = x + dx
             x_rows += [x] * known + at_x.rows
             v_rows += [v] * known + (v + dv).rows
-            x_low_rows += [x_low] * known + (dx - (at_x - x)).rows
+            x_low_rows += [x_comp] * known + (dx - (at_x - x)).rows
             held_forces.append((count, force))
-        x, v, x_low = Rows([*x_rows, motion.x]), Rows([*v_rows, motion.v]), Rows([*x_low_rows, motion._x_low])
+            first += count
+        x, v, x_low = Rows([*x_rows, end.x]), Rows([*v_rows, end.v]), Rows([*x_low_rows, end.x_comp])
         wall = self._controller.params.wall
         place = wall.position, wall.stiffness, wall.inward
         return Ticked(x, v, x_low, held_forces, row.columns, row.forces, place, tau)
 
     def _end(self, tick: int) -> None:
-        self._line.forget_before(tick + 1)
-        self._forces[:] = [None] * len(self._forces)
         self._controller.tick = tick
-        self._motion._response = []
-        self._motion._over = []
-        self._motion._tau = None  # pyright: ignore[reportAttributeAccessIssue]
-        for drawn in self._drawn:
-            drawn.row = None

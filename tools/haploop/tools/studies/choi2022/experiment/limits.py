@@ -127,7 +127,7 @@ class GatedMap:
 
         least, more = map_with(_NO_MASS), map_with(_SOME_MASS)
         per_kg = (more.without_wall - least.without_wall) / (_SOME_MASS - _NO_MASS)
-        return cls(least.without_wall, per_kg, least.pushed, len(Chain.of(scene).states))
+        return cls(least.without_wall, per_kg, least.pushed, len(Chain.from_scene(scene).states))
 
     def growth(self, stiffness: Any, mass: Any, *, seed: int = 1, ticks: int = _TICKS) -> np.ndarray:
         """Returns ln of the factor per tick by which the fastest of some random starts grows in the end, peak to peak.

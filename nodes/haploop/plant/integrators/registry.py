@@ -1,0 +1,100 @@
+"""The registry of integrators: one line for each."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from importlib import import_module
+from importlib.metadata import entry_points
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from haploop.plant.integrators.linear_rates import OneStep
+
+# Name in ``clock.integrator`` -> module and name of its ``Integrator``, imported when it is asked for.
+INTEGRATORS = {
+    "exact": "haploop.plant.integrators.registry:EXACT",
+    "euler": "haploop.plant.integrators.euler:EULER",
+    "semi-implicit-euler": "haploop.plant.integrators.euler:SEMI_IMPLICIT_EULER",
+    "rk4": "haploop.plant.integrators.rk4:RK4",
+    "implicit-midpoint": "haploop.plant.integrators.implicit_midpoint:IMPLICIT_MIDPOINT",
+    "dop853": "haploop.plant.integrators.dop853:DOP853",
+}
+# Other packages name theirs in this group of entry points, as here.
+_GROUP = "haploop.integrators"
+
+
+@dataclass(frozen=True)
+class Integrator:
+    """A method that moves the bodies from one plant step to the next.
+
+    Attributes:
+        name: in ``clock.integrator``.
+        does: what it makes every plant step, in one phrase.
+        order: of its error in the plant step; None where that depends on no plant step.
+        method: the formula of a one-step method; None for a motion of its own.
+        evaluations: of the rates, in every plant step, or in every tick where it chooses its own steps.
+        chooses_steps: whether its steps are its own, at a tolerance, whatever ``clock.plant_rate``.
+        motions: "module:class" of the motion without friction and of that with it.
+    """
+
+    name: str
+    does: str
+    order: int | None
+    method: type[OneStep] | None = None
+    evaluations: int = 1
+    chooses_steps: bool = False
+    motions: tuple[str, str] = (
+        "haploop.plant.integrators.stepwise:StepwiseMotion",
+        "haploop.plant.integrators.stepwise_friction:StepwiseFrictionMotion",
+    )
+
+    @property
+    def is_exact(self) -> bool:
+        """Whether its error is near the last bits, whatever the plant step."""
+        return self.order is None
+
+    def make_motion(self, scene: dict[str, Any], *args: Any) -> Any:
+        """Makes the motion of a resolved scene; nothing else is imported."""
+        return _load(self.motions["friction" in scene])(scene, *args)
+
+
+EXACT = Integrator(
+    "exact",
+    "exact",
+    order=None,
+    motions=("haploop.plant.chain.motion:ChainMotion", "haploop.plant.friction.motion:FrictionMotion"),
+)
+
+
+def integrator_names() -> tuple[str, ...]:
+    """Returns the names of all integrators, those of other packages last."""
+    return *INTEGRATORS, *(entry.name for entry in entry_points(group=_GROUP) if entry.name not in INTEGRATORS)
+
+
+def integrator_module(name: str) -> str:
+    """Returns the module an integrator is written in.
+
+    Raises:
+        KeyError: there is none of this name.
+    """
+    return _place(name).partition(":")[0]
+
+
+def find_integrator(name: str) -> Integrator:
+    """Returns the integrator of a name; no other is imported.
+
+    Raises:
+        KeyError: there is none of this name.
+    """
+    return _load(_place(name))
+
+
+def _place(name: str) -> str:
+    if name not in INTEGRATORS:
+        return {entry.name: entry.value for entry in entry_points(group=_GROUP)}[name]
+    return INTEGRATORS[name]
+
+
+def _load(place: str) -> Any:
+    module, _, name = place.partition(":")
+    return getattr(import_module(module), name)

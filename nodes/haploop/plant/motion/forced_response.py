@@ -1,0 +1,104 @@
+"""The response of one mass to the hand's force alone, made beforehand for every plant step."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from haploop.plant.motion.hand_force import HandForce
+from haploop.plant.motion.transition import FohTransition
+from haploop.protocol.trees import tree_select
+
+# Responses are made for this many intervals at a time, on a fixed grid.
+_PIECE_TICKS = 256
+# Where every member of a batch has a response of its own, fewer intervals of it are made at a time.
+_PIECE_TICKS_OF_EACH = 8
+
+
+def forced_response(transition: FohTransition, start: Any, rise: Any) -> Iterator[tuple[Any, Any]]:
+    """Yields the forced (zero-state) response at every step of intervals but their start.
+
+    Args:
+        transition: over a plant step.
+        start, rise: load at the start of each step and its rise over it, N, shape (n, intervals); both and what is
+            yielded may have a last axis for the members of a batch.
+
+    Yields:
+        What is added to x in m and v in m/s, shape (intervals,) each.
+    """
+    s = transition
+    push_x, push_v = s.x_force * start + s.x_slope * rise, s.v_force * start + s.v_slope * rise
+    x = v = push_x[0] - push_x[0]
+    for of_x, of_v in zip(push_x, push_v, strict=True):
+        x, v = x + (s.x_x * x + s.x_v * v + of_x), v + (s.v_x * x + s.v_v * v + of_v)
+        yield x, v
+
+
+class ForcedResponse:
+    """Response to tau and the spring's rest, from zero at the start of every interval: a cache, no state.
+
+    It does not depend on the controller, and is made piece by piece of the run.
+
+    Args:
+        transition: over a plant step.
+        tau: force of the hand.
+        rest_N: force of the spring with the device at the origin, k x_rest.
+        steps: n, plant steps an interval has.
+
+    Attributes:
+        transition, tau, rest_N: as given.
+        is_shared: whether all members of a batch have the same response.
+    """
+
+    def __init__(self, transition: FohTransition, tau: HandForce, rest_N: Any, steps: int) -> None:
+        self.transition, self.tau, self.rest_N, self._steps = transition, tau, rest_N, steps
+        load = tau.at_steps(0, 1)[0] + rest_N
+        self.is_shared = not np.shape(transition.x_x) and (np.shape(load) or (1,))[-1] == 1
+        self._piece_ticks = _PIECE_TICKS if self.is_shared else _PIECE_TICKS_OF_EACH
+        self._pieces: dict[int, np.ndarray] = {}
+
+    def loads(self, first: int, last: int) -> np.ndarray:
+        """Returns tau + k x_rest at the steps first ... last - 1, N."""
+        return self.tau.at_steps(first, last) + self.rest_N
+
+    def ends(self, tick: int) -> tuple[int, list[Any]]:
+        """Returns (first interval of the piece with ``tick``, what is added to (x, v) over each interval of it)."""
+        piece = tick // self._piece_ticks
+        at_ends = self._piece(piece)[:, :, -1].swapaxes(0, 1)
+        return piece * self._piece_ticks, at_ends.tolist() if at_ends.ndim == 2 else list(at_ends)
+
+    def between(self, tick: int, ticks: int) -> np.ndarray:
+        """Returns the response of x and v in some intervals, shape (2, ticks, n + 1, ...), the last step their end."""
+        size = self._piece_ticks
+        first, last = tick // size, max(tick, tick + ticks - 1) // size
+        pieces = [self._piece(piece) for piece in range(first, last + 1)]
+        joined = pieces[0] if len(pieces) == 1 else np.concatenate(pieces, axis=1)
+        start = tick - first * size
+        return joined[:, start : start + ticks]
+
+    def _piece(self, piece: int) -> np.ndarray:
+        if piece not in self._pieces:
+            if len(self._pieces) > 8:
+                self._pieces.clear()
+            self._pieces[piece] = self._made(piece)
+        return self._pieces[piece]
+
+    def _made(self, piece: int) -> np.ndarray:
+        n, ticks = self._steps, self._piece_ticks
+        first = piece * ticks * n
+        force = self.loads(first, first + ticks * n + 1)
+        start, rise = (rows.reshape(ticks, n, *force.shape[1:]) for rows in (force[:-1], np.diff(force, axis=0)))
+        states = list(forced_response(self.transition, start.swapaxes(0, 1), rise.swapaxes(0, 1)))
+        response = np.zeros((2, ticks, n + 1, *states[0][0].shape[1:]))
+        for i, (x, v) in enumerate(states, 1):
+            response[0, :, i], response[1, :, i] = x, v
+        return response
+
+    def select(self, kept: np.ndarray) -> None:
+        """Drops the members of a batch that are not kept, shape (members,)."""
+        self.transition, self.rest_N = tree_select((self.transition, self.rest_N), kept)
+        self.tau.select(kept)
+        if not self.is_shared:
+            self._pieces = {piece: np.compress(kept, made, axis=-1) for piece, made in self._pieces.items()}
