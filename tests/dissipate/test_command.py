@@ -12,8 +12,8 @@ from typer.testing import CliRunner, Result
 from haploop.launch.runs.in_process import run_in_process
 from haploop.launch.scene.toml_writer import to_toml
 from haploop.tools.cli.main import app
-from haploop.tools.dissipate.figure import figure_of
-from haploop.tools.dissipate.report import answer
+from haploop.tools.dissipate.figure import make_figure
+from haploop.tools.dissipate.report import conclusion
 from helpers.data.recordings import outcome, write
 from helpers.scenes.least import KINDS, scene
 
@@ -150,7 +150,7 @@ def test_a_recording_that_is_not_there_is_said(tmp_path: Path) -> None:
 
 def test_the_figure_draws_the_books_that_the_table_tells(recording: Path) -> None:
     found = outcome(recording, delay_s=1e-3, dampings=["2.7"], masses=["0.0018"])
-    figure = figure_of(found)
+    figure = make_figure(found)
     lines = {line.get_gid(): line for ax in figure.get_axes() for line in reversed(ax.lines) if line.get_gid()}
     scale = {"µ": 1e-6, "m": 1e-3, "": 1.0, "n": 1e-9}
     (energy,) = [ax for ax in figure.get_axes() if ax.get_title(loc="left").startswith("Energy that")]
@@ -167,7 +167,7 @@ def test_the_figure_draws_the_books_that_the_table_tells(recording: Path) -> Non
 def test_the_close_view_is_where_most_was_given_back(tmp_path: Path) -> None:
     x = 2e-3 * np.sin(2.0 * np.pi * 3.0 * T)
     x[1500:1600] += 2e-4 * np.sin(2.0 * np.pi * 300.0 * T[1500:1600])  # damping feeds above a quarter of the rate
-    close = outcome(write(tmp_path / "jitter.csv", {"t": T, "x": x}), dampings=["2.7"]).course.close
+    close = outcome(write(tmp_path / "jitter.csv", {"t": T, "x": x}), dampings=["2.7"]).trace.close
     assert close is not None
     assert 1.4 < close[0, 0] < 1.6 < close[0, -1] + 0.06 < 1.71
 
@@ -175,17 +175,17 @@ def test_the_close_view_is_where_most_was_given_back(tmp_path: Path) -> None:
 def test_where_nothing_is_given_back_there_is_no_close_view(tmp_path: Path) -> None:
     x = np.linspace(0.0, 1e-2, 500)
     found = outcome(write(tmp_path / "slide.csv", {"t": T[:500], "x": x}), dampings=["2.7"])
-    assert found.course.close is None
-    shown = [text.get_text() for ax in figure_of(found).get_axes() for text in ax.texts]
+    assert found.trace.close is None
+    shown = [text.get_text() for ax in make_figure(found).get_axes() for text in ax.texts]
     assert "No element gave anything back." in shown
 
 
 def test_the_answer_says_who_takes_most_and_who_feeds(tmp_path: Path) -> None:
     slow = write(tmp_path / "slow.csv", {"t": T, "x": 2e-3 * np.sin(2.0 * np.pi * 3.0 * T)})
     fast = write(tmp_path / "fast.csv", {"t": T, "x": 2e-5 * np.sin(2.0 * np.pi * 400.0 * T)})
-    assert answer(outcome(slow, dampings=["2.7"])).startswith("damping 2.7 N s/m would have dissipated")
-    assert answer(outcome(fast, dampings=["2.7"])) == (
+    assert conclusion(outcome(slow, dampings=["2.7"])).startswith("damping 2.7 N s/m would have dissipated")
+    assert conclusion(outcome(fast, dampings=["2.7"])) == (
         "none of these would have dissipated; all would have fed the motion."
     )
-    both = answer(outcome(slow, dampings=["2.7", "1.35"]))
+    both = conclusion(outcome(slow, dampings=["2.7", "1.35"]))
     assert "2.00 times as much as damping 1.35 N s/m" in both

@@ -79,10 +79,10 @@ def test_recorded_rates_have_the_units_of_the_lengths(tmp_path: Path) -> None:
     si = write(tmp_path / "si.csv", {"t": T, "x": X, "v": v, "a": a})
     mm = write(tmp_path / "mm.csv", {"t": T, "x": X * 1e3, "v (mm/s)": v * 1e3, "a": a * 1e3})
     layout = Layout(velocity="v", acceleration="a")
-    asked: dict[str, Any] = {"dampings": ["1.0"], "masses": ["0.01"]}
-    expected = [element.true_J for element in outcome(si, layout=layout, **asked).elements]
+    selection: dict[str, Any] = {"dampings": ["1.0"], "masses": ["0.01"]}
+    expected = [element.true_J for element in outcome(si, layout=layout, **selection).elements]
     in_mm = Layout(velocity="v", acceleration="a", length="mm", acceleration_unit="mm/s^2")
-    found = outcome(mm, layout=in_mm, **asked)
+    found = outcome(mm, layout=in_mm, **selection)
     assert [element.true_J for element in found.elements] == pytest.approx(expected, rel=1e-9)
     assert found.recorded == ["acceleration", "velocity"]
 
@@ -229,7 +229,7 @@ def test_the_whole_of_a_long_recording_is_in_the_line_that_is_drawn(tmp_path: Pa
     t = np.arange(60_000) * 1e-3
     x = np.sin(t * 3.0) * 1e-3
     x[34_567] = 0.5
-    lines = outcome(write(tmp_path / "long.csv", {"t": t, "x": x}), dampings=["1.0"]).course.lines()
+    lines = outcome(write(tmp_path / "long.csv", {"t": t, "x": x}), dampings=["1.0"]).trace.lines()
     assert lines.shape[1] < 20_000
     assert lines[1].max() == 0.5
     assert lines[0, np.argmax(lines[1])] == pytest.approx(34.567, abs=0.05)

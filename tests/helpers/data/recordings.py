@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from haploop.tools.dissipate.booking import Booking
-from haploop.tools.dissipate.command import Request, dissipation_of
+from haploop.tools.dissipate.command import Request, compute_outcome
+from haploop.tools.dissipate.controller_scene import Selection, make_scene_for_text
 from haploop.tools.dissipate.outcome import Outcome
 from haploop.tools.dissipate.samples import Floats, Samples
-from haploop.tools.dissipate.setting import Asked, setting_of_text
 from haploop.tools.dissipate.text_recording import Layout
 from helpers.scenes.least import KINDS
 
@@ -26,17 +26,17 @@ def write(path: Path, columns: Mapping[str, Any], mark: str = ",") -> Path:
     return path
 
 
-def outcome(path: Path, *, delay_s: float | None = None, layout: Layout | None = None, **asked: Any) -> Outcome:
+def outcome(path: Path, *, delay_s: float | None = None, layout: Layout | None = None, **selection: Any) -> Outcome:
     """What comes of a recording."""
-    return dissipation_of(Request(path, Asked(**asked), layout or Layout(), delay_s), KINDS)
+    return compute_outcome(Request(path, Selection(**selection), layout or Layout(), delay_s), KINDS)
 
 
 def booking(
-    delay_s: float, *, recorded: frozenset[str] = frozenset(), period_s: float = PERIOD_S, **asked: Any
+    delay_s: float, *, recorded: frozenset[str] = frozenset(), period_s: float = PERIOD_S, **selection: Any
 ) -> Booking:
     """An account of elements on samples that are handed to it."""
-    setting = setting_of_text(Asked(**asked), Path("made.csv"), period_s, recorded, KINDS)
-    return Booking(setting, period_s, delay_s, KINDS, recorded)
+    scene = make_scene_for_text(Selection(**selection), Path("made.csv"), period_s, recorded, KINDS)
+    return Booking(scene, period_s, delay_s, KINDS, recorded)
 
 
 def samples(x: Floats, begins: bool = True, first: int = 0, **more: Any) -> Samples:

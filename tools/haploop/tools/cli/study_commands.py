@@ -90,12 +90,12 @@ def dissipate(
     """
     from haploop.tools.dissipate.command import Request
     from haploop.tools.dissipate.command import dissipate as book
-    from haploop.tools.dissipate.setting import Asked
+    from haploop.tools.dissipate.controller_scene import Selection
     from haploop.tools.dissipate.text_recording import Layout
 
-    asked = Asked(damping or [], mass or [], element or [], wall, occupies, set or [])
+    selection = Selection(damping or [], mass or [], element or [], wall, occupies, set or [])
     layout = Layout(position, time, rate, velocity, acceleration, unit, time_unit, velocity_unit, acceleration_unit)
-    book(Request(recording, asked, layout, parse_seconds(delay, "--delay"), plugin or [], out), json)
+    book(Request(recording, selection, layout, parse_seconds(delay, "--delay"), plugin or [], out), json)
 
 
 def paper(

@@ -1,4 +1,4 @@
-"""Elements at work on a recorded motion that they do not change, and what they would have taken out of it."""
+"""Energy books of elements at work on a recorded motion, which they do not change."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ if TYPE_CHECKING:
 
 
 class Booked(NamedTuple):
-    """The books as they stand at some samples.
+    """The books at some samples.
 
     Attributes:
         t_s, x_m: of the samples, shape (samples,).
         sampled_J, true_J: of every element, shape (elements, samples).
-        added_J: what the true books gained since the sample before, shape (elements, samples).
+        added_J: gain of the true books since the sample before, shape (elements, samples).
     """
 
     t_s: Floats
@@ -39,13 +39,13 @@ class Booked(NamedTuple):
 
 
 class Booking:
-    """Estimates, elements and books, sample by sample, as they are in a run.
+    """Runs estimates, elements and books on samples, as a run does.
 
     sampled  E += -f[k-1] (x_m[k] - x_m[k-1]), all the controller can know (Choi et al. 2022, eq. 4)
     true     E += -f_held dx: command k is held for a period from t_k + d on, d = (L + mu) T; in the period after
              sample k command k - L - 1 still holds for mu T, and command k - L for the rest
 
-    After a gap everything begins anew but for the sums; what happened within it is not known and not booked.
+    After a gap everything but the sums starts again; the motion within it is not known and not booked.
 
     Args:
         scene: resolved: estimators, wall and elements of a controller.
@@ -55,8 +55,9 @@ class Booking:
         recorded: which of "velocity" and "acceleration" come with the samples and are taken as they are.
 
     Attributes:
-        taken_J, given_J: what the true books gained in all periods in which they gained, and lost in the others.
-        strongest_N: the largest force of every element.
+        taken_J, given_J: sum of the gains of the true books over the periods in which they gained, and of the losses
+            over the others, shape (elements,).
+        strongest_N: the largest force of every element, shape (elements,).
     """
 
     def __init__(
@@ -71,14 +72,14 @@ class Booking:
         periods = delay_s / period_s
         self._lookahead = math.floor(periods + 1e-9)
         self._late = max(0.0, periods - self._lookahead)
-        self._time = MeasuredTime.of_period(period_s, self._lookahead)
+        self._time = MeasuredTime.from_period(period_s, self._lookahead)
         self._count = len(scene["dissipation"])
         self._sums = no_sums(2 * self._count)
         self._events = _wall_events(scene, self._time)
         self.taken_J, self.given_J, self.strongest_N = np.zeros((3, self._count))
 
     def add(self, piece: Samples) -> Booked:
-        """Book a piece.
+        """Books a piece; returns the books at its samples.
 
         Raises:
             ElementError: an element raised, or gave something that is no finite number.
@@ -103,7 +104,7 @@ class Booking:
         return Booked(piece.t_s, piece.x_m, sampled, true, added[self._count :])
 
     def finish(self, end_x_m: float) -> None:
-        """Book the true energy of the period after the last sample, at whose end the device was there."""
+        """Books the true energy of the period after the last sample, which ends at ``end_x_m``."""
         true_x = np.append(self._last_true_x, end_x_m)
         between = self._last_between if self._last_between is not None else self._on_a_line(true_x)
         held = _held(self._forces[:, :1], self._forces[:, 1:2], true_x, between)
@@ -111,12 +112,12 @@ class Booking:
 
     @property
     def sampled_J(self) -> Floats:
-        """The sampled books now, shape (elements,)."""
+        """Returns the sampled books at present, shape (elements,)."""
         return (self._sums.sums + self._sums.errors)[: self._count]
 
     @property
     def true_J(self) -> Floats:
-        """The true books now, shape (elements,)."""
+        """Returns the true books at present, shape (elements,)."""
         return (self._sums.sums + self._sums.errors)[self._count :]
 
     def _begin(self) -> None:
@@ -128,7 +129,7 @@ class Booking:
         self._last_between: Floats | None = None
 
     def _answer(self, piece: Samples) -> Floats:
-        """Force of every element at every sample, N, shape (elements, samples)."""
+        """Returns the force of every element at every sample, N, shape (elements, samples)."""
         nothing = [0.0] * len(piece.x_m)
         v, a = (nothing if column is None else column.tolist() for column in (piece.v_m_s, piece.a_m_s2))
         controller = self._controller
@@ -140,7 +141,7 @@ class Booking:
         return np.array([np.concatenate(row) for row in rows])
 
     def _between(self, piece: Samples, true_x: Floats) -> Floats:
-        """Where the device was when the command changed, in every period that ends within the piece."""
+        """Returns the position at which the command changed, of every period that ends within the piece."""
         if piece.between_x_m is None:
             return self._on_a_line(true_x)
         last = np.empty(0) if self._last_between is None else self._last_between
@@ -158,12 +159,12 @@ class Booking:
 
 
 def _held(old: Floats, new: Floats, true_x: Floats, between: Floats) -> Floats:
-    """-f dx over each period of two held forces, shape (elements, periods)."""
+    """Returns -f dx over each period of two held forces, J, shape (elements, periods)."""
     return -(old * (between - true_x[:-1]) + new * (true_x[1:] - between))
 
 
 def _wall_events(scene: dict[str, Any], time: Timebase) -> list[tuple[int, dict[str, Any]]]:
-    """What changes the wall, by tick; it is the wall's place that says when elements act."""
+    """Returns the events that change the wall, by tick: its position decides when elements act."""
     found = []
     for event in scene.get("event", []):
         of_wall = {key: value for key, value in event.get("set", {}).items() if key.startswith("wall.")}
@@ -174,17 +175,17 @@ def _wall_events(scene: dict[str, Any], time: Timebase) -> list[tuple[int, dict[
 
 @dataclass(frozen=True)
 class MeasuredTime(Timebase):
-    """The time of samples whose period is what it is, and no whole number of Hz.
+    """The timebase of samples whose rate is no whole number of Hz.
 
     Attributes:
-        measured_s: the period.
+        measured_s: the period, s.
     """
 
     measured_s: float
 
     @classmethod
-    def of_period(cls, period_s: float, lookahead: int) -> MeasuredTime:
-        """Of samples ``period_s`` apart; commands take effect ``lookahead`` of them later, or one more."""
+    def from_period(cls, period_s: float, lookahead: int) -> MeasuredTime:
+        """Makes that of samples ``period_s`` apart; commands take effect ``lookahead`` samples later, or one more."""
         rate = max(1, round(1.0 / period_s))
         return cls(rate, rate, lookahead, 1, period_s)
 
@@ -195,10 +196,10 @@ class MeasuredTime(Timebase):
 
 @dataclass(frozen=True)
 class Recorded(Unchanged):
-    """An estimate that comes with the sample.
+    """The estimator that returns a recorded value of the sample.
 
     Attributes:
-        place: in the sample.
+        place: of the value in the sample.
     """
 
     place: int
@@ -211,7 +212,7 @@ class Recorded(Unchanged):
 def _recorded_controller(
     scene: dict[str, Any], time: Timebase, kinds: dict[str, type[Element]], recorded: frozenset[str]
 ) -> Controller:
-    """A controller that is given samples (x, acceleration, velocity) and takes what was recorded for an estimate."""
+    """Makes a controller of samples (x, acceleration, velocity) that takes recorded values in place of estimates."""
     controller = Controller(scene, time, kinds)
     places = {"acceleration": 1, "velocity": 2}
     controller.params = replace(controller.params, **{of: Recorded(places[of]) for of in recorded})

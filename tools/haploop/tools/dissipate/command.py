@@ -1,4 +1,4 @@
-"""``haploop dissipate``: a recording in, the books of the elements asked for out."""
+"""``haploop dissipate``: reads a recording, books the selected elements, prints a table and draws a figure."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from haploop.tools.cli.scenes import kinds_with
 
 if TYPE_CHECKING:
     from haploop.controller.dissipation import Element
+    from haploop.tools.dissipate.controller_scene import Selection
     from haploop.tools.dissipate.outcome import Outcome
-    from haploop.tools.dissipate.setting import Asked
     from haploop.tools.dissipate.text_recording import Layout
 
 
@@ -24,19 +24,19 @@ _LONGEST_DELAY_S = 60.0
 
 @dataclass(frozen=True)
 class Request:
-    """What the command line asks for.
+    """The arguments of the command line.
 
     Attributes:
         path: a text file, a run's directory or its log.
-        asked: elements, wall and estimates.
+        selection: elements, wall and estimates.
         layout: columns of a text file.
-        delay_s: of the forces; None for none, or for a run's own.
+        delay_s: delay of the forces; None for none, or for that of the run.
         plugins: Python files with elements.
-        out: the figure's file; beside the recording when None.
+        out: file of the figure; beside the recording when None.
     """
 
     path: Path
-    asked: Asked
+    selection: Selection
     layout: Layout
     delay_s: float | None = None
     plugins: list[Path] = field(default_factory=list)
@@ -44,55 +44,54 @@ class Request:
 
 
 def dissipate(request: Request, as_json: bool) -> None:
-    """Book, print the table, draw the figure and name its file."""
+    """Books, prints the table, draws the figure and names its file."""
     from haploop.tools.dissipate.samples import RecordingError
 
     with plain_errors():
         try:
-            outcome = dissipation_of(request, kinds_with(request.plugins))
+            outcome = compute_outcome(request, kinds_with(request.plugins))
         except (RecordingError, FileNotFoundError) as error:
             leave(str(error), WRONG_USE)
     figure = _draw(outcome, request)
     if as_json:
         print_json(outcome.as_data() | {"figure": str(figure) if figure else None})
         return
-    from haploop.tools.dissipate.report import report
+    from haploop.tools.dissipate.report import make_report
     from haploop.tools.render.terminal import console
 
-    console(stderr=True).print(report(outcome))
+    console(stderr=True).print(make_report(outcome))
     if figure:
         print(figure)
 
 
-def dissipation_of(request: Request, kinds: dict[str, type[Element]]) -> Outcome:
-    """What the elements would have taken out of the recorded motion.
+def compute_outcome(request: Request, kinds: dict[str, type[Element]]) -> Outcome:
+    """Returns what the elements would have taken out of the recorded motion.
 
     Raises:
         RecordingError, FileNotFoundError, LogError: the recording cannot be used.
-        SceneError, ElementError: what is asked for is wrong.
+        SceneError, ElementError: the selection is wrong.
     """
     from haploop.tools.dissipate.booking import Booking
-    from haploop.tools.dissipate.course import Course
-    from haploop.tools.dissipate.outcome import outcome_of
+    from haploop.tools.dissipate.outcome import Trace, make_outcome
 
-    recording, setting = _open(request, kinds)
-    booking = Booking(setting, recording.period_s, recording.delay_s, kinds, recording.recorded)
-    course = Course(recording.period_s)
+    recording, scene = _open(request, kinds)
+    booking = Booking(scene, recording.period_s, recording.delay_s, kinds, recording.recorded)
+    trace = Trace(recording.period_s)
     end_x_m = None
     with _shown(request.path.name) as show:
         for piece in recording.samples():
-            course.add(booking.add(piece))
+            trace.add(booking.add(piece))
             end_x_m = piece.end_x_m
             show(float(piece.t_s[-1]))
     if end_x_m is not None:
         booking.finish(end_x_m)
-    return outcome_of(recording, booking, course, setting, kinds)
+    return make_outcome(recording, booking, trace, scene, kinds)
 
 
 def _open(request: Request, kinds: dict[str, type[Element]]) -> tuple[Any, dict[str, Any]]:
-    """The recording and the controller's scene."""
+    """Returns the recording and the scene of the controller."""
+    from haploop.tools.dissipate.controller_scene import holds_readings, make_scene_for_log, make_scene_for_text
     from haploop.tools.dissipate.samples import RecordingError
-    from haploop.tools.dissipate.setting import holds_readings, setting_of_log, setting_of_text
     from haploop.tools.dissipate.text_recording import Layout, TextRecording
 
     if request.delay_s is not None and not 0.0 <= request.delay_s <= _LONGEST_DELAY_S:
@@ -100,20 +99,22 @@ def _open(request: Request, kinds: dict[str, type[Element]]) -> tuple[Any, dict[
     if _is_log(request.path):
         if request.layout != Layout():
             raise RecordingError("A log has its own columns, times and units; columns are named for text files alone.")
-        from haploop.tools.dissipate.log_recording import LogRecording, scene_of_log
+        from haploop.tools.dissipate.log_recording import LogRecording, read_scene
 
-        scene = scene_of_log(request.path)
-        estimated = request.asked.estimated_anew()
+        scene = read_scene(request.path)
+        estimated = request.selection.estimated_anew()
         recording = LogRecording(request.path, scene, request.delay_s, estimated, holds_readings(scene))
-        return recording, setting_of_log(request.asked, request.path, scene, kinds)
+        return recording, make_scene_for_log(request.selection, request.path, scene, kinds)
 
     recording = TextRecording(request.path, request.layout, request.delay_s or 0.0)
-    return recording, setting_of_text(request.asked, request.path, recording.period_s, recording.recorded, kinds)
+    return recording, make_scene_for_text(
+        request.selection, request.path, recording.period_s, recording.recorded, kinds
+    )
 
 
 @contextlib.contextmanager
 def _shown(name: str) -> Iterator[Callable[[float], None]]:
-    """On a terminal, a line that tells how far the recording is booked, fed with its time in s."""
+    """Shows a line on a terminal with the time to which the recording is booked, fed with that time in s."""
     from haploop.tools.render.terminal import console
 
     shown = console(stderr=True)
@@ -129,15 +130,15 @@ def _is_log(path: Path) -> bool:
 
 
 def _draw(outcome: Outcome, request: Request) -> Path | None:
-    """The figure's file; None, and a word on it, where there is no matplotlib."""
-    from haploop.tools.dissipate.figure import figure_of
+    """Draws the figure and returns its file; None, and a note on stderr, where there is no matplotlib."""
+    from haploop.tools.dissipate.figure import make_figure
     from haploop.tools.figure.data import FigureError
     from haploop.tools.figure.style import write_figure
 
     path = request.path
     beside = path / "dissipate.png" if path.is_dir() else path.with_name(f"{path.stem}-dissipate.png")
     try:
-        return write_figure(figure_of(outcome), request.out or beside)
+        return write_figure(make_figure(outcome), request.out or beside)
     except FigureError as error:
         if request.out:
             leave(str(error), FAILED)

@@ -1,7 +1,12 @@
-"""Numbers from text: CSV, TSV or columns set apart by blanks, of any length, block by block."""
+"""Text files of numbers: CSV, TSV or columns separated by blanks, of any length, read block by block.
+
+The standard library's reader splits the cells: numpy.loadtxt neither pads a short row nor names the line of a mistake,
+and pyarrow is an extra.
+"""
 
 from __future__ import annotations
 
+import contextlib
 import csv
 import itertools
 import re
@@ -34,24 +39,24 @@ class Column:
 
 
 class DelimitedFile:
-    """Text of one row a line; a header line, lines that begin with # and empty lines may be there.
+    """Reads text of one row a line; a header line, lines that begin with # and empty lines may be there.
 
-    Cells are set apart by tabs, semicolons, commas or blanks, whichever the first row has, in this order. With
+    Cells are separated by tabs, semicolons, commas or blanks, whichever the first row has, in this order. With
     semicolons a comma is taken for the decimal point.
 
     Attributes:
-        columns: as the header names them, or by number from 1.
+        columns: by the names of the header, or numbered from 1.
         has_header: whether the first line names them.
     """
 
     def __init__(self, path: Path) -> None:
-        """Look at how the file begins.
+        """Finds delimiter and columns from the beginning of the file.
 
         Raises:
             RecordingError: there is no such file, or no row in it.
         """
         self.path = path
-        with self._lines() as lines:
+        with _open_lines(self.path) as lines:
             first = list(itertools.islice((line for line in lines if line.strip()), 50))
         rows = [line for line in first if not line.startswith("#")]
         if not rows:
@@ -67,7 +72,7 @@ class DelimitedFile:
         self.columns = [_column(index, cell) for index, cell in enumerate(cells)]
 
     def column(self, given: str, what: str) -> Column:
-        """The column of this name, or with this number from 1.
+        """Returns the column of this name, or with this number from 1.
 
         Raises:
             RecordingError: there is none; it names the nearest.
@@ -90,12 +95,12 @@ class DelimitedFile:
         return found[0]
 
     def find(self, names: Sequence[str]) -> Column | None:
-        """The first column that has one of these names, whatever the case of its letters."""
+        """Returns the first column that has one of these names in any case; None for none."""
         known = {column.name.lower(): column for column in reversed(self.columns)}
         return next((known[name] for name in names if name in known), None)
 
     def blocks(self, columns: Sequence[Column]) -> Iterator[tuple[Floats, Floats]]:
-        """Numbers of these columns, shape (rows, columns), and the line of each row, shape (rows,).
+        """Yields numbers of these columns, shape (rows, columns), and the line of each row, shape (rows,).
 
         A cell that is empty, missing at the end of a line, or not finite is NaN.
 
@@ -103,7 +108,7 @@ class DelimitedFile:
             RecordingError: a cell is neither a number nor empty, or its quotes do not end; it names the line.
         """
         wanted = [column.index for column in columns]
-        with self._lines() as lines:
+        with _open_lines(self.path) as lines:
             numbered = ((n, line) for n, line in enumerate(lines, 1) if line.strip() and not line.startswith("#"))
             if self.has_header:
                 next(numbered)
@@ -140,29 +145,21 @@ class DelimitedFile:
             return [line.split() for line in lines]
         return list(csv.reader(lines, delimiter=self._delimiter))
 
-    def _lines(self) -> _Lines:
-        return _Lines(self.path)
 
-
-class _Lines:
-    """The lines of a text file; what keeps it from being one is a ``RecordingError``."""
-
-    def __init__(self, path: Path) -> None:
-        self._path = path
-
-    def __enter__(self) -> Iterator[str]:
+@contextlib.contextmanager
+def _open_lines(path: Path) -> Iterator[Iterator[str]]:
+    """Opens the lines of a text file; whatever cannot be read as one raises a ``RecordingError``."""
+    try:
+        file = path.open(encoding="utf-8-sig", newline=None)
+    except OSError as error:
+        raise RecordingError(f"The recording {path} cannot be read: {error.strerror}.") from error
+    with file:
         try:
-            self._file = self._path.open(encoding="utf-8-sig", newline=None)
-        except OSError as error:
-            raise RecordingError(f"The recording {self._path} cannot be read: {error.strerror}.") from error
-        return iter(self._file)
-
-    def __exit__(self, kind: object, error: BaseException | None, _trace: object) -> None:
-        self._file.close()
-        if isinstance(error, UnicodeDecodeError):
-            raise RecordingError(f"The recording {self._path} must be UTF-8 text, which it is not.") from error
-        if isinstance(error, csv.Error):
-            raise RecordingError(f"The recording {self._path} is no table of text: {error}.") from error
+            yield iter(file)
+        except UnicodeDecodeError as error:
+            raise RecordingError(f"The recording {path} must be UTF-8 text, which it is not.") from error
+        except csv.Error as error:
+            raise RecordingError(f"The recording {path} is no table of text: {error}.") from error
 
 
 def _column(index: int, cell: str) -> Column:

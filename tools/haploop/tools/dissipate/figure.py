@@ -1,4 +1,4 @@
-"""The figure: the recorded motion, and what every element would have taken out of it (as Choi et al. 2022, Fig. 8)."""
+"""The figure of a recorded motion and the energy of every element on it (as Choi et al. 2022, Fig. 8)."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from haploop.tools.dissipate.outcome import Outcome, in_words
-from haploop.tools.dissipate.report import answer, row_of
+from haploop.tools.dissipate.outcome import Outcome
+from haploop.tools.dissipate.report import conclusion, make_row, note_sentences
 from haploop.tools.dissipate.samples import Floats
 from haploop.tools.figure.style import (
     CLOSE,
@@ -35,21 +35,21 @@ if TYPE_CHECKING:
 
 _COLUMNS = ("", "true", "sampled", "took", "gave back", "largest force")
 _AT = (0.04, 0.46, 0.585, 0.71, 0.835, 1.0)
-# As many as there are colours.
+# Elements that are drawn, at most: one per colour.
 _MOST = len(ELEMENTS)
-# Letters that the width has room for.
+# Letters of a line, at most.
 _LINE_LETTERS = 170
 
 
-def figure_of(outcome: Outcome) -> Figure:
-    """Motion and energies, whole and close, the table, and what is to be known.
+def make_figure(outcome: Outcome) -> Figure:
+    """Draws motion and energies, whole and in detail, the table, and notes on the recording.
 
     Raises:
         FigureError: matplotlib is missing.
     """
     figure = empty_figure(13.0, 7.8)
     header, body = figure.subfigures(2, 1, squeeze=False, height_ratios=(0.085, 1.0))[:, 0]
-    lines, close = outcome.course.lines(), outcome.course.close
+    lines, close = outcome.trace.lines(), outcome.trace.close
     rows = 1 + min(len(outcome.elements), _MOST)
     grid = body.add_gridspec(3, 2, width_ratios=(1.4, 1.0), height_ratios=(0.8, 1.6, max(0.14 * rows, 0.55)))
     motion, energy = body.add_subplot(grid[0, 0]), body.add_subplot(grid[1, 0])
@@ -77,11 +77,11 @@ def figure_of(outcome: Outcome) -> Figure:
 
 
 def _motion(ax: Axes, outcome: Outcome, lines: Floats, title: str, whole: bool) -> None:
-    """Position over time, with the wall as far as it is in view; the whole view reaches to it."""
+    """Draws position over time, with the wall as far as it is in view; the whole view reaches to it."""
     factor, letter = prefix_for([float(np.abs(lines[1]).max())])
     t, x = lines[0], lines[1] / factor
     low, high = float(x.min()), float(x.max())
-    wall = None if outcome.setting.get("event") else outcome.setting.get("wall")
+    wall = None if outcome.scene.get("event") else outcome.scene.get("wall")
     surface = wall["position"] / factor if wall else low
     if whole:
         low, high = min(low, surface), max(high, surface)
@@ -116,7 +116,7 @@ def _energies(ax: Axes, outcome: Outcome, lines: Floats, title: str) -> None:
 
 
 def _common(ax: Axes, outcome: Outcome, t: Floats) -> None:
-    """The span of the times, and what of it is missing."""
+    """Sets the limits of time and marks the gaps."""
     for from_s, to_s in outcome.notes.gaps_s:
         if from_s < t[-1] and to_s > t[0]:
             ax.axvspan(from_s, to_s, color=FAINT, alpha=0.45, zorder=0.4, linewidth=0, gid="gap")
@@ -124,11 +124,11 @@ def _common(ax: Axes, outcome: Outcome, t: Floats) -> None:
 
 
 def _table(ax: Axes, outcome: Outcome, rows: int) -> None:
-    """The numbers of every element, in the colours of the lines."""
+    """Draws the numbers of every element, in the colours of the lines."""
     ax.set_axis_off()
     ax.set_xlim(0.0, 1.0)
     ax.set_ylim(max(rows, 4) + 0.2, -0.2)
-    for number, cells in enumerate([_COLUMNS, *(row_of(element) for element in outcome.elements[: rows - 1])]):
+    for number, cells in enumerate([_COLUMNS, *(make_row(element) for element in outcome.elements[: rows - 1])]):
         y = number + 0.5
         if number:
             colour = element_colour(number - 1)
@@ -139,17 +139,17 @@ def _table(ax: Axes, outcome: Outcome, rows: int) -> None:
 
 
 def _words(ax: Axes, outcome: Outcome) -> None:
-    """What is to be known, beside the table."""
+    """Draws the notes on the recording, beside the table."""
     ax.set_axis_off()
     more = len(outcome.elements) - _MOST
-    sentences = ([f"Left out here: {more} more element{'s' * (more > 1)}."] if more > 0 else []) + in_words(outcome)
-    wrapped = [line for sentence in sentences for line in textwrap.wrap(sentence, 84)]
+    notes = ([f"Left out here: {more} more element{'s' * (more > 1)}."] if more > 0 else []) + note_sentences(outcome)
+    wrapped = [line for sentence in notes for line in textwrap.wrap(sentence, 84)]
     ax.text(0.0, 1.0, "\n".join(wrapped[:9]), va="top", fontsize=SMALL, color=GREY, transform=ax.transAxes, gid="words")
 
 
 def _header(figure: SubFigure, outcome: Outcome) -> None:
     figure.text(0.008, 0.72, outcome.name, fontsize=LARGE, color=INK, va="center", gid="title")
-    words = textwrap.shorten(_capital(answer(outcome)), _LINE_LETTERS, placeholder=" …")
+    words = textwrap.shorten(_capital(conclusion(outcome)), _LINE_LETTERS, placeholder=" …")
     figure.text(0.008, 0.2, words, fontsize=TEXT + 1, color=INK, va="center", gid="answer")
 
 

@@ -1,4 +1,4 @@
-"""A run's log as a recording: what the controller measured at every tick, and where the plant was at every step."""
+"""Recordings from a run's log: the controller's measurement at every tick, the plant's position at every step."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from haploop.tools.dissipate.samples import Floats, Notes, RecordingError, Sampl
 _COLUMNS = {"/controller": ("timestamp", "x", "v", "a"), "/plant": ("x",)}
 
 
-def scene_of_log(path: Path) -> dict[str, Any]:
-    """The resolved scene in a run's log.
+def read_scene(path: Path) -> dict[str, Any]:
+    """Reads the resolved scene in a run's log.
 
     Raises:
-        FileNotFoundError, LogError: as for ``LogStream``.
+        FileNotFoundError, LogError: there is no log, or none that can be read.
         RecordingError: no scene is attached.
     """
     log = LogStream(path, topics=())
@@ -36,15 +36,15 @@ def scene_of_log(path: Path) -> dict[str, Any]:
 
 
 class LogRecording:
-    """Samples of a run's log; in between, the plant's own steps, where they were logged.
+    """Reads samples from a run's log; in between, the plant's own steps where they were logged.
 
     The force of tick k would have acted from step k n + d on, n steps a tick, d the scene's delay or another one.
 
     Args:
         path: a run's directory or its log.
         scene: the scene in it.
-        delay_s: of the forces; that of the scene when None.
-        estimated: which of "velocity" and "acceleration" are to be estimated anew, not taken as the run had them.
+        delay_s: delay of the forces; that of the scene when None.
+        estimated: which of "velocity" and "acceleration" are to be estimated again, not taken from the run.
         readings: whether the accelerations in the log are readings of an accelerometer, for estimates to read.
     """
 
@@ -76,7 +76,7 @@ class LogRecording:
             remarks.append("The forces are those commanded, without what the actuator would have made of them.")
 
     def samples(self) -> Iterator[Samples]:
-        """All samples, a chunk of the log at a time."""
+        """Yields all samples, a chunk of the log at a time."""
         log = LogStream(self._path, _COLUMNS, {name for names in _COLUMNS.values() for name in names})
         waiting, first = _Waiting(self._n, self._late, self.between == "plant steps"), True
         for batch in log:
@@ -100,11 +100,11 @@ class LogRecording:
 
 
 class _Waiting:
-    """Rows of both channels that wait for those of the other.
+    """Holds rows of both channels until those of the other have come.
 
     Args:
         n: plant steps a tick.
-        late: step of a tick at which a delayed force changes.
+        late: step within a tick at which a delayed force changes.
         of_steps: whether the plant's steps were logged.
     """
 
@@ -114,7 +114,7 @@ class _Waiting:
         self._plant = np.empty(0)
 
     def add(self, batch: Batch) -> None:
-        """Take the rows of a batch."""
+        """Takes the rows of a batch."""
         rows = cast(Table, batch.rows)
         if batch.topic == "/plant":
             self._plant = np.concatenate([self._plant, rows["x"]])
@@ -122,7 +122,7 @@ class _Waiting:
             self._controller = {name: np.concatenate([kept, rows[name]]) for name, kept in self._controller.items()}
 
     def whole(self) -> dict[str, Floats]:
-        """Columns of all ticks of which the period's end is known, with where the plant was at and within them."""
+        """Returns the columns of all ticks whose period has ended, with the plant's positions at and within them."""
         n, ticks = self._n, len(self._controller["x"])
         if self._of_steps:
             ticks = min(ticks, max(0, len(self._plant) - 1) // n)

@@ -1,10 +1,10 @@
-"""What the terminal shows of it."""
+"""The report of an outcome on the terminal, and the sentences that the figure shares with it."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from haploop.tools.dissipate.outcome import ElementOutcome, Outcome, in_words
+from haploop.tools.dissipate.outcome import ElementOutcome, Outcome
 from haploop.tools.render.terminal import make_table
 from haploop.tools.render.units import amount, fixed
 
@@ -12,27 +12,27 @@ if TYPE_CHECKING:
     from rich.console import RenderableType
 
 
-def report(outcome: Outcome) -> RenderableType:
-    """Answer, table and what is to be known."""
+def make_report(outcome: Outcome) -> RenderableType:
+    """Makes the report: conclusion, table and notes."""
     from rich.console import Group
     from rich.text import Text
 
     numbers = ("true", "sampled", "took", "gave back", "largest force")
     table = make_table("would have taken out of the device", *numbers, numbers=numbers)
     for element in outcome.elements:
-        table.add_row(*row_of(element))
-    head = Text(f"{outcome.name}: {answer(outcome)}", style="bold")
-    return Group(head, table, *(Text(sentence, style="dim") for sentence in in_words(outcome)))
+        table.add_row(*make_row(element))
+    head = Text(f"{outcome.name}: {conclusion(outcome)}", style="bold")
+    return Group(head, table, *(Text(sentence, style="dim") for sentence in note_sentences(outcome)))
 
 
-def row_of(element: ElementOutcome) -> tuple[str, ...]:
-    """Label, true and sampled energy, what it took and gave back, and its largest force."""
+def make_row(element: ElementOutcome) -> tuple[str, ...]:
+    """Returns label, true and sampled energy, energy taken and given back, and largest force of an element."""
     energies = (element.true_J, element.sampled_J, element.taken_J, element.given_J)
     return element.label, *(amount(value, "J") for value in energies), amount(element.strongest_N, "N")
 
 
-def answer(outcome: Outcome) -> str:
-    """In one sentence, which element would have dissipated most."""
+def conclusion(outcome: Outcome) -> str:
+    """Returns a sentence on which element would have dissipated most."""
     ranked = sorted(outcome.elements, key=lambda element: element.true_J, reverse=True)
     best, others = ranked[0], ranked[1:]
     if best.true_J <= 0.0:
@@ -53,3 +53,48 @@ def answer(outcome: Outcome) -> str:
 def _times(best: ElementOutcome, other: ElementOutcome) -> str:
     ratio = best.true_J / other.true_J
     return "as much as" if ratio < 1.005 else f"{fixed(ratio)} times as much as" if ratio < 1e4 else "far more than"
+
+
+def note_sentences(outcome: Outcome) -> list[str]:
+    """Returns notes on the recording and on the books, a sentence each."""
+    notes, (from_s, to_s) = outcome.notes, outcome.span_s
+    rate = 1.0 / outcome.period_s
+    sentences = [f"{notes.rows} samples at {rate:.6g} Hz, {from_s:g} to {to_s:g} s."]
+    estimated = [name for name in ("velocity", "acceleration") if name not in outcome.recorded]
+    taken = " and ".join(outcome.recorded)
+    sentences.append((f"Taken as recorded: {taken}. " if taken else "") + _estimates(outcome.scene, estimated))
+    sentences.append(_truth(outcome))
+    if notes.gaps:
+        sentences.append(
+            f"{notes.gaps} gap{'s' * (notes.gaps != 1)} of {amount(notes.missing_s, 's')} in all: what happened there "
+            "is not booked, and estimates begin anew after."
+        )
+    if notes.unusable_rows:
+        sentences.append(f"Rows left out, since a number in them is missing or not finite: {notes.unusable_rows}.")
+    if notes.uneven:
+        sentences.append(
+            f"{notes.uneven} periods are more than a tenth off the others; estimates take them for equal, as a "
+            "controller does that counts its ticks."
+        )
+    return [sentence for sentence in [*sentences, *notes.remarks] if sentence]
+
+
+def _estimates(scene: dict[str, Any], names: list[str]) -> str:
+    words = []
+    for name in names:
+        table = scene.get(name, {})
+        source = table.get("source", "encoder")
+        how = table.get("estimator") or ("backward difference" if source == "encoder" else source)
+        cutoff = f", low-passed at {table['cutoff']:g} Hz" if "cutoff" in table else ""
+        words.append(f"{name} by {how}{cutoff}")
+    return f"Estimated: {'; '.join(words)}." if words else ""
+
+
+def _truth(outcome: Outcome) -> str:
+    """Returns a sentence on how the true books were made."""
+    delay = f"{amount(outcome.delay_s, 's')} after their sample" if outcome.delay_s else "at once"
+    if outcome.between == "plant steps":
+        return f"True books: forces that act {delay}, over every step of the plant."
+    if outcome.books_agree:
+        return f"True books: forces that act {delay} on the recorded positions; they agree with the sampled ones."
+    return f"True books: forces that act {delay}, the device on straight lines between the samples."

@@ -1,4 +1,4 @@
-"""Recorded motion, piece by piece."""
+"""The interface of recordings: samples of a motion, piece by piece, and notes on what was found."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ Floats = NDArray[np.float64]
 
 
 class RecordingError(ValueError):
-    """A recording that cannot be used; the message says why and what to do."""
+    """Raised for a recording that cannot be used; the message says why and what to do."""
 
 
 @dataclass(frozen=True)
@@ -22,13 +22,13 @@ class Samples:
 
     Attributes:
         t_s: time of every sample, shape (samples,).
-        x_m: what the controller read, shape (samples,).
+        x_m: position measured by the controller, shape (samples,).
         v_m_s, a_m_s2: velocity and acceleration as recorded; None where they are to be estimated.
-        true_x_m: where the device was, shape (samples,).
-        between_x_m: where it was within the period after each sample, when a delayed force changes, shape (samples,);
+        true_x_m: position of the device, shape (samples,).
+        between_x_m: its position within the period after each sample, when a delayed force changes, shape (samples,);
             None for a straight line from sample to sample.
-        begins: whether a gap lies before it, or nothing at all.
-        end_x_m: where the device was a period after the last sample; None where the next piece tells it, or nothing.
+        begins: whether a gap lies before it, or it is the first.
+        end_x_m: position a period after the last sample; None where it is in the next piece, or not known.
     """
 
     t_s: Floats
@@ -43,15 +43,15 @@ class Samples:
 
 @dataclass
 class Notes:
-    """What was found on the way through a recording.
+    """Counts of what was found in a recording.
 
     Attributes:
         rows: samples that were used.
         unusable_rows: rows left out, since a number in them is missing or not finite.
-        gaps_s: where samples are missing, from and to; the first hundred.
-        gaps, missing_s: how many there are, and their length in all.
+        gaps_s: begin and end of each gap, s; the first hundred.
+        gaps, missing_s: number of gaps, and their length in all, s.
         uneven: periods that are more than a tenth off the others.
-        remarks: what else people should know, a sentence each.
+        remarks: further notes for people, a sentence each.
     """
 
     rows: int = 0
@@ -63,22 +63,22 @@ class Notes:
     remarks: list[str] = field(default_factory=list)
 
     def gap(self, from_s: float, to_s: float) -> None:
-        """Samples are missing between these two."""
+        """Counts a gap between two times."""
         self.gaps, self.missing_s = self.gaps + 1, self.missing_s + to_s - from_s
         if len(self.gaps_s) < 100:
             self.gaps_s.append((from_s, to_s))
 
 
 class Recording(Protocol):
-    """A recording that can be gone through once.
+    """A recording that can be read once.
 
     Attributes:
-        name: what to call it.
+        name: of the recording.
         period_s: the control period T.
-        delay_s: after what time a force acts on the device.
-        between: how the motion between two samples is known: "plant steps" or "straight lines".
+        delay_s: delay after which a force acts on the device.
+        between: what the motion between samples is taken from: "plant steps" or "straight lines".
         recorded: which of "velocity" and "acceleration" are recorded, not estimated.
-        notes: complete when all samples have come.
+        notes: complete once all samples have been read.
     """
 
     name: str
@@ -89,5 +89,5 @@ class Recording(Protocol):
     notes: Notes
 
     def samples(self) -> Iterator[Samples]:
-        """All samples, in pieces of any length."""
+        """Yields all samples, in pieces of any length."""
         ...

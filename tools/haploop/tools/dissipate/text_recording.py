@@ -1,4 +1,4 @@
-"""A recording in a text file: which columns, in which units, how regular, and what is missing."""
+"""Recordings from text files: columns, units, period and gaps."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from haploop.launch.scene.tables.units import from_text
 from haploop.tools.dissipate.delimited import Column, DelimitedFile
 from haploop.tools.dissipate.samples import Floats, Notes, RecordingError, Samples
 
-# What columns are called where nothing is said.
+# Names of columns that are looked for where none is given.
 _TIMES = ("t", "time", "timestamp", "time_s", "t_s", "seconds")
 _POSITIONS = ("x", "position", "pos", "position_m", "x_m", "displacement")
-# Samples this many periods apart have a gap between them; those this much off the others are uneven.
+# Periods above which there is a gap between two samples, and deviation above which a period is uneven.
 _GAP, _UNEVEN = 1.5, 0.1
-# No period is shorter or longer.
+# Shortest and longest period that is accepted.
 _PERIODS_S = 1e-7, 1e3
 
 
 @dataclass(frozen=True)
 class Layout:
-    """Which columns to read and what their numbers mean; None for what is to be found out, or is not there.
+    """The columns to read and their units; None for what is to be looked for, or is not there.
 
     Attributes:
         position, time, velocity, acceleration: names, or numbers from 1.
@@ -46,16 +46,16 @@ class Layout:
 
 
 class TextRecording:
-    """Samples of a text file, a control period apart; between them the device moves in straight lines.
+    """Reads samples from a text file, a control period apart; between them the device moves in straight lines.
 
-    The period is the median of those at the beginning, or that of the rate. The times are otherwise asked only where
+    The period is the median of those at the beginning, or that of the rate. The times are otherwise used only where
     samples are missing: a controller that counts its ticks takes no notice of how late each of them is.
     """
 
     between = "straight lines"
 
     def __init__(self, path: Path, layout: Layout, delay_s: float) -> None:
-        """Find the columns and the period.
+        """Finds the columns and the period.
 
         Raises:
             RecordingError: a column, a unit or a rate is missing or wrong, or there are fewer than two samples.
@@ -68,7 +68,7 @@ class TextRecording:
         self.period_s = 1.0 / layout.rate_Hz if layout.rate_Hz else self._median_period()
 
     def _choose(self, file: DelimitedFile, layout: Layout) -> tuple[dict[str, Column], dict[str, float]]:
-        """Column and scale to SI of everything that is read."""
+        """Returns column and scale to SI of every quantity that is read."""
         given = {
             "time": layout.time,
             "position": layout.position,
@@ -122,7 +122,7 @@ class TextRecording:
         return period_s
 
     def samples(self) -> Iterator[Samples]:
-        """All samples, in pieces without a gap."""
+        """Yields all samples, in pieces without a gap."""
         last_s: float | None = None
         for columns, lines in self._rows():
             t = columns["time"]
@@ -144,7 +144,7 @@ class TextRecording:
         return Samples(part["time"], x, part.get("velocity"), part.get("acceleration"), x, None, begins)
 
     def _rows(self) -> Iterator[tuple[dict[str, Floats], Floats]]:
-        """SI columns by what they are, of all rows that can be used, and their lines; times are made where needed."""
+        """Yields SI columns by quantity, of all usable rows, and the rows' lines (time from the rate if given)."""
         names, row = list(self._columns), 0
         self.notes.rows = self.notes.unusable_rows = 0
         for table, lines in self._file.blocks(list(self._columns.values())):
@@ -179,7 +179,7 @@ class TextRecording:
 
 
 def _refuse_unknown_unit(what: str, column: Column | None, unit: tuple[str | None, str]) -> None:
-    """Where the position's unit was said, that of a column beside it is not guessed: an inertial unit has its own."""
+    """Refuses to guess the unit of a column where that of the position was given: an inertial sensor has its own."""
     given, si = unit
     if column and not given and not column.unit:
         raise RecordingError(
@@ -189,7 +189,7 @@ def _refuse_unknown_unit(what: str, column: Column | None, unit: tuple[str | Non
 
 
 def _scale(unit: str, si: str) -> float:
-    """How many SI units one of these is."""
+    """Returns the factor from a unit to SI."""
     number = _as_number(unit)
     if number is not None:
         if not (math.isfinite(number) and number):

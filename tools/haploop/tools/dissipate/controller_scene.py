@@ -1,4 +1,4 @@
-"""The controller that a recorded motion is given to: estimators, wall and elements, as a resolved scene."""
+"""The resolved scene of the controller that works on a recorded motion: estimators, wall and elements."""
 
 from __future__ import annotations
 
@@ -19,19 +19,19 @@ if TYPE_CHECKING:
     from haploop.controller.dissipation import Element
 
 Kinds = Mapping[str, "type[Element]"]
-# What a recorded motion can be given to; encoder tells the estimators what the positions were rounded to.
+# Tables that can be overridden; [encoder] tells the estimators to what the positions were rounded.
 _ESTIMATES = ("velocity", "acceleration", "encoder")
 _ESTIMATED = frozenset({"velocity", "acceleration"})
 
 
 @dataclass(frozen=True)
-class Asked:
-    """What is to be found out.
+class Selection:
+    """The elements to be booked, and how the controller sees the motion.
 
     Attributes:
         dampings, masses: of damping, and of bi- and unidirectional inertia; numbers in SI units or text with a unit.
         elements: others, each as "KIND KEY=VALUE ...".
-        wall, occupies: where a wall begins, and on which side of it the elements then act; they always act without.
+        wall, occupies: position of a wall, and the side of it on which the elements act; without one they always act.
         overrides: ``KEY=VALUE`` for ``[velocity]``, ``[acceleration]`` and ``[encoder]``.
     """
 
@@ -43,10 +43,10 @@ class Asked:
     overrides: Sequence[str] = field(default_factory=tuple)
 
     def tables(self) -> frozenset[str]:
-        """The tables that the overrides speak of.
+        """Returns the tables that the overrides change.
 
         Raises:
-            RecordingError: one is not asked here.
+            RecordingError: an override is of another table.
         """
         found = set()
         for text in self.overrides:
@@ -60,68 +60,69 @@ class Asked:
         return frozenset(found)
 
     def estimated_anew(self) -> frozenset[str]:
-        """Which of "velocity" and "acceleration" the overrides change, or what they are estimated from."""
+        """Returns which of "velocity" and "acceleration" the overrides change, directly or by their source."""
         return _ESTIMATED if self.tables() - {"acceleration"} else _ESTIMATED & self.tables()
 
 
-def setting_of_text(
-    asked: Asked, path: Path, period_s: float, recorded: frozenset[str], kinds: Kinds
+def make_scene_for_text(
+    selection: Selection, path: Path, period_s: float, recorded: frozenset[str], kinds: Kinds
 ) -> dict[str, Any]:
-    """For a recording in a text file.
+    """Makes the scene for a recording in a text file.
 
     Raises:
-        RecordingError: what is asked does not fit the recording.
+        RecordingError: the selection does not fit the recording.
         SceneError: a number or a kind is wrong.
     """
-    if clash := sorted(asked.tables() & recorded):
+    if clash := sorted(selection.tables() & recorded):
         raise RecordingError(f"Give either a column of the {clash[0]} or --set for its estimate, not both.")
     rate = max(1, round(1.0 / period_s))
     device = {"mass": 1.0, "damping": 0.0}
     data = {"title": path.stem, "duration": 1.0 / rate, "device": device}
-    made = _setting({**data, "clock": {"plant_rate": rate, "control_rate": rate}}, asked, path, kinds)
+    made = _make_scene({**data, "clock": {"plant_rate": rate, "control_rate": rate}}, selection, path, kinds)
     if accelerometer_is_used(made) and "acceleration" not in recorded:
         raise RecordingError("The estimates read an accelerometer; say with --acceleration which column that is.")
     return made
 
 
-def setting_of_log(asked: Asked, path: Path, scene: dict[str, Any], kinds: Kinds) -> dict[str, Any]:
-    """For a run's log: its own estimators and wall, unless others are asked for; its events but those of the wall go.
+def make_scene_for_log(selection: Selection, path: Path, scene: dict[str, Any], kinds: Kinds) -> dict[str, Any]:
+    """Makes the scene for a run's log: its own estimators and wall unless others are selected, its events of the wall.
 
     Raises:
-        RecordingError, SceneError: as for a text file.
+        RecordingError: the selection does not fit the recording.
+        SceneError: a number or a kind is wrong.
     """
     keys = ("title", "duration", "clock", "device", "encoder", "noise", "accelerometer", *_ESTIMATED, "wall")
     data = {key: scene[key] for key in keys if key in scene}
-    made = _setting(data, asked, path, kinds)
-    if asked.overrides and accelerometer_is_used(made) and not holds_readings(scene):
+    made = _make_scene(data, selection, path, kinds)
+    if selection.overrides and accelerometer_is_used(made) and not holds_readings(scene):
         raise RecordingError("The estimates read an accelerometer, but its readings are not in the log.")
     walls = [event for event in scene.get("event", []) if any(key.startswith("wall.") for key in event.get("set", {}))]
-    return {**made, "event": [] if asked.wall else walls}
+    return {**made, "event": [] if selection.wall else walls}
 
 
 def holds_readings(scene: dict[str, Any]) -> bool:
-    """Whether the accelerations in a run's log are the accelerometer's readings themselves."""
+    """Tells whether the accelerations in a run's log are readings of an accelerometer, unfiltered."""
     table = scene.get("acceleration", {})
     return table.get("source") == "accelerometer" and "cutoff" not in table
 
 
-def _setting(data: dict[str, Any], asked: Asked, path: Path, kinds: Kinds) -> dict[str, Any]:
-    if asked.wall is not None:
-        position = next(iter(parse_assignments([f"wall={asked.wall}"]).values()))
-        data["wall"] = {"position": position, "stiffness": 0.0, "occupies": asked.occupies}
-    tables = _elements(asked)
+def _make_scene(data: dict[str, Any], selection: Selection, path: Path, kinds: Kinds) -> dict[str, Any]:
+    if selection.wall is not None:
+        position = next(iter(parse_assignments([f"wall={selection.wall}"]).values()))
+        data["wall"] = {"position": position, "stiffness": 0.0, "occupies": selection.occupies}
+    tables = _elements(selection)
     if "wall" not in data:
         _refuse_what_needs_a_wall(tables)
         tables = [{"acts": "always", **table} for table in tables]
-    return resolved(Layers(path, {**data, "dissipation": tables}), asked.overrides, kinds)
+    return resolved(Layers(path, {**data, "dissipation": tables}), selection.overrides, kinds)
 
 
-def _elements(asked: Asked) -> list[dict[str, Any]]:
-    """A ``[[dissipation]]`` table for each element."""
-    tables = [{"kind": "damping", "damping": _value(text)} for text in asked.dampings]
+def _elements(selection: Selection) -> list[dict[str, Any]]:
+    """Returns a ``[[dissipation]]`` table for each element."""
+    tables = [{"kind": "damping", "damping": _value(text)} for text in selection.dampings]
     for kind in ("bidirectional-inertia", "unidirectional-inertia"):
-        tables += [{"kind": kind, "mass": _value(text)} for text in asked.masses]
-    for text in asked.elements:
+        tables += [{"kind": kind, "mass": _value(text)} for text in selection.masses]
+    for text in selection.elements:
         kind, *parameters = shlex.split(text) or [""]
         tables.append({"kind": kind, **parse_assignments(parameters)})
     if not tables:
