@@ -14,7 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from haploop.logger import read
-from haploop.logger.log.error import LogError
+from haploop.logger.log import LogError
 from haploop.logger.log.writer import Compression, Log
 
 PLANT = {"timestamp": "s", "t": "s", "x": "m", "v": "m/s", "force": "N"}

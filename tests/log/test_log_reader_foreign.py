@@ -12,7 +12,7 @@ import pytest
 from mcap.writer import CompressionType, Writer
 
 from haploop.logger import read
-from haploop.logger.log.error import LogError
+from haploop.logger.log import LogError
 
 
 def foreign(path: Path, topics: dict[str, list[Any]], **options: Any) -> None:

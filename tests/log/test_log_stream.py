@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from haploop.logger import read, stream
-from haploop.logger.log.error import LogError
+from haploop.logger.log import LogError
 from haploop.logger.log.recording import Table, merge_columns
 from haploop.logger.log.stream import LogStream, survey
 from haploop.logger.log.writer import Log

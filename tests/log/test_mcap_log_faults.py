@@ -20,7 +20,7 @@ from mcap.reader import make_reader
 from mcap.records import Message
 from mcap.stream_reader import StreamReader
 
-from haploop.logger.log.error import LogError
+from haploop.logger.log import LogError
 from haploop.logger.log.writer import Compression, Log
 
 PLANT = {"timestamp": "s", "t": "s", "x": "m", "v": "m/s", "force": "N"}

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from haploop.controller.controller import Controller
+from haploop.logger.books.buffers import PIECES
 from haploop.logger.books.chain import ChainBooks
-from haploop.logger.books.segments import PIECES
 from haploop.logger.logger import Logger
 from haploop.plant.plant import Plant
 from haploop.protocol.ticks import Timebase

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from haploop.logger.log.columns import motion_columns
+from haploop.logger.log.channels import motion_columns
 from helpers.runs.captured import Captured, run
 from helpers.scenes.least import scene
 from oracles.effects_run import follow

@@ -10,7 +10,7 @@ import pytest
 
 import haploop.logger
 from haploop.launch.runs.start import prepare, run
-from haploop.logger.log.columns import motion_columns
+from haploop.logger.log.channels import motion_columns
 from haploop.tools.figure.data import RunData
 from haploop.tools.figure.run_figure import make_figure
 from haploop.tools.figure.text_panels import book_rows

@@ -16,16 +16,16 @@ if TYPE_CHECKING:
 
 
 def read(path: str | Path, topics: Collection[str] | None = None, columns: Collection[str] | None = None) -> Recording:
-    """Read the log of a run: see :func:`haploop.logger.log.reader.read`, imported when first used."""
-    from haploop.logger.log import reader
+    """Reads the log of a run: see :func:`haploop.logger.log.stream.read`, imported when first used."""
+    from haploop.logger.log import stream as log_stream
 
-    return reader.read(path, topics, columns)
+    return log_stream.read(path, topics, columns)
 
 
 def stream(
     path: str | Path, topics: Collection[str] | None = None, columns: Collection[str] | None = None
 ) -> LogStream:
-    """Go through the log of a run, ``for topic, log_times_ns, columns in stream(run)``.
+    """Goes through the log of a run, ``for topic, log_times_ns, columns in stream(run)``.
 
     See :class:`haploop.logger.log.stream.LogStream`, imported when first used.
     """

@@ -9,7 +9,8 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from haploop.logger.books.books import Books, Commanded
+from haploop.logger.books.books import Books
+from haploop.logger.books.buffers import Commanded
 from haploop.logger.summary import energy, finite, outcome
 from haploop.logger.verdict.window import CONTROLLER_COLUMNS, Window
 from haploop.protocol.arrays import rows_of

@@ -11,8 +11,7 @@ import numpy as np
 
 from haploop.logger.books.books import Books, moved_J, residual_J
 from haploop.logger.books.buffers import ControllerBuffer, PlantBuffer
-from haploop.logger.log.channels import Channels
-from haploop.logger.log.columns import motion_columns
+from haploop.logger.log.channels import Channels, motion_columns
 from haploop.logger.summary import summary
 from haploop.logger.verdict.verdict import RunMeasures
 from haploop.logger.verdict.window import CONTROLLER_COLUMNS, Window

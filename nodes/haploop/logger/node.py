@@ -12,7 +12,7 @@ import numpy as np
 import zmq
 
 from haploop.logger.books.buffers import TelemetryGap
-from haploop.logger.log.error import LogError
+from haploop.logger.log import LogError
 from haploop.logger.session import LogSession, open_session
 from haploop.protocol.clock_client import REPORT_MS, Aborted, ClockClient
 from haploop.protocol.node import NodeError, run_node

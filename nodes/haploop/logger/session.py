@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any
 
 from haploop.logger import summary as summaries
+from haploop.logger.log import LogError
 from haploop.logger.log.channels import Channels
-from haploop.logger.log.error import LogError
-from haploop.logger.log.memory import MemoryLog
+from haploop.logger.log.recording import MemoryLog
 from haploop.logger.log.writer import Log
 from haploop.logger.logger import Logger
 from haploop.protocol.ticks import Timebase

@@ -6,7 +6,7 @@ import asyncio
 import time as wall_clock
 from typing import Any
 
-from haploop.logger.log.error import LogError
+from haploop.logger.log import LogError
 from haploop.protocol.clock_client import Aborted, Refused
 from haploop.view.draw.state import WAITING, event_lines, state
 from haploop.view.receive.backfill import Backfill

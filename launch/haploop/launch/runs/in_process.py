@@ -17,7 +17,7 @@ from haploop.protocol.ticks import Timebase
 
 if TYPE_CHECKING:
     from haploop.controller.dissipation import Element
-    from haploop.logger.log.memory import MemoryLog
+    from haploop.logger.log.recording import MemoryLog
 
 Progress = Callable[[dict[str, Any]], None]
 

@@ -33,6 +33,7 @@ from haploop.protocol.arrays import first_row
 from haploop.protocol.ticks import Timebase
 
 if TYPE_CHECKING:
+    from haploop.logger.books.buffers import Commanded
     from haploop.logger.books.chain import ChainBooks
 
 
@@ -53,22 +54,6 @@ class BooksState(NamedTuple):
     stored_at_start_J: Any
     wall: tuple[Any, Any] | None
     wall_changes_J: Any
-
-
-class Commanded(NamedTuple):
-    """Controller rows of some ticks and of all commands in effect in them; columns may have a last axis for a batch.
-
-    Attributes:
-        first: tick of the first row.
-        x_m: positions as measured, shape (rows,), m.
-        forces: of the wall, by the name "wall", and of every element's book, shape (rows,) each, N.
-        wall: position in m, stiffness in N/m and direction into it, +1 or -1, as they stand in all intervals booked.
-    """
-
-    first: int
-    x_m: np.ndarray
-    forces: dict[str, np.ndarray]
-    wall: tuple[Any, Any, float]
 
 
 class Books:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from haploop.logger.books.books import Commanded
-from haploop.logger.books.segments import PIECES
+# Columns of pieces of steps have a row for each piece, in order; ``pieces.step`` says of which step it is.
+PIECES = "pieces."
 
 
 def as_float64(data: bytes) -> np.ndarray:
@@ -64,6 +64,22 @@ class PlantBuffer:
         self._columns = {name: column[cuts[name][1] :] for name, column in self._columns.items()}
         self.tick = tick
         return taken
+
+
+class Commanded(NamedTuple):
+    """Controller rows of some ticks and of all commands in effect in them; columns may have a last axis for a batch.
+
+    Attributes:
+        first: tick of the first row.
+        x_m: positions as measured, shape (rows,), m.
+        forces: of the wall, by the name "wall", and of every element's book, shape (rows,) each, N.
+        wall: position in m, stiffness in N/m and direction into it, +1 or -1, as they stand in all intervals booked.
+    """
+
+    first: int
+    x_m: np.ndarray
+    forces: dict[str, np.ndarray]
+    wall: tuple[Any, Any, float]
 
 
 class ControllerBuffer:

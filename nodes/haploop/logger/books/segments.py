@@ -6,11 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from haploop.logger.books.buffers import PIECES
 from haploop.plant.chain.chain import Chain
 
 Columns = dict[str, np.ndarray]
-# Columns of pieces of steps have a row for each piece, in order; ``pieces.step`` says of which step it is.
-PIECES = "pieces."
 # A part of a step is counted in 2^-62 of it: whole numbers, whose sums over many steps may overflow unharmed.
 _FINEST = 62
 

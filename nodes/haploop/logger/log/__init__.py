@@ -1,4 +1,8 @@
 """The log of a run as an MCAP file: written a block at a time, read back into arrays.
 
-``writer`` writes, ``reader`` and ``stream`` read; ``channels`` says which columns there are.
+``writer`` writes, ``stream`` reads; ``channels`` says which columns there are; ``recording`` holds what was read.
 """
+
+
+class LogError(Exception):
+    """The log cannot be written further, or is no log; the message says which file, why, and what to do."""

@@ -6,7 +6,7 @@ import contextlib
 from pathlib import Path
 from typing import NoReturn
 
-from haploop.logger.log.error import LogError
+from haploop.logger.log import LogError
 
 
 class AppendFile:

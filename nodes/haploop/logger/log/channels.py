@@ -9,10 +9,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from haploop.logger.books.buffers import as_float64
-from haploop.logger.log.columns import UNITS
 from haploop.logger.log.table import Floats
 from haploop.protocol.ticks import Timebase
 
+UNITS = {
+    "x": "m",
+    "v": "m/s",
+    "force": "N",
+    "tip_x": "m",
+    "tip_v": "m/s",
+    "hand_x": "m",
+    "hand_v": "m/s",
+    "actuator": "N",
+    "friction": "N",
+}
+# Each link of telemetry leads on to the body that the log names.
+_FAR_END = {"cable": "tip", "grip": "hand"}
 CONTROLLER_UNITS = {"x": "m", "v": "m/s", "a": "m/s^2", "wall": "N", "total": "N", "in_contact": ""}
 
 
@@ -84,3 +96,14 @@ class Channels:
         self._log.message(
             self._events, self._time.tick_ns(tick), {"timestamp": tick / self._time.control_rate, "tick": tick, **event}
         )
+
+
+def motion_columns(plant: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Columns of ``UNITS`` from telemetry: positions and velocities of all bodies against ground, forces in N."""
+    x, v = plant["x"], plant["v"]
+    columns = {"x": x, "v": v, "force": plant["force"]}
+    for link, body in _FAR_END.items():
+        if f"{link}.stretch" in plant:
+            x, v = x + plant[f"{link}.stretch"], v + plant[f"{link}.rate"]
+            columns |= {f"{body}_x": x, f"{body}_v": v}
+    return columns | {name: plant[name] for name in ("actuator", "friction") if name in plant}

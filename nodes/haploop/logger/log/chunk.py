@@ -1,23 +1,154 @@
-"""One MCAP chunk: the messages gathered since the last one, compressed, checked by a CRC and indexed by channel."""
+"""One MCAP chunk: messages gathered channel by channel, then compressed, checked by a CRC and indexed.
+
+Message records and their index are composed by NumPy, a block at a time: that takes 2.5 us a message against 20.9 us
+through the ``mcap`` library's writer, which makes a Python call for each.
+"""
 
 from __future__ import annotations
 
+import struct
 import zlib
 from collections.abc import Callable, Sequence
 from functools import partial
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from mcap.data_stream import RecordBuilder
-from mcap.records import Chunk, ChunkIndex
+from mcap.opcode import Opcode
+from mcap.records import Chunk, ChunkIndex, Message
+from numpy.typing import NDArray
 
-from haploop.logger.log.rows import FreeRows, TableRows
+from haploop.logger.log.table import Floats, TableLayout
 
 Compression = Literal["", "lz4"]
 
 # Negative levels give up size for speed. On a log of random motions -3 takes three quarters of the time of level 0 and
 # gives 3 % more bytes, still half of what goes in; -5 gives 14 % more and wins hardly any time.
 _LZ4_LEVEL = -3
+# Opcode and length of a record; what they count follows.
+_PREFIX_BYTES = 9
+# In a message record, before its data: channel, sequence, log time, publish time.
+_FIXED_BYTES = 22
+
+
+def _index(channel: int, log_times_ns: NDArray[Any], offsets: NDArray[Any]) -> bytes:
+    """A MessageIndex record, which the library would compose pair by pair."""
+    pairs = np.stack((log_times_ns, offsets), axis=1).astype("<u8").tobytes()
+    return struct.pack("<BQHI", Opcode.MESSAGE_INDEX, 6 + len(pairs), channel, len(pairs)) + pairs
+
+
+class TableRows:
+    """Messages of a table, as records of equal length in one array that is stamped once and then only filled in.
+
+    Attributes:
+        channel: id of the channel.
+        count: messages held.
+        size: bytes of their records.
+    """
+
+    def __init__(self, channel: int, layout: TableLayout) -> None:
+        self.channel = channel
+        self.count = 0
+        self._layout = layout
+        self._record = np.dtype(
+            [
+                ("opcode", "u1"),
+                ("length", "<u8"),
+                ("channel", "<u2"),
+                ("sequence", "<u4"),
+                ("log_time", "<u8"),
+                ("publish_time", "<u8"),
+                ("message", layout.dtype),
+            ]
+        )
+        self._records = np.empty(0, self._record)
+        self._views: list[Floats] = []
+
+    @property
+    def size(self) -> int:
+        return self.count * self._record.itemsize
+
+    def _reserve(self, capacity: int) -> None:
+        held = self._records[: self.count]
+        self._records = np.empty(capacity, self._record)
+        self._records["opcode"] = Opcode.MESSAGE
+        self._records["length"] = _FIXED_BYTES + self._layout.dtype.itemsize
+        self._records["channel"] = self.channel
+        self._layout.stamp(self._records["message"])
+        self._records[: self.count] = held
+        self._views = self._layout.views(self._records["message"])
+
+    def append(self, sequence: int, log_times_ns: NDArray[np.int64], values: Floats) -> None:
+        """Add messages.
+
+        Args:
+            sequence: number of the first message on its channel.
+            log_times_ns: shape (messages,).
+            values: shape (messages, columns), or (messages, samples, columns) where the layout has samples.
+        """
+        start, end = self.count, self.count + len(log_times_ns)
+        if end > len(self._records):
+            self._reserve(max(end, 2 * len(self._records)))
+        new = self._records[start:end]
+        new["sequence"] = np.arange(sequence, sequence + len(new)) & 0xFFFFFFFF
+        new["log_time"] = new["publish_time"] = log_times_ns
+        for number, view in enumerate(self._views):
+            view[start:end] = values[..., number]
+        self.count = end
+
+    def body(self) -> memoryview:
+        """The records, end to end; valid until the next append or clear."""
+        return self._records[: self.count].view(np.uint8).data
+
+    def log_times(self) -> NDArray[Any]:
+        """Log times in ns, shape (count,)."""
+        return self._records["log_time"][: self.count]
+
+    def index(self, base: int) -> bytes:
+        """The MessageIndex record for a body that begins ``base`` bytes into the chunk."""
+        return _index(self.channel, self.log_times(), base + np.arange(self.count) * self._record.itemsize)
+
+    def clear(self) -> None:
+        """Forget the messages and keep the stamped array for the next chunk."""
+        self.count = 0
+
+
+class FreeRows:
+    """Messages of any length, one by one; attributes and methods as of :class:`TableRows`."""
+
+    def __init__(self, channel: int) -> None:
+        self.channel = channel
+        self.clear()
+
+    @property
+    def count(self) -> int:
+        return len(self._log_times)
+
+    @property
+    def size(self) -> int:
+        return len(self._records)
+
+    def append(self, sequence: int, log_time_ns: int, data: bytes) -> None:
+        """Add one message, number ``sequence`` on its channel, with ``data`` as its encoded content."""
+        record = RecordBuilder()
+        Message(self.channel, log_time_ns, data, log_time_ns, sequence & 0xFFFFFFFF).write(record)
+        self._offsets.append(len(self._records))
+        self._log_times.append(log_time_ns)
+        self._records += record.end()
+
+    def body(self) -> bytes:
+        return bytes(self._records)
+
+    def log_times(self) -> NDArray[Any]:
+        return np.array(self._log_times, np.uint64)
+
+    def index(self, base: int) -> bytes:
+        return _index(self.channel, self.log_times(), base + np.array(self._offsets, np.int64))
+
+    def clear(self) -> None:
+        self._records = bytearray()
+        self._offsets: list[int] = []
+        self._log_times: list[int] = []
 
 
 def compressor(compression: Compression) -> Callable[[bytes], bytes]:

@@ -1,24 +1,29 @@
-"""The records of an MCAP file: the whole ones, one after the other, and what stands inside a chunk.
+"""The records of an MCAP file: the whole ones, one after the other, what stands inside a chunk, and its messages.
 
 The frame of the file is read by the ``mcap`` library's own records; messages of equal length that stand end to end in a
-chunk, as this project's logs have them, are gathered by NumPy all at once.
+chunk, as this project's logs have them, are gathered and decoded by NumPy all at once.
 """
 
 from __future__ import annotations
 
 import os
 import struct
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from io import BytesIO
-from typing import IO
+from typing import IO, Any
 
+import msgpack
 import numpy as np
 from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
 from mcap.records import Chunk
 from mcap.stream_reader import get_chunk_data_stream
 from numpy.typing import NDArray
+
+from haploop.logger.log import LogError
+from haploop.logger.log.recording import Table
+from haploop.logger.log.table import Floats, TableLayout, rows_of
 
 _PREFIX = struct.Struct("<BQ")
 _MESSAGE = struct.Struct("<HIQQ")
@@ -97,3 +102,45 @@ def _run(body: bytes, start: int, end: int) -> tuple[MessageRun, int]:
     channel, _, _, _ = _MESSAGE.unpack_from(body, start + _PREFIX.size)
     log_times = messages[:, data - 16 : data - 8].copy().view("<u8")[:, 0]
     return MessageRun(channel, log_times, messages[:, data:].tobytes(), size - data), start + messages.size
+
+
+@dataclass(frozen=True)
+class LogChannel:
+    """A channel of this topic whose messages are laid out so; without columns, they are any maps."""
+
+    topic: str
+    layout: TableLayout
+
+    def decode(
+        self, runs: Sequence[MessageRun], names: Collection[str] | None
+    ) -> tuple[NDArray[np.uint64], Table | list[Any]]:
+        """Log time in ns of every row, shape (rows,), and the rows: the columns ``names`` (None: all), or the maps.
+
+        Raises:
+            LogError: the messages are not what the schema of the channel says.
+        """
+        try:
+            return self._decode(runs, names)
+        except (ValueError, TypeError, AttributeError) as error:
+            raise LogError(f"A message on {self.topic} is no msgpack map of its schema's numbers: {error}.") from error
+
+    def _decode(
+        self, runs: Sequence[MessageRun], names: Collection[str] | None
+    ) -> tuple[NDArray[np.uint64], Table | list[Any]]:
+        log_times_ns = np.concatenate([run.log_times_ns for run in runs])
+        units = self.layout.columns
+        if not units:
+            return log_times_ns, [msgpack.unpackb(payload) for run in runs for payload in run]
+        rows_each, columns = self._columns(runs)
+        kept = ((name, column) for name, column in zip(units, columns, strict=True) if names is None or name in names)
+        return np.repeat(log_times_ns, rows_each), Table(kept, units)
+
+    def _columns(self, runs: Sequence[MessageRun]) -> tuple[int | list[int], Sequence[Floats]]:
+        """Rows in each message, and all columns."""
+        columns = self.layout.read(b"".join([run.payloads for run in runs]))
+        if columns is not None:
+            return self.layout.samples or 1, columns
+        # Other programs may order or encode the same numbers otherwise.
+        rows = [rows_of(msgpack.unpackb(payload), self.layout.columns) for run in runs for payload in run]
+        flat = np.array([row for of_message in rows for row in of_message], np.float64)
+        return [len(of_message) for of_message in rows], list(flat.reshape(-1, len(self.layout.columns)).T)

@@ -15,11 +15,10 @@ from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Schema
 from numpy.typing import NDArray
 
-from haploop.logger.log.channel import LogChannel
+from haploop.logger.log import LogError
 from haploop.logger.log.closing import MAGIC
-from haploop.logger.log.error import LogError
-from haploop.logger.log.recording import Table, join, merge_columns
-from haploop.logger.log.records import MessageRun, chunk_body, lone_message, parts, records
+from haploop.logger.log.recording import Recording, Table, join, merge_columns
+from haploop.logger.log.records import LogChannel, MessageRun, chunk_body, lone_message, parts, records
 from haploop.logger.log.table import TableLayout
 
 _DAMAGE = (ValueError, OverflowError, RuntimeError, struct.error, McapError)
@@ -178,6 +177,35 @@ class LogStream:
                 raise LogError(f"The topic {channel.topic} mixes messages with and without columns; read them apart.")
             self.units[channel.topic] = merge_columns(known, layout.columns)
             self._channels.setdefault(channel.id, LogChannel(channel.topic, layout))
+
+
+def read(path: str | Path, topics: Collection[str] | None = None, columns: Collection[str] | None = None) -> Recording:
+    """Read the log of a run.
+
+    Args:
+        path: a run's directory, or an MCAP file of msgpack maps.
+        topics: only these topics; all when None.
+        columns: only these columns, of every topic that has them; all when None. A topic that has none of them is left
+            out, one without columns at all (``/events``) is not.
+
+    Returns:
+        Arrays by topic and column, ``read(run)["/plant"]["x"]``; of a log that was cut off, everything up to the last
+        whole chunk, with ``truncated`` set.
+
+    Raises:
+        FileNotFoundError: there is no such directory or file, or the directory holds no log.
+        LogError: the file is empty, is no MCAP file, or holds messages other than msgpack maps.
+    """
+    log = LogStream(path, topics, columns)
+    batches: dict[str, list[Batch]] = {}
+    for batch in log:
+        batches.setdefault(batch.topic, []).append(batch)
+    rows = {
+        topic: join([batch[1:] for batch in batches.pop(topic, [])], units)[1]
+        for topic in log.units
+        if log.chosen(topic) and ((units := log.chosen_units(topic)) or not log.units[topic])
+    }
+    return Recording(rows, log.cut, log.attachments)
 
 
 def survey(path: str | Path) -> LogStream:

@@ -1,7 +1,7 @@
 """The log file of a run: MCAP, written a block of ticks at a time, readable up to its last chunk whatever happens.
 
 The frame of the file is made of the ``mcap`` library's own records. What is written a thousand times a second, the
-message records inside a chunk and their index, is composed by NumPy (:mod:`haploop.logger.log.rows`), since the
+message records inside a chunk and their index, is composed by NumPy (:mod:`haploop.logger.log.chunk`), since the
 library's writer takes a Python call, and some microseconds, for every message.
 """
 
@@ -17,9 +17,8 @@ from mcap.records import Attachment, AttachmentIndex, Channel, Header, McapRecor
 from numpy.typing import NDArray
 
 from haploop.logger.log.append_file import AppendFile
-from haploop.logger.log.chunk import Compression, chunk, compressor
+from haploop.logger.log.chunk import Compression, FreeRows, TableRows, chunk, compressor
 from haploop.logger.log.closing import MAGIC, Summary
-from haploop.logger.log.rows import FreeRows, TableRows
 from haploop.logger.log.table import Floats, TableLayout, pack
 
 # Bytes of messages after which a chunk is closed: what a reader must at least unpack to reach one message.

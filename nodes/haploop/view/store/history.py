@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from haploop.logger.log.columns import motion_columns
+from haploop.logger.log.channels import motion_columns
 from haploop.protocol.ticks import Timebase
 from haploop.view.store.lod_series import LodSeries
 

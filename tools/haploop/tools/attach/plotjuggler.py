@@ -24,8 +24,7 @@ from numpy.typing import NDArray
 
 from haploop.launch.processes.run_directory import LiveRun, RunNotFound
 from haploop.logger.books.buffers import as_float64
-from haploop.logger.log.channels import Channels
-from haploop.logger.log.columns import motion_columns
+from haploop.logger.log.channels import Channels, motion_columns
 from haploop.logger.log.table import Floats, TableLayout
 from haploop.protocol.clock_client import Refused
 from haploop.protocol.sockets import has_message, open_socket

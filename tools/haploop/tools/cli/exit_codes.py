@@ -32,7 +32,7 @@ def plain_errors() -> Iterator[None]:
     from haploop.launch.processes.control import CommandRefused
     from haploop.launch.processes.run_directory import RunNotFound
     from haploop.launch.scene.mistakes import SceneError
-    from haploop.logger.log.error import LogError
+    from haploop.logger.log import LogError
 
     try:
         yield

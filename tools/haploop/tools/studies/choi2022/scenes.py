@@ -11,8 +11,7 @@ import numpy as np
 from haploop.controller.dissipation import registry
 from haploop.launch.runs.in_process import run_in_process
 from haploop.launch.scene.file import load
-from haploop.logger.log.memory import MemoryLog
-from haploop.logger.log.recording import Recording
+from haploop.logger.log.recording import MemoryLog, Recording
 from haploop.tools.cost.grid import scenes_folder
 
 SPEED_M_S = 0.1
