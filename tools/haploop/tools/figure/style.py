@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.axis import Axis
     from matplotlib.figure import Figure
+    from matplotlib.text import Text
 
 INK, GREY, FAINT = "#222222", "#666666", "#BBBBBB"
 WALL, WALL_FILL, CLOSE = "#0072B2", "#D6E6F2", "#EBD9A8"
@@ -111,6 +112,17 @@ def write_figure(figure: Figure, target: Path) -> Path:
 
 
 def fix_layout(figure: Figure) -> None:
-    """Gives everything its place and keep it there, so that labels can be placed among what is drawn."""
+    """Gives everything its place and keeps it there, so that labels can be placed among what is drawn."""
     figure.draw_without_rendering()
     figure.set_layout_engine("none")
+
+
+def fit_text(text: Text, room_px: float, smallest: float = 0.78) -> None:
+    """Makes a text no wider than some pixels: smaller, down to a share of its size, then cut off."""
+    width = text.get_window_extent().width
+    if width > room_px:
+        text.set_fontsize(float(text.get_fontsize()) * max(smallest, room_px / width))
+        width = text.get_window_extent().width
+    if width > room_px:
+        content = text.get_text()
+        text.set_text(content[: int(len(content) * room_px / width) - 2].rstrip() + " …")

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 from haploop.protocol.changes import describe
 from haploop.tools.figure.data import Book, RunData
-from haploop.tools.figure.style import GREY, INK, LARGE, SMALL, TEXT, VERDICTS
-from haploop.tools.render.report import count_losses, plant_books
+from haploop.tools.figure.style import GREY, INK, LARGE, SMALL, TEXT, VERDICTS, fit_text
+from haploop.tools.render.report import LEAK_CAUSES, count_losses, plant_books
 from haploop.tools.render.units import amount, parameters, spring
 
 if TYPE_CHECKING:
@@ -32,9 +32,7 @@ def draw_header(figure: Figure | SubFigure, run: RunData) -> None:
     right = sign.get_window_extent().x1 / figure.bbox.width
     words = run.scene.get("title", "untitled run")
     title = figure.text(right + 0.018, 0.66, words, fontsize=LARGE, color=INK, va="center", gid="title")
-    room, width = figure.bbox.width * (0.97 - right), title.get_window_extent().width
-    if width > room:
-        title.set_text(words[: int(len(words) * room / width) - 2].rstrip() + " …")
+    fit_text(title, figure.bbox.width * (0.97 - right), smallest=1.0)
     figure.text(0.006, 0.16, "   ·   ".join(key_numbers(run)), fontsize=TEXT + 1, color=INK, va="center", gid="numbers")
 
 
@@ -114,8 +112,7 @@ def book_rows(run: RunData, books: list[Book]) -> list[Row]:
 def _leak_rows(wall: dict[str, Any]) -> list[Row]:
     if "leak" not in wall:
         return []
-    causes = {"sampling_and_hold_J": "sampling and hold", "quantisation_J": "quantisation", "delay_J": "delay"}
-    rows = [Row(f"    leak by {words}", amount(wall["leak"][key], "J")) for key, words in causes.items()]
+    rows = [Row(f"    leak by {words}", amount(wall["leak"][key], "J")) for key, words in LEAK_CAUSES.items()]
     ideal = wall["ideal_J"] or 0.0
     held = abs(ideal) > 1e-9 * abs(wall["true_J"] or 0.0)
     return rows + ([Row("    held by an ideal spring", amount(ideal, "J"))] if held else [])

@@ -60,7 +60,7 @@ def bisect_figure(data: MapData) -> Figure:
     legend = Legend(sheet.side, *sheet.side_in)
     legend.lines(f"{second.key}" if second else "", signs)
     legend.boundaries(styles, {b.name: b.words for over in overs for b in over.boundaries})
-    legend.notes(edge_notes(data, edges, overs, count))
+    legend.notes(edge_notes(data, edges, overs))
     fix_layout(sheet.figure)
     _names(ax, x, y, edges, overs, styles)
     return sheet.figure

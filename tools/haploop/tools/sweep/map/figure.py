@@ -24,15 +24,8 @@ from haploop.tools.sweep.map.panels import (
     label_swings,
     mark_disagreement,
 )
-from haploop.tools.sweep.map.sentences import (
-    answer,
-    count_verdicts,
-    description,
-    failures,
-    star_words,
-    unknown_amplitudes,
-)
-from haploop.tools.sweep.map.sheet import MOST_PANELS, Layout, Panel, Sheet, fit_title, panel_title
+from haploop.tools.sweep.map.sentences import count_verdicts, description, map_notes, star_words
+from haploop.tools.sweep.map.sheet import Layout, Panel, Sheet, fit_title, panel_title
 from haploop.tools.sweep.table import NeedsPyarrow, TableError, read
 
 if TYPE_CHECKING:
@@ -75,7 +68,7 @@ def make_figure(data: MapData) -> Figure:
     if scale:
         legend.amplitudes(scale)
     legend.boundaries(styles, words)
-    legend.notes(_notes(data, cells, layout, overs))
+    legend.notes(map_notes(data, cells, layout, overs))
     fix_layout(sheet.figure)
     for ax, panel, over in zip(sheet.axes, panels, overs, strict=True):
         fit_title(ax, panel.titles)
@@ -115,29 +108,6 @@ def _label(
     for name, lines in over.drawn.items():
         for line in sorted(lines, key=len, reverse=True)[:1]:
             room.on_line(line, name, colours[name], "name of a line")
-
-
-def _notes(data: MapData, cells: Cells, layout: Layout, overs: Sequence[PanelLines]) -> list[str]:
-    """Returns the notes, the answer first."""
-    notes = [answer(data.axes, stiffest_steady(data.axes, cells))]
-    if (count := layout.count(data.axes)) > MOST_PANELS:
-        notes.append(f"The first {MOST_PANELS} of {count} panels are drawn.")
-    reasons = list(dict.fromkeys(over.why_none for over in overs if over.why_none))
-    everywhere = " in some panels" if any(not over.why_none for over in overs) else ""
-    notes += [f"No exact limit{everywhere}, since the loop is not linear: {', '.join(reasons)}."] if reasons else []
-    outside = [boundary.name for over in overs for boundary in over.boundaries if not boundary.lines]
-    if outside:
-        panels = "panel" if len(overs) == 1 else "panels that do not show them"
-        notes.append(f"Outside the {panels}: {', '.join(dict.fromkeys(outside))}.")
-    if (cells.agree < cells.seeds).any():
-        notes.append(
-            "The worst verdict of the seeds is shown; a number such as 2/5 (a dot in small cells): so many of them "
-            "came to it, the others to milder ones."
-        )
-    if layout.y is None and len(data.seeds) > 1:
-        notes.append("Upright lines reach down to the seed that swings least.")
-    notes += [unknown_amplitudes(data, cells), failures(data)]
-    return [note for note in notes if note]
 
 
 def draw_map(directory: Path, target: Path | None = None) -> Path:

@@ -22,12 +22,36 @@ from haploop.tools.sweep.map.data import (
     short,
     with_prefix,
 )
-from haploop.tools.sweep.map.edges import ALL_HOLD, FOUND, NONE_HOLDS, UNKNOWN, Edges, StiffestSteady
+from haploop.tools.sweep.map.edges import ALL_HOLD, FOUND, NONE_HOLDS, UNKNOWN, Edges, StiffestSteady, stiffest_steady
 from haploop.tools.sweep.map.legend import verdict_words
+from haploop.tools.sweep.map.sheet import Layout
 
 # What fits into the line below the title; the base scene's title is cut short before anything else is.
 _BETWEEN, _LETTERS, _LEAST_LETTERS = "   ·   ", 185, 12
 _REASON_LETTERS = 160
+
+FEW_PANELS = "The first {shown} of {all} panels are drawn."
+FEW_LINES = "The first {shown} of {all} lines are drawn."
+NO_LIMIT = "No exact limit, since the loop is not linear: {reasons}."
+NO_LIMIT_IN_SOME = "No exact limit in some panels, since the loop is not linear: {reasons}."
+OUTSIDE = "Outside the panel: {names}."
+OUTSIDE_SOME = "Outside the panels that do not show them: {names}."
+WORST_SEED = (
+    "The worst verdict of the seeds is shown; a number such as 2/5 (a dot in small cells): so many of them came to it, "
+    "the others to milder ones."
+)
+LEAST_SWING = "Upright lines reach down to the seed that swings least."
+UNKNOWN_SWINGS = "How far limit cycles swing was not recorded."
+BRACKETS = "Upright bars are the brackets. Each boundary is the first change from {begin} on."
+BRACKETS_OF_SEEDS = (
+    "Upright bars are the brackets; a point is the seed that is {holds} least far, its bar covers all seeds. Each "
+    "boundary is the first change from {begin} on."
+)
+HOLDS_UPWARDS = "▲ {holds} at every point that was tried."
+HOLDS_DOWNWARDS = "▼ {holds} at every point that was tried."
+HOLDS_NOWHERE = "× not {holds} where the search begins."
+FAILED_BEFORE = "? a run failed before a boundary was found."
+CHANGED_MORE = "{more} of {all} searches changed more than once."
 
 
 def description(data: MapData, cells: Cells) -> str:
@@ -105,12 +129,27 @@ def failures(data: MapData) -> str:
     return f"{len(failed)} failed" + (f", {count} of them" if len(reasons) > 1 else "") + f": {reason}"
 
 
-def unknown_amplitudes(data: MapData, cells: Cells) -> str:
-    """Returns why limit cycles have one colour, where they have."""
+def map_notes(data: MapData, cells: Cells, layout: Layout, lines: Sequence[PanelLines]) -> list[str]:
+    """Returns the notes beside a map, the answer first."""
+    panels, reasons = layout.count(data.axes), _reasons(lines)
+    outside = list(dict.fromkeys(line.name for panel in lines for line in panel.boundaries if not line.lines))
     swinging = cells.verdict == LIMIT_CYCLE
-    if not swinging.any() or (swinging & np.isfinite(cells.amplitude_m)).any():
-        return ""
-    return "How far limit cycles swing was not recorded." if not data.has_amplitudes else ""
+    every, one = all(panel.why_none for panel in lines), len(lines) == 1
+    notes = [
+        (True, answer(data.axes, stiffest_steady(data.axes, cells))),
+        (panels > len(lines), FEW_PANELS.format(shown=len(lines), all=panels)),
+        (reasons, (NO_LIMIT if every else NO_LIMIT_IN_SOME).format(reasons=reasons)),
+        (outside, (OUTSIDE if one else OUTSIDE_SOME).format(names=", ".join(outside))),
+        ((cells.agree < cells.seeds).any(), WORST_SEED),
+        (layout.y is None and len(data.seeds) > 1, LEAST_SWING),
+        (swinging.any() and not data.has_amplitudes, UNKNOWN_SWINGS),
+        (True, failures(data)),
+    ]
+    return [sentence for applies, sentence in notes if applies and sentence]
+
+
+def _reasons(lines: Sequence[PanelLines]) -> str:
+    return ", ".join(dict.fromkeys(panel.why_none for panel in lines if panel.why_none))
 
 
 @dataclass(frozen=True)
@@ -151,30 +190,27 @@ def edge_description(data: MapData, edges: Edges) -> str:
     return about(data, f"boundaries: {came}")
 
 
-def edge_notes(data: MapData, edges: Edges, overs: Sequence[PanelLines], lines: int) -> list[str]:
-    """Returns the notes of a search, the answer first."""
-    notes = []
-    if best := furthest(edges):
-        at = ", ".join(f"{axis.key} {axis.word(i)}" for axis, i in zip(edges.others, best.index, strict=True))
-        notes.append(f"★ Furthest: {best.words} at {at}.")
-    if len(edges.others) > 1 and lines < len(edges.others[1].values):
-        notes.append(f"The first {lines} of {len(edges.others[1].values)} lines are drawn.")
-    bars = "Upright bars are the brackets"
-    seeds = f"; a point is the seed that is {edges.holds} least far, its bar covers all seeds" * (len(data.seeds) > 1)
-    notes.append(
-        f"{bars}{seeds}. Each boundary is the first change from {edges.along.word(0 if edges.rising else -1)} on."
-    )
-    if (edges.state == ALL_HOLD).any():
-        notes.append(f"{'▲' if edges.rising else '▼'} {edges.holds} at every point that was tried.")
-    if (edges.state == NONE_HOLDS).any():
-        notes.append(f"× not {edges.holds} where the search begins.")
-    if (edges.state == UNKNOWN).any():
-        notes.append("? a run failed before a boundary was found.")
-    if edges.more:
-        notes.append(f"{edges.more} of {len(data.boundary['low'])} searches changed more than once.")
-    reasons = list(dict.fromkeys(over.why_none for over in overs if over.why_none))
-    notes += [f"No exact limit, since the loop is not linear: {', '.join(reasons)}."] if reasons else []
-    return [note for note in [*notes, failures(data)] if note]
+def edge_notes(data: MapData, edges: Edges, lines: Sequence[PanelLines]) -> list[str]:
+    """Returns the notes beside the boundaries of a search, of which these lines are drawn; the answer first."""
+    best, reasons, several = furthest(edges), _reasons(lines), len(data.seeds) > 1
+    at = [f"{axis.key} {axis.word(i)}" for axis, i in zip(edges.others, best.index, strict=True)] if best else []
+    rows = len(edges.others[1].values) if len(edges.others) > 1 else 1
+    begin = edges.along.word(0 if edges.rising else -1)
+    notes = [
+        (best, f"★ Furthest: {best.words if best else ''} at {', '.join(at)}."),
+        (len(lines) < rows, FEW_LINES.format(shown=len(lines), all=rows)),
+        (True, (BRACKETS_OF_SEEDS if several else BRACKETS).format(holds=edges.holds, begin=begin)),
+        (
+            (edges.state == ALL_HOLD).any(),
+            (HOLDS_UPWARDS if edges.rising else HOLDS_DOWNWARDS).format(holds=edges.holds),
+        ),
+        ((edges.state == NONE_HOLDS).any(), HOLDS_NOWHERE.format(holds=edges.holds)),
+        ((edges.state == UNKNOWN).any(), FAILED_BEFORE),
+        (edges.more, CHANGED_MORE.format(more=edges.more, all=len(data.boundary["low"]))),
+        (reasons, NO_LIMIT.format(reasons=reasons)),
+        (True, failures(data)),
+    ]
+    return [sentence for applies, sentence in notes if applies and sentence]
 
 
 def _amount(edges: Edges, value: float) -> str:

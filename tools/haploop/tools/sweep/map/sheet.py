@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from haploop.tools.figure.style import GREY, INK, LARGE, SMALL, TEXT, empty_figure
+from haploop.tools.figure.style import GREY, INK, LARGE, SMALL, TEXT, empty_figure, fit_text
 from haploop.tools.sweep.map.data import STIFFNESS, Axis, Cells, MapData
 
 if TYPE_CHECKING:
@@ -84,8 +84,6 @@ WIDTH_IN, SIDE_IN, _HEADER_IN = 11.64, 2.75, 0.8
 # Height of a row of panels, by how many rows there are.
 _HEIGHTS_IN = {1: 6.0, 2: 3.6}
 _LEAST_HEIGHT_IN = 2.7
-# Words that are too long get this much smaller before they are cut off.
-_SMALLEST = 0.78
 # How far a panel's title may reach into the gap beside it, as a multiple of the panel's width.
 _BEYOND = 1.05
 
@@ -134,14 +132,7 @@ def _write(header: SubFigure, words: str, y: float, size: float, colour: str, gi
     """Writes one line, smaller if it has to be, cut off if that does not do."""
     weight = "bold" if bold else "normal"
     text = header.text(0.008, y, words, fontsize=size, color=colour, va="center", fontweight=weight, gid=gid)
-    room = header.figure.bbox.width * 0.984
-    width = text.get_window_extent().width
-    if width > room:
-        smallest = size * _SMALLEST
-        text.set_fontsize(max(smallest, size * room / width))
-        width = text.get_window_extent().width
-    if width > room:
-        text.set_text(words[: int(len(words) * room / width) - 2].rstrip() + " …")
+    fit_text(text, header.figure.bbox.width * 0.984)
 
 
 def panel_title(ax: Axes, words: str) -> Text:
@@ -151,12 +142,9 @@ def panel_title(ax: Axes, words: str) -> Text:
 
 def fit_title(ax: Axes, titles: Sequence[str]) -> None:
     """Writes the first of some titles that is no wider than its panel; the last, cut off, if need be."""
-    room, width = ax.get_window_extent().width * _BEYOND, 0.0
+    room_px = ax.get_window_extent().width * _BEYOND
     for words in titles:
-        width = panel_title(ax, words).get_window_extent().width
-        if width <= room:
+        title = panel_title(ax, words)
+        if words == titles[-1] or title.get_window_extent().width <= room_px:
+            fit_text(title, room_px)
             return
-    panel_title(ax, titles[-1]).set_fontsize(TEXT * max(_SMALLEST, room / width))
-    if room < _SMALLEST * width:
-        words = titles[-1][: int(len(titles[-1]) * room / (_SMALLEST * width)) - 2]
-        panel_title(ax, f"{words}…").set_fontsize(TEXT * _SMALLEST)
