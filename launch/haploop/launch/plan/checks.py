@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from haploop.launch.plan.effect import Draft, at
+from haploop.plant.integrators.registry import find_integrator
 from haploop.protocol.scene.effects import Accelerometer, Actuator, Friction, UniformJitter
 from haploop.protocol.scene.scene import Clock, Hand
 from haploop.protocol.ticks import whole_count
@@ -27,13 +28,13 @@ def check_friction(draft: Draft) -> None:
     if friction.stribeck_velocity is not None and friction.breakaway is None:
         expected = "It says how breakaway falls towards kinetic, so friction.breakaway must be given too."
         draft.complain(("friction", "stribeck_velocity"), expected)
-    if draft.scene and draft.scene.clock.integrator != "dop853":
+    if draft.scene and not find_integrator(draft.scene.clock.integrator).chooses_steps:
         _check_rate(draft, draft.scene.as_dict())
 
 
 def _check_rate(draft: Draft, scene: dict[str, Any]) -> None:
     rate, integrator = scene["clock"]["plant_rate"], scene["clock"]["integrator"]
-    if integrator == "exact":
+    if find_integrator(integrator).method is None:
         from haploop.plant.chain.chain import Chain
         from haploop.plant.friction.substeps import MOST_PARTS, parts_of_a_step
 
@@ -109,6 +110,8 @@ def note_accelerometer(scene: dict[str, Any]) -> list[str]:
 
 def note_growth(scene: dict[str, Any]) -> list[str]:
     """Says where a method of a fixed step makes the bodies swing ever wider by itself."""
+    if find_integrator(scene["clock"]["integrator"]).method is None:
+        return []
     from haploop.plant.integrators.stability import growth
 
     factor = growth(scene)

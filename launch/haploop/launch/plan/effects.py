@@ -8,13 +8,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 from functools import cache, partial
 from importlib.metadata import entry_points
-from typing import Any
 
 from haploop.controller.estimators.choose import estimator_class, estimators_for
 from haploop.launch.plan import checks, ideal
 from haploop.launch.plan.effect import Effect, Resolved, at, without_keys
-from haploop.launch.plan.modules import CHAIN, COUNTED, HISTORY, LINE, NOISY, RUBBING, STEPWISE
-from haploop.plant.integrators.registry import integrator_module
+from haploop.launch.plan.modules import CHAIN, COUNTED, HISTORY, LINE, LINEAR_RATES, NOISY, RUBBING
+from haploop.plant.integrators.registry import find_integrator, integrator_module, integrator_names
 from haploop.plant.sensing.encoder import accelerometer_is_used
 from haploop.protocol.ticks import Timebase
 from haploop.protocol.trees import tree_leaves
@@ -27,24 +26,24 @@ def _plant(module: str, *others: str) -> tuple[str, ...]:
     return f"haploop.plant.{module}", *others
 
 
-def _integrator(name: str, does: str, *modules: str, **says: Any) -> Effect:
-    """Makes the effect of a method of ``clock.integrator``, written in a module of its own."""
-    own = (integrator_module(name), *modules)
-    return Effect(
-        "clock.integrator",
-        "plant",
-        own,
-        "motion",
-        f"every step is {does}",
-        value=name,
-        batches=False,
-        **says,
-    )
-
-
-def _stepwise(name: str, does: str) -> Effect:
-    """Makes the effect of a method of a fixed step, whose map in a tick is its own and may be unstable."""
-    return _integrator(name, does, *STEPWISE, linear=False, note=checks.note_growth)
+def _integrators() -> Iterator[Effect]:
+    """Makes the effects of all methods of ``clock.integrator`` but the exact transition."""
+    for name in integrator_names():
+        if name != "exact":
+            method = find_integrator(name)
+            modules = (integrator_module(name), method.motions[0].partition(":")[0])
+            yield Effect(
+                "clock.integrator",
+                "plant",
+                (*dict.fromkeys(modules), *LINEAR_RATES * (method.method is not None), *HISTORY),
+                "motion",
+                f"every step is {method.does}",
+                value=name,
+                # The map of a fixed step is not that of the loop; that of an exact method is.
+                linear=method.is_exact,
+                batches=False,
+                note=checks.note_growth,
+            )
 
 
 def _estimators(of: str) -> Iterator[Effect]:
@@ -96,12 +95,7 @@ _OF_ACCELEROMETER = _plant("sensing.accelerometer", *NOISY, *COUNTED)
 
 # In the order in which they act within their stage.
 EFFECTS: tuple[Effect, ...] = (
-    _stepwise("euler", "one of the explicit Euler method, order 1"),
-    _stepwise("semi-implicit-euler", "one of the semi-implicit Euler method, order 1"),
-    _stepwise("rk4", "one of the classical Runge-Kutta method, order 4"),
-    _stepwise("implicit-midpoint", "one of the implicit midpoint rule, order 2"),
-    # Its error is near the last bits: for a linear map its steps are those of the exact flow.
-    _integrator("dop853", "made of DOP853's own steps, order 8, from event to event", *HISTORY),
+    *_integrators(),
     Effect(
         "transmission",
         "plant",

@@ -11,6 +11,7 @@ from haploop.launch.plan.effect import Effect, Stage, at
 from haploop.launch.plan.effects import all_effects, effects_of
 from haploop.plant.chain.chain import Chain
 from haploop.plant.choose import integrator_name, needs_chain
+from haploop.plant.integrators.registry import find_integrator
 from haploop.protocol.ticks import Timebase
 
 
@@ -89,7 +90,8 @@ def multiplications(scene: dict[str, Any]) -> int:
     """
     time, size = Timebase.from_clock(scene["clock"], scene["duration"]), len(Chain.from_scene(scene).states)
     if needs_chain(scene):
-        moves = {"rk4": 4 * time.steps_per_tick, "dop853": 12}.get(integrator_name(scene), time.steps_per_tick)
+        method = find_integrator(integrator_name(scene))
+        moves = method.evaluations * (1 if method.chooses_steps else time.steps_per_tick)
         return moves * size * (size + 2)
     return (time.steps_per_tick + (2 if time.delay_steps % time.steps_per_tick else 1)) * size * (size + 1)
 

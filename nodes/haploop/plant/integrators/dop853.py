@@ -6,7 +6,6 @@ from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.integrate import solve_ivp
 
 from haploop.plant.chain.chain import Chain
 from haploop.plant.chain.history import ChainHistory, Interval
@@ -71,6 +70,8 @@ class Dop853Motion(ChainHistory):
         Raises:
             ArithmeticError: the steps became too small to go on.
         """
+        from scipy.integrate import solve_ivp  # half a second to import
+
         found = solve_ivp(
             rates, span, z, "DOP853", t_eval=ends, events=events or None, rtol=_TOLERANCE, atol=self._absolute
         )

@@ -13,8 +13,8 @@ if TYPE_CHECKING:
 # Name in ``clock.integrator`` -> module and name of its ``Integrator``, imported when it is asked for.
 INTEGRATORS = {
     "exact": "haploop.plant.integrators.registry:EXACT",
-    "euler": "haploop.plant.integrators.euler:EULER",
     "semi-implicit-euler": "haploop.plant.integrators.euler:SEMI_IMPLICIT_EULER",
+    "euler": "haploop.plant.integrators.euler:EULER",
     "rk4": "haploop.plant.integrators.rk4:RK4",
     "implicit-midpoint": "haploop.plant.integrators.implicit_midpoint:IMPLICIT_MIDPOINT",
     "dop853": "haploop.plant.integrators.dop853:DOP853",

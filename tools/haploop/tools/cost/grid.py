@@ -7,13 +7,13 @@ import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any
 
 from haploop.launch.scene.file import load
 from haploop.launch.scene.mistakes import COMMAND_LINE, SceneError
-from haploop.protocol.scene.scene import Integrator
+from haploop.plant.integrators.registry import INTEGRATORS
 
-METHODS: tuple[str, ...] = get_args(Integrator)
+METHODS = tuple(INTEGRATORS)
 RATES = (1_000, 2_000, 5_000, 10_000, 20_000, 50_000, 100_000)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from functools import cache, reduce
 from operator import or_
 from types import UnionType
@@ -17,10 +17,11 @@ from haploop.launch.plan.effects import all_effects
 from haploop.launch.scene.force_csv import fault
 from haploop.launch.scene.tables.base import Model
 from haploop.launch.scene.tables.number import Number
+from haploop.plant.integrators.registry import integrator_names
 from haploop.protocol.quantity import Quantity
 from haploop.protocol.scene.estimators import Acceleration, Velocity
 from haploop.protocol.scene.hand_force import Trace
-from haploop.protocol.scene.scene import Scene
+from haploop.protocol.scene.scene import Clock, Scene
 from haploop.protocol.scene.table import Table
 
 if TYPE_CHECKING:
@@ -75,14 +76,19 @@ def _registered(table: type[Table]) -> dict[str, Any]:
     """The keys that registries give: names of estimators with the keys of their own, tables of others' effects."""
     if table is Scene:
         return {effect.key: (model_of(effect.table) | None, None) for effect in all_effects() if effect.table}
+    if table is Clock:
+        return {"integrator": (_one_name(integrator_names()), "exact")}
     if table not in (Velocity, Acceleration):
         return {}
     kinds = estimators_for(table.__name__.lower())
-    names: Any = Literal[tuple(kinds)]  # pyright: ignore[reportInvalidTypeForm]
-    keys: dict[str, Any] = {"estimator": (names | None, None)}
+    keys: dict[str, Any] = {"estimator": (_one_name(kinds) | None, None)}
     for kind in kinds.values():
         keys |= {key: (Annotated[float | None, Number(quantity)], None) for key, quantity in kind.keys.items()}
     return keys
+
+
+def _one_name(names: Iterable[str]) -> Any:
+    return Literal[tuple(names)]  # pyright: ignore[reportInvalidTypeForm]
 
 
 def _default(field: dataclasses.Field[Any]) -> Any:
