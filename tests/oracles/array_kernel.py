@@ -167,7 +167,7 @@ def run_kernel(scenes: list[dict[str, Any]], energy: bool) -> np.ndarray:
         time.ticks,
         time.lookahead_ticks,
         held,
-        np.moveaxis(motion.response.between(0, time.ticks), 0, -1).copy(),
+        motion.response.between(0, time.ticks).transpose(2, 1, 0).copy(),
         motion.response.tau.at_steps(0, time.ticks * n + 1),
         as_squares(square * np.outer(scales, scales)).astype(float),
         (lag * scales).astype(float),

@@ -42,6 +42,7 @@ class Plant:
         self._block_first = 0
         self._delays: list[tuple[int, int]] = []
         self._delay_now: int | None = None
+        self._x = self._motion.x
         self.tick = 0
         self.stop_reason: str | None = None
 
@@ -93,7 +94,7 @@ class Plant:
         for _ in range(count):
             if self._interval_due and not self._advance():
                 break
-            samples.append(self._measure(self._motion.x))
+            samples.append(self._measure(self._x))
             self.tick += 1
             self._interval_due = True
         return samples
@@ -116,10 +117,10 @@ class Plant:
         holds = self._line.holds(tick)
         if self._unusable and self._refuse(tick, holds):
             return False
-        x = self._motion.advance(tick, holds)
-        self._interval_due = False
-        if not -self._limit_m <= x <= self._limit_m:
-            self._stop(tick + 1, beyond(x, self._limit_m))
+        self._x = x = self._motion.advance(tick, holds)
+        self._interval_due, limit_m = False, self._limit_m
+        if not -limit_m <= x <= limit_m:
+            self._stop(tick + 1, beyond(x, limit_m))
             return False
         return True
 

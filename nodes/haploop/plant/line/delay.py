@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -14,51 +14,24 @@ if TYPE_CHECKING:
     from haploop.plant.counters import Counter
 
 
-class Cut(NamedTuple):
-    """Where the holds of an interval begin under a round-trip delay of d = L n + r steps.
+class DelayLine:
+    """Line of a round-trip delay of d = L n + r steps: command k acts from step k n + d on.
 
-    Command k acts from step k n + d on: in interval k command k - L - 1 still holds for the first r steps and command
-    k - L for the rest; before the first command the force is 0.
+    In interval k command k - L - 1 still holds for the first r steps and command k - L for the rest; before the first
+    command the force is 0. Commands are kept no longer than they are in flight.
 
     Attributes:
         lookahead: L.
-        late_steps: r.
-        prompt_steps: n - r.
-    """
-
-    lookahead: int
-    late_steps: int
-    prompt_steps: int
-
-    def holds(self, tick: int, older: Any, newer: Any) -> list[Hold]:
-        """Returns the holds of interval ``tick`` from the forces of commands tick - L - 1 and tick - L, in N."""
-        newest = tick - self.lookahead
-        hold: Hold = (self.prompt_steps, newer, newest if newest > -1 else -1)
-        if not self.late_steps:
-            return [hold]
-        return [(self.late_steps, older, newest - 1 if newest > 0 else -1), hold]
-
-
-def make_cut(time: Timebase) -> Cut:
-    """Makes the cut of a run's delay."""
-    lookahead, late_steps = divmod(time.delay_steps, time.steps_per_tick)
-    return Cut(lookahead, late_steps, time.steps_per_tick - late_steps)
-
-
-class DelayLine:
-    """Line of a fixed delay; commands are kept no longer than they are in flight.
-
-    Attributes:
-        cut: where the holds of an interval begin.
         state: (tick of the oldest command kept, forces of the commands kept).
         counters: none; nothing befalls a command.
     """
 
     def __init__(self, time: Timebase) -> None:
-        self._time, self.cut = time, make_cut(time)
-        self._lookahead = self.cut.lookahead
-        self._forces: list[Any] = [0.0] * (self._lookahead + 1)
-        self._first = -self._lookahead - 1
+        self._time = time
+        self.lookahead, self._late_steps = divmod(time.delay_steps, time.steps_per_tick)
+        self._prompt_steps = time.steps_per_tick - self._late_steps
+        self._forces: list[Any] = [0.0] * (self.lookahead + 1)
+        self._first = -self.lookahead - 1
         self.receive = self._forces.extend
         self.counters: dict[str, Counter] = {}
 
@@ -76,8 +49,13 @@ class DelayLine:
         Raises:
             IndexError: command tick - L has not been received.
         """
-        forces, at = self._forces, tick - self._lookahead - self._first
-        holds = self.cut.holds(tick, forces[at - 1], forces[at])
+        newest = tick - self.lookahead
+        forces, at = self._forces, newest - self._first
+        hold: Hold = (self._prompt_steps, forces[at], newest if newest > -1 else -1)
+        if not self._late_steps:
+            holds = [hold]
+        else:
+            holds = [(self._late_steps, forces[at - 1], newest - 1 if newest > 0 else -1), hold]
         if at > 64:
             del forces[: at - 1]
             self._first += at - 1
@@ -85,7 +63,7 @@ class DelayLine:
 
     def in_flight(self, tick: int) -> list[Any]:
         """Returns the forces of commands tick - L - 1 ... tick - 1, the oldest of which may still act in ``tick``."""
-        return self._forces[tick - self._lookahead - 1 - self._first :]
+        return self._forces[tick - self.lookahead - 1 - self._first :]
 
     def retimed(self, delay_steps: int, tick: int) -> Line:
         """Returns a line that lets commands overtake; those before ``tick``, all received, are on it or in effect."""

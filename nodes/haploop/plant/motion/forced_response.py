@@ -66,17 +66,17 @@ class ForcedResponse:
     def ends(self, tick: int) -> tuple[int, list[Any]]:
         """Returns (first interval of the piece with ``tick``, what is added to (x, v) over each interval of it)."""
         piece = tick // self._piece_ticks
-        at_ends = self._piece(piece)[:, :, -1].swapaxes(0, 1)
+        at_ends = self._piece(piece)[:, -1].swapaxes(0, 1)
         return piece * self._piece_ticks, at_ends.tolist() if at_ends.ndim == 2 else list(at_ends)
 
     def between(self, tick: int, ticks: int) -> np.ndarray:
-        """Returns the response of x and v in some intervals, shape (2, ticks, n + 1, ...), the last step their end."""
+        """Returns the response of x and v in some intervals, shape (2, n + 1, ticks, ...), the last step their end."""
         size = self._piece_ticks
         first, last = tick // size, max(tick, tick + ticks - 1) // size
         pieces = [self._piece(piece) for piece in range(first, last + 1)]
-        joined = pieces[0] if len(pieces) == 1 else np.concatenate(pieces, axis=1)
+        joined = pieces[0] if len(pieces) == 1 else np.concatenate(pieces, axis=2)
         start = tick - first * size
-        return joined[:, start : start + ticks]
+        return joined[:, :, start : start + ticks]
 
     def _piece(self, piece: int) -> np.ndarray:
         if piece not in self._pieces:
@@ -91,9 +91,9 @@ class ForcedResponse:
         force = self.loads(first, first + ticks * n + 1)
         start, rise = (rows.reshape(ticks, n, *force.shape[1:]) for rows in (force[:-1], np.diff(force, axis=0)))
         states = list(forced_response(self.transition, start.swapaxes(0, 1), rise.swapaxes(0, 1)))
-        response = np.zeros((2, ticks, n + 1, *states[0][0].shape[1:]))
+        response = np.zeros((2, n + 1, *states[0][0].shape))
         for i, (x, v) in enumerate(states, 1):
-            response[0, :, i], response[1, :, i] = x, v
+            response[0, i], response[1, i] = x, v
         return response
 
     def select(self, kept: np.ndarray) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from copy import deepcopy
 from types import SimpleNamespace
 from typing import Any, NamedTuple
 
@@ -16,7 +17,8 @@ from haploop.launch.batch.jax.state import Leaves
 from haploop.logger.books.one_mass import OneMassBooks
 from haploop.plant.line.actuator import ActuatedLine
 from haploop.plant.motion.forced_response import forced_response
-from haploop.plant.motion.one_mass import OneMassMotion, OneMassState, advance, change_over, sensed_acceleration
+from haploop.plant.motion.one_mass import OneMassMotion, OneMassState, advance, sensed_acceleration
+from haploop.plant.motion.record import NOTED, change_over
 from haploop.plant.random.streams import Draw
 from haploop.plant.sensing.encoder import PositionSensor, make_encoder
 from haploop.plant.sensing.noise import NoisyPositionSensor
@@ -99,6 +101,7 @@ class Tick:
         self._actuator = line if isinstance(line, ActuatedLine) else None
         self._delay: Any = self._actuator.line if self._actuator else line
         self.commands: list[Any] = self._delay.in_flight(at)
+        self._holds = deepcopy(self._delay)
         self._by_itself = [controller, self.books]
         response, actuator = motion.response, self._actuator
         self._plant = [
@@ -113,15 +116,15 @@ class Tick:
 
     def responses(self, first: int, ticks: int) -> np.ndarray:
         """What the hand does to all loops in these intervals, as ``Outside`` has it."""
-        return np.moveaxis(self._motion.response.between(first, ticks), 0, 2)
+        return self._motion.response.between(first, ticks).transpose(2, 1, 0, 3)
 
     def put(self, data: list[Any], commands: list[Any], ticks: int) -> None:
         """Have the objects of the plant stand where so many ticks more have brought them."""
         self.leaves.put(data, self.leaves.whole)
-        plant, end, cut = self._plant[0], self.at + ticks, self._delay.cut
-        self._motion.state, newest = plant.state, end - 1 - cut.lookahead
-        self._motion.last = (cut.prompt_steps, plant.acting, newest)
-        line = end - cut.lookahead - 1, tuple(commands)
+        plant, end, lookahead = self._plant[0], self.at + ticks, self._delay.lookahead
+        self._motion.state, newest = plant.state, end - 1 - lookahead
+        self._motion.last = (0, plant.acting, newest)
+        line = end - lookahead - 1, tuple(commands)
         if self._actuator:
             self._actuator.restore((line, newest, plant.acting, plant.saturated))
         else:
@@ -165,8 +168,9 @@ class Tick:
         if plant.actuator:
             newer, is_saturated = plant.actuator.drive(newer)
             saturated = saturated + is_saturated
-        holds = self._delay.cut.holds(tick, plant.acting, newer)
-        state, noted = advance(plant.held, plant.state, holds, response[-1])
+        self._holds.restore((tick - self._delay.lookahead - 1, (plant.acting, newer)))
+        noted: list[Any] = []
+        state = OneMassState(*advance(plant.held, plant.state, self._holds.holds(tick), response[-1], noted))
         self._plant[0] = plant._replace(state=state, acting=newer, saturated=saturated, last_noise=noise)
         (row,) = self._rows.take_rows()
         told = self._told(plant, state, noted, response, tau, row)
@@ -192,12 +196,12 @@ class Tick:
         self, plant: PlantTree, end: OneMassState, noted: list[Any], response: Any, tau: Rows, row: Any
     ) -> Ticked:
         x_rows, v_rows, x_low_rows, held_forces, first = [], [], [], [], 0
-        for at in range(0, len(noted), 7):
-            count, x, v, x_comp, v_comp, force, _ = noted[at : at + 7]
+        for at in range(0, len(noted), NOTED):
+            count, x, v, x_comp, v_comp, force, _ = noted[at : at + NOTED]
             known = int(not first)
             held, during = Rows(list(plant.held[known:count])), slice(first + known, first + count)
-            dx = change_over(held[:, :3], response[during, 0], x, v, force, x_comp)
-            dv = change_over(held[:, 3:], response[during, 1], x, v, force, v_comp)
+            dx = change_over([held[:, i] for i in range(3)], response[during, 0], x, v, force, x_comp)
+            dv = change_over([held[:, i] for i in range(3, 6)], response[during, 1], x, v, force, v_comp)
             at_x = x + dx
             x_rows += [x] * known + at_x.rows
             v_rows += [v] * known + (v + dv).rows
