@@ -16,11 +16,11 @@ _JOIN_MS = 20_000
 
 
 class Aborted(Exception):
-    """The clock ended the run because something failed elsewhere; the message says what."""
+    """Raised where the clock has ended the run because something failed elsewhere; the message says what."""
 
 
 class Refused(Exception):
-    """The clock did not let this node join; the message says why."""
+    """Raised where the clock does not let this node join; the message says why."""
 
 
 class ClockClient:

@@ -1,4 +1,4 @@
-"""The frame of a node's process: start, watch on its parent, report to the clock of how it ended."""
+"""The process of a node: its start, the watch on its parent, and the report to the clock of how it ended."""
 
 from __future__ import annotations
 

@@ -44,6 +44,7 @@ class Motion:
 
 
 @dataclass_transform(kw_only_default=True)
+@dataclasses.dataclass(kw_only=True, eq=False)
 class Element(ABC):
     """Base of every dissipation element.
 
@@ -76,7 +77,7 @@ class Element(ABC):
 
     def values(self) -> dict[str, float]:
         """Returns the parameters as they are now."""
-        return {name: getattr(self, name) for name in self.__dataclass_fields__}  # pyright: ignore[reportAttributeAccessIssue]
+        return {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
 
     @classmethod
     def parameters(cls) -> dict[str, tuple[Quantity, Any]]:
@@ -86,7 +87,7 @@ class Element(ABC):
             TypeError: a parameter is not declared as ``Annotated[float, Quantity(...)]``.
         """
         hints = get_type_hints(cls, include_extras=True)
-        return {f.name: (_quantity(cls, f.name, hints[f.name]), f.default) for f in dataclasses.fields(cls)}  # pyright: ignore[reportArgumentType]
+        return {f.name: (_quantity(cls, f.name, hints[f.name]), f.default) for f in dataclasses.fields(cls)}
 
 
 def _quantity(cls: type, name: str, hint: Any) -> Quantity:

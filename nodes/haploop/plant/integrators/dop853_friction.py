@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -122,12 +123,12 @@ class Dop853FrictionMotion(Dop853Motion):
         """Returns z' while body 0 slips, and what falls below 0 when it no longer does: the speed in its direction."""
         law, v, direction = self._friction, self._v, self._mode.direction
         smooth, unit = self._free.under(*forces), -direction * self._free.of_friction
-        return (lambda t, z: smooth(t, z) + law.at(z[v]) * unit), _event(lambda _t, z: direction * z[v])
+        return (lambda t, z: smooth(t, z) + law.at(z[v]) * unit), _Event(lambda _t, z: direction * z[v])
 
     def _sticking(self, forces: _Forces) -> tuple[Rates, Callable[[float, np.ndarray], float]]:
         """Returns z' while body 0 is held, and what falls below 0 when it no longer is: what more could be held."""
         most = self._friction.holds_N
-        return self._clamped.under(*forces), _event(lambda t, z: most - abs(self._other_forces(t, z, forces)))
+        return self._clamped.under(*forces), _Event(lambda t, z: most - abs(self._other_forces(t, z, forces)))
 
     def _other_forces(self, t: float, z: np.ndarray, forces: _Forces) -> float:
         """Returns all forces on body 0 but friction, N."""
@@ -135,7 +136,13 @@ class Dop853FrictionMotion(Dop853Motion):
         return float(pull[:size] @ z + pull[size] * forces.command + pull[size + 2] * forces.load_at(t))
 
 
-def _event(function: Callable[[float, np.ndarray], float]) -> Callable[[float, np.ndarray], float]:
-    """Makes an event of ``solve_ivp`` that ends the motion where the function falls below 0."""
-    function.terminal, function.direction = True, -1.0  # pyright: ignore[reportFunctionMemberAccess]
-    return function
+@dataclass
+class _Event:
+    """An event of ``solve_ivp`` that ends the motion where the function falls below 0."""
+
+    function: Callable[[float, np.ndarray], float]
+    terminal: bool = True
+    direction: float = -1.0
+
+    def __call__(self, t: float, z: np.ndarray) -> float:
+        return self.function(t, z)

@@ -44,12 +44,12 @@ def state(session: RunSession, status: dict[str, Any], options: dict[str, Any] |
         "wall": dict(history.wall) if history.inward else None,
         "delay_s": session.delay_s,
         "summary": session.summary,
-        **_looks(session),
+        **_figures(session),
     }
     return finite(message)
 
 
-def _looks(session: RunSession) -> dict[str, Any]:
+def _figures(session: RunSession) -> dict[str, Any]:
     """Returns verdict and figures, from the summary once there is one, else from the newest status of the logger."""
     if session.summary:
         window, energy = session.summary["window"], session.summary["energy"]

@@ -24,19 +24,19 @@ def ingest(history: History, frames: Sequence[tuple[str, Frame]]) -> dict[str, A
     for role, frame in frames:
         if frame.name == "STATE":
             history.begin(role, frame.fields[0])
-            status = _stands(history, role, frame.fields[1]) or status
+            status = _note_state(history, role, frame.fields[1]) or status
         elif frame.name.endswith("_BLOCK"):
             blocks.setdefault(frame.name, []).append(block := frame.as_dict())
             status = block.get("status") or status
-    for name, take in _TAKERS.items():
-        for run in _runs(blocks.get(name, [])):
-            take(history, run)
+    for name, take in _BY_MESSAGE.items():
+        for group in _contiguous(blocks.get(name, [])):
+            take(history, group)
     for tick in ends:
         history.end(tick)
     return status
 
 
-def _stands(history: History, role: str, state: dict[str, Any]) -> dict[str, Any]:
+def _note_state(history: History, role: str, state: dict[str, Any]) -> dict[str, Any]:
     """Notes elements and wall from a STATE, all there is of a run that stands still; returns the logger's status."""
     if role == "controller" and state["history"]:
         block = state["history"][-1]
@@ -44,7 +44,7 @@ def _stands(history: History, role: str, state: dict[str, Any]) -> dict[str, Any
     return state if role == "logger" else {}
 
 
-def _runs(blocks: list[dict[str, Any]]) -> list[list[dict[str, Any]]]:
+def _contiguous(blocks: list[dict[str, Any]]) -> list[list[dict[str, Any]]]:
     """Groups blocks that follow each other without a gap and have the same columns, elements and wall."""
     runs: list[list[dict[str, Any]]] = []
     for block in blocks:
@@ -90,7 +90,7 @@ def _energy(history: History, run: list[dict[str, Any]]) -> None:
     history.append_energy(run[0]["from_tick"], _joined(run, names))
 
 
-_TAKERS = {"PLANT_BLOCK": _plant, "CONTROLLER_BLOCK": _controller, "ENERGY_BLOCK": _energy}
+_BY_MESSAGE = {"PLANT_BLOCK": _plant, "CONTROLLER_BLOCK": _controller, "ENERGY_BLOCK": _energy}
 
 
 def elements_as_telemetry(scene: dict[str, Any]) -> list[dict[str, Any]]:

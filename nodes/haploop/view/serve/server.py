@@ -59,7 +59,7 @@ def make_app(viewer: Viewer, guard: Guard) -> web.Application:
             writer_limit=1,  # every picture waits until there is room for it
         )
         await page.prepare(request)
-        _narrow(page)
+        _shrink_send_buffer(page)
         pages.add(page)
         await Page(page, viewer, guard).run()
         return page
@@ -92,7 +92,7 @@ def _only_by_name(guard: Guard) -> Middleware:
     return check
 
 
-def _narrow(page: web.WebSocketResponse) -> None:
+def _shrink_send_buffer(page: web.WebSocketResponse) -> None:
     """Shrinks the send buffer of a page: snapshots that wait in it are old when they arrive."""
     connection = page.get_extra_info("socket")
     if connection is not None:

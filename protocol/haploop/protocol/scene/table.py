@@ -10,6 +10,7 @@ from typing import Annotated, Any, ClassVar, Self, Union, dataclass_transform, g
 
 
 @dataclass_transform(kw_only_default=True, frozen_default=True)
+@dataclasses.dataclass(kw_only=True, frozen=True)
 class Table:
     """Base of every table; a subclass is a frozen dataclass with keyword arguments by itself.
 
@@ -29,7 +30,7 @@ class Table:
     @classmethod
     def fields(cls) -> tuple[dataclasses.Field[Any], ...]:
         """Returns the declared keys, in order."""
-        return dataclasses.fields(cls)  # pyright: ignore[reportArgumentType]  every subclass is a dataclass
+        return dataclasses.fields(cls)
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Self:

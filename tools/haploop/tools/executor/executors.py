@@ -185,7 +185,8 @@ class DaskExecutor(Executor):
         except (OSError, ValueError, TypeError) as error:
             raise ExecutorError(f"There is no Dask scheduler at {address}: {error}") from error
         self._executor = self._client.get_executor(pure=False)
-        self.count = sum(dict(self._client.nthreads()).values())  # pyright: ignore
+        threads: Any = self._client.nthreads()
+        self.count = sum(threads.values())
         self.room = 2 * self.count
         self.worker_died = (distributed.KilledWorker,)
         if not self.count:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -31,12 +31,12 @@ _DWARFED = 3.0
 _NEAR = 0.025
 
 
-def line(ax: Axes, t: Floats, y: Floats, label: str, colour: str, held: bool = False, **style: object) -> None:
+def line(ax: Axes, t: Floats, y: Floats, label: str, colour: str, held: bool = False, **style: Any) -> None:
     """Draws a line over time, reduced to its extremes; ``held`` for a value that holds until the next."""
     keep = extremes(y)
     steps = "steps-post" if held else "default"
-    look = {"linewidth": 1.2, "label": label, "color": colour, "drawstyle": steps} | style
-    ax.plot(t[keep], y[keep], **look)  # pyright: ignore[reportArgumentType]
+    look: dict[str, Any] = {"linewidth": 1.2, "label": label, "color": colour, "drawstyle": steps} | style
+    ax.plot(t[keep], y[keep], **look)
 
 
 def position_panel(ax: Axes, run: RunData, span_s: tuple[float, float], title: str) -> None:

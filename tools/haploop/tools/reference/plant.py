@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
 
 import numpy as np
@@ -195,8 +197,7 @@ class IntegratedPlant(StickSlipPlant[np.ndarray]):
         def margin(_t: float, w: np.ndarray) -> float:
             return self._breakaway - abs(float(self._row @ w)) if stuck else direction * float(w[v])
 
-        margin.terminal, margin.direction = True, -1.0  # pyright: ignore[reportFunctionMemberAccess]
-        solved = self._solved(length, margin)
+        solved = self._solved(length, _Switch(margin))
         if not solved.t_events[0].size:
             self.w = solved.y[:, -1].copy()
             return length
@@ -215,6 +216,18 @@ class IntegratedPlant(StickSlipPlant[np.ndarray]):
         if not solved.success:
             raise ArithmeticError(f"DOP853 did not get through a tick: {solved.message}")
         return solved
+
+
+@dataclass
+class _Switch:
+    """An event of ``solve_ivp`` that ends the motion where the margin falls below 0."""
+
+    margin: Callable[[float, np.ndarray], float]
+    terminal: bool = True
+    direction: float = -1.0
+
+    def __call__(self, t: float, w: np.ndarray) -> float:
+        return self.margin(t, w)
 
 
 def _coordinates(bodies: int, size: int) -> tuple[Any, Any]:
