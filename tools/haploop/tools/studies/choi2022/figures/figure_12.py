@@ -28,13 +28,7 @@ def best_pair(work: Work) -> tuple[dict[str, Any], Elements]:
     """Returns the scene of the pair that swings least, and its elements."""
     setup = nearest(work)
     choices = [both(b, m) for b in _DAMPINGS for m in _MASSES]
-    chosen = tuned(
-        work,
-        "tuning damping with inertia",
-        setup,
-        STIFFNESS_N_M,
-        choices[2::7] if work.small else choices,
-    )
+    chosen = tuned(work, "tuning damping with inertia", setup, STIFFNESS_N_M, choices[2::7] if work.small else choices)
     return setup.scene(STIFFNESS_N_M, chosen.elements), chosen.elements
 
 
@@ -44,10 +38,7 @@ def make(work: Work) -> list[Finding]:
     b, m = elements[0]["damping"], elements[1]["mass"]
     cases = {
         f"{b:g} N s/m with {1e3 * m:g} g, the best here": (scene, "best"),
-        "2.15 N s/m with 9 g, as in the paper": (
-            nearest(work).scene(STIFFNESS_N_M, _PAPERS),
-            "paper",
-        ),
+        "2.15 N s/m with 9 g, as in the paper": (nearest(work).scene(STIFFNESS_N_M, _PAPERS), "paper"),
     }
     figure = empty_figure(12.0, 6.4)
     axes = figure.subplots(2, 2, sharex=True)

@@ -15,10 +15,7 @@ TITLE = "Damping alone at 5.0 N/mm, unidirectional inertia alone at 5.5 N/mm"
 CLAIMS = claims_of(9)
 # What is drawn, and the next stiffness up, for "larger than 5.0".
 _BEYOND = ("damping", 5500.0, DAMPINGS)
-_CASES = (
-    ("damping", 5000.0, DAMPINGS),
-    ("unidirectional-inertia", 5500.0, MASSES),
-)
+_CASES = (("damping", 5000.0, DAMPINGS), ("unidirectional-inertia", 5500.0, MASSES))
 
 
 def make(work: Work) -> list[Finding]:
