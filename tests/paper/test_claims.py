@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from haploop.tools.studies.choi2022.claims import VERDICTS, Claim, Finding
+from haploop.tools.studies.choi2022.claims import VERDICTS, Claim, Finding, texts_of
 from haploop.tools.studies.choi2022.command import page, paper
 from haploop.tools.studies.choi2022.figures import figure, numbers
 from haploop.tools.studies.choi2022.work import Work
@@ -22,6 +22,14 @@ def test_an_assumption_belongs_to_one_verdict_alone() -> None:
     for verdict, assumption in [(VERDICTS[0], "slow"), (VERDICTS[1], ""), (VERDICTS[2], "slow"), ("perhaps", "")]:
         with pytest.raises(ValueError, match="verdict"):
             Finding(CLAIM, verdict, "1 J", assumption)  # pyright: ignore[reportArgumentType]
+
+
+def test_a_claim_holds_or_holds_under_its_assumption_or_fails_with_the_numbers_in_its_own_words() -> None:
+    claim = Claim("III", "slowly", "{energy} J", "slower than {limit:.0f} Hz")
+    computed = {"energy": 2, "limit": 80.0}
+    assert claim.holds_if(True, True, **computed) == claim.holds("2 J")
+    assert claim.holds_if(False, True, **computed) == claim.assuming("slower than 80 Hz", "2 J")
+    assert claim.holds_if(False, **computed) == claim.fails("2 J")
 
 
 def test_what_is_kept_of_a_finding_reads_back_to_it() -> None:
@@ -54,7 +62,7 @@ def test_the_page_tells_every_finding_by_section_and_what_was_not_made(tmp_path:
 @pytest.mark.parametrize("number", numbers())
 def test_every_figure_has_a_title_and_claims_of_its_own(number: int) -> None:
     module = figure(number)
-    assert module.TITLE
+    assert texts_of(number)["title"]
     assert len(set(module.CLAIMS.values())) == len(module.CLAIMS) > 0
     assert all(claim.place and claim.quote for claim in module.CLAIMS.values())
 

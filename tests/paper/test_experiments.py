@@ -158,17 +158,17 @@ def test_inertias_that_are_booked_unfelt_are_booked_as_recorded() -> None:
 
 
 def test_a_claim_that_the_nearest_interpretation_breaks_may_hold_in_another(tmp_path: Path) -> None:
-    work, claim = Work(tmp_path, 8), Claim("V.B", "it does")
-    assert verdict_under_assumptions(work, claim, False, "1 J", "8 more").verdict == "does not hold here"
+    work, claim = Work(tmp_path, 8), Claim("V.B", "it does", "{energy}")
+    assert verdict_under_assumptions(work, claim, False, "8 more", energy="1 J").verdict == "does not hold here"
     assert nearest_with(work, "8 more") is None
     broken, held = ({name: float(not is_so) for name in CLAIMS} | {"distance": 3.0} for is_so in (False, True))
     table = [SETUP.as_dict() | broken] * 30 + [replace(SETUP, mount="motor").as_dict() | held] * 30
     keep_shares(work, list(CLAIMS), table, options(table, SPACE))
     work.scene("figure_7", replace(SETUP, mode_Hz=300.0).scene(5000.0, []))
-    found = verdict_under_assumptions(work, claim, False, "1 J", "8 more")
+    found = verdict_under_assumptions(work, claim, False, "8 more", energy="1 J")
     assert "mount of the unit: motor" in found.assumption
     assert found.numbers == "1 J. In 50 % of 60 random interpretations"
-    assert verdict_under_assumptions(work, claim, True, "1 J", "8 more").assumption == NEAREST
+    assert verdict_under_assumptions(work, claim, True, "8 more", energy="1 J").assumption == NEAREST
     assert nearest_with(work, "8 more") == replace(SETUP, mount="motor")
     assert nearest_in(work).mode_Hz == 300.0
     assert nearest_in(Work(tmp_path, 8, small=True)) == nearest()

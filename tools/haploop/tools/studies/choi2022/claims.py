@@ -1,9 +1,9 @@
-"""Claims of the paper, and the findings that tests of them come to."""
+"""Claims of the paper, the findings that tests of them come to, and the texts of the figures (``figures.toml``)."""
 
 from __future__ import annotations
 
 import tomllib
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 from typing import Any, Literal
@@ -20,10 +20,13 @@ class Claim:
     Attributes:
         place: section, and figure, equation or item: "III, Fig. 4".
         quote: its words, shortened; what was left out or put in is in brackets or dots.
+        numbers, assumption: of a finding, with names in braces for what is computed.
     """
 
     place: str
     quote: str
+    numbers: str = field(default="", compare=False, repr=False)
+    assumption: str = field(default="", compare=False, repr=False)
 
     def holds(self, numbers: str) -> Finding:
         """Finds that it holds, without any assumption beyond the paper's own words."""
@@ -37,11 +40,12 @@ class Claim:
         """Finds that it does not hold."""
         return Finding(self, FAILS, numbers)
 
-    def holds_if(self, is_so: bool, numbers: str, assumption: str = "", under_it: bool = False) -> Finding:
-        """Finds that it holds if ``is_so``, else that it holds under the assumption if ``under_it``, else neither."""
+    def holds_if(self, is_so: bool, under_it: bool = False, **computed: Any) -> Finding:
+        """Finds that it holds if ``is_so``, else that it holds under its assumption if ``under_it``, else neither."""
+        numbers = self.numbers.format(**computed)
         if is_so:
             return self.holds(numbers)
-        return self.assuming(assumption, numbers) if under_it else self.fails(numbers)
+        return self.assuming(self.assumption.format(**computed), numbers) if under_it else self.fails(numbers)
 
 
 @dataclass(frozen=True)
@@ -69,8 +73,8 @@ class Finding:
 
     def as_dict(self) -> dict[str, Any]:
         """Returns it as it is kept beside the figure."""
-        kept = asdict(self)
-        return kept.pop("claim") | kept
+        claim = {"place": self.claim.place, "quote": self.claim.quote}
+        return {**claim, "verdict": self.verdict, "assumption": self.assumption, "numbers": self.numbers}
 
     @classmethod
     def from_dict(cls, kept: dict[str, Any]) -> Finding:
@@ -79,10 +83,15 @@ class Finding:
 
 
 def claims_of(figure: int) -> dict[str, Claim]:
-    """Returns the claims that a figure tests, by name, from ``claims.toml``."""
-    return {name: Claim(**claim) for name, claim in _claims()[str(figure)].items()}
+    """Returns the claims that a figure tests, by name."""
+    return {name: Claim(**claim) for name, claim in _figures()[str(figure)]["claims"].items()}
+
+
+def texts_of(figure: int) -> dict[str, str]:
+    """Returns title, caption and the other texts of a figure, with names in braces for what is computed."""
+    return {name: text for name, text in _figures()[str(figure)].items() if isinstance(text, str)}
 
 
 @cache
-def _claims() -> dict[str, dict[str, dict[str, str]]]:
-    return tomllib.loads(Path(__file__).with_name("claims.toml").read_text(encoding="utf-8"))
+def _figures() -> dict[str, Any]:
+    return tomllib.loads(Path(__file__).with_name("figures.toml").read_text(encoding="utf-8"))

@@ -69,7 +69,7 @@ def make_figure(
         FigureError: matplotlib is missing, or a picture cannot be written.
     """
     module, work = figure(number), Work(out, number, small=small, workers=workers, stage=stage)
-    work.keep(module.TITLE, module.make(work))
+    work.keep(module.make(work))
 
 
 def write_page(directory: Path, target: Path | None = None, pictures: str = "") -> Path:

@@ -15,7 +15,7 @@ from haploop.tools.executor.executors import make_executor, map_parallel
 from haploop.tools.executor.pool import Pool
 from haploop.tools.figure.style import write_figure
 from haploop.tools.render.progress import Stage, silent
-from haploop.tools.studies.choi2022.claims import Finding
+from haploop.tools.studies.choi2022.claims import Finding, texts_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -36,8 +36,9 @@ class Work:
 
     Attributes:
         kinds: classes of elements, by name.
+        texts: of the figure, by name: its title among them.
         answer: what a builder of devices can take from it, in a sentence or two; empty for what has none.
-        caption: what is to be seen, in a sentence or two.
+        caption: what is to be seen, in a sentence or two; that of the texts unless it is told otherwise.
         notes: whole sections in Markdown that go below the figure on the page.
     """
 
@@ -46,7 +47,8 @@ class Work:
     ) -> None:
         self.out, self.number, self.small, self.workers, self.stage = out, number, small, workers, stage
         self.kinds = registry()
-        self.answer = self.caption = ""
+        self.texts = texts_of(number)
+        self.answer, self.caption = "", self.texts.get("caption", "")
         self.notes: list[str] = []
         self._files: list[str] = []
         self._seen: dict[str, str] = {}
@@ -72,6 +74,10 @@ class Work:
             self._files.append(name)
         return self.out / name
 
+    def tell(self, name: str, **computed: Any) -> str:
+        """Returns one of the texts with what was computed in the place of names in braces."""
+        return self.texts[name].format(**computed)
+
     def text(self, name: str, text: str) -> None:
         """Writes a text file."""
         self.path(name).write_text(text, encoding="utf-8")
@@ -90,11 +96,11 @@ class Work:
         """Writes a resolved scene that runs by itself."""
         self.text(f"{name}.toml", to_toml(scene))
 
-    def keep(self, title: str, findings: Sequence[Finding]) -> None:
+    def keep(self, findings: Sequence[Finding]) -> None:
         """Writes what the page needs: figure_N.json."""
         kept = {
             "number": self.number,
-            "title": title,
+            "title": self.texts["title"],
             "answer": self.answer,
             "caption": self.caption,
             "seen": self._seen,

@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from haploop.tools.render.markdown import markdown_table
-from haploop.tools.render.units import amount
 from haploop.tools.search.random import Effort, Point, Scale, random_search
 from haploop.tools.studies.choi2022.experiment.measure import CLAIMS, NAMES, PAPER, gap_N_m, measure
 from haploop.tools.studies.choi2022.experiment.setup import FRICTION_N, SCENE_FILE, UNITS, VELOCITIES, Setup
@@ -136,12 +135,12 @@ def describe(setup: Setup) -> str:
     return SPACE.describe(setup.as_dict(), (*SPACE.choices, *SPACE.bounds))
 
 
-def notes(found: Found, options: Sequence[Option]) -> list[str]:
+def notes(work: Work, found: Found, options: Sequence[Option]) -> list[str]:
     """Returns the sections below the figure."""
-    return [*_nearest(found), *_alone(found, options), *_together(found), *_method(found)]
+    return [*_nearest(work, found), *_alone(found, options), *_together(found), *_method(work, found)]
 
 
-def _nearest(found: Found) -> list[str]:
+def _nearest(work: Work, found: Found) -> list[str]:
     values = describe(found.nearest)
     lacks = ", ".join(f"*{name}*" for name in CLAIMS if not holds(found.row, name))
     measured = {"nearest interpretation": found.row, "with friction of 48 mN": found.with_friction}
@@ -154,8 +153,7 @@ def _nearest(found: Found) -> list[str]:
         f"{found.row['holding']} of the {len(CLAIMS)} claims hold for it; it lacks {lacks}. Largest steady stiffness "
         "in N/mm:",
         markdown_table(["", *kinds], rows, numbers=range(1, 6)),
-        "The friction that Cavusoglu et al. 2002 found on one device steadies all the more, beyond what the paper "
-        "reports; it is left out of the interpretations.",
+        work.tell("friction"),
     ]
 
 
@@ -186,7 +184,7 @@ def _together(found: Found) -> list[str]:
     ]
 
 
-def _method(found: Found) -> list[str]:
+def _method(work: Work, found: Found) -> list[str]:
     count = Counter(row["stage"] for row in found.rows)
     papers = ", ".join(f"{name.replace('-', ' ')} {stiffness / 1e3:.1f}" for name, stiffness in PAPER.items())
     numbers = [
@@ -195,16 +193,7 @@ def _method(found: Found) -> list[str]:
     ]
     return [
         "#### How was searched",
-        f"{count['random']} interpretations were drawn with the seed {SEED}, numbers evenly in their logarithm; in "
-        "each every element was tried on walls from 2.5 to 7.5 N/mm in steps of 0.5, in 8 sizes (12 of the pair), "
-        "until none was steady. A run is steady where over the last half second the position swings by no more than "
-        "one encoder step to either side, or what swings dies down. Around the three best "
-        f"{count['refined']} more were drawn in two rounds, every number times e^(s ξ), ξ normal, s {WHOLE.far:g}, "
-        f"then {WHOLE.close:g}. {count['neighbour']} neighbours of the nearest, s {WHOLE.close:g}, show how much hangs "
-        "on its numbers. Shares are of the random ones alone.",
-        "How far an interpretation is from the paper: the number of claims that do not hold, and the steps of 0.5 "
-        f"N/mm, beyond one, by which its largest stiffnesses differ from the paper's ({papers} N/mm).",
+        work.tell("method", seed=SEED, far=WHOLE.far, close=WHOLE.close, papers=papers, **count),
         "\n".join([list_of_choices(SPACE), *numbers]),
-        "Where the unit sits: its own lag is in its setting (1046 Hz: 0.50 ms in all, 420 Hz: 1.38 ms, 218 Hz: 1.88 "
-        f"ms), *ideal* has none; one encoder step is {amount(28.7e-6, 'm')}.",
+        work.tell("unit"),
     ]

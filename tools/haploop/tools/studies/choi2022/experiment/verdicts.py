@@ -47,24 +47,26 @@ def nearest_with(work: Work, tested: str) -> Setup | None:
 
 
 def verdict_under_assumptions(
-    work: Work, claim: Claim, is_so: bool, numbers: str, tested: str = "", more: str = ""
+    work: Work, claim: Claim, is_so: bool, tested: str = "", more: str = "", **computed: Any
 ) -> Finding:
     """Finds that a claim holds under the nearest interpretation, else under others, else not at all.
 
     Args:
         is_so: whether it holds under the nearest.
-        numbers: what was computed for that.
         tested: name of the claim in the search, where that tests it.
         more: what is assumed besides the nearest interpretation.
+        computed: what the claim's numbers name, for the nearest.
     """
-    kept, likeliest = _shares(work), ""
+    kept, likeliest, numbers = _shares(work), "", claim.numbers.format(**computed)
     if tested and kept:
         found = kept["claims"][tested]
         numbers += f". In {percent(found['share'])} of {kept['interpretations']} random interpretations"
         likeliest = found["likeliest"] if found["share"] else ""
     if is_so:
         return claim.assuming(NEAREST + more, numbers)
-    return claim.holds_if(False, numbers, f"another interpretation, likeliest with {likeliest}", bool(likeliest))
+    if likeliest:
+        return claim.assuming(f"another interpretation, likeliest with {likeliest}", numbers)
+    return claim.fails(numbers)
 
 
 def _shares(work: Work) -> dict[str, Any]:

@@ -17,7 +17,6 @@ _NAME = re.compile(r"figure_(\d+)")
 class PaperFigure(Protocol):
     """A module ``figure_N``."""
 
-    TITLE: str
     CLAIMS: Mapping[str, Claim]
     make: Callable[[Work], list[Finding]]
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from haploop.tools.figure.style import INK, SMALL, dress, empty_figure
@@ -11,7 +13,6 @@ from haploop.tools.studies.choi2022.experiment.setup import both
 from haploop.tools.studies.choi2022.experiment.verdicts import nearest, verdict_under_assumptions
 from haploop.tools.studies.choi2022.work import Work
 
-TITLE = "Largest steady stiffness of damping with unidirectional inertia"
 CLAIMS = claims_of(11)
 STIFFNESSES = np.arange(2500.0, 10001.0, 500.0)
 _DAMPINGS = (0.0, 0.5, 1.0, 1.5, 2.15, 3.0, 4.0, 5.5, 7.5, 10.0)
@@ -47,52 +48,36 @@ def make(work: Work) -> list[Finding]:
         "figure_11", {"damping_N_s_m": dampings, "mass_kg": masses, "stiffness_N_m": stiffnesses, "steady": steady}
     )
     work.scene("figure_11", setup.scene(PAPER_N_M, both(PAPER_DAMPING, PAPER_MASS_KG)))
-    work.caption = (
-        "The largest of the stiffnesses 2.5, 3.0, … N/mm up to which every one is steady; a dash where 2.5 is not, "
-        "though a stiffer one may be (large inertias need a stiff wall)."
+    i, j = np.unravel_index(largest.argmax(), largest.shape)
+    most, alone, damped = float(largest[i, j]), float(largest[0].max()), float(largest[:, 0].max())
+    bears = np.flatnonzero(largest[0, 1:]) + 1
+    helped = int((largest[1:, bears].max(axis=0) >= largest[0, bears] + 500.0).sum())
+    computed: dict[str, Any] = {
+        "most": most / 1e3,
+        "damping": dampings[i],
+        "mass_g": 1e3 * masses[j],
+        "damped": damped / 1e3,
+        "alone": alone / 1e3,
+        "helped": helped,
+        "bears": len(bears),
+    }
+    near = bool(
+        abs(most - PAPER_N_M) <= 500.0
+        and 0.5 <= dampings[i] / PAPER_DAMPING <= 2.0
+        and 0.5 <= masses[j] / PAPER_MASS_KG <= 2.0
     )
-    work.answer = _answer(largest, dampings, masses)
-    return _findings(work, largest, dampings, masses)
+    work.answer = work.tell("answer", **computed)
+    return [
+        verdict_under_assumptions(work, CLAIMS[name], is_so, tested, **computed)
+        for name, is_so, tested in (
+            ("most", near, "11 up to 6.3"),
+            ("more", most > max(alone, damped), "11 more"),
+            ("step", helped == len(bears), ""),
+        )
+    ]
 
 
 def largest_steady(steady: np.ndarray, stiffnesses: np.ndarray) -> np.ndarray:
     """Returns the last stiffness, along the last axis, before the first that is not steady; 0 if none is."""
     count = np.where(steady.all(axis=-1), steady.shape[-1], (~steady).argmax(axis=-1))
     return np.where(count > 0, stiffnesses[np.maximum(count - 1, 0)], 0.0)
-
-
-def _answer(largest: np.ndarray, dampings: np.ndarray, masses: np.ndarray) -> str:
-    i, j = np.unravel_index(largest.argmax(), largest.shape)
-    return (
-        "**Damping and unidirectional inertia together bear more than either alone.** In the interpretation nearest to "
-        f"the paper {largest[i, j] / 1e3:.1f} N/mm ({dampings[i]:g} N s/m with {1e3 * masses[j]:g} g) against "
-        f"{largest[:, 0].max() / 1e3:.1f} of damping and {largest[0].max() / 1e3:.1f} of inertia, each the best of the "
-        "sizes drawn; tune the two together"
-    )
-
-
-def _findings(work: Work, largest: np.ndarray, dampings: np.ndarray, masses: np.ndarray) -> list[Finding]:
-    i, j = np.unravel_index(largest.argmax(), largest.shape)
-    most, alone = float(largest[i, j]), float(largest[0].max())
-    damped = float(largest[:, 0].max())
-    numbers = (
-        f"{most / 1e3:.1f} N/mm with {dampings[i]:g} N s/m and {1e3 * masses[j]:g} g; damping alone "
-        f"{damped / 1e3:.1f}, unidirectional inertia alone {alone / 1e3:.1f} N/mm"
-    )
-    bears = np.flatnonzero(largest[0, 1:]) + 1
-    helped = int((largest[1:, bears].max(axis=0) >= largest[0, bears] + 500.0).sum())
-    near = (
-        abs(most - PAPER_N_M) <= 500.0
-        and 0.5 <= dampings[i] / PAPER_DAMPING <= 2.0
-        and 0.5 <= masses[j] / PAPER_MASS_KG <= 2.0
-    )
-    return [
-        verdict_under_assumptions(work, CLAIMS["most"], near, numbers, "11 up to 6.3"),
-        verdict_under_assumptions(work, CLAIMS["more"], most > max(alone, damped), numbers, "11 more"),
-        verdict_under_assumptions(
-            work,
-            CLAIMS["step"],
-            helped == len(bears),
-            f"for {helped} of {len(bears)} inertias that steady a wall alone, some damping adds 0.5 N/mm or more",
-        ),
-    ]

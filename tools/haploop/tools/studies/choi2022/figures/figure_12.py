@@ -16,7 +16,6 @@ from haploop.tools.studies.choi2022.experiment.verdicts import nearest, verdict_
 from haploop.tools.studies.choi2022.scenes import run
 from haploop.tools.studies.choi2022.work import Work
 
-TITLE = "Damping with unidirectional inertia at 6.3 N/mm"
 CLAIMS = claims_of(12)
 STIFFNESS_N_M = 6300.0
 _TUNED = ", and its own best parameters"
@@ -53,37 +52,30 @@ def make(work: Work) -> list[Finding]:
     legend(axes[0, 0], loc="upper right", ncols=3, **INSIDE)
     work.figure(figure, "figure_12")
     work.data("figure_12", columns)
-    work.caption = "Above the forces as commanded, below their sum over the penetration, tick by tick."
     return _findings(work, tried["best"], tried["paper"], presses["best"])
 
 
 def _findings(work: Work, best: Tuned, papers: Tuned, press: Press) -> list[Finding]:
-    b, m = best.elements[0]["damping"], best.elements[1]["mass"]
     shown = best.result["window"]["displayed_stiffness_N_m"]
     off = abs(shown / STIFFNESS_N_M - 1.0)
     inside = press.displayed_N_m[press.output_N != 0.0]
     within = int(np.argmax(np.abs(inside / STIFFNESS_N_M - 1.0) < 0.5))
     last = press.output_N[len(press.output_N) // 2 :]
-    numbers = (
-        f"{shown / 1e3:.4f} N/mm ({100 * off:.2f} % off), {best.ended} (an encoder step is "
-        f"28.7 µm); the force still ripples by "
-        f"{amount(float(np.ptp(last)), 'N', 2)} peak to peak; with {b:g} N s/m and {1e3 * m:g} g"
-    )
+    sizes = {"damping": best.elements[0]["damping"], "mass_g": 1e3 * best.elements[1]["mass"]}
     return [
-        verdict_under_assumptions(work, CLAIMS["displayed"], best.steady and off < 0.01, numbers, more=_TUNED),
         verdict_under_assumptions(
             work,
-            CLAIMS["values"],
-            papers.steady,
-            f"with these values {papers.ended}; the best here: {b:g} N s/m and {1e3 * m:g} g",
-            "12 pair",
-        ),
-        verdict_under_assumptions(
-            work,
-            CLAIMS["instant"],
-            within <= 2,
-            f"within half of what is asked for {within} ms after the first force; what precedes is damping and inertia "
-            f"over a penetration of a few encoder steps, {inside[0] / 1e3:.1f} N/mm at the first tick",
+            CLAIMS["displayed"],
+            best.steady and off < 0.01,
             more=_TUNED,
+            shown=shown / 1e3,
+            off=100 * off,
+            ended=best.ended,
+            ripple=amount(float(np.ptp(last)), "N", 2),
+            **sizes,
+        ),
+        verdict_under_assumptions(work, CLAIMS["values"], papers.steady, "12 pair", ended=papers.ended, **sizes),
+        verdict_under_assumptions(
+            work, CLAIMS["instant"], within <= 2, more=_TUNED, within=within, first=inside[0] / 1e3
         ),
     ]

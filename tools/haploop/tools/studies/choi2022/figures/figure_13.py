@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from haploop.tools.figure.style import SMALL, WALL_FILL, dress, empty_figure
@@ -14,7 +16,6 @@ from haploop.tools.studies.choi2022.figures.figure_12 import best_pair
 from haploop.tools.studies.choi2022.scenes import run
 from haploop.tools.studies.choi2022.work import Work
 
-TITLE = "What damping and unidirectional inertia take out of a contact with 6.3 N/mm"
 CLAIMS = claims_of(13)
 # The person lets go at this time, so that the contact has an end.
 _RELEASED_S, _PULL_N = 0.6, 4.0
@@ -55,10 +56,7 @@ def make(work: Work) -> list[Finding]:
     work.figure(figure, "figure_13")
     work.data("figure_13", {"t_s": t, "in_contact": inside, **{f"{kind}_J": book for kind, book in books.items()}})
     work.scene("figure_13", scene)
-    work.caption = (
-        f"Pressed until {_RELEASED_S:g} s, then pulled back, with the best pair of Fig. 12. Sampled books are what the "
-        "paper's Fig. 13 shows, the true ones what left the device."
-    )
+    work.caption = work.tell("caption", released_s=_RELEASED_S)
     return _findings(work, books["sampled"], books["true"], t, inside)
 
 
@@ -70,16 +68,16 @@ def _findings(work: Work, sampled: np.ndarray, true: np.ndarray, t: np.ndarray, 
     flows = np.diff(sampled[:, : len(t)], axis=1, prepend=0.0)
     shares = flows[:, edge].sum(axis=1) / np.where(took == 0.0, 1.0, took)
     middle = flows[:, ~edge].sum(axis=1)
-    true_ones = f"true: {amount(left[0], 'J')}, {amount(left[1], 'J')}"
-    both = f"damping {amount(took[0], 'J')}, inertia {amount(took[1], 'J')} ({true_ones})"
-    percent = f"damping {100 * shares[0]:.0f} %, inertia {100 * shares[1]:.0f} %"
-    parts = f"share within {1e3 * _EDGE_S:.0f} ms of either end: {percent}"
-    rest = f"in between: damping {amount(float(middle[0]), 'J')}, inertia {amount(float(middle[1]), 'J')}"
-    exact_only = "" if took[1] > took[0] else "; by the true books, not by the sampled ones that the paper has"
+    both = {"damping": took[0], "inertia": took[1], "true_damping": left[0], "true_inertia": left[1]}
+    computed: dict[str, Any] = {name: amount(float(energy), "J") for name, energy in both.items()} | {
+        "edge_ms": 1e3 * _EDGE_S,
+        "shares": f"damping {100 * shares[0]:.0f} %, inertia {100 * shares[1]:.0f} %",
+        "between": f"damping {amount(float(middle[0]), 'J')}, inertia {amount(float(middle[1]), 'J')}",
+    }
+    more = "" if took[1] > took[0] else "; by the true books, not by the sampled ones that the paper has"
+    larger = bool(took[1] > took[0] or left[1] > left[0])
     return [
-        verdict_under_assumptions(
-            work, CLAIMS["larger"], bool(took[1] > took[0] or left[1] > left[0]), both, "13 more", exact_only
-        ),
-        verdict_under_assumptions(work, CLAIMS["ends"], bool(shares[0] > 0.8), f"{parts}; {rest}"),
-        verdict_under_assumptions(work, CLAIMS["middle"], bool(middle[1] > abs(middle[0])), f"{rest}; {parts}"),
+        verdict_under_assumptions(work, CLAIMS["larger"], larger, "13 more", more, **computed),
+        verdict_under_assumptions(work, CLAIMS["ends"], bool(shares[0] > 0.8), **computed),
+        verdict_under_assumptions(work, CLAIMS["middle"], bool(middle[1] > abs(middle[0])), **computed),
     ]

@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-TITLE = "Beyond the paper: which element steadies the stiffest wall"
 CLAIMS = claims_of(14)
 
 _MODES_HZ = (60.0, 90.0, 125.0, 170.0, 225.0, 300.0, 400.0, 600.0)
@@ -64,18 +63,10 @@ def make(work: Work) -> list[Finding]:
     }
     work.data("figure_14", columns)
     work.scene("figure_14", setups[len(setups) // 2].scene(2000.0, elements_of(KINDS[3], 0.009)))
-    work.caption = (
-        "Colour: the element whose largest steady stiffness is the greatest, each with its best parameter, and how "
-        "many times the next best (white: by less than 5 %). In a cell: that stiffness in kN/m (60: at least). "
-        "Exact for nothing, damping and bidirectional inertia (where the one-tick map of the loop in contact has the "
-        "spectral radius 1), and for unidirectional inertia the growth of the same map switched by eq. 9; device, hand "
-        "and drive as in the "
-        "experiments, no encoder and no friction."
-    )
-    lead, answer = _lead(work)
-    work.notes.append(lead)
+    soft, note = _drives(work)
     finding, winners = _higher(stiffness)
-    work.answer = f"{answer}. {winners}"
+    work.notes.append(note)
+    work.answer = work.tell("answer", cells=len(setups), winners=winners, **soft)
     return [finding]
 
 
@@ -127,41 +118,31 @@ def _higher(stiffness: np.ndarray) -> tuple[Finding, str]:
     shares = ", ".join(f"{SHORT[kind]} {np.sum(clear & (best == i))}" for i, kind in enumerate(KINDS))
     uni, others = cells[:, 3], cells[:, 1:3].max(axis=1)
     above = uni >= DRAW * others
-    numbers = (
-        f"of {len(cells)} cells clearly first: {shares}, nobody {np.sum(~clear)}. Unidirectional inertia beats "
-        f"damping in {np.sum(uni >= DRAW * cells[:, 1])}, bidirectional inertia in "
-        f"{np.sum(uni >= DRAW * cells[:, 2])}, both in {np.sum(above)}, at most by "
-        f"×{(uni / np.maximum(others, 1.0)).max():.2f}"
+    winners = f"{shares}, nobody {np.sum(~clear)}"
+    finding = CLAIMS["higher"].holds_if(
+        False,
+        bool(above.any()),
+        cells=len(cells),
+        winners=winners,
+        damping=np.sum(uni >= DRAW * cells[:, 1]),
+        bidirectional=np.sum(uni >= DRAW * cells[:, 2]),
+        both=np.sum(above),
+        most=(uni / np.maximum(others, 1.0)).max(),
     )
-    winners = f"Clear winners over {len(cells)} drives, delays and units: {shares}, nobody {np.sum(~clear)}"
-    if not above.any():
-        return CLAIMS["higher"].fails(numbers), winners
-    return CLAIMS["higher"].assuming("a drive and a delay of the cells where it is first", numbers), winners
+    return finding, winners
 
 
-def _lead(work: Work) -> tuple[str, str]:
-    """Returns a note with a table of how the softness of a drive decides, and the answer in short."""
+def _drives(work: Work) -> tuple[dict[str, Any], str]:
+    """Returns how the softness of a drive decides: what the texts name, and a note with a table."""
     modes = (125.0, 450.0) if work.small else (100.0, 125.0, 170.0, 225.0, 300.0, 450.0, 600.0)
-    setups = [replace(_BASE, mode_Hz=mode) for mode in modes]
-    found = work.map_parallel("soft and stiff drives", limits, setups)
+    found = work.map_parallel("soft and stiff drives", limits, [replace(_BASE, mode_Hz=mode) for mode in modes])
     heads = ["mode (Hz)", *(SHORT[kind] for kind in KINDS)]
     rows = [[f"{mode:g}", *(_describe(one[kind]) for kind in KINDS)] for mode, one in zip(modes, found, strict=True)]
     ahead = [max(one[kind].stiffness for kind in KINDS[2:]) / max(one[KINDS[1]].stiffness, 1.0) for one in found]
     first = next((mode for mode, times in zip(modes, ahead, strict=True) if times < 1.0), None)
     turns = f"up to {modes[modes.index(first) - 1]:g} Hz; from {first:g} Hz on damping does" if first else "throughout"
-    note = (
-        "#### Soft and stiff drives\n\nLargest steady stiffness in kN/m (element's size in N s/m or g), with 0.5 ms "
-        "of extra delay, an ideal unit at the near mass and 0.3 of the mass there:\n\n"
-        + markdown_table(heads, rows, numbers=range(len(heads)))
-        + "\n\n"
-        f"The better inertia bears ×{ahead[0]:.1f} of what damping does at {modes[0]:g} Hz and ×{ahead[-1]:.1f} at "
-        f"{modes[-1]:g} Hz. Inertia wins {turns}."
-    )
-    return note, (
-        "**A soft drive asks for inertia, a stiff one for damping.** With 0.5 ms of delay inertia steadies "
-        f"×{ahead[0]:.1f} the stiffness that damping does where the drive rings at {modes[0]:g} Hz, and "
-        f"×{ahead[-1]:.1f} at {modes[-1]:g} Hz; it wins {turns}"
-    )
+    soft = {"soft": ahead[0], "soft_Hz": modes[0], "stiff": ahead[-1], "stiff_Hz": modes[-1], "turns": turns}
+    return soft, work.tell("drives", table=markdown_table(heads, rows, numbers=range(len(heads))), **soft)
 
 
 def _describe(best: Best) -> str:

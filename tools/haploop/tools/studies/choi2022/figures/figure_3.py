@@ -17,7 +17,6 @@ from haploop.tools.studies.choi2022.work import Work
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-TITLE = "Position against force in a single contact with a virtual spring"
 CLAIMS = claims_of(3)
 
 # Coarse enough to be seen.
@@ -48,15 +47,8 @@ def make(work: Work) -> list[Finding]:
         _draw(ax, name, depth, force, walls[name])
     work.figure(figure, "figure_3")
     work.data("figure_3", columns)
-    work.caption = (
-        "The device coasts into the 0.15 N/mm wall at 0.1 m/s and out again; every plant step is drawn. The force "
-        "is the one that acts, held from tick to tick. Red is the energy that the wall gives beyond what it took."
-    )
-    leaks = [amount(-wall["true_J"], "J") for wall in walls.values()]
-    work.answer = (
-        f"**A sampled spring gives more than it takes, and delay makes most of it.** One contact with 0.15 N/mm leaks "
-        f"{leaks[0]} by sampling and hold, {leaks[1]} with an encoder of 0.1 mm, {leaks[2]} with 2 ms of delay as well"
-    )
+    sampled, quantised, delayed = (amount(-wall["true_J"], "J") for wall in walls.values())
+    work.answer = work.tell("answer", sampled=sampled, quantised=quantised, delayed=delayed)
     return _findings(loops, walls)
 
 
@@ -109,54 +101,42 @@ def _given(depth: np.ndarray, force: np.ndarray) -> float:
 
 def _findings(loops: dict[str, Any], walls: dict[str, Any]) -> list[Finding]:
     energies = {name: (_taken(*one), _given(*one)) for name, one in loops.items()}
-    each = "; ".join(
-        f"{name}: took {amount(took, 'J')}, gave {amount(gave, 'J')}" for name, (took, gave) in energies.items()
-    )
-    areas = [area_J(*one) for one in loops.values()]
-    leaks = [-wall["true_J"] for wall in walls.values()]
+    areas, leaks = [area_J(*one) for one in loops.values()], [-wall["true_J"] for wall in walls.values()]
     apart = max(abs(area / leak - 1.0) for area, leak in zip(areas, leaks, strict=True))
     leak = walls["and 2 ms of delay"]["leak"]
-    parts = {cause: -leak[f"{cause}_J"] for cause in ("sampling_and_hold", "quantisation", "delay")}
-    causes = ", ".join(f"{cause.replace('_', ' ')} {amount(value, 'J')}" for cause, value in parts.items())
+    causes = ("sampling_and_hold", "quantisation", "delay")
     edges = [_edges_m(*one) for one in loops.values()]
-    edges_mm = "; ".join(f"{1e3 * began:.2f} and {1e3 * ended:.2f} mm".replace("-", "−") for began, ended in edges)
     late = [began > 0.0 > ended for began, ended in edges]
     levels = [len(np.unique(force)) for _, force in loops.values()]
-    moving = [int(np.count_nonzero(force)) for _, force in loops.values()]
+    steps = [int(np.count_nonzero(force)) for _, force in loops.values()]
     exact, closed = _constant_speed()
     summed, formula = _telescoped()
-    ideals = [abs(wall["ideal_J"]) for wall in walls.values()]
     return [
         CLAIMS["generates"].holds_if(
             all(gave > took for took, gave in energies.values()),
-            f"{each}. At constant speed v to depth x_max and back the leak is K x_max v T: {amount(exact, 'J')} "
-            f"against {amount(closed, 'J')}",
+            energies="; ".join(f"{name}: took {_J(took)}, gave {_J(gave)}" for name, (took, gave) in energies.items()),
+            exact=_J(exact),
+            closed=_J(closed),
         ),
         CLAIMS["late"].holds_if(
             all(late),
-            f"penetration at the first force, and at the last: {edges_mm}",
-            "the encoder does not round a device into the wall up to half a step early",
             late[0],
+            edges="; ".join(f"{1e3 * began:.2f} and {1e3 * end:.2f} mm".replace("-", "−") for began, end in edges),
         ),
         CLAIMS["staircase"].holds_if(
-            all(level < steps / 5 for level, steps in zip(levels, moving, strict=True)) and levels[1] < levels[0],
-            f"{' / '.join(map(str, levels))} force levels in {' / '.join(map(str, moving))} plant steps of contact "
-            f"(the three panels). Each cause by itself gives: {causes}",
+            all(level < count / 5 for level, count in zip(levels, steps, strict=True)) and levels[1] < levels[0],
+            levels=" / ".join(map(str, levels)),
+            steps=" / ".join(map(str, steps)),
+            causes=", ".join(f"{cause.replace('_', ' ')} {_J(-leak[f'{cause}_J'])}" for cause in causes),
         ),
-        CLAIMS["counterclockwise"].holds_if(
-            min(areas) > 0.0 and apart < 1e-9,
-            f"area within the loops {', '.join(amount(area, 'J') for area in areas)}, counter-clockwise; the wall's "
-            "true books say the same",
-        ),
-        CLAIMS["sum"].holds_if(
-            abs(summed / formula - 1.0) < 1e-9,
-            f"for a spring over a closed path the sum is −(K/2) Σ(Δx)², never positive: {amount(summed, 'J')} "
-            f"against {amount(formula, 'J')} along a random path. It sees neither delay nor hold between samples",
-        ),
-        CLAIMS["ideal"].holds_if(
-            max(ideals) < 1e-12, "an ideal spring along the same paths gives back all it took, but for rounding"
-        ),
+        CLAIMS["counterclockwise"].holds_if(min(areas) > 0.0 and apart < 1e-9, areas=", ".join(map(_J, areas))),
+        CLAIMS["sum"].holds_if(abs(summed / formula - 1.0) < 1e-9, summed=_J(summed), formula=_J(formula)),
+        CLAIMS["ideal"].holds_if(max(abs(wall["ideal_J"]) for wall in walls.values()) < 1e-12),
     ]
+
+
+def _J(value: float) -> str:
+    return amount(value, "J")
 
 
 def _constant_speed() -> tuple[float, float]:

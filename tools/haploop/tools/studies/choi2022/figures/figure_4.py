@@ -18,7 +18,6 @@ from haploop.tools.studies.choi2022.sampled import MASS_KG, PERIOD_S, closed_for
 from haploop.tools.studies.choi2022.scenes import fig6, pushed_and_braked, run, single_contact
 from haploop.tools.studies.choi2022.work import Work
 
-TITLE = "Velocity against momentum of virtual inertia in a single contact"
 CLAIMS = claims_of(4)
 CUTOFFS_HZ = (None, 100.0, 30.0, 10.0)
 # An IMU of the class of the paper's: 300 ug/Hz^0.5, 16 bit over 8 g, 420 Hz (MPU-9250's data sheet).
@@ -50,17 +49,9 @@ def make(work: Work) -> list[Finding]:
     work.data("figure_4", {"prescribed_v_m_s": pulse, "run_v_m_s": v})
     work.scene("figure_4_pushed", pushed)
     work.scene("figure_4_contact", contact)
-    work.caption = (
-        "10 g of virtual inertia. What is taken while the speed grows is green, what is given back while it falls "
-        "red, and grey where both lie; the path runs clockwise, and what lies within it is kept. Left the motion of "
-        "the schematic, right the paper's device and hand, pushed by hand and braked again."
-    )
     masses_g = {cutoff: 1e3 * largest_mass_kg(cutoff, 0.0) for cutoff in CUTOFFS_HZ}
     masses = [f"{mass:.0f} g {'at ' * bool(cutoff)}{named(cutoff)}" for cutoff, mass in masses_g.items()]
-    work.answer = (
-        "**A low-pass over the acceleration helps.** Largest stable bidirectional inertia of the paper's device and "
-        f"hand, 2 ms late and without a wall: {', '.join(masses)}"
-    )
+    work.answer = work.tell("answer", masses=", ".join(masses))
     return [
         *_on_energy(pulse, v, pushed, contact, 20 if work.small else 160),
         *_on_filters({named(cutoff): mass for cutoff, mass in masses_g.items()}),
@@ -77,28 +68,11 @@ def _on_energy(
     theta = 2.0 * np.pi * np.linspace(5.3, 497.9, frequencies) * PERIOD_S
     formula = closed_form("bidirectional-inertia", theta, 0)
     off = float(np.abs(mean_taken("bidirectional-inertia", theta, 0) - formula).max() / np.abs(formula).max())
-    changes = {late: 1e3 / (2 * late + 3) for late in (0, 2)}
     return [
-        CLAIMS["step"].holds_if(
-            apart < 1e-9,
-            "along the run at the right the program's sampled book and eq. 8 are the same, but for rounding",
-        ),
-        CLAIMS["clockwise"].holds_if(
-            closed > 0.0, f"the loop of the prescribed motion encloses {amount(closed, 'J')}, clockwise"
-        ),
-        CLAIMS["unlike"].holds_if(
-            sampled_J > 0.0 > wall_J,
-            f"in one contact the inertia took {amount(sampled_J, 'J')} net, the wall {amount(wall_J, 'J')} (sampled "
-            "books)",
-        ),
-        CLAIMS["passive"].holds_if(
-            False,
-            "under a sine it takes (2m/T²) sin²(θ/2)(cos (d+1)θ − cos (d+2)θ) A² a sample, d samples late: up to "
-            f"{changes[0]:.0f} Hz at 1 kHz without delay, {changes[2]:.0f} Hz with 2 ms, and gives above; the "
-            f"program's controller differs by {100 * off:.2g} % of the largest",
-            "the motion is slower than a third of the sample rate, a seventh with 2 ms of delay",
-            off < 1e-3,
-        ),
+        CLAIMS["step"].holds_if(apart < 1e-9),
+        CLAIMS["clockwise"].holds_if(closed > 0.0, closed=amount(closed, "J")),
+        CLAIMS["unlike"].holds_if(sampled_J > 0.0 > wall_J, inertia=amount(sampled_J, "J"), wall=amount(wall_J, "J")),
+        CLAIMS["passive"].holds_if(False, off < 1e-3, undelayed=1e3 / 3.0, delayed=1e3 / 7.0, off=100 * off),
     ]
 
 
@@ -111,28 +85,18 @@ def _on_filters(masses_g: dict[str, float]) -> list[Finding]:
     return [
         CLAIMS["filtered"].holds_if(
             min(passive.values()) >= 0.98 * passive["unfiltered"],
-            f"without delay bidirectional inertia takes energy from sines up to: {_listed(passive, 'Hz')}",
-            f"the motion is slower than {min(passive.values()):.0f} Hz",
             True,
+            passive=_listed(passive, "Hz"),
+            least=min(passive.values()),
         ),
         CLAIMS["range"].holds_if(
             all(masses_g[named(cutoff)] > masses_g["unfiltered"] for cutoff in CUTOFFS_HZ[1:]),
-            f"largest bidirectional mass of device and hand without a wall, 2 ms late: {_listed(masses_g, 'g')}",
+            masses=_listed(masses_g, "g"),
         ),
-        CLAIMS["lag"].holds_if(
-            stiffest["unfiltered"] >= max(stiffest.values()),
-            f"largest stable stiffness with 10 g of bidirectional inertia, 2 ms late: {_listed(stiffest, 'N/mm')}. "
-            "Some lag turns the inertia into damping",
-        ),
-        CLAIMS["measured"].holds_if(
-            errors["accelerometer"] < best,
-            f"RMS error in a contact, 28.7 µm encoder, IMU of 300 µg/√Hz: {_listed(errors, 'm/s²')}",
-        ),
+        CLAIMS["lag"].holds_if(stiffest["unfiltered"] >= max(stiffest.values()), stiffest=_listed(stiffest, "N/mm")),
+        CLAIMS["measured"].holds_if(errors["accelerometer"] < best, errors=_listed(errors, "m/s²")),
         CLAIMS["choose"].holds_if(
-            finest < fine["accelerometer"],
-            f"in such a contact the accelerometer is better whatever the encoder: with steps of 0.1 µm the best "
-            f"difference is {fixed(finest)} m/s² off, the accelerometer {fixed(fine['accelerometer'])} m/s²; a "
-            "difference of differences is a period old",
+            finest < fine["accelerometer"], difference=fixed(finest), accelerometer=fixed(fine["accelerometer"])
         ),
     ]
 

@@ -27,7 +27,6 @@ from haploop.tools.studies.choi2022.work import Work
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-TITLE = "The acceleration's sign alternates: inertia generates, and unidirectional inertia may not"
 CLAIMS = claims_of(5)
 
 BI, UNI = "bidirectional-inertia", "unidirectional-inertia"
@@ -52,27 +51,11 @@ def make(work: Work) -> list[Finding]:
     work.figure(figure, "figure_5")
     named = {f"{kind}_{late}_ticks_late_J_m2".replace("-", "_"): value for (kind, late), value in measured.items()}
     work.data("figure_5", {"frequency_Hz": frequencies, **named, **books})
-    work.caption = (
-        "Top: a velocity that jitters by ±10 mm/s from sample to sample, its loop (counter-clockwise: more is given "
-        "than taken) and its energy, about rest and on top of 50 mm/s. Bottom: mean energy taken a sample from a "
-        "sine of 1 m, relative to what the damper would take if it were not sampled; lines are closed forms, dots "
-        "the program's controller. The paper's numbers: 0.15 N/mm, 0.8 N s/m, 10 g."
-    )
-    work.answer = _answer(frequencies, measured)
-    return [*_on_alternation(), *_on_unidirectional(frequencies, measured)]
-
-
-def _answer(frequencies: np.ndarray, measured: dict[tuple[str, int], np.ndarray]) -> str:
-    ends = {(kind, late): _hertz(_first_negative(frequencies, measured[kind, late])) for kind, late in measured}
-    parts = [
-        f"{name} {ends[kind, 0]} and {ends[kind, 2]}"
-        for name, kind in (("damping", "damping"), ("bidirectional inertia", BI), ("unidirectional inertia", UNI))
-    ]
-    return (
-        "**Inertia takes energy from faster swings than damping does, and from slow ones hardly any.** Highest "
-        f"frequency at 1 kHz, without delay and with 2 ms: {', '.join(parts)}. An encoder's jitter turns bidirectional "
-        "inertia into a source of energy"
-    )
+    ends = {(kind, late): _first_negative(frequencies, measured[kind, late]) for kind, late in measured}
+    names = (("damping", "damping"), ("bidirectional inertia", BI), ("unidirectional inertia", UNI))
+    both = (f"{name} {_hertz(ends[kind, 0])} and {_hertz(ends[kind, 2])}" for name, kind in names)
+    work.answer = work.tell("answer", ends=", ".join(both))
+    return [*_on_alternation(), *_on_unidirectional(frequencies, measured, ends)]
 
 
 def _over_samples(ax: Axes) -> dict[str, np.ndarray]:
@@ -142,27 +125,18 @@ def _on_alternation() -> list[Finding]:
     shifts = [
         _taken_under_jitter(BI, drift)[1:].reshape(-1, 2).sum(axis=1).mean() for drift in (-_DRIFT_M_S, 0.0, _DRIFT_M_S)
     ]
-    same = max(shifts) - min(shifts) < 1e-9 * abs(shifts[1])
     return [
         CLAIMS["alternates"].holds_if(
             abs(level / formula - 1.0) < 1e-9,
-            f"a velocity of ±V loses 2 m V² a sample: {amount(level, 'J')} for 10 g and 10 mm/s, closed form "
-            f"{amount(formula, 'J')}. Of 2000 random loops whose acceleration alternates {100 * leaking:.0f} % leak",
+            level=amount(level, "J"),
+            formula=amount(formula, "J"),
+            leaking=100 * leaking,
         ),
-        CLAIMS["three"].holds_if(
-            least >= -1e-15,
-            "over a closed loop of velocity E/m = ½ΣΔ² + ΣΔ(k)Δ(k−1), Δ the changes; where each tendency lasts two "
-            "changes or more, no Δ is at two turns and E ≥ 0. The least of 2000 random ones took "
-            f"{amount(least, 'J')}",
-        ),
+        CLAIMS["three"].holds_if(least >= -1e-15, least=amount(least, "J")),
         CLAIMS["any_velocity"].holds_if(
-            same,
-            f"two samples of jitter take {', '.join(amount(one, 'J') for one in shifts)} on top of −50, 0 and 50 mm/s",
+            max(shifts) - min(shifts) < 1e-9 * abs(shifts[1]), shifts=", ".join(amount(one, "J") for one in shifts)
         ),
-        CLAIMS["at_rest"].holds_if(
-            level < 0.0,
-            f"jitter of ±10 mm/s about rest (one 10 µm count back and forth) takes {amount(level / PERIOD_S, 'W')}",
-        ),
+        CLAIMS["at_rest"].holds_if(level < 0.0, power=amount(level / PERIOD_S, "W")),
     ]
 
 
@@ -189,55 +163,43 @@ def _loop_J(v: np.ndarray) -> float:
     return float(steps_J(around, MASS_KG)[period:].sum())
 
 
-def _on_unidirectional(frequencies: np.ndarray, measured: dict[tuple[str, int], np.ndarray]) -> list[Finding]:
+def _on_unidirectional(
+    frequencies: np.ndarray, measured: dict[tuple[str, int], np.ndarray], ends: dict[tuple[str, int], float]
+) -> list[Finding]:
     ratio = measured[UNI, 0] / measured[BI, 0]
     until = _first_negative(frequencies, ratio - 1.0)
     at = int(np.argmin(np.abs(frequencies - 20.0)))
-    gives = {late: _first_negative(frequencies, measured[UNI, late]) for late in (0, 2)}
     rest, drift = (float(_taken_under_jitter(UNI, one)[1:].mean()) for one in (0.0, _DRIFT_M_S))
     back = {
         name: returned(hertz)
         for name, hertz in (("5 Hz", 5.1), ("20 Hz", 20.3), ("50 Hz", 50.7), ("100 Hz", 101.0), ("200 Hz", 201.3))
     }
     at_once = abs(returned(50.7, before=False))
-    ends = {(kind, late): _first_negative(frequencies, measured[kind, late]) for kind, late in measured}
     up_to = "; ".join(
-        how + ", ".join(f" {kind.partition('-')[0]} {_hertz(ends[kind, late])}" for kind in KINDS)
+        how + " " + ", ".join(f"{kind.partition('-')[0]} {_hertz(ends[kind, late])}" for kind in KINDS)
         for late, how in ((0, "without delay"), (2, "with 2 ms"))
     )
-    pure = f"from a sine it takes energy up to {_hertz(gives[0])} at 1 kHz without delay, {_hertz(gives[2])} with 2 ms"
-    within = min(ends[BI, 0], ends[UNI, 0]), ends["damping", 0]
     return [
-        CLAIMS["only_stored"].assuming(
-            "the motion is slow against the sample rate",
-            "share of what it takes that it gives back, since the test looks at a(k−1) and the force is held to the "
-            f"next sample: {', '.join(f'{100 * share:.2g} % at {name}' for name, share in back.items())}",
+        CLAIMS["only_stored"].holds_if(
+            False, True, shares=", ".join(f"{100 * share:.2g} % at {name}" for name, share in back.items())
         ),
-        CLAIMS["before"].holds_if(
-            at_once >= back["50 Hz"],
-            f"given back of what is taken from a sine of 50 Hz: {100 * back['50 Hz']:.2g} % with a(k−1), "
-            f"{100 * at_once:.2g} % with a(k): the older sample keeps the gate open past the turn",
-        ),
+        CLAIMS["before"].holds_if(at_once >= back["50 Hz"], before=100 * back["50 Hz"], present=100 * at_once),
         CLAIMS["pure"].holds_if(
-            not np.isfinite(gives[2]), pure, f"the motion is slower than {_hertz(gives[2])}", under_it=True
+            not np.isfinite(ends[UNI, 2]), True, undelayed=_hertz(ends[UNI, 0]), delayed=_hertz(ends[UNI, 2])
         ),
         CLAIMS["more"].holds_if(
             until > 0.0 and not np.isfinite(until),
-            f"under a sine of {frequencies[at]:.0f} Hz, without delay, it takes {fixed(float(ratio[at]))} times what "
-            f"the bidirectional one takes, at {frequencies[4]:.1f} Hz {fixed(float(ratio[4]))} times; from "
-            f"{_hertz(until)} on it takes less",
-            f"the motion is slower than {_hertz(until)}",
             until > 0.0,
+            hertz=frequencies[at],
+            times=fixed(float(ratio[at])),
+            slow=frequencies[4],
+            slow_times=fixed(float(ratio[4])),
+            until=_hertz(until),
         ),
         CLAIMS["chatter"].holds_if(
-            False,
-            f"under ±10 mm/s from sample to sample it takes {amount(rest, 'J') if rest else 'nothing'} about rest, "
-            f"where bidirectional inertia takes −2.00 µJ; on top of 50 mm/s it takes {amount(drift, 'J')}: it acts "
-            "on every other sample, the one that pushes on",
-            "the velocity chatters about zero",
-            rest >= 0.0,
+            False, rest >= 0.0, rest=amount(rest, "J") if rest else "nothing", drift=amount(drift, "J")
         ),
-        CLAIMS["higher"].holds_if(within[0] > within[1], f"each takes energy from a sine up to: {up_to}"),
+        CLAIMS["higher"].holds_if(min(ends[BI, 0], ends[UNI, 0]) > ends["damping", 0], ends=up_to),
     ]
 
 

@@ -17,7 +17,6 @@ from haploop.tools.studies.choi2022.simulation.search import SMALL, WHOLE, Found
 from haploop.tools.studies.choi2022.work import Work
 
 TABLE = "figure_6_readings.parquet"
-TITLE = "The simulation of a slight contact with a soft wall"
 CLAIMS = claims_of(6)
 # What the search tests under every interpretation, and in which words.
 TESTED = {name: (COUNTED | ASIDE)[name] for name in CLAIMS if name in COUNTED | ASIDE}
@@ -30,23 +29,11 @@ def make(work: Work) -> list[Finding]:
     found = search(work, SMALL if work.small else WHOLE)
     interpretations = {"base": BASE, "nearest": found.nearest}
     runs: dict[str, dict[str, Run]] = {name: {} for name in interpretations}
-    for name, stem, seen in (
-        (
-            "base",
-            "figure_6",
-            "Our own interpretation of what the paper leaves open (launch/scenes/fig6a.toml to fig6c.toml). From top: "
-            "position, with the wall shaded, forces, and energy taken out of the device.",
-        ),
-        (
-            "nearest",
-            "figure_6_nearest",
-            "The nearest interpretation that was found (launch/scenes/paper/fig6a_nearest.toml to fig6c_nearest.toml).",
-        ),
-    ):
+    for name, stem in (("base", "figure_6"), ("nearest", "figure_6_nearest")):
         for panel in "abc":
             scene = scene_of(interpretations[name], panel)
             runs[name][panel] = (scene, *run(scene))
-        work.figure(panels(runs[name]), stem, seen)
+        work.figure(panels(runs[name]), stem, work.tell(f"seen_{name}"))
         work.data(stem, _columns(runs[name]))
         for panel, (scene, _, _) in runs[name].items():
             work.scene(f"{stem}_{panel}", scene)
@@ -54,26 +41,21 @@ def make(work: Work) -> list[Finding]:
         work.text(f"fig6{panel}_nearest.toml", scene_text(found.nearest, panel))
     rows = found.of("random")
     if there := options(rows, SPACE):
-        seen = "How often each claim holds under which choice; what the claims say is told in the table below."
-        work.figure(share_map(there, [*COUNTED, "all"], len(rows)), "figure_6_search", seen)
+        work.figure(share_map(there, [*COUNTED, "all"], len(rows)), "figure_6_search", work.tell("seen_search"))
     if write_table(found.rows, work.out / TABLE):
         work.path(TABLE)
-    work.notes = notes(found)
-    work.answer = _answer(found)
-    return [*(_verdict(name, found) for name in TESTED), *findings_on_logs(CLAIMS, runs), _together(found)]
-
-
-def _answer(found: Found) -> str:
-    rows, [nearest] = found.of("random"), found.of("nearest")
-    decides = decider(options(rows, SPACE), "c beats bidirectional")
-    return (
-        "**Inertia against damping in a slight contact: it depends on the signals, not on the element alone.** The "
-        "paper's picture of it, inertia swinging at most half as wide as damping, comes out in "
-        f"{percent(share(rows, 'c smaller'))} of {len(rows)} interpretations, and {nearest['holding']} of its "
-        f"{len(COUNTED)} claims together in the nearest. Unidirectional inertia swings no more than bidirectional of "
-        f"the same mass in {percent(share(rows, 'c beats bidirectional'))}"
-        + (f", decided most by the {decides.describe('c beats bidirectional')}" if decides else "")
+    work.notes = notes(work, found)
+    decides = decider(there, "c beats bidirectional")
+    work.answer = work.tell(
+        "answer",
+        smaller=percent(share(rows, "c smaller")),
+        count=len(rows),
+        holding=found.of("nearest")[0]["holding"],
+        claims=len(COUNTED),
+        beats=percent(share(rows, "c beats bidirectional")),
+        decided=f", decided most by the {decides.describe('c beats bidirectional')}" if decides else "",
     )
+    return [*(_verdict(name, found) for name in TESTED), *findings_on_logs(CLAIMS, runs), _together(found)]
 
 
 def _columns(runs: dict[str, Run]) -> dict[str, np.ndarray]:
@@ -101,9 +83,9 @@ def _verdict(name: str, found: Found) -> Finding:
         growth = OneTickMap.of(alone).growth(150.0)
         numbers += f". In contact the loop is linear and grows by a factor of {growth:.4f} a tick"
     holds_somewhere = any(holds(row, name) for row in found.rows)
-    return CLAIMS[name].holds_if(
-        often >= _ALWAYS and holds(base, name), numbers, _assumption(name, found), holds_somewhere
-    )
+    if often >= _ALWAYS and holds(base, name):
+        return CLAIMS[name].holds(numbers)
+    return CLAIMS[name].assuming(_assumption(name, found), numbers) if holds_somewhere else CLAIMS[name].fails(numbers)
 
 
 def _assumption(name: str, found: Found) -> str:
@@ -119,11 +101,15 @@ def _together(found: Found) -> Finding:
     rows, held = found.of("random"), [row for row in found.rows if holds(row, "all")]
     most = fullest(found)
     lacks = ", ".join(name for name in COUNTED if not holds(most, name))
-    numbers = (
-        f"all {len(COUNTED)} that the search tests hold for {len(held)} of {len(found.rows)} interpretations "
-        f"({len(rows)} of them at random); the most that do in any are "
-        f"{most['holding']}{f', without: {lacks}' if lacks else ''}; in the nearest "
-        f"{found.of('nearest')[0]['holding']}, in our own {found.of('base')[0]['holding']}"
+    return CLAIMS["together"].holds_if(
+        False,
+        bool(held),
+        claims=len(COUNTED),
+        held=len(held),
+        count=len(found.rows),
+        random=len(rows),
+        most=most["holding"],
+        lacks=f", without: {lacks}" if lacks else "",
+        nearest=found.of("nearest")[0]["holding"],
+        ours=found.of("base")[0]["holding"],
     )
-    assumption = "what the paper leaves open is as in one of these interpretations"
-    return CLAIMS["together"].holds_if(False, numbers, assumption, bool(held))

@@ -21,7 +21,6 @@ from haploop.tools.studies.choi2022.work import Work
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-TITLE = "The device of the experiments: interpretations, and the one nearest to the paper"
 CLAIMS = claims_of(7)
 # Largest steady stiffness in N/m by element, and by key of a setup at a lower and an upper value of it.
 Largest = dict[str, float]
@@ -36,23 +35,20 @@ def make(work: Work) -> list[Finding]:
     rows = found.of("random")
     there = options(rows, SPACE)
     if there:
-        seen = "How often each claim of Figs. 8 to 13 holds, by what was chosen; the claims are told below."
-        work.figure(share_map(there, list(TESTED), len(rows)), "figure_7", seen)
+        work.figure(share_map(there, list(TESTED), len(rows)), "figure_7", work.tell("seen_search"))
     keep_shares(work, list(TESTED), rows, there)
     varied = _varied(found.nearest, work.small)
     base, influences = _influences(work, found, varied)
     work.figure(
         _draw(base, influences, varied | {"friction_N": (0.0, FRICTION_N)}),
         "figure_7_influence",
-        "What one value changes, all others as in the nearest interpretation (the line): the largest stiffness that "
-        f"each element steadies. Numbers are taken 1/{_FACTOR:g} (blue) and {_FACTOR:g} times (orange), the delay 0.5 "
-        "ms less and more, the friction as it was published; beside a bar the value.",
+        work.tell("seen_influence", factor=_FACTOR),
     )
     work.data("figure_7_readings", columns(found.rows))
     work.scene(SCENE.removesuffix(".toml"), found.nearest.scene(5000.0, []))
     work.text(SCENE_FILE, file_text(found.nearest))
-    work.notes = notes(found, there)
-    work.answer = _answer(found)
+    work.notes = notes(work, found, there)
+    work.answer = _answer(work, found)
     return [_on_the_unit(found, *influences["acceleration"])]
 
 
@@ -119,25 +115,22 @@ def _draw(base: Largest, influences: Influences, varied: dict[str, tuple[Any, An
     return figure
 
 
-def _answer(found: Found) -> str:
+def _answer(work: Work, found: Found) -> str:
     rows, row = found.of("random"), found.row
-    here = ", ".join(f"{SHORT[name]} {row[f'{name}_N_m'] / 1e3:.1f}" for name in PAPER)
-    papers = ", ".join(f"{stiffness / 1e3:.1f}" for stiffness in PAPER.values())
-    return (
-        "**The ranking of the paper's experiments is possible, and rare.** Unidirectional inertia steadies a stiffer "
-        f"wall than damping and bidirectional inertia do in {percent(share(rows, '10 larger'))} of {len(rows)} random "
-        "interpretations of the device. The nearest interpretation bears, in N/mm and with the best of the few sizes "
-        f"that the search tries, {here} (the paper: {papers}); of its neighbours, "
-        f"all numbers a few per cent off, {percent(share(found.of('neighbour'), '10 larger'))} keep that ranking"
+    return work.tell(
+        "answer",
+        larger=percent(share(rows, "10 larger")),
+        count=len(rows),
+        here=", ".join(f"{SHORT[name]} {row[f'{name}_N_m'] / 1e3:.1f}" for name in PAPER),
+        papers=", ".join(f"{stiffness / 1e3:.1f}" for stiffness in PAPER.values()),
+        neighbours=percent(share(found.of("neighbour"), "10 larger")),
     )
 
 
 def _on_the_unit(found: Found, unit: Largest, encoder: Largest) -> Finding:
     """Finds whether inertia steadies stiffer walls with the unit than with the encoder's second differences."""
-    bears = [" and ".join(f"{of[kind] / 1e3:.1f}" for kind in KINDS[2:]) for of in (unit, encoder)]
-    numbers = (
-        f"largest steady stiffness with bi- and unidirectional inertia, acceleration of the unit {bears[0]}; "
-        f"the encoder {bears[1]} N/mm (low-pass of the velocity: {found.nearest.velocity})"
-    )
     better = all(unit[kind] > encoder[kind] for kind in KINDS[2:])
-    return CLAIMS["unit"].holds_if(False, numbers, NEAREST, better)
+    of_unit, of_encoder = (" and ".join(f"{of[kind] / 1e3:.1f}" for kind in KINDS[2:]) for of in (unit, encoder))
+    return CLAIMS["unit"].holds_if(
+        False, better, unit=of_unit, encoder=of_encoder, velocity=found.nearest.velocity, nearest=NEAREST
+    )

@@ -22,7 +22,6 @@ from haploop.tools.studies.choi2022.sampled import bidirectional_J, damper_J, un
 from haploop.tools.studies.choi2022.scenes import run, strongest_Hz
 from haploop.tools.studies.choi2022.work import Work
 
-TITLE = "What damping dissipated in a contact, and what inertias would have on the same motion"
 CLAIMS = claims_of(8)
 
 LABELS = ("damping", "bidirectional inertia", "unidirectional inertia")
@@ -52,18 +51,16 @@ class Contact:
 def make(work: Work) -> list[Finding]:
     """Runs two contacts with damping, and books all three elements on the motion of each."""
     found = contacts(nearest(work), work)
-    _picture(work, found, "figure_8", "In the nearest interpretation of the device.")
+    _picture(work, found, "figure_8", work.tell("seen_nearest"))
     _sines(work)
     if setup := nearest_with(work, "8 more"):
-        seen = f"In the interpretation nearest to the paper in which it holds: {describe(setup)}."
-        _picture(work, contacts(setup, work), "figure_8_holds", seen)
-    work.caption = (
-        f"Damping of {BOOKED_DAMPING:g} N s/m was at work; inertias of {1e3 * BOOKED_KG:g} g are booked on its motion, "
-        "as `haploop dissipate DIR --damping 2.7 --mass 0.0018` does after `haploop run` of a scene beside the figure."
-    )
+        _picture(work, contacts(setup, work), "figure_8_holds", work.tell("seen_holds", setup=describe(setup)))
+    sizes = {"damping": BOOKED_DAMPING, "mass_g": 1e3 * BOOKED_KG}
+    work.caption = work.tell("caption", **sizes)
     if not work.small:
-        work.notes = [_tried(contacts(replace(nearest(work), friction_N=FRICTION_N), work))]
-    work.answer = _answer(found)
+        work.notes = [_tried(contacts(replace(nearest(work), friction_N=FRICTION_N), work), work)]
+    first = first_ahead_Hz(bidirectional_J(_FREQUENCIES_HZ, None))
+    work.answer = work.tell("answer", first=first, swings=found[0].swings_Hz, **sizes)
     return _findings(found, work)
 
 
@@ -111,12 +108,7 @@ def _picture(work: Work, contacts: list[Contact], name: str, seen: str) -> None:
         work.scene(f"{name}_{key}", contact.scene)
     legend(axes[0], **UPPER_LEFT, **INSIDE)
     work.data(name, columns)
-    work.figure(
-        figure,
-        name,
-        f"{seen} Solid: sampled books, all the controller can know (eq. 4), as in the paper; dashed: what the forces, "
-        "which act later, really took out of the device.",
-    )
+    work.figure(figure, name, f"{seen} {work.tell('seen_books')}")
 
 
 def _sines(work: Work) -> None:
@@ -131,13 +123,7 @@ def _sines(work: Work) -> None:
         ax.set_ylim(0.0, 3.0)
         legend(ax, **UPPER_LEFT)
     axes[0].set_ylabel("energy taken, inertia / damping (sampled)")
-    work.figure(
-        figure,
-        "figure_8_sines",
-        "When it can hold: above 1 the inertia takes more than the damper out of a sine of that frequency, by the "
-        "sampled books. The lag of the acceleration helps the inertia; the damper fades towards 250 Hz and generates "
-        "beyond.",
-    )
+    work.figure(figure, "figure_8_sines", work.tell("seen_sines"))
 
 
 def ahead(inertia_J: np.ndarray) -> np.ndarray:
@@ -151,61 +137,38 @@ def first_ahead_Hz(inertia_J: np.ndarray) -> float:
     return float(_FREQUENCIES_HZ[over.argmax()]) if over.any() else float("nan")
 
 
-def _tried(rough: list[Contact]) -> str:
+def _tried(rough: list[Contact], work: Work) -> str:
     """Returns what else might make the claim hold, and the books with friction."""
-    ends = _by_wall(rough, [contact.booked.sampled_J[:, -1] for contact in rough])
-    needed = max(BOOKED_KG * end[0] / end[1:].min() for end in (contact.booked.sampled_J[:, -1] for contact in rough))
-    return (
-        "#### What was tried for inertias to take more\n\n"
-        "Motions that vibrate (drives that ring at 80 to 500 Hz), accelerations up to 1.88 ms old on either side of "
-        "the drive, velocities low-passed at 50 and 200 Hz: the interpretations of [figure 7](#figure-7), *8 more*. "
-        "And dry friction: with the published 48 mN the sampled books of the nearest interpretation end, for "
-        f"{', '.join(LABELS)}, at {ends}; there it would take {1e3 * needed:.0f} g to be ahead of the damping. "
-        "Units of the paper's 0.0018 kg do not explain it: "
-        "a reading in g taken for m/s² would make the inertia's force 9.8 times "
-        "smaller, not larger."
-    )
-
-
-def _answer(found: list[Contact]) -> str:
-    first = first_ahead_Hz(bidirectional_J(_FREQUENCIES_HZ, None))
-    return (
-        f"**Small inertias do not replace a damper in the bounce of a contact.** {1e3 * BOOKED_KG:g} g takes more than "
-        f"{BOOKED_DAMPING:g} N s/m only out of swings faster than some {first:.0f} Hz, where sampling leaves little of "
-        f"the damper; the contacts here swing at {found[0].swings_Hz:.0f} Hz. Book your own recording with `haploop "
-        "dissipate` before choosing"
-    )
+    ends = [contact.booked.sampled_J[:, -1] for contact in rough]
+    needed_kg = max(BOOKED_KG * end[0] / end[1:].min() for end in ends)
+    return work.tell("tried", labels=", ".join(LABELS), ends=_by_wall(rough, ends), needed_g=1e3 * needed_kg)
 
 
 def _findings(contacts: list[Contact], work: Work) -> list[Finding]:
     ends = [contact.booked.sampled_J[:, -1] for contact in contacts]
     back = [contact.back_J for contact in contacts]
     all_more = all((end[1:] > end[0]).all() and end[0] > 0.0 for end in ends)
-    bounce = " and ".join(f"{contact.swings_Hz:.0f} Hz" for contact in contacts)
-    differenced = first_ahead_Hz(bidirectional_J(_FREQUENCIES_HZ, None))
-    numbers = (
-        f"sampled books at the end, {', '.join(LABELS)}: {_by_wall(contacts, ends)}. 1.8 g is ahead of 2.7 N s/m in "
-        f"swings faster than {differenced:.0f} Hz (differenced acceleration); these swing at {bounce}"
-    )
-    given = f"given back on the way, {', '.join(LABELS)}: {_by_wall(contacts, back)}"
     pure = max(float(of[2] / end[2]) for of, end in zip(back, ends, strict=True))
     late = 1.0 + contacts[0].scene["clock"]["round_trip_delay"] * 1e3
+    computed: dict[str, Any] = {
+        "labels": ", ".join(LABELS),
+        "ends": _by_wall(contacts, ends),
+        "first": first_ahead_Hz(bidirectional_J(_FREQUENCIES_HZ, None)),
+        "swings": " and ".join(f"{contact.swings_Hz:.0f} Hz" for contact in contacts),
+        "back": _by_wall(contacts, back),
+        "limit": 250.0 / late,
+        "share": 100 * pure,
+    }
+    holds = {
+        "more": all_more,
+        "oscillates": all(of[1] > of[2] > 0.0 for of in back),
+        "also_generates": all(of[0] > _ROUNDING for of in back),
+        "pure": all_more and pure < 0.01,
+    }
+    tested = {"more": "8 more"}
     return [
-        verdict_under_assumptions(work, CLAIMS["more"], all_more, numbers, "8 more"),
-        verdict_under_assumptions(work, CLAIMS["oscillates"], all(of[1] > of[2] > 0.0 for of in back), given),
-        verdict_under_assumptions(
-            work,
-            CLAIMS["also_generates"],
-            all(of[0] > _ROUNDING for of in back),
-            f"{given}. A sampled damper generates above 250 Hz, as it acts here above {250.0 / late:.0f} Hz",
-        ),
-        verdict_under_assumptions(
-            work,
-            CLAIMS["pure"],
-            all_more and pure < 0.01,
-            f"takes less than the damping does (above), and gives back {100 * pure:.1f} % of what it keeps, since the "
-            "gate of eq. 9 closes a sample late",
-        ),
+        verdict_under_assumptions(work, CLAIMS[name], is_so, tested.get(name, ""), **computed)
+        for name, is_so in holds.items()
     ]
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from haploop.tools.figure.style import empty_figure, legend
 from haploop.tools.studies.choi2022.claims import Finding, claims_of
 from haploop.tools.studies.choi2022.drawing import INSIDE, Press, draw_press
@@ -11,7 +13,6 @@ from haploop.tools.studies.choi2022.experiment.verdicts import nearest, verdict_
 from haploop.tools.studies.choi2022.scenes import run
 from haploop.tools.studies.choi2022.work import Work
 
-TITLE = "Damping alone at 5.0 N/mm, unidirectional inertia alone at 5.5 N/mm"
 CLAIMS = claims_of(9)
 # What is drawn, and the next stiffness up, for "larger than 5.0".
 _BEYOND = ("damping", 5500.0, DAMPINGS)
@@ -38,10 +39,6 @@ def make(work: Work) -> list[Finding]:
     legend(axes[0, 0], loc="upper right", ncols=3, **INSIDE)
     work.figure(figure, "figure_9")
     work.data("figure_9", columns)
-    work.caption = (
-        "Each with the best of its sizes. Above the forces as commanded, below their sum over the penetration, tick by "
-        "tick."
-    )
     kind, stiffness, sizes = _BEYOND
     choices = [elements_of(kind, float(size)) for size in (sizes[::8] if work.small else sizes)]
     beyond = tuned(work, f"tuning {kind}", setup, stiffness, choices)
@@ -49,22 +46,20 @@ def make(work: Work) -> list[Finding]:
 
 
 def _findings(work: Work, damping: Tuned, beyond: Tuned, inertia: Tuned) -> list[Finding]:
-    b, over = (one.elements[0]["damping"] for one in (damping, beyond))
-    m = inertia.elements[0]["mass"]
     shown = inertia.result["window"]["displayed_stiffness_N_m"]
-    of_damping = (
-        f"with the best of its sizes, 5.5 N/mm: {over:.2g} N s/m, {beyond.ended}; 5.0 N/mm: {b:.2g} N s/m, "
-        f"{damping.ended}"
-    )
-    of_inertia = f"with the best of its sizes, {1e3 * m:.3g} g: {inertia.ended}"
     off = abs(shown / 5500.0 - 1.0)
+    computed: dict[str, Any] = {
+        "inertia": f"{1e3 * inertia.elements[0]['mass']:.3g} g: {inertia.ended}",
+        "here": f"{damping.elements[0]['damping']:.2g} N s/m, {damping.ended}",
+        "beyond": f"{beyond.elements[0]['damping']:.2g} N s/m, {beyond.ended}",
+        "shown": shown / 1e3,
+        "off": 100 * off,
+    }
     return [
-        verdict_under_assumptions(work, CLAIMS["damping"], not beyond.steady, of_damping, "9 damping ends"),
-        verdict_under_assumptions(work, CLAIMS["inertia"], inertia.steady, of_inertia, "9 inertia"),
-        verdict_under_assumptions(
-            work,
-            CLAIMS["displayed"],
-            inertia.steady and off < 0.01,
-            f"{shown / 1e3:.4f} N/mm, {100 * off:.2f} % off; {of_inertia}",
-        ),
+        verdict_under_assumptions(work, CLAIMS[name], is_so, tested, **computed)
+        for name, is_so, tested in (
+            ("damping", not beyond.steady, "9 damping ends"),
+            ("inertia", inertia.steady, "9 inertia"),
+            ("displayed", inertia.steady and off < 0.01, ""),
+        )
     ]

@@ -137,26 +137,19 @@ def findings_on_logs(claims: Mapping[str, Claim], runs: Mapping[str, Mapping[str
     quieter = [name for name, (b, c) in fast.items() if c < b]
     phases = {name: _in_phase(of["c"][2]) for name, of in runs.items()}
     return [
-        claims["heat"].holds_if(
-            abs(settled - 1.0) < 0.05,
-            "heat of both dampers over what the wall gave beyond what it took, in whole swings of the last second "
-            f"of {_SETTLED_S:g} s, when the limit cycle has settled: {settled:.2f} ({OURS})",
-        ),
-        claims["felt"].holds_if(
-            min(swings.values()) > _FELT_M, f"(a) swings by {listed(felt)}; 26 µm are felt at 10 Hz (Israr et al. 2006)"
-        ),
+        claims["heat"].holds_if(abs(settled - 1.0) < 0.05, settled_s=_SETTLED_S, ratio=settled),
+        claims["felt"].holds_if(min(swings.values()) > _FELT_M, swings=listed(felt)),
         claims["noise"].holds_if(
             len(quieter) == len(fast),
-            f"rms of x above {_HIGH_HZ:.0f} Hz in the last half second: {listed(noise)}",
-            NEAREST if quieter == ["nearest"] else OURS,
             bool(quieter),
+            high_Hz=_HIGH_HZ,
+            noise=listed(noise),
+            where=NEAREST if quieter == ["nearest"] else OURS,
         ),
         claims["phases"].holds_if(
             min(phases.values()) > _NEARLY_ALL,
-            "share of the ticks at work with v(k) a(k) ≥ 0: "
-            + listed({name: f"{100.0 * value:.1f} %" for name, value in phases.items()}),
-            "the acceleration's sign lasts from one sample to the next, which eq. 9 looks at",
             max(phases.values()) > _NEARLY_ALL,
+            shares=listed({name: f"{100.0 * value:.1f} %" for name, value in phases.items()}),
         ),
     ]
 

@@ -77,9 +77,9 @@ def write_table(rows: Sequence[dict[str, Any]], path: Path) -> bool:
     return True
 
 
-def notes(found: Found) -> list[str]:
+def notes(work: Work, found: Found) -> list[str]:
     """Returns the sections below the figure."""
-    return [*_together(found), *_alone(found), *_nearest(found), *_method(found)]
+    return [*_together(found), *_alone(found), *_nearest(found), *_method(work, found)]
 
 
 def fullest(found: Found) -> Row:
@@ -133,7 +133,7 @@ def _nearest(found: Found) -> list[str]:
     ]
 
 
-def _method(found: Found) -> list[str]:
+def _method(work: Work, found: Found) -> list[str]:
     count = Counter(row["stage"] for row in found.rows)
     numbers = [
         [SPACE.label(key), SPACE.value(key, low), SPACE.value(key, high), ABOUT[key][1]]
@@ -141,16 +141,8 @@ def _method(found: Found) -> list[str]:
     ]
     return [
         "#### How was searched",
-        f"An interpretation chooses what the paper leaves open, and keeps all numbers that it gives. {count['random']} "
-        f"interpretations were drawn with the seed {SEED}. The search was then tuned to the distance below: around the "
-        f"best of them, and in rounds around the best of all so far, {count['refined']} more were drawn, every number "
-        f"times e^(s ξ), ξ normal, s from {WHOLE.far:g} down to {WHOLE.close:g}; {count['neighbour']} neighbours of "
-        "the nearest show how much hangs on its numbers. Shares are of the random ones alone.",
-        "The 2 ms lie between sample and force. Where in the round trip they sit changes no motion, only which book is "
-        "seen: *sampled* is what a controller in front of them reads, *true* what acts on the device behind them. A "
-        "low-pass over the position itself, as the paper's words could also mean, is not among the choices.",
+        work.tell("method", seed=SEED, far=WHOLE.far, close=WHOLE.close, **count),
         list_of_choices(SPACE),
         markdown_table(["number, drawn evenly in its logarithm", "from", "to", "why"], numbers, numbers=(1, 2)),
-        "The distance of an interpretation is the sum over the claims of how far each is from holding: ln of the "
-        "factor that is missing (at most 3), 1 for a yes that is a no, 3 for a run that diverged.",
+        work.tell("distance"),
     ]
