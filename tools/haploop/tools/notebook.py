@@ -20,7 +20,7 @@ Notebook = dict[str, Any]
 
 
 def run_cells(notebook: Notebook) -> None:
-    """Runs every code cell and replace its outputs.
+    """Runs every code cell and replaces its outputs.
 
     Raises:
         Exception: whatever a cell raises; the notebook is then to be thrown away.
@@ -35,7 +35,7 @@ def run_cells(notebook: Notebook) -> None:
 
 
 def _outputs(source: str, names: dict[str, Any], number: int) -> list[dict[str, Any]]:
-    """Runs the code of cell ``number`` and return what it gave."""
+    """Runs the code of cell ``number`` and returns its outputs."""
     tree, file = ast.parse(source), f"cell {number}"
     shows = bool(tree.body) and isinstance(tree.body[-1], ast.Expr) and not source.rstrip().endswith(";")
     last = tree.body.pop() if shows else None
@@ -67,7 +67,7 @@ def _figures() -> list[str]:
 
 
 def main(path: Path) -> None:
-    """Runs a notebook and write it back."""
+    """Runs a notebook and writes it back."""
     path = path.resolve()
     notebook = json.loads(path.read_text(encoding="utf-8"))
     os.chdir(path.parent)

@@ -141,10 +141,13 @@ class Effect:
 
 
 def at(scene: Resolved, key: str) -> Any:
-    """Returns what stands at a dotted key of a scene; None where nothing does."""
+    """Returns the value at a dotted key of a scene or a summary, lists counted from 0; None where there is none."""
     found: Any = scene
     for part in key.split("."):
-        found = found.get(part) if isinstance(found, dict) else None
+        if isinstance(found, list):
+            found = found[int(part)] if part.isdecimal() and int(part) < len(found) else None
+        else:
+            found = found.get(part) if isinstance(found, dict) else None
     return found
 
 

@@ -12,7 +12,7 @@ FAILED, WRONG_USE = 1, 2
 
 
 def leave(message: str, status: int) -> NoReturn:
-    """Prints a message for people and exit."""
+    """Prints a message for people and exits."""
     print(message, file=sys.stderr)
     raise SystemExit(status)
 

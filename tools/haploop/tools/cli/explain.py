@@ -24,7 +24,7 @@ _READING = (
 
 
 def explain_scene(scene_path: Path, overrides: list[str], plugins: list[Path], as_json: bool) -> None:
-    """Prints the plan of a scene and count what it costs; no process is started."""
+    """Prints the plan of a scene and what it costs; no process is started."""
     from haploop.launch.plan.plan import plan
     from haploop.launch.scene.elements import elements_of, try_out
     from haploop.launch.scene.file import load
@@ -85,7 +85,7 @@ def as_data(scene: dict[str, Any], planned: Plan, costs: Bill) -> dict[str, Any]
 
 
 def explanation(scene: dict[str, Any], planned: Plan, costs: Bill) -> RenderableType:
-    """Returns the same for people."""
+    """Returns the plan and its costs as tables for the terminal."""
     from rich.console import Group
     from rich.text import Text
 

@@ -28,7 +28,7 @@ def run_scene(
     as_json: bool,
     viewing: Viewing,
 ) -> None:
-    """Runs a scene, show how it goes and what came of it."""
+    """Runs a scene with progress, and shows its summary."""
     from haploop.launch.runs.start import prepare, run
     from haploop.tools.render.progress import ProgressLine
     from haploop.tools.render.report import print_summary

@@ -21,7 +21,7 @@ def kinds_with(plugins: list[Path]) -> dict[str, type[Element]]:
 
 
 def check_scene(scene_path: Path, overrides: list[str], plugins: list[Path], as_json: bool) -> None:
-    """Says whether a scene can be run; print the resolved scene."""
+    """Prints the resolved scene, and whether it can be run."""
     from haploop.launch.scene.file import load
     from haploop.launch.scene.toml_writer import to_toml
 
@@ -36,7 +36,7 @@ def check_scene(scene_path: Path, overrides: list[str], plugins: list[Path], as_
 
 
 def print_notes(scene: dict[str, Any]) -> None:
-    """Says on stderr what in a resolved scene may not be what was meant."""
+    """Prints on stderr what in a resolved scene may not be what was meant."""
     from haploop.launch.plan.effects import notes
 
     for note in notes(scene):
@@ -74,7 +74,7 @@ def _parameters(element: type[Element]) -> dict[str, Any]:
 
 
 def plot_directory(directory: Path) -> None:
-    """Draws the figure of a run, or the map of a sweep, and name its file."""
+    """Draws the figure of a run, or the map of a sweep, and names its file."""
     from haploop.tools.figure.data import FigureError
     from haploop.tools.sweep.table import is_sweep
 

@@ -29,7 +29,7 @@ class LiveRuns:
     """The live runs of this user, as a viewer finds and steers them."""
 
     def live(self) -> Sequence[LiveRun]:
-        """Returns those that live now, the oldest first."""
+        """Returns the runs that live now, the oldest first."""
         from haploop.launch.processes import run_directory
 
         return run_directory.live_runs()
@@ -129,7 +129,7 @@ class Viewing:
 
 @contextlib.contextmanager
 def viewing(wanted: bool, in_process: bool) -> Iterator[Viewing]:
-    """Shows what is run meanwhile from its first tick on; when it is over, keep the page until Ctrl-C.
+    """Shows what is run meanwhile from its first tick on; when it is over, keeps the page until Ctrl-C.
 
     The viewer is a process of its own; what becomes of it is no matter to the run.
     """
@@ -175,7 +175,7 @@ class _Viewer(Viewing):
             print(f"The page is at {self._link}", file=sys.stderr, flush=True)
 
     def stay(self) -> None:
-        """Keeps the page until Ctrl-C, or until it ends by itself; leave no process behind."""
+        """Keeps the page until Ctrl-C, or until it ends by itself; leaves no process behind."""
         if not (process := self._process):
             return
         with contextlib.suppress(KeyboardInterrupt):

@@ -132,7 +132,7 @@ class Pool:
                 future.cancel()
 
     def _by_itself(self, work: Work, items: Sequence[Any], stop: Callable[[], bool]) -> Iterator[list[tuple[Any, Any]]]:
-        """Items that were under way when a worker died, with nothing beside it."""
+        """Runs items that were under way when a worker died, with nothing beside them."""
         self._executor.renew()
         if stop():
             return

@@ -28,7 +28,7 @@ __all__ = ["FigureError", "draw", "make_figure"]
 
 
 def draw(run_directory: Path, target: Path | None = None) -> Path:
-    """Draws a run.
+    """Draws the figure of a run into a file.
 
     Args:
         run_directory: what ``haploop run`` made; the log of a run that was killed serves as well.
@@ -46,7 +46,7 @@ def draw(run_directory: Path, target: Path | None = None) -> Path:
 
 
 def make_figure(run: RunData) -> Figure:
-    """Returns all panels, as a matplotlib figure.
+    """Makes the figure of a run, with all panels.
 
     Raises:
         FigureError: matplotlib is missing.

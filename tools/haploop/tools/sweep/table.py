@@ -24,7 +24,7 @@ class NeedsPyarrow(ImportError):
 
 
 def pyarrow() -> Any:
-    """Returns the module, with its Parquet.
+    """Imports pyarrow with its Parquet.
 
     Raises:
         NeedsPyarrow: it is not installed.
@@ -49,7 +49,7 @@ class Column:
 
 
 def make_schema(columns: Iterable[Column], sweep: str) -> Any:
-    """Returns the schema; units stand in the metadata of the fields, the resolved sweep and the versions in its own."""
+    """Makes the schema; units stand in the metadata of the fields, the resolved sweep and the versions in its own."""
     arrow = pyarrow()
     fields = [
         arrow.field(
@@ -61,7 +61,7 @@ def make_schema(columns: Iterable[Column], sweep: str) -> Any:
 
 
 def make_table(rows: Sequence[Mapping[str, Any]], schema: Any) -> Any:
-    """Rows as an Arrow table; what a row does not have is null."""
+    """Makes an Arrow table of rows; what a row does not have is null."""
     arrow = pyarrow()
     arrays = [arrow.array([row.get(field.name) for row in rows], type=field.type) for field in schema]
     return arrow.Table.from_arrays(arrays, schema=schema)
@@ -108,7 +108,7 @@ def is_sweep(directory: Path) -> bool:
 
 
 def read(directory: str | Path, *, scenes: bool = True) -> SweepTable:
-    """Returns the table of a sweep, of a running or interrupted one as far as it is written.
+    """Reads the table of a sweep, of a running or interrupted one as far as it is written.
 
     Args:
         directory: that the sweep writes to.

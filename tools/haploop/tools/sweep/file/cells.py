@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from haploop.launch.batch.stacking import runs_in_arrays
+from haploop.launch.plan.effect import at
 from haploop.launch.scene.check import resolve
 from haploop.launch.scene.elements import elements_of, try_out
 from haploop.launch.scene.layers import Layers
@@ -180,7 +181,7 @@ class Sweep:
         ]
 
     def axis_columns(self) -> list[Column]:
-        """Returns one an axis; the seed, where it is one, is a whole number."""
+        """Returns a column for each axis; the seed, where it is one, is a whole number."""
         kinds = {True: TEXT, False: NUMBER}
         return [
             Column(axis.key, WHOLE if axis.key == SEED else kinds[axis.unit is None], axis.unit or "")
@@ -242,10 +243,5 @@ class Refused(SceneError):
 
 def _entry(result: dict[str, Any], column: Column) -> Any:
     """Returns the value of a result at a dotted key; None where there is none."""
-    value: Any = result
-    for part in column.name.split("."):
-        if isinstance(value, list):
-            value = value[int(part)] if part.isdecimal() and int(part) < len(value) else None
-        else:
-            value = value.get(part) if isinstance(value, dict) else None
+    value = at(result, column.name)
     return value if value is None or column.kind != NUMBER else float(value)

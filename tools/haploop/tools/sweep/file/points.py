@@ -121,7 +121,7 @@ def _even(first: Decimal, last: Decimal, steps: int) -> Iterator[float]:
 
 
 def _in_ratio(first: float, last: float, count: int) -> list[float]:
-    """Returns the ends as they are."""
+    """Returns values even in ratio, the ends as they are given."""
     if not first * last > 0.0:
         raise PointsError("scale", "A log scale needs two ends of one sign, neither of them 0.")
     inner = (first * (last / first) ** (k / (count - 1)) for k in range(1, count - 1))

@@ -35,7 +35,7 @@ class RecordError(ValueError):
 
 
 def make_columns(names: Sequence[str], sweep: Sweep, kinds: dict[str, type[Element]]) -> list[Column]:
-    """Returns a column each; the verdict is always among them.
+    """Makes a column for each key; the verdict is always among them.
 
     Args:
         names: dotted keys.
@@ -74,7 +74,7 @@ def wants_trajectories(columns: Sequence[Column]) -> bool:
 
 
 def _samples(sweep: Sweep) -> Iterator[dict[str, Any]]:
-    """Scenes of the corners of the grid; the base where none of them can be run."""
+    """Returns the scenes of the corners of the grid; the base where none of them can be run."""
     found = []
     for cell in (0, sweep.count - 1):
         try:
@@ -105,7 +105,7 @@ def _leaves(value: Any, key: str = "") -> dict[str, Any]:
 
 
 def _without_places(name: str) -> str:
-    """Returns an element may be swapped in later, so that the list of elements is longer than it is at first."""
+    """Returns a key with every place in a list as 0: an element that is swapped in later makes the list longer."""
     return ".".join("0" if part.isdecimal() else part for part in name.split("."))
 
 

@@ -54,7 +54,7 @@ class SweepFile(Model):
 
 
 def load(path: Path, overrides: Sequence[str] = (), sources: Sources = ()) -> Sweep:
-    """Returns the resolved sweep of a TOML file.
+    """Reads the resolved sweep of a TOML file.
 
     Args:
         path: the sweep file.
@@ -79,7 +79,7 @@ class _Reader:
         self._data = data
 
     def sweep(self, overrides: Sequence[str]) -> Sweep:
-        """Returns the sweep, or every mistake."""
+        """Makes the sweep."""
         table = self._table()
         base = self._base(overrides)
         shape = base or self._unchanged()
@@ -92,7 +92,7 @@ class _Reader:
         return Sweep(title, base, tuple(axes), table.repeat, tuple(record), bisect, self._sources)
 
     def _table(self) -> SweepFile | None:
-        """Returns the shape of the file."""
+        """Validates the shape of the file; its mistakes are added."""
         table = None
         try:
             table = SweepFile.model_validate(self._data)
@@ -135,7 +135,7 @@ class _Reader:
             return None
 
     def _placed(self, mistake: Mistake, changes: Mapping[str, Any]) -> Mistake:
-        """Returns a mistake in what ``[set]`` laid over the scene is one of this file."""
+        """Returns a mistake of the scene as one of this file where ``[set]`` made it."""
         if mistake.file == COMMAND_LINE and mistake.key in changes:
             return replace(mistake, file=shown(self._layers.path), key=f"set.{mistake.key}")
         return mistake
@@ -206,7 +206,7 @@ class _Reader:
         return make_points(span, number)
 
     def _complain_of_span(self, at: KeyPath, what: str, message: str, key: KeyPath, schema: dict[str, Any]) -> None:
-        """Its keys are those of the span; they are told as those of the file."""
+        """Adds a mistake in a span, with its keys as those of the file."""
         layers = Layers(self._layers.path, self._layers.value(at))
         complain(layers, what, message, key, schema)
         name = ".".join(map(str, at))

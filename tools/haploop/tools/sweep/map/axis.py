@@ -42,7 +42,7 @@ class Ruler:
 
     @classmethod
     def from_axis(cls, axis: Axis) -> Ruler:
-        """Returns the ruler that suits an axis' values."""
+        """Makes the ruler that suits an axis' values."""
         if axis.names:
             return cls(axis, "even", 1.0, "")
         return cls(axis, _scale(axis.planned), *with_prefix(axis.values, axis.unit))

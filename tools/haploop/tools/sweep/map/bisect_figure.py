@@ -33,7 +33,7 @@ _STRIP = 0.024
 
 
 def bisect_figure(data: MapData) -> Figure:
-    """Returns the boundaries of a finished bisecting sweep with two or three axes.
+    """Makes the figure of the boundaries of a finished bisecting sweep with two or three axes.
 
     Raises:
         FigureError: matplotlib is missing.
@@ -75,7 +75,7 @@ def _over(data: MapData, rulers: Sequence[Ruler], second: Axis | None, number: i
 
 
 def _draw_over(ax: Axes, overs: Sequence[PanelLines], rulers: Sequence[Ruler]) -> dict[str, dict[str, Any]]:
-    """Returns the exact limit of every line in its colour, and the bounds where there is one line."""
+    """Draws the exact limit of every line in its colour, and the bounds where there is one line; returns the styles."""
     names = [boundary.name for over in overs for boundary in over.boundaries if boundary.lines]
     styles = line_styles(list(dict.fromkeys(names)))
     for number, over in enumerate(overs):

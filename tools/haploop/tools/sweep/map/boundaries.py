@@ -9,12 +9,13 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from haploop.launch.plan.effect import at
 from haploop.tools.linear.bounds import Bound, bounds_of
 from haploop.tools.linear.linearity import installed_kinds, left_out, why_not_linear
 from haploop.tools.linear.one_tick import NotLinear, OneTickMap
 from haploop.tools.sweep.map.axis import Ruler
 from haploop.tools.sweep.map.data import STIFFNESS
-from haploop.tools.sweep.map.plane import Plane, value_at
+from haploop.tools.sweep.map.plane import Plane
 
 EXACT = "ρ(M) = 1"
 
@@ -66,27 +67,29 @@ def bound_boundaries(plane: Plane) -> list[Boundary]:
 
     A bound that applies but allows no wall of the panel, or every one, has no lines.
     """
-    if value_at(plane.scene, STIFFNESS) is None:
+    if at(plane.scene, STIFFNESS) is None:
         return []
     known: dict[tuple[float, ...], dict[str, Bound]] = {}
 
-    def at(x: float, y: float) -> dict[str, Bound]:
+    def bounds_at(x: float, y: float) -> dict[str, Bound]:
         key = plane.but_for_stiffness(x, y)
         if key not in known:
             known[key] = {bound.name: bound for bound in bounds_of(plane.at(x, y))}
         return known[key]
 
     first = {bound.name: bound for bound in bounds_of(plane.scene)}
-    lines = {name: plane.zero_lines(_level(plane, at, name), whole_ticks=True) for name in first}
+    lines = {name: plane.zero_lines(_level(plane, bounds_at, name), whole_ticks=True) for name in first}
     applied = {name for bounds in known.values() for name, bound in bounds.items() if bound.applies}
     return [Boundary(name, _MEANING[bound.kind], lines[name]) for name, bound in first.items() if name in applied]
 
 
-def _level(plane: Plane, at: Callable[[float, float], dict[str, Bound]], name: str) -> Callable[[float, float], float]:
+def _level(
+    plane: Plane, bounds_at: Callable[[float, float], dict[str, Bound]], name: str
+) -> Callable[[float, float], float]:
     """Returns the logarithm of the wall's stiffness over what a bound allows; NaN where the bound does not apply."""
 
     def level(x: float, y: float) -> float:
-        allowed = at(x, y)[name].stiffness_N_m
+        allowed = bounds_at(x, y)[name].stiffness_N_m
         if allowed is None:
             return math.nan
         stiffness = plane.stiffness(x, y)

@@ -19,7 +19,7 @@ Level = Callable[[float, float], float]
 
 
 def fine_values(ruler: Ruler, points: int, own: bool) -> np.ndarray:
-    """Values along an axis between its cells' outermost edges, even in its scale.
+    """Returns values along an axis between its cells' outermost edges, even in its scale.
 
     Args:
         ruler: the axis.
@@ -77,7 +77,7 @@ def _at_scenes(places: np.ndarray, exact: tuple[bool, bool]) -> np.ndarray:
 
 
 def _along_one(level: Level, xs: np.ndarray, ys: np.ndarray, exact: tuple[bool, bool]) -> list[np.ndarray]:
-    """Zeros along the one axis that has several values, each a line of one point."""
+    """Finds the zeros along the one axis that has several values, each a line of one point."""
     heights = np.array([[level(x, y) for x in xs] for y in ys]).ravel()
     found = []
     for first in np.flatnonzero(heights[:-1] * heights[1:] < 0.0):
@@ -88,7 +88,7 @@ def _along_one(level: Level, xs: np.ndarray, ys: np.ndarray, exact: tuple[bool, 
 
 
 def _exact(level: Level, place: np.ndarray, xs: np.ndarray, ys: np.ndarray, exact: tuple[bool, bool]) -> np.ndarray:
-    """Returns the zero on the edge of the grid on which ``place`` (count_verdicts in grid lines) lies."""
+    """Returns the zero on the edge of the grid on which ``place`` (counted in grid lines) lies."""
     grid = (xs, ys)
     whole = np.rint(place)
     off = np.abs(place - whole)

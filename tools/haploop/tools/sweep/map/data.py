@@ -51,7 +51,7 @@ class Axis:
 
     @classmethod
     def from_column(cls, key: str, unit: str, column: Sequence[Any], planned: Sequence[Any] = ()) -> Axis:
-        """Returns the axis of a column of the table; ``planned`` are values the sweep has, run or not."""
+        """Makes the axis of a column of the table; ``planned`` are values the sweep has, run or not."""
         given = [*planned, *column]
         if any(isinstance(value, str | bool | np.bool_ | list | dict) for value in given):
             names = tuple(dict.fromkeys(_name(value) for value in given))
@@ -191,7 +191,7 @@ def is_number(value: Any) -> bool:
 
 
 def verdict_number(word: str | None) -> int:
-    """Its place in ``VERDICTS``; a run without a verdict failed."""
+    """Returns the place of a verdict in ``VERDICTS``; a run without a verdict failed."""
     return VERDICTS.index(word) if word in VERDICTS else FAILED
 
 
@@ -201,7 +201,7 @@ def make_map_data(
     sweep: dict[str, Any],
     boundary: Columns | None = None,
 ) -> MapData:
-    """Returns a sweep's table as data of a map.
+    """Makes the data of a map from a sweep's table.
 
     Args:
         columns: of the table, equally long; axes by their dotted keys.

@@ -41,7 +41,7 @@ class Edges:
 
 
 def find_edges(data: MapData) -> Edges:
-    """Returns the boundaries of a bisecting sweep that is finished."""
+    """Finds the boundaries of a bisecting sweep that is finished."""
     key, holds = data.sweep["bisect"]["axis"], data.sweep["bisect"].get("holds", "steady")
     along = next(axis for axis in data.axes if axis.key == key).as_planned()
     others = [axis for axis in data.axes if axis.key != key]
@@ -105,7 +105,7 @@ class StiffestSteady:
 
 
 def stiffest_steady(axes: tuple[Axis, ...], cells: Cells) -> StiffestSteady | None:
-    """Returns the stiffest steady wall below which every wall that was tried with the same other values is steady, too.
+    """Finds the stiffest steady wall below which every wall that was tried with the same other values is steady, too.
 
     Where several cells share it, the one in the middle of them is taken. None where the wall was not swept, or no
     softest wall is steady.

@@ -38,7 +38,7 @@ _SIDES: tuple[Literal["x", "y"], ...] = ("x", "y")
 
 
 def make_figure(data: MapData) -> Figure:
-    """Returns the map of a sweep's cells, a panel for each combination of the axes that do not lie along it.
+    """Makes the map of a sweep's cells, a panel for each combination of the axes that do not lie along it.
 
     Raises:
         FigureError: matplotlib is missing.
@@ -111,7 +111,7 @@ def _label(
 
 
 def draw_map(directory: Path, target: Path | None = None) -> Path:
-    """Draws a sweep, finished or not.
+    """Draws the map of a sweep, finished or not, into a file.
 
     Args:
         directory: that ``haploop sweep`` writes to.

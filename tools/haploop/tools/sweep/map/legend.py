@@ -44,7 +44,7 @@ WORDS = {LIMIT_CYCLE: "limit cycle", NO_CONTACT: "no contact"}
 
 
 def verdict_words(verdict: int) -> str:
-    """Returns a verdict as people write it."""
+    """Returns a verdict in words."""
     return WORDS.get(verdict, VERDICTS[verdict])
 
 

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from haploop.launch.plan.effect import at
 from haploop.protocol.ticks import TimebaseError
 from haploop.tools.sweep.map.axis import Ruler
 from haploop.tools.sweep.map.contour import FEW_POINTS, POINTS, Level, fine_values, zero_lines
@@ -66,17 +67,17 @@ class Plane:
         return [line[:, : len(self.rulers)] for line in lines]
 
     def _grid(self, which: int) -> tuple[np.ndarray, bool]:
-        """Values along an axis, and whether those between them are scenes as well."""
+        """Returns values along an axis, and whether those between them are scenes as well."""
         if which >= len(self.rulers):
             return np.zeros(1), False
         ruler = self.rulers[which]
         key = ruler.axis.key
-        own = bool(ruler.axis.names) or isinstance(value_at(self.scene, key), int)
+        own = bool(ruler.axis.names) or isinstance(at(self.scene, key), int)
         swept = any(other.axis.key == STIFFNESS for other in self.rulers)
         return fine_values(ruler, POINTS if swept else FEW_POINTS, own), not own
 
     def _between(self, level: Level, rate: float) -> Level:
-        """Delays are whole multiples of 1/rate; between two of them the level is interpolated."""
+        """Returns the level, interpolated between delays that are whole multiples of 1/rate, where delay is an axis."""
         keys = [ruler.axis.key for ruler in self.rulers]
         if _DELAY not in keys:
             return level
@@ -114,14 +115,3 @@ def set_key(scene: dict[str, Any], key: str, value: float) -> None:
         node = node[int(part)] if isinstance(node, list) else node[part]
     place: Any = int(last) if isinstance(node, list) else last
     node[place] = int(value) if isinstance(node[place], int) else float(value)
-
-
-def value_at(scene: dict[str, Any], key: str) -> Any:
-    """Returns the value at a dotted key of a resolved scene; None where there is none."""
-    node: Any = scene
-    for part in key.split("."):
-        if isinstance(node, list):
-            node = node[int(part)] if int(part) < len(node) else None
-        else:
-            node = node.get(part) if isinstance(node, dict) else None
-    return node

@@ -55,7 +55,7 @@ class Request:
 
 
 def sweep(request: Request, as_json: bool) -> None:
-    """Runs what is missing of a sweep and say what came of it."""
+    """Runs what is missing of a sweep and prints its summary."""
     if request.workers is not None and request.workers < 1:
         leave(f"--workers must be at least 1, but {request.workers} was given.", WRONG_USE)
     with plain_errors():

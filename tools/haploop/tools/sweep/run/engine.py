@@ -62,7 +62,7 @@ class Engine:
         )
 
     def run(self) -> list[Boundary]:
-        """Runs what is missing and write the table; the boundaries, where they are sought.
+        """Runs what is missing and writes the table; returns the boundaries, where they are sought.
 
         Raises:
             Stopped: before all was done.
@@ -96,14 +96,14 @@ class Engine:
             raise Stopped
 
     def _bisected(self, bisect: Bisect) -> list[Boundary]:
-        """Returns the boundary of every combination of the other axes and the seed, in that order."""
+        """Finds the boundary of every combination of the other axes and the seed, in that order."""
         axis = next(axis for axis in self._sweep.axes if axis.key == bisect.axis)
         stored = {row[CELL]: row for row in self._store.done((CELL, ENDED, WHY, VERDICT))}
         self._watcher.add_rows(list(stored.values()), stored=True)
         rows, next_cell = list(_rows_of(self._sweep, axis)), 0
 
         def run(candidates: Sequence[Candidate]) -> Iterator[tuple[int, Row]]:
-            """Yields a round: the grid at first, then one cell between its values in some of the rows."""
+            """Runs a round: the grid at first, then one cell between its values in some of the rows."""
             nonlocal next_cell
             at_points = next_cell == 0
             items = [
@@ -162,7 +162,7 @@ def _cell(item: Item) -> int:
 
 
 def _boundary_table(sweep: Sweep, bisect: Bisect, found: Sequence[Boundary]) -> Any:
-    """Returns one row a combination: the other axes, the seed, and what is known of the boundary."""
+    """Makes one row a combination: the other axes, the seed, and what is known of the boundary."""
     axis = next(axis for axis in sweep.axes if axis.key == bisect.axis)
     others = [column for column in sweep.axis_columns() if column.name != axis.key]
     numbers = [Column(name, NUMBER, axis.unit or "") for name in ("low", "high", "boundary")]

@@ -85,7 +85,7 @@ class Store:
         self.rows += len(rows)
 
     def finish(self, boundaries: Any = None) -> None:
-        """Merges all parts into the table, in the order of the cells; write the table of the boundaries, if any.
+        """Merges all parts into the table, in the order of the cells; writes the table of the boundaries, if any.
 
         Raises:
             StoreError: as for ``add``.
