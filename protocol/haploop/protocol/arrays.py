@@ -44,6 +44,8 @@ def nearest_multiple(value: Any, unit: Any) -> Any:
 
 def clipped(value: Any, most: Any) -> Any:
     """``value``, but not beyond +-``most``; what is no number stays none."""
+    if value.__class__ is float and most.__class__ is float:
+        return most if value > most else -most if value < -most else value
     return where(value > most, most, where(value < -most, -most, value))
 
 

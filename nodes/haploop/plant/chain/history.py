@@ -146,7 +146,7 @@ class ChainHistory(ABC):
 
         Args:
             tick: the first interval of the record.
-            positions_only: leave out all but x and what was held.
+            positions_only: leave out all states but x.
 
         Returns:
             Shape (steps + 1,) each; in a batch (steps + 1, members), but for ``command``, which all members share,
@@ -154,14 +154,12 @@ class ChainHistory(ABC):
         """
         done, self._done = self._done, []
         chain, (z, z_comp, held, *_) = self.chain, self.state
-        states = ("x",) if positions_only else chain.states
-        record = {name: _joined([one.states[:-1, at] for one in done], z[at]) for at, name in enumerate(states)}
-        lows = () if positions_only else chain.positions
-        for at, name in enumerate(lows):
-            record[f"{name}_low"] = _joined([one.comps[:-1, at] for one in done], z_comp[at])
-        for at, name in enumerate(self.held_names):
-            if not positions_only or name == "command":
-                record[name] = _joined([one.held[:, at] for one in done], held[at])
+        states = _columns([one.states[:-1] for one in done], z, 1 if positions_only else len(z))
+        record: dict[str, Any] = dict(zip(chain.states, states, strict=False))
+        if not positions_only:
+            comps = _columns([one.comps[:-1] for one in done], z_comp, chain.count)
+            record |= {f"{name}_low": comp for name, comp in zip(chain.positions, comps, strict=True)}
+        record |= zip(self.held_names, _columns([one.held for one in done], held, len(held)), strict=True)
         if self._members is not None:
             record["command"] = record["command"][:, 0]
             record["held_N"] = rows_of(self._forces, z.shape[-1])
@@ -175,5 +173,9 @@ class ChainHistory(ABC):
         self._sensor.select(kept)
 
 
-def _joined(parts: Iterable[np.ndarray], end: np.ndarray) -> np.ndarray:
-    return np.concatenate([*parts, end[None]])
+def _columns(parts: list[np.ndarray], end: np.ndarray, count: int) -> Iterable[np.ndarray]:
+    """Returns the first ``count`` columns of parts of shape (rows, columns[, members]), one after the other, and of
+    their end; in a batch each contiguous."""
+    if end.ndim == 1:
+        return np.vstack([*parts, end]).T[:count]
+    return (np.concatenate([*(part[:, at] for part in parts), end[at, None]]) for at in range(count))

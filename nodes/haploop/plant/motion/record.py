@@ -31,7 +31,12 @@ def change_over(held: Any, response: Any, x: Any, v: Any, force: Any, comp: Any)
         Shape (steps, intervals); all shapes may have one more axis, for the members of a batch.
     """
     of_x, of_v, of_force = held
-    return of_x * x + of_v * v + of_force * force + comp + response
+    change = of_x * x
+    change += of_v * v
+    change += of_force * force
+    change += comp
+    change += response
+    return change
 
 
 def record_of_holds(
@@ -110,13 +115,13 @@ def _alike(
         known, end = int(not first), first + count
         over, during = held[known:count, :, None], slice(first + known, end)
         dx = change_over(over[:, :3].swapaxes(0, 1), response[0, during], x, v, force, x_comp)
-        at_x = x + dx
-        rows["x"][during] = at_x
+        at_x = np.add(x, dx, out=rows["x"][during])
         if known:
             rows["x"][0] = x
         if not positions_only:
             dv = change_over(over[:, 3:].swapaxes(0, 1), response[1, during], x, v, force, v_comp)
-            rows["v"][during], rows["x_low"][during] = v + dv, dx - (at_x - x)
+            np.add(v, dv, out=rows["v"][during])
+            np.subtract(dx, at_x - x, out=rows["x_low"][during])
             if known:
                 rows["v"][0], rows["x_low"][0] = v, x_comp
             rows["force"][first:end] = force
