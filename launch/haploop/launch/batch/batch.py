@@ -27,8 +27,9 @@ from haploop.protocol.ticks import Timebase
 if TYPE_CHECKING:
     from haploop.controller.dissipation import Element
 
-# A column of a block holds about so many numbers: what is worked on at a time then stays in the cache.
-BLOCK = 32_768
+# A column of a block holds about so many numbers: with fewer, calls of NumPy take longer than what they do; more do not
+# stay in the cache.
+BLOCK = 98_304
 # An operand that is the same for all loops, or for all steps of a tick, is copied into buffers of NumPy's unless these
 # are shorter than a row of loops; that triples the time such an operation takes.
 _BUFFER = 512
