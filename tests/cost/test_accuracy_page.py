@@ -60,7 +60,7 @@ def changed(cost: Cost, change: Callable[[Point], Point]) -> Cost:
 
 def tables(cost: Cost) -> dict[str, FindingTable]:
     """The tables of findings by what they are about."""
-    names = ("The cheapest setting", "Methods", "The other prices", "What stiffness costs")
+    names = ("The cheapest setting", "Methods", "The other prices")
     return {name: table for table in findings(cost) for name in names if table.title.startswith(name)}
 
 
@@ -70,7 +70,7 @@ def rows(cost: Cost, table: str) -> dict[str, list[str]]:
 
 
 def test_the_page_holds_every_table_of_findings_with_and_without_prices(cost: Cost) -> None:
-    assert len(findings(cost)) == len(tables(cost)) == 4
+    assert len(findings(cost)) == len(tables(cost)) == 3
     assert list(tables(fake_cost())) == ["The cheapest setting", "Methods"]
     for made in (cost, fake_cost()):
         text = page(made)
@@ -139,13 +139,6 @@ def test_numbers_are_those_of_the_data(cost: Cost) -> None:
     assert prices["all effects at once"][0] == "the same scene without any"
     (note,) = tables(cost)["The other prices"].notes
     assert note == "The dearest effect is friction: without it a tick with all effects would save 250 of 400 µs."
-    stiffness = [cells[1:4] for cells in tables(cost)["What stiffness costs"].rows]
-    assert stiffness == [
-        ["0 ms", "220 N/m", "50.0"],
-        ["10 ms", "11.0 N/m", "20.0"],
-        ["1 kHz", "220 N/m", "6.00"],
-        ["5 kHz", "1100 N/m", "24.0"],
-    ]
 
 
 def test_on_a_machine_twice_as_slow_the_findings_about_methods_are_the_same(cost: Cost) -> None:
@@ -184,12 +177,6 @@ def test_where_no_setting_meets_the_tolerance_that_is_said(cost: Cost) -> None:
     assert next(iter(rows(none, "The cheapest setting").values()))[0] == "none"
     assert tables(none)["Methods"].notes == ("No setting came within the tolerance in any scene.",)
     assert rows(none, "Methods")["euler"][:3] == ["0 of 1", "–", "–"]
-
-
-def test_stiffness_that_runs_do_not_confirm_is_told_as_theory(cost: Cost) -> None:
-    made = dataclasses.replace(cost, prices=priced(confirmed=False))
-    limits = [cells[2] for cells in tables(made)["What stiffness costs"].rows]
-    assert limits == ["220 N/m", "11.0 N/m", "220 N/m in theory", "1100 N/m in theory"]
 
 
 def test_an_effect_that_chance_could_explain_is_not_called_dear(cost: Cost) -> None:
@@ -240,4 +227,4 @@ def test_without_measurements_the_command_says_what_to_run(tmp_path: Path) -> No
 def test_the_readme_links_to_the_page_on_its_first_screen_once_make_accuracy_has_written_it() -> None:
     first_screen = (HOUSE / "README.md").read_text(encoding="utf-8").splitlines()[:20]
     assert sum("](docs/accuracy.md)" in line for line in first_screen) == (HOUSE / "docs/accuracy.md").exists()
-    assert "cost.draw.page runs/accuracy docs" in (HOUSE / "Makefile").read_text(encoding="utf-8")
+    assert "cost.page runs/accuracy docs" in (HOUSE / "Makefile").read_text(encoding="utf-8")

@@ -33,7 +33,7 @@ def test_a_finished_measurement_is_not_made_again(smooth, tmp_path, monkeypatch)
             measurement.times(count_stages(counts))
             costs = measurement.cost(1e-6)
         monkeypatch.setattr(measure, "outcome", None)
-        monkeypatch.setattr(times, "in_process_us", None)
+        monkeypatch.setattr(times, "time_job", None)
     assert [stage["made"] for stage in first.values()] == [5, 10]
     assert again == {}
     assert len(costs.scenes[0].points) == 5
@@ -52,7 +52,7 @@ def test_what_was_stopped_goes_on_where_it_was_and_gives_a_cost_meanwhile(smooth
         return 1.0
 
     # Nothing is timed here, so that each call stands for one measurement.
-    monkeypatch.setattr(times, "in_process_us", interrupted)
+    monkeypatch.setattr(times, "time_job", interrupted)
     monkeypatch.setattr(times, "_warm", lambda *_: None)
     with Measurement(grids, tmp_path, 3, 0, exact_reference) as measurement:
         measurement.errors(count_stages({}))
@@ -61,7 +61,7 @@ def test_what_was_stopped_goes_on_where_it_was_and_gives_a_cost_meanwhile(smooth
         partial = measurement.cost(1e-6)
     assert len(partial.scenes[0].points) == 3
     assert partial.scenes[0].advice == ""
-    monkeypatch.setattr(times, "in_process_us", lambda job: timed.append(job.key) or 1.0)
+    monkeypatch.setattr(times, "time_job", lambda job: timed.append(job.key) or 1.0)
     with Measurement(grids, tmp_path, 3, 0, exact_reference) as measurement:
         measurement.times(count_stages({}))
         assert measurement.cost(1e-6).scenes[0].advice
@@ -71,7 +71,7 @@ def test_what_was_stopped_goes_on_where_it_was_and_gives_a_cost_meanwhile(smooth
 
 def test_every_round_times_every_candidate_once_in_an_order_of_its_own(smooth, tmp_path, monkeypatch):
     order = []
-    monkeypatch.setattr(times, "in_process_us", lambda job: order.append(job.key) or 1.0)
+    monkeypatch.setattr(times, "time_job", lambda job: order.append(job.key) or 1.0)
     monkeypatch.setattr(times, "_warm", lambda *_: None)
     with Measurement([grid(smooth, ["euler"], [1_000, 2_000, 5_000, 10_000])], tmp_path, 5, 0, exact_reference) as made:
         made.errors(count_stages({}))

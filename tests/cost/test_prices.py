@@ -181,6 +181,20 @@ def test_all_groups_are_measured_and_a_second_time_nothing_is(measuring: Measuri
     assert measuring.runs == runs
 
 
+def test_stiffness_that_runs_do_not_confirm_is_told_as_theory(
+    measuring: Measuring, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def words() -> set[str]:
+        return {price.buys for group in measuring.measure(0) if group.name == "control rate" for price in group.prices}
+
+    assert words() == {"a wall of up to 100 N/m stays steady"}
+    odd = StiffnessLimit(100.0, "steady", "steady")
+    monkeypatch.setattr(prices, "stiffness_limit", lambda scene, kinds: odd)
+    measuring.directory = measuring.directory / "odd"
+    measuring.directory.mkdir()
+    assert all(text.startswith("in theory a wall of up to 100 N/m stays steady") for text in words())
+
+
 @pytest.mark.slow
 def test_a_measurement_that_was_stopped_goes_on_where_it_was(measuring: Measuring, tmp_path: Path) -> None:
     """In the end every record is there once, as if it had not been stopped."""

@@ -1,4 +1,4 @@
-"""Findings about what accuracy costs: tables of scenes, methods, the other prices and the stiffness they buy."""
+"""Findings about what accuracy costs: tables of scenes, methods and the other prices."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from haploop.tools.ablation import NONE
 from haploop.tools.cost.advice import cheapest, length, meets, name_of, rate, setting
 from haploop.tools.cost.data import Cost, Point, Price, PriceGroup, SceneCost, chance_in
-from haploop.tools.render.units import amount, fixed, spring
+from haploop.tools.render.units import amount, fixed
 
 _NONE = "–"
 # Group and price -> the price in words, and what its ratio is against.
@@ -40,7 +40,7 @@ class FindingTable:
 def findings(cost: Cost) -> list[FindingTable]:
     """Returns the tables for which there are data."""
     groups = {group.name: group for group in cost.prices}
-    tables = (scene_table(cost), method_table(cost), price_table(groups), stiffness_table(groups))
+    tables = (scene_table(cost), method_table(cost), price_table(groups))
     return [table for table in tables if table.rows]
 
 
@@ -137,19 +137,6 @@ def price_table(groups: dict[str, PriceGroup]) -> FindingTable:
     return FindingTable("The other prices", ("", "against", "ratio of times"), rows, notes)
 
 
-def stiffness_table(groups: dict[str, PriceGroup]) -> FindingTable:
-    """Makes a row for every delay and control rate: the stiffest wall that stays steady, and the time it takes."""
-    rows = [
-        [group.title, price.what, _limit(price), fixed(price.time.median), group.unit]
-        for name in ("delay", "control rate")
-        if (group := groups.get(name))
-        for price in sorted(group.prices, key=lambda price: float(price.what.split()[0]))
-        if price.stiffness
-    ]
-    heads = ("", "", "stiffest steady wall", "time", "unit")
-    return FindingTable("What stiffness costs", heads, rows)
-
-
 def own_point(scene: SceneCost) -> Point | None:
     """Returns the point of the method and plant rate that the scene itself names."""
     return next((p for p in scene.points if (p.method, p.plant_rate) == (scene.own_method, scene.own_rate)), None)
@@ -194,8 +181,3 @@ def _ratio(point: Point | None, other: Point | None) -> str:
 
 def _entry(groups: dict[str, PriceGroup], name: str, what: str) -> Price | None:
     return next((price for price in groups[name].prices if price.what == what), None) if name in groups else None
-
-
-def _limit(price: Price) -> str:
-    assert price.stiffness is not None
-    return spring(price.stiffness.stiffness_N_m) + ("" if price.stiffness.confirmed else " in theory")

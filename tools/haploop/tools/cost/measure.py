@@ -98,11 +98,10 @@ class Measurement:
 
     def times(self, stage: Stage) -> None:
         """Makes every measurement of time that is missing; errors come first."""
-        clocks = {IN_PROCESS: times.in_process_us, PROCESSES: times.processes_us}
-        for what, clock in clocks.items():
-            jobs, repeats = self._jobs(what), self._repeats[what]
-            if count := times.missing(self._store, what, jobs, repeats):
-                times.measure(self._store, what, clock, jobs, repeats, stage(f"times, {what}", count))
+        for way, repeats in self._repeats.items():
+            jobs = self._jobs(way)
+            if count := times.missing(self._store, jobs, repeats):
+                times.measure(self._store, jobs, repeats, stage(f"times, {way}", count))
 
     def other_prices(self, stage: Stage) -> None:
         """Measures the prices of books, log, effects, processes, delay and control rate."""
@@ -111,11 +110,16 @@ class Measurement:
     def _prices(self) -> Prices:
         return Prices(scenes_folder(), self._store, self._repeats)
 
-    def _jobs(self, what: str) -> list[Job]:
+    def _jobs(self, way: str) -> list[Job]:
         """Returns a job for every candidate whose run had a tick; as processes, for those that ended as planned."""
-        found = ((c, self._key(c), self._outcome(c)) for grid in self._grids for c in grid.candidates)
-        jobs = [Job(c, key, came.ticks, came.error is None) for c, key, came in found if came and came.ticks]
-        return jobs if what == IN_PROCESS else [job for job in jobs if not job.diverges]
+        found = [(c, self._key(c), self._outcome(c)) for grid in self._grids for c in grid.candidates]
+        if way == PROCESSES:
+            return [times.processes_job(c, key, came.ticks) for c, key, came in found if came and came.error]
+        return [
+            times.in_process_job(c, key, came.ticks, diverges=came.error is None)
+            for c, key, came in found
+            if came and came.ticks
+        ]
 
     def _outcome(self, candidate: Candidate) -> Outcome | None:
         record = self._store.get(_OUTCOME, self._key(candidate))
@@ -127,7 +131,7 @@ class Measurement:
     def cost(self, tolerance_m: float) -> Cost:
         """Returns all that is known so far, the prices included."""
         scenes = [self._scene_cost(grid, tolerance_m) for grid in self._grids if self._note(grid)]
-        loads = [times.quiet(self._store, what, self._jobs(what), n) for what, n in self._repeats.items()]
+        loads = [times.quiet(self._store, self._jobs(way), n) for way, n in self._repeats.items()]
         return Cost(
             machine=machine(),
             versions=versions(),
@@ -153,7 +157,7 @@ class Measurement:
         return dataclasses.replace(made, advice=advice(made, tolerance_m)) if complete else made
 
     def _untimed(self) -> int:
-        return times.missing(self._store, IN_PROCESS, self._jobs(IN_PROCESS), self._repeats[IN_PROCESS])
+        return times.missing(self._store, self._jobs(IN_PROCESS), self._repeats[IN_PROCESS])
 
     def _point(self, candidate: Candidate) -> Point | None:
         came = self._outcome(candidate)

@@ -17,7 +17,7 @@ from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol, TypeVar
+from typing import Any
 
 import numpy as np
 
@@ -41,57 +41,44 @@ _QUIET = "quiet for "
 _STEPS = 100_000
 
 
-class Timed(Protocol):
-    """A thing that can be timed again and again.
-
-    Attributes:
-        key: its name in the store.
-        family: one of each family is run untimed beforehand, which warms up all of it.
-    """
-
-    @property
-    def key(self) -> str: ...
-
-    @property
-    def family(self) -> Hashable: ...
-
-
-TimedType = TypeVar("TimedType", bound=Timed)
-
-
 @dataclass(frozen=True)
 class Job:
-    """A candidate to be timed.
+    """A scene and a way to time its run.
 
     Attributes:
+        way: ``IN_PROCESS`` or ``PROCESSES``.
+        family: jobs of which one, run untimed beforehand, warms up all.
         key: its name in the store.
-        ticks: that its run has.
-        diverges: whether it ends early because of that.
+        scene: resolved.
+        clock: runs it once and returns the time of a tick, µs; None where the run failed.
     """
 
-    candidate: Candidate
+    way: str
+    family: Hashable
     key: str
-    ticks: int
-    diverges: bool = False
-
-    @property
-    def family(self) -> Hashable:
-        """Scene and method."""
-        return self.candidate.path, self.candidate.method
+    scene: dict[str, Any]
+    clock: Callable[[], float | None]
 
 
-def in_process_us(job: Job) -> float | None:
-    """Returns the time of a tick of a candidate in this process, µs.
+def in_process_job(candidate: Candidate, key: str, ticks: int, diverges: bool) -> Job:
+    """Makes a job of a candidate in this process.
 
-    One that diverges has but a few ticks: it is let go on far beyond where it is stopped otherwise, in blocks so short
-    that there is more than the first one where it can be.
+    A run that diverges has but a few ticks: it is let go on far beyond where it is stopped otherwise, in blocks so
+    short that there is more than the first one where it can be.
     """
-    scene = job.candidate.scene
-    assert scene is not None
-    if job.diverges:
-        short = {**scene["run"], "block_ticks": max(_LEAST_BLOCK, job.ticks // 2)}
+    assert candidate.scene is not None
+    scene = candidate.scene
+    if diverges:
+        short = {**scene["run"], "block_ticks": max(_LEAST_BLOCK, ticks // 2)}
         scene = {**scene, "diverged_beyond": _FAR_M, "run": short}
-    return loop_us(scene)
+    return Job(IN_PROCESS, (candidate.path, candidate.method), key, scene, lambda: loop_us(scene))
+
+
+def processes_job(candidate: Candidate, key: str, ticks: int) -> Job:
+    """Makes a job of a candidate as processes, every plant step logged."""
+    assert candidate.scene is not None
+    overrides = [*candidate.overrides, "run.log=steps"]
+    return Job(PROCESSES, "", key, candidate.scene, lambda: run_us(candidate.path, overrides, ticks))
 
 
 def loop_us(scene: dict[str, Any]) -> float | None:
@@ -133,11 +120,6 @@ def timed_s(work: Callable[[], object]) -> float:
         gc.enable()
 
 
-def processes_us(job: Job) -> float | None:
-    """Returns the time of a tick as processes, every plant step logged, µs; None where the run failed."""
-    return run_us(job.candidate.path, [*job.candidate.overrides, "run.log=steps"], job.ticks)
-
-
 def run_us(path: Path, overrides: Sequence[str], ticks: int) -> float | None:
     """Returns the time of a tick as processes, starting up not included, µs; None where the run failed.
 
@@ -154,34 +136,34 @@ def run_us(path: Path, overrides: Sequence[str], ticks: int) -> float | None:
     return summary["wall_s"] / summary["ticks"] * 1e6
 
 
-def missing(store: Store, what: str, jobs: Sequence[Timed], repeats: int) -> int:
+def missing(store: Store, jobs: Sequence[Job], repeats: int) -> int:
     """Returns how many measurements are still to be made."""
-    return sum(not store.has(what, job.key, repeat) for job in jobs for repeat in range(repeats))
+    return sum(not store.has(job.way, job.key, repeat) for job in jobs for repeat in range(repeats))
 
 
-def measure(
-    store: Store,
-    what: str,
-    clock: Callable[[TimedType], float | None],
-    jobs: Sequence[TimedType],
-    repeats: int,
-    advance: Callable[[], None],
-) -> None:
-    """Makes every measurement that is missing; ``advance`` is called after each.
+def time_job(job: Job) -> float | None:
+    """Runs a job once and returns the time of a tick, µs; None where the run failed."""
+    return job.clock()
+
+
+def measure(store: Store, jobs: Sequence[Job], repeats: int, advance: Callable[[], None]) -> None:
+    """Makes every measurement of jobs of one way that is missing; ``advance`` is called after each.
 
     With each goes into the store the load of the machine in its round.
     """
-    if not missing(store, what, jobs, repeats):
+    if not missing(store, jobs, repeats):
         return
+    way = jobs[0].way
     with _still():
-        _warm(store, what, clock, jobs, repeats)
+        if way == IN_PROCESS:
+            _warm(store, jobs, repeats)
         for repeat in range(repeats):
-            seen = observe_machine(alone=what == IN_PROCESS)
+            seen = observe_machine(alone=way == IN_PROCESS)
             for job in random.Random(_SEED + repeat).sample(jobs, len(jobs)):
-                if not store.has(what, job.key, repeat):
-                    took = clock(job)
-                    store.add(_QUIET + what, job.key, seen, repeat)
-                    store.add(what, job.key, took, repeat)
+                if not store.has(way, job.key, repeat):
+                    took = time_job(job)
+                    store.add(_QUIET + way, job.key, seen, repeat)
+                    store.add(way, job.key, took, repeat)
                     advance()
 
 
@@ -198,20 +180,15 @@ def _still() -> Iterator[None]:
         gc.unfreeze()
 
 
-def _warm(
-    store: Store, what: str, clock: Callable[[TimedType], float | None], jobs: Sequence[TimedType], repeats: int
-) -> None:
-    """Runs every family once untimed: imports, first calls, the interpreter's adaptive code."""
-    if what == PROCESSES:
-        return
-    first = {j.family: j for j in jobs if missing(store, what, [j], repeats)}
-    for job in first.values():
-        clock(job)
+def _warm(store: Store, jobs: Sequence[Job], repeats: int) -> None:
+    """Runs one of every family once untimed: imports, first calls, the interpreter's adaptive code."""
+    for job in {job.family: job for job in jobs if missing(store, [job], repeats)}.values():
+        time_job(job)
 
 
-def quiet(store: Store, what: str, jobs: Sequence[Timed], repeats: int) -> Load | None:
+def quiet(store: Store, jobs: Sequence[Job], repeats: int) -> Load | None:
     """Returns the load of the machine in the rounds of these jobs; None where nothing was measured."""
-    return machine_load(seen for job in jobs for seen in store.all(_QUIET + what, job.key, repeats))
+    return machine_load(seen for job in jobs for seen in store.all(_QUIET + job.way, job.key, repeats))
 
 
 def observe_machine(alone: bool) -> dict[str, Any]:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +15,7 @@ from haploop.protocol.block_length import BlockLength
 from haploop.protocol.ticks import Timebase
 from haploop.tools.ablation import ablations
 from haploop.tools.cost.grid import digest
-from haploop.tools.cost.times import IN_PROCESS, PROCESSES, loop_us, run_us, timed_s
+from haploop.tools.cost.times import IN_PROCESS, PROCESSES, Job, loop_us, run_us, timed_s
 
 DELAYS_S = (0.0, 0.001, 0.002, 0.005, 0.010)
 CONTROL_RATES_HZ = (1_000, 500, 2_000, 5_000, 10_000)
@@ -25,31 +25,8 @@ _IN_PROCESS_S, _EFFECTS_S, _PROCESSES_S = 4.0, 0.5, 2.0
 _FREE = "diverged_beyond=1e9"
 
 
-@dataclass(frozen=True)
-class PriceJob:
-    """A scene and a way to run it.
-
-    Attributes:
-        way: ``IN_PROCESS`` or ``PROCESSES``.
-        family: jobs that are warmed up together.
-        key: its name in the store.
-        scene: resolved.
-        clock: runs it once and returns the time of a tick, µs; None where the run failed.
-    """
-
-    way: str
-    family: Hashable
-    key: str
-    scene: dict[str, Any]
-    clock: Callable[[], float | None]
-
-    def measure(self) -> float | None:
-        """Runs it once and returns the time of a tick, µs."""
-        return self.clock()
-
-
 # Group -> what -> job; jobs of the same key are the same and timed once.
-Jobs = dict[str, dict[str, PriceJob]]
+Jobs = dict[str, dict[str, Job]]
 
 
 def price_jobs(scenes: Path, made_with: Sequence[Any]) -> Jobs:
@@ -61,10 +38,10 @@ def price_jobs(scenes: Path, made_with: Sequence[Any]) -> Jobs:
     """
     wall, everything = scenes / "fig6a.toml", scenes / "all_effects.toml"
 
-    def in_process(settings: Sequence[str] = ()) -> PriceJob:
+    def in_process(settings: Sequence[str] = ()) -> Job:
         return _in_process(load(wall, [f"duration={_IN_PROCESS_S}", _FREE, _prompt(), "run.log=none", *settings]))
 
-    def as_processes(settings: Sequence[str]) -> PriceJob:
+    def as_processes(settings: Sequence[str]) -> Job:
         return _as_processes(wall, [f"duration={_PROCESSES_S}", _FREE, _prompt(), *settings])
 
     effects = load(everything, [f"duration={_EFFECTS_S}", _FREE, "run.log=none"])
@@ -83,27 +60,24 @@ def _prompt(delay_s: float = 0.0) -> str:
     return f"clock.round_trip_delay={delay_s}"
 
 
-def _keyed(jobs: Mapping[str, PriceJob], made_with: Sequence[Any]) -> dict[str, PriceJob]:
+def _keyed(jobs: Mapping[str, Job], made_with: Sequence[Any]) -> dict[str, Job]:
     """Returns the same jobs, with keys made of all that their times depend on."""
-    return {
-        what: PriceJob(job.way, job.family, digest([job.key, job.scene, *made_with]), job.scene, job.clock)
-        for what, job in jobs.items()
-    }
+    return {what: replace(job, key=digest([job.key, job.scene, *made_with])) for what, job in jobs.items()}
 
 
-def _in_process(scene: dict[str, Any], name: str = "") -> PriceJob:
+def _in_process(scene: dict[str, Any], name: str = "") -> Job:
     """Makes a job of plant, controller and books in one process; a name keeps equal jobs apart."""
-    return PriceJob(IN_PROCESS, f"books {name}", f"books {name}", scene, lambda: loop_us(scene))
+    return Job(IN_PROCESS, f"books {name}", f"books {name}", scene, lambda: loop_us(scene))
 
 
-def _as_processes(path: Path, overrides: Sequence[str]) -> PriceJob:
+def _as_processes(path: Path, overrides: Sequence[str]) -> Job:
     scene = load(path, overrides)
-    return PriceJob(PROCESSES, "", "processes", scene, lambda: run_us(path, overrides, _ticks(scene)))
+    return Job(PROCESSES, "", "processes", scene, lambda: run_us(path, overrides, _ticks(scene)))
 
 
-def _bare(scene: dict[str, Any]) -> PriceJob:
+def _bare(scene: dict[str, Any]) -> Job:
     """Makes a job of plant and controller alone: their telemetry is made and thrown away."""
-    return PriceJob(IN_PROCESS, "bare", "bare", scene, lambda: bare_us(scene))
+    return Job(IN_PROCESS, "bare", "bare", scene, lambda: bare_us(scene))
 
 
 def bare_us(scene: dict[str, Any]) -> float:

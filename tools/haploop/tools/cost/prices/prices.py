@@ -12,9 +12,9 @@ from haploop.launch.plan.effects import EFFECTS
 from haploop.tools.ablation import AGAIN, NONE, WHOLE
 from haploop.tools.cost import times
 from haploop.tools.cost.data import Price, PriceGroup, Spread, price
-from haploop.tools.cost.prices.jobs import PriceJob, price_jobs
+from haploop.tools.cost.prices.jobs import price_jobs
 from haploop.tools.cost.store import Store
-from haploop.tools.cost.times import IN_PROCESS, PROCESSES
+from haploop.tools.cost.times import IN_PROCESS, PROCESSES, Job
 from haploop.tools.linear.stiffness_limit import StiffnessLimit, stiffness_limit
 from haploop.tools.machine import machine, source_digest, versions
 from haploop.tools.operations import operations
@@ -80,9 +80,9 @@ class Prices:
         every = {job.key: job for members in self._jobs.values() for job in members.values()}
         for way, repeats in self._repeats.items():
             jobs = [job for job in every.values() if job.way == way]
-            if count := times.missing(self._store, way, jobs, repeats):
+            if count := times.missing(self._store, jobs, repeats):
                 advance = stage(f"other prices, {way}", count)
-                times.measure(self._store, way, PriceJob.measure, jobs, repeats, advance)
+                times.measure(self._store, jobs, repeats, advance)
 
     def _limits_and_counts(self, stage: Stage) -> None:
         kinds = registry()
@@ -103,7 +103,7 @@ class Prices:
         """Returns the groups of which every time is known."""
         return [self._group(name) for name, jobs in self._jobs.items() if all(map(self._times, jobs.values()))]
 
-    def _times(self, job: PriceJob) -> list[float]:
+    def _times(self, job: Job) -> list[float]:
         """Returns the times of a job in µs per tick, as far as there are any; none for a run that failed."""
         values = self._store.all(job.way, job.key, self._repeats[job.way])
         return [] if None in values else values
@@ -123,7 +123,7 @@ class Prices:
             prices.append(price(what, found_us, baseline, words, is_left_out=name == "effects", **more))
         return PriceGroup(name, title, unit, self._repeats[way], how, prices)
 
-    def _limit(self, name: str, job: PriceJob) -> StiffnessLimit | None:
+    def _limit(self, name: str, job: Job) -> StiffnessLimit | None:
         found = self._store.get(_LIMIT, job.key) if name in _WITH_LIMIT else None
         return StiffnessLimit(**found) if found else None
 
