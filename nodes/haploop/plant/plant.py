@@ -141,6 +141,39 @@ class Plant:
         _, force, command = motion.last
         return {"tick": self.reached, "x": motion.x, "v": motion.v, "force": force, "command": command}
 
+    def checkpoint(self) -> dict[str, Any]:
+        """Returns all that the plant goes on from, once its block has been taken.
+
+        A tree of numbers, strings and arrays of NumPy, of which msgpack makes bytes with ``default=np.ndarray.tolist``.
+        """
+        return {
+            "tick": self.tick,
+            "interval_due": self._interval_due,
+            "unusable": self._unusable,
+            "stop_reason": self.stop_reason,
+            "delays": self._delays,
+            "delay_steps": self._delay_now,
+            "motion": self._motion.state,
+            "last": self._motion.last,
+            "line": self._line.state,
+            "position": self._position.state,
+            "accelerometer": self._sensor.state if self._sensor else None,
+        }
+
+    def restore(self, checkpoint: dict[str, Any]) -> None:
+        """Goes on from a checkpoint of a plant of the same scene, as taken or as unpacked; this plant is a new one."""
+        if checkpoint["delay_steps"] is not None:
+            self._retime(checkpoint["delay_steps"])
+        self.tick, self._interval_due = checkpoint["tick"], checkpoint["interval_due"]
+        self._unusable, self.stop_reason = checkpoint["unusable"], checkpoint["stop_reason"]
+        self._delays = [(tick, delay_steps) for tick, delay_steps in checkpoint["delays"]]
+        self._motion.restore(checkpoint["motion"], checkpoint["last"])
+        self._line.restore(checkpoint["line"])
+        self._position.restore(checkpoint["position"])
+        if self._sensor:
+            self._sensor.restore(checkpoint["accelerometer"])
+        self._x, self._block_first = self._motion.x, self.reached
+
     def take_block(self) -> tuple[int, int, dict[str, bytes]]:
         """Returns (first tick, ticks, columns) of what was stepped since the last block; empties it.
 

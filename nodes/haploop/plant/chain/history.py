@@ -105,6 +105,16 @@ class ChainHistory(ABC):
         """Hold in effect last, its steps left out (0)."""
         return 0, first_row(self.state.held), int(self.state.held[1].flat[0])
 
+    def restore(self, state: Any, _last: Any) -> None:
+        """Goes on from a state, whose arrays may be lists."""
+        z, z_comp, held, sensed, mode = state
+        arrays = np.array(z), np.array(z_comp), np.array(held)
+        self.state = ChainState(*arrays, tuple(sensed), self._mode_of(mode))
+
+    def _mode_of(self, _mode: Any) -> StickSlipState | None:
+        """Returns the mode of friction of a packed state."""
+        return None
+
     def loads(self, first: int, last: int) -> np.ndarray:
         """Returns the load on the last body at the steps first ... last - 1, N."""
         return self._tau.at_steps(first, last) + self._rest_N

@@ -41,6 +41,9 @@ class FrictionMotion(ChainMotion):
         friction = self._stick_slip.friction_at(mode, z[self._v])
         return np.array([0.0, -1.0, friction, float(mode.is_stuck)]), mode
 
+    def _mode_of(self, mode: Any) -> StickSlipState:
+        return StickSlipState(*mode)
+
     def advance(self, tick: int, holds: list[Hold]) -> Any:
         """Moves through interval ``tick`` under the forces held in it; returns x at its end, m."""
         interval, mode = self._begin(holds), self.state.mode

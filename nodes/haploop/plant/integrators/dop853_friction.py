@@ -51,6 +51,9 @@ class Dop853FrictionMotion(Dop853Motion):
         mode = self._stick_slip.begin(z, float(self.loads(0, 1)[0]))
         return np.array([0.0, -1.0, self._stick_slip.friction_at(mode, z[self._v]), float(mode.is_stuck)]), mode
 
+    def _mode_of(self, mode: Any) -> StickSlipState:
+        return StickSlipState(*mode)
+
     def advance(self, tick: int, holds: list[Hold]) -> float:
         """Moves through interval ``tick`` under the forces held in it; returns x at its end, m."""
         assert self.state.mode

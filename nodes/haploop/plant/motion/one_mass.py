@@ -123,6 +123,11 @@ class OneMassMotion:
         """Velocity at the end of the last interval, m/s."""
         return self._state[1]
 
+    def restore(self, state: Sequence[Any], last: Sequence[Any]) -> None:
+        """Goes on from a state and the hold in effect last."""
+        count, force, command = last
+        self.state, self.last = OneMassState(*state), (count, force, command)
+
     def advance(self, tick: int, holds: list[Hold]) -> Any:
         """Moves through interval ``tick`` under the forces held in it; returns x at its end, m."""
         if tick >= self._ends_last:
