@@ -113,7 +113,7 @@ class BatchLogger:
         self.note_accounts(rows[-1].elements)
 
     def _commanded(self, end: int, wall: tuple[Any, Any, float], members: int) -> Commanded:
-        """What books need of the rows kept, the latest of tick ``end - 1``."""
+        """Returns the part of the rows kept that books need; the latest row is of tick ``end - 1``."""
         rows = self.rows
         forces = {"wall": rows_of([row.columns["wall"] for row in rows], members)}
         for book in sorted({book for row in rows for book in row.forces}):
@@ -159,7 +159,7 @@ class BatchLogger:
             yield (entries if is_finite else finite(entries)) | energies
 
     def _energies(self, ends: Sequence[MemberEnd], places: np.ndarray) -> list[dict[str, Any]]:
-        """The ``energy`` entry of each summary; none without books."""
+        """Returns the ``energy`` entry of each summary; none without books."""
         if not self.books or not ends:
             return [{} for _ in ends]
         accounts = tree_take([*self._accounts.values()], places)
@@ -169,7 +169,7 @@ class BatchLogger:
 
 
 def _column(values: list[Any], members: int) -> np.ndarray:
-    """A number for all members, or one for each, in every row; shape (rows, members), or (rows, 1)."""
+    """Returns a number for all members, or one for each, in every row; shape (rows, members), or (rows, 1)."""
     is_shared = not any(getattr(value, "shape", ()) for value in values)
     return np.array(values)[:, None] if is_shared else rows_of(values, members)
 

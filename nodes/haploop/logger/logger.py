@@ -138,7 +138,7 @@ class Logger:
         self._log_events()
 
     def _named(self, rows: np.ndarray) -> dict[str, np.ndarray]:
-        """Running books by the names people read: an element's book by its kind, numbered where a kind recurs."""
+        """Returns the running books by names for people: an element's by its kind, numbered where a kind recurs."""
         names = [self._account_name(name) for name in self.books.names]
         return dict(zip(names, rows, strict=True)) | {"residual": self.books.residuals(rows)}
 
@@ -175,7 +175,7 @@ class Logger:
         return summary(self._scene, ran, self._measured(), self.books.state, self._covered_accounts(), diverged)
 
     def _counts(self, telemetry_gaps: int) -> dict[str, dict[str, int]]:
-        """Counts of what was lost, and of the scene's effects, by entry of the summary."""
+        """Returns counts of what was lost, and of the scene's effects, by entry of the summary."""
         entries = {"lost": {"commands_dropped": 0, "commands_lost": 0, "telemetry_gaps": telemetry_gaps}}
         for name in COUNTERS:
             if name in self._counted:
@@ -184,7 +184,7 @@ class Logger:
         return entries
 
     def _covered_accounts(self) -> list[dict[str, Any]]:
-        """Every element of which anything was booked, with the ticks that were."""
+        """Returns every element of which anything was booked, with the ticks that were."""
         booked = set(self.books.names)
         return [
             {**a, "from_tick": max(a["from_tick"], self._first_tick), "to_tick": min(a["to_tick"], self.tick)}
@@ -193,7 +193,7 @@ class Logger:
         ]
 
     def _measured(self) -> RunMeasures:
-        """The measures of the run as it stands, worked out once."""
+        """Returns the measures of the run as it stands, worked out once."""
         if self._measures is None:
             (self._measures,) = self.window.measures()
         return self._measures

@@ -48,7 +48,7 @@ class LoggerNode:
         self._started = False
 
     def start(self, welcome: dict[str, Any], out: Path) -> None:
-        """Subscribe to plant and controller, take their state, and be ready."""
+        """Subscribes to plant and controller, takes their state, and reports to be ready."""
         self.out = out
         endpoints = welcome["endpoints"]
         self._streams = Subscriber(
@@ -78,7 +78,7 @@ class LoggerNode:
         self._client.ready(self.session.logger.tick)
 
     def run(self) -> tuple[int, dict[str, Any]]:
-        """Take blocks until plant and controller have ended, then close the log and write the summary."""
+        """Takes blocks until plant and controller have ended, then closes the log and writes the summary."""
         poller = zmq.Poller()
         poller.register(self._client.socket, zmq.POLLIN)
         self._streams.register(poller)
@@ -135,7 +135,7 @@ class LoggerNode:
             self._publisher.publish("ENERGY_BLOCK", first, self.session.logger.tick - first, columns, self._status)
 
     def save(self, failed: str) -> dict[str, Any] | None:
-        """Finish because of what ``failed`` says, with the blocks that are here already; None if nothing has begun."""
+        """Finishes because of what ``failed`` says, with the blocks that have come; None if nothing has begun."""
         if not self._started:
             return None
         with contextlib.suppress(TelemetryGap):
@@ -143,7 +143,7 @@ class LoggerNode:
         return self.finish(failed)[1]
 
     def finish(self, failed: str) -> tuple[int, dict[str, Any]]:
-        """Close the log and write the summary of what ran; ``failed`` says why it ended early, if it did."""
+        """Closes the log and writes the summary of what ran; ``failed`` says why it ended early, if it did."""
         self._note_events()
         self._streams.close()
         reason = next((reason for _, reason, _ in self._ended.values() if reason), None)
@@ -155,7 +155,7 @@ class LoggerNode:
 
 
 def work(client: ClockClient, context: zmq.Context[zmq.Socket[bytes]], directory: Path) -> tuple[int, dict[str, Any]]:
-    """Run the run's own logger."""
+    """Runs the run's own logger."""
     node: LoggerNode
 
     def state() -> tuple[int, dict[str, Any]]:

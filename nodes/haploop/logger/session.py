@@ -28,14 +28,14 @@ class LogSession:
         self._flush_due = wall_clock.monotonic() + _FLUSH_S
 
     def flush_when_due(self) -> None:
-        """Hand the log to the operating system if the last time is too long ago."""
+        """Hands the log to the operating system if the last time is too long ago."""
         now = wall_clock.monotonic()
         if self._log and now >= self._flush_due:
             self._log.flush()
             self._flush_due = now + _FLUSH_S
 
     def close(self, failed: str, reason: str | None, trouble: str | None, telemetry_gaps: int) -> dict[str, Any]:
-        """Write the end state, close the log and write the summary; returns the summary.
+        """Writes the end state, closes the log and writes the summary; returns the summary.
 
         Args:
             failed: why the run failed, "" if it did not.
@@ -66,7 +66,7 @@ def open_session(
     attachments: dict[str, str],
     memory: MemoryLog | None = None,
 ) -> LogSession:
-    """A logger with its files in directory ``out``, or without any when None.
+    """Makes a logger with its files in directory ``out``, or without any when None.
 
     Args:
         scene: the resolved scene; ``run.log`` decides what is logged.

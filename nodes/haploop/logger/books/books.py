@@ -122,7 +122,7 @@ class Books:
         self.state = self.state._replace(sums=add_ticks_of_batch(self.state.sums, np.stack(flows, axis=1)))
 
     def _flows(self, tick: int, plant: dict[str, np.ndarray], commanded: Commanded) -> list[np.ndarray]:
-        """What each tick adds to each book, shape (ticks,), or (ticks, batch), in the order of ``names``."""
+        """Returns the energy each tick adds to each book, shape (ticks,), or (ticks, batch), ordered as ``names``."""
         n, forces, before = self._time.steps_per_tick, commanded.forces, tick - commanded.first
         for account in forces:
             if f"{account}.true" not in self.state.names:
@@ -153,7 +153,7 @@ class Books:
         first_command: int,
         forces: dict[str, np.ndarray],
     ) -> Iterator[tuple[str, np.ndarray]]:
-        """What every interval adds to each book of the balance, by name; shape (ticks,)."""
+        """Yields every book of the balance by name, with the energy each interval adds to it, shape (ticks,)."""
         n = self._time.steps_per_tick
         command = plant["command"][:-1].astype(np.intp)
         asked = (in_effect(force, command, first_command) for force in forces.values())
@@ -201,7 +201,7 @@ def plant_books(scene: dict[str, Any], time: Timebase, members: int | None = Non
 
 
 def _half_of_magnitudes(flows: Iterable[np.ndarray]) -> np.ndarray:
-    """Half of the sum of all flows in magnitude, first to last."""
+    """Returns half of the sum of all flows in magnitude, first to last."""
     first, *others = flows
     total, magnitude = np.abs(first), np.empty_like(first)
     for flow in others:

@@ -23,7 +23,7 @@ from haploop.protocol.ticks import Timebase
 
 
 class ChainBooks:
-    """What every plant step moves between the hand's muscles, dampers, friction, actuator, masses and springs.
+    """Energies that every plant step moves between the hand's muscles, dampers, friction, actuator, masses and springs.
 
     Over a step, or a piece of it where friction cut it, with x_j, v_j of body j and the stretch s_i of link i:
         work of tau        (tau + tau+)/2 dx + (tau+ - tau) integral (t - t_mid)/t_end v dt, of the last body
@@ -56,7 +56,7 @@ class ChainBooks:
     def increments(
         self, first_step: int, columns: dict[str, Any], moved: Displacement, commanded: Iterable[np.ndarray]
     ) -> Iterator[np.ndarray]:
-        """Yields what each interval adds to each book, J; see ``OneMassBooks.increments``.
+        """Yields the energy each interval adds to each book, J; see ``OneMassBooks.increments``.
 
         ``columns`` of a batch with friction have ``pieces``: the pieces of every member that has any, by its place.
         """
@@ -67,7 +67,7 @@ class ChainBooks:
     def by_step(
         self, first_step: int, columns: dict[str, Any], dx: np.ndarray, commanded: Iterable[np.ndarray]
     ) -> Iterator[np.ndarray]:
-        """Yields what each step adds to each book, J, shape (steps,), or (steps, batch), each."""
+        """Yields the energy each step adds to each book, J, shape (steps,), or (steps, batch), each."""
         tau = self._tau.at_steps(first_step, first_step + len(dx) + 1)
         if not columns.get("pieces"):
             return self._of_run(first_step, columns, tau, dx, commanded)
@@ -87,7 +87,7 @@ class ChainBooks:
         ]
 
         def joined(values: np.ndarray) -> np.ndarray:
-            """A column of all steps, of those members one after the other; 0 where there is no step between them."""
+            """Returns a column of all steps of those members, one member after the other; 0 between them."""
             column = np.zeros((len(places), rows))
             column[:, : len(values)] = np.broadcast_to(values, (len(values), shape[1]))[:, places].T
             return column.ravel()
@@ -103,7 +103,7 @@ class ChainBooks:
     def _of_run(
         self, first_step: int, columns: Columns, tau: np.ndarray, dx: np.ndarray, commanded: Iterable[np.ndarray]
     ) -> Iterator[np.ndarray]:
-        """What each step adds to each book, where all steps of a batch are whole; tau at the steps and at the end."""
+        """Yields the energy each step adds to each book, where all steps of a batch are whole."""
         segments, force, steps = Segments.from_columns(self._chain, first_step, columns), columns["force"][:-1], len(dx)
         rise = np.diff(tau, axis=0)[segments.step]
         start = tau[:-1][segments.step] + rise * segments.elapsed
@@ -128,7 +128,7 @@ class ChainBooks:
         return sum_rows([masses[body] * dv[body] * (v[body] + dv[body] / 2.0) for body in range(n)])
 
     def _spring(self, segments: Segments, way: np.ndarray) -> np.ndarray:
-        """Change of energy in the hand's spring, whose end moves by ``way``, and in the links."""
+        """Returns the change of energy in the hand's spring, whose end moves by ``way``, and in the links."""
         (stiffness, rest), lengths = self._chain.spring, segments.states[: self._chain.count]
         beyond = sum_rows([lengths[0] - rest, *lengths[1:], *segments.lows])
         parts = [stiffness * way * (beyond + way / 2.0)]
@@ -148,5 +148,5 @@ class ChainBooks:
 
 
 def _by_step(values: np.ndarray, step: np.ndarray, steps: int) -> np.ndarray:
-    """The sum over the segments of each step, in their order."""
+    """Returns the sum over the segments of each step, in their order."""
     return values if len(values) == steps == step[-1] + 1 else np.bincount(step, values, steps)

@@ -90,7 +90,7 @@ def _tables(chain: Chain, step_s: float) -> tuple[np.ndarray, ...]:
 
 
 def _sum_of(factors: np.ndarray, columns: Sequence[np.ndarray], which: slice | np.ndarray) -> np.ndarray:
-    """The sum of factor times column, term by term in a fixed order (a matrix product may reorder with its size)."""
+    """Returns the sum of factor times column in a fixed order (a matrix product may reorder with its size)."""
     total = np.zeros_like(columns[0][which])
     counts: Any = (factors.any(axis=-1) if factors.ndim > 1 else factors).tolist()
     for factor, column, there in zip(factors, columns, counts, strict=True):
@@ -100,7 +100,7 @@ def _sum_of(factors: np.ndarray, columns: Sequence[np.ndarray], which: slice | n
 
 
 def _forms_of(forms: np.ndarray, w: Sequence[np.ndarray]) -> np.ndarray:
-    """w' Q w of every form Q and every column of w, in a fixed order; shape (forms, columns), or with a batch."""
+    """Returns w' Q w of every form Q and every column of w in a fixed order, shape (forms, columns)."""
     total = np.zeros((len(forms), *w[0].shape), w[0].dtype)
     counts: Any = forms.any(axis=(0, *range(3, forms.ndim))).tolist()
     for i in range(len(w)):

@@ -76,7 +76,7 @@ def one_mass_params(scene: dict[str, Any], time: Timebase, members: int | None =
 def increments(
     params: OneMassParams, steps: Steps, ticks: Ticks, commanded: Iterable[Any] | None, summed: SumSteps
 ) -> Iterator[Any]:
-    """Yields what every interval moves between the hand's muscles, the dampers, the mass and the spring, J.
+    """Yields the energy every interval moves between the hand's muscles, the dampers, the mass and the spring, J.
 
     Over a plant step from x, v to x+, v+ with dx = x+ - x, under the held force f and tau linear in time:
         work of tau        integral tau v dt = (tau + tau+)/2 dx + (tau+ - tau) integral (t - h/2)/h v dt
@@ -128,12 +128,12 @@ def _hand_work(lag: np.ndarray, tau: Any, rise: Any, dx: Any, rates: Sequence[An
 
 
 def beyond_limits(commanded: Iterable[Any], force: Any) -> Any:
-    """Returns what was commanded in all beyond the force that the actuator holds, N."""
+    """Returns the force commanded in all beyond the force that the actuator holds, N."""
     return sum_rows(commanded) - force
 
 
 def as_squares(form: np.ndarray) -> np.ndarray:
-    """Returns what makes w' Q w of three entries a sum of squares a (w0 + b w1 + c w2)^2 + d (w1 + e w2)^2 + f w2^2.
+    """Returns the factors of w' Q w as a sum of squares a (w0 + b w1 + c w2)^2 + d (w1 + e w2)^2 + f w2^2.
 
     Q is positive: no term is below 0, and where they are far apart none cancels another.
 
@@ -185,7 +185,7 @@ class OneMassBooks:
     def increments(
         self, first_step: int, columns: dict[str, np.ndarray], moved: Displacement, commanded: Iterable[np.ndarray]
     ) -> Iterator[np.ndarray]:
-        """Yields what each interval adds to each book, J.
+        """Yields the energy each interval adds to each book, J.
 
         Args:
             first_step: step of the first state.

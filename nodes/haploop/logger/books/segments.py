@@ -51,7 +51,7 @@ class Segments:
         zero = np.zeros((steps + 1, *[1] * (columns["x"].ndim - 1)))
 
         def table(name: str) -> np.ndarray:
-            """A column at every step, at the end, and where every piece begins; 0 in a row that has none."""
+            """Returns a column at every step, at the end, and where every piece begins; 0 in a row that has none."""
             column, of_pieces = columns.get(name, zero), columns.get(PIECES + name, zero[:0])
             return np.concatenate([column, of_pieces]) if len(of_pieces) else column
 
@@ -107,7 +107,7 @@ def end_to_end(first_step: int, columns: Columns, pieces: list[tuple[int, Column
 
 
 def _in_order(steps: int, step_of_piece: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(plant step, row of the table of states) of every segment: whole steps, and the pieces of the others."""
+    """Returns (plant step, row of the table of states) of every segment: whole steps, and the pieces of the others."""
     whole = np.setdiff1d(np.arange(steps), step_of_piece)
     step = np.concatenate([whole, step_of_piece])
     rows = np.concatenate([whole, steps + 1 + np.arange(len(step_of_piece))])
@@ -116,7 +116,7 @@ def _in_order(steps: int, step_of_piece: np.ndarray) -> tuple[np.ndarray, np.nda
 
 
 def _elapsed(step: np.ndarray, level: np.ndarray) -> np.ndarray:
-    """Part of its plant step that is over when each segment begins: exact, and the same wherever a block begins."""
+    """Returns the part of its step that is over when each segment begins: exact, the same wherever a block begins."""
     lasts = np.uint64(1) << (_FINEST - level).astype(np.uint64)
     over = np.cumsum(lasts) - lasts
     first = np.searchsorted(step, step)

@@ -58,7 +58,7 @@ def sampled_work(x_m: Any, force: Any) -> Any:
 
 
 def in_effect(force: np.ndarray, command: np.ndarray, first: int) -> np.ndarray:
-    """Returns what an account commanded where each of these commands is in effect, N; 0 before the first command.
+    """Returns the force an account commanded where each of these commands is in effect, N; 0 before the first command.
 
     Args:
         force: of the commands from ``first`` on.
@@ -73,7 +73,7 @@ def in_effect(force: np.ndarray, command: np.ndarray, first: int) -> np.ndarray:
 
 
 def held_J(x: Any, wall: tuple[Any, Any], into_wall: float) -> Any:
-    """Returns what an ideal spring of position and stiffness ``wall`` holds with the device at x: k p^2 / 2, J."""
+    """Returns the energy in an ideal spring of position and stiffness ``wall`` with the device at x: k p^2 / 2, J."""
     return each(_held_J, x, *wall, into_wall)
 
 

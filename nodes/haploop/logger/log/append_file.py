@@ -18,7 +18,7 @@ class AppendFile:
     """
 
     def __init__(self, path: str | Path) -> None:
-        """Make the file.
+        """Makes the file.
 
         Raises:
             LogError: the operating system refuses.
@@ -36,11 +36,11 @@ class AppendFile:
 
     @property
     def writable(self) -> bool:
-        """Whether another piece may be appended: neither closed nor refused by the operating system."""
+        """Tells whether another piece may be appended: neither closed nor refused by the operating system."""
         return not self._file.closed
 
     def append(self, piece: bytes) -> None:
-        """Hand a piece to the operating system.
+        """Hands a piece to the operating system.
 
         Raises:
             LogError: the operating system refuses, now or at an earlier piece; the file is cut back to the whole
@@ -71,5 +71,5 @@ class AppendFile:
         raise self._failure from error
 
     def close(self) -> None:
-        """Close the file; a second call does nothing."""
+        """Closes the file; a second call does nothing."""
         self._file.close()

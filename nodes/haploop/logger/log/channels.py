@@ -48,18 +48,18 @@ class Channels:
         self._events = log.channel("/events", {}, title="what changed the run, at its tick")
 
     def _tick_times(self, first: int, ticks: int) -> tuple[np.ndarray, np.ndarray]:
-        """Log times in ns and time stamps in s of some ticks."""
+        """Returns log times in ns and time stamps in s of some ticks."""
         numbers = np.arange(first, first + ticks, dtype=np.int64)
         return numbers * 1_000_000_000 // self._time.control_rate, numbers / self._time.control_rate
 
     def plant(self, first: int, ticks: int, columns: dict[str, np.ndarray]) -> None:
-        """One message a tick, an array of its steps; ``columns`` of ``motion_columns`` have ``ticks * n + 1`` rows."""
+        """Writes one message a tick, an array of its steps; ``columns`` are ``motion_columns`` of whole intervals."""
         if self._every_step and ticks:
             steps = self._time.steps_per_tick
             self._plant_messages(first, ticks, steps, {name: column[:-1] for name, column in columns.items()})
 
     def plant_end(self, tick: int, state: dict[str, np.ndarray]) -> None:
-        """The end state of the run, a message of one sample; its force is the last one held."""
+        """Writes the end state of the run, a message of one sample; its force is the last one held."""
         if self._every_step:
             self._plant_messages(tick, 1, 1, state)
 
@@ -75,7 +75,7 @@ class Channels:
         self._log.write(channel, times, values.reshape(ticks, samples, len(units)))
 
     def controller(self, block: dict[str, Any]) -> None:
-        """One message a tick: estimates, the force of wall and elements, their total."""
+        """Writes one message a tick: estimates, the force of wall and elements, their total."""
         names = list(block["columns"])
         kinds = ", ".join(f"dissipation.{i} is {e['kind']}" for i, e in enumerate(block["elements"])) or "no element"
         units = {"timestamp": "s"} | {name: CONTROLLER_UNITS.get(name, "N") for name in names}
@@ -85,21 +85,21 @@ class Channels:
         self._log.write(channel, times, values)
 
     def energy(self, first: int, columns: dict[str, np.ndarray]) -> None:
-        """One message a tick: the books as they stand."""
+        """Writes one message a tick: the books as they stand."""
         units = {"timestamp": "s"} | dict.fromkeys(columns, "J")
         channel = self._log.channel("/energy", units, title="the energy books at every tick")
         times, stamps = self._tick_times(first, len(next(iter(columns.values()))))
         self._log.write(channel, times, np.stack([stamps, *columns.values()], axis=1))
 
     def event(self, tick: int, event: dict[str, Any]) -> None:
-        """One message: the tick, its time in s, and the event as it was given."""
+        """Writes one message: the tick, its time in s, and the event as it was given."""
         self._log.message(
             self._events, self._time.tick_ns(tick), {"timestamp": tick / self._time.control_rate, "tick": tick, **event}
         )
 
 
 def motion_columns(plant: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Columns of ``UNITS`` from telemetry: positions and velocities of all bodies against ground, forces in N."""
+    """Returns columns of ``UNITS`` from telemetry: positions and velocities of all bodies against ground, forces."""
     x, v = plant["x"], plant["v"]
     columns = {"x": x, "v": v, "force": plant["force"]}
     for link, body in _FAR_END.items():

@@ -32,7 +32,7 @@ _FIXED_BYTES = 22
 
 
 def _index(channel: int, log_times_ns: NDArray[Any], offsets: NDArray[Any]) -> bytes:
-    """A MessageIndex record, which the library would compose pair by pair."""
+    """Returns a MessageIndex record, which the library would compose pair by pair."""
     pairs = np.stack((log_times_ns, offsets), axis=1).astype("<u8").tobytes()
     return struct.pack("<BQHI", Opcode.MESSAGE_INDEX, 6 + len(pairs), channel, len(pairs)) + pairs
 
@@ -79,7 +79,7 @@ class TableRows:
         self._views = self._layout.views(self._records["message"])
 
     def append(self, sequence: int, log_times_ns: NDArray[np.int64], values: Floats) -> None:
-        """Add messages.
+        """Adds messages.
 
         Args:
             sequence: number of the first message on its channel.
@@ -97,19 +97,19 @@ class TableRows:
         self.count = end
 
     def body(self) -> memoryview:
-        """The records, end to end; valid until the next append or clear."""
+        """Returns the records, end to end; valid until the next append or clear."""
         return self._records[: self.count].view(np.uint8).data
 
     def log_times(self) -> NDArray[Any]:
-        """Log times in ns, shape (count,)."""
+        """Returns log times in ns, shape (count,)."""
         return self._records["log_time"][: self.count]
 
     def index(self, base: int) -> bytes:
-        """The MessageIndex record for a body that begins ``base`` bytes into the chunk."""
+        """Returns the MessageIndex record for a body that begins ``base`` bytes into the chunk."""
         return _index(self.channel, self.log_times(), base + np.arange(self.count) * self._record.itemsize)
 
     def clear(self) -> None:
-        """Forget the messages and keep the stamped array for the next chunk."""
+        """Forgets the messages and keeps the stamped array for the next chunk."""
         self.count = 0
 
 
@@ -129,7 +129,7 @@ class FreeRows:
         return len(self._records)
 
     def append(self, sequence: int, log_time_ns: int, data: bytes) -> None:
-        """Add one message, number ``sequence`` on its channel, with ``data`` as its encoded content."""
+        """Adds one message, number ``sequence`` on its channel, with ``data`` as its encoded content."""
         record = RecordBuilder()
         Message(self.channel, log_time_ns, data, log_time_ns, sequence & 0xFFFFFFFF).write(record)
         self._offsets.append(len(self._records))
@@ -152,7 +152,7 @@ class FreeRows:
 
 
 def compressor(compression: Compression) -> Callable[[bytes], bytes]:
-    """The function that packs a chunk's messages."""
+    """Returns the function that packs a chunk's messages."""
     if not compression:
         return bytes
     import lz4.frame
@@ -163,7 +163,7 @@ def compressor(compression: Compression) -> Callable[[bytes], bytes]:
 def chunk(
     rows: Sequence[TableRows | FreeRows], start: int, compression: Compression, compress: Callable[[bytes], bytes]
 ) -> tuple[bytes, ChunkIndex]:
-    """Compose a chunk and the message indexes that follow it.
+    """Composes a chunk and the message indexes that follow it.
 
     Args:
         rows: the messages, at least one channel's and at least one message each.

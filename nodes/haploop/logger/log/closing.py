@@ -1,4 +1,4 @@
-"""What closes an MCAP file: the end of its data, the summary that lets a reader seek in it, and the footer."""
+"""The close of an MCAP file: the end of its data, the summary that lets a reader seek in it, and the footer."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _CRC_BYTES = 4
 
 @dataclass
 class Summary:
-    """All that is remembered of a log while it is written."""
+    """Records that are kept of a log while it is written."""
 
     schemas: list[Schema] = field(default_factory=list)
     channels: list[Channel] = field(default_factory=list)
@@ -35,7 +35,7 @@ class Summary:
     message_counts: dict[int, int] = field(default_factory=dict)
 
     def statistics(self) -> Statistics:
-        """The counts and the span of time of everything written."""
+        """Returns the counts and the span of time of everything written."""
         return Statistics(
             attachment_count=len(self.attachments),
             channel_count=len(self.channels),
@@ -49,7 +49,7 @@ class Summary:
         )
 
     def closing(self, data_bytes: int) -> bytes:
-        """Everything from the DataEnd record to the end of a file that holds ``data_bytes`` so far."""
+        """Returns everything from the DataEnd record to the end of a file that holds ``data_bytes`` so far."""
         data_end = RecordBuilder()
         DataEnd(data_section_crc=0).write(data_end)
         start = data_bytes + data_end.count

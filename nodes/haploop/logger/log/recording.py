@@ -1,4 +1,4 @@
-"""What was read from a log: arrays by channel and column."""
+"""Arrays by channel and column: a log that was read from its file, or kept in memory."""
 
 from __future__ import annotations
 
@@ -36,13 +36,13 @@ class Table(dict[str, Floats]):
         raise KeyError(f"There is no column {name}; the columns are {', '.join(self)}.")
 
     def quantity(self, name: str) -> pint.Quantity[Floats]:
-        """A column with its unit, as a quantity of pint's application registry."""
+        """Returns a column with its unit, as a quantity of pint's application registry."""
         import pint
 
         return pint.get_application_registry().Quantity(self[name], self.units[name])
 
     def frame(self) -> pandas.DataFrame:
-        """The columns as a data frame indexed by ``timestamp`` (s), with ``frame.attrs["units"]`` by name.
+        """Returns the columns as a data frame indexed by ``timestamp`` (s), with ``frame.attrs["units"]`` by name.
 
         Raises:
             ImportError: pandas is missing.
@@ -58,7 +58,7 @@ class Table(dict[str, Floats]):
 
 
 class Recording(dict[str, Any]):
-    """What a log holds, by topic: a :class:`Table`, or a list of maps for a topic without columns (``/events``).
+    """The content of a log by topic: a :class:`Table`, or a list of maps for a topic without columns (``/events``).
 
     Attributes:
         truncated: whether the file ends before its closing summary, as that of a killed run or of one still going.
@@ -80,7 +80,7 @@ Rows = Table | list[Any]
 
 
 def join(pieces: Sequence[tuple[NDArray[np.uint64], Rows]], units: Mapping[str, str] | None = None) -> tuple[Any, Any]:
-    """Pieces of one topic as one, rows in the order of log time and, at the same time, of the pieces.
+    """Joins pieces of one topic, rows in the order of log time and, at the same time, of the pieces.
 
     The tables are used up on the way, so that hardly more than one column is held twice.
 
@@ -117,7 +117,7 @@ def _joined_columns(
 
 
 def merge_columns(known: Mapping[str, str], new: Mapping[str, str]) -> dict[str, str]:
-    """The columns of both, by unit, each in its own order: a new one comes after the one it follows."""
+    """Returns the columns of both, by unit, each in its own order: a new one comes after the one it follows."""
     names, at = list(known), 0
     for name in new:
         if name in known:
@@ -141,7 +141,7 @@ class MemoryLog:
     def channel(
         self, topic: str, columns: Mapping[str, str], *, samples_per_message: int | None = None, title: str
     ) -> int:
-        """Register a channel, whatever the samples in a message and its title; for one known already, its number."""
+        """Registers a channel, whatever the samples in a message and its title; for one known already, its number."""
         key = topic, dict(columns)
         if key not in self._channels:
             self._channels.append(key)
@@ -150,7 +150,7 @@ class MemoryLog:
         return self._channels.index(key)
 
     def write(self, channel: int, log_times_ns: NDArray[np.int64], values: Floats) -> None:
-        """Add messages: values of shape (messages, columns), or (messages, samples, columns)."""
+        """Adds messages: values of shape (messages, columns), or (messages, samples, columns)."""
         topic, units = self._channels[channel]
         rows = values.reshape(-1, len(units))
         times = np.repeat(log_times_ns.astype(np.uint64), values[..., 0].size // max(1, len(values)))
@@ -158,21 +158,21 @@ class MemoryLog:
         self._pieces[topic].append((times, Table(columns, units)))
 
     def message(self, channel: int, log_time_ns: int, obj: dict[str, Any]) -> None:
-        """Add one map, as it would come back from a file."""
+        """Adds one map, as it would come back from a file."""
         topic, _ = self._channels[channel]
         self._pieces[topic].append((np.array([log_time_ns], np.uint64), [msgpack.unpackb(pack(obj))]))
 
     def attach(self, name: str, media_type: str, data: bytes) -> None:
-        """Keep a whole file, of any ``media_type``."""
+        """Keeps a whole file, of any ``media_type``."""
         self._attachments[name] = data
 
     def flush(self) -> None:
-        """Everything is where it can be read already."""
+        """Does nothing: everything can be read already."""
 
     def close(self) -> None:
-        """There is nothing to close."""
+        """Does nothing: there is no file."""
 
     def recording(self) -> Recording:
-        """All that was written, once: the log is empty afterwards."""
+        """Returns all that was written, once: the log is empty afterwards."""
         topics = {topic: join(self._pieces.pop(topic), units)[1] for topic, units in self._units.items()}
         return Recording(topics, "", self._attachments)

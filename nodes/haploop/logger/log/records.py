@@ -44,7 +44,7 @@ class MessageRun:
 
 
 def records(stream: IO[bytes]) -> Iterator[tuple[int, bytes]]:
-    """Opcode and content of each whole record that is left in a file as it is now."""
+    """Yields opcode and content of each whole record that is left in a file as it is now."""
     end = os.fstat(stream.fileno()).st_size
     while len(prefix := stream.read(_PREFIX.size)) == _PREFIX.size:
         opcode, length = _PREFIX.unpack(prefix)
@@ -54,7 +54,7 @@ def records(stream: IO[bytes]) -> Iterator[tuple[int, bytes]]:
 
 
 def chunk_body(content: bytes) -> bytes:
-    """The records in a chunk, unpacked and checked against their CRC.
+    """Returns the records in a chunk, unpacked and checked against their CRC.
 
     Raises:
         ValueError, RuntimeError, McapError: the chunk is damaged.
@@ -65,12 +65,12 @@ def chunk_body(content: bytes) -> bytes:
 
 
 def lone_message(content: bytes) -> bytes:
-    """A message that stands outside of any chunk, as a chunk's body would hold it."""
+    """Returns a message that stands outside of any chunk, as a chunk's body would hold it."""
     return _PREFIX.pack(Opcode.MESSAGE, len(content)) + content
 
 
 def parts(body: bytes) -> Iterator[MessageRun | tuple[int, bytes]]:
-    """What stands in a chunk's body, in order: runs of messages, and other records by opcode and content.
+    """Yields the parts of a chunk's body in order: runs of messages, and other records by opcode and content.
 
     Raises:
         ValueError, struct.error: the body is damaged.
@@ -88,7 +88,7 @@ def parts(body: bytes) -> Iterator[MessageRun | tuple[int, bytes]]:
 
 
 def _run(body: bytes, start: int, end: int) -> tuple[MessageRun, int]:
-    """The messages like the one in ``start:end`` that stand end to end from it on, and where the last of them ends."""
+    """Returns the messages like the one in ``start:end`` that follow each other from it on, and where the last ends."""
     if end > len(body):
         raise ValueError("a message is longer than its chunk")
     size, head_end = end - start, start + _PREFIX.size + 2  # the head is opcode, length and channel
@@ -114,7 +114,7 @@ class LogChannel:
     def decode(
         self, runs: Sequence[MessageRun], names: Collection[str] | None
     ) -> tuple[NDArray[np.uint64], Table | list[Any]]:
-        """Log time in ns of every row, shape (rows,), and the rows: the columns ``names`` (None: all), or the maps.
+        """Returns log time of every row in ns, shape (rows,), and the rows: columns ``names`` (None: all), or the maps.
 
         Raises:
             LogError: the messages are not what the schema of the channel says.
@@ -136,7 +136,7 @@ class LogChannel:
         return np.repeat(log_times_ns, rows_each), Table(kept, units)
 
     def _columns(self, runs: Sequence[MessageRun]) -> tuple[int | list[int], Sequence[Floats]]:
-        """Rows in each message, and all columns."""
+        """Returns the rows in each message, and all columns."""
         columns = self.layout.read(b"".join([run.payloads for run in runs]))
         if columns is not None:
             return self.layout.samples or 1, columns

@@ -25,7 +25,7 @@ _DAMAGE = (ValueError, OverflowError, RuntimeError, struct.error, McapError)
 
 
 class Batch(NamedTuple):
-    """What one chunk holds of a topic, in order of log time.
+    """Rows that one chunk holds of a topic, in order of log time.
 
     Attributes:
         topic: such as ``/plant``.
@@ -59,7 +59,7 @@ class LogStream:
         columns: Collection[str] | None = None,
         until: int | None = None,
     ) -> None:
-        """Look at how the file begins.
+        """Looks at how the file begins.
 
         Args:
             path: a run's directory, or an MCAP file of msgpack maps.
@@ -91,23 +91,23 @@ class LogStream:
 
     @property
     def cut(self) -> str:
-        """A sentence on where the file ends, "" once it was read to the end it should have."""
+        """Sentence on where the file ends, "" once it was read to the end it should have."""
         if not self._open_end:
             return ""
         where = f"it was read up to byte {self.read_bytes} ({self._open_end})"
         return f"The log {self.path} was cut off or is still being written; {where}."
 
     def chosen(self, topic: str) -> bool:
-        """Whether a topic is one of those asked for."""
+        """Tells whether a topic is one of those asked for."""
         return self._topics is None or topic in self._topics
 
     def chosen_units(self, topic: str) -> dict[str, str]:
-        """Unit by column of a topic, of the columns asked for."""
+        """Returns unit by column of a topic, of the columns asked for."""
         units = self.units[topic]
         return {name: units[name] for name in units if self._columns is None or name in self._columns}
 
     def __iter__(self) -> Iterator[Batch]:
-        """All batches that have not come yet.
+        """Yields all batches that have not come yet.
 
         Raises:
             LogError: there are messages other than the msgpack maps their schema tells of.
@@ -127,14 +127,14 @@ class LogStream:
                 self._open_end = f"what follows is damaged: {damage or type(damage).__name__}"
 
     def _close(self, file: IO[bytes]) -> bool:
-        """Whether the file ends as it should after its footer."""
+        """Tells whether the file ends as it should after its footer."""
         if file.read(len(MAGIC)) != MAGIC:
             return False
         self._open_end = ""
         return True
 
     def _take(self, opcode: int, content: bytes) -> list[Batch]:
-        """What one record of the file holds; indexes and the summary tell nothing new and are passed over."""
+        """Returns the batches in one record of the file; indexes and the summary are passed over."""
         if opcode == Opcode.CHUNK:
             return self._batches(chunk_body(content))
         if opcode == Opcode.MESSAGE:
@@ -147,7 +147,7 @@ class LogStream:
         return []
 
     def _batches(self, body: bytes) -> list[Batch]:
-        """The messages of a chunk, topic by topic."""
+        """Returns the messages of a chunk, topic by topic."""
         found: dict[str, dict[int, list[MessageRun]]] = {}
         for part in parts(body):
             if not isinstance(part, MessageRun):
@@ -171,7 +171,7 @@ class LogStream:
             if channel.message_encoding != "msgpack":
                 raise LogError(f"The channel {channel.topic} is {channel.message_encoding}; a run's log is msgpack.")
             schema = self._schemas.get(channel.schema_id)
-            layout = TableLayout.of_json_schema(schema.data if schema else b"")
+            layout = TableLayout.from_json_schema(schema.data if schema else b"")
             known = self.units.setdefault(channel.topic, dict(layout.columns))
             if bool(known) != bool(layout.columns):
                 raise LogError(f"The topic {channel.topic} mixes messages with and without columns; read them apart.")
@@ -180,7 +180,7 @@ class LogStream:
 
 
 def read(path: str | Path, topics: Collection[str] | None = None, columns: Collection[str] | None = None) -> Recording:
-    """Read the log of a run.
+    """Reads the log of a run.
 
     Args:
         path: a run's directory, or an MCAP file of msgpack maps.
@@ -209,7 +209,7 @@ def read(path: str | Path, topics: Collection[str] | None = None, columns: Colle
 
 
 def survey(path: str | Path) -> LogStream:
-    """A stream that has gone through a whole log without unpacking a message.
+    """Returns a stream that has gone through a whole log without unpacking a message.
 
     Its ``units`` are those of every channel there is, and its ``read_bytes`` is where the log ended.
 

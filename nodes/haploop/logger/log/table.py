@@ -19,7 +19,7 @@ Floats = NDArray[np.float64]
 
 
 def pack(value: Any) -> bytes:
-    """One value as msgpack."""
+    """Returns one value as msgpack."""
     return cast(bytes, msgpack.packb(value))
 
 
@@ -33,7 +33,7 @@ class TableLayout:
     """
 
     def __init__(self, columns: Mapping[str, str], samples: int | None = None) -> None:
-        """Lay out the message.
+        """Lays out the message.
 
         Raises:
             ValueError: ``samples`` is less than 1.
@@ -62,12 +62,12 @@ class TableLayout:
         self._template = np.frombuffer(message, self.dtype)
 
     def stamp(self, messages: NDArray[Any]) -> None:
-        """Make every message of an array of this dtype, of any strides, a copy of the template: all numbers 0."""
+        """Makes every message of an array of this dtype, of any strides, a copy of the template: all numbers 0."""
         as_bytes = np.dtype((np.void, self.dtype.itemsize))
         messages.view(as_bytes)[:] = self._template.view(as_bytes)
 
     def views(self, messages: NDArray[Any]) -> list[Floats]:
-        """The numbers inside an array of messages, as writable views in column order.
+        """Returns the numbers inside an array of messages, as writable views in column order.
 
         Args:
             messages: shape (messages,), of this dtype.
@@ -79,7 +79,7 @@ class TableLayout:
         return [maps[str(number)] for number in range(len(self.columns))]
 
     def read(self, payload: bytes) -> list[Floats] | None:
-        """Take messages standing end to end apart.
+        """Takes messages standing end to end apart.
 
         Returns:
             One native float64 array a column, flat over messages and samples; None when the bytes are not of this
@@ -97,7 +97,7 @@ class TableLayout:
         return [column.astype(np.float64).reshape(-1) for column in found] if again.tobytes() == payload else None
 
     def json_schema(self, title: str) -> bytes:
-        """JSON Schema of a message; each column is a number with its ``unit``. A table without columns is any map."""
+        """Returns the JSON Schema of a message: each column a number with its ``unit``, or any map without columns."""
         numbers = {name: {"type": "number", "unit": unit} for name, unit in self.columns.items()}
         schema: dict[str, Any] = {"type": "object"}
         if numbers:
@@ -107,8 +107,8 @@ class TableLayout:
         return json.dumps({"title": title, **schema}, ensure_ascii=False).encode()
 
     @classmethod
-    def of_json_schema(cls, schema: bytes) -> TableLayout:
-        """The layout that :meth:`json_schema` described; without columns for any schema that describes no table."""
+    def from_json_schema(cls, schema: bytes) -> TableLayout:
+        """Returns the layout that :meth:`json_schema` described; one without columns for any other schema."""
         try:
             found = json.loads(schema or b"{}")
             samples = found["minItems"] if found.get("type") == "array" else None
@@ -119,7 +119,7 @@ class TableLayout:
 
 
 def rows_of(message: Any, columns: Iterable[str]) -> list[list[float]]:
-    """The numbers of one unpacked message (a map, or an array of maps), a row a map; NaN where a column is absent."""
+    """Returns the numbers of a message (a map, or an array of maps), a row a map; NaN where a column is absent."""
     names = list(columns)
     maps = message if isinstance(message, list) else [message]
     return [[float(one.get(name, "nan")) for name in names] for one in maps]

@@ -34,7 +34,7 @@ class Log:
     """
 
     def __init__(self, path: str | Path, *, compression: Compression = "lz4") -> None:
-        """Begin the file, over any file of that name.
+        """Begins the file, over any file of that name.
 
         Raises:
             LogError: the file cannot be made.
@@ -51,7 +51,7 @@ class Log:
     def channel(
         self, topic: str, columns: Mapping[str, str], *, samples_per_message: int | None = None, title: str
     ) -> int:
-        """Register a channel; for what is registered already, the number it has.
+        """Registers a channel; for what is registered already, the number it has.
 
         The same topic may be registered again with other columns: it then has several channels, which
         :func:`haploop.logger.read` joins.
@@ -86,7 +86,7 @@ class Log:
         return number
 
     def write(self, channel: int, log_times_ns: NDArray[np.int64], values: Floats) -> None:
-        """Add messages to a channel with columns.
+        """Adds messages to a channel with columns.
 
         Args:
             channel: the channel's number.
@@ -114,7 +114,7 @@ class Log:
         self._close_full_chunk()
 
     def message(self, channel: int, log_time_ns: int, obj: dict[str, Any]) -> None:
-        """Add one map to a channel without columns; ``obj`` holds what msgpack can carry.
+        """Adds one map to a channel without columns; ``obj`` holds what msgpack can carry.
 
         Raises:
             LogError: the file cannot be written.
@@ -129,7 +129,7 @@ class Log:
         self._close_full_chunk()
 
     def attach(self, name: str, media_type: str, data: bytes) -> None:
-        """Put a whole file, such as the scene, into the log.
+        """Puts a whole file, such as the scene, into the log.
 
         Raises:
             LogError: the file cannot be written.
@@ -145,7 +145,7 @@ class Log:
             self.flush()
 
     def flush(self) -> None:
-        """Close the chunk and hand it to the operating system: every message up to now can be read from the file.
+        """Closes the chunk and hands it to the operating system: every message up to now can be read from the file.
 
         Raises:
             LogError: the file cannot be written.
@@ -163,7 +163,7 @@ class Log:
             rows.clear()
 
     def close(self) -> None:
-        """Close the chunk, add the summary and close the file; nothing is left to do after a LogError or a close.
+        """Closes the chunk, adds the summary and closes the file; nothing is left to do after a LogError or a close.
 
         Raises:
             LogError: the file cannot be written.

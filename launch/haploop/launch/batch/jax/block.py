@@ -204,7 +204,7 @@ def _apart(go: Any, make: Callable[[], Any]) -> Any:
 
 
 def _add(book: tuple[Any, Any], added: Any) -> tuple[Any, Any]:
-    """As ``RunningSums.add``: the sum, and the sum of what each addition loses."""
+    """Returns the sum, and the sum of what each addition loses."""
     before, errors = book
     after = before + added
     part = after - before
