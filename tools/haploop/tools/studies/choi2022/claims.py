@@ -87,9 +87,14 @@ def claims_of(figure: int) -> dict[str, Claim]:
     return {name: Claim(**claim) for name, claim in _figures()[str(figure)]["claims"].items()}
 
 
-def texts_of(figure: int) -> dict[str, str]:
+def texts_of(part: int | Literal["page"]) -> dict[str, str]:
     """Returns title, caption and the other texts of a figure, with names in braces for what is computed."""
-    return {name: text for name, text in _figures()[str(figure)].items() if isinstance(text, str)}
+    return {name: text for name, text in _figures()[str(part)].items() if isinstance(text, str)}
+
+
+def sections() -> dict[str, str]:
+    """Returns the titles of the paper's sections, in its order."""
+    return _figures()["page"]["sections"]
 
 
 @cache

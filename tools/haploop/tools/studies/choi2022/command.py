@@ -14,30 +14,11 @@ from haploop.tools.cli.exit_codes import WRONG_USE, leave, plain_errors
 from haploop.tools.figure.data import FigureError
 from haploop.tools.render.markdown import markdown_table
 from haploop.tools.render.progress import Stage, bars, silent
-from haploop.tools.studies.choi2022.claims import ASSUMING, VERDICTS, Finding
+from haploop.tools.studies.choi2022.claims import ASSUMING, VERDICTS, Finding, sections, texts_of
 from haploop.tools.studies.choi2022.figures import figure, numbers
 from haploop.tools.studies.choi2022.work import Work
 
 PAGE = "paper.md"
-_INTRO = """\
-What Choi et al. 2022 ("Virtual Inertia as an Energy Dissipation Element for Haptic Interfaces", IEEE Robotics and
-Automation Letters) say in their sections II to VI, and what this program finds of it. Every number here was computed by
-`haploop paper` and written by `make paper`; none was typed."""
-_SMALL = "**Made with `--small`, with few runs: the numbers are those of a trial.**"
-_INTERPRETATIONS = """\
-The paper leaves much open: of the simulation the encoder's step, the noise, the operator's force and how the
-acceleration is had, of the experiments the device's inner mode, the loop's delay and the inertial unit. An
-*interpretation* chooses all of it and keeps every number the paper gives. Interpretations were drawn at random, with
-fixed seeds, and "in 37 % of 4096 interpretations" means that. A claim that holds under some interpretations only is
-said to hold *assuming* one."""
-_SECTIONS = {
-    "II": "Energy leak in haptic interfaces",
-    "III": "Energy behavior of virtual inertia",
-    "IV": "Unidirectional virtual inertia",
-    "V.A": "Simulation",
-    "V.B": "Experiment",
-    "VI": "Conclusion",
-}
 
 
 def paper(wanted: Sequence[int], out: Path, small: bool, workers: int | None) -> None:
@@ -94,12 +75,13 @@ def made(directory: Path) -> dict[int, dict[str, Any]]:
 def page(kept: dict[int, dict[str, Any]], pictures: str = "") -> str:
     """Returns the page in Markdown: answers, the finding of every claim, then the figures."""
     rows = [(number, Finding.from_dict(entry)) for number, one in kept.items() for entry in one["findings"]]
-    parts = ["# The paper, claim by claim", _INTRO]
-    parts += [_SMALL] if any(one["small"] for one in kept.values()) else []
+    texts = texts_of("page")
+    parts = ["# The paper, claim by claim", texts["intro"]]
+    parts += [texts["small"]] if any(one["small"] for one in kept.values()) else []
     # The last figures are nearest to a device that is to be built.
     answers = [f"- {one['answer']} ([{number}](#figure-{number}))" for number, one in kept.items() if one.get("answer")]
     parts += ["## What a builder can take from it", "\n".join(reversed(answers))] if answers else []
-    parts += ["## Claims", _count(rows), _INTERPRETATIONS, *_tables(rows), *_missing(kept), "## Figures"]
+    parts += ["## Claims", _count(rows), texts["interpretations"], *_tables(rows), *_missing(kept), "## Figures"]
     for number, one in kept.items():
         parts += _figure(number, one, pictures)
     return "\n\n".join(parts) + "\n"
@@ -113,7 +95,7 @@ def _count(rows: list[tuple[int, Finding]]) -> str:
 def _tables(rows: list[tuple[int, Finding]]) -> list[str]:
     """Returns a table for each section of the paper, in its order; within it by figure."""
     parts = []
-    for section, title in _SECTIONS.items():
+    for section, title in sections().items():
         if there := [row for row in rows if _section(row[1].claim.place) == section]:
             parts += [f"### {section}. {title}", _table(there)]
     return parts

@@ -10,7 +10,7 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from haploop.tools.render.units import amount
 from haploop.tools.search.random import Space
 
 Row = Mapping[str, Any]
+Nearest = TypeVar("Nearest")
 # An option with fewer interpretations says nothing.
 _FEWEST = 20
 
@@ -50,6 +51,23 @@ class InterpretationSpace(Space):
     def _label_and_unit(self, key: str) -> tuple[str, str]:
         label, _, unit = self.labels.get(key, key).partition(" (")
         return label, unit.removesuffix(")")
+
+
+@dataclass(frozen=True)
+class Found(Generic[Nearest]):
+    """The outcome of a search among interpretations.
+
+    Attributes:
+        rows: of every interpretation, with the ``stage`` at which it was run.
+        nearest: the interpretation nearest to the paper.
+    """
+
+    rows: list[dict[str, Any]]
+    nearest: Nearest
+
+    def of(self, stage: str) -> list[dict[str, Any]]:
+        """Returns the rows of a stage."""
+        return [row for row in self.rows if row["stage"] == stage]
 
 
 def holds(row: Row, claim: str) -> bool:

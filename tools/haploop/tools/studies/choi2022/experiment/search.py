@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 from haploop.tools.render.markdown import markdown_table
 from haploop.tools.search.random import Effort, Point, Scale, random_search
 from haploop.tools.studies.choi2022.experiment.measure import CLAIMS, NAMES, PAPER, gap_N_m, measure
 from haploop.tools.studies.choi2022.experiment.setup import FRICTION_N, SCENE_FILE, UNITS, VELOCITIES, Setup
-from haploop.tools.studies.choi2022.interpretations import InterpretationSpace, Option, holds, percent, share
+from haploop.tools.studies.choi2022.interpretations import Found, InterpretationSpace, Option, holds, percent, share
 from haploop.tools.studies.choi2022.search_report import (
     by_number_of_claims,
     claims_table,
@@ -67,27 +67,6 @@ SMALL = Effort(structures=1, each=2, rounds=1, best=1, children=1, neighbours=1,
 _OFTEN = 0.05
 
 
-@dataclass(frozen=True)
-class Found:
-    """The outcome of the search.
-
-    Attributes:
-        rows: of every interpretation, with ``stage``: "random", "refined", "neighbour" or "friction".
-        nearest: the one nearest to the paper.
-        row: that of the nearest.
-        with_friction: the row of the nearest with the published friction.
-    """
-
-    rows: list[dict[str, Any]]
-    nearest: Setup
-    row: dict[str, Any]
-    with_friction: dict[str, Any]
-
-    def of(self, stage: str) -> list[dict[str, Any]]:
-        """Returns the rows of a stage."""
-        return [row for row in self.rows if row["stage"] == stage]
-
-
 def setup_of(point: Point) -> Setup:
     """Returns a point of the space as a setup, without friction."""
     return Setup(**point.numbers, **point.choices)
@@ -98,10 +77,11 @@ def evaluate(points: Sequence[Point]) -> list[dict[str, Any]]:
     return measure([setup_of(point) for point in points])
 
 
-def search(work: Work) -> Found:
+def search(work: Work) -> Found[Setup]:
     """Searches with the fixed seed; the same effort gives the same rows, whatever the number of workers.
 
-    It is without friction, which takes some forty times as long to run; the nearest alone is run with it, too.
+    Stages are "random", "refined", "neighbour", "nearest" and "friction": all are without friction, which takes some
+    forty times as long to run, and the nearest alone is run with it, too.
     """
 
     def run(stage: str, *args: Any) -> list[Any]:
@@ -118,15 +98,14 @@ def search(work: Work) -> Found:
     )
     nearest = setup_of(found.best.point)
     rough = replace(nearest, friction_N=0.0 if work.small else FRICTION_N)
-    [[row]] = run("friction", measure, [[rough]])
-    with_friction = row | {"stage": "friction"}
-    rows = [trial.row for trial in [*found.trials, *found.neighbours]]
-    return Found([*rows, with_friction], nearest, found.best.row, with_friction)
+    [[with_friction]] = run("friction", measure, [[rough]])
+    ends = [found.best.row | {"stage": "nearest"}, with_friction | {"stage": "friction"}]
+    return Found([*(trial.row for trial in [*found.trials, *found.neighbours]), *ends], nearest)
 
 
-def columns(found: Iterable[dict[str, Any]]) -> dict[str, list[Any]]:
-    """Returns rows as columns, for the data beside the figure."""
-    rows = list(found)
+def columns(found: Found[Setup]) -> dict[str, list[Any]]:
+    """Returns the rows as columns, for the data beside the figure; that of the nearest is among them once."""
+    rows = [row for row in found.rows if row["stage"] != "nearest"]
     return {key.replace(" ", "_"): [row[key] for row in rows] for key in rows[0]}
 
 
@@ -135,29 +114,30 @@ def describe(setup: Setup) -> str:
     return SPACE.describe(setup.as_dict(), (*SPACE.choices, *SPACE.bounds))
 
 
-def notes(work: Work, found: Found, options: Sequence[Option]) -> list[str]:
+def notes(work: Work, found: Found[Setup], options: Sequence[Option]) -> list[str]:
     """Returns the sections below the figure."""
     return [*_nearest(work, found), *_alone(found, options), *_together(found), *_method(work, found)]
 
 
-def _nearest(work: Work, found: Found) -> list[str]:
+def _nearest(work: Work, found: Found[Setup]) -> list[str]:
     values = describe(found.nearest)
-    lacks = ", ".join(f"*{name}*" for name in CLAIMS if not holds(found.row, name))
-    measured = {"nearest interpretation": found.row, "with friction of 48 mN": found.with_friction}
+    [row], [with_friction] = found.of("nearest"), found.of("friction")
+    lacks = ", ".join(f"*{name}*" for name in CLAIMS if not holds(row, name))
+    measured = {"nearest interpretation": row, "with friction of 48 mN": with_friction}
     rows = [["the paper", "", *(f"{stiffness / 1e3:.1f}" for stiffness in PAPER.values())]]
-    rows += [[name, *(f"{row[f'{kind}_N_m'] / 1e3:.1f}" for kind in NAMES)] for name, row in measured.items()]
+    rows += [[name, *(f"{one[f'{kind}_N_m'] / 1e3:.1f}" for kind in NAMES)] for name, one in measured.items()]
     kinds = ["nothing", "damping", "bidirectional", "unidirectional", "damping with unidirectional"]
     return [
         "#### The nearest interpretation",
         f"{values[:1].upper()}{values[1:]}: launch/scenes/{SCENE_FILE}, in which Figs. 8 to 13 are made. "
-        f"{found.row['holding']} of the {len(CLAIMS)} claims hold for it; it lacks {lacks}. Largest steady stiffness "
+        f"{row['holding']} of the {len(CLAIMS)} claims hold for it; it lacks {lacks}. Largest steady stiffness "
         "in N/mm:",
         markdown_table(["", *kinds], rows, numbers=range(1, 6)),
         work.tell("friction"),
     ]
 
 
-def _alone(found: Found, options: Sequence[Option]) -> list[str]:
+def _alone(found: Found[Setup], options: Sequence[Option]) -> list[str]:
     rows = found.of("random")
     bears = sum(max(row[f"{name}_N_m"] for name in PAPER) > 0.0 for row in rows)
     return [
@@ -165,7 +145,7 @@ def _alone(found: Found, options: Sequence[Option]) -> list[str]:
         f"Of {len(rows)} random interpretations {bears} let any element steady a wall of 2.5 N/mm. Shares are of all.",
         claims_table(
             CLAIMS,
-            {"nearest": found.row},
+            {"nearest": found.of("nearest")[0]},
             {"its neighbours": found.of("neighbour"), "random interpretations": rows},
             options,
             "likeliest with, and least with",
@@ -173,7 +153,7 @@ def _alone(found: Found, options: Sequence[Option]) -> list[str]:
     ]
 
 
-def _together(found: Found) -> list[str]:
+def _together(found: Found[Setup]) -> list[str]:
     rows, most = found.of("random"), max(row["holding"] for row in found.rows)
     never = pairs_never_together(rows, [name for name in CLAIMS if share(rows, name) >= _OFTEN])
     often = f" Of those that hold in {percent(_OFTEN)} or more, never both: {never}." if never else ""
@@ -184,7 +164,7 @@ def _together(found: Found) -> list[str]:
     ]
 
 
-def _method(work: Work, found: Found) -> list[str]:
+def _method(work: Work, found: Found[Setup]) -> list[str]:
     count = Counter(row["stage"] for row in found.rows)
     papers = ", ".join(f"{name.replace('-', ' ')} {stiffness / 1e3:.1f}" for name, stiffness in PAPER.items())
     numbers = [

@@ -5,15 +5,16 @@ from __future__ import annotations
 import numpy as np
 
 from haploop.tools.linear.one_tick import OneTickMap
+from haploop.tools.search.random import Point
 from haploop.tools.studies.choi2022.claims import Finding, claims_of
-from haploop.tools.studies.choi2022.interpretations import decider, holds, options, percent, share, yes
+from haploop.tools.studies.choi2022.interpretations import Found, decider, holds, options, percent, share, yes
 from haploop.tools.studies.choi2022.scenes import run
 from haploop.tools.studies.choi2022.search_report import share_map
 from haploop.tools.studies.choi2022.simulation.interpretation import BASE, NEAREST, SPACE, scene_of, scene_text
 from haploop.tools.studies.choi2022.simulation.measure import ASIDE
 from haploop.tools.studies.choi2022.simulation.measure import CLAIMS as COUNTED
 from haploop.tools.studies.choi2022.simulation.panels import Run, findings_on_logs, panels
-from haploop.tools.studies.choi2022.simulation.search import SMALL, WHOLE, Found, fullest, notes, search, write_table
+from haploop.tools.studies.choi2022.simulation.search import SMALL, WHOLE, fullest, notes, search, write_table
 from haploop.tools.studies.choi2022.work import Work
 
 TABLE = "figure_6_readings.parquet"
@@ -70,7 +71,7 @@ def _columns(runs: dict[str, Run]) -> dict[str, np.ndarray]:
     return kept
 
 
-def _verdict(name: str, found: Found) -> Finding:
+def _verdict(name: str, found: Found[Point]) -> Finding:
     """Finds that a claim holds if it does in our interpretation and nearly all; under an assumption if in some."""
     rows, [base], [nearest] = found.of("random"), found.of("base"), found.of("nearest")
     often = share(rows, name)
@@ -88,7 +89,7 @@ def _verdict(name: str, found: Found) -> Finding:
     return CLAIMS[name].assuming(_assumption(name, found), numbers) if holds_somewhere else CLAIMS[name].fails(numbers)
 
 
-def _assumption(name: str, found: Found) -> str:
+def _assumption(name: str, found: Found[Point]) -> str:
     """Names the nearest interpretation where the claim holds in it, else what it is likeliest with."""
     if holds(found.of("nearest")[0], name):
         return NEAREST
@@ -96,7 +97,7 @@ def _assumption(name: str, found: Found) -> str:
     return f"an interpretation with {decides.best}" if decides else "another interpretation than ours or the nearest"
 
 
-def _together(found: Found) -> Finding:
+def _together(found: Found[Point]) -> Finding:
     """Finds whether all that the search counts hold together under one interpretation."""
     rows, held = found.of("random"), [row for row in found.rows if holds(row, "all")]
     most = fullest(found)

@@ -11,10 +11,10 @@ from haploop.tools.studies.choi2022.drawing import SHORT
 from haploop.tools.studies.choi2022.experiment.measure import CLAIMS as TESTED
 from haploop.tools.studies.choi2022.experiment.measure import NAMES, PAPER, largest, stiffness_ladder
 from haploop.tools.studies.choi2022.experiment.scene_file import file_text
-from haploop.tools.studies.choi2022.experiment.search import SPACE, Found, columns, notes, search
+from haploop.tools.studies.choi2022.experiment.search import SPACE, columns, notes, search
 from haploop.tools.studies.choi2022.experiment.setup import FRICTION_N, KINDS, SCENE_FILE, Setup
 from haploop.tools.studies.choi2022.experiment.verdicts import NEAREST, SCENE, keep_shares
-from haploop.tools.studies.choi2022.interpretations import options, percent, share
+from haploop.tools.studies.choi2022.interpretations import Found, options, percent, share
 from haploop.tools.studies.choi2022.search_report import share_map
 from haploop.tools.studies.choi2022.work import Work
 
@@ -44,7 +44,7 @@ def make(work: Work) -> list[Finding]:
         "figure_7_influence",
         work.tell("seen_influence", factor=_FACTOR),
     )
-    work.data("figure_7_readings", columns(found.rows))
+    work.data("figure_7_readings", columns(found))
     work.scene(SCENE.removesuffix(".toml"), found.nearest.scene(5000.0, []))
     work.text(SCENE_FILE, file_text(found.nearest))
     work.notes = notes(work, found, there)
@@ -73,12 +73,13 @@ def _varied(setup: Setup, small: bool) -> dict[str, tuple[Any, Any]]:
     return {key: pairs[key] for key in ("delay_s", "acceleration")} if small else pairs
 
 
-def _influences(work: Work, found: Found, varied: dict[str, tuple[Any, Any]]) -> tuple[Largest, Influences]:
+def _influences(work: Work, found: Found[Setup], varied: dict[str, tuple[Any, Any]]) -> tuple[Largest, Influences]:
     """Returns the largest stiffnesses of the nearest interpretation, and those at both values of each key."""
     ends = [replace(found.nearest, **{key: value}) for key, pair in varied.items() for value in pair]
     base, *rest = _largest(work, [found.nearest, *ends])
     influences = {key: (rest[2 * i], rest[2 * i + 1]) for i, key in enumerate(varied)}
-    return base, influences | {"friction_N": (base, {name: found.with_friction[f"{name}_N_m"] for name in NAMES})}
+    [rough] = found.of("friction")
+    return base, influences | {"friction_N": (base, {name: rough[f"{name}_N_m"] for name in NAMES})}
 
 
 def _largest(work: Work, setups: list[Setup]) -> list[Largest]:
@@ -115,8 +116,8 @@ def _draw(base: Largest, influences: Influences, varied: dict[str, tuple[Any, An
     return figure
 
 
-def _answer(work: Work, found: Found) -> str:
-    rows, row = found.of("random"), found.row
+def _answer(work: Work, found: Found[Setup]) -> str:
+    rows, [row] = found.of("random"), found.of("nearest")
     return work.tell(
         "answer",
         larger=percent(share(rows, "10 larger")),
@@ -127,7 +128,7 @@ def _answer(work: Work, found: Found) -> str:
     )
 
 
-def _on_the_unit(found: Found, unit: Largest, encoder: Largest) -> Finding:
+def _on_the_unit(found: Found[Setup], unit: Largest, encoder: Largest) -> Finding:
     """Finds whether inertia steadies stiffer walls with the unit than with the encoder's second differences."""
     better = all(unit[kind] > encoder[kind] for kind in KINDS[2:])
     of_unit, of_encoder = (" and ".join(f"{of[kind] / 1e3:.1f}" for kind in KINDS[2:]) for of in (unit, encoder))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +12,7 @@ import numpy as np
 from haploop.tools.render.markdown import markdown_table
 from haploop.tools.render.units import amount
 from haploop.tools.search.random import Effort, Point, evaluated, random_search
-from haploop.tools.studies.choi2022.interpretations import Row, holds, options, percent, share
+from haploop.tools.studies.choi2022.interpretations import Found, Row, holds, options, percent, share
 from haploop.tools.studies.choi2022.search_report import (
     by_number_of_claims,
     claims_table,
@@ -29,25 +28,11 @@ WHOLE = Effort(structures=64, each=64, rounds=4, best=3, children=64, finalists=
 SMALL = Effort(structures=2, each=4, rounds=1, best=1, children=2, neighbours=2)
 
 
-@dataclass(frozen=True)
-class Found:
-    """The outcome of the search.
+def search(work: Work, effort: Effort) -> Found[Point]:
+    """Searches with the fixed seed; the same effort gives the same rows, whatever the number of workers.
 
-    Attributes:
-        rows: of every interpretation, with ``stage``: "base", "nearest", "random", "refined" or "neighbour".
-        nearest: the interpretation nearest to the paper, its numbers rounded to three digits.
+    Stages are "base", "nearest" (its numbers rounded to three digits), "random", "refined" and "neighbour".
     """
-
-    rows: list[dict[str, Any]]
-    nearest: Point
-
-    def of(self, stage: str) -> list[dict[str, Any]]:
-        """Returns the rows of a stage."""
-        return [row for row in self.rows if row["stage"] == stage]
-
-
-def search(work: Work, effort: Effort) -> Found:
-    """Searches with the fixed seed; the same effort gives the same rows, whatever the number of workers."""
 
     def evaluate_all(stage: str, *args: Any) -> list[Any]:
         return work.map_parallel(f"{stage} interpretations, in groups", *args)
@@ -77,17 +62,17 @@ def write_table(rows: Sequence[dict[str, Any]], path: Path) -> bool:
     return True
 
 
-def notes(work: Work, found: Found) -> list[str]:
+def notes(work: Work, found: Found[Point]) -> list[str]:
     """Returns the sections below the figure."""
     return [*_together(found), *_alone(found), *_nearest(found), *_method(work, found)]
 
 
-def fullest(found: Found) -> Row:
+def fullest(found: Found[Point]) -> Row:
     """Returns the interpretation with the most claims, of several the nearest to the paper."""
     return max(found.rows, key=lambda row: (row["holding"], -row["distance"]))
 
 
-def _together(found: Found) -> list[str]:
+def _together(found: Found[Point]) -> list[str]:
     rows, refined, most = found.of("random"), found.of("refined"), fullest(found)
     lacks = ", ".join(f"*{name}*" for name in CLAIMS if not holds(most, name))
     limit = f"No interpretation of any kind has more than {most['holding']}; that one lacks {lacks}. " if lacks else ""
@@ -101,7 +86,7 @@ def _together(found: Found) -> list[str]:
     ]
 
 
-def _alone(found: Found) -> list[str]:
+def _alone(found: Found[Point]) -> list[str]:
     rows, [base], [nearest] = found.of("random"), found.of("base"), found.of("nearest")
     return [
         "#### Each claim alone",
@@ -116,7 +101,7 @@ def _alone(found: Found) -> list[str]:
     ]
 
 
-def _nearest(found: Found) -> list[str]:
+def _nearest(found: Found[Point]) -> list[str]:
     [row], around = found.of("nearest"), found.of("neighbour")
     missed = ", ".join(f"*{name}* by {row[name]:.2g}" for name in CLAIMS if row[name] > 0.0)
     swings = ", ".join(
@@ -133,7 +118,7 @@ def _nearest(found: Found) -> list[str]:
     ]
 
 
-def _method(work: Work, found: Found) -> list[str]:
+def _method(work: Work, found: Found[Point]) -> list[str]:
     count = Counter(row["stage"] for row in found.rows)
     numbers = [
         [SPACE.label(key), SPACE.value(key, low), SPACE.value(key, high), ABOUT[key][1]]
