@@ -65,12 +65,12 @@ def test_a_plant_whose_state_was_packed_and_unpacked_goes_on_to_the_same_bits(na
 
 
 @pytest.mark.parametrize("name", SCENES)
-def test_a_checkpoint_of_another_tick_goes_on_otherwise(name: str) -> None:
+def test_the_motion_of_another_tick_goes_on_otherwise(name: str) -> None:
     """So that the states of the test above are seen to hold something."""
     whole, before, after = (plant_of(SCENES[name]) for _ in range(3))
     run(whole, 100)
     run(before, 99)
-    after.restore(before.checkpoint() | {"tick": 100})
+    after.restore(whole.checkpoint() | {"motion": before.checkpoint()["motion"]})
     assert run(after, 300) != run(whole, 300)
 
 
