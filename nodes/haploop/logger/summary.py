@@ -45,7 +45,8 @@ def energy(books: BooksState, accounts: list[dict[str, Any]], has_wall: bool) ->
         parts = {cause: after - before for cause, before, after in zip(causes, steps[:-1], steps[1:], strict=True)}
         wall |= {"ideal_J": steps[0] + books.wall_changes_J, "changes_J": books.wall_changes_J}
         wall |= {"leak": {"total_J": steps[-1] - steps[0], **parts}}
-    plants = {f"{name}_J": total(name) for name in books.names if name.endswith("_heat") or name == "actuator"}
+    beside = [name for name in books.names if name.endswith(("_heat", "_work")) or name == "actuator"]
+    plants = {f"{name}_J": total(name) for name in beside if name != "hand_work"}
     return {
         "elements": elements,
         "wall": wall,

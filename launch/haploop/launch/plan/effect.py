@@ -76,7 +76,8 @@ class Effect:
         frees: cause of a buzzing contact, such as "friction" -> makes of a resolved scene that simulates the effect one
             with the ideal in its place, or gives back the scene itself where its values are ideal.
         scaled_with: quantity that may be uncertain, such as "device mass" -> key of the effect that goes with it.
-        table: declaration of its table, for an effect of another package; the scene itself declares the others.
+        table: declaration of its table, for an effect of another package; the scene itself declares the others. The
+            force of one that pushes is named in the group of entry points ``haploop.forces``.
     """
 
     key: str
@@ -128,7 +129,9 @@ class Effect:
         return self.is_named(scene) and self.used(scene)
 
     def batches_in(self, scene: Resolved) -> bool:
-        """Returns whether a scene that names it can be one of many that run as one."""
+        """Returns whether a scene that names it can be one of many that run as one; one of another package cannot."""
+        if self.table is not None:
+            return False
         return self.batches if isinstance(self.batches, bool) else self.batches(scene)
 
     def states_in(self, scene: Resolved) -> int:

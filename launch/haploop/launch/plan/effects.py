@@ -261,7 +261,7 @@ def all_effects() -> tuple[Effect, ...]:
 @cache
 def alone_perhaps() -> tuple[Effect, ...]:
     """Returns the effects with which a scene cannot always be one of many that run as one."""
-    return tuple(effect for effect in all_effects() if effect.batches is not True)
+    return tuple(effect for effect in all_effects() if effect.batches is not True or effect.table)
 
 
 def effects_of(scene: Resolved) -> tuple[Effect, ...]:

@@ -215,12 +215,13 @@ def _of_account(name: str) -> tuple[str, str]:
 
 
 # How books count in the balance: what the hand gave less what is elsewhere.
-_SIGNS = {"hand_work": 1.0, "kinetic": -1.0, "spring": -1.0, "actuator": -1.0}
+_SIGNS = {"kinetic": -1.0, "spring": -1.0, "actuator": -1.0}
+_ENDINGS = {"_work": 1.0, "_heat": -1.0, ".true": -1.0}
 
 
 def balance_sign(name: str) -> float:
     """Returns how a book counts in the balance, 0 where it is no part of it."""
-    return _SIGNS.get(name, -1.0 if name.endswith(("_heat", ".true")) else 0.0)
+    return _SIGNS.get(name) or next((sign for ending, sign in _ENDINGS.items() if name.endswith(ending)), 0.0)
 
 
 def balance(names: Sequence[str]) -> list[tuple[float, int]]:

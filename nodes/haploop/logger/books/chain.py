@@ -17,7 +17,7 @@ from haploop.logger.books.segments import Columns, Segments, end_to_end
 from haploop.logger.books.sums import sum_rows, sum_steps
 from haploop.logger.books.work import Displacement, by_interval
 from haploop.plant.chain.chain import Chain
-from haploop.plant.motion.hand_force import make_hand_force
+from haploop.plant.motion.hand_force import constant_forces, make_hand_force
 from haploop.protocol.arrays import first_row
 from haploop.protocol.ticks import Timebase
 
@@ -51,7 +51,9 @@ class ChainBooks:
         self._forms = ChainForms(self._chain, time.step_s, of_batch=members is not None and not self._rubs)
         self._heats = [name for name in self._forms.names if name.endswith("_heat")]
         friction, actuator = ["friction_heat"] * self._rubs, ["actuator"] * self._is_limited
-        self.names = ["hand_work", *self._heats, *friction, "kinetic", "spring", *actuator]
+        self._constant = constant_forces(scene)
+        works = [f"{name}_work" for name in self._constant]
+        self.names = ["hand_work", *self._heats, *friction, "kinetic", "spring", *actuator, *works]
 
     def increments(
         self, first_step: int, columns: dict[str, Any], moved: Displacement, commanded: Iterable[np.ndarray]
@@ -116,11 +118,15 @@ class ChainBooks:
         if self._rubs:
             books["friction_heat"] = -segments.friction * segments.displacements[0] + segments.stop_loss
         books |= {"kinetic": self._kinetic(segments), "spring": self._spring(segments, way)}
+        if self._constant:
+            books["hand_work"] -= sum(self._constant.values()) * way
         for book in books.values():
             yield _by_step(book, segments.step, steps)
         if self._is_limited:
             lag = _by_step(integrals.get("lag", np.zeros(way.shape)), segments.step, steps)
             yield lag + beyond_limits(commanded, force) * dx
+        for constant_N in self._constant.values():
+            yield _by_step(constant_N * way, segments.step, steps)
 
     def _kinetic(self, segments: Segments) -> np.ndarray:
         n, masses = self._chain.count, self._chain.masses_kg

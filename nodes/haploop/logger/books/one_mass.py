@@ -9,7 +9,7 @@ import numpy as np
 
 from haploop.logger.books.sums import sum_rows, sum_steps
 from haploop.logger.books.work import Displacement, SumSteps, by_interval
-from haploop.plant.motion.hand_force import make_hand_force
+from haploop.plant.motion.hand_force import constant_forces, make_hand_force
 from haploop.plant.motion.mechanics import Mechanics
 from haploop.plant.motion.transition import motion_integrals, natural_rate
 from haploop.protocol.arrays import each, first_row
@@ -115,6 +115,14 @@ def increments(
         yield summed(beyond_limits(commanded, force) * dx)
 
 
+def _parted(found: Iterator[Any], constant_N: Sequence[float], dx: Any) -> Iterator[Any]:
+    """Yields the books with the work of constant forces, which is F dx, taken from the hand's and added at the end."""
+    works = [force * dx for force in constant_N]
+    yield next(found) - sum(works)
+    yield from found
+    yield from works
+
+
 def _hand_work(lag: np.ndarray, tau: Any, rise: Any, dx: Any, rates: Sequence[Any]) -> Any:
     if rise is None:
         return tau * dx
@@ -180,7 +188,8 @@ class OneMassBooks:
         self.is_limited = "actuator" in scene
         dampers = self.params.mechanics.dampers
         self.names = ["hand_work", *(f"{name}_heat" for name in dampers), "kinetic", "spring"]
-        self.names += ["actuator"] * self.is_limited
+        self._constant = constant_forces(scene)
+        self.names += ["actuator"] * self.is_limited + [f"{name}_work" for name in self._constant]
 
     def increments(
         self, first_step: int, columns: dict[str, np.ndarray], moved: Displacement, commanded: Iterable[np.ndarray]
@@ -204,7 +213,8 @@ class OneMassBooks:
         steps = Steps(*starts, rise=by_interval(rise, n) if rise.any() else None, dx=moved.by_step)
         ticks = Ticks(x[::n], v[::n], moved.by_tick)
         limited = (by_interval(force, n) for force in commanded) if self.is_limited else None
-        return increments(self.params, steps, ticks, limited, sum_steps)
+        found = increments(self.params, steps, ticks, limited, sum_steps)
+        return _parted(found, list(self._constant.values()), moved.by_tick) if self._constant else found
 
     def stored_J(self, columns: dict[str, np.ndarray]) -> Any:
         """Returns kinetic and spring energy in the first state of some telemetry, J."""

@@ -3,16 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from importlib.metadata import entry_points
 from typing import Any
 
 import numpy as np
 
+from haploop.protocol.scene.scene import Scene
 from haploop.protocol.trees import tree_select
 
 # The force is made in pieces on a fixed grid, so that how a run is cut into messages cannot change a bit of it.
 _PIECE_STEPS = 4096
 # Where every member of a batch has a force of its own, fewer steps of it are made at a time.
 _PIECE_STEPS_OF_EACH = 256
+
+# The tables of a scene that come with haploop, and the group in which other packages name their forces.
+_DECLARED, _GROUP = {field.name for field in Scene.fields()}, "haploop.forces"
 
 Profile = Callable[[np.ndarray], np.ndarray]
 
@@ -43,6 +48,11 @@ class HandForce:
         self._profile = PROFILES[table["kind"]](table) if table else np.zeros_like
         self._pieces: dict[int, np.ndarray] = {}
 
+    def add(self, constant_N: float) -> None:
+        """Adds a constant force; for one run."""
+        profile = self._profile
+        self._profile = lambda t: profile(t) + constant_N
+
     def at_steps(self, first: int, last: int) -> np.ndarray:
         """Returns tau at the steps first ... last - 1, shape (last - first,) or (last - first, 1 or members)."""
         size = self._piece_steps
@@ -67,8 +77,25 @@ class HandForce:
 
 
 def make_hand_force(scene: dict[str, Any], plant_rate: int, members: int | None = None) -> HandForce:
-    """Makes the hand force of a resolved scene, or of the stacked scene of a batch."""
-    return HandForce(scene.get("hand", {}).get("force"), plant_rate, members)
+    """Makes the hand force of a resolved scene, or of the stacked scene of a batch.
+
+    The constant forces of other packages are added to it, since they act on the same body; the books part them again.
+    """
+    force = HandForce(scene.get("hand", {}).get("force"), plant_rate, members)
+    if constant := constant_forces(scene):
+        force.add(sum(constant.values()))
+    return force
+
+
+def constant_forces(scene: dict[str, Any]) -> dict[str, float]:
+    """Returns the constant forces on the last body that effects of other packages bring, N, by the key of their table.
+
+    The group of entry points ``haploop.forces`` names, by that key, functions that make the force of a resolved scene.
+    """
+    others = scene.keys() - _DECLARED
+    if not others:
+        return {}
+    return {entry.name: entry.load()(scene) for entry in entry_points(group=_GROUP) if entry.name in others}
 
 
 def _constant(table: dict[str, Any]) -> Profile:

@@ -16,6 +16,7 @@ from haploop.controller.dissipation import registry
 from haploop.logger.verdict.window import CONTROLLER_COLUMNS, Window
 from haploop.plant.choose import make_position_sensor
 from haploop.plant.line.delay import make_line
+from haploop.plant.motion.hand_force import constant_forces
 from haploop.plant.sensing.accelerometer import make_accelerometer
 from haploop.plant.sensing.encoder import accelerometer_is_used
 from haploop.protocol.ticks import Timebase
@@ -48,7 +49,7 @@ def make_timebase(scene: dict[str, Any]) -> Timebase:
     Raises:
         ValueError: something in it falls between ticks, depends on the plant rate, or is not linear.
     """
-    wrong = [table for table in ("jitter", "event") if table in scene]
+    wrong = [table for table in ("jitter", "event", *constant_forces(scene)) if table in scene]
     if "stribeck_velocity" in scene.get("friction", {}):
         wrong.append("friction.stribeck_velocity")
     if wrong:
