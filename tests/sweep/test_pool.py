@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +14,7 @@ from haploop.controller.dissipation import PluginError
 from haploop.launch.batch.run import run_array
 from haploop.tools.executor.executors import make_executor, map_parallel
 from haploop.tools.executor.parts import Group, Sizes, cut, grouped
-from haploop.tools.executor.pool import DIED, Pool, results
+from haploop.tools.executor.pool import DIED, Pool
 from haploop.tools.executor.work import Work, load_kinds
 from helpers.runs.workers import of_stiffness, pressed, threads
 from helpers.scenes.least import KINDS
@@ -41,6 +41,14 @@ class Deadly(Element):
 """
 
 
+def results(
+    scenes: list[dict[str, Any]], plugins: Sequence[Path] = (), *, workers: int = 2, trajectories: bool = False
+) -> list[tuple[int, dict[str, Any]]]:
+    """Results of scenes as a pool of so many workers gives them."""
+    with Pool(workers) as pool:
+        return list(pool.results(scenes, plugins, trajectories=trajectories))
+
+
 def of_many_structures() -> list[dict[str, Any]]:
     """Some run in arrays, some alone, in no order."""
     effects: list[dict[str, Any]] = [
@@ -54,7 +62,7 @@ def of_many_structures() -> list[dict[str, Any]]:
 @pytest.mark.parametrize("workers", [1, 2])
 def test_every_scene_comes_back_once_with_every_bit_it_has_in_one_array(workers: int) -> None:
     scenes = of_many_structures()
-    came = list(results(scenes, workers=workers, trajectories=True))
+    came = results(scenes, workers=workers, trajectories=True)
     assert sorted(index for index, _ in came) == list(range(len(scenes)))
     expected = run_array(scenes, KINDS, trajectories=True)
     assert [dict(came)[index] for index in range(len(scenes))] == expected
@@ -86,7 +94,7 @@ def test_a_plugin_that_does_not_load_is_said_before_anything_is_started(tmp_path
     path = tmp_path / "broken.py"
     path.write_text("1 / 0")
     with pytest.raises(PluginError, match=r"broken\.py does not load: ZeroDivisionError"):
-        list(results([pressed(100.0)], [path]))
+        results([pressed(100.0)], [path])
 
 
 def test_scenes_are_taken_as_there_is_room_for_them() -> None:

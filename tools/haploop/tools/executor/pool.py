@@ -18,33 +18,6 @@ _POLL_S = 0.3
 DIED = "The process that ran it died: it was killed, ran out of memory or crashed in compiled code."
 
 
-def results(
-    scenes: Iterable[Scene],
-    plugins: Sequence[Path] = (),
-    *,
-    workers: int | None = None,
-    energy: bool = True,
-    trajectories: bool = False,
-) -> Iterator[tuple[int, Result]]:
-    """Yields the results of ``haploop.launch.batch.run.results_of``, from as many processes, in the order they come in.
-
-    Args:
-        scenes: resolved; taken a few thousand at a time.
-        plugins: files that define elements.
-        workers: processes; as many as there are cores when None; 1 runs in this process.
-        energy, trajectories: as for ``results_of``.
-
-    Yields:
-        The index of a scene and its result. A scene that fails, or kills its worker, is a result with its reason.
-
-    Raises:
-        PluginError: a plugin cannot be used.
-        ExecutorError: no worker can be started.
-    """
-    with Pool(workers) as pool:
-        yield from pool.results(scenes, plugins, energy=energy, trajectories=trajectories)
-
-
 class Pool:
     """Workers that stay for several calls; a context manager.
 
@@ -75,7 +48,19 @@ class Pool:
     def results(
         self, scenes: Iterable[Scene], plugins: Sequence[Path] = (), *, energy: bool = True, trajectories: bool = False
     ) -> Iterator[tuple[int, Result]]:
-        """Yields the index of each scene and its result; for the arguments see the function ``results``."""
+        """Yields the index of each scene and its result, in the order in which they come in.
+
+        A scene that fails, or kills its worker, has a result with its reason.
+
+        Args:
+            scenes: resolved; taken a few thousand at a time.
+            plugins: files that define elements.
+            energy, trajectories: as of ``haploop.launch.batch.run.results_of``.
+
+        Raises:
+            PluginError: a plugin cannot be used.
+            ExecutorError: no worker can be started.
+        """
         work = Work(make=_second, sources=read_sources(plugins), energy=energy, trajectories=trajectories)
         count = len(scenes) if isinstance(scenes, Sequence) else None
         by_structure = grouped(enumerate(scenes), _structure)

@@ -190,28 +190,14 @@ class Sweep:
 
     def toml(self) -> str:
         """Returns the sweep as a file that runs by itself."""
-        bisect = self.bisect
-        tolerances = {"tolerance": bisect.tolerance, "relative": bisect.relative} if bisect else {}
-        return to_toml(
-            {
-                "title": self.title,
-                "repeat": self.repeat,
-                "record": [column.name for column in self.record],
-                "axes": {axis.key: list(axis.values) for axis in self.axes},
-                **(
-                    {
-                        "bisect": {
-                            "axis": bisect.axis,
-                            **{k: v for k, v in tolerances.items() if v},
-                            "holds": bisect.holds,
-                        }
-                    }
-                    if bisect
-                    else {}
-                ),
-                "base": self.base,
-            }
-        )
+        table: dict[str, Any] = {"title": self.title, "repeat": self.repeat}
+        table["record"] = [column.name for column in self.record]
+        table["axes"] = {axis.key: list(axis.values) for axis in self.axes}
+        if bisect := self.bisect:
+            tolerances = {"tolerance": bisect.tolerance, "relative": bisect.relative}
+            given = {name: value for name, value in tolerances.items() if value}
+            table["bisect"] = {"axis": bisect.axis, **given, "holds": bisect.holds}
+        return to_toml({**table, "base": self.base})
 
 
 def resolved(values: dict[str, Any], base: dict[str, Any], kinds: dict[str, Any]) -> dict[str, Any]:

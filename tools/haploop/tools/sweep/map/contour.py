@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -98,14 +99,7 @@ def _exact(level: Level, place: np.ndarray, xs: np.ndarray, ys: np.ndarray, exac
         return point
     point[1 - moving] = grid[1 - moving][int(whole[1 - moving])]
     low, high = (grid[moving][int(end(place[moving]))] for end in (np.floor, np.ceil))
-
-    def along(value: float) -> float:
-        at = point.copy()
-        at[moving] = value
-        return level(float(at[0]), float(at[1]))
-
-    point[moving] = _root(along, float(low), float(high), float(point[moving]))
-    return point
+    return _root(level, point, moving, float(low), float(high))
 
 
 def _rounded(level: Level, line: np.ndarray, xs: np.ndarray, ys: np.ndarray, exact: tuple[bool, bool]) -> np.ndarray:
@@ -128,25 +122,19 @@ def _across(level: Level, ends: np.ndarray, moving: int, grid: np.ndarray) -> np
     point = ends.mean(axis=0)
     place = int(np.clip(np.searchsorted(grid, point[moving]), 1, len(grid) - 1))
     reach = grid[place] - grid[place - 1]
-
-    def along(value: float) -> float:
-        at = point.copy()
-        at[moving] = value
-        return level(float(at[0]), float(at[1]))
-
     low, high = max(point[moving] - reach, grid[0]), min(point[moving] + reach, grid[-1])
-    point[moving] = _root(along, float(low), float(high), float(point[moving]))
-    return point
+    return _root(level, point, moving, float(low), float(high))
 
 
-def _root(along: Callable[[float], float], low: float, high: float, guess: float) -> float:
-    """Returns the zero between two values by Brent's method; the guess where the ends do not enclose one."""
+def _root(level: Level, point: np.ndarray, moving: int, low: float, high: float) -> np.ndarray:
+    """Moves a point along one axis to the zero by Brent's method; leaves it where the ends do not enclose one."""
     from scipy.optimize import brentq
 
-    if not along(low) * along(high) < 0.0:
-        return guess
-    try:
-        root: Any = brentq(along, low, high, xtol=1e-11 * max(abs(low), abs(high)))
-    except ValueError:  # the level is not a number somewhere in between
-        return guess
-    return float(root)
+    def along(value: float) -> float:
+        return level(value, float(point[1])) if moving == 0 else level(float(point[0]), value)
+
+    root: Any = point[moving]
+    if along(low) * along(high) < 0.0:
+        with suppress(ValueError):  # the level is not a number somewhere in between
+            root = brentq(along, low, high, xtol=1e-11 * max(abs(low), abs(high)))
+    return np.array([root, point[1]] if moving == 0 else [point[0], root])
