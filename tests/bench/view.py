@@ -1,4 +1,4 @@
-"""What the live page costs its server in real time: share of a core, pictures and bytes a second."""
+"""What the live page costs its server in real time: share of a core, snapshots and bytes a second."""
 
 from __future__ import annotations
 
@@ -35,25 +35,25 @@ def cpu_s(pid: int) -> float:
 async def measure(
     address: str, pid: int, watch: dict[str, float | None], seconds: float
 ) -> tuple[float, float, float, int]:
-    """Share of a core, pictures a second, MB a second, and columns of a picture, with one page open."""
+    """Share of a core, snapshots a second, MB a second, and columns of a snapshot, with one page open."""
     import json
 
     async with aiohttp.ClientSession() as session:
         ws = await session.ws_connect(f"{address}/stream", headers={"Origin": address}, max_msg_size=0)
         await ws.send_json({"type": "watch", **watch})
-        settled, pictures, size, columns = time.monotonic() + 1.0, 0, 0, 0
+        settled, snapshots, size, columns = time.monotonic() + 1.0, 0, 0, 0
         began, used = 0.0, 0.0
         async for message in ws:
             now = time.monotonic()
             if not began and now >= settled:
                 began, used = now, cpu_s(pid)
             if began and message.type is aiohttp.WSMsgType.BINARY:
-                pictures, size = pictures + 1, size + len(message.data)
+                snapshots, size = snapshots + 1, size + len(message.data)
                 head = json.loads(message.data[4 : 4 + int.from_bytes(message.data[:4], "little")])
                 columns = sum(len(table["columns"]) for table in head["tables"])
             if began and now >= began + seconds:
                 took = now - began
-                return (cpu_s(pid) - used) / took, pictures / took, size / took / 1e6, columns
+                return (cpu_s(pid) - used) / took, snapshots / took, size / took / 1e6, columns
         raise RuntimeError("The page was closed.")
 
 
@@ -77,7 +77,7 @@ def main() -> None:
             print(f"{machine()}; {seconds:g} s each, in real time")
             for name, watch in WATCHES.items():
                 share, rate, rate_MB, columns = asyncio.run(measure(found[0], viewer.pid, watch, seconds))
-                print(f"{name:<40}{share:6.3f} of a core{rate:7.1f} pictures/s{rate_MB:7.2f} MB/s{columns:4} columns")
+                print(f"{name:<40}{share:6.3f} of a core{rate:7.1f} snapshots/s{rate_MB:7.2f} MB/s{columns:4} columns")
         finally:
             for process in (run, viewer):
                 process.terminate()

@@ -3,7 +3,7 @@
 from playwright.sync_api import expect
 
 from helpers.live.stand_in import RUNNING, WAITING
-from oracles.pictures import contact
+from oracles.snapshots import contact
 
 LEAK = {"total_J": -1.2e-3, "sampling_and_hold_J": -1e-4, "quantisation_J": 2e-6, "delay_J": -1.1e-3}
 SUMMARY = {
@@ -73,7 +73,7 @@ def test_it_shows_who_waits_for_whom_and_what_each_node_skipped(stand_in, open_p
     expect(rows).to_have_count(2)
 
 
-def test_after_the_end_it_shows_what_came_of_the_run_and_its_last_picture(stand_in, open_page):
+def test_after_the_end_it_shows_what_came_of_the_run_and_its_last_snapshot(stand_in, open_page):
     stand_in.state(**ENDED)
     stand_in.show(contact())
     page = open_page(stand_in.url)
@@ -106,7 +106,7 @@ def test_a_lost_server_is_told_and_taken_up_again_with_the_same_question(stand_i
     expect(page.locator("#phase")).to_have_text("not connected")
     expect(page.locator("#notice")).to_contain_text("No connection")
     expect(page.locator("#pause")).to_be_disabled()
-    stand_in.heard.clear()
+    stand_in.received.clear()
     stand_in.start()
     expect(page.locator("#phase")).to_have_text("running")
     expect(page.locator("#pause")).to_be_enabled()

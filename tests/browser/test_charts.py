@@ -6,7 +6,7 @@ import re
 import pytest
 from playwright.sync_api import expect
 
-from oracles.pictures import contact, picture, table
+from oracles.snapshots import contact, snapshot, table
 
 NAN = math.nan
 ROWS = 400
@@ -56,11 +56,11 @@ def positions(x, wall=None):
     columns = [("x", "m", "position", x)]
     if wall:
         columns.append(("wall", "m", "wall", [wall] * len(x)))
-    return picture(0.0, 2.0, table("position", 0.0, 2.0 / (len(x) - 1), *columns))
+    return snapshot(0.0, 2.0, table("position", 0.0, 2.0 / (len(x) - 1), *columns))
 
 
 def settled(page, chart, text):
-    """Wait until a chart's legend says so: then the picture is drawn."""
+    """Wait until a chart's legend says so: then the snapshot is drawn."""
     expect(page.locator(f"#{chart} .legend")).to_contain_text(text)
 
 
@@ -134,7 +134,7 @@ def test_an_element_has_the_same_colour_in_force_energy_and_momentum(stand_in, p
 
 
 @pytest.mark.slow
-def test_a_line_can_be_hidden_and_brought_back_and_stays_hidden_in_the_next_picture(stand_in, page):
+def test_a_line_can_be_hidden_and_brought_back_and_stays_hidden_in_the_next_snapshot(stand_in, page):
     stand_in.show(positions([0.004] * ROWS, wall=0.0))
     settled(page, "position", "4.000")
     assert seen(page, "position", [0.5], "ink")[0]
@@ -150,7 +150,7 @@ def test_a_line_can_be_hidden_and_brought_back_and_stays_hidden_in_the_next_pict
 
 
 @pytest.mark.slow
-def test_of_pictures_that_come_faster_than_the_screen_the_last_is_what_stays(stand_in, page):
+def test_of_snapshots_that_come_faster_than_the_screen_the_last_is_what_stays(stand_in, page):
     for i in range(100):
         stand_in.show(positions([0.001 * i] * ROWS))
     settled(page, "position", "99.000")
@@ -225,13 +225,13 @@ def test_without_wall_or_inertia_the_loops_say_that_there_is_none(stand_in, page
 
 
 @pytest.mark.slow
-def test_pressing_and_releasing_are_told_apart_anew_in_every_picture(stand_in, page):
-    """A straight way in and, in the next picture, the same way out: each has the one colour and not the other."""
+def test_pressing_and_releasing_are_told_apart_anew_in_every_snapshot(stand_in, page):
+    """A straight way in and, in the next snapshot, the same way out: each has the one colour and not the other."""
     way_in = [1e-5 * i for i in range(1, 201)]
     for depth, colour, other in ((way_in, "pressing", "releasing"), (way_in[::-1], "releasing", "pressing")):
         force = [150 * d for d in depth]
         loop = table("loop", 0.0, 1e-3, ("penetration", "m", "", depth), ("force", "N", "", force))
-        stand_in.show(picture(0.0, 0.2, {**loop, "stiffness": None}))
+        stand_in.show(snapshot(0.0, 0.2, {**loop, "stiffness": None}))
         expect(page.locator("#loop .legend button")).to_have_count(2)
         page.wait_for_timeout(200)
         parts = [0.4 + 0.01 * i for i in range(20)]
@@ -245,7 +245,7 @@ def test_the_ideal_spring_is_as_steep_as_the_wall(stand_in, page):
 
     def spring(stiffness):
         rows = table("loop", 0.0, 1e-3, ("penetration", "m", "", depth), ("force", "N", "", [150 * d for d in depth]))
-        return picture(0.0, 0.2, {**rows, "stiffness": stiffness})
+        return snapshot(0.0, 0.2, {**rows, "stiffness": stiffness})
 
     def height(stiffness):
         """Where the dashed line is, near the deepest point, when the loop itself is hidden."""
@@ -271,5 +271,5 @@ def test_the_ideal_spring_is_as_steep_as_the_wall(stand_in, page):
 @pytest.mark.slow
 def test_a_scene_of_many_elements_is_drawn_with_all_of_them(stand_in, page):
     forces = [(f"element.{i}.damping", "N", f"element {i}: damping", [0.1 * i] * ROWS) for i in range(10)]
-    stand_in.show(picture(0.0, 2.0, table("force", 0.0, 2.0 / (ROWS - 1), *forces)))
+    stand_in.show(snapshot(0.0, 2.0, table("force", 0.0, 2.0 / (ROWS - 1), *forces)))
     expect(page.locator("#force .legend li")).to_have_count(10)

@@ -141,12 +141,12 @@ def test_what_the_page_draws_are_the_numbers_of_the_log(running, viewing):
             const socket = new WebSocket(`ws://${location.host}/stream`);
             socket.binaryType = "arraybuffer";
             socket.onopen = () => socket.send(JSON.stringify({ type: "watch", span_s: 0.1, points: 2000, end_s: 1.0 }));
-            const picture = await new Promise(found => socket.onmessage = ({ data }) => {
-                const picture = typeof data === "string" ? null : decode(data);
-                if (picture && picture.from_s === 0.9 && picture.to_s === 1.0) found(picture);
+            const snapshot = await new Promise(found => socket.onmessage = ({ data }) => {
+                const snapshot = typeof data === "string" ? null : decode(data);
+                if (snapshot && snapshot.from_s === 0.9 && snapshot.to_s === 1.0) found(snapshot);
             });
             socket.close();
-            const { position, force, loop } = picture.tables;
+            const { position, force, loop } = snapshot.tables;
             const plain = table => Object.fromEntries(table.columns.map(({ name, values }) => [name, [...values]]));
             return { dt_s: position.dt_s, t0_s: position.t0_s, envelope: position.envelope, stiffness: loop.stiffness,
                      position: plain(position), force: plain(force) };

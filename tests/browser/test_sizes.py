@@ -5,7 +5,7 @@ from playwright.sync_api import expect
 
 from helpers.live.browser import DESK, PHONE
 from helpers.live.launched import first_and_slowly
-from oracles.pictures import contact
+from oracles.snapshots import contact
 
 TABLET, LARGE = {"width": 820, "height": 1180}, {"width": 1920, "height": 1080}
 MAIN = ["#verdict", "#position", "#force", "#energy", "#pause", "[data-step='100']", "#stop", "#freeze", "#help"]

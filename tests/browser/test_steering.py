@@ -4,7 +4,7 @@ import pytest
 from playwright.sync_api import expect
 
 from helpers.live.stand_in import OPTIONS, RUNNING, TOKEN
-from oracles.pictures import contact
+from oracles.snapshots import contact
 
 
 @pytest.fixture

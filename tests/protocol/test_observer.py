@@ -13,7 +13,7 @@ from helpers.live.live_run import going, undisturbed
 ALL = ("plant", "controller", "logger")
 
 
-def heard(observer, until=ALL):
+def receive_all(observer, until=ALL):
     """Every message up to the end of each stream."""
     frames = []
     while not set(until) <= observer.ended.keys():
@@ -22,7 +22,7 @@ def heard(observer, until=ALL):
     return frames
 
 
-def joined(frames, name, column, steps=1):
+def join_blocks(frames, name, column, steps=1):
     """One column of all blocks of a kind, end to end; the plant's without the state two blocks share."""
     parts = []
     for _, frame in frames:
@@ -44,16 +44,16 @@ def test_an_observer_hears_every_tick_of_all_three_streams_and_every_event_at_it
                     break
             subject.ask("set", set={"wall.stiffness": 200.0})
             subject.ask("resume")
-            frames = heard(observer)
+            frames = receive_all(observer)
             events = observer.take_events()
         finally:
             context.destroy(linger=0)
         subject.result()
     log = read(subject.prepared.out)
     assert observer.skipped == dict.fromkeys(ALL, 0)
-    assert np.array_equal(joined(frames, "PLANT_BLOCK", "x", 10), log["/plant"]["x"][70:-1])
-    assert np.array_equal(joined(frames, "CONTROLLER_BLOCK", "total"), log["/controller"]["total"][7:])
-    assert np.array_equal(joined(frames, "ENERGY_BLOCK", "wall.true"), log["/energy"]["wall.true"][7:])
+    assert np.array_equal(join_blocks(frames, "PLANT_BLOCK", "x", 10), log["/plant"]["x"][70:-1])
+    assert np.array_equal(join_blocks(frames, "CONTROLLER_BLOCK", "total"), log["/controller"]["total"][7:])
+    assert np.array_equal(join_blocks(frames, "ENERGY_BLOCK", "wall.true"), log["/energy"]["wall.true"][7:])
     assert [(tick, next(key for key in event if key != "at")) for tick, event in events] == [
         (7, "pause"), (7, "set"), (7, "resume"),
     ]  # fmt: skip
@@ -76,7 +76,7 @@ def test_one_that_does_not_listen_costs_the_run_no_bit_and_is_told_what_it_misse
                 observer.wait(50)
                 observer.poll()
             subject.ask("resume")
-            heard(observer)
+            receive_all(observer)
         finally:
             context.destroy(linger=0)
         summary = subject.result()

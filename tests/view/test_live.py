@@ -48,29 +48,29 @@ def same(column, truth):
 
 
 async def whole(tab, run, ticks, **watch):
-    """A picture of everything since the start, once all three streams of it are there."""
+    """A snapshot of everything since the start, once all three streams of it are there."""
     begins = {"position": "x", "force": "total", "energy": "residual"}
     await tab.until("the end", lambda: tab.state and tab.state.get("tick", 0) >= ticks)
     await tab.watch(**{"span_s": None, "points": 8000} | watch)
 
     def is_whole():
-        tables, from_start = tab.picture["tables"], "span_s" in watch or tab.picture["from_s"] == 0.0
+        tables, from_start = tab.snapshot["tables"], "span_s" in watch or tab.snapshot["from_s"] == 0.0
         return (from_start and tables.keys() >= begins.keys()) and all(
             np.isfinite(tables[name]["values"][column][0]) for name, column in begins.items()
         )
 
     await tab.until("the start", is_whole)
-    return tab.picture
+    return tab.snapshot
 
 
-def test_every_sample_of_the_picture_is_the_logs(tmp_path):
+def test_every_sample_of_the_snapshot_is_the_logs(tmp_path):
     """Joined in mid-run: what came before it joined is there as well, bit for bit as float32."""
 
     async def play(run, tab, here):
         await stands(run, 600)
         log = await has_logged(run, 600)
-        picture = await whole(tab, run, 600)
-        tables = picture["tables"]
+        snapshot = await whole(tab, run, 600)
+        tables = snapshot["tables"]
         assert {name: table["envelope"] for name, table in tables.items()} == dict.fromkeys(tables, False)
         position, force, energy = (tables[name]["values"] for name in ("position", "force", "energy"))
         assert (tables["position"]["t0_s"], tables["position"]["rows"]) == (0.0, 6000)
@@ -102,8 +102,8 @@ def test_a_long_view_is_an_envelope_that_touches_every_extreme(tmp_path):
     async def play(run, tab, here):
         await stands(run, 3000)
         log = await has_logged(run, 3000)
-        picture = await whole(tab, run, 3000, points=200)
-        table = picture["tables"]["position"]
+        snapshot = await whole(tab, run, 3000, points=200)
+        table = snapshot["tables"]["position"]
         assert table["envelope"]
         assert table["rows"] <= 2 * 200
         buckets = table["rows"] // 2
@@ -153,9 +153,9 @@ def test_since_now_shows_nothing_older(tmp_path):
             await late.until("the step", lambda: late.state["tick"] >= 550)
             await asyncio.sleep(1.0)  # longer than it takes to read a log
             assert late.state["first_s"] == 0.5
-            picture = await late.watch(span_s=None, points=1000)
-            assert (picture["from_s"], picture["to_s"]) == (0.5, 0.55)
-            assert picture["tables"]["position"]["rows"] == 500
+            snapshot = await late.watch(span_s=None, points=1000)
+            assert (snapshot["from_s"], snapshot["to_s"]) == (0.5, 0.55)
+            assert snapshot["tables"]["position"]["rows"] == 500
 
     follow(play, tmp_path, pauses=(500,))
 
@@ -194,13 +194,13 @@ def test_commands_of_the_page_reach_the_run_and_what_took_effect_is_told_with_it
         tick = state["tick"]
         log = await has_logged(run, min(tick, 600))
         await whole(tab, run, 507, span_s=0.02, end_s=0.507)
-        await tab.until("all 20 ticks", lambda: len(tab.picture["tables"]["force"]["values"]["total"]) == 20)
-        picture = tab.picture
-        force = picture["tables"]["force"]["values"]
+        await tab.until("all 20 ticks", lambda: len(tab.snapshot["tables"]["force"]["values"]["total"]) == 20)
+        snapshot = tab.snapshot
+        force = snapshot["tables"]["force"]["values"]
         assert np.isnan(force["element.0.damping"][:13]).all()
         assert np.isnan(force["element.0.unidirectional-inertia"][13:]).all()
         same(force["element.0.damping"][13:], log["/controller"]["dissipation.0"][500:507])
-        assert {"damping", "unidirectional-inertia"} <= picture["tables"]["energy"]["values"].keys()
+        assert {"damping", "unidirectional-inertia"} <= snapshot["tables"]["energy"]["values"].keys()
         assert (await tab.ask("stop"))[0]
         await tab.phase("ended")
 
@@ -261,9 +261,9 @@ def test_the_end_is_told_with_the_summary_and_what_was_seen_can_still_be_looked_
         assert state["summary"] == summary
         assert (state["verdict"], state["verdict_rule"]) == (summary["verdict"], summary["verdict_rule"])
         assert state["residual_J"] == summary["energy"]["residual_J"]
-        picture = await whole(tab, run, 500)
+        snapshot = await whole(tab, run, 500)
         log = read(tmp_path / "out")
-        x = picture["tables"]["position"]["values"]["x"]
+        x = snapshot["tables"]["position"]["values"]["x"]
         same(x[:5001], log["/plant"]["x"])  # the end state is there too
         assert np.isnan(x[5001:]).all()
         later = await here.tab()
@@ -282,7 +282,7 @@ def test_the_next_run_is_taken_up_and_the_first_stays_on_show_until_then(tmp_pat
                 await asyncio.to_thread(one_run, tab, tmp_path / name, f"title={name}")
                 state = await tab.phase("ended")
                 assert state["title"] == name
-                await tab.until("its picture", lambda: tab.picture["tables"])
+                await tab.until("its snapshot", lambda: tab.snapshot["tables"])
 
     def one_run(tab, directory, title):
         with going(directory, "duration=0.3", "wall.position=-0.001", title, pauses=(100,)) as run:
@@ -311,7 +311,7 @@ def test_a_failed_run_says_why(tmp_path):
 
 
 def test_pages_that_come_go_and_say_nothing_leave_the_bits_of_the_run_alone(tmp_path):
-    """Pictures all the while, one page that reads nothing, one that leaves without a word."""
+    """Snapshots all the while, one page that reads nothing, one that leaves without a word."""
 
     async def play(run, tab, here):
         await tab.phase("paused")
@@ -321,11 +321,11 @@ def test_pages_that_come_go_and_say_nothing_leave_the_bits_of_the_run_alone(tmp_
         await rude.socket.send_json({"type": "watch", "span_s": None, "points": 8000})
         await tab.ask("pace", pace=2)
         await tab.ask("resume")
-        await rude.until("pictures", lambda: rude.pictures > 3)
+        await rude.until("snapshots", lambda: rude.snapshots > 3)
         rude.reading.cancel()
         rude.socket._response.connection.transport.abort()
         await tab.phase("ended")
-        assert tab.pictures > 10
+        assert tab.snapshots > 10
         return tab.state["skipped_ticks"]
 
     with going(tmp_path, "duration=3", pauses=(100,)) as run:
@@ -341,20 +341,20 @@ def test_pages_that_come_go_and_say_nothing_leave_the_bits_of_the_run_alone(tmp_
 
 
 @pytest.mark.slow
-def test_a_paused_run_sends_its_picture_once(tmp_path):
+def test_a_paused_run_sends_its_snapshot_once(tmp_path):
     """Nothing new is nothing sent; a change of what is watched is answered at once."""
 
     async def play(run, tab, here):
         await stands(run, 300)
         await whole(tab, run, 300)
         await asyncio.sleep(0.7)
-        seen = tab.pictures
+        seen = tab.snapshots
         states = tab.state
         await asyncio.sleep(1.0)
-        assert tab.pictures == seen
+        assert tab.snapshots == seen
         assert tab.state is not states
         await tab.watch(span_s=0.1)
-        assert tab.pictures == seen + 1
+        assert tab.snapshots == seen + 1
 
     follow(play, tmp_path, pauses=(300,))
 

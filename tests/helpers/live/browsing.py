@@ -28,19 +28,19 @@ def to_its_end(work: Coroutine[Any, Any, Any]) -> Any:
 
 
 def decode(data: bytes) -> dict[str, Any]:
-    """A picture: its header, every table with its columns by name as ``values``."""
+    """A snapshot: its header, every table with its columns by name as ``values``."""
     length = int.from_bytes(data[:4], "little")
     assert (4 + length) % 8 == 0
-    picture = json.loads(data[4 : 4 + length])
+    snapshot = json.loads(data[4 : 4 + length])
     at, tables = 4 + length, {}
-    for table in picture["tables"]:
+    for table in snapshot["tables"]:
         size = table["rows"] * len(table["columns"])
         rows = np.frombuffer(data, "<f4", size, at).reshape(len(table["columns"]), table["rows"])
         names = [column["name"] for column in table["columns"]]
         tables[table["name"]] = {**table, "values": dict(zip(names, rows, strict=True))}
         at += -(-4 * size // 8) * 8
     assert at == len(data)
-    return {**picture, "tables": tables}
+    return {**snapshot, "tables": tables}
 
 
 class Tab:
@@ -48,8 +48,8 @@ class Tab:
 
     Attributes:
         state, events: as told last; None before.
-        picture: the last one, decoded; None before.
-        pictures: how many have come.
+        snapshot: the last one, decoded; None before.
+        snapshots: how many have come.
         closed: (code, reason) once the server has closed.
     """
 
@@ -57,8 +57,8 @@ class Tab:
         self.socket, self.token = socket, token
         self.state: Any = None
         self.events: Any = None
-        self.picture: Any = None
-        self.pictures = 0
+        self.snapshot: Any = None
+        self.snapshots = 0
         self.closed: tuple[int | None, str] | None = None
         self._answers: dict[int, dict[str, Any]] = {}
         self._asked = 0
@@ -68,7 +68,7 @@ class Tab:
         reason = ""
         async for message in self.socket:
             if message.type is aiohttp.WSMsgType.BINARY:
-                self.picture, self.pictures = decode(message.data), self.pictures + 1
+                self.snapshot, self.snapshots = decode(message.data), self.snapshots + 1
                 continue
             told = json.loads(message.data)
             if told["type"] == "answer":
@@ -94,20 +94,20 @@ class Tab:
         )
 
     async def watch(self, **what: Any) -> dict[str, Any]:
-        """Watch something; returns the first picture that shows it."""
+        """Watch something; returns the first snapshot that shows it."""
         await self.socket.send_json({"type": "watch", **what})
-        seen, span_s, end_s = self.pictures, what.get("span_s"), what.get("end_s")
+        seen, span_s, end_s = self.snapshots, what.get("span_s"), what.get("end_s")
 
         def shows() -> bool:
-            if self.pictures == seen:
+            if self.snapshots == seen:
                 return False
-            from_s, to_s = self.picture["from_s"], self.picture["to_s"]
+            from_s, to_s = self.snapshot["from_s"], self.snapshot["to_s"]
             return (span_s is None or abs(to_s - from_s - span_s) < 1e-9) and (
                 end_s is None or abs(to_s - end_s) < 1e-9
             )
 
-        await self.until("the picture asked for", shows)
-        return self.picture
+        await self.until("the snapshot asked for", shows)
+        return self.snapshot
 
     async def ask(self, verb: str, **arguments: Any) -> tuple[bool, str]:
         """A command; returns whether it was done, and the answer."""

@@ -76,16 +76,16 @@ class StandIn:
     """A server of the page in a thread of its own.
 
     Attributes:
-        heard: every message of the page, in order.
+        received: every message of the page, in order.
         answer: gives (ok, text) for a command.
         url: the link to open, token included.
     """
 
     def __init__(self) -> None:
-        self.heard: list[dict[str, Any]] = []
+        self.received: list[dict[str, Any]] = []
         self.answer: Callable[[dict[str, Any]], tuple[bool, str] | None] = lambda command: (True, "done")
         self._told: dict[str, str] = {}
-        self._picture: bytes | None = None
+        self._snapshot: bytes | None = None
         self._sockets: set[web.WebSocketResponse] = set()
         self._loop = asyncio.new_event_loop()
         self._thread = threading.Thread(target=self._loop.run_forever)
@@ -103,11 +103,11 @@ class StandIn:
 
     def commands(self) -> list[dict[str, Any]]:
         """What was ordered: verb and arguments."""
-        return [message for message in self.heard if message["type"] == "command"]
+        return [message for message in self.received if message["type"] == "command"]
 
     def watches(self) -> list[dict[str, Any]]:
         """Which stretches of time were asked for."""
-        return [message for message in self.heard if message["type"] == "watch"]
+        return [message for message in self.received if message["type"] == "watch"]
 
     def asked(self, is_so: Callable[[dict[str, Any]], bool]) -> dict[str, Any]:
         """The stretch of time that was asked for last, once it is so: what a page asks for takes its time to arrive."""
@@ -145,10 +145,10 @@ class StandIn:
         """A running loop, but for some changes."""
         self.tell(RUNNING | changes)
 
-    def show(self, picture: bytes) -> None:
-        """Send a picture to every page."""
-        self._picture = picture
-        self._do(self._send(picture))
+    def show(self, snapshot: bytes) -> None:
+        """Send a snapshot to every page."""
+        self._snapshot = snapshot
+        self._do(self._send(snapshot))
 
     def _do(self, work: Any) -> None:
         asyncio.run_coroutine_threadsafe(work, self._loop).result(20)
@@ -186,17 +186,17 @@ class StandIn:
         await socket.prepare(request)
         for text in self._told.values():
             await socket.send_str(text)
-        if self._picture:
-            await socket.send_bytes(self._picture)
+        if self._snapshot:
+            await socket.send_bytes(self._snapshot)
         self._sockets.add(socket)
         async for message in socket:
             if message.type is WSMsgType.TEXT:
-                await self._hear(socket, json.loads(message.data))
+                await self._receive(socket, json.loads(message.data))
         self._sockets.discard(socket)
         return socket
 
-    async def _hear(self, socket: web.WebSocketResponse, message: dict[str, Any]) -> None:
-        self.heard.append(message)
+    async def _receive(self, socket: web.WebSocketResponse, message: dict[str, Any]) -> None:
+        self.received.append(message)
         if message["type"] == "command" and (answer := self.answer(message)):
             await socket.send_json({"type": "answer", "id": message["id"], "ok": answer[0], "text": answer[1]})
 

@@ -1,4 +1,4 @@
-"""Pictures as the server of the live page sends them, written out from the description of the format alone."""
+"""Snapshots as the server of the live page sends them, written out from the description of the format alone."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def table(name: str, t0_s: float, dt_s: float, *columns: Column, envelope: bool 
     return {"name": name, "t0_s": t0_s, "dt_s": dt_s, "columns": columns, "envelope": envelope}
 
 
-def picture(from_s: float, to_s: float, *tables: dict[str, Any]) -> bytes:
+def snapshot(from_s: float, to_s: float, *tables: dict[str, Any]) -> bytes:
     """Length and header, then the columns of every table as little-endian 32-bit floats, each table filled up to 8."""
     rows = [len(t["columns"][0][3]) for t in tables]
     described = [
@@ -50,7 +50,7 @@ def contact(from_s: float = 0.0, to_s: float = 2.0, rows: int = 1000, wall_m: fl
     recent = slice(-200, None)
     depth = [wall_m - here for here in x][recent]
     loop = table("loop", from_s, dt, ("penetration", "m", "penetration", depth), ("force", "N", "force", total[recent]))
-    return picture(
+    return snapshot(
         from_s,
         to_s,
         table(
