@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-import math
 from fractions import Fraction
+from functools import reduce
+from operator import add
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from haploop.logger.books.sums import add_columns, add_ticks_of_batch, no_sums, sum_in_order, sum_steps, with_rows
+from haploop.logger.books.sums import add_columns, add_ticks_of_batch, no_sums, sum_steps, with_rows
 from haploop.protocol.trees import tree_select, tree_take
 
 amounts = st.floats(-1e6, 1e6, allow_subnormal=False)
@@ -55,19 +56,21 @@ def test_totals_are_given_before_the_first_column_and_after_each():
     assert totals[:, 0].tolist() == [3.0, 0.0, 0.0]
 
 
+def sum_in_order(values: np.ndarray) -> np.ndarray:
+    """The sum over the last axis, one number after the other."""
+    return np.array([reduce(add, row.tolist()) for row in values.reshape(-1, values.shape[-1])]).reshape(
+        values.shape[:-1]
+    )
+
+
 @pytest.mark.parametrize("n", [1, 2, 7, 8, 9, 100])
-def test_sums_within_a_tick_run_from_first_to_last_whatever_the_memory_layout(n):
-    rng = np.random.default_rng(n)
-    values = rng.normal(size=(3, 4, n)) * 10.0 ** rng.integers(-8, 8, (3, 4, n))
-    expected = [[math.nan] * 4 for _ in range(3)]
-    for i in range(3):
-        for j in range(4):
-            total = 0.0
-            for value in values[i, j]:
-                total += value
-            expected[i][j] = total
-    assert sum_in_order(values).tolist() == expected
-    assert sum_in_order(np.asfortranarray(values)).tolist() == expected
+@pytest.mark.parametrize("members", [None, 1, 5])
+def test_sums_within_a_tick_run_from_first_to_last_whatever_the_memory_layout(n, members):
+    rng, shape = np.random.default_rng(n), (4, n) if members is None else (4, n, members)
+    values = rng.normal(size=shape) * 10.0 ** rng.integers(-8, 8, shape)
+    expected = sum_in_order(np.moveaxis(values, 1, -1)).tolist()
+    assert sum_steps(values).tolist() == expected
+    assert sum_steps(np.asfortranarray(values)).tolist() == expected
 
 
 @pytest.mark.parametrize("members", [1, 2, 3, 17, 1024])

@@ -14,7 +14,6 @@ from haploop.logger.books.sums import (
     add_columns,
     add_ticks_of_batch,
     no_sums,
-    sum_in_order,
     sum_rows,
     sum_steps,
     with_rows,
@@ -182,8 +181,7 @@ class Books:
 
     def residuals(self, at_ticks: np.ndarray) -> np.ndarray:
         """Returns the signed residual at each tick from the rows that ``book`` returned, shape (ticks,), J."""
-        signs, rows = zip(*balance(self.state.names), strict=True)
-        return sum_in_order((at_ticks[list(rows)] * np.array(signs)[:, None]).T)
+        return sum_rows(sign * at_ticks[row] for sign, row in balance(self.state.names))
 
 
 def plant_books(scene: dict[str, Any], time: Timebase, members: int | None = None) -> OneMassBooks | ChainBooks:

@@ -8,21 +8,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 
-def sum_in_order(values: np.ndarray) -> np.ndarray:
-    """Returns the sum over the last axis, first to last, so that its order never depends on memory layout.
-
-    Args:
-        values: shape (..., n), n >= 1.
-
-    Returns:
-        Shape (...).
-    """
-    total = values[..., 0].copy()
-    for index in range(1, values.shape[-1]):
-        total += values[..., index]
-    return total
-
-
 def sum_rows(rows: Iterable[Any]) -> Any:
     """Returns the sum of at least one array, first to last, element by element; all of one shape."""
     first, *others = rows
