@@ -12,7 +12,7 @@ import pytest
 from haploop.controller.dissipation import Element, Motion, Quantity, where
 from haploop.launch.batch import batch
 from haploop.launch.batch import run as array_run
-from haploop.launch.batch.batch import LoopArray
+from haploop.launch.batch.batch import Batch
 from haploop.launch.batch.run import run_array
 from haploop.launch.batch.stacking import runs_in_arrays, stacked, structure, structures
 from haploop.logger.batch import BatchLogger
@@ -216,12 +216,12 @@ def test_chunks_cover_a_group_and_none_is_longer_than_allowed(monkeypatch: pytes
     scenes = [pressed(wall={"position": -0.002, "stiffness": k}) for k in np.linspace(100, 300, 11).tolist()]
     seen = []
 
-    class Spy(LoopArray):
+    class Spy(Batch):
         def __init__(self, chunk: list[dict[str, Any]], *args: Any, **kwargs: Any) -> None:
             seen.append(len(chunk))
             super().__init__(chunk, *args, **kwargs)
 
-    monkeypatch.setattr(array_run, "LoopArray", Spy)
+    monkeypatch.setattr(array_run, "Batch", Spy)
     results = run_array(scenes, KINDS, trajectories=True, fewest=2, most=4)
     assert seen == [3, 4, 4]
     assert results == [alone(each) for each in scenes]

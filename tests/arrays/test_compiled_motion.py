@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from haploop.launch.batch.batch import LoopArray
+from haploop.launch.batch.batch import Batch
 from haploop.launch.batch.run import run_array
 from helpers.runs.batches import pressed
 from helpers.runs.compiled import agree, compiled
@@ -19,24 +19,24 @@ from helpers.scenes.varied_scenes import drawn_base, varied
 TOLERANCE = 1e-11
 
 
-def loops_of(scenes: list[dict[str, Any]], by_program: bool) -> LoopArray:
+def loops_of(scenes: list[dict[str, Any]], by_program: bool) -> Batch:
     """All loops run to their ends, none dropped."""
     if not by_program:
-        loops = LoopArray(scenes, KINDS)
+        loops = Batch(scenes, KINDS)
         loops._drop_ended = lambda: None
         loops.run()
         return loops
     from haploop.launch.batch.jax import programs as compiled_programs
-    from haploop.launch.batch.jax.batch import CompiledLoops
+    from haploop.launch.batch.jax.batch import CompiledBatch
 
     compiled_programs.most()
     with compiled_programs.in_double():
-        loops = CompiledLoops(scenes, KINDS, energy=True, size=len(scenes), programs=compiled_programs.PROGRAMS)
+        loops = CompiledBatch(scenes, KINDS, energy=True, size=len(scenes), programs=compiled_programs.PROGRAMS)
         loops.run()
     return loops
 
 
-def positions(loops: LoopArray, ticks: int) -> np.ndarray:
+def positions(loops: Batch, ticks: int) -> np.ndarray:
     return loops._logger.window.state.x[: ticks * loops._time.steps_per_tick]
 
 

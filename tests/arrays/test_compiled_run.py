@@ -60,10 +60,10 @@ def test_put_together_for_a_gpu_the_loops_are_the_same(monkeypatch: pytest.Monke
     from haploop.launch.batch.jax import programs
 
     class Programs(programs.Programs):
-        def compiled(self, key: Any, block: Any, args: Any) -> Any:
-            lowered = jax.jit(block.run).trace(*args).lower(lowering_platforms=("cuda",))
+        def compiled(self, run: Any, args: Any) -> Any:
+            lowered = jax.jit(run).trace(*args).lower(lowering_platforms=("cuda",))
             assert "stablehlo.case" not in lowered.as_text()
-            return super().compiled(key, block, args)
+            return super().compiled(run, args)
 
     programs.most()  # what jax is told first, it is told of the device there is
     monkeypatch.setattr(jax, "default_backend", lambda: "gpu")

@@ -21,6 +21,7 @@ class Recorder:
 
     Attributes:
         add: takes the row of one tick.
+        elements: descriptions of the elements at work.
         refused: changes that could not be carried out.
         history: the newest blocks taken, covering every command that may still be in flight.
         trouble: the element that first gave a force which is no finite number, as a sentence, or None.
@@ -38,9 +39,9 @@ class Recorder:
         """Start a block with the columns of these elements, in which wall and elements are as they are now."""
         wall = params.wall
         self._begin()
-        self._elements = [active.describe() for active in params.elements]
+        self.elements = [active.describe() for active in params.elements]
         self._wall = {"position": wall.position, "stiffness": wall.stiffness, "into_wall": wall.inward}
-        names = [f"dissipation.{index}" for index in range(len(self._elements))]
+        names = [f"dissipation.{index}" for index in range(len(self.elements))]
         self._names = [*MOTION_COLUMNS, *names, "total", "in_contact"]
 
     def _begin(self) -> None:
@@ -71,7 +72,7 @@ class Recorder:
                 "from_tick": self._next_tick,
                 "ticks": ticks,
                 "columns": {name: column.tobytes() for name, column in columns.items()},
-                "elements": self._elements,
+                "elements": self.elements,
                 "wall": self._wall,
             }
         )
@@ -90,13 +91,13 @@ class Recorder:
     def _find_trouble(self, columns: dict[str, array[float]]) -> None:
         found = [
             (tick, index, force)
-            for index in range(len(self._elements))
+            for index in range(len(self.elements))
             for tick, force in enumerate(columns[f"dissipation.{index}"], self._next_tick)
             if not math.isfinite(force)
         ]
         if found:
             tick, index, force = min(found)
-            self.trouble = f"element {index} ({self._elements[index]['kind']}) gave {force} at tick {tick}"
+            self.trouble = f"element {index} ({self.elements[index]['kind']}) gave {force} at tick {tick}"
 
 
 class Row(NamedTuple):
@@ -133,7 +134,7 @@ class BatchRecorder(Recorder):
     def _add(self, row: list[Any]) -> None:
         motion, forces = row[: len(MOTION_COLUMNS)], row[len(MOTION_COLUMNS) : -2]
         columns = dict(zip(MOTION_COLUMNS, motion, strict=True)) | {"total": row[-2], "in_contact": row[-1]}
-        self._taken.append(Row(columns | self._shared, dict(zip(self._books, forces, strict=True)), self._elements))
+        self._taken.append(Row(columns | self._shared, dict(zip(self._books, forces, strict=True)), self.elements))
 
     def take_rows(self) -> list[Row]:
         """Returns all rows since the last call."""

@@ -121,6 +121,13 @@ class BatchLogger:
         x_m = rows_of([row.columns["x"] for row in rows], members)
         return Commanded(end - len(rows), x_m, forces, wall)
 
+    def select(self, kept: np.ndarray) -> None:
+        """Drops the members for which ``kept``, shape (members,), is false."""
+        self.rows, self._accounts = tree_select((self.rows, self._accounts), kept)
+        for part in (self.books, self.window, self._trajectories):
+            if part:
+                part.select(kept)
+
     def note_accounts(self, elements: Sequence[dict[str, Any]]) -> None:
         """Takes note that these elements have been at work up to ``tick``."""
         for element in elements:

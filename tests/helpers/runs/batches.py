@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import numpy as np
 
 from haploop.controller.dissipation import Element, Motion, Quantity
-from haploop.launch.batch.batch import LoopArray
+from haploop.launch.batch.batch import Batch
 from haploop.launch.runs.in_process import run_in_process
 from haploop.logger.summary import OF_THE_MACHINE
 from helpers.scenes.least import KINDS, scene
@@ -22,7 +22,7 @@ def alone(made: dict[str, Any], kinds: dict[str, type[Element]] = KINDS) -> dict
 
 
 def together(scenes: list[dict[str, Any]], kinds: dict[str, type[Element]] = KINDS) -> list[dict[str, Any] | None]:
-    loops = LoopArray(scenes, kinds, trajectories=True)
+    loops = Batch(scenes, kinds, trajectories=True)
     loops.run()
     return loops.results
 

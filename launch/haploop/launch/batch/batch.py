@@ -13,7 +13,6 @@ import numpy as np
 from haploop.controller.active_elements import Unchanged
 from haploop.controller.controller import Controller
 from haploop.controller.recorder import BatchRecorder
-from haploop.launch.batch.object_state import keep
 from haploop.launch.batch.stacking import stacked
 from haploop.launch.runs.in_process import scene_events
 from haploop.logger.batch import BatchLogger, MemberEnd
@@ -23,6 +22,7 @@ from haploop.plant.plant import beyond
 from haploop.plant.sensing.accelerometer import make_accelerometer
 from haploop.plant.sensing.encoder import accelerometer_is_used
 from haploop.protocol.ticks import Timebase
+from haploop.protocol.trees import tree_select
 
 if TYPE_CHECKING:
     from haploop.controller.dissipation import Element
@@ -38,7 +38,7 @@ _BUFFER = 512
 _UNHEEDED = 0.25
 
 
-class LoopArray:
+class Batch:
     """The loops of scenes of one structure, each a place in arrays: sensor, line, motion, controller and books.
 
     The code that computes is that of a single loop, on arrays. What decides for a single loop when it ends is written
@@ -174,13 +174,14 @@ class LoopArray:
 
     def _drop_ended(self) -> None:
         on = ~self._ended
-        for part in (self._motion, self._line, self._position, *([self._sensor] if self._sensor else [])):
-            part.select(on)
-        keep([self._logger, self._in_flight], on)
-        self._controller.select(on)
+        for part in (self._motion, self._line, self._position, self._sensor, self._controller, self._logger):
+            if part:
+                part.select(on)
         self._elements = Unchanged(self._controller.params.elements)
-        self._limit_m = self._limit_m[on] if isinstance(self._limit_m, np.ndarray) else self._limit_m
-        self._scene_of, self._ended = self._scene_of[on], self._ended[on]
+        in_flight = tree_select([*self._in_flight], on)
+        self._in_flight.clear()
+        self._in_flight.extend(in_flight)
+        self._limit_m, self._scene_of, self._ended = tree_select((self._limit_m, self._scene_of, self._ended), on)
 
 
 @contextmanager

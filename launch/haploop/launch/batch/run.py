@@ -7,7 +7,7 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 from haploop.controller.dissipation import ElementError
-from haploop.launch.batch.batch import LoopArray
+from haploop.launch.batch.batch import Batch
 from haploop.launch.batch.stacking import runs_in_arrays, structures
 from haploop.launch.errors import RunFailed
 from haploop.launch.runs.in_process import run_in_process
@@ -89,7 +89,7 @@ def _together(
     comes to its own end.
     """
     try:
-        loops = LoopArray(scenes, kinds, energy=energy, trajectories=trajectories)
+        loops = Batch(scenes, kinds, energy=energy, trajectories=trajectories)
         loops.run()
     except (ElementError, ArithmeticError):
         return [None] * len(scenes)

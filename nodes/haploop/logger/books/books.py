@@ -30,6 +30,7 @@ from haploop.logger.books.work import (
 )
 from haploop.protocol.arrays import first_row
 from haploop.protocol.ticks import Timebase
+from haploop.protocol.trees import tree_select
 
 if TYPE_CHECKING:
     from haploop.logger.books.buffers import Commanded
@@ -178,6 +179,11 @@ class Books:
             change_J = held_J(x, wall, into_wall) - held_J(x, before, into_wall)
             self.state = self.state._replace(wall_changes_J=self.state.wall_changes_J + change_J)
         self.state = self.state._replace(wall=wall)
+
+    def select(self, kept: np.ndarray) -> None:
+        """Drops the members of a batch for which ``kept``, shape (members,), is false."""
+        self.state = tree_select(self.state, kept)
+        self.plant.select(kept)
 
     def residuals(self, at_ticks: np.ndarray) -> np.ndarray:
         """Returns the signed residual at each tick from the rows that ``book`` returned, shape (ticks,), J."""

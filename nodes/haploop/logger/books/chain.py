@@ -20,6 +20,7 @@ from haploop.plant.chain.chain import Chain
 from haploop.plant.motion.hand_force import constant_forces, make_hand_force
 from haploop.protocol.arrays import first_row
 from haploop.protocol.ticks import Timebase
+from haploop.protocol.trees import tree_select
 
 
 class ChainBooks:
@@ -141,6 +142,12 @@ class ChainBooks:
         for link, stretch, change in zip(self._chain.links, lengths[1:], segments.displacements[1:], strict=True):
             parts.append(link.stiffness * change * (stretch + change / 2.0))
         return sum_rows(parts)
+
+    def select(self, kept: np.ndarray) -> None:
+        """Drops the members of a batch for which ``kept``, shape (members,), is false."""
+        self._chain = tree_select(self._chain, kept)
+        self._forms.select(kept)
+        self._tau.select(kept)
 
     def stored_J(self, columns: Columns) -> Any:
         """Returns kinetic and spring energy in the first state of some telemetry, J."""

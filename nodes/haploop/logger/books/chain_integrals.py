@@ -10,6 +10,7 @@ import numpy as np
 from haploop.logger.books.segments import Segments
 from haploop.plant.chain.chain import Chain
 from haploop.plant.chain.transition import ChainIntegrals, make_tables
+from haploop.protocol.trees import tree_select
 
 
 class ChainForms:
@@ -31,8 +32,9 @@ class ChainForms:
         heats = [f"{name}_heat" for name in (*chain.grounded, *(link.name for link in chain.links))]
         self.names = [*heats, *["lag"] * (chain.actuator_rate is not None), "lag_integral"]
         self._made: dict[tuple[int, bool], tuple[np.ndarray, np.ndarray]] = {}
+        self._of_batch = of_batch
         if of_batch:
-            rates, *forms = make_tables(lambda one: _tables(one, step_s), chain)
+            rates, *forms = make_tables(lambda one: _tables(one, step_s), chain, has_members=True)
             self._real: Any = np.float64
             self._rates, self._made[0, False] = {False: rates}, (forms[0], forms[1])
             return
@@ -83,6 +85,11 @@ class ChainForms:
             made = np.stack(forms), flow.lag(self._last, level)
             self._made[level, stuck] = made[0].astype(self._real), made[1].astype(self._real)
         return self._made[level, stuck]
+
+    def select(self, kept: np.ndarray) -> None:
+        """Drops the members of a batch for which ``kept``, shape (members,), is false."""
+        if self._of_batch:
+            self._chain, self._rates, self._made = tree_select((self._chain, self._rates, self._made), kept)
 
 
 def _tables(chain: Chain, step_s: float) -> tuple[np.ndarray, ...]:

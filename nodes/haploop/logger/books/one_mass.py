@@ -14,6 +14,7 @@ from haploop.plant.motion.mechanics import Mechanics
 from haploop.plant.motion.transition import motion_integrals, natural_rate
 from haploop.protocol.arrays import each, first_row
 from haploop.protocol.ticks import Timebase
+from haploop.protocol.trees import tree_select
 
 
 class OneMassParams(NamedTuple):
@@ -215,6 +216,11 @@ class OneMassBooks:
         limited = (by_interval(force, n) for force in commanded) if self.is_limited else None
         found = increments(self.params, steps, ticks, limited, sum_steps)
         return _parted(found, list(self._constant.values()), moved.by_tick) if self._constant else found
+
+    def select(self, kept: np.ndarray) -> None:
+        """Drops the members of a batch for which ``kept``, shape (members,), is false."""
+        self.params = tree_select(self.params, kept)
+        self._tau.select(kept)
 
     def stored_J(self, columns: dict[str, np.ndarray]) -> Any:
         """Returns kinetic and spring energy in the first state of some telemetry, J."""

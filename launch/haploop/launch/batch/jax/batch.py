@@ -1,46 +1,52 @@
-"""Many loops of one structure, taken by compiled programs through all ticks at which nothing else changes."""
+"""A batch that compiled programs take through all ticks at which nothing else changes."""
 
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterable, Sequence
+from collections.abc import Hashable, Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
 import jax
 import numpy as np
 
 from haploop.controller.recorder import Row
-from haploop.launch.batch.batch import LoopArray
-from haploop.launch.batch.jax.block import RINGS, Block, Carry, Given, Rings
+from haploop.controller.tick import NoForce
+from haploop.launch.batch.batch import Batch
+from haploop.launch.batch.jax.block import RINGS, Block, BlockInputs, Carry, Rings, constants_of, numbers_of
 from haploop.launch.batch.jax.books import Forces
-from haploop.launch.batch.jax.programs import Program, Programs
-from haploop.launch.batch.jax.stand_ins import Outside
-from haploop.launch.batch.jax.tick import NoTick, Tick
+from haploop.launch.batch.jax.programs import Call, Programs
+from haploop.launch.batch.jax.tick import BatchParams, BatchState, NotCompilable, TickInputs
 from haploop.launch.batch.jax.window import CompiledWindow
 from haploop.launch.batch.stacking import structure
-from haploop.logger.books.chain import ChainBooks
+from haploop.logger.books.one_mass import OneMassBooks
 from haploop.logger.books.sums import Sums
+from haploop.plant.line.actuator import ActuatedLine
 from haploop.plant.motion.one_mass import OneMassMotion
 from haploop.plant.plant import beyond
 from haploop.plant.random.streams import Draw, NormalRows
+from haploop.plant.sensing.noise import NoisyPositionSensor
 from haploop.protocol.arrays import rows_of
+from haploop.protocol.trees import tree_leaves, tree_map, tree_unflatten
 
 if TYPE_CHECKING:
     from haploop.controller.dissipation import Element
 
 # Ticks that a program goes through at a time.
 BLOCK_TICKS = 128
-# After so many ticks in which the structure of its objects kept changing a loop is not compiled.
-_SETTLED_TICKS = 512
 
 
-class CompiledLoops(LoopArray):
-    """``LoopArray`` that goes by itself only where a change, or the start, alters what the loop's objects are.
+class CompiledBatch(Batch):
+    """``Batch`` that goes by itself only at its start and where a change comes, until all that is in effect is known.
 
     Args:
-        scenes, kinds, energy: as there.
+        scenes: resolved scenes of one structure, with which a batch can be run.
+        kinds: element kinds at hand.
+        energy: whether to keep energy books.
         size: of the arrays; places beyond the scenes are computed, unheeded.
         programs: where compiled blocks are kept.
+
+    Raises:
+        NotCompilable: there are several bodies.
     """
 
     def __init__(
@@ -48,23 +54,30 @@ class CompiledLoops(LoopArray):
         programs: Programs,
     ) -> None:  # fmt: skip
         super().__init__([*scenes, *[scenes[-1]] * (size - len(scenes))], kinds, energy=energy)
+        books = self._logger.books.plant if self._logger.books else None
+        if not isinstance(self._motion, OneMassMotion) or not isinstance(books, OneMassBooks | None):
+            raise NotCompilable("There are several bodies.")
+        self._plant_books = books
         self._ended[len(scenes) :] = True
         self._programs = programs
-        self._key = structure(scenes[0]), frozenset(kinds.items()), energy
+        self._key: Hashable = structure(scenes[0]), frozenset(kinds.items()), energy
         self._has_wall = "wall" in scenes[0]
+        self._noisy = self._position if isinstance(self._position, NoisyPositionSensor) else None
+        self._actuated = self._line if isinstance(self._line, ActuatedLine) else None
+        self._delay: Any = self._actuated.line if self._actuated else self._line
         resolution = self._logger.window.swing_m
         self._window = self._logger.window = CompiledWindow(self._time, resolution, size, spare_ticks=BLOCK_TICKS)
-        # A loop of which only the program changes anything needs the window at its end, unless it diverges.
+        # A batch of which only the program changes anything needs the window at its end, unless a member diverges.
         self._keep_from = 0 if self._changes else max(0, self._end - self._window.kept_ticks)
 
     def _drop_ended(self) -> None:
         """The size stays."""
 
     def run(self) -> None:
-        """Run all loops to their ends.
+        """Run all members to their ends.
 
         Raises:
-            NoTick: the loops cannot be compiled; their results are void.
+            NotCompilable: an element cannot be compiled; the results are void.
         """
         tick = 0
         with np.errstate(all="ignore"):
@@ -81,128 +94,158 @@ class CompiledLoops(LoopArray):
                 self._finish(np.flatnonzero(~self._ended), "done" if whole else "stopped")
             self._programs.spare = self._window.rings
 
-    def _by_itself(self, tick: int, until: int) -> int:
-        """Go on until a tick leaves the structure as it was and all forces still in effect are of elements at work."""
-        settled, before = tick + self._time.lookahead_ticks + 2, None
-        for _ in range(_SETTLED_TICKS):
-            if tick in self._changes:
-                self._book()
+    def _by_itself(self, first: int, until: int) -> int:
+        """Go on until all forces still in effect are of elements at work; returns the tick where that is."""
+        end = min(first + self._time.lookahead_ticks + 2, until)
+        self._book()
+        for tick in range(first, end):
             self._work(tick)
             self._look_for_ends(tick)
-            tick += 1
-            if tick < min(settled - 1, until):
-                continue
-            self._book()
-            now = self._shapes(tick)
-            if tick == until or (tick >= settled and now == before):
-                return tick
-            before = now
-        raise NoTick("what the loop remembers keeps growing")
-
-    def _shapes(self, tick: int) -> Any:
-        at = self._tick(tick)
-        at.release(at.leaves.data, at.leaves.whole, at.commands, 0)
-        return at.leaves.shapes(), len(at.leaves.whole)
-
-    def _tick(self, tick: int) -> Tick:
-        motion, books = self._motion, self._logger.books.plant if self._logger.books else None
-        if not isinstance(motion, OneMassMotion) or isinstance(books, ChainBooks):
-            raise NoTick("there are several bodies")
-        return Tick(tick, motion, self._line, self._position, self._feels, self._controller, self._rows, books)
+        self._book()
+        return end
 
     def _by_program(self, first: int, until: int) -> None:
-        tick = self._tick(first)
-        given, carry = self._given(tick, first, first), self._carry(tick)
-        key = (
-            *self._key,
-            tuple(tick.leaves.whole),
-            *((np.shape(a), np.result_type(a)) for a in jax.tree.leaves((tick.leaves.data, given, carry))),
-        )
-        program = self._programs.known(key)
-        block = program.block if program else Block(tick, self._logger.books is not None, self._has_wall)
-        if not program:
-            block.learn(given.outside._replace(commands=tuple(tick.commands[:2])))
-        changing, constant = block.split(tick.leaves.data)
-        carry = carry._replace(changing=changing)
-        given = given._replace(constant=constant)
-        rings = self._rings()
-        program = program or self._programs.compiled(key, block, (carry, rings, given))
-        rings = self._programs.begun(rings, first)
-        done, data = first, tick.leaves.data
-        before = deque[tuple[Carry, Given]](maxlen=-(-self._window.kept_ticks // BLOCK_TICKS) + 1)
+        params, state = self._params(), self._state()
+        carry, rings, inputs = self._carry(first, state), self._rings(), self._inputs(params, first, first)
+        call = self._call(params, state, (carry, rings, inputs))
+        rings, done = self._programs.begun(rings, first), first
+        before = deque[tuple[Carry, BlockInputs]](maxlen=-(-self._window.kept_ticks // BLOCK_TICKS) + 1)
         while done < until and not self._ended.all():
             end = min(done + BLOCK_TICKS, until)
             if done - first < len(self._window.state.rows["wall_position"]):  # beyond, what would be written is there
                 self._note_wall_position(done, end)
-            given = self._given(tick, done, end)._replace(constant=constant)
-            before.append((carry, given))
-            carry, rings = program.call(carry, rings, given)
+            inputs = self._inputs(params, done, end)
+            before.append((carry, inputs))
+            carry, rings = call(carry, rings, inputs)
             done = end
             new = np.logical_not(carry.running) & ~self._ended
             if new.any() and self._keep_from:
-                carry, rings = self._again(program, before, rings)
+                carry, rings = self._again(call, before, rings)
             if new.any() or done == until:
-                data = block.join([np.array(leaf) for leaf in carry.changing], constant)
-                tick.put(data, [row["command"] for row in self._last(carry, done)], done - first)
-                self._in_flight.extend(row["command"] for row in self._last(carry, done))
+                self._take_state(carry, state, first, done)
                 self._fetch(carry, rings, writable=done == until < self._end)
                 self._report_ends(new, first + np.asarray(carry.ticks))
-        whole = [value + count * (done - first) for value, count in zip(tick.leaves.whole, block.counts, strict=True)]
-        commands = [row["command"] for row in self._last(carry, done)]
-        tick.release(data, whole, commands, done - first)
+        self._controller.tick += done - first
         self._resume(carry, done)
 
-    def _again(self, program: Program, before: Iterable[tuple[Carry, Given]], rings: Rings) -> tuple[Carry, Rings]:
-        """Go through the last blocks once more, for the windows of loops that ended; from now on all is kept."""
+    def _again(self, call: Call, before: Iterable[tuple[Carry, BlockInputs]], rings: Rings) -> tuple[Carry, Rings]:
+        """Go through the last blocks once more, for the windows of members that ended; from now on all is kept."""
         self._keep_from = 0
         carry = None
-        for start, given in before:
-            carry, rings = program.call(carry or start, rings, given._replace(keep_from=np.int64(0)))
+        for start, inputs in before:
+            carry, rings = call(carry or start, rings, inputs._replace(keep_from=np.int64(0)))
         assert carry
         return carry, rings
 
-    def _given(self, tick: Tick, first: int, end: int) -> Given:
+    def _call(self, params: BatchParams, state: BatchState, args: tuple[Carry, Rings, BlockInputs]) -> Call:
+        """The program for batches of this structure, compiled where it is not known yet."""
+        carry, _, inputs = args
+        elements = tuple(type(active.element) for active in params.controller.elements)
+        shapes = tuple((np.shape(a), np.result_type(a)) for a in jax.tree.leaves((carry, inputs)))
+        key = self._key, elements, constants_of(params), shapes
+        names = tuple(self._plant_books.names) if self._plant_books else ()
+        block = Block(params, state, names, self._has_wall)
+        try:
+            call = self._programs.call(key, block.run, args)
+        except NoForce as error:
+            raise NotCompilable(error.sentence(params.controller, self._controller.tick)) from error
+        self._elements.check()
+        return call
+
+    # The batch as numbers, and back
+
+    def _params(self) -> BatchParams:
+        motion, books = self._motion, self._plant_books
+        return BatchParams(
+            motion.held,
+            motion.mechanics,
+            motion.response.transition,
+            motion.response.rest_N,
+            self._actuated.actuator if self._actuated else None,
+            self._position.encoder,
+            self._noisy.noise if self._noisy else None,
+            self._feels,
+            *divmod(self._time.delay_steps, self._time.steps_per_tick),
+            self._controller.params,
+            books.params if books else None,
+        )
+
+    def _state(self) -> BatchState:
+        """Everything remembered, a number for every member in each leaf."""
+        assert self._controller.state is not None
+        state = BatchState(
+            self._motion.state,
+            self._motion.last[1],
+            self._actuated.state[3] if self._actuated else 0,
+            self._noisy.state[1] if self._noisy else 0.0,
+            self._controller.state,
+        )
+        members = len(self._ended)
+
+        def of_each(leaf: Any) -> np.ndarray:
+            return np.broadcast_to(leaf, (*np.shape(leaf)[:-1], members)).copy()
+
+        return tree_map(of_each, state)
+
+    def _take_state(self, carry: Carry, template: BatchState, first: int, end: int) -> None:
+        """Have the objects of the batch stand where the program has brought them at tick ``end``."""
+        motion, acting, saturated, noise, controller = tree_unflatten(template, map(np.array, carry.state))
+        newest = end - 1 - self._time.delay_steps // self._time.steps_per_tick
+        self._motion.state, self._motion.last = motion, (0, acting, newest)
+        self._controller.state = controller
+        commands = [row["command"] for row in self._last(carry, end)]
+        line = newest, tuple(commands)
+        if self._actuated:
+            self._actuated.restore((line, newest, acting, saturated))
+        else:
+            self._line.restore(line)
+        if self._noisy:
+            self._noisy.go_on(end, noise)
+        self._in_flight.extend(commands)
+
+    def _inputs(self, params: BatchParams, first: int, end: int) -> BlockInputs:
         """What the program is given for the ticks first ... end - 1."""
-        n, ticks = self._time.steps_per_tick, BLOCK_TICKS
-        tau = tick.tau.at_steps(first * n, (first + ticks) * n + 1)
-        response = None
-        if tick.is_shared:
-            response = tick.responses(first, ticks)
-        noise = tuple(self._rows_of(draw, end - first) for draw in tick.draws)
-        limit_m = np.asarray(self._limit_m)
-        outside = Outside(tau, response, noise, np.int64(0))
-        return Given([], limit_m, outside, np.int64(first), np.int64(end - first), np.int64(self._keep_from))
+        n, response = self._time.steps_per_tick, self._motion.response
+        tau = response.tau.at_steps(first * n, (first + BLOCK_TICKS) * n + 1)
+        shared = None
+        if response.is_shared and params.held.shape[-1] == 1:
+            shared = response.between(first, BLOCK_TICKS).transpose(2, 1, 0, 3)
+        noise = self._rows_of(self._noisy.draw, end - first) if self._noisy else None
+        ticks_in = TickInputs(tau, shared, noise, np.int64(0))
+        limit_m, keep_from = np.asarray(self._limit_m), np.int64(self._keep_from)
+        return BlockInputs(numbers_of(params), limit_m, ticks_in, np.int64(first), np.int64(end - first), keep_from)
 
     def _rows_of(self, draw: Draw, ticks: int) -> np.ndarray:
-        """The next random numbers, shape (BLOCK_TICKS,) or (BLOCK_TICKS, loops)."""
+        """The next random numbers, shape (BLOCK_TICKS,) or (BLOCK_TICKS, members)."""
         one_for_all = not isinstance(draw, NormalRows)
         rows = np.zeros((BLOCK_TICKS, *([] if one_for_all else [len(self._ended)])))
         for row in range(ticks):
             rows[row] = draw()
         return rows
 
-    def _carry(self, tick: Tick) -> Carry:
-        """Where a program begins, but for the leaves."""
-        loops, books, window = len(self._ended), self._logger.books, self._window
+    def _carry(self, tick: int, state: BatchState) -> Carry:
+        """Where a program begins."""
+        members, books, window = len(self._ended), self._logger.books, self._window
         sums = {}
         if books:
             sums = dict(zip(books.names, zip(*books.state.sums, strict=True), strict=True))
         extremes = window.state.x_min_m, window.state.x_max_m, window.state.force_max_N
-        x_m = np.broadcast_to(self._logger.rows[-1].columns["x"], loops) if books else np.zeros(loops)
-        return Carry([], ~self._ended, np.zeros(loops, np.int64), extremes, sums, x_m, self._past(tick))
+        x_m = np.broadcast_to(self._logger.rows[-1].columns["x"], members) if books else np.zeros(members)
+        none = np.zeros(members, np.int64)
+        return Carry(tree_leaves(state), ~self._ended, none, extremes, sums, x_m, self._past(tick))
 
-    def _past(self, tick: Tick) -> Forces:
+    def _past(self, tick: int) -> Forces:
         """Commands on their way, and the forces that go with them."""
-        loops = len(self._ended)
-        columns: dict[str, list[Any]] = {"command": tick.commands}
+        members = len(self._ended)
+        columns: dict[str, list[Any]] = {"command": self._delay.in_flight(tick)}
         if self._logger.books:
             rows = self._logger.rows
             columns["wall"] = [row.columns["wall"] for row in rows]
             columns |= {str(book): [row.forces[book] for row in rows] for book in rows[-1].forces}
         past = {}
         for name, column in columns.items():
-            past[name] = np.zeros((len(column) + 1, loops))
-            past[name][np.arange(tick.at - len(column), tick.at) % (len(column) + 1)] = rows_of(column, loops)
+            past[name] = np.zeros((len(column) + 1, members))
+            past[name][np.arange(tick - len(column), tick) % (len(column) + 1)] = rows_of(column, members)
         return past
 
     def _rings(self) -> Rings:
@@ -231,7 +274,7 @@ class CompiledLoops(LoopArray):
             books.state = books.state._replace(sums=sums)
 
     def _report_ends(self, new: np.ndarray, ticks: np.ndarray) -> None:
-        """Take the results of the loops that diverged after these numbers of ticks."""
+        """Take the results of the members that diverged after these numbers of ticks."""
         x, limit_m = self._motion.x, np.broadcast_to(self._limit_m, new.shape)
         for end in np.unique(ticks[new]).tolist():
             places = np.flatnonzero(new & (ticks == end))
@@ -243,13 +286,13 @@ class CompiledLoops(LoopArray):
     def _log_stands_at(self, tick: int) -> None:
         self._logger.tick = tick
         self._window.state = self._window.state._replace(steps=tick * self._time.steps_per_tick)
-        self._logger.note_accounts(self._controller.recorder._elements)
+        self._logger.note_accounts(self._rows.elements)
 
     def _resume(self, carry: Carry, tick: int) -> None:
         """Have the logger go on from here by itself."""
         self._log_stands_at(tick)
         if self._logger.books:
-            elements, self._logger.rows = self._controller.recorder._elements, []
+            elements, self._logger.rows = self._rows.elements, []
             for forces in self._last(carry, tick):
                 columns = {"x": np.array(carry.x_m), "wall": forces.pop("wall")}
                 del forces["command"]

@@ -9,12 +9,12 @@ from contextlib import AbstractContextManager, contextmanager
 from functools import lru_cache, partial
 from importlib import import_module
 from time import perf_counter
-from typing import Any, NamedTuple
+from typing import Any
 
 import jax
 import numpy as np
 
-from haploop.launch.batch.jax.block import Block, Carry, Given, Rings
+from haploop.launch.batch.jax.block import BlockInputs, Carry, Rings
 
 # How many are kept.
 _MOST = 64
@@ -28,16 +28,7 @@ _FLAGS, _OPTIONS = "XLA_FLAGS", "--xla_backend_extra_options="
 _TAKES_ALL = "XLA_PYTHON_CLIENT_PREALLOCATE"
 
 
-class Program(NamedTuple):
-    """A compiled block.
-
-    Attributes:
-        block: what was compiled; what it knows of the leaves holds for all groups of loops.
-        call: the machine code.
-    """
-
-    block: Block
-    call: Callable[[Carry, Rings, Given], tuple[Carry, Rings]]
+Call = Callable[[Carry, Rings, BlockInputs], tuple[Carry, Rings]]
 
 
 class Programs:
@@ -52,27 +43,28 @@ class Programs:
     """
 
     def __init__(self) -> None:
-        self._kept: OrderedDict[Hashable, Program] = OrderedDict()
+        self._kept: OrderedDict[Hashable, Call] = OrderedDict()
         self.seconds, self.count = 0.0, 0
         self.asked = Counter[Hashable]()
         self.spare: Rings | None = None
 
-    def known(self, key: Hashable) -> Program | None:
-        """The program of a key, if it was compiled before."""
+    def call(self, key: Hashable, run: Call, args: tuple[Carry, Rings, BlockInputs]) -> Call:
+        """Returns the machine code of a block, compiled for arguments of these shapes where the key is not known."""
         if key in self._kept:
             self._kept.move_to_end(key)
-        return self._kept.get(key)
+        else:
+            self._kept[key] = self.compiled(run, args)
+            if len(self._kept) > _MOST:
+                self._kept.popitem(last=False)
+        return self._kept[key]
 
-    def compiled(self, key: Hashable, block: Block, args: tuple[Carry, Rings, Given]) -> Program:
-        """Compile a block for arguments of these shapes."""
+    def compiled(self, run: Call, args: tuple[Carry, Rings, BlockInputs]) -> Call:
+        """Compiles a block for arguments of these shapes."""
         began = perf_counter()
-        lowered = jax.jit(block.run, donate_argnums=1).lower(*args)
-        program = Program(block, lowered.compile(_WIDE if jax.default_backend() == "cpu" else None))
+        lowered = jax.jit(run, donate_argnums=1).lower(*args)
+        compiled = lowered.compile(_WIDE if jax.default_backend() == "cpu" else None)
         self.seconds, self.count = self.seconds + perf_counter() - began, self.count + 1
-        self._kept[key] = program
-        if len(self._kept) > _MOST:
-            self._kept.popitem(last=False)
-        return program
+        return compiled
 
     def begun(self, rings: Rings, ticks: int) -> Rings:
         """These rings of NumPy, in spare memory if it fits; the first rows, so many, and the last are in use."""

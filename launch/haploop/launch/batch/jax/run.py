@@ -27,7 +27,7 @@ def results_of_compiled(
 
     Sensor, estimators, wall, elements, line, motion and books are the objects of a single loop, run once on jax's
     placeholders; what comes out is compiled and kept for as long as the process lives. The first ticks and those after
-    a change are done by ``LoopArray``. What is random comes from the same streams. It runs where jax does by default;
+    a change are done by ``Batch``. What is random comes from the same streams. It runs where jax does by default;
     on GPUs it has been compiled, but never yet run.
 
     **Tolerance.** Every operation is the same in float64, but for products and sums that the compiler makes in one
@@ -84,16 +84,16 @@ def _is_worth_compiling(scene: Scene, loops: int, least: int) -> bool:
 
 def _together(scenes: list[Scene], kinds: Kinds, energy: bool, most: int) -> list[dict[str, Any] | None]:
     """The results of scenes of one structure; None where a scene has to be run by ``results_of``."""
-    from haploop.launch.batch.jax.batch import CompiledLoops
-    from haploop.launch.batch.jax.tick import NoTick
+    from haploop.launch.batch.jax.batch import CompiledBatch
+    from haploop.launch.batch.jax.tick import NotCompilable
 
     size = next(most // part for part in _PARTS if len(scenes) <= most // part)
     programs = _programs()
     try:
         with programs.in_double():
-            loops = CompiledLoops(scenes, kinds, energy=energy, size=size, programs=programs.PROGRAMS)
+            loops = CompiledBatch(scenes, kinds, energy=energy, size=size, programs=programs.PROGRAMS)
             loops.run()
-    except (ElementError, NoTick):
+    except (ElementError, NotCompilable):
         return [None] * len(scenes)
     return loops.results[: len(scenes)]
 
