@@ -12,10 +12,10 @@ import pytest
 from haploop.tools.linear.bounds import bounds_of
 from haploop.tools.linear.one_tick import NotLinear, OneTickMap
 from haploop.tools.sweep.map.axis import Ruler
-from haploop.tools.sweep.map.boundaries import EXACT, bound_boundaries, exact_boundary
 from haploop.tools.sweep.map.contour import zero_lines
 from haploop.tools.sweep.map.data import Axis
 from haploop.tools.sweep.map.figure import make_figure
+from haploop.tools.sweep.map.lines import EXACT, bound_lines, exact_limit
 from haploop.tools.sweep.map.plane import Plane, set_key
 from helpers.data.sweep_tables import UNITS, cells_of, said, table
 from helpers.scenes.least import scene
@@ -56,7 +56,7 @@ def with_values(made: dict[str, Any], **values: float) -> dict[str, Any]:
 def test_every_point_of_the_exact_limit_is_the_stiffness_limit_there(values: list[float], delay: float) -> None:
     made = loop(clock={"round_trip_delay": delay})
     stiffnesses = np.linspace(20.0, 2000.0, 7).tolist()
-    found = points(exact_boundary(plane(made, b=values, k=stiffnesses)).lines)
+    found = points(exact_limit(plane(made, b=values, k=stiffnesses)).pieces)
     assert len(found) > 10
     for b, k in found[:: max(1, len(found) // 12)]:
         ranges = OneTickMap.of(with_values(made, b=b)).stable_ranges()
@@ -65,14 +65,14 @@ def test_every_point_of_the_exact_limit_is_the_stiffness_limit_there(values: lis
 
 def test_a_wall_a_little_stiffer_than_the_line_grows_and_a_softer_one_decays() -> None:
     made = loop()
-    for b, k in points(exact_boundary(plane(made, b=[0.05, 0.2, 0.8], k=[50.0, 500.0, 1000.0])).lines)[::8]:
+    for b, k in points(exact_limit(plane(made, b=[0.05, 0.2, 0.8], k=[50.0, 500.0, 1000.0])).pieces)[::8]:
         growth = OneTickMap.of(with_values(made, b=b)).growth
         assert growth(0.999 * k) < 1.0 < growth(1.001 * k)
 
 
 def test_the_limit_over_delay_is_exact_at_whole_steps_and_only_there_asked_for() -> None:
     made = loop()
-    found = points(exact_boundary(plane(made, delay=[0.0, 0.001, 0.002], k=[50.0, 300.0, 1000.0])).lines)
+    found = points(exact_limit(plane(made, delay=[0.0, 0.001, 0.002], k=[50.0, 300.0, 1000.0])).pieces)
     at_steps = [(d, k) for d, k in found if abs(d * 1e4 - round(d * 1e4)) < 1e-9]
     assert at_steps
     for d, k in at_steps:
@@ -82,7 +82,7 @@ def test_the_limit_over_delay_is_exact_at_whole_steps_and_only_there_asked_for()
 
 def test_without_a_stiffness_axis_the_line_is_where_the_scene_s_own_wall_is_at_its_limit() -> None:
     made = loop(clock={"round_trip_delay": 0.001})
-    found = points(exact_boundary(plane(made, b=[0.01, 0.1, 1.0], delay=[0.0, 0.002, 0.004, 0.006])).lines)
+    found = points(exact_limit(plane(made, b=[0.01, 0.1, 1.0], delay=[0.0, 0.002, 0.004, 0.006])).pieces)
     for b, d in found[::7]:
         ends = [math.floor(d * 1e4 + 1e-6), math.ceil(d * 1e4 - 1e-6)]
         growths = [OneTickMap.of(with_values(made, b=b, delay=end / 1e4)).growth(100.0) for end in ends]
@@ -92,21 +92,21 @@ def test_without_a_stiffness_axis_the_line_is_where_the_scene_s_own_wall_is_at_i
 
 def test_the_stable_windows_of_an_inertia_are_all_outlined() -> None:
     made = loop(dissipation=[{"kind": "bidirectional-inertia", "mass": 0.005}])
-    found = exact_boundary(plane(made, m=[0.001, 0.005, 0.01, 0.02], k=np.geomspace(10.0, 1e5, 9).tolist()))
-    for m, k in points(found.lines)[::6]:
+    found = exact_limit(plane(made, m=[0.001, 0.005, 0.01, 0.02], k=np.geomspace(10.0, 1e5, 9).tolist()))
+    for m, k in points(found.pieces)[::6]:
         ranges = OneTickMap.of(with_values(made, m=m)).stable_ranges()
         assert min(abs(k - end) for pair in ranges for end in pair) <= 1e-7 * k
 
 
 def test_one_axis_has_its_limit_as_a_place_on_it() -> None:
     made = loop()
-    [[[k]]] = exact_boundary(plane(made, k=[50.0, 100.0, 5000.0])).lines
+    [[[k]]] = exact_limit(plane(made, k=[50.0, 100.0, 5000.0])).pieces
     assert k == pytest.approx(OneTickMap.of(made).stiffness_limit(), rel=1e-9)
 
 
 def test_rates_are_only_asked_for_at_their_own_values() -> None:
     made = loop()
-    found = points(exact_boundary(plane(made, rate=[500.0, 1000.0, 2000.0], k=[10.0, 500.0, 5000.0])).lines)
+    found = points(exact_limit(plane(made, rate=[500.0, 1000.0, 2000.0], k=[10.0, 500.0, 5000.0])).pieces)
     assert {x for x, _ in found} <= {500.0, 1000.0, 2000.0}
     for rate, k in found:
         there = {**made, "clock": {**made["clock"], "control_rate": int(rate)}}
@@ -123,7 +123,7 @@ def test_rates_are_only_asked_for_at_their_own_values() -> None:
 def test_a_loop_that_is_not_linear_has_no_line_and_the_figure_says_why(tables: dict[str, Any], why: str) -> None:
     made = loop(**tables)
     with pytest.raises(NotLinear, match=why):
-        exact_boundary(plane(made, k=[50.0, 100.0, 5000.0], delay=[0.0, 0.001]))
+        exact_limit(plane(made, k=[50.0, 100.0, 5000.0], delay=[0.0, 0.001]))
     drawn = figure_over(made, {K: [50.0, 100.0, 5000.0], DELAY: [0.0, 0.001]})
     assert not artists(drawn, f"boundary {EXACT}")
     assert why.replace("\\", "") in legend(drawn)
@@ -155,11 +155,11 @@ def legend(drawn: Any) -> str:
 
 def test_bounds_are_drawn_where_they_apply_at_the_stiffness_they_allow() -> None:
     made = loop(clock={"round_trip_delay": 0.001})
-    found = {bound.name: bound for bound in bound_boundaries(plane(made, b=[0.02, 0.05, 0.1, 0.2], k=[5.0, 500.0]))}
+    found = {bound.name: bound for bound in bound_lines(plane(made, b=[0.02, 0.05, 0.1, 0.2], k=[5.0, 500.0]))}
     assert {"Colgate & Schenkel 1997", "Gil et al. 2009"} <= set(found)
     assert "Abbott & Okamura 2005" not in found
     for name, boundary in found.items():
-        for b, k in points(boundary.lines)[::5] if boundary.lines else ():
+        for b, k in points(boundary.pieces)[::5] if boundary.pieces else ():
             [bound] = [one for one in bounds_of(with_values(made, b=b)) if one.name == name]
             assert bound.stiffness_N_m == pytest.approx(k, rel=1e-6)
 

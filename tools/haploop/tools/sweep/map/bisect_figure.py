@@ -10,11 +10,11 @@ import numpy as np
 from haploop.tools.figure.labels import LabelRoom
 from haploop.tools.figure.style import ELEMENTS, FAINT, INK, WALL, fix_layout
 from haploop.tools.sweep.map.axis import Ruler
-from haploop.tools.sweep.map.boundaries import PanelLines, find_lines
-from haploop.tools.sweep.map.curves import draw_boundary, line_styles
+from haploop.tools.sweep.map.curves import draw_line, line_styles
 from haploop.tools.sweep.map.data import Axis, MapData
 from haploop.tools.sweep.map.edges import ALL_HOLD, FOUND, NONE_HOLDS, UNKNOWN, Edges, find_edges
 from haploop.tools.sweep.map.legend import LOOKS, Legend
+from haploop.tools.sweep.map.lines import PanelLines, find_lines
 from haploop.tools.sweep.map.sentences import edge_description, edge_notes, furthest
 from haploop.tools.sweep.map.sheet import Sheet
 
@@ -59,7 +59,7 @@ def bisect_figure(data: MapData) -> Figure:
         signs.append((second.word(number) if second else "boundary", look))
     legend = Legend(sheet.side, *sheet.side_in)
     legend.lines(f"{second.key}" if second else "", signs)
-    legend.boundaries(styles, {b.name: b.words for over in overs for b in over.boundaries})
+    legend.map_lines(styles, {line.name: line.words for over in overs for line in over.lines})
     legend.notes(edge_notes(data, edges, overs))
     fix_layout(sheet.figure)
     _names(ax, x, y, edges, overs, styles)
@@ -76,13 +76,13 @@ def _over(data: MapData, rulers: Sequence[Ruler], second: Axis | None, number: i
 
 def _draw_over(ax: Axes, overs: Sequence[PanelLines], rulers: Sequence[Ruler]) -> dict[str, dict[str, Any]]:
     """Draws the exact limit of every line in its colour, and the bounds where there is one line; returns the styles."""
-    names = [boundary.name for over in overs for boundary in over.boundaries if boundary.lines]
+    names = [line.name for over in overs for line in over.lines if line.pieces]
     styles = line_styles(list(dict.fromkeys(names)))
     for number, over in enumerate(overs):
-        for boundary in over.boundaries:
-            if boundary.lines:
+        for line in over.lines:
+            if line.pieces:
                 own = {"color": _COLOURS[number], "linewidth": 1.5} if len(overs) > 1 else {}
-                over.drawn[boundary.name] = draw_boundary(ax, boundary, rulers, styles[boundary.name] | own)
+                over.drawn[line.name] = draw_line(ax, line, rulers, styles[line.name] | own)
     return styles
 
 

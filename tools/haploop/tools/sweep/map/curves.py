@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from haploop.tools.figure.style import INK
-from haploop.tools.sweep.map.boundaries import EXACT, Boundary
+from haploop.tools.sweep.map.lines import EXACT, MapLine
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -31,7 +31,7 @@ def line_styles(names: Sequence[str]) -> dict[str, dict[str, Any]]:
     return ({EXACT: {"color": INK, "linewidth": 2.0}} if EXACT in names else {}) | styles
 
 
-def draw_boundary(ax: Axes, boundary: Boundary, rulers: Sequence[Ruler], style: dict[str, Any]) -> list[np.ndarray]:
+def draw_line(ax: Axes, line: MapLine, rulers: Sequence[Ruler], style: dict[str, Any]) -> list[np.ndarray]:
     """Draws all pieces of a line; a piece that is one value of the only axis stands upright.
 
     Returns:
@@ -43,12 +43,12 @@ def draw_boundary(ax: Axes, boundary: Boundary, rulers: Sequence[Ruler], style: 
     look = style | {
         "zorder": 4 if len(rulers) == 2 else 1.5,
         "path_effects": halo,
-        "gid": f"boundary {boundary.name}",
+        "gid": f"boundary {line.name}",
         "solid_capstyle": "round",
     }
     drawn = []
-    for line in boundary.lines:
-        places = np.column_stack([ruler.place(line[:, number]) for number, ruler in enumerate(rulers)])
+    for piece in line.pieces:
+        places = np.column_stack([ruler.place(piece[:, number]) for number, ruler in enumerate(rulers)])
         if len(rulers) == 1:
             for (x,) in places:
                 ax.axvline(x, **look)

@@ -11,11 +11,11 @@ from haploop.tools.figure.labels import LabelRoom
 from haploop.tools.figure.style import fix_layout, write_figure
 from haploop.tools.sweep.map.axis import Ruler
 from haploop.tools.sweep.map.bisect_figure import bisect_figure
-from haploop.tools.sweep.map.boundaries import PanelLines, find_lines
-from haploop.tools.sweep.map.curves import draw_boundary, line_styles
+from haploop.tools.sweep.map.curves import draw_line, line_styles
 from haploop.tools.sweep.map.data import LIMIT_CYCLE, Axis, Cells, MapData, make_map_data
 from haploop.tools.sweep.map.edges import stiffest_steady
 from haploop.tools.sweep.map.legend import Legend, amplitude_scale
+from haploop.tools.sweep.map.lines import PanelLines, find_lines
 from haploop.tools.sweep.map.panels import (
     SwingScale,
     count_disagreement,
@@ -49,7 +49,7 @@ def make_figure(data: MapData) -> Figure:
     panels = list(layout.panels(data, cells))
     scenes = data.columns["scene"]
     overs = [find_lines((scenes[row] for row in panel.cells.row.flat if row >= 0), rulers) for panel in panels]
-    words = {boundary.name: boundary.words for over in overs for boundary in over.boundaries if boundary.lines}
+    words = {line.name: line.words for over in overs for line in over.lines if line.pieces}
     styles = line_styles(list(words))
     swings, scale = SwingScale(cells), _limit_cycles(cells) if layout.y is not None else None
     sheet = Sheet(len(panels), data.title, description(data, cells))
@@ -62,12 +62,12 @@ def make_figure(data: MapData) -> Figure:
         for ruler, which in zip(rulers, _SIDES, strict=False):
             ruler.dress(ax, which, sheet.is_low(number) if which == "x" else sheet.is_left(number))
         panel_title(ax, panel.titles[0])
-        over.drawn = {b.name: draw_boundary(ax, b, rulers, styles[b.name]) for b in over.boundaries if b.lines}
+        over.drawn = {it.name: draw_line(ax, it, rulers, styles[it.name]) for it in over.lines if it.pieces}
     legend = Legend(sheet.side, *sheet.side_in)
     legend.verdicts(count_verdicts(cells), as_points=layout.y is None)
     if scale:
         legend.amplitudes(scale)
-    legend.boundaries(styles, words)
+    legend.map_lines(styles, words)
     legend.notes(map_notes(data, cells, layout, overs))
     fix_layout(sheet.figure)
     for ax, panel, over in zip(sheet.axes, panels, overs, strict=True):

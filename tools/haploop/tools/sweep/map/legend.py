@@ -127,7 +127,7 @@ class Legend:
         bar.set_gid("amplitude scale")
         self._y += 0.14 + 0.28 + _GAP_IN
 
-    def boundaries(self, styles: Mapping[str, dict[str, Any]], words: Mapping[str, str]) -> None:
+    def map_lines(self, styles: Mapping[str, dict[str, Any]], words: Mapping[str, str]) -> None:
         """Writes the names of the lines over the map and what they say."""
         for name, style in styles.items():
             middle = self._y + _LINE_IN / 2

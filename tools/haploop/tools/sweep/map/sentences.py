@@ -9,7 +9,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from haploop.tools.render.units import spring
-from haploop.tools.sweep.map.boundaries import PanelLines
 from haploop.tools.sweep.map.data import (
     FAILED,
     LIMIT_CYCLE,
@@ -24,6 +23,7 @@ from haploop.tools.sweep.map.data import (
 )
 from haploop.tools.sweep.map.edges import ALL_HOLD, FOUND, NONE_HOLDS, UNKNOWN, Edges, StiffestSteady, stiffest_steady
 from haploop.tools.sweep.map.legend import verdict_words
+from haploop.tools.sweep.map.lines import PanelLines
 from haploop.tools.sweep.map.sheet import Layout
 
 # What fits into the line below the title; the base scene's title is cut short before anything else is.
@@ -132,7 +132,7 @@ def failures(data: MapData) -> str:
 def map_notes(data: MapData, cells: Cells, layout: Layout, lines: Sequence[PanelLines]) -> list[str]:
     """Returns the notes beside a map, the answer first."""
     panels, reasons = layout.count(data.axes), _reasons(lines)
-    outside = list(dict.fromkeys(line.name for panel in lines for line in panel.boundaries if not line.lines))
+    outside = list(dict.fromkeys(line.name for panel in lines for line in panel.lines if not line.pieces))
     swinging = cells.verdict == LIMIT_CYCLE
     every, one = all(panel.why_none for panel in lines), len(lines) == 1
     notes = [

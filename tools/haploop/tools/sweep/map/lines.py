@@ -21,21 +21,21 @@ EXACT = "ρ(M) = 1"
 
 
 @dataclass(frozen=True)
-class Boundary:
+class MapLine:
     """A named line over a map.
 
     Attributes:
         name: what is written on it.
         words: what it says, and its source.
-        lines: points of each piece, values of the axes in SI, shape (n, axes).
+        pieces: points of each, values of the axes in SI, shape (n, axes).
     """
 
     name: str
     words: str
-    lines: list[np.ndarray]
+    pieces: list[np.ndarray]
 
 
-def exact_boundary(plane: Plane) -> Boundary:
+def exact_limit(plane: Plane) -> MapLine:
     """Finds where rho(M) = 1 for the linear loop; without lines where it grows nowhere or everywhere.
 
     Raises:
@@ -55,14 +55,14 @@ def exact_boundary(plane: Plane) -> Boundary:
         return math.log(loops[key].growth(plane.stiffness(x, y)))
 
     without = f", without {', '.join(left)}" if (left := left_out(plane.scene)) else ""
-    return Boundary(EXACT, f"exact, linear loop in contact{without}", plane.zero_lines(level))
+    return MapLine(EXACT, f"exact, linear loop in contact{without}", plane.zero_lines(level))
 
 
 _MEANING = {"passivity": "passive, whatever passive hand holds it", "stability": "stable with the scene's own hand"}
 _MOST_LOG = 50.0
 
 
-def bound_boundaries(plane: Plane) -> list[Boundary]:
+def bound_lines(plane: Plane) -> list[MapLine]:
     """Finds for every bound that applies at some place of a panel the line on which the wall is as stiff as it allows.
 
     A bound that applies but allows no wall of the panel, or every one, has no lines.
@@ -80,7 +80,7 @@ def bound_boundaries(plane: Plane) -> list[Boundary]:
     first = {bound.name: bound for bound in bounds_of(plane.scene)}
     lines = {name: plane.zero_lines(_level(plane, bounds_at, name), whole_ticks=True) for name in first}
     applied = {name for bounds in known.values() for name, bound in bounds.items() if bound.applies}
-    return [Boundary(name, _MEANING[bound.kind], lines[name]) for name, bound in first.items() if name in applied]
+    return [MapLine(name, _MEANING[bound.kind], lines[name]) for name, bound in first.items() if name in applied]
 
 
 def _level(
@@ -104,7 +104,7 @@ def _level(
 class PanelLines:
     """The lines over a panel, and their pieces as drawn by name; ``why_none`` where there is no exact limit."""
 
-    boundaries: list[Boundary] = field(default_factory=list)
+    lines: list[MapLine] = field(default_factory=list)
     why_none: str = ""
     drawn: dict[str, list[np.ndarray]] = field(default_factory=dict)
 
@@ -121,8 +121,8 @@ def find_lines(texts: Iterable[str | None], rulers: Sequence[Ruler], bounds: boo
     if foreign := sorted(elements - set(installed_kinds())):
         return PanelLines(why_none=f"the element {foreign[0]} comes from a plugin")
     plane = Plane(scene, rulers)
-    known = bound_boundaries(plane) if bounds else []
+    known = bound_lines(plane) if bounds else []
     try:
-        return PanelLines([exact_boundary(plane), *known])
+        return PanelLines([exact_limit(plane), *known])
     except NotLinear as error:
         return PanelLines(known, str(error))
