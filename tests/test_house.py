@@ -1,5 +1,6 @@
 """The house: one import name from four folders, arrows that only go down, and pinned dependencies."""
 
+import ast
 import os
 import re
 import shutil
@@ -122,6 +123,31 @@ def test_a_circle_is_found_however_it_is_imported(source: str, tmp_path: Path, m
     (tmp_path / "circled/second.py").write_text("import circled.first\n", encoding="utf-8")
     monkeypatch.syspath_prepend(tmp_path)
     assert set(circle(imports_within(["circled"]))) == {"circled.first", "circled.second"}
+
+
+def foreign_private_names(source: str) -> set[str]:
+    """Private attributes that a module reads without defining them itself; those of a NamedTuple are public."""
+    tree, public = ast.parse(source), {"_replace", "_asdict", "_fields", "_make", "_exit"}
+    defined = {
+        node.name for node in ast.walk(tree) if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef)
+    }
+    attributes = [node for node in ast.walk(tree) if isinstance(node, ast.Attribute)]
+    of_self = [node for node in attributes if ast.unparse(node.value) in ("self", "cls", "super()")]
+    defined |= {node.attr for node in of_self}
+    private = {node.attr for node in attributes if node.attr.startswith("_") and not node.attr.startswith("__")}
+    return private - defined - public
+
+
+def test_no_module_reads_the_private_names_of_another() -> None:
+    files = [file for root in SOURCE_ROOTS for file in HOUSE.glob(f"{root}/haploop/**/*.py")]
+    found = {str(file): foreign_private_names(file.read_text(encoding="utf-8")) for file in files}
+    assert {name: names for name, names in found.items() if names} == {}
+
+
+def test_a_private_name_of_another_module_is_found_and_one_of_its_own_is_not() -> None:
+    own = "class A:\n    def f(self, other):\n        self._x = other._x"
+    assert foreign_private_names(own) == set()
+    assert foreign_private_names("def f(a):\n    return a.b._y + a._replace(c=1)") == {"_y"}
 
 
 def test_a_wheel_holds_every_module_scene_sweep_device_hand_reference_and_the_live_page(tmp_path: Path) -> None:

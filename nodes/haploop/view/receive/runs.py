@@ -26,7 +26,9 @@ class Run(Protocol):
         ...
 
     @property
-    def title(self) -> str: ...
+    def title(self) -> str:
+        """Title of the scene."""
+        ...
 
     @property
     def out(self) -> str:

@@ -34,7 +34,6 @@ class LodSeries:
         origin: the first tick.
 
     Attributes:
-        names: columns, in the order of their first rows.
         first_tick: first tick that is known; None before anything is.
     """
 
@@ -49,6 +48,7 @@ class LodSeries:
 
     @property
     def names(self) -> list[str]:
+        """Returns the columns, in the order of their first rows."""
         return list(self._columns)
 
     @property
