@@ -15,6 +15,7 @@ from hypothesis import HealthCheck, settings
 from helpers.live.launched import Launched, Run
 
 settings.register_profile("haploop", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.register_profile("quick", settings.get_profile("haploop"), max_examples=20)
 settings.load_profile("haploop")
 # A shell has its background jobs ignore Ctrl-C, and what they start inherits that.
 signal.signal(signal.SIGINT, signal.default_int_handler)
