@@ -10,7 +10,7 @@ import numpy as np
 from haploop.tools.figure.labels import LabelRoom
 from haploop.tools.figure.style import ELEMENTS, FAINT, INK, WALL, fix_layout
 from haploop.tools.sweep.map.axis import Ruler
-from haploop.tools.sweep.map.curves import draw_line, line_styles
+from haploop.tools.sweep.map.curves import draw_line, draw_star, line_styles, name_lines
 from haploop.tools.sweep.map.data import Axis, MapData
 from haploop.tools.sweep.map.edges import ALL_HOLD, FOUND, NONE_HOLDS, UNKNOWN, Edges, find_edges
 from haploop.tools.sweep.map.legend import LOOKS, Legend
@@ -25,7 +25,6 @@ if TYPE_CHECKING:
 MOST_LINES = 8
 _COLOURS = (WALL, *ELEMENTS, "#332288")
 _MARKERS = "osD^vP*X"
-_STAR = "#C00000"
 # Signs of several lines at an edge stand above one another.
 _STACK_PT = 9.0
 # Of the height of a panel, what one of them takes.
@@ -144,8 +143,6 @@ def _names(
     room.avoid_lines(line for over in overs for lines in over.drawn.values() for line in lines)
     if best := furthest(edges):
         at = x.coordinates[best.index[0]], float(y.place([best.value])[0])
-        ax.plot(*at, "*", color=_STAR, markersize=13, markeredgecolor="white", zorder=6, gid="star")
-        room.beside(*at, [best.words], _STAR, "star words")
-    for over in overs if len(overs) == 1 else ():
-        for name, lines in over.drawn.items():
-            room.on_line(max(lines, key=len), name, styles[name]["color"], "name of a line")
+        draw_star(ax, room, *at, [best.words])
+    if len(overs) == 1:
+        name_lines(room, overs[0].drawn, styles)

@@ -1,8 +1,8 @@
-"""The lines over a map as drawn: the exact limit, and the analytic bounds beside it, each with its own dashes."""
+"""The lines over a map as drawn, each with its own dashes and its name, and the star of the answer."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,11 +13,13 @@ from haploop.tools.sweep.map.lines import EXACT, MapLine
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+    from haploop.tools.figure.labels import LabelRoom
     from haploop.tools.sweep.map.axis import Ruler
 
 # Of a straight line, so that its name finds room.
 _POINTS = 41
 _DASHES = ((5, 2), (2, 1.5), (7, 2, 1.5, 2), (1, 1), (9, 3), (4, 1.5, 1, 1.5, 1, 1.5))
+_STAR = "#C00000"
 _COLOURS = ("#0B5FA5", "#7A1FA2", "#00664A", "#5B3A29", "#8A0F3C", "#3C3C8F")
 
 
@@ -70,3 +72,16 @@ def _across(place: np.ndarray, rulers: Sequence[Ruler]) -> np.ndarray:
         if len(ruler.axis.values) == 1:
             points[:, number] = np.linspace(ruler.edges[0], ruler.edges[-1], _POINTS)
     return points
+
+
+def draw_star(ax: Axes, room: LabelRoom, x: float, y: float, texts: Sequence[str]) -> None:
+    """Draws the star of the answer, and beside it the first of some texts that has room."""
+    ax.plot(x, y, "*", color=_STAR, markersize=13, markeredgecolor="white", zorder=6, gid="star")
+    room.beside(x, y, texts, _STAR, "star words")
+
+
+def name_lines(room: LabelRoom, drawn: Mapping[str, Sequence[np.ndarray]], styles: dict[str, dict[str, Any]]) -> None:
+    """Writes the name of each line on its longest piece, where there is room."""
+    for name, pieces in drawn.items():
+        if pieces:
+            room.on_line(max(pieces, key=len), name, styles[name]["color"], "name of a line")

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from haploop.tools.figure.data import FigureError
 from haploop.tools.figure.labels import LabelRoom
 from haploop.tools.figure.style import fix_layout, write_figure
 from haploop.tools.sweep.map.axis import Ruler
 from haploop.tools.sweep.map.bisect_figure import bisect_figure
-from haploop.tools.sweep.map.curves import draw_line, line_styles
-from haploop.tools.sweep.map.data import LIMIT_CYCLE, Axis, Cells, MapData, make_map_data
+from haploop.tools.sweep.map.curves import draw_line, draw_star, line_styles, name_lines
+from haploop.tools.sweep.map.data import LIMIT_CYCLE, Axis, MapData, make_map_data
 from haploop.tools.sweep.map.edges import stiffest_steady
 from haploop.tools.sweep.map.legend import Legend, amplitude_scale
 from haploop.tools.sweep.map.lines import PanelLines, find_lines
@@ -30,10 +30,8 @@ from haploop.tools.sweep.table import NeedsPyarrow, TableError, read
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.colors import LogNorm
     from matplotlib.figure import Figure
 
-_STAR = "#C00000"
 _SIDES: tuple[Literal["x", "y"], ...] = ("x", "y")
 
 
@@ -51,7 +49,8 @@ def make_figure(data: MapData) -> Figure:
     overs = [find_lines((scenes[row] for row in panel.cells.row.flat if row >= 0), rulers) for panel in panels]
     words = {line.name: line.words for over in overs for line in over.lines if line.pieces}
     styles = line_styles(list(words))
-    swings, scale = SwingScale(cells), _limit_cycles(cells) if layout.y is not None else None
+    swinging = cells.amplitude_m[cells.verdict == LIMIT_CYCLE]
+    swings, scale = SwingScale(cells), amplitude_scale(swinging) if layout.y is not None else None
     sheet = Sheet(len(panels), data.title, description(data, cells))
     for number, (ax, panel, over) in enumerate(zip(sheet.axes, panels, overs, strict=True)):
         if layout.y is None:
@@ -76,12 +75,8 @@ def make_figure(data: MapData) -> Figure:
             count_disagreement(ax, rulers[0], panel.cells, swings)
         else:
             mark_disagreement(ax, rulers[0], rulers[1], panel.cells)
-        _label(ax, along, rulers, panel, over, swings, {name: style["color"] for name, style in styles.items()})
+        _label(ax, along, rulers, panel, over, swings, styles)
     return sheet.figure
-
-
-def _limit_cycles(cells: Cells) -> LogNorm | None:
-    return amplitude_scale(cells.amplitude_m[cells.verdict == LIMIT_CYCLE])
 
 
 def _label(
@@ -91,7 +86,7 @@ def _label(
     panel: Panel,
     over: PanelLines,
     swings: SwingScale,
-    colours: dict[str, str],
+    styles: dict[str, dict[str, Any]],
 ) -> None:
     """Writes star and names, once the panel has its place."""
     room = LabelRoom(ax)
@@ -103,11 +98,8 @@ def _label(
     if found:
         x, *rest = (ruler.coordinates[index] for ruler, index in zip(rulers, found.index, strict=True))
         y = rest[0] if rest else float(swings.place(panel.cells.amplitude_m)[found.index])
-        ax.plot(x, y, "*", color=_STAR, markersize=13, markeredgecolor="white", zorder=5, gid="star")
-        room.beside(x, y, star_words(along, found), _STAR, "star words")
-    for name, lines in over.drawn.items():
-        for line in sorted(lines, key=len, reverse=True)[:1]:
-            room.on_line(line, name, colours[name], "name of a line")
+        draw_star(ax, room, x, y, star_words(along, found))
+    name_lines(room, over.drawn, styles)
 
 
 def draw_map(directory: Path, target: Path | None = None) -> Path:
