@@ -11,7 +11,7 @@ import pytest
 from haploop.logger.books.books import Books
 from haploop.logger.verdict.window import Window
 from haploop.protocol.ticks import Timebase
-from haploop.protocol.trees import tree_leaves, tree_unflatten
+from haploop.protocol.trees import tree_leaves, tree_select, tree_unflatten
 from helpers.runs.batches import together
 from helpers.runs.captured import run
 from helpers.scenes.least import scene
@@ -89,6 +89,40 @@ def test_books_go_on_from_a_packed_state_to_the_same_bits(
     assert bits(other.state) == bits(one.state) == bits(calls[0][0].state)
     assert "0.true" in one.names
     assert bits(forgetful.state) != bits(one.state)
+
+
+@pytest.mark.parametrize("grip", [{}, {"grip": {"stiffness": 500.0, "damping": 3.0}}], ids=["one mass", "a chain"])
+def test_books_of_the_members_that_are_kept_have_the_bits_they_have_when_none_is_dropped(
+    grip: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made, calls = calls_of(monkeypatch, Books, "__init__"), calls_of(monkeypatch, Books, "book_batch")
+    resolved, kept = busy({}), np.array([True, False, False, True, True, False])
+    hand = {**resolved["hand"], **grip}
+    together(
+        [
+            {
+                **resolved,
+                "device": {**resolved["device"], "mass": 0.01 + 0.001 * i},
+                "hand": {**hand, "force": {**hand["force"], "value": -1.0 - 0.1 * i}},
+                "wall": {**resolved["wall"], "stiffness": 100.0 + i},
+            }
+            for i in range(len(kept))
+        ]
+    )
+    monkeypatch.undo()
+    (_, *arguments), half = made[0], len(calls) // 2
+    dropped = Books(*arguments)
+    dropped.start(calls[0][2])
+    for at, (_, tick, plant, commanded) in enumerate(calls):
+        if at == half:
+            dropped.select(kept)
+        if at >= half:
+            commands = {"command": plant["command"]}
+            plant = tree_select({name: plant[name] for name in plant.keys() - commands.keys()}, kept) | commands
+            commanded = tree_select(commanded, kept)
+        dropped.book_batch(tick, plant, commanded)
+    assert bits(dropped.state) == bits(tree_select(calls[0][0].state, kept))
+    assert dropped.state.sums.sums.shape == (len(dropped.names), 3)
 
 
 @pytest.mark.parametrize("members", [1, 7])

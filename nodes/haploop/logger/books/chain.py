@@ -145,7 +145,7 @@ class ChainBooks:
 
     def select(self, kept: np.ndarray) -> None:
         """Drops the members of a batch for which ``kept``, shape (members,), is false."""
-        self._chain = tree_select(self._chain, kept)
+        self._chain, self._constant = tree_select((self._chain, self._constant), kept)
         self._forms.select(kept)
         self._tau.select(kept)
 

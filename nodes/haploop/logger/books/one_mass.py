@@ -24,11 +24,13 @@ class OneMassParams(NamedTuple):
         mechanics: mass, dampers, spring.
         square: factors of ``sum_squares`` that give integral v^2 dt over a step, shape (6,).
         lag: factors of v, m a and tau' h that give integral (t - h/2)/h v dt over a step, shape (3,).
+        constant_N: constant forces that act like the hand's but have books of their own.
     """
 
     mechanics: Mechanics
     square: np.ndarray
     lag: np.ndarray
+    constant_N: tuple[Any, ...]
 
 
 class Steps(NamedTuple):
@@ -71,7 +73,7 @@ def one_mass_params(scene: dict[str, Any], time: Timebase, members: int | None =
     square, lag = each(forms, m.mass_kg, m.damping, m.stiffness)
     if members is not None:
         square, lag = square.reshape(6, -1), lag.reshape(3, -1)
-    return OneMassParams(m, square, lag)
+    return OneMassParams(m, square, lag, tuple(constant_forces(scene).values()))
 
 
 def increments(
@@ -83,6 +85,7 @@ def increments(
         work of tau        integral tau v dt = (tau + tau+)/2 dx + (tau+ - tau) integral (t - h/2)/h v dt
         heat of damper i   b_i integral v^2 dt = b_i w' S w,  w = (v, m a, tau' h)
         actuator           (f_commanded - f) dx, what saturation and steps of force keep from the device
+        constant force F   F dx, which is no part of the work of tau, though tau includes F
     all summed over the steps of an interval; and over a whole interval, in which x goes by X and v by V:
         kinetic change     m V (v + V / 2)
         spring change      k X (x - x_rest + X / 2)
@@ -105,7 +108,9 @@ def increments(
     beyond *= m.stiffness
     net -= beyond
     rates = [v, net] if rise is None else [v, net, rise]
-    yield summed(_hand_work(params.lag, tau, rise, dx, rates))
+    works = [force_N * ticks.dx for force_N in params.constant_N]
+    work = summed(_hand_work(params.lag, tau, rise, dx, rates))
+    yield work - sum(works) if works else work
     square = summed(sum_squares(params.square, rates))
     for damping in m.dampers.values():
         yield damping * square
@@ -114,13 +119,6 @@ def increments(
     yield m.stiffness * ticks.dx * (ticks.x[:-1] - m.rest_m + ticks.dx * 0.5)
     if commanded is not None:
         yield summed(beyond_limits(commanded, force) * dx)
-
-
-def _parted(found: Iterator[Any], constant_N: Sequence[float], dx: Any) -> Iterator[Any]:
-    """Yields the books with the work of constant forces, which is F dx, taken from the hand's and added at the end."""
-    works = [force * dx for force in constant_N]
-    yield next(found) - sum(works)
-    yield from found
     yield from works
 
 
@@ -189,8 +187,7 @@ class OneMassBooks:
         self.is_limited = "actuator" in scene
         dampers = self.params.mechanics.dampers
         self.names = ["hand_work", *(f"{name}_heat" for name in dampers), "kinetic", "spring"]
-        self._constant = constant_forces(scene)
-        self.names += ["actuator"] * self.is_limited + [f"{name}_work" for name in self._constant]
+        self.names += ["actuator"] * self.is_limited + [f"{name}_work" for name in constant_forces(scene)]
 
     def increments(
         self, first_step: int, columns: dict[str, np.ndarray], moved: Displacement, commanded: Iterable[np.ndarray]
@@ -214,8 +211,7 @@ class OneMassBooks:
         steps = Steps(*starts, rise=by_interval(rise, n) if rise.any() else None, dx=moved.by_step)
         ticks = Ticks(x[::n], v[::n], moved.by_tick)
         limited = (by_interval(force, n) for force in commanded) if self.is_limited else None
-        found = increments(self.params, steps, ticks, limited, sum_steps)
-        return _parted(found, list(self._constant.values()), moved.by_tick) if self._constant else found
+        return increments(self.params, steps, ticks, limited, sum_steps)
 
     def select(self, kept: np.ndarray) -> None:
         """Drops the members of a batch for which ``kept``, shape (members,), is false."""
