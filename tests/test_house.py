@@ -69,17 +69,6 @@ def test_an_arrow_that_goes_up_or_sideways_is_caught(importer: str, imported: st
     assert f"{importer.split('/', 1)[1].replace('/', '.')}.offender -> {imported}" in report.stdout
 
 
-# Circles that are still to be cut: an import within each, importer first.
-STILL = {
-    ("haploop.controller.estimators.choose", "haploop.controller.estimators.foaw"),
-    ("haploop.controller.estimators.choose", "haploop.controller.estimators.kalman"),
-    ("haploop.controller.estimators.choose", "haploop.controller.estimators.window"),
-    ("haploop.logger.books.one_mass", "haploop.logger.books.chain"),
-    ("haploop.logger.books.one_mass", "haploop.logger.books.friction_batch"),
-    ("haploop.tools.render.progress", "haploop.tools.render.report"),
-}
-
-
 def imports_within(packages: list[str]) -> dict[str, set[str]]:
     """Module -> the modules of the same package that it imports, within functions and for types included."""
     graph = grimp.build_graph(*packages, cache_dir=None)
@@ -87,7 +76,7 @@ def imports_within(packages: list[str]) -> dict[str, set[str]]:
         module: {
             imported
             for imported in graph.find_modules_directly_imported_by(module)
-            if imported.startswith(f"{package}.") and (module, imported) not in STILL
+            if imported.startswith(f"{package}.")
         }
         for package in packages
         for module in graph.modules
