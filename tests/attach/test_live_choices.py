@@ -4,8 +4,8 @@ import math
 
 import pytest
 
-from haploop.launch.clock.capabilities import capabilities
 from haploop.launch.clock.clock import ClockError
+from haploop.launch.clock.commands import capabilities
 from haploop.launch.processes.control import CommandRefused
 from haploop.launch.runs.replay import replay
 from haploop.logger import read

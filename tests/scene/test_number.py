@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic_core import PydanticCustomError
 
-from haploop.launch.scene.tables.number import si
+from haploop.launch.scene.number import si
 from helpers.scenes.least import mistakes, scene
 
 
@@ -87,7 +87,7 @@ def test_any_text_is_a_number_or_a_sentence(text):
 
 def test_units_are_loaded_only_when_text_carries_one():
     code = (
-        "import sys; from haploop.launch.scene.tables.number import si; si('m').read(1.0);"
+        "import sys; from haploop.launch.scene.number import si; si('m').read(1.0);"
         "assert 'pint' not in sys.modules;"
         "si('m').read('1 mm'); assert 'pint' in sys.modules"
     )

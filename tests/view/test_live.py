@@ -8,7 +8,7 @@ import signal
 import numpy as np
 import pytest
 
-from haploop.launch.errors import RunFailed
+from haploop.launch.spec import RunFailed
 from haploop.logger import read
 from helpers.live.browsing import site, to_its_end
 from helpers.live.live_run import going, undisturbed

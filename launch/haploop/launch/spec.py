@@ -1,4 +1,4 @@
-"""The one description of a run: the scene, where it is written to, and how it is carried out."""
+"""The one description of a run: the scene, where it is written to, and how it is carried out; and its failure."""
 
 from __future__ import annotations
 
@@ -12,6 +12,10 @@ from haploop.protocol.transport import Transport
 
 if TYPE_CHECKING:
     from haploop.controller.dissipation import Element
+
+
+class RunFailed(Exception):
+    """A run that could not go on; the message names the node and the last common tick."""
 
 
 @dataclass(frozen=True)

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 from haploop.controller.dissipation import ElementError
 from haploop.launch.batch.batch import Batch
 from haploop.launch.batch.stacking import runs_in_arrays, structures
-from haploop.launch.errors import RunFailed
 from haploop.launch.runs.in_process import run_in_process
+from haploop.launch.spec import RunFailed
 from haploop.logger.summary import OF_THE_MACHINE
 
 if TYPE_CHECKING:

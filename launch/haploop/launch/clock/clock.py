@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from haploop.launch.scene.check import resolve_event
-from haploop.launch.scene.elements import swapped_in, try_out
+from haploop.launch.scene.events import swapped_in, try_out
 from haploop.protocol.changes import Event, at_work, changes_of
 from haploop.protocol.ticks import Timebase
 

@@ -11,7 +11,7 @@ import zmq
 
 from haploop.launch.clock.clock import Clock
 from haploop.launch.clock.roster import Node, Roster
-from haploop.launch.errors import RunFailed
+from haploop.launch.spec import RunFailed
 from haploop.protocol.changes import refusals_of
 from haploop.protocol.processes import PROCESSES
 from haploop.protocol.sockets import bind, has_message, open_socket

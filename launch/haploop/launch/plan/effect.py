@@ -6,13 +6,38 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal, Protocol, TypeVar
 
-from haploop.launch.plan.modules import moved_by
+from haploop.plant.integrators.registry import find_integrator
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.scene.table import Table
 
 TableType = TypeVar("TableType", bound=Table)
 Resolved = dict[str, Any]
 Stage = Literal["motion", "measurement", "estimate", "line", "actuation"]
+
+# Modules of the plant that effects bring. These move bodies in a row, or one under forces that change between ticks.
+HISTORY = tuple(f"haploop.plant.chain.{name}" for name in ("history", "chain", "sensed_acceleration", "transition"))
+_EXACT = ("haploop.plant.chain.motion",)
+CHAIN = (*_EXACT, *HISTORY)
+_EXACT_RUBBING = tuple(f"haploop.plant.friction.{name}" for name in ("motion", "substeps"))
+RUBBING = _EXACT_RUBBING
+# Shared by the one-step methods.
+LINEAR_RATES = ("haploop.plant.integrators.linear_rates",)
+DRAWN = ("haploop.plant.random.streams",)
+NOISY = ("haploop.plant.sensing.noise", *DRAWN)
+COUNTED = ("haploop.plant.counters",)
+LINE = ("haploop.plant.line.lossy", *DRAWN, *COUNTED, *CHAIN)
+
+
+def moved_by(integrator: str, modules: tuple[str, ...], rubs: bool) -> tuple[str, ...]:
+    """Returns the modules under an integrator, which has its own in place of those that move bodies exactly.
+
+    Args:
+        rubs: whether they are those of friction.
+    """
+    if integrator == "exact":
+        return modules
+    kept = tuple(module for module in modules if module not in (*_EXACT, *_EXACT_RUBBING))
+    return (*kept, find_integrator(integrator).motions[1].partition(":")[0]) if rubs else kept
 
 
 class Draft(Protocol):

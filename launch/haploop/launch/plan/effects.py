@@ -10,9 +10,20 @@ from functools import cache, partial
 from importlib.metadata import entry_points
 
 from haploop.controller.estimators.choose import estimator_class, estimators_for
-from haploop.launch.plan import checks, ideal
-from haploop.launch.plan.effect import Effect, Resolved, at, without_keys
-from haploop.launch.plan.modules import CHAIN, COUNTED, HISTORY, LINE, LINEAR_RATES, NOISY, RUBBING
+from haploop.launch.plan import rules
+from haploop.launch.plan.effect import (
+    CHAIN,
+    COUNTED,
+    HISTORY,
+    LINE,
+    LINEAR_RATES,
+    NOISY,
+    RUBBING,
+    Effect,
+    Resolved,
+    at,
+    without_keys,
+)
 from haploop.plant.integrators.registry import find_integrator, integrator_module, integrator_names
 from haploop.plant.sensing.encoder import accelerometer_is_used
 from haploop.protocol.ticks import Timebase
@@ -42,7 +53,7 @@ def _integrators() -> Iterator[Effect]:
                 # The map of a fixed step is not that of the loop; that of an exact method is.
                 linear=method.is_exact,
                 batches=False,
-                note=checks.note_growth,
+                note=rules.note_growth,
             )
 
 
@@ -90,7 +101,7 @@ def _goes_by_whole_steps(scene: Resolved) -> bool:
 
 
 _LINE_COUNTS = ("lost.commands_dropped", "lost.commands_lost")
-_LIMITED = {"actuator": ideal.left_out("actuator")}
+_LIMITED = {"actuator": rules.left_out("actuator")}
 _OF_ACCELEROMETER = _plant("sensing.accelerometer", *NOISY, *COUNTED)
 
 # In the order in which they act within their stage.
@@ -104,7 +115,7 @@ EFFECTS: tuple[Effect, ...] = (
         "a cable lets the tip lag behind the motor",
         columns=("tip_x", "tip_v"),
         states=2,
-        frees={"structural mode": ideal.rigid},
+        frees={"structural mode": rules.rigid},
         scaled_with={"device mass": "transmission.motor_mass"},
     ),
     Effect(
@@ -115,7 +126,7 @@ EFFECTS: tuple[Effect, ...] = (
         "a grip lets the hand's mass lag behind the tip",
         columns=("hand_x", "hand_v"),
         states=2,
-        check=checks.check_grip,
+        check=rules.check_grip,
         scaled_with={"hand damping": "hand.grip.damping", "hand stiffness": "hand.grip.stiffness"},
     ),
     Effect(
@@ -126,7 +137,7 @@ EFFECTS: tuple[Effect, ...] = (
         "the force follows the command with a lag",
         columns=("actuator",),
         states=1,
-        check=checks.check_actuator,
+        check=rules.check_actuator,
         frees=_LIMITED,
     ),
     Effect(
@@ -138,8 +149,8 @@ EFFECTS: tuple[Effect, ...] = (
         columns=("friction",),
         linear=False,
         batches=_goes_by_whole_steps,
-        check=checks.check_friction,
-        frees={"friction": ideal.left_out("friction")},
+        check=rules.check_friction,
+        frees={"friction": rules.left_out("friction")},
     ),
     Effect(
         "accelerometer.bandwidth",
@@ -167,7 +178,7 @@ EFFECTS: tuple[Effect, ...] = (
         "noise is added to the position",
         states=1,
         left_out=("noise",),
-        frees={"noise": ideal.left_out("noise")},
+        frees={"noise": rules.left_out("noise")},
     ),
     Effect(
         "encoder",
@@ -176,7 +187,7 @@ EFFECTS: tuple[Effect, ...] = (
         "measurement",
         "the position is rounded to whole counts",
         left_out=("encoder",),
-        frees={"quantisation": ideal.unrounded},
+        frees={"quantisation": rules.unrounded},
     ),
     Effect(
         "accelerometer",
@@ -187,9 +198,9 @@ EFFECTS: tuple[Effect, ...] = (
         states=_noise_memory,
         left_out=("accelerometer.bias", "accelerometer.noise_density", "accelerometer.resolution"),
         used=accelerometer_is_used,
-        check=checks.check_accelerometer,
-        note=checks.note_accelerometer,
-        frees={"noise": ideal.noiseless},
+        check=rules.check_accelerometer,
+        note=rules.note_accelerometer,
+        frees={"noise": rules.noiseless},
     ),
     Effect(
         "accelerometer.range",
@@ -216,8 +227,8 @@ EFFECTS: tuple[Effect, ...] = (
         counts=_LINE_COUNTS,
         linear=False,
         batches=False,
-        check=checks.check_jitter,
-        frees={"jitter and loss": ideal.left_out("jitter")},
+        check=rules.check_jitter,
+        frees={"jitter and loss": rules.left_out("jitter")},
     ),
     Effect(
         "loss",
@@ -228,7 +239,7 @@ EFFECTS: tuple[Effect, ...] = (
         counts=_LINE_COUNTS,
         linear=False,
         batches=False,
-        frees={"jitter and loss": ideal.left_out("loss")},
+        frees={"jitter and loss": rules.left_out("loss")},
     ),
     Effect(
         "actuator.resolution",

@@ -1,4 +1,4 @@
-"""The processes of a run: started together, watched, and never left behind."""
+"""The processes of a run, started together, watched and never left behind; and the signals that end a run."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import os
 import signal
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -102,3 +103,29 @@ def share_cores(run_number: int) -> tuple[set[int] | None, set[int] | None]:
         return None, None
     shared = cores[run_number % len(cores)]
     return {shared}, set(cores) - {shared}
+
+
+@contextlib.contextmanager
+def interrupts(usual_from: int) -> Iterator[list[int]]:
+    """Collect SIGINT and SIGTERM in a list.
+
+    Args:
+        usual_from: the signal of this number, counted from 1, and later ones raise KeyboardInterrupt where they come.
+    """
+    received: list[int] = []
+
+    def note(number: int, _frame: Any) -> None:
+        received.append(number)
+        if len(received) >= usual_from:
+            raise KeyboardInterrupt
+
+    try:
+        before = {number: signal.signal(number, note) for number in (signal.SIGINT, signal.SIGTERM)}
+    except ValueError:  # not in the main thread: signals are somebody else's business
+        yield received
+        return
+    try:
+        yield received
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)

@@ -12,11 +12,9 @@ import zmq
 from haploop.launch.clock.clock import Clock
 from haploop.launch.clock.commands import Commands
 from haploop.launch.clock.server import ClockServer
-from haploop.launch.errors import RunFailed
 from haploop.launch.processes import run_directory
-from haploop.launch.processes.children import Child, start_children
-from haploop.launch.processes.interrupts import interrupts
-from haploop.launch.spec import RunSpec
+from haploop.launch.processes.children import Child, interrupts, start_children
+from haploop.launch.spec import RunFailed, RunSpec
 from haploop.protocol.ticks import Timebase
 from haploop.protocol.transport import SecureContext
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 from haploop.controller.controller import Controller
 from haploop.controller.dissipation import ElementError
-from haploop.launch.errors import RunFailed
+from haploop.launch.spec import RunFailed
 from haploop.logger.session import LogSession, open_session
 from haploop.plant.plant import Plant
 from haploop.protocol.block_length import BlockLength

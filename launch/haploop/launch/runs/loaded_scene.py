@@ -12,7 +12,7 @@ from haploop.controller.dissipation import Element, load_plugin, registry
 from haploop.controller.dissipation.registry import checked
 from haploop.launch.scene import file as scene_file
 from haploop.launch.scene.check import resolve
-from haploop.launch.scene.elements import elements_of, try_out
+from haploop.launch.scene.events import elements_of, try_out
 from haploop.launch.scene.layers import Layers
 from haploop.launch.scene.overrides import lay_overrides
 from haploop.launch.scene.toml_writer import inline, to_toml

@@ -12,10 +12,10 @@ import numpy as np
 
 import haploop.logger
 from haploop.controller.dissipation import load_plugin, registry
-from haploop.launch.errors import RunFailed
 from haploop.launch.output import PLUGINS, SCENE
 from haploop.launch.runs.in_process import run_in_process
 from haploop.launch.scene.file import load
+from haploop.launch.spec import RunFailed
 from haploop.logger.log.recording import Recording
 from haploop.logger.session import SUMMARY
 from haploop.logger.summary import finite

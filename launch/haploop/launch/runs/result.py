@@ -16,7 +16,7 @@ from haploop.launch.output import SCENE, make_output
 from haploop.launch.runs import start
 from haploop.launch.runs.in_process import run_in_process
 from haploop.launch.runs.loaded_scene import Scene, load
-from haploop.launch.scene.elements import elements_of
+from haploop.launch.scene.events import elements_of
 from haploop.logger.log.recording import MemoryLog, Recording, Table
 from haploop.logger.session import LOG
 

@@ -9,7 +9,7 @@ from typing import Any
 
 from haploop.controller.dissipation import Element, load_plugin, registry
 from haploop.launch.output import keep_plugin, make_output, write_scene
-from haploop.launch.scene.elements import elements_of, try_out
+from haploop.launch.scene.events import elements_of, try_out
 from haploop.launch.scene.file import load
 from haploop.launch.spec import RunSpec
 
@@ -73,7 +73,7 @@ def run(spec: RunSpec, *, in_process: bool = False, **options: Any) -> dict[str,
         from haploop.launch.processes.supervisor import run_processes
 
         return run_processes(spec)
-    from haploop.launch.processes.interrupts import interrupts
+    from haploop.launch.processes.children import interrupts
     from haploop.launch.runs.in_process import run_in_process
 
     with interrupts(usual_from=2) as received:

@@ -11,12 +11,12 @@ from pydantic import ValidationError
 from pydantic_core import PydanticCustomError
 
 from haploop.launch.plan.effects import all_effects
+from haploop.launch.scene.estimator_keys import check_estimators, check_filter
 from haploop.launch.scene.events import check_events
 from haploop.launch.scene.layers import KeyPath, Layers
 from haploop.launch.scene.mistakes import SceneError, nearest
+from haploop.launch.scene.models import number_of, read_table, scene_model
 from haploop.launch.scene.schema import Schema, alternatives, schema_at, whole_schema
-from haploop.launch.scene.tables.estimator_keys import check_estimators, check_filter
-from haploop.launch.scene.tables.models import number_of, read_table, scene_model
 from haploop.launch.scene.toml_writer import inline
 from haploop.protocol.scene.scene import Clock, Scene
 from haploop.protocol.scene.table import Table

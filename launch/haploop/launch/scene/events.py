@@ -1,16 +1,17 @@
-"""The ``[[event]]`` tables: what a single table cannot show, namely whether each change fits the run it comes into."""
+"""The ``[[event]]`` tables: whether each change fits the run it comes into, which a single table cannot show."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
 from pydantic_core import PydanticCustomError
 
+from haploop.controller.active_elements import make_element
 from haploop.launch.scene.layers import KeyPath, Layers
 from haploop.launch.scene.mistakes import counted, nearest
-from haploop.launch.scene.tables.models import EventModel, number_in, number_of
-from haploop.launch.scene.tables.number import Number
+from haploop.launch.scene.models import EventModel, number_in, number_of
+from haploop.launch.scene.number import Number
 from haploop.protocol.changes import NO_ELEMENT
 from haploop.protocol.scene.scene import Clock, Wall
 from haploop.protocol.ticks import DELAY, Timebase, whole_count
@@ -132,3 +133,23 @@ def _read(event: dict[str, Any], key: str) -> Any:
 
 def _tables(value: Any) -> list[Any]:
     return value if isinstance(value, list) else []
+
+
+def elements_of(scene: dict[str, Any]) -> list[dict[str, Any]]:
+    """The table of every element a resolved scene begins with or swaps in."""
+    return [*scene.get("dissipation", []), *swapped_in(scene.get("event", []))]
+
+
+def swapped_in(events: Iterable[dict[str, Any]]) -> list[dict[str, Any]]:
+    """The table of every element these resolved events bring."""
+    return [event["swap"] for event in events if "swap" in event and event["swap"]["kind"] != NO_ELEMENT]
+
+
+def try_out(tables: Iterable[dict[str, Any]], kinds: Mapping[str, type[Element]]) -> None:
+    """Make each element and throw it away.
+
+    Raises:
+        ElementError: one cannot be made.
+    """
+    for table in tables:
+        make_element(table, kinds)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from pydantic.json_schema import GenerateJsonSchema
 from pydantic_core import core_schema
 
-from haploop.launch.scene.tables.models import scene_model
+from haploop.launch.scene.models import scene_model
 
 if TYPE_CHECKING:
     from haploop.controller.dissipation import Element

@@ -9,7 +9,7 @@ from typing import Any
 
 from haploop.launch.output import make_output, write_scene
 from haploop.launch.processes import run_directory
-from haploop.launch.processes.interrupts import interrupts
+from haploop.launch.processes.children import interrupts
 from haploop.launch.processes.run_directory import LiveRun
 from haploop.logger.books.buffers import TelemetryGap
 from haploop.logger.node import LoggerNode

@@ -26,7 +26,7 @@ _READING = (
 def explain_scene(scene_path: Path, overrides: list[str], plugins: list[Path], as_json: bool) -> None:
     """Prints the plan of a scene and what it costs; no process is started."""
     from haploop.launch.plan.plan import plan
-    from haploop.launch.scene.elements import elements_of, try_out
+    from haploop.launch.scene.events import elements_of, try_out
     from haploop.launch.scene.file import load
     from haploop.tools.operations import bill
 

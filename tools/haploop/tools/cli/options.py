@@ -50,7 +50,7 @@ def parse_seconds(text: str | None, option: str = "--at") -> float | None:
         return float(text)
     except ValueError:
         pass
-    from haploop.launch.scene.tables.number import Number
+    from haploop.launch.scene.number import Number
     from haploop.protocol.quantity import Quantity
 
     try:

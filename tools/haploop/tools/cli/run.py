@@ -39,7 +39,7 @@ def run_scene(
         prepared = prepare(scene_path, overrides, plugins, out)
         print_notes(prepared.scene)
         title, duration_s = prepared.scene["title"], prepared.scene["duration"]
-        from haploop.launch.errors import RunFailed
+        from haploop.launch.spec import RunFailed
 
         try:
             with ProgressLine(title, duration_s) as line:

@@ -22,9 +22,9 @@ from typing import Any
 import numpy as np
 
 from haploop.controller.dissipation import ElementError, registry
-from haploop.launch.errors import RunFailed
 from haploop.launch.runs.in_process import Loop, scene_events
 from haploop.launch.runs.start import prepare, run
+from haploop.launch.spec import RunFailed
 from haploop.logger.session import open_session
 from haploop.protocol.ticks import Timebase
 from haploop.tools.cost.data import Load

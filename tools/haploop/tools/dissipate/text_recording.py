@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from haploop.launch.scene.tables.units import from_text
+from haploop.launch.scene.number import from_text
 from haploop.tools.dissipate.delimited import Column, DelimitedFile
 from haploop.tools.dissipate.samples import Floats, Notes, RecordingError, Samples
 

@@ -13,7 +13,7 @@ from typing import Any
 from haploop.launch.batch.stacking import runs_in_arrays
 from haploop.launch.plan.effect import at
 from haploop.launch.scene.check import resolve
-from haploop.launch.scene.elements import elements_of, try_out
+from haploop.launch.scene.events import elements_of, try_out
 from haploop.launch.scene.layers import Layers
 from haploop.launch.scene.mistakes import Mistake, SceneError
 from haploop.launch.scene.overrides import key_path, lay_value

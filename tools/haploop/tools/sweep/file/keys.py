@@ -8,9 +8,8 @@ from types import UnionType
 from typing import TYPE_CHECKING, Annotated, Any, Union, get_args, get_origin
 
 from haploop.launch.scene.mistakes import nearest
-from haploop.launch.scene.tables.base import Model
-from haploop.launch.scene.tables.models import scene_model
-from haploop.launch.scene.tables.number import Number
+from haploop.launch.scene.models import Model, scene_model
+from haploop.launch.scene.number import Number
 
 if TYPE_CHECKING:
     from haploop.controller.dissipation import Element

@@ -9,8 +9,8 @@ from typing import Annotated, Any, Literal
 from pydantic import ConfigDict, Field, model_validator
 from pydantic_core import PydanticCustomError
 
-from haploop.launch.scene.tables.base import Model
-from haploop.launch.scene.tables.number import Number, si
+from haploop.launch.scene.models import Model
+from haploop.launch.scene.number import Number, si
 from haploop.protocol.quantity import Quantity
 
 # Of one axis; more is a slip of a key.

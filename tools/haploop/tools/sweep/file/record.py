@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
-from haploop.launch.errors import RunFailed
 from haploop.launch.runs.in_process import run_in_process
 from haploop.launch.runs.result import unit_of
 from haploop.launch.scene.mistakes import nearest
+from haploop.launch.spec import RunFailed
 from haploop.logger.summary import OF_THE_MACHINE
 from haploop.tools.sweep.table import ENDED, NUMBER, TEXT, TRUTH, WHY, Column
 

@@ -16,10 +16,10 @@ from haploop.launch.scene import file as scene_file
 from haploop.launch.scene.check import complain, resolve
 from haploop.launch.scene.layers import KeyPath, Layers, parse
 from haploop.launch.scene.mistakes import COMMAND_LINE, Mistake, SceneError, nearest, shown
+from haploop.launch.scene.models import Model
+from haploop.launch.scene.number import Number, si
 from haploop.launch.scene.overrides import key_path, lay_overrides
 from haploop.launch.scene.schema import TomlSchema
-from haploop.launch.scene.tables.base import Model
-from haploop.launch.scene.tables.number import Number, si
 from haploop.protocol.quantity import Quantity
 from haploop.tools.executor.work import Sources, load_kinds
 from haploop.tools.sweep.file.cells import Axis, Bisect, Refused, Sweep, resolved

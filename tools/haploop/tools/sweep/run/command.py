@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from haploop.launch.output import PLUGINS, OutputError, keep_plugin, kept_name, make_output
-from haploop.launch.processes.interrupts import interrupts
+from haploop.launch.processes.children import interrupts
 from haploop.logger.summary import write
 from haploop.tools.cli.exit_codes import FAILED, WRONG_USE, leave, plain_errors, print_json
 from haploop.tools.executor.executors import ExecutorError

@@ -10,8 +10,8 @@ import numpy as np
 
 from haploop.controller.dissipation import registry
 from haploop.launch.batch.run import run_array
-from haploop.launch.errors import RunFailed
 from haploop.launch.runs.in_process import run_in_process
+from haploop.launch.spec import RunFailed
 from haploop.logger.log.recording import MemoryLog
 from haploop.tools.search.random import Point
 from haploop.tools.studies.choi2022.simulation.interpretation import as_row, scene_of

@@ -9,14 +9,13 @@ from operator import or_
 from types import UnionType
 from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
 
-from pydantic import Field, ValidationError, create_model, model_validator
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model, model_validator
 from pydantic_core import PydanticCustomError
 
 from haploop.controller.estimators.choose import estimators_for
 from haploop.launch.plan.effects import all_effects
 from haploop.launch.scene.force_csv import fault
-from haploop.launch.scene.tables.base import Model
-from haploop.launch.scene.tables.number import Number
+from haploop.launch.scene.number import Number
 from haploop.plant.integrators.registry import integrator_names
 from haploop.protocol.quantity import Quantity
 from haploop.protocol.scene.estimators import Acceleration, Velocity
@@ -26,6 +25,13 @@ from haploop.protocol.scene.table import Table
 
 if TYPE_CHECKING:
     from haploop.controller.dissipation import Element
+
+
+class Model(BaseModel):
+    """Validates a TOML table: unknown keys are mistakes and nothing is converted silently."""
+
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True, defer_build=True, protected_namespaces=())
+
 
 TableType = TypeVar("TableType", bound=Table)
 

@@ -1,10 +1,11 @@
-"""The mistakes that no single key of an effect can show, and notes on scenes that are in order."""
+"""The rules of effects: checks, notes on scenes that are in order, and scenes with the ideal in place of an effect."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
-from haploop.launch.plan.effect import Draft, at
+from haploop.launch.plan.effect import Draft, Resolved, at, without_keys
 from haploop.plant.integrators.registry import find_integrator
 from haploop.protocol.scene.effects import Accelerometer, Actuator, Friction, UniformJitter
 from haploop.protocol.scene.scene import Clock, Hand
@@ -122,3 +123,32 @@ def note_growth(scene: dict[str, Any]) -> list[str]:
         f'clock.integrator = "{clock["integrator"]}" is unstable by itself at {clock["plant_rate"]} Hz: it multiplies '
         f"the fastest growing swing of the bodies by {factor:.7g} in every plant step, whatever the controller does."
     ]
+
+
+def unrounded(scene: Resolved) -> Resolved:
+    """Takes out the counts of encoder and accelerometer; estimators go on trusting positions as before."""
+    one_count, velocity = scene["encoder"]["resolution"], scene.get("velocity", {})
+    if velocity.get("estimator") == "kalman" and "measurement_noise" not in velocity:
+        velocity = {**velocity, "measurement_noise": one_count / 12**0.5}
+    if velocity.get("estimator") == "foaw" and "bound" not in velocity:
+        velocity = {**velocity, "bound": one_count}
+    kept = without_keys(scene, "encoder", "accelerometer.resolution")
+    return {**kept, "velocity": velocity} if velocity else kept
+
+
+def noiseless(scene: Resolved) -> Resolved:
+    """Takes the noise out of an accelerometer; the scene itself where there is none."""
+    table = scene["accelerometer"]
+    return {**scene, "accelerometer": {**table, "noise_density": 0.0}} if table.get("noise_density") else scene
+
+
+def rigid(scene: Resolved) -> Resolved:
+    """Makes one body of motor and tip."""
+    cable, device = scene["transmission"], scene["device"]
+    mass, damping = device["mass"] + cable["motor_mass"], device["damping"] + cable["motor_damping"]
+    return {**without_keys(scene, "transmission"), "device": {**device, "mass": mass, "damping": damping}}
+
+
+def left_out(table: str) -> Callable[[Resolved], Resolved]:
+    """Makes what leaves a whole table out."""
+    return lambda scene: without_keys(scene, table)

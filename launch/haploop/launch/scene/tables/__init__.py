@@ -1,1 +1,0 @@
-"""The tables of a scene, each key with unit, bounds and default."""
