@@ -158,7 +158,7 @@ def test_inertias_that_are_booked_unfelt_are_booked_as_recorded() -> None:
 
 
 def test_a_claim_that_the_nearest_interpretation_breaks_may_hold_in_another(tmp_path: Path) -> None:
-    work, claim = Work(tmp_path, 8), Claim("V.B", "it does", "{energy}")
+    work, claim = Work(tmp_path, 8), Claim("V.B", "it does", "does", "{energy}")
     assert verdict_under_assumptions(work, claim, False, "8 more", energy="1 J").verdict == "does not hold here"
     assert nearest_with(work, "8 more") is None
     broken, held = ({name: float(not is_so) for name in CLAIMS} | {"distance": 3.0} for is_so in (False, True))
@@ -178,7 +178,7 @@ def test_a_claim_that_the_nearest_interpretation_breaks_may_hold_in_another(tmp_
 def test_a_small_figure_has_its_files_and_a_finding_for_every_claim(number: int, tmp_path: Path) -> None:
     make_figure(number, tmp_path, small=True, workers=1)
     kept = json.loads((tmp_path / f"figure_{number}.json").read_text(encoding="utf-8"))
-    claims = [Finding.from_dict(entry).claim for entry in kept["findings"]]
+    claims = [Finding.from_dict(entry, figure(number).CLAIMS).claim for entry in kept["findings"]]
     assert sorted(claims, key=str) == sorted(figure(number).CLAIMS.values(), key=str)
     for name in kept["files"]:
         assert (tmp_path / name).stat().st_size > 0

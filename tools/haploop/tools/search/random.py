@@ -31,6 +31,10 @@ class Point:
     numbers: dict[str, float]
     seed: int = 0
 
+    def rounded(self, digits: int) -> Point:
+        """Returns the point with numbers of so many significant digits."""
+        return replace(self, numbers={key: float(f"{value:.{digits}g}") for key, value in self.numbers.items()})
+
 
 Group = Sequence[Point]
 Evaluate = Callable[[Group], list[Row]]
@@ -72,7 +76,7 @@ class Space:
         for column in columns.values():
             rng.shuffle(column)
         drawn = [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
-        return [[self._point(rng, choices) for _ in range(each)] for choices in drawn]
+        return [[self._draw_point(rng, choices) for _ in range(each)] for choices in drawn]
 
     def neighbours(
         self, rng: np.random.Generator, point: Point, spread: float, count: int, *, shifted: bool = True
@@ -84,30 +88,30 @@ class Space:
         Args:
             shifted: whether choices with a scale are shifted by 10 spread xi steps, the same for the whole group.
         """
-        shifts = {key: round(10.0 * spread * rng.standard_normal()) for key in self.scales} if shifted else {}
-        moved = {key: _shifted(point.choices[key], steps, self.scales[key]) for key, steps in shifts.items()}
-        near = replace(point, choices=point.choices | moved)
-        return [self._neighbour(rng, near, spread) for _ in range(count)]
+        choices = dict(point.choices)
+        for key, scale in self.scales.items() if shifted else ():
+            value = choices[key] + round(10.0 * spread * rng.standard_normal()) * scale.step
+            choices[key] = round(min(max(value, scale.low), scale.high), 12)
+        return [self._draw_neighbour(rng, choices, point.numbers, spread) for _ in range(count)]
 
-    def rounded(self, point: Point, digits: int) -> Point:
-        """Returns the point with numbers of so many significant digits."""
-        return replace(point, numbers={key: _round(value, digits) for key, value in point.numbers.items()})
+    def _draw_point(self, rng: np.random.Generator, choices: dict[str, Any]) -> Point:
+        return self._finished(
+            rng,
+            choices,
+            {key: math.exp(rng.uniform(math.log(low), math.log(high))) for key, (low, high) in self.bounds.items()},
+        )
 
-    def _point(self, rng: np.random.Generator, choices: dict[str, Any]) -> Point:
-        numbers = {
-            key: math.exp(rng.uniform(math.log(low), math.log(high))) for key, (low, high) in self.bounds.items()
-        }
-        return self._finished(rng, Point(choices, numbers))
+    def _draw_neighbour(
+        self, rng: np.random.Generator, choices: dict[str, Any], near: Mapping[str, float], spread: float
+    ) -> Point:
+        numbers = {key: value * math.exp(spread * rng.standard_normal()) for key, value in near.items()}
+        return self._finished(
+            rng, choices, {key: float(np.clip(value, *self.bounds[key])) for key, value in numbers.items()}
+        )
 
-    def _neighbour(self, rng: np.random.Generator, point: Point, spread: float) -> Point:
-        numbers = {
-            key: float(np.clip(value * math.exp(spread * rng.standard_normal()), *self.bounds[key]))
-            for key, value in point.numbers.items()
-        }
-        return self._finished(rng, replace(point, numbers=numbers))
-
-    def _finished(self, rng: np.random.Generator, point: Point) -> Point:
-        point = self.rounded(point, self.digits) if self.digits else point
+    def _finished(self, rng: np.random.Generator, choices: dict[str, Any], numbers: dict[str, float]) -> Point:
+        point = Point(choices, numbers)
+        point = point.rounded(self.digits) if self.digits else point
         return replace(point, seed=int(rng.integers(2**31))) if self.seeded else point
 
 
@@ -232,11 +236,3 @@ def _best(trials: Sequence[Trial], count: int, key: Callable[[Row], Any]) -> lis
         if len(picked) == count:
             break
     return picked
-
-
-def _shifted(value: float, steps: int, scale: Scale) -> float:
-    return round(min(max(value + steps * scale.step, scale.low), scale.high), 12)
-
-
-def _round(value: float, digits: int) -> float:
-    return float(f"{value:.{digits}g}")

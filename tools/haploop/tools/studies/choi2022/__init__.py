@@ -1,19 +1,23 @@
-"""The figures of Choi et al. 2022 made by this program, and a table of every claim of its sections II to V.
+"""A study of Choi et al. 2022: its figures made by this program, and a finding for every claim of sections II to VI.
 
-A figure is a module ``figure_N.py`` here. It is found by its name and needs no entry anywhere:
+A figure N is a module ``figures/figure_N.py`` and a table ``[N]`` of ``figures.toml`` with its title, its texts and its
+claims. It is found by its name and needs no entry anywhere:
 
-    TITLE = "What the figure shows"
-    LEAK = Claim("II, Fig. 3", "the output energy [is] greater than the input energy")
-    CLAIMS = (LEAK,)
+    CLAIMS = claims_of(3)
 
     def make(work: Work) -> list[Finding]:
         ...                                     # run scenes; work.small asks for a version of seconds
         work.figure(figure, "figure_3")         # figure_3.png
         work.data("figure_3", columns)          # figure_3.npz
         work.scene("figure_3", scene)           # figure_3.toml, runs by itself
-        work.caption = "What is seen, in a sentence or two."
-        return [LEAK.holds("2.1 uJ a contact")]
+        return [CLAIMS["generates"].holds_if(leak_J > 0.0, leak=amount(leak_J, "J"))]
 
-Each claim gets one finding: ``holds``, ``assuming`` (under a stated assumption) or ``fails``, with numbers that were
-computed. The page (``page.py``) is written from what ``make`` returned, never by hand.
+Each claim gets one finding: it holds, holds under a stated assumption or does not hold, with numbers that were
+computed. The page is written from them, never by hand.
+
+    simulation/   interpretations of section V.A as scenes, the search among them, the runs of Fig. 6
+    experiment/   interpretations of section V.B as setups of the device, the search among them, which walls are steady
+    sampled, gate, scenes: energy of sampled motion, the gate of eq. 9, runs of the program
+    interpretations, search_report: tables of interpretations, and what a search among them found
+    claims, work, command: claims and findings, a figure in the making, ``haploop paper`` and its page
 """

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tomllib
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
@@ -20,11 +21,13 @@ class Claim:
     Attributes:
         place: section, and figure, equation or item: "III, Fig. 4".
         quote: its words, shortened; what was left out or put in is in brackets or dots.
+        name: by which its figure tests it.
         numbers, assumption: of a finding, with names in braces for what is computed.
     """
 
     place: str
     quote: str
+    name: str = field(default="", compare=False)
     numbers: str = field(default="", compare=False, repr=False)
     assumption: str = field(default="", compare=False, repr=False)
 
@@ -72,19 +75,19 @@ class Finding:
             raise ValueError(f"An assumption belongs to the verdict {ASSUMING!r} and to no other.")
 
     def as_dict(self) -> dict[str, Any]:
-        """Returns it as it is kept beside the figure."""
-        claim = {"place": self.claim.place, "quote": self.claim.quote}
-        return {**claim, "verdict": self.verdict, "assumption": self.assumption, "numbers": self.numbers}
+        """Returns it as it is kept beside the figure: with the name of the claim, whose words stay in their table."""
+        kept = {"verdict": self.verdict, "assumption": self.assumption, "numbers": self.numbers}
+        return {"claim": self.claim.name, **kept}
 
     @classmethod
-    def from_dict(cls, kept: dict[str, Any]) -> Finding:
-        """Reads back what ``as_dict`` returned."""
-        return cls(Claim(kept["place"], kept["quote"]), kept["verdict"], kept["numbers"], kept["assumption"])
+    def from_dict(cls, kept: dict[str, Any], claims: Mapping[str, Claim]) -> Finding:
+        """Reads back what ``as_dict`` returned, given the claims by name."""
+        return cls(claims[kept["claim"]], kept["verdict"], kept["numbers"], kept["assumption"])
 
 
 def claims_of(figure: int) -> dict[str, Claim]:
     """Returns the claims that a figure tests, by name."""
-    return {name: Claim(**claim) for name, claim in _figures()[str(figure)]["claims"].items()}
+    return {name: Claim(name=name, **claim) for name, claim in _figures()[str(figure)]["claims"].items()}
 
 
 def texts_of(part: int | Literal["page"]) -> dict[str, str]:

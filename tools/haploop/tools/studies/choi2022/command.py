@@ -14,7 +14,7 @@ from haploop.tools.cli.exit_codes import WRONG_USE, leave, plain_errors
 from haploop.tools.figure.data import FigureError
 from haploop.tools.render.markdown import markdown_table
 from haploop.tools.render.progress import Stage, bars, silent
-from haploop.tools.studies.choi2022.claims import ASSUMING, VERDICTS, Finding, sections, texts_of
+from haploop.tools.studies.choi2022.claims import ASSUMING, VERDICTS, Finding, claims_of, sections, texts_of
 from haploop.tools.studies.choi2022.figures import figure, numbers
 from haploop.tools.studies.choi2022.work import Work
 
@@ -74,7 +74,8 @@ def made(directory: Path) -> dict[int, dict[str, Any]]:
 
 def page(kept: dict[int, dict[str, Any]], pictures: str = "") -> str:
     """Returns the page in Markdown: answers, the finding of every claim, then the figures."""
-    rows = [(number, Finding.from_dict(entry)) for number, one in kept.items() for entry in one["findings"]]
+    claims = {number: claims_of(number) for number in kept}
+    rows = [(number, Finding.from_dict(one, claims[number])) for number in kept for one in kept[number]["findings"]]
     texts = texts_of("page")
     parts = ["# The paper, claim by claim", texts["intro"]]
     parts += [texts["small"]] if any(one["small"] for one in kept.values()) else []
@@ -135,7 +136,11 @@ def _figure(number: int, one: dict[str, Any], pictures: str) -> list[str]:
 
 
 def main() -> None:
-    """``python -m haploop.tools.studies.choi2022.command RUN DOCS``: writes the page and its pictures into docs."""
+    """``python -m haploop.tools.studies.choi2022.command RUN DOCS``: takes a run into the documentation.
+
+    Pictures and findings are copied to DOCS/paper, and the page is written. With DOCS/paper itself for RUN only the
+    page is written anew, from its findings and the words in ``figures.toml``: in a second.
+    """
     if len(sys.argv) != 3:
         leave("Two directories were expected: that of a haploop paper, and where the page goes.", WRONG_USE)
     directory, docs = map(Path, sys.argv[1:])
@@ -143,12 +148,11 @@ def main() -> None:
     if not kept:
         leave(f"There is no figure in {directory}; make them with haploop paper --out {directory}.", WRONG_USE)
     pictures = docs / "paper"
-    pictures.mkdir(parents=True, exist_ok=True)
-    for old in pictures.glob("*.png"):
-        old.unlink()
-    for one in kept.values():
-        for name in one["files"]:
-            if name.endswith(".png"):
+    if directory.resolve() != pictures.resolve():
+        shutil.rmtree(pictures, ignore_errors=True)
+        pictures.mkdir(parents=True)
+        for number, one in kept.items():
+            for name in (f"figure_{number}.json", *(name for name in one["files"] if name.endswith(".png"))):
                 shutil.copyfile(directory / name, pictures / name)
     print(write_page(directory, docs / PAGE, "paper/"))
 

@@ -1,16 +1,18 @@
-"""What several figures share: a colour for each kind of element, the loop of an inertia, and a press on a wall."""
+"""Drawings of several figures: a colour for each kind of element, the loop of an inertia, and a press on a wall."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from haploop.tools.figure.style import ELEMENTS, FAINT, INK, WALL, dress, legend
+from haploop.tools.figure.style import ELEMENTS, FAINT, INK, TEXT, WALL, dress, legend
 from haploop.tools.studies.choi2022.sampled import steps_J
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 COLOURS = {
     "nothing": FAINT,
@@ -33,6 +35,14 @@ UPPER_LEFT: dict[str, Any] = {"loc": "upper left", "bbox_to_anchor": (0.0, 1.0),
 _TAKEN, _GIVEN = "#9FD3B0", "#E8A0A0"
 # Steps shorter than this share of all have no arrow.
 _ARROW = 0.04
+
+
+def legend_of_colours(figure: Figure, colours: Mapping[str, str]) -> None:
+    """Draws a legend of labelled colours below a figure."""
+    from matplotlib.patches import Patch
+
+    handles = [Patch(facecolor=colour, edgecolor=INK, linewidth=0.4, label=name) for name, colour in colours.items()]
+    figure.legend(handles=handles, loc="outside lower center", ncols=len(handles), frameon=False, fontsize=TEXT)
 
 
 def draw_loop(ax: Axes, v_m_s: np.ndarray, mass_kg: float, title: str) -> None:
@@ -58,7 +68,7 @@ def draw_loop(ax: Axes, v_m_s: np.ndarray, mass_kg: float, title: str) -> None:
 
 
 class Press(NamedTuple):
-    """What is drawn of a run that presses on a wall.
+    """The signals of a run that presses on a wall.
 
     Attributes:
         t_s: of the ticks.

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from haploop.tools.figure.style import ELEMENTS, GREY, dress, empty_figure, legend
-from haploop.tools.studies.choi2022.drawing import COLOURS
+from haploop.tools.studies.choi2022.drawing import COLOURS, legend_of_colours
 from haploop.tools.studies.choi2022.experiment.setup import UNITS, VELOCITIES, Setup
 
 if TYPE_CHECKING:
@@ -20,14 +20,12 @@ FREQUENCIES_HZ = np.linspace(2.0, 498.0, 249)
 # Age of a reading of an MPU-9250 at its setting of 420 Hz.
 OLD_S = 1.38e-3
 DELAYS_S = np.linspace(0.0, 3e-3, 121)
-# What damps where: neither, bidirectional alone, unidirectional alone, both.
-_COLOURS = ("#F0F0F0", COLOURS["bidirectional-inertia"], COLOURS["unidirectional-inertia"], "#DDEBF5")
-_NAMES = (
-    "both drive",
-    "bidirectional damps, unidirectional drives",
-    "unidirectional damps, bidirectional drives",
-    "both damp",
-)
+_DAMPS = {
+    "both drive": "#F0F0F0",
+    "bidirectional damps, unidirectional drives": COLOURS["bidirectional-inertia"],
+    "unidirectional damps, bidirectional drives": COLOURS["unidirectional-inertia"],
+    "both damp": "#DDEBF5",
+}
 
 
 class Felt(NamedTuple):
@@ -126,8 +124,8 @@ def gate_figure(setup: Setup) -> Figure:
     two, one = felt_with(setup, FREQUENCIES_HZ)
     damping, mass = axes[0]
     for ax, name, label in ((damping, "damping", "felt damping / (m w)"), (mass, "mass", "felt mass / m")):
-        ax.plot(FREQUENCIES_HZ, getattr(two, name), color=_COLOURS[1], label="bidirectional")
-        ax.plot(FREQUENCIES_HZ, getattr(one, name), color=_COLOURS[2], label="unidirectional")
+        ax.plot(FREQUENCIES_HZ, getattr(two, name), color=COLOURS["bidirectional-inertia"], label="bidirectional")
+        ax.plot(FREQUENCIES_HZ, getattr(one, name), color=COLOURS["unidirectional-inertia"], label="unidirectional")
         ax.axhline(0.0, color=GREY, linewidth=0.6)
         dress(ax, f"felt {name}", "frequency (Hz)", label)
     mass.plot(FREQUENCIES_HZ, one.duty, ":", color=ELEMENTS[3], linewidth=0.9, label="gate open, share")
@@ -135,12 +133,7 @@ def gate_figure(setup: Setup) -> Figure:
     legend(mass)
     _who(axes[1, 0], 0.0, "who damps: an ideal accelerometer")
     _who(axes[1, 1], OLD_S, f"who damps: a reading {1e3 * OLD_S:.2f} ms old")
-    from matplotlib.patches import Patch
-
-    patches = [
-        Patch(facecolor=colour, edgecolor=GREY, label=name) for colour, name in zip(_COLOURS, _NAMES, strict=True)
-    ]
-    figure.legend(handles=patches, loc="outside lower center", ncols=4, frameon=False)
+    legend_of_colours(figure, _DAMPS)
     return figure
 
 
@@ -148,7 +141,7 @@ def _who(ax: Axes, reading_s: float, heading: str) -> None:
     from matplotlib.colors import ListedColormap
 
     reach = (FREQUENCIES_HZ[0], FREQUENCIES_HZ[-1], 0.0, 1e3 * DELAYS_S[-1])
-    colours = {"cmap": ListedColormap(_COLOURS), "vmin": -0.5, "vmax": 3.5, "interpolation": "nearest"}
+    colours = {"cmap": ListedColormap(list(_DAMPS.values())), "vmin": -0.5, "vmax": 3.5, "interpolation": "nearest"}
     ax.imshow(damps(reading_s), origin="lower", aspect="auto", extent=reach, **colours)
     dress(ax, heading, "frequency (Hz)", "extra delay (ms)")
     ax.grid(visible=False)

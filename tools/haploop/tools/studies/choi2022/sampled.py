@@ -13,7 +13,7 @@ from haploop.controller.dissipation import registry
 from haploop.protocol.ticks import Timebase
 
 PERIOD_S = 1e-3
-# What each kind is given by default: the paper's numbers.
+# The paper's numbers.
 _PARAMETERS = {
     "damping": {"damping": 0.8},
     "bidirectional-inertia": {"mass": 0.01},

@@ -1,4 +1,4 @@
-"""What a search among interpretations found, as both searches report it: tables, lists and a picture."""
+"""Tables, lists and a picture of a search among interpretations."""
 
 from __future__ import annotations
 

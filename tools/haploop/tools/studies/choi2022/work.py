@@ -1,4 +1,4 @@
-"""Where a figure leaves what it made: pictures, data, scenes and findings."""
+"""A figure in the making, and the files it leaves: pictures, data, scenes and findings."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ Answer = TypeVar("Answer")
 
 
 class Work:
-    """A figure in the making.
+    """The means and the results of one figure.
 
     Args:
         out: directory of all figures.

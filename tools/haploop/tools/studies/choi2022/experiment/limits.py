@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -24,7 +25,6 @@ _SOFTEST, _STIFFEST, _COARSE, _HALVINGS = 50.0, 60e3, 30, 4
 _REFINED = 3
 # A mass that adds nothing but keeps its place in the map, and one to take the map's slope from; kg.
 _NO_MASS, _SOME_MASS = 1e-15, 1e-3
-_NO_DAMPING = 1e-12
 _STARTS, _TICKS, _SETTLED, _RESCALED_EVERY = 3, 1200, 400, 50
 
 
@@ -37,17 +37,16 @@ class Best(NamedTuple):
 
 def limits(setup: Setup) -> dict[str, Best]:
     """Returns the limit of each of ``KINDS``: exact (rho(M) = 1) of three, by the gated map of the last."""
-    scene = setup.linear_scene([])
-    gated = GatedMap.from_scene(scene)
 
-    def exact(kind: str) -> Callable[[np.ndarray], np.ndarray]:
-        return lambda sizes: np.array([first_end(setup, kind, size) for size in sizes])
+    def exact(kind: str, sizes: np.ndarray) -> np.ndarray:
+        return np.array([first_end(setup, kind, size) for size in sizes])
 
-    found = {"nothing": Best(first_end(setup, "nothing", 0.0), 0.0)}
-    for kind in KINDS[1:3]:
-        found[kind] = _best(exact(kind), DAMPINGS if kind == "damping" else MASSES)
-    found[KINDS[3]] = _best(lambda masses: gated_ends(gated, masses), MASSES)
-    return found
+    return {
+        KINDS[0]: Best(first_end(setup, KINDS[0], 0.0), 0.0),
+        KINDS[1]: _best(partial(exact, KINDS[1]), DAMPINGS),
+        KINDS[2]: _best(partial(exact, KINDS[2]), MASSES),
+        KINDS[3]: _best(partial(gated_ends, GatedMap.from_scene(setup.linear_scene([]))), MASSES),
+    }
 
 
 def first_end(setup: Setup, kind: str, size: float) -> float:
@@ -56,9 +55,9 @@ def first_end(setup: Setup, kind: str, size: float) -> float:
     return min(ranges[0][1], _STIFFEST) if ranges and ranges[0][0] == 0.0 else 0.0
 
 
-def swings_at_Hz(setup: Setup, stiffness: float, kind: str = "nothing", size: float = 0.0) -> float:
-    """Returns the frequency of what grows fastest, or decays slowest, at a stiffness in N/m."""
-    scene = setup.linear_scene(elements_of(kind, size))
+def swings_at_Hz(setup: Setup, stiffness: float) -> float:
+    """Returns the frequency of what grows fastest, or decays slowest, without an element at a stiffness in N/m."""
+    scene = setup.linear_scene([])
     values = np.linalg.eigvals(OneTickMap.of(scene).matrix(stiffness))
     return float(abs(np.angle(values[np.abs(values).argmax()])) / (2.0 * np.pi) * scene["clock"]["control_rate"])
 
@@ -110,8 +109,8 @@ class GatedMap:
     states: int
 
     @classmethod
-    def from_scene(cls, scene: dict[str, Any], damping: float = 0.0) -> GatedMap:
-        """Makes the map of a resolved scene without elements, with so much damping in N s/m beside the inertia.
+    def from_scene(cls, scene: dict[str, Any]) -> GatedMap:
+        """Makes the map of a resolved scene without elements.
 
         Raises:
             ValueError: velocity or acceleration are not read as the map has it.
@@ -121,9 +120,8 @@ class GatedMap:
             raise ValueError("The gate's map is that of a plain difference of positions and a raw accelerometer.")
 
         def map_with(mass: float) -> OneTickMap:
-            damped = {"kind": "damping", "acts": "always", "damping": damping or _NO_DAMPING}
             inertia = {"kind": "bidirectional-inertia", "acts": "always", "mass": mass}
-            return OneTickMap.of({**scene, "dissipation": [damped, inertia]})
+            return OneTickMap.of({**scene, "dissipation": [inertia]})
 
         least, more = map_with(_NO_MASS), map_with(_SOME_MASS)
         per_kg = (more.without_wall - least.without_wall) / (_SOME_MASS - _NO_MASS)

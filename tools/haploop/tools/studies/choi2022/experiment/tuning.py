@@ -14,7 +14,7 @@ from haploop.tools.studies.choi2022.work import Work
 
 # From 2.5 N/mm in steps of 0.5 (Choi et al. 2022, V.B.3), to where nothing is steady any more.
 STIFFNESSES = np.arange(2500.0, 8001.0, 500.0)
-# What a hand feels at 100 Hz, between 8.5 um at 20 Hz and 0.06 um at 320 Hz in logarithms (Israr, Choi and Tan 2006).
+# Felt by a hand at 100 Hz, between 8.5 um at 20 Hz and 0.06 um at 320 Hz in logarithms (Israr, Choi and Tan 2006).
 FELT_M = 0.5e-6
 # Sizes of the order of the paper's 2.7 N s/m and 9 g.
 DAMPINGS = np.geomspace(0.2, 10.0, 24)
@@ -45,16 +45,14 @@ def ranges(work: Work, setup: Setup, stiffnesses: np.ndarray) -> dict[str, Range
     """Returns the ranges of nothing and of the three elements, one at a time."""
     step = 6 if work.small else 1
     sizes = {KINDS[0]: np.zeros(1), KINDS[1]: DAMPINGS[::step], KINDS[2]: MASSES[::step], KINDS[3]: MASSES[::step]}
-    cells = [(kind, size, k) for kind in KINDS for k in stiffnesses for size in sizes[kind]]
-    scenes = [setup.scene(k, elements_of(kind, float(size))) for kind, size, k in cells]
-    results = work.run_all("stable ranges", scenes)
-    steady, swings = [is_steady(result) for result in results], [_swing_m(result) for result in results]
-    found, first = {}, 0
-    for kind in KINDS:
-        count = len(stiffnesses) * len(sizes[kind])
-        here = slice(first, first + count)
-        found[kind] = Range(sizes[kind], *(np.reshape(of[here], (len(stiffnesses), -1)) for of in (steady, swings)))
-        first += count
+    cells = [(kind, k, float(size)) for kind in KINDS for k in stiffnesses for size in sizes[kind]]
+    results = work.run_all("stable ranges", [setup.scene(k, elements_of(kind, size)) for kind, k, size in cells])
+    found = {}
+    for kind, of_kind in sizes.items():
+        here = [result for cell, result in zip(cells, results, strict=True) if cell[0] == kind]
+        shape = len(stiffnesses), len(of_kind)
+        steady, swings_m = (np.reshape([of(result) for result in here], shape) for of in (is_steady, _swing_m))
+        found[kind] = Range(of_kind, steady, swings_m)
     return found
 
 
@@ -70,7 +68,7 @@ class Tuned(NamedTuple):
 
     @property
     def steady(self) -> bool:
-        """Whether there is no unwanted vibration."""
+        """True if there is no unwanted vibration."""
         return is_steady(self.result)
 
     @property

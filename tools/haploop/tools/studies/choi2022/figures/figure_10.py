@@ -54,13 +54,16 @@ def make(work: Work) -> list[Finding]:
 
 def _draw(found: dict[str, Range], stiffnesses: np.ndarray) -> Figure:
     figure = empty_figure(13.0, 4.6)
-    axes = figure.subplots(1, 4, sharey=True, width_ratios=(1.0, 1.0, 1.0, 1.0))
+    axes = figure.subplots(1, 4, sharey=True)
     for ax, kind in zip(axes, KINDS[1:], strict=False):
         _cells(ax, found[kind], stiffnesses, kind)
     two, one = (found[kind].steady for kind in KINDS[2:])
-    _marks(axes[3], found[KINDS[2]].sizes * 1e3, stiffnesses, two & one, GREY, "both")
-    _marks(axes[3], found[KINDS[2]].sizes * 1e3, stiffnesses, two & ~one, COLOURS[KINDS[2]], "bidirectional only")
-    _marks(axes[3], found[KINDS[2]].sizes * 1e3, stiffnesses, one & ~two, COLOURS[KINDS[3]], "unidirectional only")
+    for there, colour, label in (
+        (two & one, GREY, "both"),
+        (two & ~one, COLOURS[KINDS[2]], "bidirectional only"),
+        (one & ~two, COLOURS[KINDS[3]], "unidirectional only"),
+    ):
+        _marks(axes[3], found[KINDS[2]].sizes * 1e3, stiffnesses, there, colour, label)
     _dress(axes[3], "which inertia?", "inertia (g)", "")
     legend(axes[3], **UPPER_LEFT, **INSIDE)
     axes[3].set_xlim(axes[2].get_xlim())

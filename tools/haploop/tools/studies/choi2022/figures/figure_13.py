@@ -26,11 +26,8 @@ def make(work: Work) -> list[Finding]:
     """Runs a press of half a second with the best pair, after which the hand pulls back."""
     scene, _ = best_pair(work)
     push = scene["hand"]["force"]["value"]
-    scene["hand"]["force"] = {
-        "kind": "trace",
-        "time": [0.0, _RELEASED_S, _RELEASED_S + 0.05],
-        "force": [push, push, _PULL_N],
-    }
+    times = [0.0, _RELEASED_S, _RELEASED_S + 0.05]
+    scene["hand"]["force"] = {"kind": "trace", "time": times, "force": [push, push, _PULL_N]}
     _, log = run(scene)
     energy = log["/energy"]
     t = np.asarray(log["/controller"]["timestamp"])
@@ -42,14 +39,8 @@ def make(work: Work) -> list[Finding]:
     ax = figure.subplots()
     for i, label in enumerate(("damping", "unidirectional inertia")):
         for book, style, width in (("sampled", "-", 1.4), ("true", "--", 1.0)):
-            ax.plot(
-                t,
-                1e3 * books[book][i][: len(t)],
-                style,
-                color=COLOURS[label.replace(" ", "-")],
-                linewidth=width,
-                label=f"{label}, {book}",
-            )
+            look = {"color": COLOURS[label.replace(" ", "-")], "linewidth": width, "label": f"{label}, {book}"}
+            ax.plot(t, 1e3 * books[book][i][: len(t)], style, **look)
     ax.axvspan(t[inside][0], t[inside][-1], color=WALL_FILL, zorder=0, linewidth=0, label="in contact")
     dress(ax, "", "time (s)", "energy taken (mJ)")
     figure.legend(loc="outside lower center", ncols=5, frameon=False, fontsize=SMALL)

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import product
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from haploop.tools.figure.style import INK, SMALL, TEXT, dress, empty_figure
+from haploop.tools.figure.style import INK, SMALL, dress, empty_figure
 from haploop.tools.render.markdown import markdown_table
 from haploop.tools.studies.choi2022.claims import Finding, claims_of
-from haploop.tools.studies.choi2022.drawing import COLOURS, SHORT
+from haploop.tools.studies.choi2022.drawing import COLOURS, SHORT, legend_of_colours
 from haploop.tools.studies.choi2022.experiment.limits import Best, limits
 from haploop.tools.studies.choi2022.experiment.setup import KINDS, Setup, elements_of
 from haploop.tools.studies.choi2022.work import Work
@@ -30,7 +31,7 @@ _BASE = Setup(
 # By less than this nobody wins: the gated map's limits are known to some 2 %.
 DRAW = 1.05
 Drive = tuple[str, dict[str, Any]]
-# What decides beside mode and delay: where the masses sit, and how old the reading is.
+# Beside mode and delay these decide: where the masses sit, and how old the reading is.
 DRIVES: tuple[Drive, ...] = (
     ("rotor against the rest, ideal unit", {"near_share": 0.055, "unit": "ideal", "mount": "motor"}),
     ("near mass 0.3, ideal unit", {"near_share": 0.3, "unit": "ideal", "mount": "motor"}),
@@ -43,25 +44,14 @@ def make(work: Work) -> list[Finding]:
     """Computes the limits of every cell, without a run."""
     modes, delays = (_MODES_HZ[2:7:2], _DELAYS_S[1:2]) if work.small else (_MODES_HZ, _DELAYS_S)
     drives = DRIVES[1:2] if work.small else DRIVES
-    setups = [
-        replace(_BASE, **choice, mode_Hz=mode, delay_s=delay)
-        for _, choice in drives
-        for delay in delays
-        for mode in modes
-    ]
+    cells = product((choice for _, choice in drives), delays, modes)
+    setups = [replace(_BASE, **choice, mode_Hz=mode, delay_s=delay) for choice, delay, mode in cells]
     found = work.map_parallel("which element wins", limits, setups)
-    table = np.array([[cell[kind].stiffness for kind in KINDS] for cell in found])
-    sizes = np.array([[cell[kind].size for kind in KINDS] for cell in found])
-    shape = len(drives), len(delays), len(modes), len(KINDS)
-    stiffness = table.reshape(shape)
+    best = np.array([[cell[kind] for kind in KINDS] for cell in found])
+    stiffness, sizes = np.moveaxis(best.reshape(len(drives), len(delays), len(modes), len(KINDS), 2), -1, 0)
     work.figure(_draw(stiffness, modes, delays, [name for name, _ in drives]), "figure_14")
-    columns = {
-        "mode_Hz": modes,
-        "delay_s": delays,
-        "stiffness_N_m": stiffness,
-        "size_N_s_m_or_kg": sizes.reshape(shape),
-    }
-    work.data("figure_14", columns)
+    grid = {"mode_Hz": modes, "delay_s": delays}
+    work.data("figure_14", grid | {"stiffness_N_m": stiffness, "size_N_s_m_or_kg": sizes})
     work.scene("figure_14", setups[len(setups) // 2].scene(2000.0, elements_of(KINDS[3], 0.009)))
     soft, note = _drives(work)
     finding, winners = _higher(stiffness)
@@ -82,15 +72,8 @@ def _draw(stiffness: np.ndarray, modes: Any, delays: Any, names: list[str]) -> F
     axes = np.atleast_1d(figure.subplots(-(-len(names) // columns), columns)).ravel()
     for ax, name, of in zip(axes, names, stiffness, strict=False):
         _panel(ax, name, of, modes, delays)
-    handles = [_patch(COLOURS[kind], SHORT[kind]) for kind in KINDS] + [_patch("#FFFFFF", "by less than 5 %")]
-    figure.legend(handles=handles, loc="outside lower center", ncols=len(handles), frameon=False, fontsize=TEXT)
+    legend_of_colours(figure, {SHORT[kind]: COLOURS[kind] for kind in KINDS} | {"by less than 5 %": "#FFFFFF"})
     return figure
-
-
-def _patch(colour: str, label: str) -> Any:
-    from matplotlib.patches import Patch
-
-    return Patch(facecolor=colour, edgecolor=INK, linewidth=0.4, label=label)
 
 
 def _panel(ax: Axes, name: str, stiffness: np.ndarray, modes: Any, delays: Any) -> None:

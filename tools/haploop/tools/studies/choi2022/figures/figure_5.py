@@ -64,15 +64,8 @@ def _over_samples(ax: Axes) -> dict[str, np.ndarray]:
     for kind in (BI, UNI):
         for drift, style, where in ((0.0, "-", "about rest"), (_DRIFT_M_S, (0, (4, 2)), "on 50 mm/s")):
             book = np.cumsum(_taken_under_jitter(kind, drift))
-            ax.plot(
-                1e6 * book,
-                color=COLOURS[kind],
-                linestyle=style,
-                linewidth=1.5,
-                marker=".",
-                markersize=4,
-                label=f"{kind.partition('-')[0]}, {where}",
-            )
+            look = {"color": COLOURS[kind], "linestyle": style, "linewidth": 1.5, "marker": ".", "markersize": 4}
+            ax.plot(1e6 * book, label=f"{kind.partition('-')[0]}, {where}", **look)
             drawn[f"{kind}_{where}_J".replace("-", "_").replace(" ", "_").replace("/", "_per_")] = book
     ax.axhline(0.0, color=GREY, linewidth=0.8, zorder=0)
     dress(ax, "Energy taken by 10 g of inertia under that jitter", "sample", "energy (µJ)")
@@ -80,14 +73,9 @@ def _over_samples(ax: Axes) -> dict[str, np.ndarray]:
     return drawn
 
 
-def _jitter(drift_m_s: float, ticks: int) -> np.ndarray:
-    """Returns samples of a velocity drift +- jitter, the sign new every sample, shape (ticks, 1)."""
-    return positions(drift_m_s + _JITTER_M_S * (-1.0) ** np.arange(ticks))[:, None]
-
-
 def _taken_under_jitter(kind: str, drift_m_s: float, ticks: int = 24) -> np.ndarray:
-    """Returns the energy of each sample after the first few, when the jitter is what it is from then on."""
-    x = _jitter(drift_m_s, ticks + 4)
+    """Returns the energy of each sample after the first few under a velocity drift +- jitter, a new sign each time."""
+    x = positions(drift_m_s + _JITTER_M_S * (-1.0) ** np.arange(ticks + 4))[:, None]
     taken = taken_J(x, forces(x, kind))[:, 0]
     return np.concatenate([[0.0], taken[4:]])
 

@@ -19,7 +19,7 @@ from haploop.tools.studies.choi2022.work import Work
 
 TABLE = "figure_6_readings.parquet"
 CLAIMS = claims_of(6)
-# What the search tests under every interpretation, and in which words.
+# The claims that the search tests under every interpretation, in its words.
 TESTED = {name: (COUNTED | ASIDE)[name] for name in CLAIMS if name in COUNTED | ASIDE}
 # A claim that holds as often as this, our own interpretation included, needs no assumption.
 _ALWAYS = 0.9

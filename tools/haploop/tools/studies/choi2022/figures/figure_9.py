@@ -14,7 +14,7 @@ from haploop.tools.studies.choi2022.scenes import run
 from haploop.tools.studies.choi2022.work import Work
 
 CLAIMS = claims_of(9)
-# What is drawn, and the next stiffness up, for "larger than 5.0".
+# The next stiffness beyond those that are drawn, for "larger than 5.0".
 _BEYOND = ("damping", 5500.0, DAMPINGS)
 _CASES = (("damping", 5000.0, DAMPINGS), ("unidirectional-inertia", 5500.0, MASSES))
 

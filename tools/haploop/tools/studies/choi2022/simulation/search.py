@@ -40,7 +40,7 @@ def search(work: Work, effort: Effort) -> Found[Point]:
     found = random_search(
         SPACE, shortfalls, effort, seed=SEED, distance=lambda row: row["distance"], evaluate_all=evaluate_all
     )
-    nearest = SPACE.rounded(found.best.point, 3)
+    nearest = found.best.point.rounded(3)
     ends = [
         *evaluated("base", shortfalls, [[BASE]], evaluate_all),
         *evaluated("nearest", shortfalls, [[nearest]], evaluate_all),
