@@ -131,11 +131,6 @@ def number_in(model: type[Model], key: str) -> Number:
     return next(mark for mark in model.model_fields[key].metadata if isinstance(mark, Number))
 
 
-def keys_of(table: type[Table]) -> list[str]:
-    """Returns the keys a table may have, in order."""
-    return list(model_of(table).model_fields)
-
-
 def read_table(table: type[TableType], data: Any) -> TableType | None:
     """Returns a table validated by itself; None where it is absent or wrong."""
     try:
