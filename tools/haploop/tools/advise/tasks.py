@@ -51,7 +51,7 @@ class Tasks:
 
     @property
     def is_one_run(self) -> bool:
-        """Whether a loop is judged by one run."""
+        """True where a loop is judged by one run."""
         return len(self.scenes) == self.seeds == 1
 
     @property

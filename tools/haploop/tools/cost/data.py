@@ -149,7 +149,7 @@ class Load:
 
     @property
     def busy(self) -> bool:
-        """Whether something else seems to have run meanwhile."""
+        """True where something else seems to have run meanwhile."""
         return self.calibration_spread > QUIET_SPREAD or (self.average or 0.0) > QUIET_LOAD
 
 
