@@ -76,7 +76,9 @@ def test_the_quick_tests_are_files_that_exist() -> None:
     assert all((HOUSE / f"tests/physics/test_{name}.py").is_file() for name in names)
 
 
-@pytest.mark.parametrize("document", [path for path in DOCUMENTS if path.name != "CHANGELOG.md"], ids=lambda p: p.name)
+@pytest.mark.parametrize(
+    "document", [*(path for path in DOCUMENTS if path.name != "CHANGELOG.md"), HOUSE / "Makefile"], ids=lambda p: p.name
+)
 def test_every_module_that_a_document_starts_or_imports_exists(document: Path) -> None:
     text = document.read_text(encoding="utf-8")
     modules = set(re.findall(r"(?:from|-m) (haploop(?:\.[a-z_0-9]+)+)", text))
