@@ -119,10 +119,11 @@ def fix_layout(figure: Figure) -> None:
 
 def fit_text(text: Text, room_px: float, smallest: float = 0.78) -> None:
     """Makes a text no wider than some pixels: smaller, down to a share of its size, then cut off."""
-    width = text.get_window_extent().width
+    width, size = text.get_window_extent().width, float(text.get_fontsize())
     if width > room_px:
-        text.set_fontsize(float(text.get_fontsize()) * max(smallest, room_px / width))
-        width = text.get_window_extent().width
-    if width > room_px:
-        content = text.get_text()
-        text.set_text(content[: int(len(content) * room_px / width) - 2].rstrip() + " …")
+        # A little smaller than in proportion, since letters are as wide as whole pixels.
+        text.set_fontsize(size * max(smallest, min(1.0, 0.98 * room_px / width)))
+    content = text.get_text()
+    while content and (width := text.get_window_extent().width) > room_px:
+        content = content[: min(len(content) - 1, int(len(content) * room_px / width))].rstrip()
+        text.set_text(f"{content} …")
