@@ -1,4 +1,4 @@
-"""What a figure and a terminal show, taken apart."""
+"""Parts of a figure and of a terminal's text."""
 
 from __future__ import annotations
 

@@ -52,7 +52,7 @@ def chain_scene(rng: np.random.Generator, effects: str) -> dict[str, Any]:
 
 @dataclass
 class Made:
-    """What was made.
+    """A chain, and its energies known beforehand.
 
     Attributes:
         columns: telemetry of all steps and the end, ``pieces.*`` of the steps that were cut.

@@ -106,7 +106,7 @@ class Bodies:
         return dict(zip(self.books, self.z[2 * self.count + 2 :].tolist(), strict=True))
 
     def reading(self, command: float, tau: float) -> float:
-        """What an accelerometer gives now, under the command held until now."""
+        """Returns the reading of an accelerometer now, under the command held until now."""
         if self.meter_rate:
             return float(self.z[2 * self.count + 1])
         return float(self.accelerations(self.z, command, tau)[self.meter_body])
@@ -153,13 +153,13 @@ class Bodies:
         return length
 
     def _spare(self, t: float, z: np.ndarray, command: float, tau: float, slope: float) -> float:
-        """What is left, above 0, until body 0 stops (speed) or breaks away (force)."""
+        """Returns what is left, above 0, until body 0 stops (speed) or breaks away (force)."""
         if self.sliding:
             return self.sliding * float(z[self.count])
         return self.breakaway_N - abs(self._load(t, z, command, tau + slope * t))
 
     def _spare_rate(self, t: float, z: np.ndarray, command: float, tau: float, slope: float) -> float:
-        """How fast that changes."""
+        """Returns the rate of ``_spare``."""
         change = self.rates(t, z, command, tau, slope)
         if self.sliding:
             return self.sliding * float(change[self.count])

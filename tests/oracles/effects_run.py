@@ -13,7 +13,7 @@ from oracles.reference import Controller, hand_force_N
 
 
 class EffectsTruth:
-    """What the reference did.
+    """The motion and the books of the reference.
 
     Attributes:
         force: commanded over every step, N.
@@ -59,7 +59,7 @@ class EffectsTruth:
 
     @property
     def unexplained_J(self) -> float:
-        """What the reference's own books leave: how well it was integrated."""
+        """The residual of the reference's own books: how well it was integrated."""
         e = self.energies
         heats = [-value for name, value in e.items() if "heat" in name]
         return math.fsum([self.stored[0], e["hand_work"], e["actuator_work"], *heats, -self.stored[-1]])

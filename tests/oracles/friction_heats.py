@@ -1,4 +1,4 @@
-"""What friction turned into heat, step by step and piece by piece, from the plant's columns alone."""
+"""Heat of friction, step by step and piece by piece, from the plant's columns alone."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from helpers.runs.captured import Captured
 
 
 def friction_heats(ran: Captured) -> np.ndarray:
-    """What friction turned into heat in every step in one piece, and in every piece of the others, J."""
+    """Returns the heat of friction in every step in one piece, and in every piece of the others, J."""
     plant = ran.plant
     dx = np.diff(plant["x"]) + np.diff(plant["x_low"])
     whole = -plant["friction"][:-1] * dx

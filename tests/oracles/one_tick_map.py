@@ -77,7 +77,7 @@ class OneTickMap(ABC):
 
 @dataclass(frozen=True)
 class LinearLoop(OneTickMap):
-    """The same on a device in a hand: one mass."""
+    """The one-tick map of a device in a hand: one mass."""
 
     mass_kg: float
     damping: float

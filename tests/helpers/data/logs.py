@@ -65,7 +65,7 @@ def cut(run: Path, share: float) -> None:
 
 
 def same_bits(a: np.ndarray, b: np.ndarray) -> bool:
-    """Whether two arrays of float64 agree in every bit; any NaN is as good as another."""
+    """Tells whether two arrays of float64 agree in every bit; any NaN is as good as another."""
     a, b = np.ascontiguousarray(a), np.ascontiguousarray(b)
     equal = (a.view(np.uint64) == b.view(np.uint64)) | (np.isnan(a) & np.isnan(b))
     return a.dtype == b.dtype == np.float64 and a.shape == b.shape and bool(equal.all())

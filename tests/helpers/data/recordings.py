@@ -27,7 +27,7 @@ def write(path: Path, columns: Mapping[str, Any], mark: str = ",") -> Path:
 
 
 def outcome(path: Path, *, delay_s: float | None = None, layout: Layout | None = None, **selection: Any) -> Outcome:
-    """What comes of a recording."""
+    """Books a recording and returns the outcome."""
     return compute_outcome(Request(path, Selection(**selection), layout or Layout(), delay_s), KINDS)
 
 

@@ -1,4 +1,4 @@
-"""What a stranger, a broken node or a typing error may send to the sockets of a run.
+"""Frames that an unknown peer, a broken node or a typing error may send to the sockets of a run.
 
 As a script, ``attacks.py DIRECTORY``: send junk to all sockets there as fast as they take it, until ended.
 """

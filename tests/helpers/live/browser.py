@@ -17,5 +17,5 @@ PHONE = {"width": 390, "height": 844}
 
 
 def is_complaint(said: Any) -> bool:
-    """Whether a word on the console is one of the page."""
+    """Tells whether a message on the console is a complaint of the page."""
     return said.type in ("error", "warning") and not any(word in said.text for word in OF_THE_TEST)

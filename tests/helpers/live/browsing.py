@@ -22,7 +22,7 @@ PATIENCE_S = 40.0
 
 
 def to_its_end(work: Coroutine[Any, Any, Any]) -> Any:
-    """What a coroutine returns, run on a thread of its own: a browser of other tests may keep a loop on this one."""
+    """Runs a coroutine to its end on a thread of its own: a browser of other tests may keep a loop on this one."""
     with ThreadPoolExecutor(1) as thread:
         return thread.submit(asyncio.run, work).result()
 

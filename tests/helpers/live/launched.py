@@ -59,12 +59,12 @@ def processes() -> list[Row]:
 
 
 def alive(pids: Sequence[int]) -> list[int]:
-    """Which of these processes are still there; one that only waits to be reaped is gone."""
+    """Returns those of these processes that are still there; one that only waits to be reaped is gone."""
     return [pid for pid, _, state, _ in processes() if pid in pids and not state.startswith("Z")]
 
 
 def where(pid: int) -> str:
-    """What each thread of a process waits for, and which signals are pending or ignored (Linux)."""
+    """Returns what each thread of a process waits for, and its pending and ignored signals (Linux)."""
     status = Path(f"/proc/{pid}/status").read_text(encoding="utf-8").splitlines()
     threads = [f"{task.name}: {(task / 'wchan').read_text()}" for task in Path(f"/proc/{pid}/task").iterdir()]
     return "\n".join([*threads, *(line for line in status if line.startswith(("State", "Sig", "Shd")))])
@@ -82,7 +82,7 @@ def on_a_disk_of(size_bytes: int, command: list[str]) -> list[str]:
 
 
 def same_bits(log: Recording, truth: Recording) -> int:
-    """How many ticks of the controller a log holds, every number in it being the undisturbed run's, bit for bit."""
+    """Asserts that every number of a log is the undisturbed run's, bit for bit; returns its ticks of the controller."""
     for topic, names in (("/plant", ("timestamp", "x", "v")), ("/controller", ("timestamp", "x", "v", "a", "total"))):
         for name in names if topic in log else ():
             shared = min(len(log[topic][name]), len(truth[topic][name]))
@@ -110,7 +110,7 @@ class Launched:
 
     @property
     def stderr(self) -> str:
-        """What it and its nodes have said to people so far."""
+        """Its standard error so far, with that of its nodes."""
         return os.pread(self._said.fileno(), 1_000_000, 0).decode()
 
     def says(self, words: str) -> None:
@@ -123,11 +123,11 @@ class Launched:
         self._process.send_signal(number)
 
     def stood_for(self, seconds: float) -> bool:
-        """Whether so much time has gone since the last signal."""
+        """Tells whether so much time has gone since the last signal."""
         return time.monotonic() - self._since >= seconds
 
     def is_there(self) -> bool:
-        """Whether the process has not ended yet."""
+        """Tells whether the process has not ended yet."""
         return self._process.poll() is None
 
     def end(self, status: int) -> str:
@@ -227,7 +227,7 @@ class Run(Launched):
         return wait_for("a flushed log", lambda: found if (found := look()) >= ticks else 0)
 
     def log(self) -> Recording:
-        """What its log holds now."""
+        """Its log as it is now."""
         return read(self.out_directory)
 
     def stands(self, at: int | None = None) -> int:

@@ -102,11 +102,11 @@ class StandIn:
         return f"http://127.0.0.1:{self._port}"
 
     def commands(self) -> list[dict[str, Any]]:
-        """What was ordered: verb and arguments."""
+        """The commands received: verb and arguments."""
         return [message for message in self.received if message["type"] == "command"]
 
     def watches(self) -> list[dict[str, Any]]:
-        """Which stretches of time were asked for."""
+        """The stretches of time that were asked for."""
         return [message for message in self.received if message["type"] == "watch"]
 
     def asked(self, is_so: Callable[[dict[str, Any]], bool]) -> dict[str, Any]:

@@ -16,7 +16,7 @@ from helpers.scenes.least import KINDS
 
 @dataclass
 class Captured:
-    """What a run did.
+    """A run kept whole.
 
     Attributes:
         plant: x, v, force, command and what effects add at every step and at the end, shape (steps + 1,).

@@ -26,7 +26,7 @@ def many(count: int, **tables: Any) -> list[dict[str, Any]]:
 
 
 def agree(found: Any, expected: Any, within: float = 1e-9) -> bool:
-    """Whether two results say the same, numbers to within a relative error, or what is nothing beside 1."""
+    """Tells whether two results say the same, numbers to within a relative error, or what is nothing beside 1."""
     if isinstance(expected, dict):
         return found.keys() == expected.keys() and all(agree(found[key], expected[key], within) for key in expected)
     if isinstance(expected, list):

@@ -24,5 +24,5 @@ def of_stiffness(k: int) -> dict[str, Any]:
 
 
 def threads(*_: Any) -> str:
-    """How many threads linear algebra may use here."""
+    """Returns the number of threads that linear algebra may use here."""
     return os.environ["OMP_NUM_THREADS"]

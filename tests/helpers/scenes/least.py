@@ -20,7 +20,7 @@ def scene(**tables: Any) -> dict[str, Any]:
 
 
 def mistakes(**tables: Any) -> list[str]:
-    """What is wrong with the least scene with these tables, without the name of the file."""
+    """Returns the mistakes of the least scene with these tables, without the name of the file."""
     try:
         scene(**tables)
     except SceneError as error:
@@ -29,7 +29,7 @@ def mistakes(**tables: Any) -> list[str]:
 
 
 def file_mistakes(path: Path, *overrides: str) -> list[str]:
-    """What is wrong with a scene file."""
+    """Returns the mistakes of a scene file."""
     try:
         load(path, overrides)
     except SceneError as error:

@@ -55,7 +55,7 @@ def drawn(seed: int) -> tuple[dict[str, Any], Truth]:
 
 
 def is_comparable(candidate: dict[str, Any], truth: Truth) -> bool:
-    """Whether a scene's outcome hangs on no last bit."""
+    """Tells whether a scene's outcome hangs on no last bit."""
     beside = simulate(candidate, start_beside=1e-16)
     if len(truth.x) != len(beside.x):
         return False

@@ -56,7 +56,7 @@ def loaded(folder: Path, text: str = GRID, overrides: Sequence[str] = (), press:
 
 
 def mistakes(folder: Path, text: str, overrides: Sequence[str] = ()) -> list[str]:
-    """What is wrong with such a file, without its name."""
+    """Returns the mistakes of such a file, without its name."""
     try:
         loaded(folder, text, overrides)
     except SceneError as error:

@@ -59,7 +59,7 @@ def drawn_chain(seed: int) -> dict[str, Any]:
 
 
 def varied(base: dict[str, Any], rng: np.random.Generator) -> dict[str, Any]:
-    """The same structure, every number by up to a tenth another one, and another seed."""
+    """Returns a scene of equal structure, every number by up to a tenth another one, and another seed."""
     return _varied(base, rng) | {"seed": int(rng.integers(2**62)), "title": f"varied {rng.integers(1000)}"}
 
 
