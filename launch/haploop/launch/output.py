@@ -17,7 +17,7 @@ class OutputError(Exception):
 
 
 def make_output(out: Path | None, scene_path: Path) -> Path:
-    """Make the run's directory: ``out``, or a new one below ``runs/`` named by scene and time.
+    """Makes the run's directory: ``out``, or a new one below ``runs/`` named by scene and time.
 
     Raises:
         OutputError: ``out`` holds something already, or cannot be made.
@@ -36,7 +36,7 @@ def make_output(out: Path | None, scene_path: Path) -> Path:
 
 
 def write_scene(scene: dict[str, Any], out: Path) -> str:
-    """Write the resolved scene, which runs by itself, and return its text."""
+    """Writes the resolved scene, which runs by itself; returns its text."""
     text = to_toml(scene)
     try:
         (out / SCENE).write_text(text, encoding="utf-8")
@@ -46,13 +46,13 @@ def write_scene(scene: dict[str, Any], out: Path) -> str:
 
 
 def kept_name(path: Path) -> str:
-    """The name under which a plugin file is kept: its own with its digest, unless that is its name already."""
+    """Returns the name under which a plugin file is kept: its own with its digest, unless that is its name already."""
     digest = hashlib.sha256(path.read_bytes()).hexdigest()[:12]
     return path.name if path.stem.endswith(f"-{digest}") else f"{path.stem}-{digest}.py"
 
 
 def keep_plugin(path: Path, out: Path) -> Path:
-    """Copy a plugin file into the run's directory under a name that holds its digest, so that a replay finds it.
+    """Copies a plugin file into the run's directory under a name with its digest, so that a replay finds it.
 
     Raises:
         OutputError: the file cannot be read or copied.

@@ -72,13 +72,13 @@ class Clock:
         self._least_ticks = 0 if math.isinf(pace) else math.floor(pace * AHEAD_S / 4 * self._time.control_rate)
 
     def _pace_anew(self, now: float) -> None:
-        """Count the pace from wall time ``now`` (s) and from here on: what was waited is not made up for."""
+        """Counts the pace from wall time ``now`` (s) and the present tick on; time spent waiting is not made up for."""
         self._pace_from, self._pace_tick = now, self.until
 
     # Time
 
     def grant(self, slowest: int, now: float) -> int:
-        """How far the nodes may go, given the slowest lossless node's tick and the wall time in s."""
+        """Returns the tick the nodes may go up to, given the slowest lossless node's tick and the wall time in s."""
         limit = min(self.end, slowest + self._window, self._paced(now))
         if self._pauses and not self.paused and self.until >= self._pauses[0]:
             del self._pauses[0]
@@ -104,14 +104,14 @@ class Clock:
         return allowed if allowed >= self.until + self._least_ticks else self.until
 
     def wait_s(self, now: float) -> float | None:
-        """How long until the pace lets time go on; None when it waits for something else."""
+        """Returns the time in s until the pace lets time go on; None when the run waits for something else."""
         if math.isinf(self.pace) or self.paused or self.until >= self.end:
             return None
         return AHEAD_S / 4
 
     @property
     def is_last(self) -> bool:
-        """Whether nothing will be granted beyond ``until``."""
+        """True once nothing will be granted beyond ``until``."""
         return self.until >= self.end
 
     # Changes
@@ -137,7 +137,7 @@ class Clock:
             self.end = min(self.end, max(tick, self.until))
 
     def change(self, change: Event, at_s: float | None = None, **extra: Any) -> int:
-        """Have a swap or set take effect; returns the tick.
+        """Schedules a swap or a set; returns its tick.
 
         Args:
             change: ``{"swap": {...}, "element": i}`` or ``{"set": {...}}`` as in ``[[event]]``, not yet checked.
@@ -170,31 +170,31 @@ class Clock:
             )
 
     def note(self, event: Event) -> int:
-        """Put something that changes no bit (pause, resume, a refusal) on record at the present tick."""
+        """Puts an event that changes no bit (pause, resume, a refusal) on record at the present tick; returns it."""
         self._insert(self.until, event)
         return self.until
 
     def pause(self) -> int:
-        """Stand still at the first tick not yet granted; returns it."""
+        """Stops time at the first tick not yet granted; returns it."""
         self.paused, self._step_target = True, None
         return self.until
 
     def resume(self, now: float) -> int:
-        """Go on."""
+        """Lets time go on; returns the tick."""
         self.paused, self._step_target = False, None
         self._pauses = [tick for tick in self._pauses if tick > self.until]  # stepped over while standing still
         self._pace_anew(now)
         return self.until
 
     def step(self, ticks: int, now: float) -> int:
-        """Go on for some ticks, then stand still; returns the tick it will stand at."""
+        """Lets time go on for some ticks; returns the tick at which it will stop."""
         self.paused = True
         self._step_target = min(self.end, max(self.until, self._step_target or 0) + ticks)
         self._pace_anew(now)
         return self._step_target
 
     def run_at(self, pace: float, now: float) -> int:
-        """Go on at another pace, in simulated seconds per wall second from ``now`` on; returns the tick.
+        """Sets another pace, in simulated seconds per wall second from ``now`` on; returns the tick.
 
         Raises:
             ClockError: the pace is no positive number.
@@ -206,15 +206,15 @@ class Clock:
         return self.until
 
     def present(self) -> dict[str, Any]:
-        """The scene as it stands at the first tick not yet granted: everything that has taken effect done to it."""
+        """Returns the scene as it stands at the first tick not yet granted, all changes up to there made."""
         return at_work(self._scene, [change for change in changes_of(self.events) if change.tick <= self.until])
 
     def stop(self) -> int:
-        """End the run at the first tick not yet granted; returns it."""
+        """Ends the run at the first tick not yet granted; returns it."""
         self.end = min(self.end, self.until)
         self.paused = False
         return self.end
 
     def end_at(self, tick: int) -> None:
-        """The plant has ended the run."""
+        """Ends the run where the plant has ended it by itself."""
         self.end = min(self.end, tick)

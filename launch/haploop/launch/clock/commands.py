@@ -25,7 +25,7 @@ Answer = tuple[bool, str, dict[str, Any]]
 
 
 def in_words(pace: float) -> float | str:
-    """A pace as people write it."""
+    """Returns a pace as people write it: a number, or ``free``."""
     return "free" if math.isinf(pace) else pace
 
 
@@ -51,7 +51,7 @@ class Commands:
         }
 
     def __call__(self, verb: str, arguments: dict[str, Any]) -> Answer:
-        """Carry out one command."""
+        """Carries out one command."""
         act = self._verbs.get(verb)
         if act is None:
             return False, f"{verb[:40]!r} is no command; these are: {', '.join(self._verbs)}.", {}
@@ -86,7 +86,7 @@ class Commands:
         return f"{state} at {self._at(data['tick'])} of {clock.end}", data
 
     def _options(self) -> tuple[str, dict[str, Any]]:
-        """What can be set and swapped in now: units, bounds, present values."""
+        """Answers what can be set and swapped in now, with units, bounds and present values."""
         data = capabilities(self._clock.present(), self._spec.kinds)
         return f"{len(data['settable'])} keys can be set, {len(data['kinds'])} kinds swapped in", data
 
@@ -138,7 +138,7 @@ class Commands:
         return f"{what} from {self._at(tick)} on", {"tick": tick}
 
     def _reload(self, kind: str) -> dict[str, Any]:
-        """Take up the edited file of a kind named at launch; a file that does not load changes nothing."""
+        """Loads the edited file of a kind named at launch; a file that does not load changes nothing."""
         source: Path | None = self._spec.plugin_sources.get(kind)
         if source is None:
             known = ", ".join(sorted(self._spec.plugin_sources)) or "none"
@@ -152,7 +152,7 @@ class Commands:
 
 
 def capabilities(scene: dict[str, Any], kinds: Mapping[str, type[Element]]) -> dict[str, Any]:
-    """Everything a form needs, as plain values.
+    """Returns the keys that can be set and the kinds that can be swapped in, as plain values.
 
     Args:
         scene: the resolved scene as it stands now.

@@ -1,4 +1,4 @@
-"""Who takes part in a run, how far each one is, and who keeps the others waiting."""
+"""The nodes that take part in a run, the tick each has reached, and those that keep the others waiting."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class Node:
 
     @property
     def is_own(self) -> bool:
-        """Whether it is one of the run's own processes, not an attached one."""
+        """True for one of the run's own processes, false for an attached one."""
         return self.role in PROCESSES
 
 
@@ -46,19 +46,19 @@ class Roster:
         self.nodes: dict[bytes, Node] = {}
 
     def add(self, node: Node) -> None:
-        """Take a node in."""
+        """Adds a node."""
         self.nodes[node.identity] = node
 
     def own(self, role: str) -> Node | None:
-        """The run's own process of this role, if it has joined."""
+        """Returns the run's own process of this role, None before it has joined."""
         return next((node for node in self.nodes.values() if node.role == role), None)
 
     def all_own(self, what: str) -> bool:
-        """Whether all the run's own processes have joined and ``what`` ("ready", "done") holds for each."""
+        """Tells whether all the run's own processes have joined and ``what`` ("ready", "done") holds for each."""
         return all((node := self.own(role)) is not None and getattr(node, what) for role in PROCESSES)
 
     def joined(self) -> bool:
-        """Whether all the run's own processes have joined."""
+        """Tells whether all the run's own processes have joined."""
         return all(self.own(role) for role in PROCESSES)
 
     def endpoints(self) -> dict[str, dict[str, str]]:
@@ -66,11 +66,11 @@ class Roster:
         return {node.role: node.endpoints for node in self.nodes.values() if node.is_own}
 
     def slowest(self) -> int:
-        """Tick of the slowest lossless node that is neither plant nor controller: it bounds what is in flight."""
+        """Returns the tick of the slowest lossless node but plant and controller; it bounds what is in flight."""
         return min((node.tick for node in self.nodes.values() if node.lossless and not node.done), default=0)
 
     def common_tick(self) -> int:
-        """The last tick all own processes have done."""
+        """Returns the last tick that all own processes have done."""
         return min((node.tick for node in self.nodes.values() if node.is_own), default=0)
 
     def silent(self, now: float, deadline_s: float) -> list[Node]:
@@ -79,12 +79,12 @@ class Roster:
         return sorted(silent, key=lambda node: node.heard)
 
     def discount_silence(self, seconds: float) -> None:
-        """Not to count some time as silence."""
+        """Leaves some time out of the silence of every node."""
         for node in self.nodes.values():
             node.heard += seconds
 
     def table(self) -> list[dict[str, Any]]:
-        """For people: role, pid, tick, how far behind the first, whom it waits for, ticks it skipped."""
+        """Returns role, pid, tick, lag behind the first, whom it waits for and skipped ticks of every node."""
         first = max((node.tick for node in self.nodes.values()), default=0)
         return [
             {

@@ -62,15 +62,15 @@ class ClockServer:
 
     @property
     def socket(self) -> zmq.Socket[bytes]:
-        """For pollers."""
+        """The socket, for pollers."""
         return self._socket
 
     def close(self) -> None:
-        """Stop listening; what was sent still goes out."""
+        """Stops listening; what was sent still goes out."""
         self._socket.close(linger=200)
 
     def serve(self) -> None:
-        """Take the messages that are there, though no more than a turn's worth, then grant what can be granted.
+        """Takes the messages that are there, up to a limit, then grants what can be granted.
 
         Raises:
             RunFailed: one of the run's own processes said that it cannot go on.
@@ -96,7 +96,7 @@ class ClockServer:
         return has_begun or self._start_gate({node.pid for node in self.roster.nodes.values() if node.ready})
 
     def grant(self) -> None:
-        """Tell everyone how far they may go, and what changes on the way, if that is news."""
+        """Sends every node how far it may go and what changes on the way, if that is news."""
         clock = self._clock
         until = clock.grant(self.roster.slowest(), time.monotonic())
         events = clock.take_events()
@@ -108,7 +108,7 @@ class ClockServer:
                 self._send(node.identity, "GRANT", until, clock.is_last, events)
 
     def probe(self, nodes: list[Node]) -> None:
-        """Repeat the grant to those attached: what cannot be sent shows that a node is gone, and takes it off."""
+        """Repeats the grant to attached nodes; one to which it cannot be sent is gone and is taken off."""
         for node in nodes:
             if not node.is_own:
                 self._send(node.identity, "GRANT", self._clock.until, self._clock.is_last, [])
@@ -225,12 +225,12 @@ class ClockServer:
         del self.roster.nodes[node.identity]
 
     def drop(self, node: Node, reason: str) -> None:
-        """Go on without an attached node."""
+        """Takes an attached node off and tells it why."""
         self._send(node.identity, "ABORT", reason)
         self.roster.nodes.pop(node.identity, None)
 
     def abort(self, reason: str) -> None:
-        """Tell every node to save what it has and leave."""
+        """Tells every node to save what it has and leave."""
         for node in list(self.roster.nodes.values()):
             if not node.done:
                 self._send(node.identity, "ABORT", reason)

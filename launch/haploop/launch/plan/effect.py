@@ -76,7 +76,7 @@ def _always(_scene: Resolved) -> bool:
 
 @dataclass(frozen=True)
 class Effect:
-    """What a scene may name beside device, hand, wall and elements.
+    """Something that a scene may name beside device, hand, wall and elements.
 
     Plan, checks, JSON Schema, ``explain``, ablation, advice, the linear map and batches all ask this object alone.
 
@@ -137,7 +137,7 @@ class Effect:
 
     @property
     def acts(self) -> str:
-        """How often: "every plant step" or "every tick"."""
+        """ "every plant step" or "every tick"."""
         return "every plant step" if self.stage == "motion" else "every tick"
 
     def modules_in(self, scene: Resolved) -> tuple[str, ...]:

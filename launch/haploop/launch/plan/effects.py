@@ -1,4 +1,4 @@
-"""The one table of effects: what a scene may name beside device, hand, wall and elements, and what it then costs.
+"""The one table of effects: all that a scene may name beside device, hand, wall and elements.
 
 An effect that is not named is not there: its modules are not imported and no instruction is spent on it.
 """

@@ -1,4 +1,4 @@
-"""What a resolved scene comes to: bodies, states, what happens in a tick and in a plant step, and what is not there."""
+"""The plan of a resolved scene: bodies, states, the steps of a tick and of a plant step, effects named and absent."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ class Plan:
 
 
 def plan(scene: dict[str, Any]) -> Plan:
-    """The plan of a resolved scene."""
+    """Returns the plan of a resolved scene."""
     named = effects_of(scene)
     chain = Chain.from_scene(scene)
     return Plan(
@@ -97,7 +97,7 @@ def multiplications(scene: dict[str, Any]) -> int:
 
 
 def _memory(scene: dict[str, Any], named: tuple[Effect, ...]) -> dict[str, int]:
-    """The states of effects in the motion are integrated; those of all others are remembered."""
+    """Counts what effects remember; the states of those in the motion are integrated instead."""
     counts = {effect.name: effect.states_in(scene) for effect in named if effect.stage != "motion"}
     return {name: count for name, count in counts.items() if count}
 
@@ -124,7 +124,7 @@ def _tick(scene: dict[str, Any], chain: Chain, named: tuple[Effect, ...]) -> tup
 
 
 def _estimates(scene: dict[str, Any], named: tuple[Effect, ...]) -> Iterable[Step]:
-    """A backward difference where no effect stands in its place, then its low-pass."""
+    """Yields a backward difference where no effect stands in its place, then its low-pass."""
     for table, letter, of in (("velocity", "v", "the position"), ("acceleration", "a", "v")):
         effects = [e for e in named if e.stage == "estimate" and e.key.startswith(f"{table}.")]
         if all(effect.key.endswith(".cutoff") for effect in effects):
@@ -141,7 +141,7 @@ def _forces(scene: dict[str, Any]) -> Iterable[Step]:
 
 
 def _stage(stage: Stage, named: Iterable[Effect], scene: dict[str, Any]) -> tuple[Step, ...]:
-    """What the named effects of a stage do, with their values."""
+    """Returns what the named effects of a stage do, with their values."""
     return tuple(
         Step(effect.node, effect.does + _values(at(scene, effect.key), effect.key), effect.name)
         for effect in named
@@ -150,7 +150,7 @@ def _stage(stage: Stage, named: Iterable[Effect], scene: dict[str, Any]) -> tupl
 
 
 def _values(found: Any, key: str = "") -> str:
-    """The numbers of an effect, or of an element, in parentheses."""
+    """Returns the numbers of an effect, or of an element, in parentheses."""
     name = key.rpartition(".")[2]
     table = found if isinstance(found, dict) else {name: found}
     words = [f"{k} = {v:g}" for k, v in table.items() if isinstance(v, (int, float)) and not isinstance(v, bool)]

@@ -48,7 +48,7 @@ class Child:
         return self._process.pid
 
     def exit_description(self) -> str:
-        """How the process ended, in words."""
+        """Returns how the process ended, in words."""
         try:
             code = self._process.wait(timeout=1.0)
         except subprocess.TimeoutExpired:
@@ -58,12 +58,12 @@ class Child:
         return f"ended with exit status {code}"
 
     def exited(self) -> bool:
-        """Whether the process ended by itself, so that it may have left a last message."""
+        """Tells whether the process ended by itself, so that it may have left a last message."""
         code = self._process.poll()
         return code is not None and code >= 0
 
     def wait(self, timeout_s: float) -> bool:
-        """Give the process some time to end by itself; whether it did."""
+        """Gives the process some time to end by itself; returns whether it did."""
         try:
             self._process.wait(timeout=timeout_s)
         except subprocess.TimeoutExpired:
@@ -71,7 +71,7 @@ class Child:
         return True
 
     def kill(self) -> None:
-        """End the process now, stopped or not, and reap it."""
+        """Ends the process now, stopped or not, and reaps it."""
         with contextlib.suppress(ProcessLookupError):
             self._process.kill()
         self._process.wait()
@@ -82,7 +82,7 @@ class Child:
 
 
 def start_children(sockets: Path, start: dict[str, Any], pin: bool, run_number: int) -> dict[str, Child]:
-    """Start every process of the table.
+    """Starts every process of the table.
 
     Plant and controller wait for each other at every tick and gain nothing from two cores, but lose the wake-up from
     one to the other: they share a core, the others get the rest. Runs beside each other take different cores.
@@ -95,7 +95,7 @@ def start_children(sockets: Path, start: dict[str, Any], pin: bool, run_number: 
 
 
 def share_cores(run_number: int) -> tuple[set[int] | None, set[int] | None]:
-    """(core of plant and controller, cores of the others), or (None, None) where nothing can be gained."""
+    """Returns (core of plant and controller, cores of the others); (None, None) where nothing can be gained."""
     if not hasattr(os, "sched_getaffinity"):
         return None, None
     cores = sorted(os.sched_getaffinity(0))
@@ -107,7 +107,7 @@ def share_cores(run_number: int) -> tuple[set[int] | None, set[int] | None]:
 
 @contextlib.contextmanager
 def interrupts(usual_from: int) -> Iterator[list[int]]:
-    """Collect SIGINT and SIGTERM in a list.
+    """Collects SIGINT and SIGTERM in a list.
 
     Args:
         usual_from: the signal of this number, counted from 1, and later ones raise KeyboardInterrupt where they come.

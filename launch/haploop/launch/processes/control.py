@@ -19,7 +19,7 @@ class CommandRefused(Exception):
 
 
 def ask(run: LiveRun, verb: str, **arguments: Any) -> tuple[str, dict[str, Any]]:
-    """Have a live run carry out a command; returns its answer, a sentence and data.
+    """Sends a command to a live run; returns its answer, a sentence and data.
 
     Raises:
         CommandRefused: it was refused; nothing has changed.

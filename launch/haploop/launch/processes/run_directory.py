@@ -1,4 +1,4 @@
-"""Where runs live while they run: a private directory of sockets each, in which other terminals find them."""
+"""The directories of live runs: a private one of sockets each, in which other terminals find the run."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class RunNotFound(Exception):
 
 
 def base_directory() -> Path:
-    """The user's directory of live runs, mode 0700, below XDG_RUNTIME_DIR or the temporary directory.
+    """Returns the user's directory of live runs, mode 0700, below XDG_RUNTIME_DIR or the temporary directory.
 
     Raises:
         PermissionError: a directory of that name belongs to somebody else.
@@ -57,12 +57,12 @@ class LiveRun:
     keys: str | None = None
 
     def make_context(self) -> SecureContext:
-        """A context whose sockets may connect to the run."""
+        """Makes a context whose sockets may connect to the run."""
         return SecureContext.from_transport(Transport(keys=Path(self.keys) if self.keys else None))
 
 
 def create() -> Path:
-    """A new directory of sockets, named by the run's id; clears away what dead runs left."""
+    """Makes a directory of sockets, named by the run's id; clears away what dead runs left."""
     live_runs()
     while True:
         path = base_directory() / secrets.token_hex(3)
@@ -74,7 +74,7 @@ def create() -> Path:
 
 
 def announce(sockets: Path, clock: str, title: str, out: str, keys: str | None = None) -> None:
-    """Let other terminals find the run."""
+    """Writes the entry by which other terminals find the run."""
     entry = {"pid": os.getpid(), "clock": clock, "title": title, "out": out, "keys": keys}
     temporary = sockets / "run.part"
     temporary.write_text(json.dumps(entry), encoding="utf-8")
@@ -82,12 +82,12 @@ def announce(sockets: Path, clock: str, title: str, out: str, keys: str | None =
 
 
 def remove(sockets: Path) -> None:
-    """Forget a run: no socket file stays behind."""
+    """Removes a run's directory with all its sockets."""
     shutil.rmtree(sockets, ignore_errors=True)
 
 
 def live_runs() -> list[LiveRun]:
-    """All runs of this user, oldest first; the directories of dead ones are cleared away."""
+    """Returns all runs of this user, oldest first; the directories of dead ones are cleared away."""
     runs = []
     for path in sorted(base_directory().iterdir(), key=_made):
         run = _read(path)
@@ -99,12 +99,12 @@ def live_runs() -> list[LiveRun]:
 
 
 def is_live(run: LiveRun) -> bool:
-    """Whether the run's launcher is still there."""
+    """Tells whether the run's launcher is still there."""
     return _is_alive(run.pid)
 
 
 def find(run_id: str | None) -> LiveRun:
-    """The run with this id (or its beginning), or the only one there is.
+    """Returns the run with this id (or its beginning), or the only one there is.
 
     Raises:
         RunNotFound: none, or several, fit.
@@ -122,7 +122,7 @@ def find(run_id: str | None) -> LiveRun:
 
 
 def _made(path: Path) -> float:
-    """When a run's directory was made; 0 for one that its run has just removed."""
+    """Returns the time at which a run's directory was made; 0 for one that its run has just removed."""
     try:
         return path.stat().st_mtime
     except FileNotFoundError:

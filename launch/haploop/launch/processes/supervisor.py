@@ -32,7 +32,7 @@ _HELD_UP_S = 1.0
 
 
 def run_processes(spec: RunSpec) -> dict[str, Any]:
-    """Run to the end and return the summary.
+    """Runs to the end and returns the summary.
 
     The first SIGINT or SIGTERM ends the run in order, with a summary of what ran; the second at once.
 
@@ -82,7 +82,7 @@ class Supervisor:
         self._stopping = False
 
     def run(self) -> dict[str, Any]:
-        """Lead the run to its end."""
+        """Leads the run to its end; returns its summary."""
         try:
             address = f" at {self._server.address}" if self._spec.transport.host else ""
             self._spec.on_started(self._sockets.name + address)
@@ -119,7 +119,7 @@ class Supervisor:
             child.wait(2.0)
 
     def _look_at(self, child: Child) -> None:
-        """A process has ended: in order after DONE, otherwise the run fails."""
+        """Takes note that a process has ended: in order after DONE, otherwise the run fails."""
         ended = child.exit_description()
         given_up = time.monotonic() + (_LAST_WORDS_S if child.exited() else 0.0)
         self._server.serve()
@@ -134,7 +134,7 @@ class Supervisor:
         return node is not None and node.done
 
     def _discount_silence(self, now: float) -> None:
-        """Time in which the launcher itself did not listen is nobody's silence."""
+        """Leaves the time in which the launcher itself did not listen out of every node's silence."""
         held_up_s = now - self._looked
         self._looked = now
         if held_up_s > _HELD_UP_S:
@@ -178,7 +178,7 @@ class Supervisor:
             self._server.serve()
 
     def _save(self, reason: str) -> None:
-        """Let the logger write down what it has; the others have nothing to lose."""
+        """Lets the logger write what it has, and ends the others, which have nothing to lose."""
         for role, child in self._children.items():
             if role != "logger":
                 child.kill()

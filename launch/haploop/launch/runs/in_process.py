@@ -33,7 +33,7 @@ def run_in_process(
     memory: MemoryLog | None = None,
     stop: Callable[[], bool] = lambda: False,
 ) -> dict[str, Any]:
-    """Run a resolved scene to its end and return the summary.
+    """Runs a resolved scene to its end and returns the summary.
 
     Args:
         scene: the resolved scene.
@@ -68,7 +68,7 @@ def run_in_process(
 
 
 def scene_events(scene: dict[str, Any], time: Timebase) -> list[tuple[int, Event]]:
-    """The events of a scene with their ticks, in order."""
+    """Returns the events of a scene with their ticks, in order."""
     return [(time.first_tick_at(event["at"]), event) for event in scene.get("event", [])]
 
 
@@ -85,7 +85,7 @@ class Loop:
         session.logger.start(self._plant.state(), [])
 
     def schedule(self, events: list[tuple[int, Event]]) -> None:
-        """Have events take effect at their ticks."""
+        """Schedules events at their ticks."""
         for tick, event in events:
             self._session.logger.event(tick, event)
             if is_change(event):
@@ -95,7 +95,7 @@ class Loop:
                 self._end = min(self._end, tick)
 
     def block(self) -> bool:
-        """Work through one block; False when the run has ended."""
+        """Works through one block; returns False when the run has ended."""
         plant, controller = self._plant, self._controller
         until = min(plant.tick + self._block.ticks, self._end)
         plant.run_until(until, lambda _, samples: [float(force) for force in controller.answer(samples)])
@@ -115,17 +115,17 @@ class Loop:
         self._controller.recorder.refused = []
 
     def end_here(self) -> None:
-        """End the run at the ticks worked on so far."""
+        """Ends the run at the ticks worked on so far."""
         self.schedule([(self._plant.tick, {"stop": True})])
 
     def fail(self, reason: str) -> NoReturn:
-        """Save what there is and raise RunFailed."""
+        """Saves what there is and raises RunFailed."""
         self._hand_over()
         self._close(reason)
         raise RunFailed(reason)
 
     def finish(self) -> dict[str, Any]:
-        """Close the books and return the summary."""
+        """Closes the books and returns the summary."""
         return self._close("")
 
     def _close(self, failed: str) -> dict[str, Any]:

@@ -43,7 +43,7 @@ class Scene:
 
     @property
     def tables(self) -> dict[str, Any]:
-        """A copy of all tables: plain dicts, all numbers SI, defaults filled in, absent tables absent."""
+        """All tables, copied: plain dicts, all numbers SI, defaults filled in, absent tables absent."""
         return deepcopy(self._tables)
 
     def __getitem__(self, key: str) -> Any:
@@ -61,7 +61,7 @@ class Scene:
         return f"<Scene {self['title']!r}, {self['duration']:g} s, from {self.path}>"
 
     def set(self, values: Values, at: Any = None) -> Scene:
-        """The scene with other values, from its start or from a moment on.
+        """Returns the scene with other values, from its start or from a moment on.
 
         Args:
             values: by dotted key, ``{"wall.stiffness": 200, "dissipation.0.mass": "20 g"}``, or as on the command line,
@@ -82,7 +82,7 @@ class Scene:
         return self._with_event({"at": plain(at), "set": plain(values)}, "set")
 
     def swap(self, kind: str | type[Element], *, at: Any, element: int = 0, **parameters: Any) -> Scene:
-        """The scene with an element that is swapped in in mid-run.
+        """Returns the scene with an element that is swapped in in mid-run.
 
         Args:
             kind: of the new element, or its class; "none" removes the one there is.
@@ -103,7 +103,7 @@ class Scene:
         return scene._with_event({"at": plain(at), "swap": table, "element": element}, "swap")
 
     def _with_event(self, event: dict[str, Any], by: str) -> Scene:
-        """The scene with one event more; its mistakes are those of the method ``by``, not of the file."""
+        """Returns the scene with one event more; its mistakes are those of the method ``by``, not of the file."""
         layers = Layers(self.path, self.tables)
         events = layers.data.setdefault("event", [])
         layers.origins["event", len(events)] = by
@@ -123,7 +123,7 @@ def load(
     elements: Iterable[type[Element]] = (),
     plugins: Iterable[str | Path] = (),
 ) -> Scene:
-    """Read a scene file.
+    """Reads a scene file.
 
     Args:
         path: the scene file (TOML).
@@ -158,7 +158,7 @@ def texts(values: Values) -> list[str]:
 
 
 def plain(value: Any) -> Any:
-    """A value as a scene file holds it: a quantity of pint as text with its unit, NumPy's numbers as Python's."""
+    """Returns a value as a scene file holds it: pint's quantities as text with a unit, NumPy's numbers as Python's."""
     if isinstance(value, Mapping):
         return {str(key): plain(inner) for key, inner in value.items()}
     if isinstance(value, list | tuple):

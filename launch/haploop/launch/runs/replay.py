@@ -27,7 +27,7 @@ class ReplayError(Exception):
 
 @dataclasses.dataclass(frozen=True)
 class Replay:
-    """What came of repeating a run.
+    """The outcome of repeating a run.
 
     Attributes:
         summary: of the repetition.
@@ -39,7 +39,7 @@ class Replay:
 
 
 def replay(directory: Path) -> Replay:
-    """Run again what the log says, in one process, and compare bit by bit.
+    """Repeats a run from its log, in one process, and compares bit by bit.
 
     The whole trajectory is compared where the summary holds its digest, and every logged step, tick and book.
 
@@ -69,7 +69,7 @@ def replay(directory: Path) -> Replay:
 
 
 def _recorded(directory: Path) -> Recording:
-    """The log of a run from its first tick on."""
+    """Returns the log of a run from its first tick on."""
     try:
         recorded = haploop.logger.read(directory)
     except FileNotFoundError as error:
@@ -97,7 +97,7 @@ def _launch_plugins(directory: Path, recorded: Recording) -> list[str]:
 
 
 def _event(event: dict[str, Any], directory: Path) -> tuple[int, dict[str, Any]]:
-    """A logged event as it was given, its plugin looked for in the run's directory."""
+    """Returns tick and event of a logged event, its plugin looked for in the run's directory."""
     del event["timestamp"]
     tick = event.pop("tick")
     if "plugin" in event:

@@ -29,7 +29,7 @@ _UNITS = {"_N_m": "N/m", "_m_s": "m/s", "_1_s": "1/s", "_m": "m", "_s": "s", "_N
 
 
 def unit_of(key: str) -> str:
-    """The unit of a number of a summary, by its key; "" for none."""
+    """Returns the unit of a number of a summary, by its key; "" for none."""
     return next((unit for end, unit in _UNITS.items() if key.endswith(end)), "")
 
 
@@ -92,7 +92,7 @@ def run(
     processes: bool = False,
     pace: float = math.inf,
 ) -> Result:
-    """Run a scene to its end.
+    """Runs a scene to its end.
 
     Args:
         scene: a loaded scene, or the path of one.
@@ -131,12 +131,12 @@ def _in_memory(scene: Scene) -> Result:
 
 
 def _directory(out: str | Path | None) -> AbstractContextManager[str | Path]:
-    """The directory asked for, or one that goes when it has been read."""
+    """Returns the directory asked for, or one that is removed once it has been read."""
     return tempfile.TemporaryDirectory(prefix="haploop-") if out is None else nullcontext(out)
 
 
 def _read(directory: Path) -> Recording:
-    """The log of a run, empty where the scene asks for none."""
+    """Returns the log of a run, empty where the scene asks for none."""
     return haploop.logger.read(directory) if (directory / LOG).exists() else Recording({}, "", {})
 
 

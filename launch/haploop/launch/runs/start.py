@@ -17,7 +17,7 @@ from haploop.launch.spec import RunSpec
 def prepare(
     scene_path: Path, overrides: Sequence[str] = (), plugins: Sequence[Path] = (), out: Path | None = None
 ) -> RunSpec:
-    """Read and check everything; only when all is well is anything written.
+    """Reads and checks everything; only when all is well is anything written.
 
     Raises:
         SceneError: the scene has mistakes.
@@ -42,7 +42,7 @@ def lay_out(
     plugins: Sequence[Path] = (),
     sources: dict[str, Path] | None = None,
 ) -> RunSpec:
-    """Put a resolved scene and its plugin files into the directory of its run.
+    """Puts a resolved scene and its plugin files into the directory of its run.
 
     Raises:
         OutputError: a file cannot be written.

@@ -61,7 +61,7 @@ class Checked:
 
 
 def resolve(layers: Layers, kinds: Mapping[str, type[Element]]) -> dict[str, Any]:
-    """The resolved scene: defaults filled in, SI numbers, empty lists left out.
+    """Returns the resolved scene: defaults filled in, SI numbers, empty lists left out.
 
     Raises:
         SceneError: all mistakes, those already known to ``layers`` included.
@@ -94,7 +94,7 @@ def resolve(layers: Layers, kinds: Mapping[str, type[Element]]) -> dict[str, Any
 
 
 def resolve_event(event: dict[str, Any], scene: dict[str, Any], kinds: Mapping[str, type[Element]]) -> dict[str, Any]:
-    """An event that comes in during a run, resolved, after the events of the resolved ``scene``.
+    """Returns an event that comes in during a run, resolved, after the events of the resolved ``scene``.
 
     Raises:
         SceneError: it does not fit the scene, or an event that is still to come no longer would.
@@ -104,7 +104,7 @@ def resolve_event(event: dict[str, Any], scene: dict[str, Any], kinds: Mapping[s
 
 
 def _timebase(layers: Layers) -> Timebase | None:
-    """The integers of the run; None when there are none, which is a mistake here unless it is one already."""
+    """Returns the integers of the run; None when there are none, which is a mistake here unless it is one already."""
     try:
         duration = number_of(Scene, "duration").read(layers.data.get("duration"))
     except PydanticCustomError:
@@ -123,7 +123,7 @@ def _timebase(layers: Layers) -> Timebase | None:
 
 
 def complain(layers: Layers, what: str, message: str, key: KeyPath, schema: Schema) -> None:
-    """Add a mistake that pydantic found, as a sentence; ``schema`` is that of the whole file."""
+    """Adds a mistake that pydantic found, as a sentence; ``schema`` is that of the whole file."""
     rule = schema_at(schema, key, layers.data)
     match what:
         case "extra_forbidden":
@@ -148,14 +148,14 @@ def complain(layers: Layers, what: str, message: str, key: KeyPath, schema: Sche
 
 
 def _form(rule: Schema) -> str:
-    """What a value has to be, from its schema."""
+    """Returns the form of a value, from its schema."""
     if "properties" in rule:
         return f"a table with {', '.join(rule.get('required', rule['properties']))}"
     return rule["description"].rpartition(": ")[2] if "description" in rule else rule.get("type", "given")
 
 
 def _plain(location: tuple[str | int, ...], tagged: set[KeyPath]) -> KeyPath:
-    """A location of pydantic's as a key of the scene: without the kind it puts after a table that has kinds."""
+    """Returns a location of pydantic's as a key of the scene, without the kind after a table of several kinds."""
     key: KeyPath = ()
     skip = False
     for part in location:

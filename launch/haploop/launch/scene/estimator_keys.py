@@ -1,4 +1,4 @@
-"""Which keys of ``[velocity]`` and ``[acceleration]`` an estimator needs, and which it does not take."""
+"""The keys of ``[velocity]`` and ``[acceleration]``, compared with those that their estimators declare."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _TABLES: dict[str, type[Table]] = {"velocity": Velocity, "acceleration": Acceler
 
 
 def check_estimators(layers: Layers) -> None:
-    """Add keys an estimator lacks or does not take to the mistakes; values wrong in themselves are passed over."""
+    """Adds keys an estimator lacks or does not take to the mistakes; values wrong in themselves are passed over."""
     velocity, acceleration = _table(layers, "velocity"), _table(layers, "acceleration")
     _keys(layers, "velocity", velocity)
     _keys(layers, "acceleration", acceleration)
@@ -28,7 +28,7 @@ def check_estimators(layers: Layers) -> None:
 
 
 def check_filter(layers: Layers, scene: Scene) -> None:
-    """Add a jerk density for which no filter can be computed to the mistakes of a scene that is else in order."""
+    """Adds a jerk density for which no filter can be computed to the mistakes of a scene that is else in order."""
     if scene.velocity is None or scene.velocity.jerk_density is None:
         return
     from haploop.controller.estimators.kalman import jerk_density_limits, position_noise_m

@@ -26,7 +26,7 @@ SETTABLE_OF_WALL = ("stiffness", "position")
 def check_events(
     layers: Layers, time: Timebase | None, kinds: Mapping[str, type[Element]]
 ) -> dict[int, dict[str, float]]:
-    """Walk the events in order of time, keeping book of which element is in which slot.
+    """Walks the events in order of time and follows which element is in which slot.
 
     Removing an element, by kind "none", moves those after it up by one.
 
@@ -66,7 +66,7 @@ def _check_shape(layers: Layers, key: KeyPath, event: dict[str, Any], time: Time
 
 
 def _swap(layers: Layers, key: KeyPath, event: dict[str, Any], slots: list[Any]) -> None:
-    """Put the new kind into its slot."""
+    """Puts the new kind into its slot."""
     element = _read(event, "element")
     kind = event["swap"].get("kind")
     if element < len(slots) + (kind != NO_ELEMENT):
@@ -77,7 +77,7 @@ def _swap(layers: Layers, key: KeyPath, event: dict[str, Any], slots: list[Any])
 
 
 def settable_keys(slots: list[Any], has_wall: bool, kinds: Mapping[str, type[Element]]) -> dict[str, Number]:
-    """Every key that can be set at a moment of the run when these kinds are at work, and how its value is read."""
+    """Returns every key that can be set while these kinds are at work, and the number that reads its value."""
     wall = {f"wall.{name}": number_of(Wall, name) for name in SETTABLE_OF_WALL if has_wall}
     elements = {
         f"dissipation.{slot}.{name}": Number(quantity)
@@ -117,14 +117,14 @@ def _setting(
 
 
 def _nearest_key(name: str, settable: dict[str, Number]) -> str | None:
-    """The key closest to ``name``, by its last part where the table is right: long names are alike in their front."""
+    """Returns the key closest to ``name``: by its last part where the table is right, since long names begin alike."""
     table, _, last = name.rpartition(".")
     names = {key.rpartition(".")[2]: key for key in settable if key.startswith(f"{table}.")}
     return names.get(nearest(last, names) or "") if names else nearest(name, settable)
 
 
 def _read(event: dict[str, Any], key: str) -> Any:
-    """A number of an event; 0 where it is missing, or wrong, which is a mistake reported elsewhere."""
+    """Returns a number of an event; 0 where it is missing, or wrong, which is a mistake reported elsewhere."""
     try:
         return number_in(EventModel, key).read(event.get(key))
     except PydanticCustomError:
@@ -136,17 +136,17 @@ def _tables(value: Any) -> list[Any]:
 
 
 def elements_of(scene: dict[str, Any]) -> list[dict[str, Any]]:
-    """The table of every element a resolved scene begins with or swaps in."""
+    """Returns the table of every element a resolved scene begins with or swaps in."""
     return [*scene.get("dissipation", []), *swapped_in(scene.get("event", []))]
 
 
 def swapped_in(events: Iterable[dict[str, Any]]) -> list[dict[str, Any]]:
-    """The table of every element these resolved events bring."""
+    """Returns the table of every element these resolved events bring."""
     return [event["swap"] for event in events if "swap" in event and event["swap"]["kind"] != NO_ELEMENT]
 
 
 def try_out(tables: Iterable[dict[str, Any]], kinds: Mapping[str, type[Element]]) -> None:
-    """Make each element and throw it away.
+    """Makes each element once, since its own code may refuse what its declaration allows.
 
     Raises:
         ElementError: one cannot be made.

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 def load(
     path: Path | str, overrides: Sequence[str] = (), kinds: Mapping[str, type[Element]] | None = None
 ) -> dict[str, Any]:
-    """The resolved scene of a TOML file: a plain dict, all numbers SI, defaults filled in, absent tables absent.
+    """Returns the resolved scene of a TOML file: a plain dict in SI units, defaults filled in, absent tables absent.
 
     Its events are in order of time.
 
@@ -37,7 +37,7 @@ def load(
 def resolved(
     layers: Layers, overrides: Sequence[str] = (), kinds: Mapping[str, type[Element]] | None = None
 ) -> dict[str, Any]:
-    """As ``load``, of layers that were read already.
+    """Returns the resolved scene of layers that were read already.
 
     Raises:
         SceneError: the scene cannot be run; it holds every mistake.
@@ -55,7 +55,7 @@ def resolved(
 
 
 def _read_recording(layers: Layers) -> None:
-    """Put the samples of a recorded hand force in place of its file, so that the scene runs by itself."""
+    """Puts the samples of a recorded hand force in place of its file, so that the scene runs by itself."""
     hand = layers.data.get("hand")
     force = hand.get("force") if isinstance(hand, dict) else None
     if not isinstance(force, dict) or force.get("kind") != "trace" or "file" not in force:

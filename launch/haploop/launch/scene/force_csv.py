@@ -1,4 +1,4 @@
-"""Recorded forces: a CSV of time and force, read into lists."""
+"""Recorded hand forces: a CSV of time and force, read into lists."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def read_trace(path: Path) -> tuple[list[float], list[float]]:
 
 
 def fault(times: Sequence[float], forces: Sequence[float]) -> tuple[int, str] | None:
-    """The first sample at which these are no function of time, and why; None when they are one."""
+    """Returns the first sample at which these are no function of time, and why; None when they are one."""
     if not times:
         return 0, "There must be at least one sample."
     if len(times) != len(forces):

@@ -17,7 +17,7 @@ _SORTS = {"kind": (), "estimator": ("source", "cutoff")}
 
 @dataclass
 class Layers:
-    """What the layers say together, and who said it.
+    """The merged tables of several layers, each value with the file that gave it.
 
     Attributes:
         path: the scene file on top.
@@ -32,13 +32,13 @@ class Layers:
     mistakes: list[Mistake] = field(default_factory=list)
 
     def origin(self, key: KeyPath) -> str:
-        """Who gave the value at ``key``, or the table nearest to it."""
+        """Returns the file that gave the value at ``key``, or the table nearest to it."""
         while key and key not in self.origins:
             key = key[:-1]
         return self.origins.get(key, str(self.path))
 
     def complain(self, key: KeyPath, expected: str, given: str | None = None, nearest: str | None = None) -> None:
-        """Add a mistake about ``key``, whose value is quoted unless ``given`` says what was found."""
+        """Adds a mistake about ``key``, whose value is quoted unless ``given`` says what was found."""
         if given is None:
             given = f"is {_quoted(self.value(key))}"
         origin = self.origin(key)
@@ -46,14 +46,14 @@ class Layers:
         self.mistakes.append(Mistake(file, ".".join(map(str, key)), given, expected, nearest))
 
     def value(self, key: KeyPath) -> Any:
-        """The value at ``key``."""
+        """Returns the value at ``key``."""
         value: Any = self.data
         for part in key:
             value = value[part]
         return value
 
     def lay(self, over: dict[str, Any], origin: str, key: KeyPath = ()) -> None:
-        """Lay a table over the one at ``key``: tables merge key by key, all else is replaced.
+        """Lays a table over the one at ``key``: tables merge key by key, all else is replaced.
 
         The keys of a ramp mean nothing to a sine: a table that names another kind drops what lay below it.
         """
@@ -86,7 +86,7 @@ class Layers:
 
 
 def read_layers(path: Path) -> Layers:
-    """The scene file at ``path`` over all that it extends; of several the later wins.
+    """Returns the scene file at ``path`` laid over all that it extends; of several the later wins.
 
     Raises:
         SceneError: a file that cannot be read, or that extends itself.
@@ -99,7 +99,7 @@ def read_layers(path: Path) -> Layers:
 
 
 def _read(layers: Layers, path: Path, chain: tuple[Path, ...]) -> None:
-    """Lay the file at ``path`` on, after what it extends."""
+    """Lays the file at ``path`` on, after what it extends."""
     here = path.resolve()
     if here in chain:
         circle = " extends ".join(shown(p) for p in (*chain[chain.index(here) :], here))
@@ -122,7 +122,7 @@ def _read(layers: Layers, path: Path, chain: tuple[Path, ...]) -> None:
 
 
 def parse(path: Path, what: str = "scene", needs: str = "a duration and a [device]") -> dict[str, Any]:
-    """The tables of one TOML file, which is a ``what`` and needs some keys at least.
+    """Returns the tables of one TOML file, which is a ``what`` and needs some keys at least.
 
     Raises:
         SceneError: it is missing, empty, no file, no text or no TOML (with line and column).

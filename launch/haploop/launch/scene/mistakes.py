@@ -1,4 +1,4 @@
-"""What can be wrong with a scene, said in full sentences and all at once."""
+"""Mistakes of a scene, told in full sentences and all at once."""
 
 from __future__ import annotations
 
@@ -49,17 +49,17 @@ class SceneError(ValueError):
 
 
 def nearest(name: object, allowed: Iterable[str]) -> str | None:
-    """The allowed name closest to ``name``, if one is close."""
+    """Returns the allowed name closest to ``name``, if one is close."""
     return next(iter(difflib.get_close_matches(str(name), list(allowed), n=1)), None)
 
 
 def counted(count: int, name: str) -> str:
-    """``1 element``, ``2 elements``."""
+    """Returns a count with its noun: ``1 element``, ``2 elements``."""
     return f"{count} {name}" + "s" * (count != 1)
 
 
 def shown(path: Path | str) -> str:
-    """A file as a reader wants to see it: relative when it lies below the working directory."""
+    """Returns a file's path as readers want it: relative when it lies below the working directory."""
     here = Path.cwd()
     path = Path(os.path.normpath(here / path))
     return str(path.relative_to(here)) if path.is_relative_to(here) else str(path)

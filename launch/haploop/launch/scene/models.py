@@ -79,7 +79,7 @@ def _keys_of(table: type[Table]) -> dict[str, Any]:
 
 
 def _registered(table: type[Table]) -> dict[str, Any]:
-    """The keys that registries give: names of estimators with the keys of their own, tables of others' effects."""
+    """Returns the keys that registries give: names, keys of estimators of other packages, tables of their effects."""
     if table is Scene:
         return {effect.key: (model_of(effect.table) | None, None) for effect in all_effects() if effect.table}
     if table is Clock:
@@ -104,7 +104,7 @@ def _default(field: dataclasses.Field[Any]) -> Any:
 
 
 def _validated(hint: Any) -> Any:
-    """The type of a key with numbers that read units, and models in place of tables."""
+    """Returns the type of a key with numbers that read units, and models in place of tables."""
     if isinstance(hint, type) and issubclass(hint, Table):
         return model_of(hint)
     origin, parts = get_origin(hint), get_args(hint)
@@ -170,5 +170,5 @@ def _model(name: str, base: type[Model], about: str | None, keys: dict[str, Any]
 
 
 def _one_of(models: list[Any]) -> Any:
-    """A table of one of these kinds."""
+    """Returns the type of a table of one of these kinds."""
     return Annotated[reduce(or_, models), Field(discriminator="kind")] if len(models) > 1 else models[0]

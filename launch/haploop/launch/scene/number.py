@@ -34,7 +34,7 @@ class Number:
         return self.quantity.whole
 
     def read(self, value: Any) -> float:
-        """The number in SI units.
+        """Returns the number in SI units.
 
         Raises:
             PydanticCustomError: not a number, not finite, out of bounds, or of another dimension; its message is
@@ -59,7 +59,7 @@ class Number:
 
     @property
     def form(self) -> str:
-        """What to write: 'a number in kg, above 0, or text with its unit'."""
+        """The form to write: 'a number in kg, above 0, or text with its unit'."""
         q = self.quantity
         bounds = {"at least": q.at_least, "above": q.above, "at most": q.at_most, "below": q.below}
         words = " and ".join(f"{word} {bound:g}" for word, bound in bounds.items() if bound is not None)
@@ -81,7 +81,7 @@ class Number:
 
 
 def si(unit: str, about: str = "", *, whole: bool = False, **bounds: float) -> Number:
-    """A ``Number`` in one line: ``mass: Annotated[float, si("kg", "mass of the device", above=0)]``."""
+    """Makes a ``Number`` in one line: ``mass: Annotated[float, si("kg", "mass of the device", above=0)]``."""
     return Number(quantity(unit, about, whole=whole, **bounds))
 
 
@@ -97,7 +97,7 @@ _TEXT = re.compile(rf"\s*({_NUMBER})\s*({_FACTOR}(?:(?:\s*[*/·]\s*|\s+){_FACTOR
 
 
 def from_text(text: str, target: str) -> Decimal:
-    """The number that ``text``, such as ``"0.15 N/mm"``, is in the unit ``target``.
+    """Returns the number that ``text``, such as ``"0.15 N/mm"``, is in the unit ``target``.
 
     Raises:
         ValueError: a full sentence that says why it is none.
@@ -136,7 +136,7 @@ def _angle_power(quantity: Any) -> Any:
 
 @cache
 def _registry() -> Any:
-    """pint takes half a second to load, so it comes in with the first text that carries a unit."""
+    """Loads pint, which takes half a second, with the first text that carries a unit."""
     import pint
 
     return pint.UnitRegistry(non_int_type=Decimal)  # pyright: ignore[reportArgumentType]

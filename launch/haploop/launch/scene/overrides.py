@@ -12,7 +12,7 @@ from haploop.launch.scene.mistakes import COMMAND_LINE, Mistake, counted
 
 
 def lay_overrides(layers: Layers, overrides: Iterable[str]) -> None:
-    """Lay each ``dotted.key=value`` on; what is wrong is added to the mistakes of ``layers``.
+    """Lays each ``dotted.key=value`` on; what is wrong is added to the mistakes of ``layers``.
 
     A part of the key that is a number counts the elements of a list from 0, and one past its end adds one. Tables and
     lists that are absent are made.
@@ -28,7 +28,7 @@ def lay_overrides(layers: Layers, overrides: Iterable[str]) -> None:
 
 
 def lay_value(layers: Layers, path: Sequence[str], value: Any) -> str | None:
-    """Make the way to the last part, then lay the value there; the sentence to say when there is no such way."""
+    """Makes the way to the last part and lays the value there; returns a sentence where there is no such way."""
     key: tuple[str | int, ...] = ()
     node: Any = layers.data
     for part, after in zip(path, [*path[1:], None], strict=True):
@@ -58,7 +58,7 @@ def lay_value(layers: Layers, path: Sequence[str], value: Any) -> str | None:
 
 @lru_cache(maxsize=256)
 def key_path(name: str) -> tuple[str, ...]:
-    """The parts of a dotted key, read as TOML reads it, so that a part may be quoted; empty when it is none."""
+    """Returns the parts of a dotted key, read as TOML reads it, so that a part may be quoted; () for no key."""
     try:
         node: Any = tomllib.loads(f"{name} = 0") if "\n" not in name else {}
     except ValueError:

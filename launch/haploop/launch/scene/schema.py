@@ -32,7 +32,7 @@ class TomlSchema(GenerateJsonSchema):
 
 
 def json_schema(kinds: Mapping[str, type[Element]]) -> Schema:
-    """The JSON Schema (draft 2020-12) of a scene file, with the parameters of every kind of element.
+    """Returns the JSON Schema (draft 2020-12) of a scene file, with the parameters of every kind of element.
 
     A file that extends another may leave out what the other gives, so keys are required only in arrays of tables,
     which are replaced whole.
@@ -49,7 +49,7 @@ def json_schema(kinds: Mapping[str, type[Element]]) -> Schema:
 
 
 def whole_schema(kinds: Mapping[str, type[Element]]) -> Schema:
-    """The JSON Schema of a scene after everything it extends has been merged into it."""
+    """Returns the JSON Schema of a scene after everything it extends has been merged into it."""
     schema = scene_model(kinds).model_json_schema(schema_generator=TomlSchema)
     recording = {"type": "string", "description": "a CSV of time in s and force in N, in place of time and force"}
     schema["$defs"]["Trace"]["properties"]["file"] = recording
@@ -57,7 +57,7 @@ def whole_schema(kinds: Mapping[str, type[Element]]) -> Schema:
 
 
 def schema_at(schema: Schema, path: tuple[str | int, ...], data: Any) -> Schema:
-    """The part of ``schema`` that rules the value at ``path`` of ``data``; empty where nothing does."""
+    """Returns the part of ``schema`` that rules the value at ``path`` of ``data``; empty where nothing does."""
     node = _chosen(schema, schema, data)
     for key in path:
         inner = node.get("items", {}) if isinstance(key, int) else node.get("properties", {}).get(key, {})
@@ -70,7 +70,7 @@ def schema_at(schema: Schema, path: tuple[str | int, ...], data: Any) -> Schema:
 
 
 def alternatives(schema: Schema, rule: Schema) -> list[str]:
-    """The names that may stand where ``rule`` rules: the values of a choice, or the kinds of a table."""
+    """Returns the names that may stand where ``rule`` rules: the values of a choice, or the kinds of a table."""
     if "anyOf" in rule:
         return [_chosen(schema, choice, None)["properties"]["kind"]["const"] for choice in rule["anyOf"]]
     names = rule.get("enum", [rule.get("const")])
@@ -78,7 +78,7 @@ def alternatives(schema: Schema, rule: Schema) -> list[str]:
 
 
 def _chosen(schema: Schema, node: Schema, data: Any) -> Schema:
-    """Follow a reference; of alternatives take the one whose kind ``data`` names."""
+    """Follows a reference; of alternatives takes the one whose kind ``data`` names."""
     if "$ref" in node:
         return _chosen(schema, schema["$defs"][_name(node)], data)
     for choice in node.get("anyOf", []):

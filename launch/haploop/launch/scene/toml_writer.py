@@ -15,7 +15,7 @@ Lines = dict[int, tuple[Any, list[str]]]
 
 
 def to_toml(scene: dict[str, Any], known: Lines | None = None) -> str:
-    """TOML text of a dict of str, bool, int, finite float, lists and dicts.
+    """Returns the TOML text of a dict of str, bool, int, finite float, lists and dicts.
 
     Args:
         known: lines of tables that this scene may share with another.
@@ -27,12 +27,12 @@ def to_toml(scene: dict[str, Any], known: Lines | None = None) -> str:
 
 
 def lines_of(scene: dict[str, Any]) -> Lines:
-    """The lines of each of its tables, for ``to_toml`` of scenes that share some; they must not change."""
+    """Returns the lines of each table of a scene, for ``to_toml`` of scenes that share some; they must not change."""
     return {id(entry): (entry, _tables(entry, (key,))) for key, entry in scene.items() if _has_header(entry)}
 
 
 def inline(value: Any) -> str:
-    """One value on one line, as TOML writes it."""
+    """Returns one value on one line, as TOML writes it."""
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, int) or (isinstance(value, float) and math.isfinite(value)):
