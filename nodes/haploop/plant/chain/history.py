@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from haploop.plant.chain.chain import Chain
-from haploop.plant.chain.sensed_acceleration import make_sensed_acceleration
+from haploop.plant.chain.sensed_acceleration import SensedAcceleration
 from haploop.plant.line.base import Hold
 from haploop.plant.motion.hand_force import make_hand_force
 from haploop.protocol.arrays import first_row, rows_of
@@ -81,7 +81,7 @@ class ChainHistory(ABC):
         z = chain.start_state(*tail)
         held, mode = self._begun(z)
         held = held if members is None else np.multiply.outer(held, np.ones(members))
-        self._sensor = make_sensed_acceleration(scene, chain, time, self.loads, members)
+        self._sensor = SensedAcceleration(scene, chain, time, self.loads, members)
         at_end = np.append(held[2:], np.zeros((2, *tail)), axis=0)[None, :2]
         sensed = self._sensor.after(self._sensor.none, np.stack([z, z]), held[:1], at_end, 0)
         self.state = ChainState(z, np.zeros_like(z), held, sensed, mode)

@@ -14,14 +14,38 @@ from haploop.protocol.ticks import Timebase
 from haploop.protocol.trees import tree_select
 
 
-class NoAcceleration:
-    """Stands where no sample carries an acceleration.
+class SensedAcceleration:
+    """Accelerations at plant steps, kept until a late sensor has told them.
+
+    At a step the sensor senses the acceleration under the forces held over the step that ends there; 0 at the start,
+    and while friction holds its body. A bandwidth makes it a state of the chain; a delay reads an older step.
+
+    Args:
+        scene: a resolved scene, or the stacked scene of a batch.
+        chain: of the scene.
+        time: the integers of the run.
+        loads: load in N at the steps first ... last - 1.
+        members: of the batch; None for one run.
 
     Attributes:
-        none: sensed accelerations before the first.
+        none: what is kept before the first step; empty where no sample carries an acceleration.
     """
 
-    none: tuple[Any, ...] = ()
+    def __init__(
+        self, scene: dict[str, Any], chain: Chain, time: Timebase, loads: Callable[[int, int], np.ndarray],
+        members: int | None = None,
+    ) -> None:  # fmt: skip
+        table, is_used = scene.get("accelerometer", {}), accelerometer_is_used(scene)
+        self.none = (0.0,) * (round(table.get("delay", 0.0) * time.plant_rate) + 1) if is_used else ()
+        self._loads, self._state = loads, chain.states.index("accelerometer") if chain.sensor else None
+        if is_used and not chain.sensor:
+            body = sensor_body(table, "transmission" in scene)
+
+            def factors_of(chain: Chain) -> tuple[np.ndarray, ...]:
+                return tuple(chain.accelerations(stuck)[body].astype(float) for stuck in (False, True))
+
+            factors = make_tables(factors_of, chain, has_members=members is not None)
+            self._factors = tuple(factor[:, None] for factor in factors)
 
     def after(
         self, sensed: tuple[Any, ...], states: np.ndarray, command: np.ndarray, at_ends: np.ndarray, step: int
@@ -35,90 +59,22 @@ class NoAcceleration:
             at_ends: friction in N and whether body 0 is stuck at the end of every step, shape (n, 2).
             step: the number of the plant step at the end of the first one.
         """
-        return sensed
+        if not sensed:
+            return sensed
+        rows = states[1:, self._state] if self._state else self._accelerations(states[1:], command, at_ends, step)
+        return (*sensed, *(rows.tolist() if rows.ndim == 1 else rows))[-len(sensed) :]
 
-    def select(self, kept: np.ndarray) -> None:
-        """There is nothing to drop members from."""
-
-
-class SensedAcceleration(NoAcceleration):
-    """The acceleration of a body at plant steps under the forces held over the step that ends there; 0 at the start,
-    and while friction holds the body.
-
-    Args:
-        late: plant steps by which a reading is late.
-        factors: of (states, command, friction, load), free and with body 0 stuck, shape (states + 3, 1, ...) each.
-        loads: load in N at the steps first ... last - 1.
-    """
-
-    def __init__(self, late: int, factors: tuple[np.ndarray, ...], loads: Callable[[int, int], np.ndarray]) -> None:
-        self._factors, self._loads = factors, loads
-        self.none = (0.0,) * (late + 1)
-
-    def after(
-        self, sensed: tuple[Any, ...], states: np.ndarray, command: np.ndarray, at_ends: np.ndarray, step: int
-    ) -> tuple[Any, ...]:
+    def _accelerations(self, states: np.ndarray, command: np.ndarray, at_ends: np.ndarray, step: int) -> np.ndarray:
         friction, is_stuck = at_ends.swapaxes(0, 1)
-        load = self._loads(step, step + len(command))
-        acting = [*states[1:].swapaxes(0, 1), command, friction, load]
+        acting = [*states.swapaxes(0, 1), command, friction, self._loads(step, step + len(command))]
         free, stuck = self._factors
         factors = np.where(is_stuck > 0.0, stuck, free)
         total = factors[0] * acting[0]
         for factor, of in zip(factors[1:], acting[1:], strict=True):
             total = total + factor * of
-        return (*sensed, *_rows(total))[-len(self.none) :]
+        return total
 
     def select(self, kept: np.ndarray) -> None:
-        self._factors = tree_select(self._factors, kept)
-
-
-class FilteredAcceleration(NoAcceleration):
-    """A band-limited sensor's output, which is a state of the chain.
-
-    Args:
-        late: plant steps by which a reading is late.
-        state: its place among the states.
-    """
-
-    def __init__(self, late: int, state: int) -> None:
-        self._state, self.none = state, (0.0,) * (late + 1)
-
-    def after(
-        self, sensed: tuple[Any, ...], states: np.ndarray, command: np.ndarray, at_ends: np.ndarray, step: int
-    ) -> tuple[Any, ...]:
-        return (*sensed, *_rows(states[1:, self._state]))[-len(self.none) :]
-
-
-def make_sensed_acceleration(
-    scene: dict[str, Any],
-    chain: Chain,
-    time: Timebase,
-    loads: Callable[[int, int], np.ndarray],
-    members: int | None = None,
-) -> NoAcceleration:
-    """Makes what a sensor with the scene's bandwidth and delay senses of the chain.
-
-    Args:
-        scene: a resolved scene, or the stacked scene of a batch.
-        chain: of the scene.
-        time: the integers of the run.
-        loads: load in N at the steps first ... last - 1.
-        members: of the batch; None for one run.
-    """
-    if not accelerometer_is_used(scene):
-        return NoAcceleration()
-    table = scene.get("accelerometer", {})
-    late = round(table.get("delay", 0.0) * time.plant_rate)
-    if chain.sensor:
-        return FilteredAcceleration(late, chain.states.index("accelerometer"))
-    body = sensor_body(table, "transmission" in scene)
-
-    def factors_of(chain: Chain) -> tuple[np.ndarray, ...]:
-        return tuple(chain.accelerations(stuck)[body].astype(float) for stuck in (False, True))
-
-    factors = tuple(table[:, None] for table in make_tables(factors_of, chain, has_members=members is not None))
-    return SensedAcceleration(late, factors, loads)
-
-
-def _rows(column: np.ndarray) -> list[Any]:
-    return column.tolist() if column.ndim == 1 else list(column)
+        """Drops the members of a batch that are not kept, shape (members,)."""
+        if self.none and not self._state:
+            self._factors = tree_select(self._factors, kept)

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from haploop.plant.chain.chain import Chain, Link, Matrix
+from haploop.plant.chain.chain import Chain, Matrix
 from haploop.plant.motion.transition import gramian, transition_minus_identity
 from haploop.protocol.arrays import each
-from haploop.protocol.trees import tree_select
+from haploop.protocol.trees import tree_leaves, tree_select, tree_unflatten
 
 _wide = np.longdouble
 # Responses to the load are made for this many intervals at a time, on a fixed grid; in a batch for fewer.
@@ -184,34 +184,9 @@ def make_tables(
             share them.
     """
 
-    def of(*numbers: float) -> tuple[np.ndarray, ...]:
-        return make(_with(chain, numbers))
-
-    numbers = _numbers(chain)
-    tables = each(of, *numbers)
-    is_shared = not any(getattr(number, "shape", ()) for number in numbers)
+    # What is made does not depend on the start and the rest: chains that differ in these alone share it.
+    chain = replace(chain, spring=(chain.spring[0], 0.0), start=(0.0, 0.0))
+    leaves = tree_leaves(chain)
+    tables = each(lambda *numbers: make(tree_unflatten(chain, numbers)), *leaves)
+    is_shared = not any(getattr(leaf, "shape", ()) for leaf in leaves)
     return tuple(table[..., None] for table in tables) if has_members and is_shared else tables
-
-
-def _numbers(chain: Chain) -> list[Any]:
-    numbers = [*chain.masses_kg, *(damping for _, damping in chain.grounded.values())]
-    for link in chain.links:
-        numbers += (link.stiffness, link.damping)
-    numbers.append(chain.spring[0])
-    if chain.actuator_rate is not None:
-        numbers.append(chain.actuator_rate)
-    return numbers if chain.sensor is None else [*numbers, chain.sensor[1]]
-
-
-def _with(chain: Chain, numbers: tuple[float, ...]) -> Chain:
-    left = iter(numbers)
-    return replace(
-        chain,
-        masses_kg=tuple(next(left) for _ in chain.masses_kg),
-        grounded={name: (body, next(left)) for name, (body, _) in chain.grounded.items()},
-        links=tuple(Link(link.name, next(left), next(left)) for link in chain.links),
-        spring=(next(left), 0.0),
-        actuator_rate=None if chain.actuator_rate is None else next(left),
-        sensor=None if chain.sensor is None else (chain.sensor[0], next(left)),
-        start=(0.0, 0.0),
-    )
