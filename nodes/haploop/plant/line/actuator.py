@@ -31,7 +31,10 @@ class Actuator(NamedTuple):
         force = command if self.resolution is None else nearest_multiple(command, self.resolution)
         if self.saturation is None:
             return force, False
-        limited, is_finite = clipped(force, self.saturation), force - force == 0.0
+        limited = clipped(force, self.saturation)
+        if limited is force:  # a float within the limits
+            return force, False
+        is_finite = force - force == 0.0
         return where(is_finite, limited, force), is_finite & (limited != force)
 
 

@@ -40,16 +40,19 @@ class Reading(NamedTuple):
             acceleration: what the sensor feels, m/s^2.
             noise: of this tick, m/s^2; not read where there is none.
         """
-        value = acceleration if self.bias is None else acceleration + self.bias
-        if self.noise is not None:
+        bias, has_noise, most, resolution, last_count = self
+        value = acceleration if bias is None else acceleration + bias
+        if has_noise is not None:
             value = value + noise
         is_clipped: Any = False
-        if self.range is not None:
-            inside = (value >= -self.range) & (value <= self.range)
-            is_clipped = not inside if inside.__class__ is bool else ~inside
-            value = clipped(value, self.range)
-        if self.resolution is not None:
-            value = clipped(nearest_multiple(value, self.resolution), self.last_count)
+        if most is not None:
+            limited = clipped(value, most)
+            if limited is not value or value != value:  # no float within the range
+                inside = (value >= -most) & (value <= most)
+                is_clipped = not inside if inside.__class__ is bool else ~inside
+            value = limited
+        if resolution is not None:
+            value = clipped(nearest_multiple(value, resolution), last_count)
         return value, is_clipped
 
 
