@@ -187,5 +187,5 @@ def _columns(parts: list[np.ndarray], end: np.ndarray, count: int) -> Iterable[n
     """Returns the first ``count`` columns of parts of shape (rows, columns[, members]), one after the other, and of
     their end; in a batch each contiguous."""
     if end.ndim == 1:
-        return np.vstack([*parts, end]).T[:count]
+        return np.concatenate([*parts, end[None]]).T[:count]
     return (np.concatenate([*(part[:, at] for part in parts), end[at, None]]) for at in range(count))
