@@ -38,6 +38,8 @@ class Point:
 
 Group = Sequence[Point]
 Evaluate = Callable[[Group], list[Row]]
+# From a stage, an evaluation of one group and many groups to the rows of each group.
+EvaluateAll = Callable[[str, Evaluate, Sequence[Group]], list[list[Row]]]
 
 
 class Scale(NamedTuple):
@@ -76,7 +78,7 @@ class Space:
         for column in columns.values():
             rng.shuffle(column)
         drawn = [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
-        return [[self._draw_point(rng, choices) for _ in range(each)] for choices in drawn]
+        return [[self._point(rng, choices, self._numbers(rng)) for _ in range(each)] for choices in drawn]
 
     def neighbours(
         self, rng: np.random.Generator, point: Point, spread: float, count: int, *, shifted: bool = True
@@ -92,26 +94,17 @@ class Space:
         for key, scale in self.scales.items() if shifted else ():
             value = choices[key] + round(10.0 * spread * rng.standard_normal()) * scale.step
             choices[key] = round(min(max(value, scale.low), scale.high), 12)
-        return [self._draw_neighbour(rng, choices, point.numbers, spread) for _ in range(count)]
+        return [self._point(rng, choices, self._near(rng, point.numbers, spread)) for _ in range(count)]
 
-    def _draw_point(self, rng: np.random.Generator, choices: dict[str, Any]) -> Point:
-        return self._finished(
-            rng,
-            choices,
-            {key: math.exp(rng.uniform(math.log(low), math.log(high))) for key, (low, high) in self.bounds.items()},
-        )
+    def _numbers(self, rng: np.random.Generator) -> dict[str, float]:
+        return {key: math.exp(rng.uniform(math.log(low), math.log(high))) for key, (low, high) in self.bounds.items()}
 
-    def _draw_neighbour(
-        self, rng: np.random.Generator, choices: dict[str, Any], near: Mapping[str, float], spread: float
-    ) -> Point:
-        numbers = {key: value * math.exp(spread * rng.standard_normal()) for key, value in near.items()}
-        return self._finished(
-            rng, choices, {key: float(np.clip(value, *self.bounds[key])) for key, value in numbers.items()}
-        )
+    def _near(self, rng: np.random.Generator, numbers: Mapping[str, float], spread: float) -> dict[str, float]:
+        moved = {key: value * math.exp(spread * rng.standard_normal()) for key, value in numbers.items()}
+        return {key: float(np.clip(value, *self.bounds[key])) for key, value in moved.items()}
 
-    def _finished(self, rng: np.random.Generator, choices: dict[str, Any], numbers: dict[str, float]) -> Point:
-        point = Point(choices, numbers)
-        point = point.rounded(self.digits) if self.digits else point
+    def _point(self, rng: np.random.Generator, choices: dict[str, Any], numbers: dict[str, float]) -> Point:
+        point = Point(choices, numbers).rounded(self.digits) if self.digits else Point(choices, numbers)
         return replace(point, seed=int(rng.integers(2**31))) if self.seeded else point
 
 
@@ -174,7 +167,7 @@ def random_search(
     seed: int,
     distance: Callable[[Row], float],
     tie: Callable[[Row], float] = lambda _: 0.0,
-    evaluate_all: Callable[[str, Evaluate, Sequence[Group]], list[list[Row]]] = evaluate_in_turn,
+    evaluate_all: EvaluateAll = evaluate_in_turn,
 ) -> Found:
     """Searches a space for the point with the least distance.
 
@@ -192,21 +185,17 @@ def random_search(
     def run(stage: str, groups: Sequence[Group]) -> list[Trial]:
         return evaluated(stage, evaluate, groups, evaluate_all)
 
+    def near(trial: Trial, spread: float) -> list[Point]:
+        return space.neighbours(rng, trial.point, spread, effort.children)
+
     trials = run("random", space.draw(rng, effort.structures, effort.each))
-    for spread in np.geomspace(effort.far, effort.close, effort.rounds):
+    for spread in np.geomspace(effort.far, effort.close, effort.rounds).tolist():
         parents = _best(trials, effort.best, distance)
-        trials += run(
-            "refined",
-            [
-                space.neighbours(rng, parent.point, float(spread), effort.children)
-                for parent in parents
-                for _ in range(effort.groups)
-            ],
-        )
+        trials += run("refined", [near(parent, spread) for parent in parents for _ in range(effort.groups)])
     finalists = _best(trials, effort.finalists, lambda row: (distance(row), tie(row)))
     around = [space.neighbours(rng, one.point, effort.close, effort.neighbours, shifted=False) for one in finalists]
-    near = run("neighbour", around)
-    of_each = [near[i : i + effort.neighbours] for i in range(0, len(near), effort.neighbours)]
+    neighbours = run("neighbour", around)
+    of_each = [neighbours[i : i + effort.neighbours] for i in range(0, len(neighbours), effort.neighbours)]
     means = [np.mean([distance(trial.row) for trial in group]) for group in of_each]
     i = int(np.argmin([distance(one.row) + mean for one, mean in zip(finalists, means, strict=True)]))
     return Found(trials, finalists[i], of_each[i])
@@ -216,7 +205,7 @@ def evaluated(
     stage: str,
     evaluate: Evaluate,
     groups: Sequence[Group],
-    evaluate_all: Callable[[str, Evaluate, Sequence[Group]], list[list[Row]]] = evaluate_in_turn,
+    evaluate_all: EvaluateAll = evaluate_in_turn,
 ) -> list[Trial]:
     """Evaluates groups of points and returns a trial for each point, in order."""
     rows = evaluate_all(stage, evaluate, groups)

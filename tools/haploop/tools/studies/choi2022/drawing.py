@@ -1,4 +1,4 @@
-"""Drawings of several figures: a colour for each kind of element, the loop of an inertia, and a press on a wall."""
+"""Drawings of several figures: a colour for each kind of element, momentum over velocity, and a press on a wall."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def legend_of_colours(figure: Figure, colours: Mapping[str, str]) -> None:
     figure.legend(handles=handles, loc="outside lower center", ncols=len(handles), frameon=False, fontsize=TEXT)
 
 
-def draw_loop(ax: Axes, v_m_s: np.ndarray, mass_kg: float, title: str) -> None:
+def draw_momentum(ax: Axes, v_m_s: np.ndarray, mass_kg: float, title: str) -> None:
     """Draws velocity against momentum of a virtual inertia (Choi et al. 2022, Figs. 4 and 5).
 
     The path is the staircase v[k-1] -> v[k-1], m v[k]; the rectangle of each step is the energy taken (green) or given

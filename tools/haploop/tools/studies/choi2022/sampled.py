@@ -29,12 +29,12 @@ def forces(x_m: np.ndarray, kind: str, cutoff_Hz: float | None = None) -> np.nda
     """Returns the force at every sample of the wall's spring or of an element that always acts, N.
 
     Args:
-        x_m: samples 1 ms apart, shape (ticks, loops); a spring's wall is above 0 and is never left.
+        x_m: samples 1 ms apart, shape (ticks, batch); a spring's wall is above 0 and is never left.
         kind: "spring", or the kind of an element, with the paper's parameter.
         cutoff_Hz: of a low-pass over the acceleration.
 
     Returns:
-        Shape (ticks, loops).
+        Shape (ticks, batch).
     """
     scene: dict[str, Any] = {}
     if kind == SPRING:

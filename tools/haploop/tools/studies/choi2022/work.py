@@ -32,13 +32,13 @@ class Work:
         number: of the figure.
         small: whether a version of seconds is wanted, with fewer runs; it need not come to the same verdicts.
         workers: processes for many runs; as many as there are cores when None.
-        stage: told what goes on.
+        stage: shows the progress of many runs.
 
     Attributes:
         kinds: classes of elements, by name.
         texts: of the figure, by name: its title among them.
         answer: what a builder of devices can take from it, in a sentence or two; empty for what has none.
-        caption: what is to be seen, in a sentence or two; that of the texts unless it is told otherwise.
+        caption: what is to be seen, in a sentence or two; that of the texts unless set.
         notes: whole sections in Markdown that go below the figure on the page.
     """
 

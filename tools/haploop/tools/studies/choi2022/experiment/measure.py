@@ -121,11 +121,11 @@ def measure(setups: Sequence[Setup]) -> list[dict[str, Any]]:
     Args:
         setups: best of one structure, so that they run in one batch.
     """
-    climbed = stiffness_ladder(setups)
+    ladders = stiffness_ladder(setups)
     booked = _run_all([_booked(setup, k) for setup in setups for k in BOOKED_AT_N_M], energy=True)
     pairs = _run_all([setup.scene(PAIR_AT_N_M, both(*PAIR)) for setup in setups])
-    stiffest = _run_all([_stiffest(*one) for one in zip(setups, climbed, strict=True)], energy=True)
-    found = zip(setups, climbed, booked[::2], booked[1::2], pairs, stiffest, strict=True)
+    stiffest = _run_all([_stiffest(*one) for one in zip(setups, ladders, strict=True)], energy=True)
+    found = zip(setups, ladders, booked[::2], booked[1::2], pairs, stiffest, strict=True)
     return [_row(setup, steady, two, pair, most) for setup, steady, *two, pair, most in found]
 
 

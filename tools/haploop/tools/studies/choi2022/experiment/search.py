@@ -63,7 +63,7 @@ WHOLE = Effort(
     structures=24, each=24, rounds=2, best=3, groups=3, children=8, neighbours=24, far=0.15, close=0.05
 )  # fmt: skip
 SMALL = Effort(structures=1, each=2, rounds=1, best=1, children=1, neighbours=1, far=0.15)
-# Claims that hold less often than this are in no pair that is told of.
+# Claims that hold less often than this are in no pair of those that never hold together.
 _OFTEN = 0.05
 
 

@@ -34,31 +34,31 @@ def make(work: Work) -> list[Finding]:
             "One contact, sampled, held, quantised and delayed", delay_s=0.002, **encoder
         ),
     }
-    loops, walls, columns = {}, {}, {}
+    curves, walls, columns = {}, {}, {}
     for number, (name, scene) in enumerate(scenes.items()):
         summary, log = run(scene)
-        loops[name] = loop(scene, log["/plant"])
+        curves[name] = force_curve(scene, log["/plant"])
         walls[name] = summary["energy"]["wall"]
-        columns |= {f"penetration_{number}_m": loops[name][0], f"force_{number}_N": loops[name][1]}
+        columns |= {f"penetration_{number}_m": curves[name][0], f"force_{number}_N": curves[name][1]}
         work.scene(f"figure_3_{number}", scene)
     figure = empty_figure(13.0, 4.4)
     axes = figure.subplots(1, 3, sharey=True, sharex=True)
-    for ax, (name, (depth, force)) in zip(axes, loops.items(), strict=True):
+    for ax, (name, (depth, force)) in zip(axes, curves.items(), strict=True):
         _draw(ax, name, depth, force, walls[name])
     work.figure(figure, "figure_3")
     work.data("figure_3", columns)
     sampled, quantised, delayed = (amount(-wall["true_J"], "J") for wall in walls.values())
     work.answer = work.tell("answer", sampled=sampled, quantised=quantised, delayed=delayed)
-    return _findings(loops, walls)
+    return _findings(curves, walls)
 
 
-def loop(scene: dict[str, Any], plant: Any) -> tuple[np.ndarray, np.ndarray]:
+def force_curve(scene: dict[str, Any], plant: Any) -> tuple[np.ndarray, np.ndarray]:
     """Returns penetration (m, negative outside) and force out of the wall (N) at every plant step."""
     return scene["wall"]["position"] - plant["x"], np.asarray(plant["force"])
 
 
 def area_J(depth_m: np.ndarray, force_N: np.ndarray) -> float:
-    """Returns the area within the closed loop of a held force over penetration, positive if counter-clockwise.
+    """Returns the area within the closed curve of a held force over penetration, positive if counter-clockwise.
 
     -sum f dx: the force points out, so what it gives on the way out is counted positive.
     """
@@ -77,10 +77,8 @@ def _draw(ax: Axes, name: str, depth: np.ndarray, force: np.ndarray, wall: dict[
     ax.plot(mm[deepest:], force[deepest:], color=RELEASING, linewidth=1.2, drawstyle="steps-post", label="releasing")
     dress(ax, name, "penetration (mm)", "force out of the wall (N)")
     ax.set_xlim(-0.45, None)
-    text = (
-        f"took {amount(_taken(depth, force), 'J')}\ngave {amount(_given(depth, force), 'J')}\nleak "
-        f"{amount(-wall['true_J'], 'J')}"
-    )
+    took, gave = map(_J, _taken_and_given_J(depth, force))
+    text = f"took {took}\ngave {gave}\nleak {_J(-wall['true_J'])}"
     ax.text(0.97, 0.06, text, transform=ax.transAxes, ha="right", va="bottom", fontsize=SMALL, color=INK)
     legend(ax, **UPPER_LEFT, **INSIDE)
 
@@ -91,24 +89,21 @@ def _edges_m(depth: np.ndarray, force: np.ndarray) -> tuple[float, float]:
     return float(depth[acting[0]]), float(depth[acting[-1] + 1])
 
 
-def _taken(depth: np.ndarray, force: np.ndarray) -> float:
-    return float(np.maximum(force[:-1] * np.diff(depth), 0.0).sum())
+def _taken_and_given_J(depth: np.ndarray, force: np.ndarray) -> tuple[float, float]:
+    work = force[:-1] * np.diff(depth)
+    return float(np.maximum(work, 0.0).sum()), float(np.maximum(-work, 0.0).sum())
 
 
-def _given(depth: np.ndarray, force: np.ndarray) -> float:
-    return float(np.maximum(-force[:-1] * np.diff(depth), 0.0).sum())
-
-
-def _findings(loops: dict[str, Any], walls: dict[str, Any]) -> list[Finding]:
-    energies = {name: (_taken(*one), _given(*one)) for name, one in loops.items()}
-    areas, leaks = [area_J(*one) for one in loops.values()], [-wall["true_J"] for wall in walls.values()]
+def _findings(curves: dict[str, Any], walls: dict[str, Any]) -> list[Finding]:
+    energies = {name: _taken_and_given_J(*one) for name, one in curves.items()}
+    areas, leaks = [area_J(*one) for one in curves.values()], [-wall["true_J"] for wall in walls.values()]
     apart = max(abs(area / leak - 1.0) for area, leak in zip(areas, leaks, strict=True))
     leak = walls["and 2 ms of delay"]["leak"]
     causes = ("sampling_and_hold", "quantisation", "delay")
-    edges = [_edges_m(*one) for one in loops.values()]
+    edges = [_edges_m(*one) for one in curves.values()]
     late = [began > 0.0 > ended for began, ended in edges]
-    levels = [len(np.unique(force)) for _, force in loops.values()]
-    steps = [int(np.count_nonzero(force)) for _, force in loops.values()]
+    levels = [len(np.unique(force)) for _, force in curves.values()]
+    steps = [int(np.count_nonzero(force)) for _, force in curves.values()]
     exact, closed = _constant_speed()
     summed, formula = _telescoped()
     return [

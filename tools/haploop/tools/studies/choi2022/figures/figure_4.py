@@ -13,7 +13,7 @@ from haploop.tools.linear.one_tick import OneTickMap
 from haploop.tools.render.units import amount, fixed
 from haploop.tools.search.bisect import Tolerance, bisect
 from haploop.tools.studies.choi2022.claims import Finding, claims_of
-from haploop.tools.studies.choi2022.drawing import draw_loop
+from haploop.tools.studies.choi2022.drawing import draw_momentum
 from haploop.tools.studies.choi2022.sampled import MASS_KG, PERIOD_S, closed_form, mean_taken, steps_J
 from haploop.tools.studies.choi2022.scenes import fig6, pushed_and_braked, run, single_contact
 from haploop.tools.studies.choi2022.work import Work
@@ -40,8 +40,8 @@ def make(work: Work) -> list[Finding]:
     contact = single_contact("In and out of the wall, with inertia", dissipation=[inertia[0] | {"acts": "in-contact"}])
     figure = empty_figure(11.0, 4.6)
     left, right = figure.subplots(1, 2)
-    draw_loop(left, pulse, MASS_KG, "Prescribed: faster, then slower")
-    draw_loop(right, v, MASS_KG, "A run of the program: pushed, then braked")
+    draw_momentum(left, pulse, MASS_KG, "Prescribed: faster, then slower")
+    draw_momentum(right, v, MASS_KG, "A run of the program: pushed, then braked")
     for ax, speeds in ((left, pulse), (right, v)):
         net = amount(float(steps_J(speeds, MASS_KG).sum()), "J")
         ax.text(0.03, 0.95, f"net taken {net}", transform=ax.transAxes, va="top", fontsize=SMALL, color=INK)
@@ -77,7 +77,7 @@ def _on_energy(
 
 
 def _on_filters(masses_g: dict[str, float]) -> list[Finding]:
-    """Tests what is said of filters and sensors of the acceleration; the largest masses are given by cutoff."""
+    """Tests the claims about filters and sensors of the acceleration, given the largest masses by cutoff."""
     passive = {named(cutoff): passive_up_to_Hz(cutoff) for cutoff in CUTOFFS_HZ}
     stiffest = {named(cutoff): 1e-3 * largest_stiffness_N_m(cutoff, MASS_KG) for cutoff in CUTOFFS_HZ}
     errors, fine = errors_m_s2(), errors_m_s2(_FINE_M)

@@ -9,7 +9,7 @@ import numpy as np
 from haploop.tools.figure.style import GREY, dress, empty_figure, legend, plain_numbers
 from haploop.tools.render.units import amount, fixed
 from haploop.tools.studies.choi2022.claims import Finding, claims_of
-from haploop.tools.studies.choi2022.drawing import COLOURS, INSIDE, draw_loop
+from haploop.tools.studies.choi2022.drawing import COLOURS, INSIDE, draw_momentum
 from haploop.tools.studies.choi2022.sampled import (
     KINDS,
     MASS_KG,
@@ -34,17 +34,17 @@ _JITTER_M_S, _DRIFT_M_S = 0.01, 0.05
 
 
 def make(work: Work) -> list[Finding]:
-    """Draws the alternating loop, its energy sample by sample, and all kinds over frequency."""
+    """Draws momentum over an alternating velocity, its energy sample by sample, and all kinds over frequency."""
     frequencies = np.concatenate([np.geomspace(2.03, 60.7, 20), np.linspace(63.1, 497.3, 60)])
     if work.small:
         frequencies = frequencies[::8]
     theta = 2.0 * np.pi * frequencies * PERIOD_S
     measured = {(kind, late): mean_taken(kind, theta, late) for kind in KINDS for late in (0, 2)}
     figure = empty_figure(14.0, 8.2)
-    (loop, over_samples), over_frequency = figure.subplots(2, 2)
+    (momentum, over_samples), over_frequency = figure.subplots(2, 2)
     velocity = _DRIFT_M_S + _JITTER_M_S * np.array([-1.0, 1.0, -1.0, 1.0, -1.0, 1.0])
-    draw_loop(loop, velocity, MASS_KG, "The sign alternates every sample")
-    loop.set_ylim(350.0, 650.0)
+    draw_momentum(momentum, velocity, MASS_KG, "The sign alternates every sample")
+    momentum.set_ylim(350.0, 650.0)
     books = _over_samples(over_samples)
     for ax, late in zip(over_frequency, (0, 2), strict=True):
         _over_frequency(ax, frequencies, measured, late)
@@ -109,7 +109,7 @@ def _on_alternation() -> list[Finding]:
     formula = -2.0 * MASS_KG * _JITTER_M_S**2
     kept = [_closed(rng, shortest=2) for _ in range(2000)]
     broken = [_closed(rng, shortest=1) for _ in range(2000)]
-    least, leaking = min(map(_loop_J, kept)), float(np.mean([_loop_J(v) < 0.0 for v in broken]))
+    least, leaking = min(map(_cycle_J, kept)), float(np.mean([_cycle_J(v) < 0.0 for v in broken]))
     shifts = [
         _taken_under_jitter(BI, drift)[1:].reshape(-1, 2).sum(axis=1).mean() for drift in (-_DRIFT_M_S, 0.0, _DRIFT_M_S)
     ]
@@ -131,7 +131,7 @@ def _on_alternation() -> list[Finding]:
 def _closed(rng: np.random.Generator, shortest: int) -> np.ndarray:
     """Returns a random velocity that ends as it began, m/s: tendencies of ``shortest`` changes, or up to 2 more if 2.
 
-    It is returned with its first three values again, so that every step of the loop has its past.
+    It is returned with its first three values again, so that every step of the cycle has its past.
     """
     tendencies = 2 * int(rng.integers(1, 5))
     changes = []
@@ -144,8 +144,8 @@ def _closed(rng: np.random.Generator, shortest: int) -> np.ndarray:
     return 0.01 * np.concatenate([v, v[:3]])
 
 
-def _loop_J(v: np.ndarray) -> float:
-    """Returns the energy taken once around a closed loop of velocity."""
+def _cycle_J(v: np.ndarray) -> float:
+    """Returns the energy taken once around a closed cycle of velocity."""
     period = len(v) - 3
     around = np.concatenate([v[:period], v[:period]])
     return float(steps_J(around, MASS_KG)[period:].sum())
