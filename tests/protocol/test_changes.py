@@ -1,10 +1,15 @@
 """The one meaning of a change: what it does to a scene, from which tick on, and what is told of one refused."""
 
 import json
-from typing import Any
+from pathlib import Path
+from typing import Annotated, Any
 
 import pytest
 
+import haploop.logger
+from haploop.controller.dissipation import Element, Motion, Quantity
+from haploop.launch.clock.clock import Clock
+from haploop.launch.runs.in_process import run_in_process
 from haploop.protocol.changes import (
     Change,
     at_work,
@@ -16,6 +21,8 @@ from haploop.protocol.changes import (
     refusals_of,
     spans,
 )
+from haploop.protocol.ticks import Timebase
+from helpers.scenes.least import KINDS, WALL, scene
 
 DAMPING = {"kind": "damping", "damping": 1.0}
 INERTIA = {"kind": "inertia", "mass": 0.01, "acts": "always"}
@@ -120,3 +127,48 @@ def test_pauses_and_refusals_are_no_changes() -> None:
         False,
     ]
     assert describe({"refused": "No.", "change": SWAP}) == "No."
+
+
+class Choosy(Element):
+    """Refuses a number that its declaration allows."""
+
+    kind = "choosy"
+    force_N: Annotated[float, Quantity("N", at_least=0)]
+
+    def __post_init__(self) -> None:
+        if self.force_N > 0.25:
+            raise ValueError("too strong")
+
+    def force(self, motion: Motion) -> Any:
+        return -self.force_N
+
+
+def choosy() -> dict[str, Any]:
+    """A scene whose first swap is refused and whose second is not."""
+    events = [
+        {"at": at, "element": 0, "swap": {"kind": "choosy", "force_N": force, "acts": "always"}}
+        for at, force in ((0.01, 0.5), (0.02, 0.1))
+    ]
+    damping = {"kind": "damping", "damping": 0.5}
+    resolved = scene(duration=0.05, wall=WALL, dissipation=[damping])
+    return {**resolved, "event": events}
+
+
+def test_a_refusal_in_the_log_is_a_field_that_names_the_change(tmp_path: Path) -> None:
+    made = choosy()
+    run_in_process(made, KINDS | {"choosy": Choosy}, out=tmp_path)
+    events = [(event["tick"], event) for event in haploop.logger.read(tmp_path)["/events"]]
+    (refused,) = [event for _, event in events if "refused" in event]
+    assert refused["change"] == {"tick": 10, "swap": made["event"][0]["swap"], "element": 0}
+    reason = "ElementError: The element choosy cannot be made with force_N = 0.5: ValueError: too strong"
+    assert refused["refused"].endswith(f"was refused: {reason}")
+    assert [(change.tick, change.refused is None) for change in changes_of(events)] == [(10, False), (20, True)]
+
+
+def test_the_clock_does_not_take_a_refused_change_for_one_that_was_made() -> None:
+    made = choosy()
+    clock = Clock(made, Timebase.from_clock(made["clock"], made["duration"]), KINDS | {"choosy": Choosy})
+    clock.grant(0, 0.0)
+    clock.note(refusal(Change.from_dict(10, made["event"][0]).refuse(ValueError("too strong"))))
+    clock.note(refusal(Change.from_dict(20, made["event"][1]).refuse(ValueError("no"))))
+    assert [table["kind"] for table in clock.present()["dissipation"]] == ["damping"]

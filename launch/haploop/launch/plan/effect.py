@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any, Literal, Protocol, TypeVar
+from typing import Any, Literal, TypeVar
 
 from haploop.plant.integrators.registry import find_integrator
 from haploop.protocol.scene.scene import Scene
@@ -40,30 +40,26 @@ def moved_by(integrator: str, modules: tuple[str, ...], rubs: bool) -> tuple[str
     return (*kept, find_integrator(integrator).motions[1].partition(":")[0]) if rubs else kept
 
 
-class Draft(Protocol):
-    """A scene that is being checked; any part of it may be wrong in itself, which is reported elsewhere."""
+@dataclass(frozen=True)
+class Draft:
+    """A scene that is being checked; any part of it may be wrong in itself, which is reported elsewhere.
 
-    @property
-    def data(self) -> dict[str, Any]:
-        """The merged tables as they were given."""
-        ...
+    Attributes:
+        data: the merged tables as they were given.
+        scene: the whole scene, None where some value of it is wrong.
+        valid: returns some data as a table of a kind, None where they are none.
+        complain: adds a mistake, given its key, a sentence on what is expected and, unless the value is to be quoted,
+            what was found.
+    """
 
-    @property
-    def scene(self) -> Scene | None:
-        """The whole scene; None where some value of it is wrong."""
-        ...
+    data: dict[str, Any]
+    scene: Scene | None
+    valid: Callable[[type[Any], Any], Any]
+    complain: Callable[..., None]
 
     def table(self, name: str, kind: type[TableType]) -> TableType | None:
         """Returns a table, None where it is absent or wrong."""
-        ...
-
-    def valid(self, data: Any, kind: type[TableType]) -> TableType | None:
-        """Returns some data as a table, None where they are none of this kind."""
-        ...
-
-    def complain(self, key: tuple[str, ...], expected: str, given: str | None = None) -> None:
-        """Adds a mistake about a key, whose value is quoted unless ``given`` says what was found."""
-        ...
+        return self.valid(kind, self.data.get(name))
 
 
 def _nothing(_of: Any) -> Any:

@@ -57,7 +57,7 @@ def check_grip(draft: Draft) -> None:
     hand = draft.data.get("hand")
     if not isinstance(hand, dict) or "grip" not in hand:
         return
-    mass = draft.valid({"mass": hand.get("mass", 0.0)}, Hand)
+    mass = draft.valid(Hand, {"mass": hand.get("mass", 0.0)})
     if mass and not mass.mass:
         expected = "The grip lies between the device and the hand's mass, so hand.mass must be above 0 kg."
         draft.complain(("hand", "grip"), expected, "holds no mass")
@@ -82,7 +82,7 @@ def check_accelerometer(draft: Draft) -> None:
 
 def check_jitter(draft: Draft) -> None:
     """Refuses a longest delay of no whole number of plant steps."""
-    if (jitter := draft.data.get("jitter")) and (uniform := draft.valid(jitter, UniformJitter)):
+    if (jitter := draft.data.get("jitter")) and (uniform := draft.valid(UniformJitter, jitter)):
         _whole_steps(draft, ("jitter", "most"), "longest additional delay", uniform.most)
 
 

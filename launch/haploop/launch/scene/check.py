@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 from pydantic import ValidationError
 from pydantic_core import PydanticCustomError
 
+from haploop.launch.plan.effect import Draft
 from haploop.launch.plan.effects import all_effects
 from haploop.launch.scene.estimator_keys import check_estimators, check_filter
 from haploop.launch.scene.events import check_events
@@ -19,13 +20,10 @@ from haploop.launch.scene.models import number_of, read_table, scene_model
 from haploop.launch.scene.schema import Schema, alternatives, schema_at, whole_schema
 from haploop.launch.scene.toml_writer import inline
 from haploop.protocol.scene.scene import Clock, Scene
-from haploop.protocol.scene.table import Table
 from haploop.protocol.ticks import Timebase, TimebaseError
 
 if TYPE_CHECKING:
     from haploop.controller.dissipation import Element
-
-TableType = TypeVar("TableType", bound=Table)
 
 # Where the key ``kind`` says what else is in a table; a number stands for any.
 _TAGGED = {("hand", "force"), ("jitter",), ("dissipation", 0), ("event", 0, "swap")}
@@ -37,27 +35,6 @@ _FORMS = {
     "model_type": "It must be a table.",
     "model_attributes_type": "It must be a table.",
 }
-
-
-@dataclass(frozen=True)
-class Checked:
-    """A scene that is being checked, as effects see it; ``haploop.launch.plan.effect.Draft`` says what it gives."""
-
-    layers: Layers
-    scene: Scene | None
-
-    @property
-    def data(self) -> dict[str, Any]:
-        return self.layers.data
-
-    def table(self, name: str, kind: type[TableType]) -> TableType | None:
-        return read_table(kind, self.layers.data.get(name))
-
-    def valid(self, data: Any, kind: type[TableType]) -> TableType | None:
-        return read_table(kind, data)
-
-    def complain(self, key: KeyPath, expected: str, given: str | None = None) -> None:
-        self.layers.complain(key, expected, given)
 
 
 def resolve(layers: Layers, kinds: Mapping[str, type[Element]]) -> dict[str, Any]:
@@ -75,7 +52,7 @@ def resolve(layers: Layers, kinds: Mapping[str, type[Element]]) -> dict[str, Any
         tagged = _TAGGED if len(kinds) > 1 else _TAGGED - {("dissipation", 0)}  # one kind alone is no choice
         for detail in error.errors(include_url=False):
             complain(layers, detail["type"], detail["msg"], _plain(detail["loc"], tagged), schema)
-    draft = Checked(layers, scene)
+    draft = Draft(layers.data, scene, read_table, layers.complain)
     for effect in all_effects():
         effect.check(draft)
     check_estimators(layers)
