@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from haploop.launch.batch import batch
-from haploop.launch.batch.stacking import runs_in_arrays, structure
+from haploop.launch.batch.stacking import is_batchable, structure
 from helpers.runs.batches import alone, diverging, together
 from helpers.scenes.effect_tables import EFFECTS, slowly, tap
 from helpers.scenes.least import scene
@@ -23,7 +23,7 @@ def test_a_chain_out_of_an_array_has_every_bit_of_the_chain_alone(seed: int) -> 
     scenes = [base, *({**base, "wall": {**wall, "stiffness": wall["stiffness"] * factor}} for factor in (0.9, 1.2))]
     if seed % 3:
         scenes = [base, *(varied(base, rng) for _ in range(3))]
-    assert runs_in_arrays(base)
+    assert is_batchable(base)
     assert len({structure(each) for each in scenes}) == 1
     assert together(scenes) == [alone(each) for each in scenes]
 
@@ -53,7 +53,7 @@ def test_loops_with_friction_stick_slip_and_are_booked_as_they_are_alone(effects
         {**base, "wall": {**base["wall"], "stiffness": stiffness}, "seed": index}
         for index, stiffness in enumerate(rng.uniform(50.0, 3000.0, 5).tolist())
     ]
-    assert runs_in_arrays(base)
+    assert is_batchable(base)
     results = together(scenes)
     assert results == [alone(each) for each in scenes]
     assert all(result and result["energy"]["friction_heat_J"] > 1e-5 for result in results)
@@ -74,5 +74,5 @@ def test_friction_that_needs_every_step_walked_and_bodies_that_differ_go_alone()
     base = tap(("friction",))
     curved = tap((), friction={"kinetic": 0.04, "breakaway": 0.05, "stribeck_velocity": 0.01})
     other = {**base, "device": {**base["device"], "mass": 0.06}}
-    assert not runs_in_arrays(curved)
+    assert not is_batchable(curved)
     assert structure(base) != structure(other)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from haploop.launch.batch.batch import Batch
-from haploop.launch.batch.run import run_array
+from haploop.launch.batch.run import run_batch
 from helpers.runs.batches import pressed
 from helpers.runs.compiled import agree, compiled
 from helpers.scenes.least import KINDS
@@ -110,7 +110,7 @@ def test_loops_that_diverge_stand_still_where_they_did(
         )
         for each in np.linspace(*damping, 16).tolist()
     ]
-    expected = run_array(scenes, KINDS)
+    expected = run_batch(scenes, KINDS)
     ends = {result["ticks"] for result in expected}
     assert len(ends) > 5
     if duration > 1.0:  # the first has run for longer than what is kept of it

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from haploop.controller.dissipation import Element, Motion, Quantity, where
-from haploop.launch.batch.jax.run import compiling, results_of_compiled
-from haploop.launch.batch.run import run_array
+from haploop.launch.batch.jax.run import compiled_results, compiling
+from haploop.launch.batch.run import run_batch
 from helpers.runs.batches import PUSH, Stiffening, alone, pressed
 from helpers.runs.compiled import agree, compiled, jax, many
 from helpers.scenes.least import KINDS
@@ -20,15 +20,15 @@ from helpers.scenes.least import KINDS
 
 def test_results_are_those_of_arrays_but_for_the_last_digits() -> None:
     scenes = many(13)
-    assert agree(compiled(scenes), run_array(scenes, KINDS))
-    assert not agree(compiled(scenes), run_array(many(14)[1:], KINDS))
+    assert agree(compiled(scenes), run_batch(scenes, KINDS))
+    assert not agree(compiled(scenes), run_batch(many(14)[1:], KINDS))
 
 
 def test_a_program_serves_all_scenes_of_its_structure_and_jax_stays_as_it_was() -> None:
     compiled(many(16))
     count = compiling()[0]
     others = many(29, device={"mass": 0.02, "damping": 0.2})
-    assert agree(compiled(others), run_array(others, KINDS))
+    assert agree(compiled(others), run_batch(others, KINDS))
     assert compiling()[0] == count
     assert jax.numpy.zeros(1).dtype == np.float32
 
@@ -69,7 +69,7 @@ def test_put_together_for_a_gpu_the_loops_are_the_same(monkeypatch: pytest.Monke
     monkeypatch.setattr(jax, "default_backend", lambda: "gpu")
     monkeypatch.setattr(programs, "PROGRAMS", Programs())
     scenes = many(13)
-    assert agree(compiled(scenes), run_array(scenes, KINDS))
+    assert agree(compiled(scenes), run_batch(scenes, KINDS))
     assert compiling()[0] == 1
 
 
@@ -99,7 +99,7 @@ def test_what_is_not_asked_for_is_left_out() -> None:
 
 def test_scenes_too_few_to_be_worth_it_are_run_in_arrays_to_the_same_bits() -> None:
     count, scenes = compiling()[0], many(16, duration=0.149)
-    assert list(results_of_compiled(scenes, KINDS)) == list(enumerate(run_array(scenes, KINDS)))
+    assert list(compiled_results(scenes, KINDS)) == list(enumerate(run_batch(scenes, KINDS)))
     assert compiling()[0] == count
 
 
@@ -144,10 +144,10 @@ def test_an_element_of_any_kind_comes_to_what_it_comes_to_alone(element: type[El
 
 def test_bodies_in_a_row_go_their_own_way_to_the_same_bits() -> None:
     scenes = many(2, friction={"kinetic": 0.01}, hand=PUSH)
-    assert compiled(scenes) == run_array(scenes, KINDS)
+    assert compiled(scenes) == run_batch(scenes, KINDS)
 
 
 def test_without_jax_the_error_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "haploop.launch.batch.jax.programs", None)
     with pytest.raises(ImportError, match=r"pip install 'haploop\[jax\]'"):
-        list(results_of_compiled(many(16), KINDS))
+        list(compiled_results(many(16), KINDS))

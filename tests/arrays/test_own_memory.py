@@ -10,7 +10,7 @@ import pytest
 
 from haploop.controller import active_elements
 from haploop.controller.dissipation import Element, ElementError, Motion, Quantity
-from haploop.launch.batch.run import run_array
+from haploop.launch.batch.run import run_batch
 from helpers.runs.batches import alone, diverging, pressed, together
 from helpers.scenes.least import KINDS
 
@@ -117,12 +117,12 @@ def test_attributes_of_its_own_make_a_batch_run_one_by_one_and_nothing_else_woul
 ) -> None:
     kinds = KINDS | {"fading": element}
     expected = [alone(each, kinds) for each in scenes()]
-    assert run_array(scenes(), kinds, trajectories=True, fewest=1) == expected
+    assert run_batch(scenes(), kinds, trajectories=True, fewest=1) == expected
     with pytest.raises(ElementError, match="attributes of its own"):
         together(scenes(), kinds)
     monkeypatch.setattr(active_elements, "keeps_attributes", lambda _: False)
     monkeypatch.setattr(active_elements.Unchanged, "check", lambda _: None)
-    assert run_array(scenes(), kinds, trajectories=True, fewest=1) != expected
+    assert run_batch(scenes(), kinds, trajectories=True, fewest=1) != expected
 
 
 def test_a_container_of_the_class_is_such_an_attribute() -> None:

@@ -17,7 +17,7 @@ from rich.console import Console
 from rich.table import Table
 
 from haploop.controller.dissipation import registry
-from haploop.launch.batch.run import run_array
+from haploop.launch.batch.run import run_batch
 from haploop.launch.runs.in_process import run_in_process
 from haploop.launch.scene.file import load
 from haploop.tools.machine import machine
@@ -52,7 +52,7 @@ def check_kernel(scenes: list[dict[str, Any]], kinds: dict[str, Any]) -> None:
     """That the yardstick does the same work: its books are those of the arrays."""
     from oracles.array_kernel import BOOKS, FIGURES, run_kernel
 
-    for result, row in zip(run_array(scenes, kinds), run_kernel(scenes, True)[:, FIGURES:], strict=True):
+    for result, row in zip(run_batch(scenes, kinds), run_kernel(scenes, True)[:, FIGURES:], strict=True):
         energy, found = result["energy"], dict(zip(BOOKS, row.tolist(), strict=True))
         wall, (element,) = energy["wall"], energy["elements"]
         expected = {name: energy[f"{name}_J"] for name in ("hand_work", "device_heat", "hand_heat", "moved")}
@@ -76,8 +76,8 @@ def main() -> None:
     ticks_of = round(scenes[0]["duration"] * scenes[0]["clock"]["control_rate"])
     rows: dict[str, tuple[Callable[[], Any], int]] = {
         "one process, with the books": (lambda: [run_in_process(scene, kinds) for scene in few], len(few)),
-        "arrays, with the books": (lambda: run_array(scenes, kinds), len(scenes)),
-        "arrays, without": (lambda: run_array(scenes, kinds, energy=False), len(scenes)),
+        "arrays, with the books": (lambda: run_batch(scenes, kinds), len(scenes)),
+        "arrays, without": (lambda: run_batch(scenes, kinds, energy=False), len(scenes)),
     }
     if importlib.util.find_spec("numba"):
         from oracles.array_kernel import run_kernel
@@ -86,10 +86,10 @@ def main() -> None:
         rows["numba kernel, with the books"] = (lambda: run_kernel(scenes, True), len(scenes))
         rows["numba kernel, without"] = (lambda: run_kernel(scenes, False), len(scenes))
     if importlib.util.find_spec("jax"):
-        from haploop.launch.batch.jax.run import compiling, results_of_compiled
+        from haploop.launch.batch.jax.run import compiled_results, compiling
 
         for name, energy in {"compiled, with the books": True, "compiled, without": False}.items():
-            run = partial(lambda energy: list(results_of_compiled(scenes, kinds, energy=energy, least=0)), energy)
+            run = partial(lambda energy: list(compiled_results(scenes, kinds, energy=energy, least=0)), energy)
             run()
             rows[name] = (run, len(scenes))
         programs, seconds = compiling()

@@ -148,7 +148,7 @@ def _loops(  # pragma: no cover
 
 
 def run_kernel(scenes: list[dict[str, Any]], energy: bool) -> np.ndarray:
-    """Extremes, what the window shows and ``BOOKS``, as ``results_of`` tells them; shape (scenes, FIGURES + books)."""
+    """Extremes, what the window shows and ``BOOKS``, as in a summary; shape (scenes, FIGURES + books)."""
     first = scenes[0]
     time = Timebase.from_clock(first["clock"], first["duration"])
     m, n = Mechanics.from_scene(first), time.steps_per_tick

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from haploop.launch.batch.run import results_of
+from haploop.launch.batch.run import batch_results
 from haploop.tools.linear.one_tick import OneTickMap
 from haploop.tools.search.bisect import Tolerance
 from haploop.tools.sweep.run.boundary import Boundary, Candidate, find_boundaries, verdict_is
@@ -130,7 +130,7 @@ def test_bisected_from_runs_the_boundary_of_a_linear_loop_is_where_the_spectral_
 
     def run(candidates: Sequence[Candidate]) -> Iterator[tuple[int, dict[str, Any]]]:
         scenes = [pressed(*loops[row], stiffness) for row, stiffness in candidates]
-        return results_of(scenes, KINDS, energy=False, fewest=1)
+        return batch_results(scenes, KINDS, energy=False, fewest=1)
 
     points = [20.0 * 2**k for k in range(12)]
     for limit, one in zip(limits, find_boundaries(3, points, Tolerance(relative=0.002), run, shrinking), strict=True):

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from haploop.controller.dissipation import PluginError
-from haploop.launch.batch.run import run_array
+from haploop.launch.batch.run import run_batch
 from haploop.tools.executor.executors import make_executor, map_parallel
 from haploop.tools.executor.parts import Group, Sizes, cut, grouped
 from haploop.tools.executor.pool import DIED, Pool
@@ -64,7 +64,7 @@ def test_every_scene_comes_back_once_with_every_bit_it_has_in_one_array(workers:
     scenes = of_many_structures()
     came = results(scenes, workers=workers, trajectories=True)
     assert sorted(index for index, _ in came) == list(range(len(scenes)))
-    expected = run_array(scenes, KINDS, trajectories=True)
+    expected = run_batch(scenes, KINDS, trajectories=True)
     assert [dict(came)[index] for index in range(len(scenes))] == expected
 
 
@@ -87,7 +87,7 @@ def test_of_the_scenes_that_were_under_way_when_a_worker_died_only_the_culprits_
     assert came[5] == {"title": "least", "seed": 0, "ended": "failed", "why": DIED}
     kinds = load_kinds(((str(deadly), DEADLY),))
     alone = [index for index in range(40) if index not in (5, 17)]
-    assert [came[index] for index in alone] == run_array([scenes[index] for index in alone], kinds)
+    assert [came[index] for index in alone] == run_batch([scenes[index] for index in alone], kinds)
 
 
 def test_a_plugin_that_does_not_load_is_said_before_anything_is_started(tmp_path: Path) -> None:

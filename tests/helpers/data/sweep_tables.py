@@ -6,7 +6,7 @@ import itertools
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from haploop.launch.batch.run import run_array
+from haploop.launch.batch.run import run_batch
 from haploop.launch.scene.toml_writer import to_toml
 from haploop.tools.sweep.map.data import AMPLITUDE, MapData, make_map_data
 from helpers.scenes.least import KINDS
@@ -34,7 +34,7 @@ def ran(axes: Mapping[str, Sequence[Any]], scene_of: Callable[[dict[str, Any]], 
     """The map of scenes that are run, in arrays where they can."""
     cells = cells_of(axes, seeds)
     scenes = [scene_of(cell) for cell in cells]
-    results = run_array(scenes, KINDS, energy=False)
+    results = run_batch(scenes, KINDS, energy=False)
     return table(axes, cells, results, scenes)
 
 

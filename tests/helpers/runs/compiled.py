@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from haploop.controller.dissipation import Element
-from haploop.launch.batch.jax.run import results_of_compiled
+from haploop.launch.batch.jax.run import compiled_results
 from helpers.runs.batches import pressed
 from helpers.scenes.least import KINDS
 
@@ -16,7 +16,7 @@ jax = pytest.importorskip("jax")
 
 
 def compiled(scenes: list[dict[str, Any]], kinds: dict[str, type[Element]] = KINDS, **options: Any) -> list[Any]:
-    results = dict(results_of_compiled(scenes, kinds, fewest=1, least=0, most=16, **options))
+    results = dict(compiled_results(scenes, kinds, fewest=1, least=0, most=16, **options))
     return [results[index] for index in range(len(scenes))]
 
 

@@ -1,4 +1,4 @@
 """Many scenes at once: members of one structure as arrays, all others one by one, with the bits of a single run.
 
-``run.results_of`` is the way in; ``jax`` holds the compiled form (extra ``haploop[jax]``).
+``run.batch_results`` is the way in; ``jax`` holds the compiled form (extra ``haploop[jax]``).
 """

@@ -1,4 +1,4 @@
-"""Many loops of one structure, tick by tick together."""
+"""A batch: members of one structure, tick by tick together."""
 
 from __future__ import annotations
 
@@ -30,29 +30,29 @@ if TYPE_CHECKING:
 # A column of a block holds about so many numbers: with fewer, calls of NumPy take longer than what they do; more do not
 # stay in the cache.
 BLOCK = 98_304
-# An operand that is the same for all loops, or for all steps of a tick, is copied into buffers of NumPy's unless these
-# are shorter than a row of loops; that triples the time such an operation takes.
+# An operand that all members share, or all steps of a tick, is copied into buffers of NumPy's unless these are shorter
+# than a row of members; that triples the time such an operation takes.
 _BUFFER = 512
-# Loops that have ended are computed on, unheeded, until they are more than this share; not with friction, which might
+# Members that have ended are computed on, unheeded, until they are more than this share; not with friction, which might
 # switch in them for ever.
 _UNHEEDED = 0.25
 
 
 class Batch:
-    """The loops of scenes of one structure, each a place in arrays: sensor, line, motion, controller and books.
+    """Scenes of one structure, each a place in arrays: sensor, line, motion, controller and books.
 
-    The code that computes is that of a single loop, on arrays. What decides for a single loop when it ends is written
-    here for many. A loop that diverged has its results and leaves the arrays; one whose numbers cease to be finite
+    The code that computes is that of a single run, on arrays. What decides for a single run when it ends is written
+    here for many. A member that diverged has its results and leaves the arrays; one whose numbers cease to be finite
     leaves them without.
 
     Args:
-        scenes: resolved scenes for which ``runs_in_arrays`` holds and ``structure`` is the same.
+        scenes: resolved scenes for which ``is_batchable`` holds and ``structure`` is the same.
         kinds: element kinds at hand.
         energy: whether to keep energy books.
         trajectories: whether to hash the trajectories.
 
     Attributes:
-        results: what came of each scene, in their order; None while it runs, or where it has to be run alone.
+        results: summary entries of each scene, in their order; None while it runs, or where it has to be run alone.
     """
 
     def __init__(
@@ -92,9 +92,13 @@ class Batch:
                 self._end = min(self._end, tick)
 
     def run(self) -> None:
-        """Run all loops to their ends."""
+        """Run all members to their ends.
+
+        Raises:
+            ElementError: an element takes no arrays, or keeps attributes of its own; the results are void.
+        """
         _keep_freed_memory()
-        with np.errstate(all="ignore"):  # loops that have ended may come to anything
+        with np.errstate(all="ignore"):  # members that have ended may come to anything
             np.setbufsize(_BUFFER)
             for tick in range(self._end):
                 if tick in self._changes:
@@ -109,7 +113,7 @@ class Batch:
                 self._finish(np.flatnonzero(~self._ended), "done" if whole else "stopped")
 
     def _was_refused(self) -> bool:
-        """Whether a change could not be made; for all it cannot be known that it could be for some."""
+        """Tells whether a change could not be made; it is not known for which members it could have been."""
         if self._rows.refused:
             self.results = [None] * len(self.results)
             return True
@@ -119,7 +123,8 @@ class Batch:
         motion, x_m = self._motion, self._position.reading(self._motion.x)
         sample = (x_m, self._felt(tick)) if self._feels else (x_m,)
         forces = self._controller.answer([sample])
-        self._check_elements(tick)
+        if tick in self._changes:
+            self._elements = Unchanged(self._controller.params.elements)
         self._line.receive(forces)
         self._in_flight += forces
         motion.advance(tick, self._line.holds(tick))
@@ -127,17 +132,13 @@ class Batch:
         if waiting * self._time.steps_per_tick * len(self._ended) >= BLOCK:
             self._book()
 
-    def _check_elements(self, tick: int) -> None:
-        if tick in self._changes:
-            self._elements = Unchanged(self._controller.params.elements)
-        self._elements.check()
-
     def _felt(self, tick: int) -> Any:
         acceleration = self._motion.acceleration(tick)
         return self._sensor.reading(acceleration) if self._sensor else acceleration
 
     def _book(self) -> None:
         rows = self._rows.take_rows()
+        self._elements.check()
         if rows:
             plant = self._motion.take_record(self._logger.tick, positions_only=self._positions_only)
             self._logger.book(plant, rows, self._controller.params.wall.inward)
@@ -156,7 +157,7 @@ class Batch:
             self._drop_ended()
 
     def _finish(self, places: np.ndarray, ended: str, reasons: list[str] | None = None) -> None:
-        """Take the results of loops that end here; one whose numbers are not all finite has none."""
+        """Take the results of members that end here; one whose numbers are not all finite has none."""
         x, v, sound = self._motion.x, self._motion.v, np.isfinite(self._motion.x)
         for force in self._in_flight:
             sound = sound & np.isfinite(force)
@@ -198,7 +199,7 @@ def _collector_at_rest() -> Iterator[None]:
 
 @contextmanager
 def _buffers_of(size: int) -> Iterator[None]:
-    """NumPy before 2.3 adds so many numbers at a time as its buffers hold: sums are those of a loop alone with its."""
+    """NumPy before 2.3 adds so many numbers at a time as its buffers hold: sums are those of a run alone with its."""
     with np.errstate():  # which gives back the buffers as well
         np.setbufsize(size)
         yield

@@ -1,4 +1,4 @@
-"""Many scenes at once: those of one structure in arrays, all others alone, with the same results bit for bit."""
+"""Many scenes at once: those of one structure as batches, all others alone, with the same results bit for bit."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from haploop.controller.dissipation import ElementError
 from haploop.launch.batch.batch import Batch
-from haploop.launch.batch.stacking import runs_in_arrays, structures
+from haploop.launch.batch.stacking import is_batchable, structures
 from haploop.launch.runs.in_process import run_in_process
 from haploop.launch.spec import RunFailed
 from haploop.logger.summary import OF_THE_MACHINE
@@ -18,17 +18,17 @@ if TYPE_CHECKING:
 
 Scene = dict[str, Any]
 Kinds = dict[str, "type[Element]"]
-# Fewer loops of one structure are sooner run one by one; more than so many at once outgrow the cache.
+# Fewer members of one structure are sooner run one by one; more than so many at once outgrow the cache.
 FEWEST, MOST = 16, 2048
 
 
-def run_array(scenes: Sequence[Scene], kinds: Kinds, **options: Any) -> list[dict[str, Any]]:
-    """The results of ``results_of``, in the order of the scenes."""
-    results = dict(results_of(scenes, kinds, **options))
+def run_batch(scenes: Sequence[Scene], kinds: Kinds, **options: Any) -> list[dict[str, Any]]:
+    """Returns the results of ``batch_results``, in the order of the scenes."""
+    results = dict(batch_results(scenes, kinds, **options))
     return [results[index] for index in range(len(scenes))]
 
 
-def results_of(
+def batch_results(
     scenes: Sequence[Scene],
     kinds: Kinds,
     *,
@@ -37,14 +37,14 @@ def results_of(
     fewest: int = FEWEST,
     most: int = MOST,
 ) -> Iterator[tuple[int, dict[str, Any]]]:
-    """Run resolved scenes to their ends; what came of them is told part by part, so that none of it need be kept.
+    """Runs resolved scenes to their ends; results are yielded part by part, so that none of them need be kept.
 
     Args:
         scenes: of any structure; scenes that differ in numbers alone are run together.
         kinds: element kinds at hand.
         energy: whether to keep energy books; they take most of the time.
         trajectories: whether to hash every trajectory.
-        fewest, most: loops in an array.
+        fewest, most: members of a batch.
 
     Yields:
         The index of a scene and the entries of its summary but for those of the machine, ``energy`` and
@@ -63,10 +63,10 @@ def results_of(
 
 
 def groups(scenes: Sequence[Scene]) -> list[list[int]]:
-    """Indices of the scenes of each structure that runs in arrays."""
+    """Returns the indices of the scenes of each structure that can be run as a batch."""
     found: dict[Hashable, list[int]] = {}
     for index, (scene, shape) in enumerate(zip(scenes, structures(scenes), strict=True)):
-        if runs_in_arrays(scene):
+        if is_batchable(scene):
             found.setdefault(shape, []).append(index)
     return list(found.values())
 
@@ -85,15 +85,15 @@ def _together(
 ) -> Sequence[dict[str, Any] | None]:
     """The results of scenes of one structure; None where a scene has to be run alone.
 
-    An element that does not take arrays raises here, and whatever raises for one loop stops all: alone, every loop
-    comes to its own end.
+    An element that takes no arrays, or keeps attributes of its own, raises here, and whatever raises for one member
+    stops all: alone, every one comes to its own end.
     """
     try:
-        loops = Batch(scenes, kinds, energy=energy, trajectories=trajectories)
-        loops.run()
+        batch = Batch(scenes, kinds, energy=energy, trajectories=trajectories)
+        batch.run()
     except (ElementError, ArithmeticError):
         return [None] * len(scenes)
-    return loops.results
+    return batch.results
 
 
 def _alone(scene: Scene, kinds: Kinds, energy: bool, trajectories: bool) -> dict[str, Any]:

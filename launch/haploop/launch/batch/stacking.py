@@ -15,12 +15,12 @@ from haploop.protocol.ticks import DELAY
 # What says nothing of what is simulated.
 _ASIDE = ("title", "seed", "run")
 _TIMES = ("clock", "duration", "at", "delay")
-# Loops with friction have the same bodies.
+# Members with friction have the same bodies.
 _BODIES = ("device", "hand", "transmission", "friction", "actuator", "accelerometer")
 
 
-def runs_in_arrays(scene: dict[str, Any]) -> bool:
-    """Whether a resolved scene's loop takes the same way whatever its numbers, so that many run as one.
+def is_batchable(scene: dict[str, Any]) -> bool:
+    """Tells whether a resolved scene takes the same way whatever its numbers, so that many can be run as one batch.
 
     Not so: jitter, loss, another integrator than the exact flow; a delay that changes; a chain whose damping needs the
     widest float; friction that has to be walked step by step.
@@ -33,7 +33,7 @@ def runs_in_arrays(scene: dict[str, Any]) -> bool:
 
 
 def structure(scene: dict[str, Any]) -> Hashable:
-    """What scenes that are stacked must have in common: all but the values of their numbers.
+    """Returns what scenes that are stacked must have in common: all but the values of their numbers.
 
     Times are common, too: the clock, the duration, delays, when events come, the points of a recorded force. So is
     whether a number is 0, which may mean that something is not there, and where there is friction all that moves.
@@ -42,7 +42,7 @@ def structure(scene: dict[str, Any]) -> Hashable:
 
 
 def structures(scenes: Iterable[dict[str, Any]]) -> Iterator[Hashable]:
-    """The same of each; an entry that is the very object of the scene before is not looked at again."""
+    """Yields the structure of each scene; an entry that is the object of the scene before is not looked at again."""
     before: dict[str, Any] = {}
     parts: dict[str, Hashable] = {}
     for scene in scenes:
@@ -71,11 +71,8 @@ def _structure(value: Any, by_value: bool) -> Hashable:
 
 
 def stacked(scenes: Sequence[dict[str, Any]]) -> dict[str, Any]:
-    """One scene of many with the same structure; numbers that differ are arrays of shape (loops,).
-
-    Its key ``loops`` is their count.
-    """
-    return {key: _stacked([scene[key] for scene in scenes]) for key in scenes[0]} | {"loops": len(scenes)}
+    """Returns one scene of many with the same structure; numbers that differ are arrays of shape (members,)."""
+    return {key: _stacked([scene[key] for scene in scenes]) for key in scenes[0]}
 
 
 def _stacked(values: Sequence[Any]) -> Any:

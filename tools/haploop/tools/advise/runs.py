@@ -11,7 +11,7 @@ from types import TracebackType
 from typing import Any, Self
 
 from haploop.launch.batch.run import groups
-from haploop.launch.batch.stacking import runs_in_arrays
+from haploop.launch.batch.stacking import is_batchable
 from haploop.tools.executor.parts import Group
 from haploop.tools.executor.pool import Pool, read_sources
 from haploop.tools.executor.work import Result, Results, Scene, Work, load_kinds
@@ -43,9 +43,9 @@ class Bundles(Work):
         return [lost(scene, why) for scene in item]
 
     def _results(self) -> Results:
-        from haploop.launch.batch.run import results_of
+        from haploop.launch.batch.run import batch_results
 
-        return partial(results_of, kinds=load_kinds(self.sources), energy=self.energy, fewest=self.fewest)
+        return partial(batch_results, kinds=load_kinds(self.sources), energy=self.energy, fewest=self.fewest)
 
 
 class Runs:
@@ -122,6 +122,6 @@ def execution_mode(scene: Scene) -> str:
     ``"arrays"``, where hundreds cost little more than one; ``"friction"``, in arrays out of which every stop and start
     is taken; ``"alone"``.
     """
-    if not runs_in_arrays(scene):
+    if not is_batchable(scene):
         return "alone"
     return "friction" if "friction" in scene else "arrays"

@@ -1,4 +1,4 @@
-"""Many scenes on many cores: ``results_of`` in parts that workers share, in bounded memory and without a lost scene."""
+"""Many scenes on many cores: batches in parts that workers share, in bounded memory and without a lost scene."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from types import TracebackType
 from typing import Any, Self
 
 from haploop.controller.dissipation import load_plugin
-from haploop.launch.batch.stacking import runs_in_arrays, structure
+from haploop.launch.batch.stacking import is_batchable, structure
 from haploop.tools.executor.executors import make_executor
 from haploop.tools.executor.parts import Group, Sizes, cut, grouped
 from haploop.tools.executor.work import Result, Scene, Work
@@ -55,7 +55,7 @@ class Pool:
         Args:
             scenes: resolved; taken a few thousand at a time.
             plugins: files that define elements.
-            energy, trajectories: as of ``haploop.launch.batch.run.results_of``.
+            energy, trajectories: as of ``haploop.launch.batch.run.batch_results``.
 
         Raises:
             PluginError: a plugin cannot be used.
@@ -163,4 +163,4 @@ def _second(item: tuple[int, Scene]) -> Scene:
 
 def _structure(item: tuple[int, Scene]) -> Hashable:
     """Returns the structure that scenes in one array share; None for all that run alone."""
-    return structure(item[1]) if runs_in_arrays(item[1]) else None
+    return structure(item[1]) if is_batchable(item[1]) else None

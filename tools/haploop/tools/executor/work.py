@@ -35,7 +35,7 @@ class Work:
         make: from an item to its resolved scene; an error that it raises is the reason why the item is refused.
         keep: from an item, its scene (None where it was refused) and its result to what travels back.
         sources: plugin files as (name, text); a worker on another machine has no files of this one.
-        energy, trajectories: as for ``results_of``.
+        energy, trajectories: as for ``batch_results``.
         compiled: whether to run compiled by JAX, which hashes no trajectories.
     """
 
@@ -81,12 +81,12 @@ class Work:
         if self.compiled:
             import jax  # noqa: F401 (an error raised here is no fault of a scene)
 
-            from haploop.launch.batch.jax.run import results_of_compiled
+            from haploop.launch.batch.jax.run import compiled_results
 
-            return partial(results_of_compiled, kinds=kinds, energy=self.energy)
-        from haploop.launch.batch.run import results_of
+            return partial(compiled_results, kinds=kinds, energy=self.energy)
+        from haploop.launch.batch.run import batch_results
 
-        return partial(results_of, kinds=kinds, energy=self.energy, trajectories=self.trajectories)
+        return partial(batch_results, kinds=kinds, energy=self.energy, trajectories=self.trajectories)
 
 
 def _safely(results: Results, scenes: dict[int, Scene], left: list[int]) -> Iterator[tuple[int, Result]]:

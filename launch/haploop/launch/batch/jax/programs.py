@@ -1,4 +1,4 @@
-"""Compiled blocks, kept for all groups of loops of the same structure, and how jax is asked for them."""
+"""Compiled blocks, kept for all groups of members of one structure, and how jax is asked for them."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _MOST = 64
 # On a CPU a loop over ticks is one function of machine code if XLA takes its arrays for small; else every operation is
 # a call of its own, which takes longer than what it does. There is no other way to say so than before jax first runs.
 _ONE_FUNCTION = "xla_cpu_small_while_loop_byte_threshold"
-# Arrays of loops fill the widest registers there are.
+# Arrays of members fill the widest registers there are.
 _WIDE: dict[str, Any] = {"xla_cpu_prefer_vector_width": 512}
 _FLAGS, _OPTIONS = "XLA_FLAGS", "--xla_backend_extra_options="
 # On a GPU jax takes three quarters of the memory for itself unless told otherwise; the next worker then finds none.
@@ -37,9 +37,9 @@ class Programs:
     Attributes:
         seconds: spent on compiling so far.
         count: how many were compiled so far.
-        asked: how many ticks of loops of a structure were asked for so far.
-        spare: rings that loops are done with. Their memory serves the next loops: getting it anew, and putting zeros
-            into it, takes a third as long as the loops without books do.
+        asked: how many ticks of members of a structure were asked for so far.
+        spare: rings that a batch is done with. Their memory serves the next one: getting it anew, and putting zeros
+            into it, takes a third as long as a batch without books does.
     """
 
     def __init__(self) -> None:
@@ -94,7 +94,7 @@ def in_double() -> AbstractContextManager[object]:
 
 @lru_cache(maxsize=1)
 def most() -> int:
-    """How many loops suit the device: on a CPU so many that what a tick works on stays in the cache.
+    """Returns how many members suit the device: on a CPU so many that what a tick works on stays in the cache.
 
     Where nothing has used jax before, it is told here how to start; what the user has told it stands.
     """

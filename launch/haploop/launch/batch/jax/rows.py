@@ -12,7 +12,7 @@ import jax.numpy as jnp
 
 
 class Rows:
-    """Stands in for an array of shape (rows, loops), or (rows, parts, loops), in elementwise formulas.
+    """Stands in for an array of shape (rows, members), or (rows, parts, members), in elementwise formulas.
 
     A compiler that is given whole columns writes every one of them to memory, shifts them against each other and sums
     them up again; given their rows it keeps a step's numbers in registers.

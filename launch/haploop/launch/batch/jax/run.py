@@ -7,7 +7,7 @@ from importlib import import_module
 from typing import Any
 
 from haploop.controller.dissipation import ElementError
-from haploop.launch.batch.run import FEWEST, Kinds, Scene, groups, results_of
+from haploop.launch.batch.run import FEWEST, Kinds, Scene, batch_results, groups
 from haploop.launch.batch.stacking import structure
 from haploop.plant.choose import needs_chain
 from haploop.plant.sensing.encoder import accelerometer_is_used
@@ -15,35 +15,34 @@ from haploop.protocol.ticks import Timebase
 
 # Arrays are of the greatest size, or of a half, a quarter or an eighth of it: few sizes have to be compiled.
 _PARTS = (8, 4, 2, 1)
-# Intervals of loops in arrays that take about as long as compiling a program does.
+# Ticks of members that take about as long as compiling a program does.
 LEAST = 5_000_000
 
 
-def results_of_compiled(
+def compiled_results(
     scenes: Sequence[Scene], kinds: Kinds, *, energy: bool = True, fewest: int = FEWEST, most: int | None = None,
     least: int = LEAST,
 ) -> Iterator[tuple[int, dict[str, Any]]]:  # fmt: skip
-    """As ``results_of``, by one compiled program for all scenes that differ in numbers alone.
+    """Runs resolved scenes to their ends, by one compiled program for all scenes that differ in numbers alone.
 
-    Sensor, estimators, wall, elements, line, motion and books are the objects of a single loop, run once on jax's
-    placeholders; what comes out is compiled and kept for as long as the process lives. The first ticks and those after
-    a change are done by ``Batch``. What is random comes from the same streams. It runs where jax does by default;
-    on GPUs it has been compiled, but never yet run.
+    The tick of a batch, a function of its parameters and its state, is traced on jax's placeholders, compiled, and kept
+    for as long as the process lives. The first ticks and those after a change are done by ``Batch``. What is random
+    comes from the same streams. It runs where jax does by default; on GPUs it has been compiled, but never yet run.
 
     **Tolerance.** Every operation is the same in float64, but for products and sums that the compiler makes in one
     rounding. Positions stay within 1e-11 of the largest excursion of the scene alone while no rounding of the encoder,
-    contact, gate or window of an estimator falls to the other side; where one does, the loop is another of the same
+    contact, gate or window of an estimator falls to the other side; where one does, the run is another of the same
     kind from there on, so in long limit cycles it is amplitude and energies that agree, not instants. The books
     balance as well as alone.
 
     Args:
-        scenes, kinds, energy, fewest: as there. A scene whose loop cannot be compiled goes there: bodies in a row,
-            friction, jitter, loss, an element that asks what its numbers are.
-        most: loops in an array; what suits the device where it is None.
+        scenes, kinds, energy, fewest: as for ``batch_results``, by which a scene is run that cannot be compiled: one
+            with bodies in a row, friction, jitter, loss, or an element that asks what its numbers are.
+        most: members of a batch; what suits the device where it is None.
         least: scenes of a structure are compiled when so many ticks of them have been asked for in this process.
 
     Yields:
-        As there, without ``trajectory_sha256``.
+        The index of a scene and the entries of its summary, as ``batch_results`` does without ``trajectories``.
 
     Raises:
         ImportError: jax is not installed.
@@ -64,26 +63,26 @@ def results_of_compiled(
                     left.remove(index)
                     yield index, result
     others = sorted(left)
-    for index, result in results_of([scenes[index] for index in others], kinds, energy=energy, fewest=fewest):
+    for index, result in batch_results([scenes[index] for index in others], kinds, energy=energy, fewest=fewest):
         yield others[index], result
 
 
 def compiling() -> tuple[int, float]:
-    """How many programs were compiled in this process, and how many seconds that took."""
+    """Returns how many programs were compiled in this process, and how many seconds that took."""
     programs = _programs().PROGRAMS
     return programs.count, programs.seconds
 
 
-def _is_worth_compiling(scene: Scene, loops: int, least: int) -> bool:
+def _is_worth_compiling(scene: Scene, members: int, least: int) -> bool:
     if needs_chain(scene) or ("accelerometer" in scene and accelerometer_is_used(scene)):
         return False
     asked = _programs().PROGRAMS.asked
-    asked[structure(scene)] += loops * Timebase.from_clock(scene["clock"], scene["duration"]).ticks
+    asked[structure(scene)] += members * Timebase.from_clock(scene["clock"], scene["duration"]).ticks
     return asked[structure(scene)] >= least
 
 
 def _together(scenes: list[Scene], kinds: Kinds, energy: bool, most: int) -> list[dict[str, Any] | None]:
-    """The results of scenes of one structure; None where a scene has to be run by ``results_of``."""
+    """The results of scenes of one structure; None where a scene has to be run by ``batch_results``."""
     from haploop.launch.batch.jax.batch import CompiledBatch
     from haploop.launch.batch.jax.tick import NotCompilable
 
@@ -91,11 +90,11 @@ def _together(scenes: list[Scene], kinds: Kinds, energy: bool, most: int) -> lis
     programs = _programs()
     try:
         with programs.in_double():
-            loops = CompiledBatch(scenes, kinds, energy=energy, size=size, programs=programs.PROGRAMS)
-            loops.run()
+            batch = CompiledBatch(scenes, kinds, energy=energy, size=size, programs=programs.PROGRAMS)
+            batch.run()
     except (ElementError, NotCompilable):
         return [None] * len(scenes)
-    return loops.results[: len(scenes)]
+    return batch.results[: len(scenes)]
 
 
 def _programs() -> Any:

@@ -20,13 +20,13 @@ class CompiledWindow(Window):
     """``Window`` of a batch whose rings are filled by compiled programs, and read by one.
 
     Attributes:
-        rings: what the programs have left; None where the loops went on by themselves since.
+        rings: what the programs have left; None where the batch went on by itself since.
     """
 
     rings: Rings | None = None
 
     def take(self, rings: Rings, *, writable: bool) -> None:
-        """Have the rings of a program; ``writable`` where the loops are to go on by themselves."""
+        """Takes the rings of a program; ``writable`` where the batch is to go on by itself."""
         held = np.array if writable else np.asarray
         x, rows = held(rings.x).reshape(-1, len(self.swing_m)), {name: held(ring) for name, ring in rings.rows.items()}
         self.state = self.state._replace(x=x, rows=self.state.rows | rows)
@@ -54,7 +54,7 @@ def _where_any(counts: list[int], means: list[float]) -> list[float | None]:
 
 
 class _Swings(NamedTuple):
-    """On which side of its trend line each loop was last, how often it crossed it, and how far it went."""
+    """Side of its trend line on which each member was last, how often it crossed it, and how far it went."""
 
     side: Any
     crossings: Any
@@ -67,13 +67,13 @@ def _look(x: Any, rows: dict[str, Any], ran: Any, swing_m: Any, *, steps: int, t
     """Returns the columns of ``MeasuredColumns``, with the counts before each mean; see ``measure_window``.
 
     Args:
-        x: positions, shape (ticks kept, n, loops); rows: ``CONTROLLER_COLUMNS``, shape (ticks kept, loops).
-        ran: steps that the loops have run.
-        swing_m: what does not count as a swing, shape (loops,).
+        x: positions, shape (ticks kept, n, members); rows: ``CONTROLLER_COLUMNS``, shape (ticks kept, members).
+        ran: steps that the members have run.
+        swing_m: what does not count as a swing, shape (members,).
         steps, ticks: of the window.
     """
-    n, loops = x.shape[1], len(swing_m)
-    x = x.reshape(-1, loops)
+    n, members = x.shape[1], len(swing_m)
+    x = x.reshape(-1, members)
 
     def at(i: Any) -> Any:
         return x[(ran - steps + i) % len(x)]
@@ -84,7 +84,7 @@ def _look(x: Any, rows: dict[str, Any], ran: Any, swing_m: Any, *, steps: int, t
         middle = i - (steps - 1) / 2.0
         return total + away, weighted + middle * away, jnp.minimum(low, away), jnp.maximum(high, away)
 
-    pivot, none, far = at(0), jnp.zeros(loops), jnp.full(loops, jnp.inf)
+    pivot, none, far = at(0), jnp.zeros(members), jnp.full(members, jnp.inf)
     total, weighted, low, high = jax.lax.fori_loop(0, steps, sums, (none, none, far, -far))
     slope, mean = weighted / (steps * (steps**2 - 1) / 12.0), total / steps
 
@@ -94,7 +94,7 @@ def _look(x: Any, rows: dict[str, Any], ran: Any, swing_m: Any, *, steps: int, t
         crossings = so_far.crossings + (side * so_far.side < 0.0)
         return _Swings(side, crossings, jnp.minimum(so_far.low, offset), jnp.maximum(so_far.high, offset))
 
-    first = jax.lax.fori_loop(0, steps // 2, swing, _Swings(none, jnp.zeros(loops, np.int64), far, -far))
+    first = jax.lax.fori_loop(0, steps // 2, swing, _Swings(none, jnp.zeros(members, np.int64), far, -far))
     second = jax.lax.fori_loop(steps // 2, steps, swing, first._replace(low=far, high=-far))
     before = first.high - first.low
     growth = jnp.where(before > 0.0, (second.high - second.low) / before, 0.0)
@@ -102,8 +102,8 @@ def _look(x: Any, rows: dict[str, Any], ran: Any, swing_m: Any, *, steps: int, t
 
 
 def _in_contact(rows: dict[str, Any], ran: Any, ticks: int) -> list[Any]:
-    """Of the last ticks of so many: those in contact; how many show a stiffness, its mean; and the mean depth."""
-    length, loops = rows["x"].shape
+    """Returns, of the last ticks: those in contact; how many show a stiffness, its mean; and the mean depth."""
+    length, members = rows["x"].shape
 
     def add(i: Any, so_far: list[Any]) -> list[Any]:
         place = (ran - ticks + i) % length
@@ -114,5 +114,5 @@ def _in_contact(rows: dict[str, Any], ran: Any, ticks: int) -> list[Any]:
         added = [1.0 * inside, 1.0 * real, stiffness, jnp.where(inside, abs(depth), 0.0)]
         return [total + more for total, more in zip(so_far, added, strict=True)]
 
-    inside, real, stiffness, depth = jax.lax.fori_loop(0, ticks, add, [jnp.zeros(loops)] * 4)
+    inside, real, stiffness, depth = jax.lax.fori_loop(0, ticks, add, [jnp.zeros(members)] * 4)
     return [inside, real, stiffness / real, inside, depth / inside]

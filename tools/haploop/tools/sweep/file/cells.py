@@ -10,7 +10,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from haploop.launch.batch.stacking import runs_in_arrays
+from haploop.launch.batch.stacking import is_batchable
 from haploop.launch.plan.effect import at
 from haploop.launch.scene.check import resolve
 from haploop.launch.scene.events import elements_of, try_out
@@ -115,7 +115,7 @@ class Sweep:
     def together(self, item: Item) -> bool:
         """Tells whether the scene of a cell, and those like it, go into an array."""
         try:
-            return runs_in_arrays(self.scene(item))
+            return is_batchable(self.scene(item))
         except Exception:  # it will be a row with its reason
             return False
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from haploop.controller.dissipation import registry
-from haploop.launch.batch.run import run_array
+from haploop.launch.batch.run import run_batch
 from haploop.tools.search.ladder import climb, rungs_held
 from haploop.tools.studies.choi2022.experiment.setup import KINDS, Elements, Setup, both, elements_of
 
@@ -79,7 +79,7 @@ def make_elements(name: str, size: Sequence[float]) -> Elements:
 
 def _run_all(scenes: Sequence[dict[str, Any]], *, energy: bool = False) -> list[dict[str, Any]]:
     """Returns the results of scenes in this process, in their order."""
-    return run_array(scenes, registry(), energy=energy, fewest=_FEWEST)
+    return run_batch(scenes, registry(), energy=energy, fewest=_FEWEST)
 
 
 def stiffness_ladder(setups: Sequence[Setup], stiffnesses: np.ndarray = STIFFNESSES) -> list[Steady]:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from haploop.controller.dissipation import registry
-from haploop.launch.batch.run import run_array
+from haploop.launch.batch.run import run_batch
 from haploop.launch.runs.in_process import run_in_process
 from haploop.launch.spec import RunFailed
 from haploop.logger.log.recording import MemoryLog
@@ -64,7 +64,7 @@ def shortfalls(interpretations: Sequence[Point]) -> list[dict[str, Any]]:
     """
     variants = [_variants(interpretation) for interpretation in interpretations]
     scenes = [of_one[name] for name in variants[0] for of_one in variants]
-    results = run_array(scenes, registry(), energy=False)
+    results = run_batch(scenes, registry(), energy=False)
     count = len(interpretations)
     runs = {name: results[i * count : (i + 1) * count] for i, name in enumerate(variants[0])}
     return [
