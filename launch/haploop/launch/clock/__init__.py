@@ -1,4 +1,4 @@
 """The clock that leads a run: grants, changes at their ticks, and the commands of other terminals.
 
-``clock.Clock`` decides, ``server`` speaks ZeroMQ, ``roster`` knows who takes part, ``commands`` answers.
+``clock.Clock`` decides, ``server.ClockServer`` speaks ZeroMQ, ``roster`` knows the nodes, ``commands`` answers.
 """

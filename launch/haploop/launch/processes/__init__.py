@@ -1,1 +1,5 @@
-"""The operating system side of a run: child processes, signals, and the private directory of a live run."""
+"""The operating system's side of a run.
+
+``supervisor.run_processes`` starts, leads and ends a run; ``children`` are its processes and the signals that end it.
+``run_directory`` finds live runs by their private directories, ``control.ask`` sends one a command.
+"""
