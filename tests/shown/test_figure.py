@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import shutil
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -229,6 +230,15 @@ def test_a_run_that_was_killed_still_draws(runs: dict[str, Path], tmp_path: Path
     assert data.scene["title"] == RunData.from_directory(runs["swap"]).scene["title"]
     assert draw(tmp_path).read_bytes().startswith(PNG)
     assert key_numbers(data)[0].startswith("log cut off")
+
+
+def test_a_run_draws_whose_log_of_the_plant_ends_long_before_that_of_the_controller(runs: dict[str, Path]) -> None:
+    """As where a run is killed: channels are written chunk by chunk. Its close view holds no plant step."""
+    data = RunData.from_directory(runs["swap"])
+    few = {name: getattr(data, name)[:50] for name in ("t_s", "x_m", "v_m_s", "force_N")}
+    figure = make_figure(replace(data, **few, bodies_m={}, plant_forces_N={}))
+    assert few["t_s"][-1] < data.close_s()[0]
+    assert artists(figure, "position")
 
 
 def test_a_log_of_ticks_alone_shows_what_the_controller_measured(runs: dict[str, Path]) -> None:

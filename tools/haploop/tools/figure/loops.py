@@ -71,7 +71,7 @@ def draw_force_position(ax: Axes, run: RunData, span_s: tuple[float, float]) -> 
     early_depth, early_force = force_position_loop(run, run.early_s())
     depth, force = force_position_loop(run, span_s)
     ax.plot(early_depth * MM, early_force, color=EARLY, linewidth=0.8, label="first second of contact", gid="early")
-    pressing = np.diff(depth, append=depth[-1]) > 0
+    pressing = np.diff(depth, append=depth[-1:]) > 0
     for part, colour, label in ((pressing, PRESSING, "pressing"), (~pressing, RELEASING, "releasing")):
         ax.plot(*_stretches(depth * MM, force, part), color=colour, linewidth=1.1, label=label, gid=label)
     _, stiffness = run.wall_at(np.array([span_s[1]]))

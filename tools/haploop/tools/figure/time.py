@@ -61,6 +61,8 @@ def view_mm(run: RunData, t: Floats, x_mm: Floats) -> tuple[float, float, str]:
     Args:
         t, x_mm: times in s, and positions of all bodies in mm, shape (bodies, times).
     """
+    if not np.isfinite(x_mm).any():  # the log of a run that was killed may end before
+        return -0.01, 0.01, ""
     x_mm = np.where(np.isfinite(x_mm), x_mm, np.nan)
     low, high, note = np.nanmin(x_mm), np.nanmax(x_mm), ""
     contact = run.contact_s()
