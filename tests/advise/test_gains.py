@@ -29,7 +29,7 @@ def found() -> Advice:
 
 def exact_N_m(read: dict[str, Any], elements: list[dict[str, Any]]) -> float:
     try:
-        return OneTickMap.of({**read, "dissipation": elements}, KINDS).stiffness_limit()
+        return OneTickMap.from_scene({**read, "dissipation": elements}, KINDS).stiffness_limit()
     except NeverStable:
         return 0.0
 

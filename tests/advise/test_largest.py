@@ -117,7 +117,7 @@ def test_where_the_loop_is_linear_the_limit_found_by_runs_is_that_of_the_exact_m
     elements = [{"acts": "in-contact", **element}] if element else []
     read = scene(**DEVICE, wall={"position": 0.0, "stiffness": 100.0})
     asked = make_tasks(read, has_task=False)
-    exact = OneTickMap.of({**read, "dissipation": elements}).stiffness_limit()
+    exact = OneTickMap.from_scene({**read, "dissipation": elements}).stiffness_limit()
     with Judge(KINDS, workers=1) as judge:
         found = largest_steady(
             {"": StiffnessQuery(lambda k, thorough: asked.make_runs(k, elements, None, thorough), 300.0, 1e5)},

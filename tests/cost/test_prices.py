@@ -98,7 +98,7 @@ def test_what_is_the_same_run_is_timed_once_and_nothing_else_is(jobs: price_jobs
 
 def test_stiffness_falls_with_delay_and_grows_with_control_rate(jobs: price_jobs.Jobs) -> None:
     def limits(group: str) -> list[float]:
-        return [OneTickMap.of(job.scene).stiffness_limit() for job in jobs[group].values()]
+        return [OneTickMap.from_scene(job.scene).stiffness_limit() for job in jobs[group].values()]
 
     delays = limits("delay")
     assert delays == sorted(delays, reverse=True)

@@ -80,13 +80,13 @@ def test_what_is_passive_is_stable_whatever_the_chain_behind_it(seed: int) -> No
     passive = bound(made, COLGATE).stiffness_N_m
     assert passive is not None
     assert passive > 0.0
-    assert passive <= OneTickMap.of(made).stiffness_limit() * (1.0 + 1e-6)
+    assert passive <= OneTickMap.from_scene(made).stiffness_limit() * (1.0 + 1e-6)
 
 
 @pytest.mark.parametrize("ticks", [0, 2])
 def test_passivity_is_tight_a_heavy_hand_makes_its_bound_the_limit(ticks: int) -> None:
     made = scene(**damped(0.3, delay=ticks * 1e-3, hand={"mass": 1000.0}))
-    limit = OneTickMap.of(made).stiffness_limit()
+    limit = OneTickMap.from_scene(made).stiffness_limit()
     assert bound(made, COLGATE).stiffness_N_m == pytest.approx(limit, rel=1e-4)
 
 
@@ -99,7 +99,7 @@ def test_where_it_applies_the_bound_for_soft_walls_is_near_the_exact_limit(
     made = scene(**damped(b, virtual, delay_steps * 1e-4, hand={"mass": 0.01, "damping": 0.01}))
     found = bound(made, GIL)
     simple = (b + 0.01 + virtual) / (0.5e-3 + delay_steps * 1e-4)
-    limit = OneTickMap.of(made).stiffness_limit()
+    limit = OneTickMap.from_scene(made).stiffness_limit()
     if found.applies:
         assert found.stiffness_N_m == pytest.approx(simple, rel=1e-12)
         assert found.stiffness_N_m == pytest.approx(limit, rel=0.1)
@@ -116,7 +116,7 @@ def test_without_delay_the_exact_bound_is_the_limit_of_the_map(b: float, control
         assert found == pytest.approx(2.0 * b * control_rate, abs=1e-9)
         return
     try:
-        assert found == pytest.approx(OneTickMap.of(made).stiffness_limit(), rel=1e-8)
+        assert found == pytest.approx(OneTickMap.from_scene(made).stiffness_limit(), rel=1e-8)
     except NeverStable:
         assert found is not None
         assert found < 1e-3

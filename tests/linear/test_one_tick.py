@@ -48,7 +48,7 @@ def unexplained(x: np.ndarray, growths: np.ndarray) -> float:
 @pytest.mark.parametrize("seed", SEEDS)
 def test_a_run_in_contact_moves_by_the_eigenvalues_of_its_map_and_by_no_others(seed: int) -> None:
     made = linear_scene(seed)
-    loop = OneTickMap.of(made)
+    loop = OneTickMap.from_scene(made)
     stiffness = 0.97 * limit_or_soft(loop)
     x = positions(pressed_deep(made, stiffness))
     assert unexplained(x, np.linalg.eigvals(loop.matrix(stiffness))) < 1e-7
@@ -87,7 +87,7 @@ LINEAR = {
 @pytest.mark.parametrize("of_limit", [0.97, 1.0, 1.03])
 def test_a_run_grows_by_the_spectral_radius(tables: dict[str, Any], of_limit: float) -> None:
     made = scene(**PLAIN, **tables)
-    loop = OneTickMap.of(made)
+    loop = OneTickMap.from_scene(made)
     stiffness = of_limit * loop.stiffness_limit()
     pressed = pressed_deep(made, 0.97 * loop.stiffness_limit())
     pressed["wall"]["stiffness"] = stiffness
@@ -103,7 +103,7 @@ def test_runs_on_either_side_confirm_the_limit(tables: dict[str, Any]) -> None:
 
 @pytest.mark.parametrize("seed", range(60))
 def test_the_stable_ranges_are_those_that_a_fine_grid_of_stiffnesses_shows(seed: int) -> None:
-    loop = OneTickMap.of(linear_scene(seed))
+    loop = OneTickMap.from_scene(linear_scene(seed))
     ranges = loop.stable_ranges()
     for stiffness in np.geomspace(1e-2, 1e7, 150):
         inside = any(low <= stiffness <= high for low, high in ranges)
@@ -115,7 +115,7 @@ def test_the_stable_ranges_are_those_that_a_fine_grid_of_stiffnesses_shows(seed:
 
 
 def test_stability_may_return_above_the_limit_and_the_limit_is_the_first() -> None:
-    loop = OneTickMap.of(linear_scene(12))
+    loop = OneTickMap.from_scene(linear_scene(12))
     (_, limit), (low, high) = loop.stable_ranges()
     assert loop.stiffness_limit() == limit < low < high
     assert loop.growth((limit + low) / 2.0) > 1.0 > loop.growth((low + high) / 2.0)
@@ -123,13 +123,13 @@ def test_stability_may_return_above_the_limit_and_the_limit_is_the_first() -> No
 
 def test_a_loop_that_is_never_stable_is_told_from_one_that_is_when_stiff() -> None:
     with pytest.raises(NeverStable, match="it needs damping"):
-        OneTickMap.of(scene(dissipation=[{"kind": "bidirectional-inertia", "mass": 1.0}])).stiffness_limit()
+        OneTickMap.from_scene(scene(dissipation=[{"kind": "bidirectional-inertia", "mass": 1.0}])).stiffness_limit()
 
 
 @pytest.mark.parametrize("share", [0.9, 1.1])
 def test_virtual_inertia_read_without_delay_is_stable_up_to_the_mass_of_the_device(share: float) -> None:
     """u[k] = -m a[k], a[k] = u[k-1] / m_d when nothing else acts: it grows by m / m_d a tick."""
-    loop = OneTickMap.of(
+    loop = OneTickMap.from_scene(
         scene(
             device={"mass": 0.02, "damping": 1e-9},
             acceleration={"source": "accelerometer"},
@@ -144,7 +144,7 @@ def test_virtual_inertia_read_without_delay_is_stable_up_to_the_mass_of_the_devi
 def test_elements_add_up_in_the_map(factors: tuple[float, ...]) -> None:
     split = [{"kind": kind, name: 0.05 * f} for kind, name in ELEMENTS for f in factors]
     whole = [{"kind": kind, name: 0.05} for kind, name in ELEMENTS]
-    one, many = (OneTickMap.of(scene(dissipation=elements)) for elements in (whole, split))
+    one, many = (OneTickMap.from_scene(scene(dissipation=elements)) for elements in (whole, split))
     assert many.matrix(100.0) == pytest.approx(one.matrix(100.0), abs=1e-12)
 
 
@@ -156,7 +156,7 @@ ELEMENTS = [("damping", "damping"), ("bidirectional-inertia", "mass")]
 def test_in_contact_it_is_one_which_side_the_wall_is_on_and_when_elements_act(acts: str, occupies: str) -> None:
     wall = {"position": 0.01, "stiffness": 10.0, "occupies": occupies}
     elements = [{"kind": "damping", "damping": 0.1, "acts": acts}]
-    loops = [OneTickMap.of(scene(dissipation=elements, **tables)) for tables in ({}, {"wall": wall})]
+    loops = [OneTickMap.from_scene(scene(dissipation=elements, **tables)) for tables in ({}, {"wall": wall})]
     assert loops[0].matrix(70.0).tolist() == loops[1].matrix(70.0).tolist()
 
 
@@ -173,11 +173,12 @@ class Lagging(Element):
         return -self.damping * v, v
 
 
-class Hoarding(Lagging):
+class Hoarding(Element):
     """One that keeps its memory in an attribute of its own."""
 
     kind = "hoarding"
-    memory = None
+    linear = True
+    damping: Annotated[float, Quantity("N s/m", at_least=0)]
 
     def __post_init__(self) -> None:
         self.v = 0.0
@@ -201,7 +202,7 @@ def test_an_element_of_a_plugin_that_says_it_is_linear_brings_its_memory_into_th
     filtered = scene(
         velocity={"cutoff": -math.log(0.8) * 1000.0 / math.tau}, dissipation=[{"kind": "damping", "damping": 0.2}]
     )
-    ours, theirs = OneTickMap.of(lagging, KINDS | {"lagging": Lagging}), OneTickMap.of(filtered)
+    ours, theirs = OneTickMap.from_scene(lagging, KINDS | {"lagging": Lagging}), OneTickMap.from_scene(filtered)
     assert ours.growth(80.0) == pytest.approx(theirs.growth(80.0), abs=1e-12)
     assert ours.stiffness_limit() == pytest.approx(theirs.stiffness_limit(), rel=1e-9)
 
@@ -244,4 +245,6 @@ def test_what_the_map_leaves_out_is_named_and_gone_from_the_smooth_scene() -> No
     named = ["[encoder]", "accelerometer.noise_density", "accelerometer.range", "actuator.saturation"]
     assert left_out(made) == named
     assert left_out(smooth(made)) == []
-    assert OneTickMap.of(smooth(made)).matrix(50.0) == pytest.approx(OneTickMap.of(made).matrix(50.0), abs=1e-12)
+    assert OneTickMap.from_scene(smooth(made)).matrix(50.0) == pytest.approx(
+        OneTickMap.from_scene(made).matrix(50.0), abs=1e-12
+    )

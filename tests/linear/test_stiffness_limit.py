@@ -20,7 +20,7 @@ HAND = {"mass": 0.05, "damping": 0.4, "stiffness": 20.0, "grip": {"stiffness": 8
 
 
 def limit_of(**tables: Any) -> float:
-    return OneTickMap.of(scene(**tables)).stiffness_limit()
+    return OneTickMap.from_scene(scene(**tables)).stiffness_limit()
 
 
 @pytest.mark.parametrize(("mass", "damping"), [(0.01, 0.1), (0.0525, 0.0114), (0.02, 5.0)])
@@ -49,13 +49,13 @@ def test_with_delay_the_limit_is_that_of_an_independent_map(delay_steps: int, vi
 @pytest.mark.parametrize("delay", [0.0, 0.0013, 0.002])
 def test_bodies_in_a_row_with_a_slow_actuator_have_the_map_of_their_own_equations(delay: float) -> None:
     made = scene(clock={"round_trip_delay": delay}, transmission=CABLE, hand=HAND, actuator={"bandwidth": 400.0})
-    ours, theirs = OneTickMap.of(made), ChainLoop.of(made)
+    ours, theirs = OneTickMap.from_scene(made), ChainLoop.of(made)
     for stiffness in (1.0, 100.0, 1e4):
         assert ours.growth(stiffness) == pytest.approx(theirs.growth(stiffness), abs=1e-11)
 
 
 def test_the_limit_is_where_growth_begins() -> None:
-    loop = OneTickMap.of(scene())
+    loop = OneTickMap.from_scene(scene())
     limit = loop.stiffness_limit()
     assert loop.growth(limit) < 1.0 <= loop.growth(math.nextafter(limit, math.inf))
     assert loop.growth(0.97 * limit) < 1.0 < loop.growth(1.03 * limit)
@@ -70,7 +70,7 @@ def test_runs_just_below_and_above_the_limit_are_judged_steady_and_not(delay: fl
 
 def test_a_wrong_limit_would_not_be_confirmed() -> None:
     made = scene(device={"mass": 0.02, "damping": 0.4})
-    limit = OneTickMap.of(made).stiffness_limit()
+    limit = OneTickMap.from_scene(made).stiffness_limit()
     verdicts = [run_in_process(pressed_deep(made, share * limit), KINDS)["verdict"] for share in (1.05, 1.12)]
     assert not StiffnessLimit(1.08 * limit, *verdicts).confirmed
 
@@ -85,7 +85,7 @@ def test_a_wrong_limit_would_not_be_confirmed() -> None:
 )
 def test_a_loop_that_is_no_linear_map_has_no_limit_and_says_why(tables: dict[str, Any], culprit: str) -> None:
     with pytest.raises(NotLinear, match=culprit):
-        OneTickMap.of(scene(**tables))
+        OneTickMap.from_scene(scene(**tables))
 
 
 def test_a_loop_without_damping_is_never_stable() -> None:

@@ -84,7 +84,7 @@ def test_a_gate_without_inertia_leaves_the_exact_limit() -> None:
 
 def test_the_gated_maps_growth_without_a_gate_is_that_of_the_eigenvalues() -> None:
     setup = SETUP
-    gated, exact = GatedMap.from_scene(setup.linear_scene([])), OneTickMap.of(setup.linear_scene([]))
+    gated, exact = GatedMap.from_scene(setup.linear_scene([])), OneTickMap.from_scene(setup.linear_scene([]))
     for stiffness in (1900.0, 2500.0):
         assert gated.growth(stiffness, 0.0) == pytest.approx(math.log(exact.growth(stiffness)), abs=1e-4)
 

@@ -120,7 +120,7 @@ def pressed(damping: float, delay: float, stiffness: float) -> dict[str, Any]:
 @pytest.mark.slow
 def test_bisected_from_runs_the_boundary_of_a_linear_loop_is_where_the_spectral_radius_is_one() -> None:
     loops = [(0.2, 0.0), (1.0, 0.002), (2.0, 0.0005)]
-    limits = [OneTickMap.of(pressed(*loop, 1.0)).stiffness_limit() for loop in loops]
+    limits = [OneTickMap.from_scene(pressed(*loop, 1.0)).stiffness_limit() for loop in loops]
     assert max(limits) / min(limits) > 3
 
     def shrinking(result: dict[str, Any]) -> bool | None:

@@ -348,7 +348,7 @@ def test_runs_of_the_program_make_a_map_that_the_exact_limit_divides() -> None:
 
     def made(cell: dict[str, Any]) -> dict[str, Any]:
         loop = scene(device={"mass": 0.02, "damping": 0.4}, dissipation=[{"kind": "damping", "damping": cell[B]}])
-        return pressed_deep(loop, cell[K] * OneTickMap.of(loop).stiffness_limit())
+        return pressed_deep(loop, cell[K] * OneTickMap.from_scene(loop).stiffness_limit())
 
     data = ran({K: [0.5, 0.8, 1.2, 1.5], B: [0.1, 0.5]}, made)
     assert data.cells().verdict[:2].max() == VERDICTS.index("steady")

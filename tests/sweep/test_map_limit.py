@@ -59,14 +59,14 @@ def test_every_point_of_the_exact_limit_is_the_stiffness_limit_there(values: lis
     found = points(exact_limit(plane(made, b=values, k=stiffnesses)).pieces)
     assert len(found) > 10
     for b, k in found[:: max(1, len(found) // 12)]:
-        ranges = OneTickMap.of(with_values(made, b=b)).stable_ranges()
+        ranges = OneTickMap.from_scene(with_values(made, b=b)).stable_ranges()
         assert min(abs(k - end) for pair in ranges for end in pair) <= 1e-7 * k
 
 
 def test_a_wall_a_little_stiffer_than_the_line_grows_and_a_softer_one_decays() -> None:
     made = loop()
     for b, k in points(exact_limit(plane(made, b=[0.05, 0.2, 0.8], k=[50.0, 500.0, 1000.0])).pieces)[::8]:
-        growth = OneTickMap.of(with_values(made, b=b)).growth
+        growth = OneTickMap.from_scene(with_values(made, b=b)).growth
         assert growth(0.999 * k) < 1.0 < growth(1.001 * k)
 
 
@@ -76,7 +76,9 @@ def test_the_limit_over_delay_is_exact_at_whole_steps_and_only_there_asked_for()
     at_steps = [(d, k) for d, k in found if abs(d * 1e4 - round(d * 1e4)) < 1e-9]
     assert at_steps
     for d, k in at_steps:
-        assert k == pytest.approx(OneTickMap.of(with_values(made, delay=round(d * 1e4) / 1e4)).stiffness_limit())
+        assert k == pytest.approx(
+            OneTickMap.from_scene(with_values(made, delay=round(d * 1e4) / 1e4)).stiffness_limit()
+        )
     assert (np.diff(found[np.argsort(found[:, 0]), 1]) < 0).all()
 
 
@@ -85,7 +87,7 @@ def test_without_a_stiffness_axis_the_line_is_where_the_scene_s_own_wall_is_at_i
     found = points(exact_limit(plane(made, b=[0.01, 0.1, 1.0], delay=[0.0, 0.002, 0.004, 0.006])).pieces)
     for b, d in found[::7]:
         ends = [math.floor(d * 1e4 + 1e-6), math.ceil(d * 1e4 - 1e-6)]
-        growths = [OneTickMap.of(with_values(made, b=b, delay=end / 1e4)).growth(100.0) for end in ends]
+        growths = [OneTickMap.from_scene(with_values(made, b=b, delay=end / 1e4)).growth(100.0) for end in ends]
         assert min(growths) <= 1.0 + 1e-9
         assert max(growths) >= 1.0 - 1e-9
 
@@ -94,14 +96,14 @@ def test_the_stable_windows_of_an_inertia_are_all_outlined() -> None:
     made = loop(dissipation=[{"kind": "bidirectional-inertia", "mass": 0.005}])
     found = exact_limit(plane(made, m=[0.001, 0.005, 0.01, 0.02], k=np.geomspace(10.0, 1e5, 9).tolist()))
     for m, k in points(found.pieces)[::6]:
-        ranges = OneTickMap.of(with_values(made, m=m)).stable_ranges()
+        ranges = OneTickMap.from_scene(with_values(made, m=m)).stable_ranges()
         assert min(abs(k - end) for pair in ranges for end in pair) <= 1e-7 * k
 
 
 def test_one_axis_has_its_limit_as_a_place_on_it() -> None:
     made = loop()
     [[[k]]] = exact_limit(plane(made, k=[50.0, 100.0, 5000.0])).pieces
-    assert k == pytest.approx(OneTickMap.of(made).stiffness_limit(), rel=1e-9)
+    assert k == pytest.approx(OneTickMap.from_scene(made).stiffness_limit(), rel=1e-9)
 
 
 def test_rates_are_only_asked_for_at_their_own_values() -> None:
@@ -110,7 +112,7 @@ def test_rates_are_only_asked_for_at_their_own_values() -> None:
     assert {x for x, _ in found} <= {500.0, 1000.0, 2000.0}
     for rate, k in found:
         there = {**made, "clock": {**made["clock"], "control_rate": int(rate)}}
-        assert k == pytest.approx(OneTickMap.of(there).stiffness_limit(), rel=1e-7)
+        assert k == pytest.approx(OneTickMap.from_scene(there).stiffness_limit(), rel=1e-7)
 
 
 @pytest.mark.parametrize(

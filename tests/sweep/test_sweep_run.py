@@ -237,7 +237,7 @@ def test_bisect_finds_where_the_spectral_radius_of_a_linear_loop_is_one(tmp_path
         scene = made.scene(0)
         scene["dissipation"][0]["damping"] = found["dissipation.0.damping"][k]
         scene["clock"]["round_trip_delay"] = found["clock.round_trip_delay"][k]
-        limit = OneTickMap.of(scene).stiffness_limit()
+        limit = OneTickMap.from_scene(scene).stiffness_limit()
         assert found["boundary"][k] == pytest.approx(limit, rel=0.03)
         assert found["high"][k] - found["low"][k] <= 0.005 * found["high"][k]
     assert (found["changes"] == 1).all()

@@ -117,7 +117,7 @@ def _exact(scene: Scene, kinds: dict[str, type[Element]]) -> float | None:
     if not is_linear(scene, kinds):
         return None
     try:
-        return OneTickMap.of(scene, kinds).stiffness_limit()
+        return OneTickMap.from_scene(scene, kinds).stiffness_limit()
     except NeverStable:
         return 0.0
 

@@ -146,7 +146,7 @@ class Judge:
         device = scene["device"]["mass"], scene["device"]["damping"]
         key = repr((device, hand, {name: scene[name] for name in scene if name not in aside}))
         if key not in self._maps:
-            self._maps[key] = OneTickMap.of(scene, self._kinds)
+            self._maps[key] = OneTickMap.from_scene(scene, self._kinds)
         return self._maps[key]
 
 

@@ -24,7 +24,7 @@ def installed_kinds() -> dict[str, type[Element]]:
 
 
 def is_linear(scene: dict[str, Any], kinds: Kinds | None = None) -> bool:
-    """Whether ``OneTickMap.of`` gives the map of a resolved scene."""
+    """Whether ``OneTickMap.from_scene`` gives the map of a resolved scene."""
     return not why_not_linear(scene, kinds)
 
 

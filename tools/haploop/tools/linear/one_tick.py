@@ -53,8 +53,8 @@ class OneTickMap:
     pushed: np.ndarray
 
     @classmethod
-    def of(cls, scene: dict[str, Any], kinds: Kinds | None = None) -> OneTickMap:
-        """The map of a resolved scene in contact, which need not have a wall. ``left_out`` tells what it leaves out.
+    def from_scene(cls, scene: dict[str, Any], kinds: Kinds | None = None) -> OneTickMap:
+        """Returns the map of a resolved scene in contact, which need not have a wall. ``left_out`` tells what it leaves out.
 
         Args:
             kinds: element kinds at hand; the installed ones when None.

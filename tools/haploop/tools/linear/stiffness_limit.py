@@ -52,7 +52,7 @@ def stiffness_limit(scene: dict[str, Any], kinds: dict[str, type[Element]]) -> S
     Raises:
         NotLinear, NeverStable: there is no limit to ask for.
     """
-    limit = OneTickMap.of(scene, kinds).stiffness_limit()
+    limit = OneTickMap.from_scene(scene, kinds).stiffness_limit()
     verdicts = [run_in_process(pressed_deep(scene, share * limit, kinds), kinds)["verdict"] for share in (BELOW, ABOVE)]
     return StiffnessLimit(limit, *verdicts)
 
@@ -77,7 +77,7 @@ def pressed_deep(
     pressed["device"] |= {"position": _START_M, "velocity": 0.0}
     pressed["wall"] = {"position": depth_m, "stiffness": stiffness, "occupies": "below"}
     pressed["run"] = {**pressed["run"], "log": "none"}
-    growth = OneTickMap.of(pressed, kinds).growth(stiffness)
+    growth = OneTickMap.from_scene(pressed, kinds).growth(stiffness)
     changed_s = math.log(_CHANGE) / abs(math.log(growth)) / clock["control_rate"]
     pressed["duration"] = math.ceil((at + changed_s + WINDOW_S) * clock["control_rate"]) / clock["control_rate"]
     return pressed

@@ -51,7 +51,7 @@ def exact_limit(plane: Plane) -> MapLine:
     def level(x: float, y: float) -> float:
         key = plane.but_for_stiffness(x, y)
         if key not in loops:
-            loops[key] = OneTickMap.of(plane.at(x, y))
+            loops[key] = OneTickMap.from_scene(plane.at(x, y))
         return math.log(loops[key].growth(plane.stiffness(x, y)))
 
     without = f", without {', '.join(left)}" if (left := left_out(plane.scene)) else ""

@@ -51,14 +51,14 @@ def limits(setup: Setup) -> dict[str, Best]:
 
 def first_end(setup: Setup, kind: str, size: float) -> float:
     """Returns the end of the range of steady stiffnesses that begins at 0, N/m; 0 where there is none."""
-    ranges = OneTickMap.of(setup.linear_scene(elements_of(kind, float(size)))).stable_ranges()
+    ranges = OneTickMap.from_scene(setup.linear_scene(elements_of(kind, float(size)))).stable_ranges()
     return min(ranges[0][1], _STIFFEST) if ranges and ranges[0][0] == 0.0 else 0.0
 
 
 def swings_at_Hz(setup: Setup, stiffness: float) -> float:
     """Returns the frequency of what grows fastest, or decays slowest, without an element at a stiffness in N/m."""
     scene = setup.linear_scene([])
-    values = np.linalg.eigvals(OneTickMap.of(scene).matrix(stiffness))
+    values = np.linalg.eigvals(OneTickMap.from_scene(scene).matrix(stiffness))
     return float(abs(np.angle(values[np.abs(values).argmax()])) / (2.0 * np.pi) * scene["clock"]["control_rate"])
 
 
@@ -121,7 +121,7 @@ class GatedMap:
 
         def map_with(mass: float) -> OneTickMap:
             inertia = {"kind": "bidirectional-inertia", "acts": "always", "mass": mass}
-            return OneTickMap.of({**scene, "dissipation": [inertia]})
+            return OneTickMap.from_scene({**scene, "dissipation": [inertia]})
 
         least, more = map_with(_NO_MASS), map_with(_SOME_MASS)
         per_kg = (more.without_wall - least.without_wall) / (_SOME_MASS - _NO_MASS)

@@ -139,7 +139,7 @@ def _one_tick(mass_kg: float, cutoff_Hz: float | None) -> OneTickMap:
     scene.pop("encoder")
     scene["acceleration"] = {"source": "encoder"} | ({"cutoff": cutoff_Hz} if cutoff_Hz else {})
     scene["dissipation"] = [{"kind": "bidirectional-inertia", "acts": "always", "mass": mass_kg}]
-    return OneTickMap.of(scene)
+    return OneTickMap.from_scene(scene)
 
 
 def errors_m_s2(count_m: float = COUNT_M) -> dict[str, float]:

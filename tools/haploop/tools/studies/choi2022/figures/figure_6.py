@@ -81,7 +81,7 @@ def _verdict(name: str, found: Found[Point]) -> Finding:
     )
     if name == "wall unstable":
         alone = {key: table for key, table in scene_of(BASE, "b").items() if key != "dissipation"}
-        growth = OneTickMap.of(alone).growth(150.0)
+        growth = OneTickMap.from_scene(alone).growth(150.0)
         numbers += f". In contact the loop is linear and grows by a factor of {growth:.4f} a tick"
     holds_somewhere = any(holds(row, name) for row in found.rows)
     if often >= _ALWAYS and holds(base, name):
