@@ -54,7 +54,7 @@ class OneTickMap:
 
     @classmethod
     def from_scene(cls, scene: dict[str, Any], kinds: Kinds | None = None) -> OneTickMap:
-        """Returns the map of a resolved scene in contact, which need not have a wall. ``left_out`` tells what it leaves out.
+        """Returns the map of a resolved scene in contact, with a wall or without; ``left_out`` says what it lacks.
 
         Args:
             kinds: element kinds at hand; the installed ones when None.
