@@ -40,13 +40,13 @@ class PlantNode:
         return int(state["tick"]), state
 
     def connect(self) -> None:
-        """Find the controller and the logger; no tick is worked on before both listen."""
+        """Finds the controller and the logger; no tick is worked on before both listen."""
         self._loop.greet(self._secret)
         self._publisher.await_subscriber(lambda: self._wait("logger"))
         self._client.ready(0)
 
     def run(self) -> tuple[int, dict[str, Any]]:
-        """Work until the run ends; returns the tick it ended at."""
+        """Works until the run ends; returns the tick it ended at."""
         client, plant = self._client, self._plant
         while plant.stop_reason is None and not (client.last and plant.tick >= client.until):
             for tick, event in client.take_events():
@@ -69,7 +69,7 @@ class PlantNode:
         return plant.reached, {"strangers": self._loop.unknown_peers + self._publisher.unknown_peers}
 
     def _flush(self) -> None:
-        """Publish what was stepped, answer new subscribers, report."""
+        """Publishes what was stepped, answers new subscribers, reports."""
         first, ticks, columns = self._plant.take_block()
         if ticks:
             self._publisher.publish("PLANT_BLOCK", first, ticks, columns)
@@ -86,7 +86,7 @@ class PlantNode:
 
 
 def work(client: ClockClient, context: zmq.Context[zmq.Socket[bytes]], directory: Path) -> tuple[int, dict[str, Any]]:
-    """Run the plant as a node of a run."""
+    """Runs the plant as a node of a run."""
     node = PlantNode(client, context, directory)
     node.connect()
     try:

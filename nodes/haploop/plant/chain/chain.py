@@ -61,7 +61,7 @@ class Chain:
 
     @classmethod
     def from_scene(cls, scene: dict[str, Any]) -> Chain:
-        """Read ``[device]``, ``[transmission]``, ``[hand]`` and the bandwidths of a resolved scene."""
+        """Reads ``[device]``, ``[transmission]``, ``[hand]`` and the bandwidths of a resolved scene."""
         device, hand, cable = scene["device"], scene.get("hand"), scene.get("transmission")
         bodies, masses, links = ["device"], [device["mass"]], []
         grounded = {"device": (0, device["damping"])}
@@ -116,11 +116,11 @@ class Chain:
         return z
 
     def absolute(self) -> Matrix:
-        """T: positions (velocities) of all bodies from the relative ones, shape (N, N)."""
+        """Returns T: positions (velocities) of all bodies from the relative ones, shape (N, N)."""
         return np.tril(np.ones((self.count, self.count)))
 
     def accelerations(self, stuck: bool = False) -> Matrix:
-        """Acceleration of every body from (states, command, friction, load), shape (N, states + 3).
+        """Returns the acceleration of every body from (states, command, friction, load), shape (N, states + 3).
 
         ``load`` is tau + k_h rest. ``stuck``: body 0 is held by friction whatever acts on it.
         """
@@ -143,7 +143,7 @@ class Chain:
         return result
 
     def rates(self, stuck: bool = False) -> Matrix:
-        """Rates of the states from (states, command, friction, load), shape (states, states + 3), 1/s.
+        """Returns the rates of the states from (states, command, friction, load), shape (states, states + 3), 1/s.
 
         Stuck, v is 0 and so is its rate, and x stays.
         """
@@ -164,12 +164,12 @@ class Chain:
         return rates
 
     def real_for(self, step_s: float) -> type[np.floating]:
-        """The float in which forms of rates are to be summed; see ``flow.real_for``."""
+        """Returns the float type in which to sum forms of rates; see ``transition.real_for``."""
         n = self.count
         return real_for(float(np.abs(self.rates()[n : 2 * n, n : 2 * n]).max()), step_s)
 
     def scales(self, step_s: float) -> np.ndarray:
-        """Factors that make (states, command, friction, load) velocities: c for lengths, h/m for forces, h for y.
+        """Returns factors that make (states, command, friction, load) velocities: lengths c, forces h/m, y h.
 
         c is at least 1/h and at least the fastest natural frequency (row sums bound it).
         """
@@ -194,5 +194,5 @@ def _sensor(scene: dict[str, Any], cable: bool) -> tuple[int, float] | None:
 
 
 def sensor_body(table: dict[str, Any], cable: bool) -> int:
-    """The body an accelerometer is mounted on: without a cable drive there is one only."""
+    """Returns the body an accelerometer is mounted on: without a cable drive there is one only."""
     return 1 if cable and table.get("mount") == "tip" else 0

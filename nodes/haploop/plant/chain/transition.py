@@ -40,29 +40,32 @@ class ChainTransition:
         self._step_s = _wide(step_s)
         one = transition_minus_identity(self._rates, self._step_s)
         self.step = self._unscaled(one)
-        flow, held = one, []
+        increment, held = one, []
         for _ in range(steps):
-            held.append(self._unscaled(flow)[: self._size + 2])
-            flow = flow + one + one @ flow
+            held.append(self._unscaled(increment)[: self._size + 2])
+            increment = increment + one + one @ increment
         self.held = np.stack(held, axis=1)
 
     def halves(self, levels: int) -> list[Matrix]:
-        """Over h, h/2, ... h/2^levels, each of shape (states + 4, states); the rise is that of a whole step."""
-        flow = transition_minus_identity(self._rates, self._step_s / _wide(2) ** levels)
-        table = [self._unscaled(flow)]
+        """Returns the transitions over h, h/2, ... h/2^levels, each of shape (states + 4, states).
+
+        The rise is that of a whole step.
+        """
+        increment = transition_minus_identity(self._rates, self._step_s / _wide(2) ** levels)
+        table = [self._unscaled(increment)]
         for _ in range(levels):
-            flow = 2.0 * flow + flow @ flow
-            table.append(self._unscaled(flow))
+            increment = 2.0 * increment + increment @ increment
+            table.append(self._unscaled(increment))
         return table[::-1]
 
-    def _unscaled(self, flow: Matrix) -> Matrix:
-        """What is added to the states by (z, command, friction, load, rise), transposed."""
-        rows = flow[: self._size] * self._scales / self._scales[: self._size, None]
+    def _unscaled(self, increment: Matrix) -> Matrix:
+        """Returns what (z, command, friction, load, rise) add to the states, transposed."""
+        rows = increment[: self._size] * self._scales / self._scales[: self._size, None]
         return np.ascontiguousarray(rows.T).astype(float)
 
 
 def scaled_rates(chain: Chain, step_s: float, stuck: bool) -> Matrix:
-    """A of the augmented state in the coordinates of ``Chain.scales``, shape (states + 4, states + 4), 1/s."""
+    """Returns A of the augmented state in the coordinates of ``Chain.scales``, shape (states + 4, states + 4), 1/s."""
     size = len(chain.states)
     scales = np.append(chain.scales(step_s), chain.scales(step_s)[-1])
     rates = np.zeros((size + 4, size + 4), _wide)
@@ -155,14 +158,14 @@ class ChainIntegrals:
         self._scales = scales
 
     def product(self, left: np.ndarray, right: np.ndarray, level: int = 0) -> Matrix:
-        """Symmetric Q with integral (left.w)(right.w) dt = w' Q w over h/2^level; rows and result unscaled."""
+        """Returns symmetric Q with integral (left.w)(right.w) dt = w' Q w over h/2^level; all unscaled."""
         a, b = (np.append(row, 0.0) / self._scales for row in (left, right))
         weight = (np.outer(a, b) + np.outer(b, a)) / 2.0
         form = gramian(self._rates, weight, self._step_s / _wide(2) ** level)
         return form * np.outer(self._scales, self._scales)
 
     def lag(self, velocity: np.ndarray, level: int = 0) -> np.ndarray:
-        """l with integral (t - t_end/2)/t_end velocity.w dt = l . w over h/2^level."""
+        """Returns l with integral (t - t_end/2)/t_end velocity.w dt = l . w over h/2^level."""
         n, end = len(self._rates), self._step_s / _wide(2) ** level
         extended = np.zeros((n + 2, n + 2), _wide)
         extended[:n, :n] = self._rates

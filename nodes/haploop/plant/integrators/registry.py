@@ -50,7 +50,7 @@ class Integrator:
 
     @property
     def is_exact(self) -> bool:
-        """Whether its error is near the last bits, whatever the plant step."""
+        """Tells whether its error is near the last bits, whatever the plant step."""
         return self.order is None
 
     def make_motion(self, scene: dict[str, Any], *args: Any) -> Any:

@@ -26,7 +26,7 @@ class Mechanics:
 
     @classmethod
     def from_scene(cls, scene: dict[str, Any]) -> Mechanics:
-        """Read the ``[device]`` and, where present, ``[hand]`` tables of a resolved scene."""
+        """Reads the ``[device]`` and, where present, ``[hand]`` tables of a resolved scene."""
         device = scene["device"]
         start = device["position"], device["velocity"]
         hand = scene.get("hand")

@@ -1,1 +1,1 @@
-"""What the controller gets to know of the plant: encoder, noise, accelerometer."""
+"""The sensors of the plant: encoder, noise, accelerometer."""
