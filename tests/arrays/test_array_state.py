@@ -12,6 +12,7 @@ from haploop.controller.tick import StateTuple, initial_state, tick
 from haploop.plant.random.streams import RandomStream, make_normal
 from haploop.plant.sensing.noise import NoisyPositionSensor
 from haploop.protocol.trees import tree_select
+from helpers.scenes.least import typed
 
 KEPT = np.array([True, False, True, True, False])
 
@@ -27,7 +28,7 @@ KEPT = np.array([True, False, True, True, False])
 def test_estimators_go_on_with_the_loops_that_are_kept(tables: dict[str, Any]) -> None:
     rng = np.random.default_rng(1)
     x = rng.normal(size=(12, 5)) * 1e-3
-    params = make_params({**tables, "dissipation": []}, 1e-3, {})
+    params = make_params(typed(**tables), 1e-3, {})
     whole: StateTuple = initial_state(params, (x[0],))
     cut, of_cut = whole, params
     for k, row in enumerate(x):

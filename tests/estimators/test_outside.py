@@ -11,6 +11,7 @@ import pytest
 
 from haploop.controller.estimators.base import Estimator, Sample
 from haploop.controller.estimators.choose import ESTIMATORS, estimator_class
+from haploop.protocol.scene.scene import Scene
 from haploop.tools.linear.controller import LinearController
 from helpers.runs.batches import alone, pressed, together
 from helpers.runs.estimates import T, estimates, floats
@@ -31,8 +32,9 @@ class AlphaBeta(Estimator):
     period_s: float
 
     @classmethod
-    def from_scene(cls, scene: dict[str, Any], of: str, period_s: float) -> AlphaBeta:
-        return cls(scene[of]["alpha"], scene[of]["beta"], period_s)
+    def from_scene(cls, scene: Scene, of: str, period_s: float) -> AlphaBeta:
+        own = scene.estimate(of).others
+        return cls(own["alpha"], own["beta"], period_s)
 
     def start(self, u: Any, sample: Sample) -> Any:
         return u, 0.0 * u

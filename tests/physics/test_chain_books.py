@@ -15,6 +15,7 @@ from haploop.logger.books.buffers import PIECES
 from haploop.logger.books.chain import ChainBooks
 from haploop.logger.logger import Logger
 from haploop.plant.plant import Plant
+from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
 from helpers.runs.captured import run
 from helpers.scenes.effect_tables import slowly
@@ -187,7 +188,7 @@ def test_a_logger_that_joins_begins_where_it_knows_every_command_and_its_books_c
     """Where nine of ten commands are lost, the one in effect is often older than what the controller hands over."""
     resolved = resolved_of(name)
     time = Timebase.from_clock(resolved["clock"], resolved["duration"])
-    plant, controller = Plant(resolved, time), Controller(resolved, time, KINDS)
+    plant, controller = Plant(resolved, time), Controller(Scene.from_dict(resolved), time, KINDS)
     joining: list[Logger] = []
     waited = []
     for until in range(10, time.ticks + 1, 10):

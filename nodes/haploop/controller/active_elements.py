@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from haploop.controller.dissipation import Element, ElementError
+from haploop.protocol.scene.scene import ElementTable
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,19 +38,18 @@ class ActiveElement:
         }
 
 
-def make_element(table: dict[str, Any], kinds: Mapping[str, type[Element]]) -> tuple[Element, str]:
+def make_element(table: ElementTable, kinds: Mapping[str, type[Element]]) -> tuple[Element, str]:
     """Makes the element that a validated ``[[dissipation]]`` table names; returns it, and when it acts.
 
     Raises:
         ElementError: the element's own code does not take these parameters.
     """
-    parameters = {key: value for key, value in table.items() if key not in ("kind", "acts")}
     try:
-        return kinds[table["kind"]](**parameters), table.get("acts", "in-contact")
+        return kinds[table.name](**table.parameters), table.acts
     except Exception as error:
-        given = ", ".join(f"{name} = {value}" for name, value in parameters.items()) or "no parameters"
+        given = ", ".join(f"{name} = {value}" for name, value in table.parameters.items()) or "no parameters"
         raise ElementError(
-            f"The element {table['kind']} cannot be made with {given}: {type(error).__name__}: {error}"
+            f"The element {table.name} cannot be made with {given}: {type(error).__name__}: {error}"
         ) from error
 
 

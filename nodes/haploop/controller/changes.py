@@ -10,6 +10,7 @@ from haploop.controller.active_elements import ActiveElement, make_element
 from haploop.controller.dissipation import Element, load_plugin
 from haploop.controller.tick import ControllerParams, ControllerState
 from haploop.protocol.changes import NO_ELEMENT, Change
+from haploop.protocol.scene.scene import ElementTable
 
 Kinds = dict[str, type[Element]]
 
@@ -39,7 +40,7 @@ def _swapped(
         del elements[place]
         del memories[place]
     else:
-        active = ActiveElement(*make_element(table, kinds), books, change.tick)
+        active = ActiveElement(*make_element(ElementTable.from_dict(table), kinds), books, change.tick)
         elements[place : place + 1] = [active]
         memories[place : place + 1] = [active.element.memory]
         books += 1

@@ -15,6 +15,7 @@ from haploop.controller.recorder import Recorder
 from haploop.controller.tick import ControllerParams, ControllerState, NoForce, StateTuple, initial_state, tick
 from haploop.controller.wall import Wall
 from haploop.protocol.changes import Change, Event
+from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import DELAY, Timebase
 from haploop.protocol.trees import tree_select
 
@@ -25,10 +26,10 @@ if TYPE_CHECKING:
 _NEVER = 2**62
 
 
-def make_params(scene: dict[str, Any], period_s: float, kinds: dict[str, type[Element]]) -> ControllerParams:
+def make_params(scene: Scene, period_s: float, kinds: dict[str, type[Element]]) -> ControllerParams:
     """Makes the parameters of the controller of a resolved scene, or of a batch in a stacked one."""
     elements = tuple(
-        ActiveElement(*make_element(table, kinds), book, 0) for book, table in enumerate(scene.get("dissipation", []))
+        ActiveElement(*make_element(table, kinds), book, 0) for book, table in enumerate(scene.dissipation)
     )
     wall = Wall.from_scene(scene)
     motion = Motion(period_s, wall.inward)
@@ -52,7 +53,7 @@ class Controller:
 
     def __init__(
         self,
-        scene: dict[str, Any],
+        scene: Scene,
         time: Timebase,
         kinds: dict[str, type[Element]],
         recorder: Recorder | None = None,

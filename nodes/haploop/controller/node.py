@@ -16,6 +16,7 @@ from haploop.protocol.clock_client import ClockClient
 from haploop.protocol.loop import ControllerEnd
 from haploop.protocol.node import NodeError, run_node
 from haploop.protocol.processes import PROCESSES
+from haploop.protocol.scene.scene import Scene
 from haploop.protocol.sockets import bind
 from haploop.protocol.telemetry import Publisher
 from haploop.protocol.ticks import Timebase
@@ -31,10 +32,10 @@ class ControllerNode:
         self._publisher = Publisher(context, ROLE, self._state)
         address = bind(self._publisher.socket, directory, PROCESSES[ROLE].binds["telemetry"])
         welcome = client.join({"telemetry": address})
-        scene = welcome["scene"]
+        scene = Scene.from_dict(welcome["scene"])
         kinds = registry([Path(path) for path in welcome["context"]["plugins"]])
         self._controller = Controller(scene, Timebase(**welcome["timebase"]), kinds)
-        self._block = BlockLength(scene["run"]["block_ticks"])
+        self._block = BlockLength(scene.run.block_ticks)
         self._reported = 0
         self._secret = welcome["context"]["secret"]
         self._loop = ControllerEnd(context, welcome["endpoints"]["plant"]["loop"], self._await_plant)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from haploop.protocol.arrays import where
+from haploop.protocol.scene.scene import Scene
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,12 +24,11 @@ class Wall:
     inward: float
 
     @classmethod
-    def from_scene(cls, scene: dict[str, Any]) -> Wall:
+    def from_scene(cls, scene: Scene) -> Wall:
         """Makes the wall of a resolved scene, which may have none."""
-        if "wall" not in scene:
+        if (table := scene.wall) is None:
             return cls(0.0, 0.0, 0.0)
-        table = scene["wall"]
-        return cls(table["position"], table["stiffness"], -1.0 if table["occupies"] == "below" else 1.0)
+        return cls(table.position, table.stiffness, -1.0 if table.occupies == "below" else 1.0)
 
     def contact(self, x: Any) -> tuple[Any, Any]:
         """Returns whether measured position x (m) is strictly inside, and the force on the device in N along +x."""

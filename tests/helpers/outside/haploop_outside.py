@@ -11,6 +11,7 @@ from haploop.launch.plan.effect import Draft, Effect
 from haploop.plant.integrators.linear_rates import LinearRates, Rows, moved
 from haploop.plant.integrators.registry import Integrator
 from haploop.protocol.quantity import Quantity, si
+from haploop.protocol.scene.scene import Scene
 from haploop.protocol.scene.table import Table
 
 
@@ -59,8 +60,9 @@ class AlphaBeta(Estimator):
     period_s: float
 
     @classmethod
-    def from_scene(cls, scene: dict[str, Any], of: str, period_s: float) -> AlphaBeta:
-        return cls(scene[of]["alpha"], scene[of]["beta"], period_s)
+    def from_scene(cls, scene: Scene, of: str, period_s: float) -> AlphaBeta:
+        own = scene.estimate(of).others
+        return cls(own["alpha"], own["beta"], period_s)
 
     def start(self, u: Any, sample: Sample) -> Any:
         return u, 0.0 * u

@@ -8,6 +8,7 @@ import numpy as np
 from haploop.controller.controller import make_params
 from haploop.controller.tick import StateTuple, initial_state, tick
 from haploop.plant.sensing.encoder import make_encoder
+from helpers.scenes.least import typed
 
 T = 1e-3
 COUNT = 1e-5
@@ -23,7 +24,7 @@ FUSED = {**KALMAN, "accelerometer": True, "accelerometer_noise": 0.5}
 def estimates(x: Sequence[Any], readings: Sequence[Any] = (), **tables: Any) -> tuple[np.ndarray, np.ndarray]:
     """v and a along sampled positions, by the tables of a scene; shape (ticks, ...) as the samples are."""
     samples = list(zip(x, readings, strict=True)) if len(readings) else [(at,) for at in x]
-    params, rows = make_params(tables, T, {}), []
+    params, rows = make_params(typed(**tables), T, {}), []
     state: StateTuple = initial_state(params, samples[0])
     for sample in samples:
         state, row = tick(params, state, sample)

@@ -10,6 +10,7 @@ from haploop.controller.controller import Controller
 from haploop.logger.logger import Logger
 from haploop.logger.summary import energy
 from haploop.plant.sensing.encoder import make_encoder
+from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
 from helpers.scenes.least import KINDS
 
@@ -29,7 +30,7 @@ def books_along(scene: dict[str, Any], x: np.ndarray) -> tuple[dict[str, np.ndar
     n, steps = time.steps_per_tick, time.ticks * time.steps_per_tick
     assert len(x) == steps + 1
     measure = make_encoder(scene.get("encoder"))
-    controller = Controller(scene, time, KINDS)
+    controller = Controller(Scene.from_dict(scene), time, KINDS)
     commands = controller.answer([(measure(float(at)),) for at in x[:-1:n]])
     in_effect = np.maximum((np.arange(steps + 1) - time.delay_steps) // n, -1)
     in_effect[-1] = in_effect[-2]

@@ -8,6 +8,7 @@ from haploop.launch.scene.check import resolve
 from haploop.launch.scene.file import load
 from haploop.launch.scene.layers import Layers
 from haploop.launch.scene.mistakes import SceneError
+from haploop.protocol.scene.scene import Scene
 
 KINDS = registry()
 LEAST: dict[str, Any] = {"title": "least", "duration": 1.0, "device": {"mass": 0.01, "damping": 0.1}}
@@ -17,6 +18,11 @@ WALL = {"position": -0.06, "stiffness": 150.0}
 def scene(**tables: Any) -> dict[str, Any]:
     """The least scene with these tables, resolved."""
     return resolve(Layers(Path("scene.toml"), {**LEAST, **tables}), KINDS)
+
+
+def typed(**tables: Any) -> Scene:
+    """The least scene with these tables as they are, arrays of a batch among them."""
+    return Scene.from_dict({**LEAST, **tables})
 
 
 def mistakes(**tables: Any) -> list[str]:

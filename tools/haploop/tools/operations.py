@@ -16,6 +16,7 @@ from haploop.controller.controller import Controller
 from haploop.launch.plan.effect import Effect
 from haploop.launch.plan.plan import multiplications
 from haploop.plant.plant import Plant
+from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
 
 if TYPE_CHECKING:
@@ -70,7 +71,7 @@ def operations(scene: dict[str, Any], kinds: Kinds) -> Operations:
     A shorter run is counted over its second half.
     """
     time = Timebase.from_clock(scene["clock"], scene["duration"])
-    plant, controller = Plant(scene, time), Controller(scene, time, kinds)
+    plant, controller = Plant(scene, time), Controller(Scene.from_dict(scene), time, kinds)
     counter = _Counter()
     counts: list[tuple[int, int]] = []
 

@@ -21,6 +21,7 @@ from haploop.plant.line.delay import make_line
 from haploop.plant.plant import beyond
 from haploop.plant.sensing.accelerometer import make_accelerometer
 from haploop.plant.sensing.encoder import accelerometer_is_used
+from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
 from haploop.protocol.trees import tree_select
 
@@ -70,7 +71,7 @@ class Batch:
         self._position, self._sensor = make_position_sensor(scene, time), make_accelerometer(scene, time, members)
         self._feels = accelerometer_is_used(scene)
         self._rows = BatchRecorder()
-        self._controller = Controller(scene, time, kinds, self._rows)
+        self._controller = Controller(Scene.from_dict(scene), time, kinds, self._rows)
         self._elements = Unchanged(self._controller.params.elements)
         self._logger = BatchLogger(scene, time, len(scenes), energy=energy, trajectories=trajectories)
         self._positions_only = not (energy or trajectories)

@@ -26,6 +26,7 @@ from haploop.launch.plan.effect import (
 )
 from haploop.plant.integrators.registry import find_integrator, integrator_module, integrator_names
 from haploop.plant.sensing.encoder import accelerometer_is_used
+from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
 from haploop.protocol.trees import tree_leaves
 
@@ -77,7 +78,7 @@ def _estimators(of: str) -> Iterator[Effect]:
 def _memory_of(of: str, scene: Resolved) -> int:
     """Counts the numbers that an estimator remembers; counts of ticks are none of them."""
     clock = Timebase.from_clock(scene["clock"], scene["duration"])
-    estimator = estimator_class(scene[of]["estimator"]).from_scene(scene, of, clock.period_s)
+    estimator = estimator_class(scene[of]["estimator"]).from_scene(Scene.from_dict(scene), of, clock.period_s)
     return sum(isinstance(leaf, float) for leaf in tree_leaves(estimator.start(0.0, (0.0, 0.0))))
 
 

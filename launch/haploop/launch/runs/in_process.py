@@ -13,6 +13,7 @@ from haploop.logger.session import LogSession, open_session
 from haploop.plant.plant import Plant
 from haploop.protocol.block_length import BlockLength
 from haploop.protocol.changes import Event, is_change, refusal
+from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
 
 if TYPE_CHECKING:
@@ -78,7 +79,7 @@ class Loop:
     def __init__(
         self, scene: dict[str, Any], time: Timebase, kinds: dict[str, type[Element]], session: LogSession
     ) -> None:
-        self._plant, self._controller = Plant(scene, time), Controller(scene, time, kinds)
+        self._plant, self._controller = Plant(scene, time), Controller(Scene.from_dict(scene), time, kinds)
         self._session = session
         self._end = time.ticks
         self._block = BlockLength(scene["run"]["block_ticks"])

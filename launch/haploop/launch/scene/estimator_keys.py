@@ -33,7 +33,7 @@ def check_filter(layers: Layers, scene: Scene) -> None:
         return
     from haploop.controller.estimators.kalman import jerk_density_limits, position_noise_m
 
-    noise_m, rate = position_noise_m(scene.as_dict()), scene.clock.control_rate
+    noise_m, rate = position_noise_m(scene), scene.clock.control_rate
     least, most = jerk_density_limits(noise_m, 1.0 / rate)
     if noise_m and not least <= scene.velocity.jerk_density <= most:
         expected = (

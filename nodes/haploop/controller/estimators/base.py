@@ -10,6 +10,7 @@ from typing import Any, ClassVar
 
 from haploop.protocol.arrays import each
 from haploop.protocol.quantity import Quantity
+from haploop.protocol.scene.scene import Scene
 
 # (x_m,) or (x_m, acceleration) of a tick; floats, or arrays of shape (members,).
 Sample = Sequence[Any]
@@ -43,7 +44,7 @@ class Estimator(ABC):
 
     @classmethod
     @abstractmethod
-    def from_scene(cls, scene: dict[str, Any], of: str, period_s: float) -> Estimator:
+    def from_scene(cls, scene: Scene, of: str, period_s: float) -> Estimator:
         """Makes the one that a scene's table ``of`` ("velocity" or "acceleration") names, for the control period T."""
 
     @abstractmethod
@@ -75,7 +76,7 @@ class Difference(Estimator):
     period_s: float
 
     @classmethod
-    def from_scene(cls, scene: dict[str, Any], of: str, period_s: float) -> Difference:
+    def from_scene(cls, scene: Scene, of: str, period_s: float) -> Difference:
         """Makes it; no key of the scene is asked."""
         return cls(period_s)
 
@@ -96,7 +97,7 @@ class Unchanged(Estimator):
     does: ClassVar[str] = "the input itself"
 
     @classmethod
-    def from_scene(cls, scene: dict[str, Any], of: str, period_s: float) -> Unchanged:
+    def from_scene(cls, scene: Scene, of: str, period_s: float) -> Unchanged:
         """Makes it; no key of the scene is asked."""
         return cls()
 
@@ -123,7 +124,7 @@ class LowPass(Estimator):
     gain: Any
 
     @classmethod
-    def from_scene(cls, scene: dict[str, Any], of: str, period_s: float) -> LowPass:
+    def from_scene(cls, scene: Scene, of: str, period_s: float) -> LowPass:
         """Raises TypeError: it is made of another by ``over``."""
         raise TypeError("A low-pass is made over another estimator.")
 

@@ -7,6 +7,8 @@ from importlib.metadata import entry_points
 from typing import Any
 
 from haploop.controller.estimators.base import Difference, Estimator, LowPass, Unchanged
+from haploop.protocol.scene.estimators import Acceleration
+from haploop.protocol.scene.scene import Scene
 
 # Every estimator by the name that a scene gives it: the class, or "module:class", which is imported where it is used.
 ESTIMATORS: dict[str, str | type[Estimator]] = {
@@ -45,26 +47,22 @@ def estimators_for(table: str) -> dict[str, type[Estimator]]:
     return {name: kind for name, kind in classes.items() if table in kind.tables}
 
 
-def make_estimators(scene: dict[str, Any], period_s: float) -> tuple[Estimator, Estimator, str]:
+def make_estimators(scene: Scene, period_s: float) -> tuple[Estimator, Estimator, str]:
     """Makes those that a scene's ``[velocity]`` and ``[acceleration]`` name, for the control period T.
 
     Returns:
         What estimates v of x_m, what estimates a of its input, and that input: "encoder": v as it is filtered;
         "accelerometer": the reading; "kalman": what the velocity's filter found.
     """
-    source = scene.get("acceleration", {}).get("source", "encoder")
-    acceleration = _make(scene, "acceleration", period_s) if source == "encoder" else Unchanged()
-    return (
-        _filtered(_make(scene, "velocity", period_s), scene.get("velocity", {}), period_s),
-        _filtered(acceleration, scene.get("acceleration", {}), period_s),
-        source,
-    )
+    acceleration = scene.acceleration or Acceleration()
+    raw = _make(scene, "acceleration", period_s) if acceleration.source == "encoder" else Unchanged()
+    velocity = _filtered(_make(scene, "velocity", period_s), scene.estimate("velocity").cutoff, period_s)
+    return velocity, _filtered(raw, acceleration.cutoff, period_s), acceleration.source
 
 
-def _make(scene: dict[str, Any], of: str, period_s: float) -> Estimator:
-    name = scene.get(of, {}).get("estimator") or "difference"
-    return estimator_class(name).from_scene(scene, of, period_s)
+def _make(scene: Scene, of: str, period_s: float) -> Estimator:
+    return estimator_class(scene.estimate(of).estimator or "difference").from_scene(scene, of, period_s)
 
 
-def _filtered(raw: Estimator, table: dict[str, Any], period_s: float) -> Estimator:
-    return LowPass.over(raw, table["cutoff"], period_s) if "cutoff" in table else raw
+def _filtered(raw: Estimator, cutoff_hz: Any, period_s: float) -> Estimator:
+    return raw if cutoff_hz is None else LowPass.over(raw, cutoff_hz, period_s)

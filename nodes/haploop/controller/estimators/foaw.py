@@ -9,6 +9,7 @@ from typing import Any, ClassVar
 
 from haploop.controller.estimators.base import Estimator, Sample
 from haploop.protocol.arrays import where
+from haploop.protocol.scene.scene import Scene
 
 # A deviation of just the bound, which quantised signals make often, counts as within it however it is rounded.
 _ROUNDING = 1e-6
@@ -42,11 +43,12 @@ class EndFit(Estimator):
     period_s: float
 
     @classmethod
-    def from_scene(cls, scene: dict[str, Any], of: str, period_s: float) -> EndFit:
+    def from_scene(cls, scene: Scene, of: str, period_s: float) -> EndFit:
         """Makes the one that the scene's table asks for; a velocity's bound is one count unless it is given."""
-        table = scene[of]
-        count = scene.get("encoder", {}).get("resolution", 0.0) if of == "velocity" else 0.0
-        return _FITS[table.get("fit", "end")](table["ticks"], table.get("bound", count), period_s)
+        table = scene.estimate(of)
+        count = scene.encoder.resolution if scene.encoder and of == "velocity" else 0.0
+        bound = count if table.bound is None else table.bound
+        return _FITS[table.fit or "end"](table.ticks, bound, period_s)
 
     def start(self, u: Any, sample: Sample) -> tuple[Any, ...]:
         """Returns a memory without a number."""

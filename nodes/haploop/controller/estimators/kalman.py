@@ -29,6 +29,9 @@ import numpy.typing as npt
 
 from haploop.controller.estimators.base import Estimator, Sample
 from haploop.protocol.arrays import each
+from haploop.protocol.scene.effects import Accelerometer
+from haploop.protocol.scene.estimators import Velocity
+from haploop.protocol.scene.scene import Scene
 
 Array = npt.NDArray[np.float64]
 Memory = tuple[Any, Any, Any]
@@ -60,10 +63,10 @@ class Kalman(Estimator):
     half_s2: float
 
     @classmethod
-    def from_scene(cls, scene: dict[str, Any], of: str, period_s: float) -> Kalman:
+    def from_scene(cls, scene: Scene, of: str, period_s: float) -> Kalman:
         """Makes the filter of a scene's ``[velocity]`` table, fused with the accelerometer where that is asked."""
         noises = assumed_noises(scene, period_s).values()
-        density = scene[of]["jerk_density"]
+        density = (scene.velocity or Velocity()).jerk_density
         gain = each(lambda jerk, *noises: steady_state(jerk, list(noises), period_s)[0], density, *noises)
         entries = gain.tolist() if gain.ndim == 2 else gain
         return (FusedKalman if len(noises) > 1 else Kalman)(
@@ -109,13 +112,12 @@ class FusedKalman(Kalman):
         return (x + self.period_s * v + self.half_s2 * a, v + self.period_s * a, a), v
 
 
-def assumed_noises(scene: dict[str, Any], period_s: float) -> dict[str, float]:
+def assumed_noises(scene: Scene, period_s: float) -> dict[str, float]:
     """The standard deviations that the filter of a scene counts on, by their keys in ``[velocity]``."""
-    table = scene["velocity"]
     noises = {"measurement_noise": position_noise_m(scene)}
-    if table.get("accelerometer"):
-        noise = table.get("accelerometer_noise", _accelerometer_noise_m_s2(scene, period_s))
-        noises["accelerometer_noise"] = noise
+    if scene.velocity and scene.velocity.accelerometer:
+        given = scene.velocity.accelerometer_noise
+        noises["accelerometer_noise"] = _accelerometer_noise_m_s2(scene, period_s) if given is None else given
     return noises
 
 
@@ -160,20 +162,20 @@ def _model(T: float, S: float) -> tuple[Array, Array]:
     return step, S * np.array(noise)
 
 
-def position_noise_m(scene: dict[str, Any]) -> float:
+def position_noise_m(scene: Scene) -> float:
     """Standard deviation sigma: what ``[velocity]`` says, or that of rounding (q / sqrt(12)) and noise together."""
-    if "measurement_noise" in scene["velocity"]:
-        return scene["velocity"]["measurement_noise"]
-    rounding = scene.get("encoder", {}).get("resolution", 0.0) / math.sqrt(12.0)
-    return each(math.hypot, rounding, scene.get("noise", {}).get("deviation", 0.0))
+    if scene.velocity and scene.velocity.measurement_noise is not None:
+        return scene.velocity.measurement_noise
+    rounding = (scene.encoder.resolution if scene.encoder else 0.0) / math.sqrt(12.0)
+    return each(math.hypot, rounding, scene.noise.deviation if scene.noise else 0.0)
 
 
-def _accelerometer_noise_m_s2(scene: dict[str, Any], period_s: float) -> float:
+def _accelerometer_noise_m_s2(scene: Scene, period_s: float) -> float:
     """Standard deviation of the accelerometer's white noise through its first-order bandwidth, and of its rounding.
 
     The noise of density n is n sqrt(pi B / 2) behind a corner at B Hz, n sqrt(1 / (2 T)) when sampled as it is.
     """
-    table = scene.get("accelerometer", {})
-    band_Hz = math.pi / 2.0 * table["bandwidth"] if "bandwidth" in table else 0.5 / period_s
-    rounding = table.get("resolution", 0.0) / math.sqrt(12.0)
-    return math.hypot(table.get("noise_density", 0.0) * math.sqrt(band_Hz), rounding)
+    table = scene.accelerometer or Accelerometer()
+    band_Hz = 0.5 / period_s if table.bandwidth is None else math.pi / 2.0 * table.bandwidth
+    rounding = (table.resolution or 0.0) / math.sqrt(12.0)
+    return math.hypot(table.noise_density * math.sqrt(band_Hz), rounding)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from haploop.controller.estimators.base import Estimator, Sample
+from haploop.protocol.scene.scene import Scene
 
 
 @dataclass(frozen=True)
@@ -27,9 +28,9 @@ class WindowDifference(Estimator):
     period_s: float
 
     @classmethod
-    def from_scene(cls, scene: dict[str, Any], of: str, period_s: float) -> WindowDifference:
+    def from_scene(cls, scene: Scene, of: str, period_s: float) -> WindowDifference:
         """Makes the one of ``ticks`` in the scene's table."""
-        return cls(scene[of]["ticks"], period_s)
+        return cls(scene.estimate(of).ticks or 1, period_s)
 
     def start(self, u: Any, sample: Sample) -> tuple[tuple[Any, ...], int]:
         """Returns a memory full of the first input."""

@@ -119,6 +119,10 @@ class Scene(OpenTable):
     event: tuple[dict[str, Any], ...] = ()
     run: Run = Run()
 
+    def estimate(self, of: str) -> Velocity | Acceleration:
+        """Returns the table of an estimate, "velocity" or "acceleration": its defaults where the scene has none."""
+        return (self.velocity or Velocity()) if of == "velocity" else (self.acceleration or Acceleration())
+
     def as_dict(self) -> dict[str, Any]:
         """Returns the scene as nested dicts and lists, absent tables and empty lists left out."""
         return {key: value for key, value in super().as_dict().items() if value != []}

@@ -15,6 +15,7 @@ from haploop.controller.estimators.base import Sample, Unchanged
 from haploop.logger.books.buffers import as_float64
 from haploop.logger.books.sums import add_columns, no_sums
 from haploop.logger.books.work import sampled_work
+from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
 from haploop.tools.dissipate.samples import Floats, Samples
 
@@ -213,7 +214,7 @@ def _recorded_controller(
     scene: dict[str, Any], time: Timebase, kinds: dict[str, type[Element]], recorded: frozenset[str]
 ) -> Controller:
     """Makes a controller of samples (x, acceleration, velocity) that takes recorded values in place of estimates."""
-    controller = Controller(scene, time, kinds)
+    controller = Controller(Scene.from_dict(scene), time, kinds)
     places = {"acceleration": 1, "velocity": 2}
     controller.params = replace(controller.params, **{of: Recorded(places[of]) for of in recorded})
     return controller

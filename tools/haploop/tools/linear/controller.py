@@ -9,6 +9,7 @@ import numpy as np
 from haploop.controller.controller import make_params
 from haploop.controller.tick import ControllerParams, StateTuple, initial_state, tick
 from haploop.plant.sensing.encoder import accelerometer_is_used
+from haploop.protocol.scene.scene import Scene
 from haploop.protocol.trees import tree_leaves, tree_unflatten
 from haploop.tools.linear.linearity import Kinds
 
@@ -37,7 +38,7 @@ class LinearController(NamedTuple):
         Its next state is A and B, row by row. Whole numbers of the state count ticks; they are run to where they stay.
         """
         period_s, inputs = 1.0 / scene["clock"]["control_rate"], 1 + accelerometer_is_used(scene)
-        params = make_params({**scene, "wall": _ALWAYS_INSIDE}, period_s, dict(kinds))
+        params = make_params(Scene.from_dict({**scene, "wall": _ALWAYS_INSIDE}), period_s, dict(kinds))
         state = _settled(params, (0.0,) * inputs)
         leaves = tree_leaves(state)
         numbers = [place for place, leaf in enumerate(leaves) if isinstance(leaf, float)]

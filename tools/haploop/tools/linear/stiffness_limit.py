@@ -13,6 +13,7 @@ from haploop.launch.plan.effects import all_effects
 from haploop.launch.runs.in_process import run_in_process
 from haploop.logger.verdict.measures import WINDOW_S
 from haploop.plant.chain.chain import Chain
+from haploop.protocol.scene.scene import Scene
 from haploop.tools.linear.one_tick import OneTickMap
 
 if TYPE_CHECKING:
@@ -88,7 +89,7 @@ def smooth(scene: dict[str, Any]) -> dict[str, Any]:
     smoothed = copy.deepcopy(scene)
     period_s = 1.0 / scene["clock"]["control_rate"]
     if scene.get("velocity", {}).get("estimator") == "kalman":
-        smoothed["velocity"] |= assumed_noises(scene, period_s)
+        smoothed["velocity"] |= assumed_noises(Scene.from_dict(scene), period_s)
     rough = [key for effect in all_effects() for key in effect.left_out if key not in _NOT_ABSENT]
     smoothed = without_keys(smoothed, "event", *rough)
     if "accelerometer" in smoothed:

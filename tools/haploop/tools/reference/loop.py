@@ -19,6 +19,7 @@ from haploop.plant.line.delay import make_line
 from haploop.plant.motion.hand_force import constant_forces
 from haploop.plant.sensing.accelerometer import make_accelerometer
 from haploop.plant.sensing.encoder import accelerometer_is_used
+from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
 
 
@@ -101,7 +102,7 @@ def close_loop(
     """Runs a scene with a continuous plant; ``exact`` turns a load into the plant's kind of number."""
     time = make_timebase(scene)
     position, meter, line = make_position_sensor(scene, time), make_accelerometer(scene, time), make_line(scene, time)
-    controller = Controller(scene, time, registry())
+    controller = Controller(Scene.from_dict(scene), time, registry())
     late = round(scene.get("accelerometer", {}).get("delay", 0.0) * time.control_rate)
     sensed = deque([0.0] * (late + 1), maxlen=late + 1)
     load = [exact(f) for f in loads(scene, time)]

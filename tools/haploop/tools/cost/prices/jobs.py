@@ -12,6 +12,7 @@ from haploop.controller.dissipation import registry
 from haploop.launch.scene.file import load
 from haploop.plant.plant import Plant
 from haploop.protocol.block_length import BlockLength
+from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
 from haploop.tools.ablation import ablations
 from haploop.tools.cost.grid import digest
@@ -86,7 +87,7 @@ def bare_us(scene: dict[str, Any]) -> float:
     In blocks as in a run, the first of them not counted either where there are more.
     """
     time = Timebase.from_clock(scene["clock"], scene["duration"])
-    plant, controller = Plant(scene, time), Controller(scene, time, registry())
+    plant, controller = Plant(scene, time), Controller(Scene.from_dict(scene), time, registry())
     length = BlockLength(scene["run"]["block_ticks"])
 
     def block() -> None:

@@ -10,6 +10,7 @@ import numpy as np
 
 from haploop.controller.controller import Controller
 from haploop.controller.dissipation import registry
+from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
 
 PERIOD_S = 1e-3
@@ -44,7 +45,7 @@ def forces(x_m: np.ndarray, kind: str, cutoff_Hz: float | None = None) -> np.nda
     if cutoff_Hz:
         scene["acceleration"] = {"source": "encoder", "cutoff": cutoff_Hz}
     clock = {"plant_rate": 1000, "control_rate": 1000, "round_trip_delay": 0.0}
-    controller = Controller(scene, Timebase.from_clock(clock, len(x_m) * PERIOD_S), registry())
+    controller = Controller(Scene.from_dict(scene), Timebase.from_clock(clock, len(x_m) * PERIOD_S), registry())
     answered = controller.answer([(row,) for row in x_m])
     offset = STIFFNESS_N_M * 1e3 if kind == SPRING else 0.0
     return np.array([np.broadcast_to(force, x_m.shape[1:]) for force in answered]) - offset
