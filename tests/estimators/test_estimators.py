@@ -157,7 +157,10 @@ def test_a_scene_that_names_no_estimator_loads_none():
         import sys
         from haploop.controller.controller import Controller
         from haploop.protocol.ticks import Timebase
-        scene = {"velocity": {"cutoff": 50.0}, "acceleration": {"source": "accelerometer"}}
+        from haploop.protocol.scene.scene import Scene
+        tables = {"velocity": {"cutoff": 50.0}, "acceleration": {"source": "accelerometer"}}
+        device = {"mass": 0.01, "damping": 0.1}
+        scene = Scene.from_dict({"title": "", "duration": 0.01, "device": device, **tables})
         Controller(scene, Timebase(10_000, 1_000, 0, 10), {}).answer([(0.0, 0.0)])
         print([name for name in sys.modules if name.split(".")[-1] in ("window_difference", "foaw", "kalman", "scipy")])
     """

@@ -22,19 +22,20 @@ SCENES = Path(__file__).parents[2] / "launch/scenes"
 # The nodes' cores, built from scenes on stdin as their processes build them. Each scene is built in a fork of a fresh
 # interpreter that has built none, and a line tells what of haploop is loaded then.
 CORES = {
-    "plant": "from haploop.plant.plant import Plant as Core; rest = ()",
+    "plant": "from haploop.plant.plant import Plant as Core; rest, typed = (), dict",
     "controller": "from haploop.controller.controller import Controller as Core\n"
-    "from haploop.controller.dissipation import registry; rest = (registry(),)",
+    "from haploop.controller.dissipation import registry; rest, typed = (registry(),), Scene.from_dict",
 }
 BUILD = """
 import json, os, sys
+from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
 {core}
 for scene in json.load(sys.stdin):
     if child := os.fork():
         assert os.waitpid(child, 0)[1] == 0
         continue
-    Core(scene, Timebase.from_clock(scene["clock"], scene["duration"]), *rest)
+    Core(typed(scene), Timebase.from_clock(scene["clock"], scene["duration"]), *rest)
     loaded = [module for name, module in sys.modules.items() if name.startswith("haploop.")]
     print(*(module.__name__ for module in loaded if not hasattr(module, "__path__")), flush=True)
     os._exit(0)

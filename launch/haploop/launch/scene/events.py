@@ -13,7 +13,7 @@ from haploop.launch.scene.mistakes import counted, nearest
 from haploop.launch.scene.models import EventModel, number_in, number_of
 from haploop.launch.scene.number import Number
 from haploop.protocol.changes import NO_ELEMENT
-from haploop.protocol.scene.scene import Clock, Wall
+from haploop.protocol.scene.scene import Clock, ElementTable, Wall
 from haploop.protocol.ticks import DELAY, Timebase, whole_count
 
 if TYPE_CHECKING:
@@ -152,4 +152,4 @@ def try_out(tables: Iterable[dict[str, Any]], kinds: Mapping[str, type[Element]]
         ElementError: one cannot be made.
     """
     for table in tables:
-        make_element(table, kinds)
+        make_element(ElementTable.from_dict(table), kinds)
