@@ -12,11 +12,10 @@ from haploop.controller.controller import Controller
 from haploop.controller.dissipation import Element, Motion, Quantity, where
 from haploop.controller.tick import initial_state, tick
 from haploop.plant.sensing.encoder import accelerometer_is_used
-from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
 from haploop.protocol.trees import tree_leaves, tree_map, tree_unflatten
 from helpers.runs.estimates import COUNT, ENCODER, FUSED, KALMAN
-from helpers.scenes.least import KINDS
+from helpers.scenes.least import KINDS, typed
 
 TIME = Timebase.from_clock({"plant_rate": 10_000, "control_rate": 1_000, "round_trip_delay": 0.0}, 1.0)
 TABLES: dict[str, dict[str, Any]] = {
@@ -72,7 +71,7 @@ def samples() -> list[tuple[float, ...]]:
 def test_a_controller_goes_on_from_a_packed_state_to_the_same_bits(tables: dict[str, Any], at: int) -> None:
     scene, kinds = {**SCENE, **tables}, KINDS | {"bristle": Bristle}
     whole = [sample[: 1 + accelerometer_is_used(scene)] for sample in samples()]
-    controller, other = Controller(Scene.from_dict(scene), TIME, kinds), Controller(Scene.from_dict(scene), TIME, kinds)
+    controller, other = Controller(typed(**scene), TIME, kinds), Controller(typed(**scene), TIME, kinds)
     controller.answer(whole[:at])
     packed = msgpack.packb(tree_leaves(controller.state))
     other.state = tree_unflatten(initial_state(other.params, whole[0]), msgpack.unpackb(packed))
@@ -81,14 +80,14 @@ def test_a_controller_goes_on_from_a_packed_state_to_the_same_bits(tables: dict[
     assert other.answer(whole[at:]) == rest
     assert tree_leaves(other.state)[-1] > 0
     if at == 40:
-        forgetful = Controller(Scene.from_dict(scene), TIME, kinds)
+        forgetful = Controller(typed(**scene), TIME, kinds)
         assert forgetful.answer(whole[at:]) != rest
 
 
 @pytest.mark.parametrize("tables", TABLES.values(), ids=TABLES)
 def test_a_tick_changes_neither_its_state_nor_the_structure_of_the_next(tables: dict[str, Any]) -> None:
     scene, kinds = {**SCENE, **tables}, KINDS | {"bristle": Bristle}
-    params = Controller(Scene.from_dict(scene), TIME, kinds).params
+    params = Controller(typed(**scene), TIME, kinds).params
     state: Any = initial_state(params, samples()[0])
     for sample in samples()[:30]:
         before = repr(state)
@@ -105,7 +104,7 @@ def test_a_swap_gives_a_new_element_a_fresh_memory_and_a_set_leaves_it_as_it_is(
     events = {"set": {"set": {"dissipation.0.stiffness": 30.0}}, "swap": {"swap": table, "element": 0}}
     found: dict[str, Any] = {}
     for name, event in {"none": {}, **events}.items():
-        controller = Controller(Scene.from_dict(scene), TIME, kinds)
+        controller = Controller(typed(**scene), TIME, kinds)
         if event:
             controller.schedule(50, event)
         found[name] = controller.answer(samples())

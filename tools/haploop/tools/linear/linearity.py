@@ -10,6 +10,7 @@ from haploop.controller.active_elements import keeps_attributes, make_element
 from haploop.controller.dissipation import registry
 from haploop.launch.plan.effect import as_written, at
 from haploop.launch.plan.effects import all_effects
+from haploop.protocol.scene.scene import ElementTable
 
 if TYPE_CHECKING:
     from haploop.controller.dissipation import Element
@@ -36,7 +37,9 @@ def why_not_linear(scene: dict[str, Any], kinds: Kinds | None = None) -> list[st
     """
     kinds = installed_kinds() if kinds is None else kinds
     curved = [effect.written for effect in all_effects() if not effect.linear and effect.is_named(scene)]
-    elements = {table["kind"]: make_element(table, kinds)[0] for table in scene.get("dissipation", [])}
+    elements = {
+        table["kind"]: make_element(ElementTable.from_dict(table), kinds)[0] for table in scene.get("dissipation", [])
+    }
     return curved + [f"the element {kind}" for kind, one in elements.items() if not one.linear or keeps_attributes(one)]
 
 
