@@ -129,7 +129,7 @@ def test_a_scene_that_raises_costs_no_other_its_result() -> None:
     scenes = [*(pressed(100.0 + k) for k in range(30)), broken]
     came = dict(results(scenes, workers=1))
     assert {index for index, result in came.items() if result["ended"] != "done"} == {30}
-    assert came[30]["why"].startswith("KeyError")
+    assert "stiffness" in came[30]["why"]
 
 
 def test_stopped_the_parts_under_way_are_still_told() -> None:

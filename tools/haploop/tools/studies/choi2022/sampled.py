@@ -4,13 +4,12 @@ form.
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from haploop.controller.controller import Controller
 from haploop.controller.dissipation import registry
-from haploop.protocol.scene.scene import Scene
+from haploop.protocol.scene.estimators import Acceleration
+from haploop.protocol.scene.scene import Clock, Device, ElementTable, Scene, Wall
 from haploop.protocol.ticks import Timebase
 
 PERIOD_S = 1e-3
@@ -37,15 +36,17 @@ def forces(x_m: np.ndarray, kind: str, cutoff_Hz: float | None = None) -> np.nda
     Returns:
         Shape (ticks, batch).
     """
-    scene: dict[str, Any] = {}
-    if kind == SPRING:
-        scene["wall"] = {"position": 1e3, "stiffness": STIFFNESS_N_M, "occupies": "below"}
-    else:
-        scene["dissipation"] = [{"kind": kind, "acts": "always", **_PARAMETERS[kind]}]
-    if cutoff_Hz:
-        scene["acceleration"] = {"source": "encoder", "cutoff": cutoff_Hz}
-    clock = {"plant_rate": 1000, "control_rate": 1000, "round_trip_delay": 0.0}
-    controller = Controller(Scene.from_dict(scene), Timebase.from_clock(clock, len(x_m) * PERIOD_S), registry())
+    element = ElementTable(name=kind, acts="always", parameters=_PARAMETERS.get(kind, {}))
+    scene = Scene(
+        title="prescribed samples",
+        duration=len(x_m) * PERIOD_S,
+        clock=Clock(plant_rate=1000),
+        device=Device(mass=1.0, damping=0.0),
+        wall=Wall(position=1e3, stiffness=STIFFNESS_N_M) if kind == SPRING else None,
+        dissipation=() if kind == SPRING else (element,),
+        acceleration=Acceleration(cutoff=cutoff_Hz) if cutoff_Hz else None,
+    )
+    controller = Controller(scene, Timebase.from_clock(scene.clock.as_dict(), scene.duration), registry())
     answered = controller.answer([(row,) for row in x_m])
     offset = STIFFNESS_N_M * 1e3 if kind == SPRING else 0.0
     return np.array([np.broadcast_to(force, x_m.shape[1:]) for force in answered]) - offset
