@@ -1,4 +1,4 @@
-"""Which estimators a scene asks for: the one register of them, and what makes v[k] and a[k] of its tables."""
+"""The register of estimators, and the making of those of v[k] and a[k] that a scene names."""
 
 from __future__ import annotations
 

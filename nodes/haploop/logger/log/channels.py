@@ -29,7 +29,7 @@ CONTROLLER_UNITS = {"x": "m", "v": "m/s", "a": "m/s^2", "wall": "N", "total": "N
 
 
 class Sink(Protocol):
-    """Where channels are written to: :class:`haploop.logger.log.writer.Log`, or what takes the same without a file."""
+    """Sink of channels: :class:`haploop.logger.log.writer.Log`, or what takes the same without a file."""
 
     def channel(
         self, topic: str, columns: Mapping[str, str], *, samples_per_message: int | None = None, title: str

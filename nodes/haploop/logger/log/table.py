@@ -24,7 +24,7 @@ def pack(value: Any) -> bytes:
 
 
 class TableLayout:
-    """Where each number of a table's message stands.
+    """Places of the numbers in a table's message.
 
     Attributes:
         columns: unit by column name, in the order of the map; "" for a pure number.

@@ -1,1 +1,1 @@
-"""What linear theory says of a loop in contact."""
+"""Linear theory of a loop in contact: the one-tick map, its limit of stability, and known bounds."""

@@ -18,7 +18,7 @@ _SMALL_ANGLE = 0.3
 
 @dataclass(frozen=True)
 class Bound:
-    """What an author's formula says of a scene's wall.
+    """Bound on the stiffness of a scene's wall by an author's formula.
 
     Attributes:
         name: authors and year, short enough for a label.
@@ -40,7 +40,7 @@ class Bound:
 
     @property
     def applies(self) -> bool:
-        """Whether the scene is within its domain."""
+        """Tells whether the scene is within its domain."""
         return self.stiffness_N_m is not None
 
 

@@ -1,4 +1,4 @@
-"""Whether a scene's loop in contact is a linear map, and what else it has that such a map leaves out."""
+"""Linearity of a scene's loop in contact, and the effects that a linear map leaves out."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ def installed_kinds() -> dict[str, type[Element]]:
 
 
 def is_linear(scene: dict[str, Any], kinds: Kinds | None = None) -> bool:
-    """Whether ``OneTickMap.from_scene`` gives the map of a resolved scene."""
+    """Tells whether ``OneTickMap.from_scene`` gives the map of a resolved scene."""
     return not why_not_linear(scene, kinds)
 
 
 def why_not_linear(scene: dict[str, Any], kinds: Kinds | None = None) -> list[str]:
-    """What makes the loop of a resolved scene in contact no linear map, each in a few words; empty if nothing does.
+    """Returns the reasons why a scene's loop in contact is no linear map, a few words each; empty if it is one.
 
     Args:
         kinds: element kinds at hand; the installed ones when None.
@@ -44,6 +44,6 @@ def why_not_linear(scene: dict[str, Any], kinds: Kinds | None = None) -> list[st
 
 
 def left_out(scene: dict[str, Any]) -> list[str]:
-    """What a resolved scene has, and the map of small and smooth swings in a contact that is never left has not."""
+    """Returns the effects of a resolved scene that a map of small, smooth swings in lasting contact leaves out."""
     keys = [key for effect in all_effects() for key in effect.left_out if at(scene, key)]
     return [as_written(key) for key in keys] + (["[[event]]"] if scene.get("event") else [])

@@ -155,7 +155,7 @@ def _course(chain: Chain, time: Timebase, z: np.ndarray, commands: np.ndarray) -
 
 
 def _felt_steps(scene: dict[str, Any], time: Timebase) -> int:
-    """How many plant steps' accelerations are remembered: as many as a reading is late, and the present one."""
+    """Counts the plant steps whose accelerations are remembered: as many as a reading is late, and the present one."""
     if not accelerometer_is_used(scene):
         return 0
     return 1 + round(scene.get("accelerometer", {}).get("delay", 0.0) * time.plant_rate)

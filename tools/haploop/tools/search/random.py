@@ -110,7 +110,7 @@ class Space:
 
 @dataclass(frozen=True, kw_only=True)
 class Effort:
-    """How much is searched, and how widely.
+    """Effort of a search: number of draws, of refinements, and their spread.
 
     Attributes:
         structures, each: points at random: so many structures, and points of each.

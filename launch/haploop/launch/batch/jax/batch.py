@@ -204,7 +204,7 @@ class CompiledBatch(Batch):
         self._in_flight.extend(commands)
 
     def _inputs(self, params: BatchParams, first: int, end: int) -> BlockInputs:
-        """What the program is given for the ticks first ... end - 1."""
+        """Returns the inputs of the program for the ticks first ... end - 1."""
         n, response = self._time.steps_per_tick, self._motion.response
         tau = response.tau.at_steps(first * n, (first + BLOCK_TICKS) * n + 1)
         shared = None
@@ -224,7 +224,7 @@ class CompiledBatch(Batch):
         return rows
 
     def _carry(self, tick: int, state: BatchState) -> Carry:
-        """Where a program begins."""
+        """Returns the state in which a program begins."""
         members, books, window = len(self._ended), self._logger.books, self._window
         sums = {}
         if books:
@@ -249,7 +249,7 @@ class CompiledBatch(Batch):
         return past
 
     def _rings(self) -> Rings:
-        """Where a program begins with what windows are read from."""
+        """Returns the rings, read by windows, with which a program begins."""
         x = self._window.state.x.reshape(-1, self._time.steps_per_tick, len(self._ended))
         return Rings(x, {name: self._window.state.rows[name] for name in RINGS})
 

@@ -20,7 +20,7 @@ RINGS = ("x", "total", "in_contact")
 
 
 class Carry(NamedTuple):
-    """What goes from tick to tick; arrays of shape (members,) where nothing else is said.
+    """State carried from tick to tick; arrays of shape (members,) where nothing else is said.
 
     Attributes:
         state: leaves of the state.
@@ -44,7 +44,7 @@ class Carry(NamedTuple):
 
 
 class Rings(NamedTuple):
-    """What a window is read from: the last ticks, tick k in row k modulo the length.
+    """Rings that a window is read from: the last ticks, tick k in row k modulo the length.
 
     Attributes:
         x: at the plant steps after each tick, up to the next, shape (ticks, n, members).
@@ -56,7 +56,7 @@ class Rings(NamedTuple):
 
 
 class BlockInputs(NamedTuple):
-    """What a block is given.
+    """Inputs of a block.
 
     Attributes:
         params: the numbers among the parameters.
@@ -156,7 +156,7 @@ class Block:
     def _booked(
         self, params: BatchParams, told: TickOutputs, x_m_before: Any, before: list[Forces], go: Any
     ) -> tuple[dict[str, Any], Forces]:
-        """What a tick adds to the books, and its forces; ``before`` are those of commands that act, and the last."""
+        """Returns a tick's additions to the books, and its forces; ``before``: those of commands that act, and the last."""
         command = {"command": told.row["total"]}
         if not self._book_names:
             return {}, command
@@ -189,7 +189,7 @@ def _as_before(before: list[Any], after: BatchState) -> list[Any]:
 
 
 def _apart(go: Any, make: Callable[[], Any]) -> Any:
-    """What ``make`` gives, made from numbers in memory and put into memory, so that no part of it is made twice.
+    """Returns the result of ``make``, made from numbers in memory and put into memory: no part of it is made twice.
 
     A compiler that fuses by itself makes for each of many results anew what they have in common; one for a GPU may.
 

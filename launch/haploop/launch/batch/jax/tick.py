@@ -89,7 +89,7 @@ class TickInputs(NamedTuple):
 
 
 class TickOutputs(NamedTuple):
-    """What a tick tells besides the state it leaves.
+    """Outputs of a tick beside the state it leaves.
 
     Attributes:
         x, v, x_comp: at the steps of the interval and at its end, n + 1 rows.
