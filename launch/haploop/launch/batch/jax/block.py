@@ -156,7 +156,7 @@ class Block:
     def _booked(
         self, params: BatchParams, told: TickOutputs, x_m_before: Any, before: list[Forces], go: Any
     ) -> tuple[dict[str, Any], Forces]:
-        """Returns a tick's additions to the books, and its forces; ``before``: those of commands that act, and the last."""
+        """Returns a tick's additions to the books, and its forces; ``before``: of commands that act, and the last."""
         command = {"command": told.row["total"]}
         if not self._book_names:
             return {}, command
