@@ -164,6 +164,7 @@ def test_a_device_falls_as_it_should_and_gravity_is_in_the_books(tmp_path: Path)
     np.testing.assert_allclose(booked["gravity_work"], 0.1 * (9.81 * booked["timestamp"]) ** 2, rtol=1e-12, atol=1e-15)
 
 
+@pytest.mark.slow
 def test_the_residual_stays_below_the_last_bits_also_for_bodies_in_a_row(tmp_path: Path) -> None:
     exact = ALL.replace('integrator = "kutta-3-8"', "")
     for name, text in (
@@ -182,6 +183,7 @@ def test_processes_find_them_too_and_have_the_same_bits(tmp_path: Path) -> None:
     assert one["energy"] == many["energy"]
 
 
+@pytest.mark.slow
 def test_the_integrator_is_of_order_4(tmp_path: Path) -> None:
     """Half the step leaves a sixteenth of the error."""
     errors = []

@@ -98,6 +98,7 @@ def test_a_declared_memory_follows_its_members_when_others_are_dropped() -> None
     assert together(made, kinds) == expected
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not importlib.util.find_spec("jax"), reason="needs jax")
 @pytest.mark.parametrize("made", [scenes(), with_events()], ids=["as it is", "set and swapped"])
 def test_a_declared_memory_compiles(made: list[dict[str, Any]]) -> None:

@@ -79,6 +79,7 @@ def test_members_of_a_batch_have_the_bits_of_each_alone() -> None:
     assert together(scenes()) == [alone(scene) for scene in scenes()]
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not importlib.util.find_spec("jax"), reason="needs jax")
 def test_it_compiles() -> None:
     from haploop.launch.batch.jax.run import compiling

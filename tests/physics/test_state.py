@@ -37,6 +37,9 @@ SCENES: dict[str, dict[str, Any]] = {
     "everything by dop853": EVERYTHING | {"clock": {"integrator": "dop853"}},
 }
 
+# The eighth-order method takes seconds a scene.
+NAMES = [pytest.param(name, marks=pytest.mark.slow) if "dop853" in name else name for name in SCENES]
+
 
 def plant_of(tables: dict[str, Any]) -> Plant:
     made = scene(duration=0.4, **tables)
@@ -51,7 +54,7 @@ def run(plant: Plant, end: int) -> tuple[int, int, dict[str, bytes]]:
     return plant.take_block()
 
 
-@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("cut", [1, 100, 132, 250])
 def test_a_plant_whose_state_was_packed_and_unpacked_goes_on_to_the_same_bits(name: str, cut: int) -> None:
     whole, before, after = (plant_of(SCENES[name]) for _ in range(3))
@@ -64,7 +67,7 @@ def test_a_plant_whose_state_was_packed_and_unpacked_goes_on_to_the_same_bits(na
     assert after.state() == whole.state()
 
 
-@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize("name", NAMES)
 def test_the_motion_of_another_tick_goes_on_otherwise(name: str) -> None:
     """So that the states of the test above are seen to hold something."""
     whole, before, after = (plant_of(SCENES[name]) for _ in range(3))
