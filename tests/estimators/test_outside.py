@@ -3,49 +3,19 @@
 from __future__ import annotations
 
 import importlib.util
-from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 import pytest
 
-from haploop.controller.estimators.base import Estimator, Sample
 from haploop.controller.estimators.choose import ESTIMATORS, estimator_class
-from haploop.protocol.scene.scene import Scene
 from haploop.tools.linear.controller import LinearController
+from helpers.outside.haploop_outside import AlphaBeta
 from helpers.runs.batches import alone, pressed, together
 from helpers.runs.estimates import T, estimates, floats
 from helpers.scenes.least import KINDS
 
 ALPHA, BETA = 0.4, 0.1
-
-
-@dataclass(frozen=True)
-class AlphaBeta(Estimator):
-    """The alpha-beta filter (Bar-Shalom, Li, Kirubarajan 2001, section 6.5). Memory: x and v predicted."""
-
-    name: ClassVar[str] = "alpha-beta"
-    does: ClassVar[str] = "that of an alpha-beta filter"
-    needs: ClassVar[tuple[str, ...]] = ("alpha", "beta")
-    alpha: Any
-    beta: Any
-    period_s: float
-
-    @classmethod
-    def from_scene(cls, scene: Scene, of: str, period_s: float) -> AlphaBeta:
-        own = scene.estimate(of).others
-        return cls(own["alpha"], own["beta"], period_s)
-
-    def start(self, u: Any, sample: Sample) -> Any:
-        return u, 0.0 * u
-
-    def step(self, memory: Any, u: Any, sample: Sample) -> tuple[Any, Any]:
-        x, v = memory
-        surprise = u - x
-        v = v + self.beta * surprise / self.period_s
-        return (x + self.alpha * surprise + self.period_s * v, v), v
-
-
 TABLE = {"estimator": "alpha-beta", "alpha": ALPHA, "beta": BETA}
 
 
