@@ -150,7 +150,7 @@ def _loops(  # pragma: no cover
 def run_kernel(scenes: list[dict[str, Any]], energy: bool) -> np.ndarray:
     """Extremes, what the window shows and ``BOOKS``, as in a summary; shape (scenes, FIGURES + books)."""
     first = scenes[0]
-    time = Timebase.from_clock(first["clock"], first["duration"])
+    time = Timebase.from_scene(first)
     m, n = Mechanics.from_scene(first), time.steps_per_tick
     motion = OneMassMotion(first, time)
     held = make_zoh_transitions(m.mass_kg, m.damping, m.stiffness, time.step_s, n)

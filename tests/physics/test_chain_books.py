@@ -36,7 +36,7 @@ CASES = [
 
 
 def books_of(resolved: dict[str, Any]) -> ChainBooks:
-    return ChainBooks(resolved, Timebase.from_clock(resolved["clock"], resolved["duration"]))
+    return ChainBooks(resolved, Timebase.from_scene(resolved))
 
 
 @cache
@@ -187,7 +187,7 @@ def test_friction_never_gives_heat_back_in_any_step(name):
 def test_a_logger_that_joins_begins_where_it_knows_every_command_and_its_books_close(name):
     """Where nine of ten commands are lost, the one in effect is often older than what the controller hands over."""
     resolved = resolved_of(name)
-    time = Timebase.from_clock(resolved["clock"], resolved["duration"])
+    time = Timebase.from_scene(resolved)
     plant, controller = Plant(resolved, time), Controller(Scene.from_dict(resolved), time, KINDS)
     joining: list[Logger] = []
     waited = []

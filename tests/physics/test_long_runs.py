@@ -27,7 +27,7 @@ SWINGING = {
 
 def plainly_added(resolved) -> tuple[np.ndarray, np.ndarray]:
     """The motion without forces by the same flow, x + dx and v + dv rounded at every step."""
-    m, time = Mechanics.from_scene(resolved), Timebase.from_clock(resolved["clock"], resolved["duration"])
+    m, time = Mechanics.from_scene(resolved), Timebase.from_scene(resolved)
     flow = make_foh_transition(m.mass_kg, m.damping, m.stiffness, time.step_s)
     x, v = m.start
     states = [(x, v)]
@@ -39,7 +39,7 @@ def plainly_added(resolved) -> tuple[np.ndarray, np.ndarray]:
 
 def relative_residual(resolved, x: np.ndarray, v: np.ndarray) -> float:
     """What the plant's books leave unexplained of a motion without commands, over the energy moved."""
-    time = Timebase.from_clock(resolved["clock"], resolved["duration"])
+    time = Timebase.from_scene(resolved)
     books = OneMassBooks(resolved, time)
     columns = {"x": x, "v": v, "force": np.zeros(len(x))}
     moved = Displacement(dx := by_interval(np.diff(x), time.steps_per_tick), sum_steps(dx))

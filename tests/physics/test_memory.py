@@ -23,7 +23,7 @@ SCENES = Path(__file__).parents[2] / "launch/scenes"
 def test_plant_and_controller_hold_no_more_in_their_sixth_thousand_ticks_than_in_their_third(name):
     """Blocks are taken as a node takes them; the responses to the hand's force, kept for a while, come and go."""
     scene = load(SCENES / f"{name}.toml", ["duration=60", "diverged_beyond=1e9"])
-    time, kinds = Timebase.from_clock(scene["clock"], scene["duration"]), registry()
+    time, kinds = Timebase.from_scene(scene), registry()
     plant, controller = Plant(scene, time), Controller(Scene.from_dict(scene), time, kinds)
     held = []
     tracemalloc.start()

@@ -43,7 +43,7 @@ NAMES = [pytest.param(name, marks=pytest.mark.slow) if "dop853" in name else nam
 
 def plant_of(tables: dict[str, Any]) -> Plant:
     made = scene(duration=0.4, **tables)
-    plant = Plant(made, Timebase.from_clock(made["clock"], made["duration"]))
+    plant = Plant(made, Timebase.from_scene(made))
     plant.schedule(130, {"set": {"clock.round_trip_delay": 0.0041}})
     plant.schedule(230, {"set": {"clock.round_trip_delay": 0.0012}})
     return plant
@@ -82,7 +82,7 @@ class Batch:
 
     def __init__(self, scenes: list[dict[str, Any]]) -> None:
         made, members = stacked(scenes), len(scenes)
-        time = Timebase.from_clock(made["clock"], made["duration"])
+        time = Timebase.from_scene(made)
         self.motion, self.line = make_motion(made, time, members), make_line(made, time, members)
         self.position, self.meter = make_position_sensor(made, time), make_accelerometer(made, time, members)
         self.parts = [part for part in (self.motion, self.line, self.position, self.meter) if part]

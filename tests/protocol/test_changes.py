@@ -167,7 +167,7 @@ def test_a_refusal_in_the_log_is_a_field_that_names_the_change(tmp_path: Path) -
 
 def test_the_clock_does_not_take_a_refused_change_for_one_that_was_made() -> None:
     made = choosy()
-    clock = Clock(made, Timebase.from_clock(made["clock"], made["duration"]), KINDS | {"choosy": Choosy})
+    clock = Clock(made, Timebase.from_scene(made), KINDS | {"choosy": Choosy})
     clock.grant(0, 0.0)
     clock.note(refusal(Change.from_dict(10, made["event"][0]).refuse(ValueError("too strong"))))
     clock.note(refusal(Change.from_dict(20, made["event"][1]).refuse(ValueError("no"))))

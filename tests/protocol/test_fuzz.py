@@ -156,7 +156,7 @@ def test_the_clock_grants_after_a_turns_worth_of_messages_however_many_wait(
     context: "zmq.Context[zmq.Socket[bytes]]",
 ) -> None:
     resolved = scene()
-    time = Timebase.from_clock(resolved["clock"], resolved["duration"])
+    time = Timebase.from_scene(resolved)
     with tempfile.TemporaryDirectory(prefix="hl", dir="/tmp") as sockets:
         clock = Clock(resolved, time, KINDS)
         server = ClockServer(context, Path(sockets), "", clock, {}, lambda *_: (True, "", {}), lambda _: False)

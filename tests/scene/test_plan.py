@@ -35,7 +35,7 @@ for scene in json.load(sys.stdin):
     if child := os.fork():
         assert os.waitpid(child, 0)[1] == 0
         continue
-    Core(typed(scene), Timebase.from_clock(scene["clock"], scene["duration"]), *rest)
+    Core(typed(scene), Timebase.from_scene(scene), *rest)
     loaded = [module for name, module in sys.modules.items() if name.startswith("haploop.")]
     print(*(module.__name__ for module in loaded if not hasattr(module, "__path__")), flush=True)
     os._exit(0)

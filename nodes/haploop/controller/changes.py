@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 from haploop.controller.active_elements import ActiveElement, make_element
 from haploop.controller.dissipation import Element, load_plugin
 from haploop.controller.tick import ControllerParams, ControllerState
-from haploop.protocol.changes import NO_ELEMENT, Change
-from haploop.protocol.scene.scene import ElementTable
+from haploop.protocol.changes import Change
+from haploop.protocol.scene.scene import NO_ELEMENT, ElementTable
 
 Kinds = dict[str, type[Element]]
 
@@ -25,22 +24,22 @@ def apply_change(
     if change.plugin is not None:
         kinds.update(load_plugin(Path(change.plugin)))
     if change.swap is not None:
-        params, state = _swapped(params, state, change, dict(change.swap), kinds)
+        params, state = _swapped(params, state, change, change.swap, kinds)
     for key, value in change.set.items():
         params = _set(params, change.tick, key.split("."), value)
     return params, state
 
 
 def _swapped(
-    params: ControllerParams, state: ControllerState, change: Change, table: dict[str, Any], kinds: Kinds
+    params: ControllerParams, state: ControllerState, change: Change, table: ElementTable, kinds: Kinds
 ) -> tuple[ControllerParams, ControllerState]:
     """Both with a new element in its place, one more past the end, or one less; a new one's memory is fresh."""
     place, elements, memories, books = change.element, list(params.elements), list(state.elements), params.books
-    if table["kind"] == NO_ELEMENT:
+    if table.name == NO_ELEMENT:
         del elements[place]
         del memories[place]
     else:
-        active = ActiveElement(*make_element(ElementTable.from_dict(table), kinds), books, change.tick)
+        active = ActiveElement(*make_element(table, kinds), books, change.tick)
         elements[place : place + 1] = [active]
         memories[place : place + 1] = [active.element.memory]
         books += 1

@@ -13,11 +13,12 @@ from dataclasses import dataclass, field, replace
 from functools import reduce
 from typing import Any
 
+from haploop.protocol.scene.paths import with_value
+from haploop.protocol.scene.scene import NO_ELEMENT, ElementTable, Scene
+
 Event = dict[str, Any]
 
 KINDS = ("swap", "set", "pause", "resume", "step", "stop", "pace", "refused")
-# The kind of a swap that takes an element out.
-NO_ELEMENT = "none"
 _NO_UNITS: Mapping[str, str] = {}
 
 
@@ -27,7 +28,7 @@ class Change:
 
     Attributes:
         tick: the first tick that sees the change.
-        swap: table of the element that comes, as in ``[[dissipation]]``; kind "none" takes one out. None for a set.
+        swap: the element that comes; one of the name ``NO_ELEMENT`` takes one out. None for a set.
         element: place in the list of elements, counted from 0; one past the end adds an element.
         set: dotted key -> value in SI units.
         plugin: path of a file that defines the element, loaded first; None for none.
@@ -35,7 +36,7 @@ class Change:
     """
 
     tick: int
-    swap: Mapping[str, Any] | None = None
+    swap: ElementTable | None = None
     element: int = 0
     set: Mapping[str, Any] = field(default_factory=dict)
     plugin: str | None = None
@@ -46,7 +47,7 @@ class Change:
         """Reads an event that is a change."""
         return cls(
             tick,
-            event.get("swap"),
+            ElementTable.from_dict(event["swap"]) if event.get("swap") else None,
             event.get("element") or 0,
             event.get("set") or {},
             event.get("plugin"),
@@ -55,33 +56,26 @@ class Change:
 
     def as_dict(self) -> Event:
         """Returns a map that ``from_dict`` reads back, the tick aside."""
-        content: Event = {"set": dict(self.set)} if self.swap is None else self._swap_as_dict()
+        content: Event = {"set": dict(self.set)}
+        if self.swap is not None:
+            content = {"swap": self.swap.as_dict(), "element": self.element}
         extra = {"plugin": self.plugin, "refused": self.refused}
         return {"tick": self.tick, **content, **{key: value for key, value in extra.items() if value is not None}}
 
-    def _swap_as_dict(self) -> Event:
-        return {"swap": dict(self.swap or {}), "element": self.element}
-
-    def apply(self, scene: dict[str, Any]) -> dict[str, Any]:
+    def apply(self, scene: Scene) -> Scene:
         """Returns the scene with the change made, or as it is where the change was refused.
 
         What the change leaves alone is shared with ``scene``: an element that stays is the same object.
         """
         if self.refused is not None:
             return scene
-        now = dict(scene)
         if self.swap is not None:
-            new = [] if self.swap["kind"] == NO_ELEMENT else [dict(self.swap)]
-            now["dissipation"] = _put(scene.get("dissipation", []), self.element, new)
+            elements = list(scene.dissipation)
+            elements[self.element : self.element + 1] = [] if self.swap.name == NO_ELEMENT else [self.swap]
+            scene = replace(scene, dissipation=tuple(elements))
         for key, value in self.set.items():
-            table, _, name = key.rpartition(".")
-            place, _, index = table.partition(".")
-            if index:
-                changed = {**now[place][int(index)], name: value}
-                now[place] = _put(now[place], int(index), [changed])
-            else:
-                now[place] = {**now[place], name: value}
-        return now
+            scene = with_value(scene, key, value)
+        return scene
 
     def singly(self) -> Iterator[Change]:
         """Yields the change value by value: each set of an element's parameter opens a book of its own."""
@@ -99,15 +93,14 @@ class Change:
         """
         if self.swap is None:
             return "set " + ", ".join(f"{key} = {_amount(value, units.get(key))}" for key, value in self.set.items())
-        kind = self.swap["kind"]
+        kind = self.swap.name
         if kind == NO_ELEMENT:
             return f"element {self.element} is removed"
         words = [
             f"{name} {_amount(value, units.get(f'{kind}.{name}'))}"
-            for name, value in self.swap.items()
-            if name not in ("kind", "acts")
+            for name, value in self.swap.parameters.items()
         ]
-        words += ["always"] if self.swap.get("acts") == "always" else []
+        words += ["always"] if self.swap.acts == "always" else []
         return f"element {self.element} becomes {kind}" + (f" ({', '.join(words)})" if words else "")
 
     def refuse(self, error: Exception) -> Change:
@@ -122,7 +115,7 @@ class Span:
 
     from_tick: int
     to_tick: float
-    scene: dict[str, Any]
+    scene: Scene
 
 
 def is_change(event: Mapping[str, Any]) -> bool:
@@ -158,7 +151,7 @@ def changes_of(events: Iterable[tuple[int, Mapping[str, Any]]]) -> list[Change]:
     return [_with_refusal(Change.from_dict(tick, event), refusals) for tick, event in events if is_change(event)]
 
 
-def spans(scene: dict[str, Any], changes: Iterable[Change]) -> list[Span]:
+def spans(scene: Scene, changes: Iterable[Change]) -> list[Span]:
     """Returns what was at work from when to when, in order: a span for the start and one for each change made."""
     made = [change for change in changes if change.refused is None]
     ends = [*(change.tick for change in made), math.inf]
@@ -168,7 +161,7 @@ def spans(scene: dict[str, Any], changes: Iterable[Change]) -> list[Span]:
     return found
 
 
-def at_work(scene: dict[str, Any], changes: Iterable[Change]) -> dict[str, Any]:
+def at_work(scene: Scene, changes: Iterable[Change]) -> Scene:
     """Returns the scene after all these changes."""
     return reduce(lambda now, change: change.apply(now), changes, scene)
 
@@ -186,12 +179,6 @@ def describe(event: Mapping[str, Any], units: Mapping[str, str] = _NO_UNITS) -> 
             return str(event["refused"])
         case kind:
             return {"pause": "paused", "resume": "resumed", "stop": "stopped"}.get(kind or "", "changed")
-
-
-def _put(items: Iterable[Any], index: int, new: list[Any]) -> list[Any]:
-    items = list(items)
-    items[index : index + 1] = new
-    return items
 
 
 def _amount(value: Any, unit: str | None) -> str:
@@ -217,6 +204,6 @@ def _refuses(event: Mapping[str, Any], change: Change) -> bool:
     if change.swap is None:
         words = "set " + ", ".join(f"{key} = {value}" for key, value in change.set.items())
     else:
-        words = f"swap of element {change.element} to {change.swap['kind']}"
+        words = f"swap of element {change.element} to {change.swap.name}"
     sentence = str(event["refused"])
     return sentence.startswith(words) and f" at tick {change.tick} was refused" in sentence

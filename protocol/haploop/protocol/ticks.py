@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from dataclasses import asdict, dataclass
-from typing import Any
+
+from haploop.protocol.scene.scene import Clock, Scene
 
 # Decimal fractions such as 0.0003 s are not exact in binary; a whole number of steps is accepted within this.
 _WHOLE_WITHIN = 1e-6
@@ -36,15 +37,15 @@ class Timebase:
     ticks: int
 
     @classmethod
-    def from_clock(cls, clock: dict[str, Any], duration: float) -> Timebase:
+    def from_clock(cls, clock: Clock, duration: float) -> Timebase:
         """Makes the timebase of a scene's ``[clock]`` table and its duration in seconds.
 
         Raises:
             TimebaseError: the plant rate is no whole multiple of the control rate, the delay is no whole number of
                 plant steps, or the duration is no whole number of control ticks; all that apply, one sentence each.
         """
-        plant_rate, control_rate = clock["plant_rate"], clock["control_rate"]
-        delay = clock["round_trip_delay"]
+        plant_rate, control_rate = clock.plant_rate, clock.control_rate
+        delay = clock.round_trip_delay
         complaints = []
         if plant_rate % control_rate:
             complaints.append(
@@ -58,6 +59,11 @@ class Timebase:
         if complaints:
             raise TimebaseError("\n".join(complaints))
         return cls(plant_rate, control_rate, delay_steps, ticks)
+
+    @classmethod
+    def from_scene(cls, scene: Scene) -> Timebase:
+        """Makes the timebase of a scene; raises as :meth:`from_clock` does."""
+        return cls.from_clock(scene.clock, scene.duration)
 
     def as_dict(self) -> dict[str, int]:
         """Returns the four integers, as they travel on the wire."""

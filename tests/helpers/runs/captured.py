@@ -58,7 +58,7 @@ class _CapturingLogger(Logger):
 
 def run(scene: dict[str, Any]) -> Captured:
     """Run a resolved scene in this process and keep everything."""
-    time = Timebase.from_clock(scene["clock"], scene["duration"])
+    time = Timebase.from_scene(scene)
     logger = _CapturingLogger(scene, time)
     loop = Loop(scene, time, KINDS, LogSession(logger, None, None))
     loop.schedule(sorted(scene_events(scene, time), key=lambda event: event[0]))

@@ -16,7 +16,7 @@ WINDOW_OF_400 = {"block_ticks": 100, "window_blocks": 4}
 def clock(pace: float = math.inf, run: dict[str, Any] | None = None, **tables: Any) -> Clock:
     """The clock of a run of 1000 ticks that grants 400 beyond the slowest node."""
     resolved = scene(wall=WALL, dissipation=[DAMPING], run=run or WINDOW_OF_400, **tables)
-    return Clock(resolved, Timebase.from_clock(resolved["clock"], resolved["duration"]), KINDS, pace)
+    return Clock(resolved, Timebase.from_scene(resolved), KINDS, pace)
 
 
 def granted(subject: Clock, slowest: int = TICKS, now: float = 0.0) -> int:

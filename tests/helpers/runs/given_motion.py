@@ -26,7 +26,7 @@ def books_along(scene: dict[str, Any], x: np.ndarray) -> tuple[dict[str, np.ndar
         The running books at every tick by name, J, and the summary's ``energy``. What the plant's own books say has
         no meaning here, since no plant moved so.
     """
-    time = Timebase.from_clock(scene["clock"], scene["duration"])
+    time = Timebase.from_scene(scene)
     n, steps = time.steps_per_tick, time.ticks * time.steps_per_tick
     assert len(x) == steps + 1
     measure = make_encoder(scene.get("encoder"))

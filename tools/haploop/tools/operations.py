@@ -70,7 +70,7 @@ def operations(scene: dict[str, Any], kinds: Kinds) -> Operations:
 
     A shorter run is counted over its second half.
     """
-    time = Timebase.from_clock(scene["clock"], scene["duration"])
+    time = Timebase.from_scene(scene)
     plant, controller = Plant(scene, time), Controller(Scene.from_dict(scene), time, kinds)
     counter = _Counter()
     counts: list[tuple[int, int]] = []

@@ -49,7 +49,7 @@ def trajectory(scene: dict[str, Any]) -> Trajectory:
         ElementError: an element raised, or gave something that is no number.
         ArithmeticError: friction switched too often for the plant rate.
     """
-    time = Timebase.from_clock(scene["clock"], scene["duration"])
+    time = Timebase.from_scene(scene)
     logger = _Remembering(scene, time)
     loop = Loop(scene, time, registry(), LogSession(logger, None, None))
     loop.schedule(scene_events(scene, time))

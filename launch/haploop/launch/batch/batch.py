@@ -65,7 +65,7 @@ class Batch:
         trajectories: bool = False,
     ) -> None:
         self._scenes, scene = scenes, stacked(scenes)
-        self._time = time = Timebase.from_clock(scene["clock"], scene["duration"])
+        self._time = time = Timebase.from_scene(scene)
         members = len(scenes)
         self._motion, self._line = make_motion(scene, time, members), make_line(scene, time, members)
         self._position, self._sensor = make_position_sensor(scene, time), make_accelerometer(scene, time, members)

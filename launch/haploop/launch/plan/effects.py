@@ -77,7 +77,7 @@ def _estimators(of: str) -> Iterator[Effect]:
 
 def _memory_of(of: str, scene: Resolved) -> int:
     """Counts the numbers that an estimator remembers; counts of ticks are none of them."""
-    clock = Timebase.from_clock(scene["clock"], scene["duration"])
+    clock = Timebase.from_scene(scene)
     estimator = estimator_class(scene[of]["estimator"]).from_scene(Scene.from_dict(scene), of, clock.period_s)
     return sum(isinstance(leaf, float) for leaf in tree_leaves(estimator.start(0.0, (0.0, 0.0))))
 

@@ -88,7 +88,7 @@ def multiplications(scene: dict[str, Any]) -> int:
     One mass is moved once a hold and filled in at the plant steps; bodies in a row are moved to every plant step. The
     classical Runge-Kutta method moves them four times; of DOP853 twelve times a tick are counted, the least there is.
     """
-    time, size = Timebase.from_clock(scene["clock"], scene["duration"]), len(Chain.from_scene(scene).states)
+    time, size = Timebase.from_scene(scene), len(Chain.from_scene(scene).states)
     if needs_chain(scene):
         method = find_integrator(integrator_name(scene))
         moves = method.evaluations * (1 if method.chooses_steps else time.steps_per_tick)
@@ -110,7 +110,7 @@ def _plant_step(chain: Chain, named: tuple[Effect, ...], scene: dict[str, Any]) 
 
 
 def _tick(scene: dict[str, Any], chain: Chain, named: tuple[Effect, ...]) -> tuple[Step, ...]:
-    late = f"{Timebase.from_clock(scene['clock'], scene['duration']).delay_steps} plant steps"
+    late = f"{Timebase.from_scene(scene).delay_steps} plant steps"
     return (
         Step("plant", f"the position of the {chain.bodies[0]} is sampled"),
         *_stage("measurement", named, scene),

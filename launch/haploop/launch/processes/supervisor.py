@@ -54,7 +54,7 @@ class Supervisor:
     def __init__(self, spec: RunSpec, sockets: Path, received: list[int]) -> None:
         self._spec, self._sockets, self._interrupts = spec, sockets, received
         scene = spec.scene
-        timebase = Timebase.from_clock(scene["clock"], scene["duration"])
+        timebase = Timebase.from_scene(scene)
         self._clock = Clock(scene, timebase, spec.kinds, spec.pace)
         self._deadline_s = scene["run"]["deadline"]
         self._context = SecureContext.from_transport(spec.transport)

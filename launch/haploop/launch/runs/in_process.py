@@ -50,7 +50,7 @@ def run_in_process(
         RunFailed: an element raised, or gave something that is no number.
         LogError: the log could not be written.
     """
-    time = Timebase.from_clock(scene["clock"], scene["duration"])
+    time = Timebase.from_scene(scene)
     session = open_session(scene, time, out, attachments or {}, memory)
     loop = Loop(scene, time, kinds, session)
     loop.schedule(scene_events(scene, time) if events is None else events)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from copy import deepcopy
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -16,6 +15,7 @@ from haploop.launch.scene.events import elements_of, try_out
 from haploop.launch.scene.layers import Layers
 from haploop.launch.scene.overrides import lay_overrides
 from haploop.launch.scene.toml_writer import inline, to_toml
+from haploop.protocol.scene.scene import Scene as Tables
 
 Values = Mapping[str, Any] | Iterable[str]
 
@@ -28,34 +28,35 @@ class Scene:
     table of it in SI units; ``print(scene)`` shows all of them.
 
     Attributes:
+        scene: its tables, typed.
         path: the file it was read from.
         kinds: the elements at hand, by kind.
         plugin_files: the file of each kind that came from one.
     """
 
-    _tables: dict[str, Any]
+    scene: Tables
     path: Path
     kinds: Mapping[str, type[Element]] = field(default_factory=dict)
     plugin_files: Mapping[str, Path] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        try_out(elements_of(self._tables), self.kinds)
+        try_out(elements_of(self.scene), self.kinds)
 
     @property
     def tables(self) -> dict[str, Any]:
         """All tables, copied: plain dicts, all numbers SI, defaults filled in, absent tables absent."""
-        return deepcopy(self._tables)
+        return self.scene.as_dict()
 
     def __getitem__(self, key: str) -> Any:
-        if key not in self._tables:
-            raise KeyError(f"There is no {key} in this scene; it holds {', '.join(self._tables)}.")
-        return deepcopy(self._tables[key])
+        if key not in (tables := self.tables):
+            raise KeyError(f"There is no {key} in this scene; it holds {', '.join(tables)}.")
+        return tables[key]
 
     def __contains__(self, key: str) -> bool:
-        return key in self._tables
+        return key in self.tables
 
     def __str__(self) -> str:
-        return to_toml(self._tables)
+        return to_toml(self.tables)
 
     def __repr__(self) -> str:
         return f"<Scene {self['title']!r}, {self['duration']:g} s, from {self.path}>"
@@ -111,9 +112,7 @@ class Scene:
         return self._resolved(layers)
 
     def _resolved(self, layers: Layers) -> Scene:
-        tables = resolve(layers, self.kinds)
-        tables.get("event", []).sort(key=lambda event: event["at"])
-        return replace(self, _tables=tables)
+        return replace(self, scene=resolve(layers, self.kinds).in_order())
 
 
 def load(

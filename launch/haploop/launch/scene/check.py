@@ -19,7 +19,7 @@ from haploop.launch.scene.mistakes import SceneError, nearest
 from haploop.launch.scene.models import number_of, read_table, scene_model
 from haploop.launch.scene.schema import Schema, alternatives, schema_at, whole_schema
 from haploop.launch.scene.toml_writer import inline
-from haploop.protocol.scene.scene import Clock, Scene
+from haploop.protocol.scene.scene import Clock, EventTable, Scene
 from haploop.protocol.ticks import Timebase, TimebaseError
 
 if TYPE_CHECKING:
@@ -37,8 +37,8 @@ _FORMS = {
 }
 
 
-def resolve(layers: Layers, kinds: Mapping[str, type[Element]]) -> dict[str, Any]:
-    """Returns the resolved scene: defaults filled in, SI numbers, empty lists left out.
+def resolve(layers: Layers, kinds: Mapping[str, type[Element]]) -> Scene:
+    """Returns the resolved scene: defaults filled in, numbers in SI units, events in the order given.
 
     Raises:
         SceneError: all mistakes, those already known to ``layers`` included.
@@ -61,23 +61,22 @@ def resolve(layers: Layers, kinds: Mapping[str, type[Element]]) -> dict[str, Any
     settings = check_events(layers, _timebase(layers), kinds)
     if layers.mistakes or scene is None:
         raise SceneError(layers.mistakes)
-    events = [dict(event) for event in scene.event]
-    for index, event in enumerate(events):
-        if "swap" in event:
-            event.setdefault("element", 0)
-        if "set" in event:
-            event["set"] = settings[index]
-    return replace(scene, event=tuple(events)).as_dict()
+    events = [
+        replace(event, element=event.element or 0) if event.swap else replace(event, set=settings.get(index))
+        for index, event in enumerate(scene.event)
+    ]
+    return replace(scene, event=tuple(events))
 
 
-def resolve_event(event: dict[str, Any], scene: dict[str, Any], kinds: Mapping[str, type[Element]]) -> dict[str, Any]:
+def resolve_event(event: dict[str, Any], scene: Scene, kinds: Mapping[str, type[Element]]) -> EventTable:
     """Returns an event that comes in during a run, resolved, after the events of the resolved ``scene``.
 
     Raises:
         SceneError: it does not fit the scene, or an event that is still to come no longer would.
     """
-    layers = Layers(Path("live event"), {**scene, "event": [*scene.get("event", []), event]})
-    return resolve(layers, kinds)["event"][-1]
+    events = [*(known.as_dict() for known in scene.event), event]
+    layers = Layers(Path("live event"), {**scene.as_dict(), "event": events})
+    return resolve(layers, kinds).event[-1]
 
 
 def _timebase(layers: Layers) -> Timebase | None:
@@ -90,7 +89,7 @@ def _timebase(layers: Layers) -> Timebase | None:
         return None
     clock = table.as_dict()
     try:
-        return Timebase.from_clock(clock, duration)
+        return Timebase.from_clock(table, duration)
     except TimebaseError as error:
         for sentence in str(error).splitlines():
             name = sentence.split()[0]

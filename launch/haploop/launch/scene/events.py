@@ -12,8 +12,7 @@ from haploop.launch.scene.layers import KeyPath, Layers
 from haploop.launch.scene.mistakes import counted, nearest
 from haploop.launch.scene.models import EventModel, number_in, number_of
 from haploop.launch.scene.number import Number
-from haploop.protocol.changes import NO_ELEMENT
-from haploop.protocol.scene.scene import Clock, ElementTable, Wall
+from haploop.protocol.scene.scene import NO_ELEMENT, Clock, ElementTable, EventTable, Scene, Wall
 from haploop.protocol.ticks import DELAY, Timebase, whole_count
 
 if TYPE_CHECKING:
@@ -135,21 +134,21 @@ def _tables(value: Any) -> list[Any]:
     return value if isinstance(value, list) else []
 
 
-def elements_of(scene: dict[str, Any]) -> list[dict[str, Any]]:
-    """Returns the table of every element a resolved scene begins with or swaps in."""
-    return [*scene.get("dissipation", []), *swapped_in(scene.get("event", []))]
+def elements_of(scene: Scene) -> list[ElementTable]:
+    """Returns every element that a scene begins with or swaps in."""
+    return [*scene.dissipation, *swapped_in(scene.event)]
 
 
-def swapped_in(events: Iterable[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Returns the table of every element these resolved events bring."""
-    return [event["swap"] for event in events if "swap" in event and event["swap"]["kind"] != NO_ELEMENT]
+def swapped_in(events: Iterable[EventTable]) -> list[ElementTable]:
+    """Returns every element that these events bring."""
+    return [event.swap for event in events if event.swap is not None and event.swap.name != NO_ELEMENT]
 
 
-def try_out(tables: Iterable[dict[str, Any]], kinds: Mapping[str, type[Element]]) -> None:
+def try_out(tables: Iterable[ElementTable], kinds: Mapping[str, type[Element]]) -> None:
     """Makes each element once, since its own code may refuse what its declaration allows.
 
     Raises:
         ElementError: one cannot be made.
     """
     for table in tables:
-        make_element(ElementTable.from_dict(table), kinds)
+        make_element(table, kinds)

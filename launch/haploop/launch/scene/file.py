@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from haploop.launch.scene.check import resolve
 from haploop.launch.scene.force_csv import TraceError, read_trace
 from haploop.launch.scene.layers import Layers, read_layers
 from haploop.launch.scene.mistakes import COMMAND_LINE
 from haploop.launch.scene.overrides import lay_overrides
+from haploop.protocol.scene.scene import Scene
 
 if TYPE_CHECKING:
     from haploop.controller.dissipation import Element
@@ -18,10 +19,8 @@ if TYPE_CHECKING:
 
 def load(
     path: Path | str, overrides: Sequence[str] = (), kinds: Mapping[str, type[Element]] | None = None
-) -> dict[str, Any]:
-    """Returns the resolved scene of a TOML file: a plain dict in SI units, defaults filled in, absent tables absent.
-
-    Its events are in order of time.
+) -> Scene:
+    """Returns the resolved scene of a TOML file: in SI units, defaults filled in, events in order of time.
 
     Args:
         path: the scene file.
@@ -36,7 +35,7 @@ def load(
 
 def resolved(
     layers: Layers, overrides: Sequence[str] = (), kinds: Mapping[str, type[Element]] | None = None
-) -> dict[str, Any]:
+) -> Scene:
     """Returns the resolved scene of layers that were read already.
 
     Raises:
@@ -49,9 +48,7 @@ def resolved(
         from haploop.controller.dissipation import registry
 
         kinds = registry()
-    scene = resolve(layers, kinds)
-    scene.get("event", []).sort(key=lambda event: event["at"])
-    return scene
+    return resolve(layers, kinds).in_order()
 
 
 def _read_recording(layers: Layers) -> None:

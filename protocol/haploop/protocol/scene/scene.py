@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import field
+from dataclasses import field, replace
 from typing import Annotated, Any, Literal
 
 from haploop.protocol.quantity import si
@@ -76,8 +76,15 @@ class Run(Table):
     deadline: Annotated[float, si("s", "wall time a node may stay silent", above=0)] = 5.0
 
 
+# The kind of a swap that takes an element out.
+NO_ELEMENT = "none"
+
+
 class ElementTable(Table):
-    """A dissipation element: its kind, when it acts, and the values of the parameters that the kind declares."""
+    """A dissipation element: its kind, when it acts, and the values of the parameters that the kind declares.
+
+    In a swap the kind may be ``NO_ELEMENT``.
+    """
 
     name: str
     acts: Literal["in-contact", "always"] = "in-contact"
@@ -86,12 +93,31 @@ class ElementTable(Table):
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> ElementTable:
         """Makes it from ``{"kind": ..., "acts": ..., parameter: value, ...}``."""
+        if isinstance(data, cls):
+            return data
         parameters = {key: value for key, value in data.items() if key not in ("kind", "acts")}
         return cls(name=data["kind"], acts=data.get("acts", "in-contact"), parameters=parameters)
 
     def as_dict(self) -> dict[str, Any]:
         """Returns what ``from_dict`` takes."""
+        if self.name == NO_ELEMENT:
+            return {"kind": self.name}
         return {"kind": self.name, "acts": self.acts, **self.parameters}
+
+
+class EventTable(Table):
+    """What changes during the run; exactly one of swap, set, pause and stop.
+
+    Attributes:
+        set: settable key -> value in SI units.
+    """
+
+    at: Annotated[float, si("s", "time; the first tick at or after it sees the change", at_least=0)]
+    swap: ElementTable | None = None
+    element: Annotated[int | None, si("", "which element a swap replaces", at_least=0, whole=True)] = None
+    set: dict[str, float] | None = None
+    pause: Literal[True] | None = None
+    stop: Literal[True] | None = None
 
 
 class Scene(OpenTable):
@@ -116,12 +142,16 @@ class Scene(OpenTable):
     jitter: Jitter | None = None
     loss: Loss | None = None
     dissipation: tuple[ElementTable, ...] = ()
-    event: tuple[dict[str, Any], ...] = ()
+    event: tuple[EventTable, ...] = ()
     run: Run = Run()
 
     def estimate(self, of: str) -> Velocity | Acceleration:
         """Returns the table of an estimate, "velocity" or "acceleration": its defaults where the scene has none."""
         return (self.velocity or Velocity()) if of == "velocity" else (self.acceleration or Acceleration())
+
+    def in_order(self) -> Scene:
+        """Returns the scene with its events in order of time."""
+        return replace(self, event=tuple(sorted(self.event, key=lambda event: event.at)))
 
     def as_dict(self) -> dict[str, Any]:
         """Returns the scene as nested dicts and lists, absent tables and empty lists left out."""

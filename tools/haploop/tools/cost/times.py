@@ -87,7 +87,7 @@ def loop_us(scene: dict[str, Any]) -> float | None:
     Neither building plant and controller nor the first block is counted, which makes what later ones only use; a run of
     a single block is counted whole. A method that blows up overflows: its warnings are kept back by the caller.
     """
-    base = Timebase.from_clock(scene["clock"], scene["duration"])
+    base = Timebase.from_scene(scene)
     session = open_session(scene, base, None, {})
     loop = Loop(scene, base, registry(), session)
     loop.schedule(scene_events(scene, base))

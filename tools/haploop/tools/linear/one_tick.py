@@ -129,7 +129,7 @@ class OneTickMap:
 
 def _after_a_tick(scene: dict[str, Any], controller: LinearController) -> np.ndarray:
     """w after a tick from w and a force added to u[k], shape (w, w + 1); every quantity is its row over these."""
-    time, chain = Timebase.from_clock(scene["clock"], scene["duration"]), Chain.from_scene(scene)
+    time, chain = Timebase.from_scene(scene), Chain.from_scene(scene)
     states, felt = len(chain.states), _felt_steps(scene, time)
     sizes = states, felt, len(controller.moved), time.lookahead_ticks + 1, 1
     z, y, c, in_flight, added = np.split(np.eye(sum(sizes)), np.cumsum(sizes)[:-1])

@@ -77,7 +77,7 @@ def _is_worth_compiling(scene: Scene, members: int, least: int) -> bool:
     if needs_chain(scene) or ("accelerometer" in scene and accelerometer_is_used(scene)):
         return False
     asked = _programs().PROGRAMS.asked
-    asked[structure(scene)] += members * Timebase.from_clock(scene["clock"], scene["duration"]).ticks
+    asked[structure(scene)] += members * Timebase.from_scene(scene).ticks
     return asked[structure(scene)] >= least
 
 

@@ -86,7 +86,7 @@ def bare_us(scene: dict[str, Any]) -> float:
 
     In blocks as in a run, the first of them not counted either where there are more.
     """
-    time = Timebase.from_clock(scene["clock"], scene["duration"])
+    time = Timebase.from_scene(scene)
     plant, controller = Plant(scene, time), Controller(Scene.from_dict(scene), time, registry())
     length = BlockLength(scene["run"]["block_ticks"])
 
@@ -108,4 +108,4 @@ def bare_us(scene: dict[str, Any]) -> float:
 
 
 def _ticks(scene: dict[str, Any]) -> int:
-    return Timebase.from_clock(scene["clock"], scene["duration"]).ticks
+    return Timebase.from_scene(scene).ticks

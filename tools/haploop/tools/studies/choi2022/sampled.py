@@ -46,7 +46,7 @@ def forces(x_m: np.ndarray, kind: str, cutoff_Hz: float | None = None) -> np.nda
         dissipation=() if kind == SPRING else (element,),
         acceleration=Acceleration(cutoff=cutoff_Hz) if cutoff_Hz else None,
     )
-    controller = Controller(scene, Timebase.from_clock(scene.clock.as_dict(), scene.duration), registry())
+    controller = Controller(scene, Timebase.from_scene(scene), registry())
     answered = controller.answer([(row,) for row in x_m])
     offset = STIFFNESS_N_M * 1e3 if kind == SPRING else 0.0
     return np.array([np.broadcast_to(force, x_m.shape[1:]) for force in answered]) - offset

@@ -76,7 +76,7 @@ def contacts(setup: Setup, work: Work) -> list[Contact]:
 
 def booked_on(scene: dict[str, Any], log: Any, work: Work) -> Booked:
     """Books damping and both inertias on the motion of a run, in the order of ``LABELS``."""
-    time = Timebase.from_clock(scene["clock"], scene["duration"])
+    time = Timebase.from_scene(scene)
     n, late = time.steps_per_tick, time.delay_steps % time.steps_per_tick
     elements = [
         *elements_of("damping", BOOKED_DAMPING),
