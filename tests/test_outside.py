@@ -142,10 +142,10 @@ print(json.dumps(ablations(scene)))
 def test_the_linear_map_and_batches_ask_them(scene: Path) -> None:
     code = """
 from haploop.launch.batch.stacking import is_batchable
-from haploop.launch.plan.effect import without_keys
+from haploop.protocol.scene.paths import without
 from haploop.tools.linear.linearity import why_not_linear
-exact = without_keys(scene, "clock.integrator")
-print(json.dumps([why_not_linear(scene), is_batchable(exact), is_batchable(without_keys(exact, "gravity"))]))
+exact = without(scene, "clock.integrator")
+print(json.dumps([why_not_linear(scene), is_batchable(exact), is_batchable(without(exact, "gravity"))]))
 """
     assert found(code, scene) == [['clock.integrator = "kutta-3-8"'], False, True]
 

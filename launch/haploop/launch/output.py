@@ -5,9 +5,9 @@ from __future__ import annotations
 import hashlib
 import time
 from pathlib import Path
-from typing import Any
 
 from haploop.launch.scene.toml_writer import to_toml
+from haploop.protocol.scene.scene import Scene
 
 SCENE, PLUGINS = "scene.toml", "plugins"
 
@@ -35,9 +35,9 @@ def make_output(out: Path | None, scene_path: Path) -> Path:
     return out
 
 
-def write_scene(scene: dict[str, Any], out: Path) -> str:
+def write_scene(scene: Scene, out: Path) -> str:
     """Writes the resolved scene, which runs by itself; returns its text."""
-    text = to_toml(scene)
+    text = to_toml(scene.as_dict())
     try:
         (out / SCENE).write_text(text, encoding="utf-8")
     except OSError as error:

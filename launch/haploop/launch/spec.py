@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from haploop.protocol.scene.scene import Scene
 from haploop.protocol.transport import Transport
 
 if TYPE_CHECKING:
@@ -38,7 +39,7 @@ class RunSpec:
             asked again until it says so; for a process that is to be there from the start. For processes only.
     """
 
-    scene: dict[str, Any]
+    scene: Scene
     kinds: dict[str, type[Element]]
     out: Path
     attachments: dict[str, str] = field(default_factory=dict)

@@ -17,6 +17,7 @@ from haploop.logger.session import LogSession, open_session
 from haploop.protocol.clock_client import REPORT_MS, Aborted, ClockClient
 from haploop.protocol.node import NodeError, run_node
 from haploop.protocol.processes import PROCESSES
+from haploop.protocol.scene.scene import Scene
 from haploop.protocol.sockets import bind
 from haploop.protocol.telemetry import Publisher, Subscriber
 from haploop.protocol.ticks import Timebase
@@ -55,7 +56,9 @@ class LoggerNode:
             self._context, {role: endpoints[role]["telemetry"] for role in ("plant", "controller")}
         )
         time = Timebase(**welcome["timebase"])
-        self.session: LogSession = open_session(welcome["scene"], time, out, welcome["context"].get("attachments", {}))
+        self.session: LogSession = open_session(
+            Scene.from_dict(welcome["scene"]), time, out, welcome["context"].get("attachments", {})
+        )
         self.session.logger.booked = self._publish_energy
         states: dict[str, dict[str, Any]] = {}
         early = []

@@ -13,6 +13,7 @@ from haploop.protocol.clock_client import ClockClient
 from haploop.protocol.loop import PlantEnd
 from haploop.protocol.node import NodeError, run_node
 from haploop.protocol.processes import PROCESSES
+from haploop.protocol.scene.scene import Scene
 from haploop.protocol.sockets import bind
 from haploop.protocol.telemetry import Publisher
 from haploop.protocol.ticks import Timebase
@@ -31,8 +32,9 @@ class PlantNode:
         sockets = {"loop": self._loop.socket, "telemetry": self._publisher.socket}
         endpoints = {channel: bind(socket, directory, names[channel]) for channel, socket in sockets.items()}
         welcome = client.join(endpoints)
-        self._plant = Plant(welcome["scene"], Timebase(**welcome["timebase"]))
-        self._block = BlockLength(welcome["scene"]["run"]["block_ticks"])
+        scene = Scene.from_dict(welcome["scene"])
+        self._plant = Plant(scene, Timebase(**welcome["timebase"]))
+        self._block = BlockLength(scene.run.block_ticks)
         self._secret = welcome["context"]["secret"]
 
     def _state(self) -> tuple[int, dict[str, Any]]:

@@ -97,8 +97,7 @@ class Change:
         if kind == NO_ELEMENT:
             return f"element {self.element} is removed"
         words = [
-            f"{name} {_amount(value, units.get(f'{kind}.{name}'))}"
-            for name, value in self.swap.parameters.items()
+            f"{name} {_amount(value, units.get(f'{kind}.{name}'))}" for name, value in self.swap.parameters.items()
         ]
         words += ["always"] if self.swap.acts == "always" else []
         return f"element {self.element} becomes {kind}" + (f" ({', '.join(words)})" if words else "")

@@ -5,11 +5,13 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from haploop.launch.scene.check import resolve_event
 from haploop.launch.scene.events import swapped_in, try_out
 from haploop.protocol.changes import Event, at_work, changes_of
+from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
 
 if TYPE_CHECKING:
@@ -47,19 +49,19 @@ class Clock:
     """
 
     def __init__(
-        self, scene: dict[str, Any], time: Timebase, kinds: Mapping[str, type[Element]], pace: float = math.inf
+        self, scene: Scene, time: Timebase, kinds: Mapping[str, type[Element]], pace: float = math.inf
     ) -> None:
-        self._scene = {**scene, "event": list(scene.get("event", []))}
+        self._scene = scene
         self._time, self._kinds = time, kinds
-        self._window = scene["run"]["window_blocks"] * scene["run"]["block_ticks"]
+        self._window = scene.run.window_blocks * scene.run.block_ticks
         self.until = 0
         self.end = time.ticks
         self.paused = False
         self._step_target: int | None = None
         self.events: list[tuple[int, Event]] = []
         self._sent = 0
-        for event in self._scene["event"]:
-            self._insert(time.first_tick_at(event["at"]), event)
+        for event in scene.event:
+            self._insert(time.first_tick_at(event.at), event.as_dict())
         self._pauses = [tick for tick, event in self.events if event.get("pause")]
         self._pace_from: float | None = None  # the first grant starts the pace
         self._pace_tick = 0
@@ -153,8 +155,8 @@ class Clock:
         self._check_ahead(tick)
         event = resolve_event({**change, "at": tick / self._time.control_rate}, self._scene, self._kinds)
         try_out(swapped_in([event]), self._kinds)
-        self._scene["event"].append(event)
-        self._insert(tick, event | extra)
+        self._scene = replace(self._scene, event=(*self._scene.event, event))
+        self._insert(tick, event.as_dict() | extra)
         return tick
 
     def _check_ahead(self, tick: int) -> None:
@@ -205,7 +207,7 @@ class Clock:
         self._pace_anew(now)
         return self.until
 
-    def present(self) -> dict[str, Any]:
+    def present(self) -> Scene:
         """Returns the scene as it stands at the first tick not yet granted, all changes up to there made."""
         return at_work(self._scene, [change for change in changes_of(self.events) if change.tick <= self.until])
 

@@ -16,6 +16,8 @@ from haploop.launch.output import OutputError, keep_plugin
 from haploop.launch.scene.events import settable_keys
 from haploop.launch.scene.mistakes import SceneError
 from haploop.protocol.quantity import Quantity
+from haploop.protocol.scene.paths import value_at
+from haploop.protocol.scene.scene import Scene
 
 if TYPE_CHECKING:
     from haploop.controller.dissipation import Element
@@ -37,7 +39,7 @@ class Commands:
 
     def __init__(self, clock: Clock, spec: RunSpec, roster: Callable[[], Roster]) -> None:
         self._clock, self._spec, self._roster = clock, spec, roster
-        self._rate = spec.scene["clock"]["control_rate"]
+        self._rate = spec.scene.clock.control_rate
         self._verbs = {
             "status": self._status,
             "options": self._options,
@@ -70,7 +72,7 @@ class Commands:
         clock, roster = self._clock, self._roster()
         logger = roster.own("logger")
         data = {
-            "title": self._spec.scene["title"],
+            "title": self._spec.scene.title,
             "out": str(self._spec.out),
             "tick": logger.tick if logger else 0,
             "granted": clock.until,
@@ -151,7 +153,7 @@ class Commands:
         return {"plugin": str(kept.resolve())}
 
 
-def capabilities(scene: dict[str, Any], kinds: Mapping[str, type[Element]]) -> dict[str, Any]:
+def capabilities(scene: Scene, kinds: Mapping[str, type[Element]]) -> dict[str, Any]:
     """Returns the keys that can be set and the kinds that can be swapped in, as plain values.
 
     Args:
@@ -162,24 +164,14 @@ def capabilities(scene: dict[str, Any], kinds: Mapping[str, type[Element]]) -> d
         ``settable``: key -> unit, bounds and present value; ``kinds``: kind -> what it does and its parameters with
         unit, bounds and default; ``elements``: those at work. A bound or default that is not there is None.
     """
-    elements = scene.get("dissipation", [])
-    keys = settable_keys([element["kind"] for element in elements], "wall" in scene, kinds)
+    keys = settable_keys([element.name for element in scene.dissipation], scene.wall is not None, kinds)
     return {
-        "settable": {
-            key: {**number.quantity.as_dict(), "value": _value(scene, key.split("."))} for key, number in keys.items()
-        },
+        "settable": {key: {**number.quantity.as_dict(), "value": value_at(scene, key)} for key, number in keys.items()},
         "kinds": {
             kind: {"about": _about(element), "parameters": _parameters(element)} for kind, element in kinds.items()
         },
-        "elements": elements,
+        "elements": [element.as_dict() for element in scene.dissipation],
     }
-
-
-def _value(scene: dict[str, Any], path: list[str]) -> float:
-    place: Any = scene
-    for part in path:
-        place = place[int(part)] if isinstance(place, list) else place[part]
-    return place
 
 
 def _about(element: type[Element]) -> str:

@@ -7,11 +7,11 @@ from dataclasses import dataclass, field
 from typing import Any, Literal, TypeVar
 
 from haploop.plant.integrators.registry import find_integrator
+from haploop.protocol.scene.paths import value_at, without
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.scene.table import Table
 
 TableType = TypeVar("TableType", bound=Table)
-Resolved = dict[str, Any]
 Stage = Literal["motion", "measurement", "estimate", "line", "actuation"]
 
 # Modules of the plant that effects bring. These move bodies in a row, or one under forces that change between ticks.
@@ -66,7 +66,7 @@ def _nothing(_of: Any) -> Any:
     return []
 
 
-def _always(_scene: Resolved) -> bool:
+def _always(_scene: Scene) -> bool:
     return True
 
 
@@ -109,15 +109,15 @@ class Effect:
     value: str | None = None
     columns: tuple[str, ...] = ()
     counts: tuple[str, ...] = ()
-    states: int | Callable[[Resolved], int] = 0
+    states: int | Callable[[Scene], int] = 0
     linear: bool = True
     left_out: tuple[str, ...] = ()
-    batches: bool | Callable[[Resolved], bool] = True
-    used: Callable[[Resolved], bool] = _always
-    takes_out: Callable[[Resolved], Resolved] | None = None
+    batches: bool | Callable[[Scene], bool] = True
+    used: Callable[[Scene], bool] = _always
+    takes_out: Callable[[Scene], Scene] | None = None
     check: Callable[[Draft], Any] = _nothing
-    note: Callable[[Resolved], list[str]] = _nothing
-    frees: Mapping[str, Callable[[Resolved], Resolved]] = field(default_factory=dict)
+    note: Callable[[Scene], list[str]] = _nothing
+    frees: Mapping[str, Callable[[Scene], Scene]] = field(default_factory=dict)
     scaled_with: Mapping[str, str] = field(default_factory=dict)
     table: type[Table] | None = None
 
@@ -136,56 +136,34 @@ class Effect:
         """ "every plant step" or "every tick"."""
         return "every plant step" if self.stage == "motion" else "every tick"
 
-    def modules_in(self, scene: Resolved) -> tuple[str, ...]:
+    def modules_in(self, scene: Scene) -> tuple[str, ...]:
         """Returns what it imports in a scene: another integrator has its own in place of what moves bodies exactly."""
-        return moved_by(at(scene, "clock.integrator") or "exact", self.modules, self.key == "friction")
+        return moved_by(value_at(scene, "clock.integrator") or "exact", self.modules, self.key == "friction")
 
-    def is_named(self, scene: Resolved) -> bool:
+    def is_named(self, scene: Scene) -> bool:
         """Returns whether a resolved scene names it; a number that is 0 names nothing."""
-        found = at(scene, self.key)
+        found = value_at(scene, self.key)
         return bool(found) if self.value is None else found == self.value
 
-    def is_in(self, scene: Resolved) -> bool:
+    def is_in(self, scene: Scene) -> bool:
         """Returns whether a resolved scene simulates it."""
         return self.is_named(scene) and self.used(scene)
 
-    def batches_in(self, scene: Resolved) -> bool:
+    def batches_in(self, scene: Scene) -> bool:
         """Returns whether a scene that names it can be one of many that run as one; one of another package cannot."""
         if self.table is not None:
             return False
         return self.batches if isinstance(self.batches, bool) else self.batches(scene)
 
-    def states_in(self, scene: Resolved) -> int:
+    def states_in(self, scene: Scene) -> int:
         """Returns how many states it adds to a scene that names it."""
         return self.states if isinstance(self.states, int) else self.states(scene)
 
-    def without(self, scene: Resolved) -> Resolved:
+    def without(self, scene: Scene) -> Scene:
         """Returns a resolved scene that names it without it, and without what cannot be there without it."""
-        return self.takes_out(scene) if self.takes_out else without_keys(scene, self.key)
-
-
-def at(scene: Resolved, key: str) -> Any:
-    """Returns the value at a dotted key of a scene or a summary, lists counted from 0; None where there is none."""
-    found: Any = scene
-    for part in key.split("."):
-        if isinstance(found, list):
-            found = found[int(part)] if part.isdecimal() and int(part) < len(found) else None
-        else:
-            found = found.get(part) if isinstance(found, dict) else None
-    return found
+        return self.takes_out(scene) if self.takes_out else without(scene, self.key)
 
 
 def as_written(key: str) -> str:
     """Returns a key as a scene file writes it: a table in brackets."""
     return key if "." in key else f"[{key}]"
-
-
-def without_keys(scene: Resolved, *keys: str) -> Resolved:
-    """Returns a scene without some dotted keys; it shares what stays, and an absent key changes nothing."""
-    for key in keys:
-        first, _, rest = key.partition(".")
-        if first not in scene:
-            continue
-        left = {name: value for name, value in scene.items() if name != first}
-        scene = {**left, first: without_keys(scene[first], rest)} if rest else left
-    return scene

@@ -6,6 +6,7 @@ An effect that is not named is not there: its modules are not imported and no in
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from functools import cache, partial
 from importlib.metadata import entry_points
 
@@ -20,12 +21,12 @@ from haploop.launch.plan.effect import (
     NOISY,
     RUBBING,
     Effect,
-    Resolved,
-    at,
-    without_keys,
 )
 from haploop.plant.integrators.registry import find_integrator, integrator_module, integrator_names
 from haploop.plant.sensing.encoder import accelerometer_is_used
+from haploop.protocol.scene.effects import Accelerometer
+from haploop.protocol.scene.estimators import Acceleration, Velocity
+from haploop.protocol.scene.paths import value_at, without
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
 from haploop.protocol.trees import tree_leaves
@@ -75,27 +76,35 @@ def _estimators(of: str) -> Iterator[Effect]:
             )
 
 
-def _memory_of(of: str, scene: Resolved) -> int:
+def _memory_of(of: str, scene: Scene) -> int:
     """Counts the numbers that an estimator remembers; counts of ticks are none of them."""
-    clock = Timebase.from_scene(scene)
-    estimator = estimator_class(scene[of]["estimator"]).from_scene(Scene.from_dict(scene), of, clock.period_s)
+    named = scene.estimate(of).estimator or "difference"
+    estimator = estimator_class(named).from_scene(scene, of, Timebase.from_scene(scene).period_s)
     return sum(isinstance(leaf, float) for leaf in tree_leaves(estimator.start(0.0, (0.0, 0.0))))
 
 
-def _without_estimator(of: str, scene: Resolved) -> Resolved:
+def _without_estimator(of: str, scene: Scene) -> Scene:
     """Takes out an estimator with the keys that are its own, and an acceleration that comes of it."""
-    kept = {key: scene[of][key] for key in ("source", "cutoff") if key in scene[of]}
-    from_kalman = at(scene, "acceleration.source") == "kalman"
-    return without_keys({**scene, of: kept}, *["acceleration.source"] * from_kalman)
+    if of == "velocity":
+        scene = replace(scene, velocity=Velocity(cutoff=scene.estimate(of).cutoff))
+    elif table := scene.acceleration:
+        scene = replace(scene, acceleration=Acceleration(source=table.source, cutoff=table.cutoff))
+    from_kalman = value_at(scene, "acceleration.source") == "kalman"
+    return without(scene, *["acceleration.source"] * from_kalman)
 
 
-def _noise_memory(scene: Resolved) -> int:
+def _noise_memory(scene: Scene) -> int:
     """Counts the memory of an accelerometer's noise, which is correlated where its bandwidth is limited."""
-    table = scene["accelerometer"]
-    return int(bool(table["noise_density"]) and "bandwidth" in table)
+    table = scene.accelerometer or Accelerometer()
+    return int(bool(table.noise_density) and table.bandwidth is not None)
 
 
-def _goes_by_whole_steps(scene: Resolved) -> bool:
+def _delay_memory(scene: Scene) -> int:
+    table = scene.accelerometer or Accelerometer()
+    return round(table.delay * scene.clock.plant_rate)
+
+
+def _goes_by_whole_steps(scene: Scene) -> bool:
     from haploop.plant.friction.substeps import goes_by_whole_steps
 
     return goes_by_whole_steps(scene)
@@ -168,7 +177,7 @@ EFFECTS: tuple[Effect, ...] = (
         CHAIN,
         "measurement",
         "the accelerometer tells what it felt earlier",
-        states=lambda scene: round(scene["accelerometer"]["delay"] * scene["clock"]["plant_rate"]),
+        states=_delay_memory,
         used=accelerometer_is_used,
     ),
     Effect(
@@ -276,11 +285,11 @@ def alone_perhaps() -> tuple[Effect, ...]:
     return tuple(effect for effect in all_effects() if effect.batches is not True or effect.table)
 
 
-def effects_of(scene: Resolved) -> tuple[Effect, ...]:
+def effects_of(scene: Scene) -> tuple[Effect, ...]:
     """Returns the effects that a resolved scene simulates."""
     return tuple(effect for effect in all_effects() if effect.is_in(scene))
 
 
-def notes(scene: Resolved) -> list[str]:
+def notes(scene: Scene) -> list[str]:
     """Returns what is in order in a resolved scene, but may not be what was meant; one sentence each."""
     return [note for effect in all_effects() if effect.is_named(scene) for note in effect.note(scene)]

@@ -7,11 +7,14 @@ from dataclasses import dataclass
 from typing import Any
 
 from haploop.controller.recorder import MOTION_COLUMNS
-from haploop.launch.plan.effect import Effect, Stage, at
+from haploop.launch.plan.effect import Effect, Stage
 from haploop.launch.plan.effects import all_effects, effects_of
 from haploop.plant.chain.chain import Chain
 from haploop.plant.choose import integrator_name, needs_chain
 from haploop.plant.integrators.registry import find_integrator
+from haploop.protocol.scene.paths import value_at
+from haploop.protocol.scene.scene import Scene
+from haploop.protocol.scene.table import Table
 from haploop.protocol.ticks import Timebase
 
 
@@ -58,7 +61,7 @@ class Plan:
     absent: tuple[Effect, ...]
 
 
-def plan(scene: dict[str, Any]) -> Plan:
+def plan(scene: Scene) -> Plan:
     """Returns the plan of a resolved scene."""
     named = effects_of(scene)
     chain = Chain.from_scene(scene)
@@ -82,7 +85,7 @@ def plan(scene: dict[str, Any]) -> Plan:
     )
 
 
-def multiplications(scene: dict[str, Any]) -> int:
+def multiplications(scene: Scene) -> int:
     """Multiplications that move the bodies through one tick: every state by every state, command and friction.
 
     One mass is moved once a hold and filled in at the plant steps; bodies in a row are moved to every plant step. The
@@ -96,20 +99,20 @@ def multiplications(scene: dict[str, Any]) -> int:
     return (time.steps_per_tick + (2 if time.delay_steps % time.steps_per_tick else 1)) * size * (size + 1)
 
 
-def _memory(scene: dict[str, Any], named: tuple[Effect, ...]) -> dict[str, int]:
+def _memory(scene: Scene, named: tuple[Effect, ...]) -> dict[str, int]:
     """Counts what effects remember; the states of those in the motion are integrated instead."""
     counts = {effect.name: effect.states_in(scene) for effect in named if effect.stage != "motion"}
     return {name: count for name, count in counts.items() if count}
 
 
-def _plant_step(chain: Chain, named: tuple[Effect, ...], scene: dict[str, Any]) -> tuple[Step, ...]:
+def _plant_step(chain: Chain, named: tuple[Effect, ...], scene: Scene) -> tuple[Step, ...]:
     bodies = " - ".join(chain.bodies)
     method = "exact flow" if integrator_name(scene) == "exact" else integrator_name(scene)
     what = f"{method} of {len(chain.states)} states ({bodies}), the command held, the force of the hand linear"
     return Step("plant", what), *_stage("motion", named, scene)
 
 
-def _tick(scene: dict[str, Any], chain: Chain, named: tuple[Effect, ...]) -> tuple[Step, ...]:
+def _tick(scene: Scene, chain: Chain, named: tuple[Effect, ...]) -> tuple[Step, ...]:
     late = f"{Timebase.from_scene(scene).delay_steps} plant steps"
     return (
         Step("plant", f"the position of the {chain.bodies[0]} is sampled"),
@@ -123,7 +126,7 @@ def _tick(scene: dict[str, Any], chain: Chain, named: tuple[Effect, ...]) -> tup
     )
 
 
-def _estimates(scene: dict[str, Any], named: tuple[Effect, ...]) -> Iterable[Step]:
+def _estimates(scene: Scene, named: tuple[Effect, ...]) -> Iterable[Step]:
     """Yields a backward difference where no effect stands in its place, then its low-pass."""
     for table, letter, of in (("velocity", "v", "the position"), ("acceleration", "a", "v")):
         effects = [e for e in named if e.stage == "estimate" and e.key.startswith(f"{table}.")]
@@ -132,18 +135,18 @@ def _estimates(scene: dict[str, Any], named: tuple[Effect, ...]) -> Iterable[Ste
         yield from _stage("estimate", effects, scene)
 
 
-def _forces(scene: dict[str, Any]) -> Iterable[Step]:
-    if wall := scene.get("wall"):
-        sign = "<" if wall["occupies"] == "below" else ">"
-        yield Step("controller", f"wall: {wall['stiffness']:g} N/m where x {sign} {wall['position']:g} m")
-    for table in scene.get("dissipation", []):
-        yield Step("controller", f"{table['kind']}{_values(table)}, {table['acts']}")
+def _forces(scene: Scene) -> Iterable[Step]:
+    if wall := scene.wall:
+        sign = "<" if wall.occupies == "below" else ">"
+        yield Step("controller", f"wall: {wall.stiffness:g} N/m where x {sign} {wall.position:g} m")
+    for table in scene.dissipation:
+        yield Step("controller", f"{table.name}{_values(table)}, {table.acts}")
 
 
-def _stage(stage: Stage, named: Iterable[Effect], scene: dict[str, Any]) -> tuple[Step, ...]:
+def _stage(stage: Stage, named: Iterable[Effect], scene: Scene) -> tuple[Step, ...]:
     """Returns what the named effects of a stage do, with their values."""
     return tuple(
-        Step(effect.node, effect.does + _values(at(scene, effect.key), effect.key), effect.name)
+        Step(effect.node, effect.does + _values(value_at(scene, effect.key), effect.key), effect.name)
         for effect in named
         if effect.stage == stage
     )
@@ -152,7 +155,7 @@ def _stage(stage: Stage, named: Iterable[Effect], scene: dict[str, Any]) -> tupl
 def _values(found: Any, key: str = "") -> str:
     """Returns the numbers of an effect, or of an element, in parentheses."""
     name = key.rpartition(".")[2]
-    table = found if isinstance(found, dict) else {name: found}
+    table = found.as_dict() if isinstance(found, Table) else {name: found}
     words = [f"{k} = {v:g}" for k, v in table.items() if isinstance(v, (int, float)) and not isinstance(v, bool)]
     return f" ({', '.join(words)})" if words else ""
 
@@ -161,5 +164,5 @@ def _once(entries: Iterable[str]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(entries))
 
 
-def _element_columns(scene: dict[str, Any]) -> tuple[str, ...]:
-    return tuple(f"dissipation.{index}" for index in range(len(scene.get("dissipation", []))))
+def _element_columns(scene: Scene) -> tuple[str, ...]:
+    return tuple(f"dissipation.{index}" for index in range(len(scene.dissipation)))

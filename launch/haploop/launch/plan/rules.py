@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from dataclasses import replace
 
-from haploop.launch.plan.effect import Draft, Resolved, at, without_keys
+from haploop.launch.plan.effect import Draft
 from haploop.plant.integrators.registry import find_integrator
 from haploop.protocol.scene.effects import Accelerometer, Actuator, Friction, UniformJitter
-from haploop.protocol.scene.scene import Clock, Hand
+from haploop.protocol.scene.paths import value_at, without
+from haploop.protocol.scene.scene import Clock, Hand, Scene
 from haploop.protocol.ticks import whole_count
 
 # What rounding adds to the factor 1 of a body that drifts.
@@ -30,11 +31,11 @@ def check_friction(draft: Draft) -> None:
         expected = "It says how breakaway falls towards kinetic, so friction.breakaway must be given too."
         draft.complain(("friction", "stribeck_velocity"), expected)
     if draft.scene and not find_integrator(draft.scene.clock.integrator).chooses_steps:
-        _check_rate(draft, draft.scene.as_dict())
+        _check_rate(draft, draft.scene)
 
 
-def _check_rate(draft: Draft, scene: dict[str, Any]) -> None:
-    rate, integrator = scene["clock"]["plant_rate"], scene["clock"]["integrator"]
+def _check_rate(draft: Draft, scene: Scene) -> None:
+    rate, integrator = scene.clock.plant_rate, scene.clock.integrator
     if find_integrator(integrator).method is None:
         from haploop.plant.chain.chain import Chain
         from haploop.plant.friction.substeps import MOST_PARTS, parts_of_a_step
@@ -95,7 +96,7 @@ def _whole_steps(draft: Draft, key: tuple[str, ...], name: str, seconds: float) 
             draft.complain(key, sentence)
 
 
-def note_accelerometer(scene: dict[str, Any]) -> list[str]:
+def note_accelerometer(scene: Scene) -> list[str]:
     """Says that nothing reads the accelerometer, or that there is no motor to mount it on."""
     from haploop.plant.sensing.encoder import accelerometer_is_used
 
@@ -104,51 +105,53 @@ def note_accelerometer(scene: dict[str, Any]) -> list[str]:
             "[accelerometer] is not simulated, since no estimate reads it; "
             'acceleration.source = "accelerometer" would, or velocity.accelerometer with the Kalman filter.'
         ]
-    if at(scene, "accelerometer.mount") == "motor" and "transmission" not in scene:
+    if value_at(scene, "accelerometer.mount") == "motor" and scene.transmission is None:
         return ['accelerometer.mount = "motor" means the one mass there is without a [transmission].']
     return []
 
 
-def note_growth(scene: dict[str, Any]) -> list[str]:
+def note_growth(scene: Scene) -> list[str]:
     """Says where a method of a fixed step makes the bodies swing ever wider by itself."""
-    if find_integrator(scene["clock"]["integrator"]).method is None:
+    clock = scene.clock
+    if find_integrator(clock.integrator).method is None:
         return []
     from haploop.plant.integrators.stability import growth
 
     factor = growth(scene)
     if factor <= 1.0 + _ROUNDING:
         return []
-    clock = scene["clock"]
     return [
-        f'clock.integrator = "{clock["integrator"]}" is unstable by itself at {clock["plant_rate"]} Hz: it multiplies '
+        f'clock.integrator = "{clock.integrator}" is unstable by itself at {clock.plant_rate} Hz: it multiplies '
         f"the fastest growing swing of the bodies by {factor:.7g} in every plant step, whatever the controller does."
     ]
 
 
-def unrounded(scene: Resolved) -> Resolved:
+def unrounded(scene: Scene) -> Scene:
     """Takes out the counts of encoder and accelerometer; estimators go on trusting positions as before."""
-    one_count, velocity = scene["encoder"]["resolution"], scene.get("velocity", {})
-    if velocity.get("estimator") == "kalman" and "measurement_noise" not in velocity:
-        velocity = {**velocity, "measurement_noise": one_count / 12**0.5}
-    if velocity.get("estimator") == "foaw" and "bound" not in velocity:
-        velocity = {**velocity, "bound": one_count}
-    kept = without_keys(scene, "encoder", "accelerometer.resolution")
-    return {**kept, "velocity": velocity} if velocity else kept
+    velocity = scene.velocity
+    if velocity and scene.encoder:
+        one_count = scene.encoder.resolution
+        if velocity.estimator == "kalman" and velocity.measurement_noise is None:
+            velocity = replace(velocity, measurement_noise=one_count / 12**0.5)
+        if velocity.estimator == "foaw" and velocity.bound is None:
+            velocity = replace(velocity, bound=one_count)
+    return replace(without(scene, "encoder", "accelerometer.resolution"), velocity=velocity)
 
 
-def noiseless(scene: Resolved) -> Resolved:
+def noiseless(scene: Scene) -> Scene:
     """Takes the noise out of an accelerometer; the scene itself where there is none."""
-    table = scene["accelerometer"]
-    return {**scene, "accelerometer": {**table, "noise_density": 0.0}} if table.get("noise_density") else scene
+    return without(scene, "accelerometer.noise_density") if value_at(scene, "accelerometer.noise_density") else scene
 
 
-def rigid(scene: Resolved) -> Resolved:
+def rigid(scene: Scene) -> Scene:
     """Makes one body of motor and tip."""
-    cable, device = scene["transmission"], scene["device"]
-    mass, damping = device["mass"] + cable["motor_mass"], device["damping"] + cable["motor_damping"]
-    return {**without_keys(scene, "transmission"), "device": {**device, "mass": mass, "damping": damping}}
+    cable, device = scene.transmission, scene.device
+    if cable is None:
+        return scene
+    mass, damping = device.mass + cable.motor_mass, device.damping + cable.motor_damping
+    return replace(scene, transmission=None, device=replace(device, mass=mass, damping=damping))
 
 
-def left_out(table: str) -> Callable[[Resolved], Resolved]:
+def left_out(table: str) -> Callable[[Scene], Scene]:
     """Makes what leaves a whole table out."""
-    return lambda scene: without_keys(scene, table)
+    return lambda scene: without(scene, table)

@@ -56,12 +56,12 @@ class Supervisor:
         scene = spec.scene
         timebase = Timebase.from_scene(scene)
         self._clock = Clock(scene, timebase, spec.kinds, spec.pace)
-        self._deadline_s = scene["run"]["deadline"]
+        self._deadline_s = scene.run.deadline
         self._context = SecureContext.from_transport(spec.transport)
         secret = secrets.token_hex(16)
         welcome = {
             "run": sockets.name,
-            "scene": scene,
+            "scene": scene.as_dict(),
             "timebase": timebase.as_dict(),
             "context": {
                 "secret": secret,
@@ -73,10 +73,10 @@ class Supervisor:
         commands = Commands(self._clock, spec, lambda: self._server.roster)
         self._server = ClockServer(self._context, sockets, secret, self._clock, welcome, commands, spec.start_gate)
         keys = spec.transport.as_dict()["keys"]
-        run_directory.announce(sockets, self._server.address, scene["title"], str(spec.out), keys)
+        run_directory.announce(sockets, self._server.address, scene.title, str(spec.out), keys)
         run_number = len(run_directory.live_runs()) - 1
         start = {"address": self._server.address, "secret": secret, "transport": spec.transport.as_dict()}
-        self._children = start_children(sockets, start, scene["run"]["pin"], run_number)
+        self._children = start_children(sockets, start, scene.run.pin, run_number)
         self._started = self._looked = time.monotonic()
         self._probe_due = 0.0
         self._stopping = False
@@ -165,7 +165,7 @@ class Supervisor:
 
     def _where(self) -> str:
         tick = self._server.roster.common_tick()
-        rate = self._spec.scene["clock"]["control_rate"]
+        rate = self._spec.scene.clock.control_rate
         return f"the last tick all nodes had done is {tick} ({tick / rate:g} s)."
 
     def _heed_signals(self) -> None:

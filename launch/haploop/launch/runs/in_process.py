@@ -24,7 +24,7 @@ Progress = Callable[[dict[str, Any]], None]
 
 
 def run_in_process(
-    scene: dict[str, Any],
+    scene: Scene,
     kinds: dict[str, type[Element]],
     *,
     out: Path | None = None,
@@ -68,21 +68,19 @@ def run_in_process(
     return loop.finish()
 
 
-def scene_events(scene: dict[str, Any], time: Timebase) -> list[tuple[int, Event]]:
+def scene_events(scene: Scene, time: Timebase) -> list[tuple[int, Event]]:
     """Returns the events of a scene with their ticks, in order."""
-    return [(time.first_tick_at(event["at"]), event) for event in scene.get("event", [])]
+    return [(time.first_tick_at(event.at), event.as_dict()) for event in scene.event]
 
 
 class Loop:
     """Plant, controller and session of one scene, advanced block by block."""
 
-    def __init__(
-        self, scene: dict[str, Any], time: Timebase, kinds: dict[str, type[Element]], session: LogSession
-    ) -> None:
-        self._plant, self._controller = Plant(scene, time), Controller(Scene.from_dict(scene), time, kinds)
+    def __init__(self, scene: Scene, time: Timebase, kinds: dict[str, type[Element]], session: LogSession) -> None:
+        self._plant, self._controller = Plant(scene, time), Controller(scene, time, kinds)
         self._session = session
         self._end = time.ticks
-        self._block = BlockLength(scene["run"]["block_ticks"])
+        self._block = BlockLength(scene.run.block_ticks)
         session.logger.start(self._plant.state(), [])
 
     def schedule(self, events: list[tuple[int, Event]]) -> None:

@@ -12,6 +12,7 @@ from haploop.launch.output import keep_plugin, make_output, write_scene
 from haploop.launch.scene.events import elements_of, try_out
 from haploop.launch.scene.file import load
 from haploop.launch.spec import RunSpec
+from haploop.protocol.scene.scene import Scene
 
 
 def prepare(
@@ -36,7 +37,7 @@ def prepare(
 
 
 def lay_out(
-    scene: dict[str, Any],
+    scene: Scene,
     kinds: dict[str, type[Element]],
     directory: Path,
     plugins: Sequence[Path] = (),

@@ -17,9 +17,7 @@ if TYPE_CHECKING:
     from haploop.controller.dissipation import Element
 
 
-def load(
-    path: Path | str, overrides: Sequence[str] = (), kinds: Mapping[str, type[Element]] | None = None
-) -> Scene:
+def load(path: Path | str, overrides: Sequence[str] = (), kinds: Mapping[str, type[Element]] | None = None) -> Scene:
     """Returns the resolved scene of a TOML file: in SI units, defaults filled in, events in order of time.
 
     Args:
@@ -33,9 +31,7 @@ def load(
     return resolved(read_layers(Path(path)), overrides, kinds)
 
 
-def resolved(
-    layers: Layers, overrides: Sequence[str] = (), kinds: Mapping[str, type[Element]] | None = None
-) -> Scene:
+def resolved(layers: Layers, overrides: Sequence[str] = (), kinds: Mapping[str, type[Element]] | None = None) -> Scene:
     """Returns the resolved scene of layers that were read already.
 
     Raises:

@@ -39,7 +39,7 @@ class Table:
         value = getattr(self, key, None)
         for open_keys in ("others", "parameters"):
             value = getattr(self, open_keys, {}).get(key) if value is None else value
-        if value is None or (key == "dissipation" or key == "event") and not value:
+        if value is None or ((key == "dissipation" or key == "event") and not value):
             raise KeyError(key)
         return value
 
@@ -52,8 +52,8 @@ class Table:
     def __contains__(self, key: str) -> bool:
         return self.get(key) is not None
 
-    def keys(self) -> list[str]:
-        return list(self.as_dict())
+    def keys(self) -> Any:
+        return self.as_dict().keys()
 
     def __iter__(self) -> Any:
         return iter(self.keys())

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any
 
-from haploop.launch.plan.effect import without_keys
+from haploop.protocol.scene.paths import without
 from haploop.launch.plan.effects import all_effects
 from haploop.plant.sensing.encoder import accelerometer_is_used
 
@@ -88,7 +88,7 @@ def _lag(scene: Scene) -> Scene | None:
     if (plain and not late) or not scene.get("dissipation"):
         return None
     source = acceleration.get("source", "encoder")
-    scene = without_keys(scene, "velocity", "accelerometer.bandwidth", "accelerometer.delay")
+    scene = without(scene, "velocity", "accelerometer.bandwidth", "accelerometer.delay")
     if "accelerometer" in scene:
         scene = {**scene, "accelerometer": {"delay": 0.0, **scene["accelerometer"]}}
     return {**scene, "acceleration": {"source": source if source == "accelerometer" else "encoder"}}
@@ -113,7 +113,7 @@ def _without_element(index: int) -> Callable[[Scene], Scene | None]:
         if index >= len(elements):
             return None
         left = elements[:index] + elements[index + 1 :]
-        return {**scene, "dissipation": left} if left else without_keys(scene, "dissipation")
+        return {**scene, "dissipation": left} if left else without(scene, "dissipation")
 
     return off
 

@@ -128,9 +128,9 @@ def _keys_of(quantity: str) -> list[str]:
 
 
 def _at(scene: Scene, key: str) -> Any:
-    from haploop.launch.plan.effect import at
+    from haploop.protocol.scene.paths import value_at
 
-    return at(scene, key)
+    return value_at(scene, key)
 
 
 def _with(scene: Scene, key: str, value: Any) -> Scene:

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 from haploop.controller.active_elements import keeps_attributes, make_element
 from haploop.controller.dissipation import registry
-from haploop.launch.plan.effect import as_written, at
+from haploop.launch.plan.effect import as_written
+from haploop.protocol.scene.paths import value_at
 from haploop.launch.plan.effects import all_effects
 from haploop.protocol.scene.scene import ElementTable
 
@@ -45,5 +46,5 @@ def why_not_linear(scene: dict[str, Any], kinds: Kinds | None = None) -> list[st
 
 def left_out(scene: dict[str, Any]) -> list[str]:
     """Returns the effects of a resolved scene that a map of small, smooth swings in lasting contact leaves out."""
-    keys = [key for effect in all_effects() for key in effect.left_out if at(scene, key)]
+    keys = [key for effect in all_effects() for key in effect.left_out if value_at(scene, key)]
     return [as_written(key) for key in keys] + (["[[event]]"] if scene.get("event") else [])

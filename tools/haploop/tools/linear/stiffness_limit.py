@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from haploop.controller.estimators.kalman import assumed_noises
-from haploop.launch.plan.effect import without_keys
+from haploop.protocol.scene.paths import without
 from haploop.launch.plan.effects import all_effects
 from haploop.launch.runs.in_process import run_in_process
 from haploop.logger.verdict.measures import WINDOW_S
@@ -91,7 +91,7 @@ def smooth(scene: dict[str, Any]) -> dict[str, Any]:
     if scene.get("velocity", {}).get("estimator") == "kalman":
         smoothed["velocity"] |= assumed_noises(Scene.from_dict(scene), period_s)
     rough = [key for effect in all_effects() for key in effect.left_out if key not in _NOT_ABSENT]
-    smoothed = without_keys(smoothed, "event", *rough)
+    smoothed = without(smoothed, "event", *rough)
     if "accelerometer" in smoothed:
         smoothed["accelerometer"] |= dict.fromkeys((key.partition(".")[2] for key in _NOT_ABSENT), 0.0)
     return smoothed

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from haploop.launch.batch.stacking import is_batchable
-from haploop.launch.plan.effect import at
+from haploop.protocol.scene.paths import value_at
 from haploop.launch.scene.check import resolve
 from haploop.launch.scene.events import elements_of, try_out
 from haploop.launch.scene.layers import Layers
@@ -229,5 +229,5 @@ class Refused(SceneError):
 
 def _entry(result: dict[str, Any], column: Column) -> Any:
     """Returns the value of a result at a dotted key; None where there is none."""
-    value = at(result, column.name)
+    value = value_at(result, column.name)
     return value if value is None or column.kind != NUMBER else float(value)

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from haploop.launch.plan.effect import at
+from haploop.protocol.scene.paths import value_at
 from haploop.tools.linear.bounds import Bound, bounds_of
 from haploop.tools.linear.linearity import installed_kinds, left_out, why_not_linear
 from haploop.tools.linear.one_tick import NotLinear, OneTickMap
@@ -67,7 +67,7 @@ def bound_lines(plane: Plane) -> list[MapLine]:
 
     A bound that applies but allows no wall of the panel, or every one, has no lines.
     """
-    if at(plane.scene, STIFFNESS) is None:
+    if value_at(plane.scene, STIFFNESS) is None:
         return []
     known: dict[tuple[float, ...], dict[str, Bound]] = {}
 

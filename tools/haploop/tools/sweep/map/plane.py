@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from haploop.launch.plan.effect import at
+from haploop.protocol.scene.paths import value_at
 from haploop.protocol.ticks import TimebaseError
 from haploop.tools.sweep.map.axis import Ruler
 from haploop.tools.sweep.map.contour import FEW_POINTS, POINTS, Level, fine_values, zero_lines
@@ -32,7 +32,7 @@ class Plane:
     scene: dict[str, Any]
     rulers: Sequence[Ruler]
 
-    def at(self, x: float, y: float) -> dict[str, Any]:
+    def value_at(self, x: float, y: float) -> dict[str, Any]:
         """Returns the resolved scene at a place."""
         scene = copy.deepcopy(self.scene)
         for ruler, value in zip(self.rulers, (x, y), strict=False):
@@ -72,7 +72,7 @@ class Plane:
             return np.zeros(1), False
         ruler = self.rulers[which]
         key = ruler.axis.key
-        own = bool(ruler.axis.names) or isinstance(at(self.scene, key), int)
+        own = bool(ruler.axis.names) or isinstance(value_at(self.scene, key), int)
         swept = any(other.axis.key == STIFFNESS for other in self.rulers)
         return fine_values(ruler, POINTS if swept else FEW_POINTS, own), not own
 
