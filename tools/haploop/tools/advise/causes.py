@@ -6,9 +6,9 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any
 
-from haploop.protocol.scene.paths import without
 from haploop.launch.plan.effects import all_effects
 from haploop.plant.sensing.encoder import accelerometer_is_used
+from haploop.protocol.scene.paths import without
 
 Scene = dict[str, Any]
 SAMPLING = "sampling and hold"

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 from haploop.controller.active_elements import keeps_attributes, make_element
 from haploop.controller.dissipation import registry
 from haploop.launch.plan.effect import as_written
-from haploop.protocol.scene.paths import value_at
 from haploop.launch.plan.effects import all_effects
+from haploop.protocol.scene.paths import value_at
 from haploop.protocol.scene.scene import ElementTable
 
 if TYPE_CHECKING:

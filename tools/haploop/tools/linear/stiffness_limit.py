@@ -8,11 +8,11 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from haploop.controller.estimators.kalman import assumed_noises
-from haploop.protocol.scene.paths import without
 from haploop.launch.plan.effects import all_effects
 from haploop.launch.runs.in_process import run_in_process
 from haploop.logger.verdict.measures import WINDOW_S
 from haploop.plant.chain.chain import Chain
+from haploop.protocol.scene.paths import without
 from haploop.protocol.scene.scene import Scene
 from haploop.tools.linear.one_tick import OneTickMap
 

@@ -11,13 +11,13 @@ from pathlib import Path
 from typing import Any
 
 from haploop.launch.batch.stacking import is_batchable
-from haploop.protocol.scene.paths import value_at
 from haploop.launch.scene.check import resolve
 from haploop.launch.scene.events import elements_of, try_out
 from haploop.launch.scene.layers import Layers
 from haploop.launch.scene.mistakes import Mistake, SceneError
 from haploop.launch.scene.overrides import key_path, lay_value
 from haploop.launch.scene.toml_writer import Lines, inline, lines_of, to_toml
+from haploop.protocol.scene.paths import value_at
 from haploop.tools.executor.parts import Group
 from haploop.tools.executor.work import Sources, load_kinds
 from haploop.tools.sweep.table import CELL, ENDED, NUMBER, SCENE, SEED, TEXT, WHOLE, WHY, Column
