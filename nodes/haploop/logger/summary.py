@@ -13,6 +13,8 @@ from typing import Any
 from haploop.logger.books.books import BooksState, moved_J, residual_J, stored_J, total_J
 from haploop.logger.verdict.verdict import RunMeasures
 
+# A summary as summary.json holds it.
+Summary = dict[str, Any]
 # Entries that differ between two runs of the same scene.
 OF_THE_MACHINE = ("wall_s", "real_time_factor", "versions")
 _FINITE = (str, int, bool)

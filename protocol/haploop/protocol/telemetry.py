@@ -8,8 +8,10 @@ from typing import Any
 import zmq
 
 from haploop.protocol.sockets import has_message, open_socket
-from haploop.protocol.wire import Frame, WireError, decode, encode
+from haploop.protocol.wire import Frame, Message, WireError, decode, encode
 
+# A block of telemetry: from_tick, ticks, columns and what its sender adds (messages.py).
+Block = Message
 # Requests taken at one block boundary, so that nobody who floods a publisher can hold its node up.
 _AT_ONCE = 200
 

@@ -12,6 +12,10 @@ from haploop.protocol.messages import BY_CODE, MESSAGES, VERSION, complaint
 MAX_FRAME_BYTES = 64 * 1024 * 1024
 
 
+# The fields of a message by name, and what is nested in them; the table in messages.py says which they are.
+Message = dict[str, Any]
+
+
 class WireError(ValueError):
     """Raised for a frame that is no message of this version; its text says what is wrong."""
 
@@ -22,7 +26,7 @@ class Frame(NamedTuple):
     name: str
     fields: list[Any]
 
-    def as_dict(self) -> dict[str, Any]:
+    def as_dict(self) -> Message:
         """Returns the fields by name."""
         return {name: value for (name, _), value in zip(MESSAGES[self.name].fields, self.fields, strict=True)}
 
