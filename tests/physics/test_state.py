@@ -73,7 +73,7 @@ def test_the_motion_of_another_tick_goes_on_otherwise(name: str) -> None:
     whole, before, after = (plant_of(SCENES[name]) for _ in range(3))
     run(whole, 100)
     run(before, 99)
-    after.restore(whole.checkpoint() | {"motion": before.checkpoint()["motion"]})
+    after.restore(whole.checkpoint()._replace(motion=before.checkpoint().motion))
     assert run(after, 300) != run(whole, 300)
 
 

@@ -4,10 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypedDict
 
 from haploop.controller.dissipation import Element, ElementError
 from haploop.protocol.scene.scene import ElementTable
+
+
+class Description(TypedDict):
+    """An element and its book, as they stand in telemetry and summary; ``parameters`` has ``acts`` beside its own."""
+
+    book: int
+    kind: str
+    parameters: dict[str, float | str]
+    from_tick: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,8 +37,8 @@ class ActiveElement:
     book: int
     from_tick: int
 
-    def describe(self) -> dict[str, Any]:
-        """Returns book, kind, parameters and first tick, as they stand in telemetry and summary."""
+    def describe(self) -> Description:
+        """Returns the description of the element and its book."""
         return {
             "book": self.book,
             "kind": self.element.kind,

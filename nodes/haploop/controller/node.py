@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import traceback
 from pathlib import Path
-from typing import Any
 
 import zmq
 
@@ -20,6 +19,7 @@ from haploop.protocol.scene.scene import Scene
 from haploop.protocol.sockets import bind
 from haploop.protocol.telemetry import Publisher
 from haploop.protocol.ticks import Timebase
+from haploop.protocol.wire import Message
 
 ROLE = "controller"
 
@@ -40,7 +40,7 @@ class ControllerNode:
         self._secret = welcome["context"]["secret"]
         self._loop = ControllerEnd(context, welcome["endpoints"]["plant"]["loop"], self._await_plant)
 
-    def _state(self) -> tuple[int, dict[str, Any]]:
+    def _state(self) -> tuple[int, Message]:
         return self._controller.tick, {"history": self._controller.recorder.history}
 
     def connect(self) -> None:
@@ -49,7 +49,7 @@ class ControllerNode:
         self._publisher.await_subscriber(lambda: self._wait("logger"))
         self._client.ready(0)
 
-    def run(self) -> tuple[int, dict[str, Any]]:
+    def run(self) -> tuple[int, Message]:
         """Answer until the plant ends the run; returns the number of ticks answered."""
         controller, client, loop = self._controller, self._client, self._loop
         while (samples := loop.samples(controller.tick)) is not None:
@@ -73,7 +73,7 @@ class ControllerNode:
             if is_change(event):
                 self._controller.schedule(tick, event)
 
-    def _end(self) -> tuple[int, dict[str, Any]]:
+    def _end(self) -> tuple[int, Message]:
         self._flush()
         tick, trouble = self._controller.tick, self._controller.recorder.trouble
         self._publisher.publish("END", tick, "", trouble)
@@ -102,7 +102,7 @@ class ControllerNode:
             self._publisher.serve()
 
 
-def work(client: ClockClient, context: zmq.Context[zmq.Socket[bytes]], directory: Path) -> tuple[int, dict[str, Any]]:
+def work(client: ClockClient, context: zmq.Context[zmq.Socket[bytes]], directory: Path) -> tuple[int, Message]:
     """Run the controller as a node of a run."""
     try:
         node = ControllerNode(client, context, directory)

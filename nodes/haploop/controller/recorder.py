@@ -6,10 +6,13 @@ import math
 from array import array
 from typing import Any, NamedTuple
 
+import numpy as np
+
+from haploop.controller.active_elements import Description
 from haploop.controller.tick import ControllerParams
 from haploop.protocol.changes import Change
+from haploop.protocol.telemetry import Block
 
-Block = dict[str, Any]
 MOTION_COLUMNS = ("x", "v", "a", "wall")
 
 
@@ -109,9 +112,9 @@ class Row(NamedTuple):
         elements: their descriptions; parameters may be arrays.
     """
 
-    columns: dict[str, Any]
+    columns: dict[str, float | np.ndarray]
     forces: dict[int, Any]
-    elements: list[dict[str, Any]]
+    elements: list[Description]
 
 
 class BatchRecorder(Recorder):

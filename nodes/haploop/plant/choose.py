@@ -7,31 +7,34 @@ from typing import Any
 from haploop.plant.integrators.registry import find_integrator
 from haploop.plant.motion.one_mass import OneMassMotion
 from haploop.plant.sensing.encoder import PositionSensor, accelerometer_is_used
+from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
 
 
-def integrator_name(scene: dict[str, Any]) -> str:
+def integrator_name(scene: Scene) -> str:
     """Returns the name of the integrator that moves the bodies of a resolved scene."""
-    return scene["clock"].get("integrator", "exact")
+    return scene.clock.integrator
 
 
-def needs_chain(scene: dict[str, Any]) -> bool:
+def needs_chain(scene: Scene) -> bool:
     """Tells whether there is more than one mass under held forces that change at the same steps of every interval.
 
     All integrators but the exact transition move a chain of bodies, be it of one.
     """
-    sensor = scene.get("accelerometer", {}) if accelerometer_is_used(scene) else {}
-    return (
-        integrator_name(scene) != "exact"
-        or any(table in scene for table in ("friction", "transmission", "jitter", "loss"))
-        or "grip" in scene.get("hand", {})
-        or "bandwidth" in scene.get("actuator", {})
-        or "bandwidth" in sensor
-        or sensor.get("delay", 0.0) > 0.0
+    sensor = scene.accelerometer if accelerometer_is_used(scene) else None
+    return bool(
+        scene.clock.integrator != "exact"
+        or scene.friction
+        or scene.transmission
+        or scene.jitter
+        or scene.loss
+        or (scene.hand and scene.hand.grip)
+        or (scene.actuator and scene.actuator.bandwidth is not None)
+        or (sensor and (sensor.bandwidth is not None or sensor.delay > 0.0))
     )
 
 
-def make_motion(scene: dict[str, Any], time: Timebase, members: int | None = None) -> Any:
+def make_motion(scene: Scene, time: Timebase, members: int | None = None) -> Any:
     """Makes the least motion that moves a scene; nothing else is even imported.
 
     Args:
@@ -42,8 +45,8 @@ def make_motion(scene: dict[str, Any], time: Timebase, members: int | None = Non
     if not needs_chain(scene):
         return OneMassMotion(scene, time, members)
     if members is None:
-        return find_integrator(integrator_name(scene)).make_motion(scene, time)
-    if "friction" in scene:
+        return find_integrator(scene.clock.integrator).make_motion(scene, time)
+    if scene.friction:
         from haploop.plant.friction.batch import BatchFrictionMotion
 
         return BatchFrictionMotion(scene, time, members)
@@ -52,10 +55,10 @@ def make_motion(scene: dict[str, Any], time: Timebase, members: int | None = Non
     return ChainMotion(scene, time, members)
 
 
-def make_position_sensor(scene: dict[str, Any], time: Timebase) -> PositionSensor:
+def make_position_sensor(scene: Scene, time: Timebase) -> PositionSensor:
     """Makes the position sensor of a resolved scene, or of the stacked scene of a batch."""
-    if "noise" not in scene:
-        return PositionSensor(scene.get("encoder"))
+    if scene.noise is None:
+        return PositionSensor(scene.encoder)
     from haploop.plant.sensing.noise import NoisyPositionSensor
 
-    return NoisyPositionSensor(scene.get("encoder"), scene["noise"], scene["seed"], time.period_s)
+    return NoisyPositionSensor(scene.encoder, scene.noise, scene.seed, time.period_s)

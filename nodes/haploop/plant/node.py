@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import zmq
 
@@ -17,6 +16,7 @@ from haploop.protocol.scene.scene import Scene
 from haploop.protocol.sockets import bind
 from haploop.protocol.telemetry import Publisher
 from haploop.protocol.ticks import Timebase
+from haploop.protocol.wire import Message
 
 ROLE = "plant"
 
@@ -37,7 +37,7 @@ class PlantNode:
         self._block = BlockLength(scene.run.block_ticks)
         self._secret = welcome["context"]["secret"]
 
-    def _state(self) -> tuple[int, dict[str, Any]]:
+    def _state(self) -> tuple[int, Message]:
         state = self._plant.state()
         return int(state["tick"]), state
 
@@ -47,7 +47,7 @@ class PlantNode:
         self._publisher.await_subscriber(lambda: self._wait("logger"))
         self._client.ready(0)
 
-    def run(self) -> tuple[int, dict[str, Any]]:
+    def run(self) -> tuple[int, Message]:
         """Works until the run ends; returns the tick it ended at."""
         client, plant = self._client, self._plant
         while plant.stop_reason is None and not (client.last and plant.tick >= client.until):
@@ -61,7 +61,7 @@ class PlantNode:
                 self._publisher.serve()
         return self._end()
 
-    def _end(self) -> tuple[int, dict[str, Any]]:
+    def _end(self) -> tuple[int, Message]:
         plant = self._plant
         self._loop.close(plant.reached)
         self._flush()
@@ -87,7 +87,7 @@ class PlantNode:
         self._client.poll()
 
 
-def work(client: ClockClient, context: zmq.Context[zmq.Socket[bytes]], directory: Path) -> tuple[int, dict[str, Any]]:
+def work(client: ClockClient, context: zmq.Context[zmq.Socket[bytes]], directory: Path) -> tuple[int, Message]:
     """Runs the plant as a node of a run."""
     node = PlantNode(client, context, directory)
     node.connect()

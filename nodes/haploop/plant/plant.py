@@ -3,17 +3,48 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
 
 from haploop.plant.choose import make_motion, make_position_sensor
 from haploop.plant.line.base import Hold
 from haploop.plant.line.delay import make_line
 from haploop.plant.sensing.encoder import accelerometer_is_used
+from haploop.protocol.changes import Event
+from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import DELAY, Timebase
 
 # From the first tick and its samples to the commands that answer them.
 Exchange = Callable[[int, list[tuple[float, ...]]], list[float]]
+
+
+class Checkpoint(NamedTuple):
+    """All that a plant goes on from, once its block has been taken.
+
+    A tree of numbers, strings and arrays of NumPy, of which msgpack makes bytes with ``default=np.ndarray.tolist``.
+
+    Attributes:
+        tick: the next tick to be sampled.
+        interval_due: whether the interval before it has yet to be stepped.
+        unusable: whether a command has come that is no finite number.
+        stop_reason: why the plant has ended by itself, or None.
+        delays: changes of the delay to come, (first command, plant steps).
+        delay_steps: the delay that a change has brought, or None.
+        motion, line, position, accelerometer: the states of the parts; None without an accelerometer.
+        last: hold in effect last.
+    """
+
+    tick: int
+    interval_due: bool
+    unusable: bool
+    stop_reason: str | None
+    delays: list[tuple[int, int]]
+    delay_steps: int | None
+    motion: Any
+    last: Hold
+    line: Any
+    position: Any
+    accelerometer: Any
 
 
 class Plant:
@@ -24,18 +55,18 @@ class Plant:
         stop_reason: why the plant ended by itself (diverged), or None.
     """
 
-    def __init__(self, scene: dict[str, Any], time: Timebase) -> None:
+    def __init__(self, scene: Scene, time: Timebase) -> None:
         self._motion = make_motion(scene, time)
         self._steps, self._most = time.steps_per_tick, time.lookahead_ticks + 1
         self._control_rate = time.control_rate
         self._line = make_line(scene, time)
         self._counters = dict(self._line.counters)
-        self._limit_m = scene["diverged_beyond"]
+        self._limit_m = scene.diverged_beyond
         self._position, self._sensor = make_position_sensor(scene, time), None
-        if accelerometer_is_used(scene) and "accelerometer" in scene:
+        if accelerometer_is_used(scene) and scene.accelerometer:
             from haploop.plant.sensing.accelerometer import Accelerometer
 
-            self._sensor = Accelerometer(scene["accelerometer"], scene["seed"], time)
+            self._sensor = Accelerometer(scene.accelerometer, scene.seed, time)
             self._counters |= self._sensor.counters
         self._measure = self._measure_both if accelerometer_is_used(scene) else self._measure_position
         self._interval_due = self._unusable = False
@@ -53,7 +84,7 @@ class Plant:
         acceleration, sensor = self._motion.acceleration(self.tick), self._sensor
         return self._position.reading(x), sensor.reading(acceleration) if sensor else acceleration
 
-    def schedule(self, tick: int, change: dict[str, Any]) -> None:
+    def schedule(self, tick: int, change: Event) -> None:
         """Has a change take effect at ``tick``, if it is one of the line's delay: command ``tick`` is the first."""
         if DELAY in (values := change.get("set", {})):
             self._delays.append((tick, round(values[DELAY] * self._steps * self._control_rate)))
@@ -141,37 +172,35 @@ class Plant:
         _, force, command = motion.last
         return {"tick": self.reached, "x": motion.x, "v": motion.v, "force": force, "command": command}
 
-    def checkpoint(self) -> dict[str, Any]:
-        """Returns all that the plant goes on from, once its block has been taken.
+    def checkpoint(self) -> Checkpoint:
+        """Returns all that the plant goes on from, once its block has been taken."""
+        return Checkpoint(
+            self.tick,
+            self._interval_due,
+            self._unusable,
+            self.stop_reason,
+            self._delays,
+            self._delay_now,
+            self._motion.state,
+            self._motion.last,
+            self._line.state,
+            self._position.state,
+            self._sensor.state if self._sensor else None,
+        )
 
-        A tree of numbers, strings and arrays of NumPy, of which msgpack makes bytes with ``default=np.ndarray.tolist``.
-        """
-        return {
-            "tick": self.tick,
-            "interval_due": self._interval_due,
-            "unusable": self._unusable,
-            "stop_reason": self.stop_reason,
-            "delays": self._delays,
-            "delay_steps": self._delay_now,
-            "motion": self._motion.state,
-            "last": self._motion.last,
-            "line": self._line.state,
-            "position": self._position.state,
-            "accelerometer": self._sensor.state if self._sensor else None,
-        }
-
-    def restore(self, checkpoint: dict[str, Any]) -> None:
+    def restore(self, checkpoint: Sequence[Any]) -> None:
         """Goes on from a checkpoint of a plant of the same scene, as taken or as unpacked; this plant is a new one."""
-        if checkpoint["delay_steps"] is not None:
-            self._retime(checkpoint["delay_steps"])
-        self.tick, self._interval_due = checkpoint["tick"], checkpoint["interval_due"]
-        self._unusable, self.stop_reason = checkpoint["unusable"], checkpoint["stop_reason"]
-        self._delays = [(tick, delay_steps) for tick, delay_steps in checkpoint["delays"]]
-        self._motion.restore(checkpoint["motion"], checkpoint["last"])
-        self._line.restore(checkpoint["line"])
-        self._position.restore(checkpoint["position"])
+        of = Checkpoint(*checkpoint)
+        if of.delay_steps is not None:
+            self._retime(of.delay_steps)
+        self.tick, self._interval_due = of.tick, of.interval_due
+        self._unusable, self.stop_reason = of.unusable, of.stop_reason
+        self._delays = [(tick, delay_steps) for tick, delay_steps in of.delays]
+        self._motion.restore(of.motion, of.last)
+        self._line.restore(of.line)
+        self._position.restore(of.position)
         if self._sensor:
-            self._sensor.restore(checkpoint["accelerometer"])
+            self._sensor.restore(of.accelerometer)
         self._x, self._block_first = self._motion.x, self.reached
 
     def take_block(self) -> tuple[int, int, dict[str, bytes]]:

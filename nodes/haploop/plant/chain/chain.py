@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from haploop.plant.motion.transition import real_for
 from haploop.plant.sensing.encoder import accelerometer_is_used
+from haploop.protocol.scene.scene import Scene
 
 Matrix = np.ndarray
 _wide = np.longdouble
@@ -60,27 +60,26 @@ class Chain:
     start: tuple[float, float]
 
     @classmethod
-    def from_scene(cls, scene: dict[str, Any]) -> Chain:
+    def from_scene(cls, scene: Scene) -> Chain:
         """Reads ``[device]``, ``[transmission]``, ``[hand]`` and the bandwidths of a resolved scene."""
-        device, hand, cable = scene["device"], scene.get("hand"), scene.get("transmission")
-        bodies, masses, links = ["device"], [device["mass"]], []
-        grounded = {"device": (0, device["damping"])}
+        device, hand, cable = scene.device, scene.hand, scene.transmission
+        bodies, masses, links = ["device"], [device.mass], []
+        grounded = {"device": (0, device.damping)}
         if cable:
-            bodies, masses = ["motor", "tip"], [cable["motor_mass"], device["mass"]]
-            links.append(Link("cable", cable["stiffness"], cable["damping"]))
-            grounded = {"motor": (0, cable["motor_damping"]), "device": (1, device["damping"])}
+            bodies, masses = ["motor", "tip"], [cable.motor_mass, device.mass]
+            links.append(Link("cable", cable.stiffness, cable.damping))
+            grounded = {"motor": (0, cable.motor_damping), "device": (1, device.damping)}
         spring = 0.0, 0.0
         if hand:
-            grip = hand.get("grip")
-            if grip:
+            if grip := hand.grip:
                 bodies.append("hand")
-                masses.append(hand["mass"])
-                links.append(Link("grip", grip["stiffness"], grip["damping"]))
+                masses.append(hand.mass)
+                links.append(Link("grip", grip.stiffness, grip.damping))
             else:
-                masses[-1] = masses[-1] + hand["mass"]
-            grounded["hand"] = (len(bodies) - 1, hand["damping"])
-            spring = hand["stiffness"], hand["rest"]
-        bandwidth = scene.get("actuator", {}).get("bandwidth")
+                masses[-1] = masses[-1] + hand.mass
+            grounded["hand"] = (len(bodies) - 1, hand.damping)
+            spring = hand.stiffness, hand.rest
+        bandwidth = scene.actuator.bandwidth if scene.actuator else None
         return cls(
             bodies=tuple(bodies),
             masses_kg=tuple(masses),
@@ -88,8 +87,8 @@ class Chain:
             links=tuple(links),
             spring=spring,
             actuator_rate=None if bandwidth is None else 2.0 * np.pi * bandwidth,
-            sensor=_sensor(scene, cable is not None),
-            start=(device["position"], device["velocity"]),
+            sensor=_sensor(scene),
+            start=(device.position, device.velocity),
         )
 
     @property
@@ -186,13 +185,14 @@ class Chain:
         return scales
 
 
-def _sensor(scene: dict[str, Any], cable: bool) -> tuple[int, float] | None:
-    table = scene.get("accelerometer", {})
-    if "bandwidth" not in table or not accelerometer_is_used(scene):
+def _sensor(scene: Scene) -> tuple[int, float] | None:
+    table = scene.accelerometer
+    if table is None or table.bandwidth is None or not accelerometer_is_used(scene):
         return None
-    return sensor_body(table, cable), 2.0 * np.pi * table["bandwidth"]
+    return sensor_body(scene), 2.0 * np.pi * table.bandwidth
 
 
-def sensor_body(table: dict[str, Any], cable: bool) -> int:
-    """Returns the body an accelerometer is mounted on: without a cable drive there is one only."""
-    return 1 if cable and table.get("mount") == "tip" else 0
+def sensor_body(scene: Scene) -> int:
+    """Returns the body an accelerometer is mounted on: the first without a cable, and for an ideal one."""
+    is_at_tip = scene.accelerometer is not None and scene.accelerometer.mount == "tip"
+    return int(scene.transmission is not None and is_at_tip)

@@ -13,6 +13,7 @@ from haploop.plant.chain.sensed_acceleration import SensedAcceleration
 from haploop.plant.line.base import Hold
 from haploop.plant.motion.hand_force import make_hand_force
 from haploop.protocol.arrays import first_row, rows_of
+from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
 from haploop.protocol.trees import tree_select
 
@@ -70,7 +71,7 @@ class ChainHistory(ABC):
 
     held_names = HELD
 
-    def __init__(self, scene: dict[str, Any], time: Timebase, members: int | None = None) -> None:
+    def __init__(self, scene: Scene, time: Timebase, members: int | None = None) -> None:
         self.chain = chain = Chain.from_scene(scene)
         self._n, self._v, self._step_s, self._members = time.steps_per_tick, chain.count, time.step_s, members
         self._tau = make_hand_force(scene, time.plant_rate, members)
@@ -149,7 +150,7 @@ class ChainHistory(ABC):
         """Returns what a sensor with the scene's bandwidth and delay feels at the present tick, m/s^2."""
         return self.state.sensed[0] if self.state.sensed else 0.0
 
-    def take_record(self, tick: int, *, positions_only: bool = False) -> dict[str, Any]:
+    def take_record(self, tick: int, *, positions_only: bool = False) -> dict[str, np.ndarray]:
         """Returns the record from interval ``tick`` on, and starts a new one: every plant step and the present state.
 
         Its columns are every state, what rounding left of each length (``*_low``), and what was held, by name.
@@ -165,7 +166,7 @@ class ChainHistory(ABC):
         done, self._done = self._done, []
         chain, (z, z_comp, held, *_) = self.chain, self.state
         states = _columns([one.states[:-1] for one in done], z, 1 if positions_only else len(z))
-        record: dict[str, Any] = dict(zip(chain.states, states, strict=False))
+        record: dict[str, np.ndarray] = dict(zip(chain.states, states, strict=False))
         if not positions_only:
             comps = _columns([one.comps[:-1] for one in done], z_comp, chain.count)
             record |= {f"{name}_low": comp for name, comp in zip(chain.positions, comps, strict=True)}

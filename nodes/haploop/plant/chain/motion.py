@@ -9,6 +9,7 @@ import numpy as np
 from haploop.plant.chain.history import ChainHistory, Interval
 from haploop.plant.chain.transition import ChainResponse, make_chain_tables
 from haploop.plant.line.base import Hold
+from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
 
 
@@ -20,7 +21,7 @@ class ChainMotion(ChainHistory):
     the rounding they left over (compensated addition). Sums run over the first axis, term by term.
     """
 
-    def __init__(self, scene: dict[str, Any], time: Timebase, members: int | None = None) -> None:
+    def __init__(self, scene: Scene, time: Timebase, members: int | None = None) -> None:
         super().__init__(scene, time, members)
         self._free = self._response(stuck=False)
 

@@ -10,6 +10,7 @@ import numpy as np
 from haploop.plant.chain.chain import Chain, sensor_body
 from haploop.plant.chain.transition import make_tables
 from haploop.plant.sensing.encoder import accelerometer_is_used
+from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
 from haploop.protocol.trees import tree_select
 
@@ -32,14 +33,14 @@ class SensedAcceleration:
     """
 
     def __init__(
-        self, scene: dict[str, Any], chain: Chain, time: Timebase, loads: Callable[[int, int], np.ndarray],
+        self, scene: Scene, chain: Chain, time: Timebase, loads: Callable[[int, int], np.ndarray],
         members: int | None = None,
     ) -> None:  # fmt: skip
-        table, is_used = scene.get("accelerometer", {}), accelerometer_is_used(scene)
-        self.none = (0.0,) * (round(table.get("delay", 0.0) * time.plant_rate) + 1) if is_used else ()
+        is_used, delay_s = accelerometer_is_used(scene), scene.accelerometer.delay if scene.accelerometer else 0.0
+        self.none = (0.0,) * (round(delay_s * time.plant_rate) + 1) if is_used else ()
         self._loads, self._state = loads, chain.states.index("accelerometer") if chain.sensor else None
         if is_used and not chain.sensor:
-            body = sensor_body(table, "transmission" in scene)
+            body = sensor_body(scene)
 
             def factors_of(chain: Chain) -> tuple[np.ndarray, ...]:
                 return tuple(chain.accelerations(stuck)[body].astype(float) for stuck in (False, True))

@@ -11,6 +11,7 @@ from haploop.plant.chain.motion import ChainMotion, follow
 from haploop.plant.friction.motion import FrictionMotion
 from haploop.plant.friction.stick_slip import StickSlip, StickSlipState
 from haploop.plant.line.base import Hold
+from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
 from haploop.protocol.trees import tree_member, tree_take
 
@@ -24,7 +25,7 @@ class BatchFrictionMotion(ChainMotion):
 
     held_names = (*HELD, "friction", "stuck")
 
-    def __init__(self, scene: dict[str, Any], time: Timebase, members: int) -> None:
+    def __init__(self, scene: Scene, time: Timebase, members: int) -> None:
         self._one = FrictionMotion(tree_member(scene, 0), time)
         self._pieces: list[tuple[int, dict[str, np.ndarray]]] = []
         super().__init__(scene, time, members)

@@ -12,6 +12,7 @@ from haploop.plant.chain.transition import ChainTransition
 from haploop.plant.friction.stick_slip import Friction, StickSlip, StickSlipState
 from haploop.plant.friction.substeps import SubstepSolver, pieces_record
 from haploop.plant.line.base import Hold
+from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
 
 
@@ -27,8 +28,9 @@ class FrictionMotion(ChainMotion):
 
     held_names = (*HELD, "friction", "stuck")
 
-    def __init__(self, scene: dict[str, Any], time: Timebase, members: int | None = None) -> None:
-        self.friction = Friction(scene["friction"])
+    def __init__(self, scene: Scene, time: Timebase, members: int | None = None) -> None:
+        assert scene.friction
+        self.friction = Friction(scene.friction)
         super().__init__(scene, time, members)
         self._clamped = self._response(stuck=True)
         self._pieces: list[list[float]] = []
@@ -94,7 +96,7 @@ class FrictionMotion(ChainMotion):
         at_ends[step] = self._stick_slip.friction_at(mode, states[step + 1, self._v]), mode.is_stuck
         return mode
 
-    def take_record(self, tick: int, *, positions_only: bool = False) -> dict[str, Any]:
+    def take_record(self, tick: int, *, positions_only: bool = False) -> dict[str, np.ndarray]:
         """Returns the record as without friction; the pieces of the steps within which friction switched, ``pieces.*``,
         come beside."""
         return super().take_record(tick, positions_only=positions_only) | self.take_pieces()

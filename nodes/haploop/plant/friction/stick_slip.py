@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from haploop.plant.chain.chain import Chain
+from haploop.protocol.scene import effects
 
 # Sticking ends beyond the breakaway force by this much, relative: what rounding does to a sum of forces is far less.
 _MARGIN = 1e-12
@@ -28,10 +29,10 @@ class Friction:
         holds_N: the largest force it holds at rest.
     """
 
-    def __init__(self, table: dict[str, float]) -> None:
-        self.kinetic_N = table["kinetic"]
-        self._breakaway_N = table.get("breakaway", self.kinetic_N)
-        self._stribeck_m_s = table.get("stribeck_velocity", 0.0)
+    def __init__(self, table: effects.Friction) -> None:
+        self.kinetic_N = table.kinetic
+        self._breakaway_N = table.kinetic if table.breakaway is None else table.breakaway
+        self._stribeck_m_s = table.stribeck_velocity or 0.0
         self.is_constant = not self._stribeck_m_s
         self.holds_N = self._breakaway_N * (1.0 + _MARGIN)
 

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from haploop.plant.chain.chain import Chain
 from haploop.plant.chain.transition import ChainTransition
 from haploop.plant.friction.stick_slip import Friction, StickSlip, StickSlipState
+from haploop.protocol.scene.scene import Scene
 
 # A piece is halved this often to find when friction switches: to 2e-14 s at 10 kHz.
 _HALVINGS = 32
@@ -165,10 +166,10 @@ def pieces_record(chain: Chain, pieces: list[list[float]]) -> dict[str, np.ndarr
     return {f"pieces.{name}": np.ascontiguousarray(rows[:, i]) for i, name in enumerate(names)}
 
 
-def goes_by_whole_steps(scene: dict[str, Any]) -> bool:
+def goes_by_whole_steps(scene: Scene) -> bool:
     """Tells whether a step in which nothing switches is one piece; see ``SubstepSolver.whole_steps``."""
-    is_slow = parts_of_a_step(Chain.from_scene(scene), 1.0 / scene["clock"]["plant_rate"]) == 1
-    return is_slow and Friction(scene["friction"]).is_constant
+    is_slow = parts_of_a_step(Chain.from_scene(scene), 1.0 / scene.clock.plant_rate) == 1
+    return bool(is_slow and scene.friction and Friction(scene.friction).is_constant)
 
 
 def parts_of_a_step(chain: Chain, step_s: float) -> int:

@@ -11,6 +11,7 @@ from haploop.plant.chain.chain import Chain
 from haploop.plant.chain.history import ChainHistory, Interval
 from haploop.plant.integrators.registry import Integrator
 from haploop.plant.line.base import Hold
+from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
 
 if TYPE_CHECKING:
@@ -29,7 +30,7 @@ class Dop853Motion(ChainHistory):
     tolerance, whatever ``clock.plant_rate``. Digits below the rounding of a float are not kept.
     """
 
-    def __init__(self, scene: dict[str, Any], time: Timebase) -> None:
+    def __init__(self, scene: Scene, time: Timebase) -> None:
         super().__init__(scene, time)
         self._free = System(self.chain, stuck=False)
         self._absolute = (_TOLERANCE * _STILL_M_S / self.chain.scales(self._step_s)[: len(self.state.z)]).astype(float)

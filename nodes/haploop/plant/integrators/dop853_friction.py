@@ -13,6 +13,7 @@ from haploop.plant.chain.history import HELD, Interval
 from haploop.plant.friction.stick_slip import Friction, StickSlip, StickSlipState
 from haploop.plant.integrators.dop853 import Dop853Motion, Rates, System
 from haploop.plant.line.base import Hold
+from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
 
 _MOST_SWITCHES = 1000
@@ -40,8 +41,9 @@ class Dop853FrictionMotion(Dop853Motion):
 
     held_names = (*HELD, "friction", "stuck")
 
-    def __init__(self, scene: dict[str, Any], time: Timebase) -> None:
-        self._friction = Friction(scene["friction"])
+    def __init__(self, scene: Scene, time: Timebase) -> None:
+        assert scene.friction
+        self._friction = Friction(scene.friction)
         super().__init__(scene, time)
         self._clamped = System(self.chain, stuck=True)
         self._pull = (self.chain.accelerations()[0] * self.chain.masses_kg[0]).astype(float)

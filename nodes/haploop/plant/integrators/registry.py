@@ -7,6 +7,8 @@ from importlib import import_module
 from importlib.metadata import entry_points
 from typing import TYPE_CHECKING, Any
 
+from haploop.protocol.scene.scene import Scene
+
 if TYPE_CHECKING:
     from haploop.plant.integrators.linear_rates import OneStep
 
@@ -53,9 +55,9 @@ class Integrator:
         """Tells whether its error is near the last bits, whatever the plant step."""
         return self.order is None
 
-    def make_motion(self, scene: dict[str, Any], *args: Any) -> Any:
+    def make_motion(self, scene: Scene, *args: Any) -> Any:
         """Makes the motion of a resolved scene; nothing else is imported."""
-        return _load(self.motions["friction" in scene])(scene, *args)
+        return _load(self.motions[scene.friction is not None])(scene, *args)
 
 
 EXACT = Integrator(

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from haploop.plant.chain.history import ChainHistory, Interval
 from haploop.plant.integrators.linear_rates import LinearRates
 from haploop.plant.integrators.registry import find_integrator
 from haploop.plant.line.base import Hold
+from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
 
 # A run that diverges ends at the next tick. Until then bodies this fast stand still: their squares would overflow.
@@ -24,9 +23,9 @@ class StepwiseMotion(ChainHistory):
     from each state on, show it in their residual. Digits below the rounding of a float are not kept.
     """
 
-    def __init__(self, scene: dict[str, Any], time: Timebase) -> None:
+    def __init__(self, scene: Scene, time: Timebase) -> None:
         super().__init__(scene, time)
-        method = find_integrator(scene["clock"]["integrator"]).method
+        method = find_integrator(scene.clock.integrator).method
         assert method
         self._method, self._rates = method, LinearRates(self.chain)
         self._of_command, _, self._of_load = self._rates.of_inputs

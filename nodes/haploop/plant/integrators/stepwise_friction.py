@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from haploop.plant.chain.history import HELD, Interval
 from haploop.plant.friction.stick_slip import Friction, StickSlip, StickSlipState
 from haploop.plant.integrators.linear_rates import LinearRates, OneStep, Rows, moved, response_to
 from haploop.plant.integrators.stepwise import StepwiseMotion
+from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
 
 
@@ -68,8 +67,9 @@ class StepwiseFrictionMotion(StepwiseMotion):
 
     held_names = (*HELD, "friction", "stuck")
 
-    def __init__(self, scene: dict[str, Any], time: Timebase) -> None:
-        self._friction = Friction(scene["friction"])
+    def __init__(self, scene: Scene, time: Timebase) -> None:
+        assert scene.friction
+        self._friction = Friction(scene.friction)
         super().__init__(scene, time)
         free, clamped = (
             self._method(rates, self._step_s) for rates in (self._rates, LinearRates(self.chain, stuck=True))

@@ -9,6 +9,7 @@ import numpy as np
 from haploop.plant.counters import SATURATED, make_counter
 from haploop.plant.line.base import Hold, Line
 from haploop.protocol.arrays import clipped, nearest_multiple, where
+from haploop.protocol.scene import effects
 from haploop.protocol.ticks import Timebase
 from haploop.protocol.trees import tree_select
 
@@ -55,9 +56,9 @@ class ActuatedLine:
         counters: those of the line and, where there is a saturation, the commands it clipped, each at its first step.
     """
 
-    def __init__(self, line: Line, table: dict[str, Any], time: Timebase, members: int | None = None) -> None:
+    def __init__(self, line: Line, table: effects.Actuator, time: Timebase, members: int | None = None) -> None:
         self._steps = time.steps_per_tick
-        self.actuator = Actuator(table.get("resolution"), table.get("saturation"))
+        self.actuator = Actuator(table.resolution, table.saturation)
         self._command, self._force = -1, 0.0
         self._saturated = make_counter(members)
         self._take(line)

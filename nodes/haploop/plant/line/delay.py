@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from haploop.plant.line.base import Hold, Line
+from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
 from haploop.protocol.trees import tree_select
 
@@ -79,15 +80,15 @@ class DelayLine:
         self._forces[:] = tree_select(self._forces, kept)
 
 
-def make_line(scene: dict[str, Any], time: Timebase, members: int | None = None) -> Line:
+def make_line(scene: Scene, time: Timebase, members: int | None = None) -> Line:
     """Makes the line of a scene, or of the stacked scene of a batch, with the actuator at its end."""
     line: Line = DelayLine(time)
-    if "jitter" in scene or "loss" in scene:
-        from haploop.plant.line.lossy import make_lossy_line
+    if scene.jitter or scene.loss:
+        from haploop.plant.line.lossy import LossyLine
 
-        line = make_lossy_line(scene, time)
-    actuator = scene.get("actuator", {})
-    if "saturation" in actuator or "resolution" in actuator:
+        line = LossyLine(time, scene.jitter, scene.loss, scene.seed)
+    actuator = scene.actuator
+    if actuator and (actuator.saturation is not None or actuator.resolution is not None):
         from haploop.plant.line.actuator import ActuatedLine
 
         line = ActuatedLine(line, actuator, time, members)

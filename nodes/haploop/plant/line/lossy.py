@@ -11,6 +11,7 @@ import numpy as np
 from haploop.plant.counters import DROPPED, LOST, Counter
 from haploop.plant.line.base import Hold
 from haploop.plant.random.streams import Draw, RandomStream
+from haploop.protocol.scene.effects import Jitter, Loss, UniformJitter
 from haploop.protocol.ticks import Timebase
 
 
@@ -39,9 +40,7 @@ class LossyLine:
         counters: commands dropped and lost, each at the step at which it would have taken effect.
     """
 
-    def __init__(
-        self, time: Timebase, jitter: dict[str, Any] | None = None, loss: dict[str, Any] | None = None, seed: int = 0
-    ) -> None:
+    def __init__(self, time: Timebase, jitter: Jitter | None = None, loss: Loss | None = None, seed: int = 0) -> None:
         self._time, self._jitter, self._loss, self._seed = time, jitter, loss, seed
         self._steps, self.delay_steps = time.steps_per_tick, time.delay_steps
         self._end = time.ticks * time.steps_per_tick
@@ -123,40 +122,35 @@ class LossyLine:
         raise TypeError("A line with jitter, loss or a changed delay is not run in batches.")
 
 
-def make_lossy_line(scene: dict[str, Any], time: Timebase) -> LossyLine:
-    """Makes the line of a resolved scene with ``[jitter]``, ``[loss]`` or both."""
-    return LossyLine(time, scene.get("jitter"), scene.get("loss"), scene["seed"])
-
-
-def make_jitter(table: dict[str, Any] | None, seed: int, plant_rate: int, first: int = 0) -> Draw:
+def make_jitter(table: Jitter | None, seed: int, plant_rate: int, first: int = 0) -> Draw:
     """Makes the additional delays of the commands from ``first`` on, in whole plant steps, j_k >= 0.
 
         uniform   0, 1, ... most, equally likely
         gamma     shape (mean / deviation)^2, scale deviation^2 / mean, rounded to the nearest step
 
     Args:
-        table: the resolved ``[jitter]`` table: kind, then most, or mean and deviation, in s; None for no jitter.
+        table: the ``[jitter]`` table, times in s; None for no jitter.
         seed: the scene's.
         plant_rate: plant steps per second.
     """
     if table is None:
         return repeat(0).__next__
     stream = RandomStream(seed, "jitter")
-    if table["kind"] == "uniform":
-        return stream.whole(round(table["most"] * plant_rate) + 1, first)
-    mean, deviation = table["mean"], table["deviation"]
+    if isinstance(table, UniformJitter):
+        return stream.whole(round(table.most * plant_rate) + 1, first)
+    mean, deviation = table.mean, table.deviation
     gamma, scale_steps = stream.gamma((mean / deviation) ** 2, first), deviation / mean * deviation * plant_rate
     return lambda: round(scale_steps * gamma())
 
 
-def make_loss(table: dict[str, Any] | None, seed: int, first: int = 0) -> Draw:
+def make_loss(table: Loss | None, seed: int, first: int = 0) -> Draw:
     """Makes the losses of the commands from ``first`` on, each by itself with the same probability.
 
     Args:
-        table: the resolved ``[loss]`` table: probability; None for no loss.
+        table: the ``[loss]`` table; None for no loss.
         seed: the scene's.
     """
     if table is None:
         return repeat(False).__next__
-    uniform, probability = RandomStream(seed, "loss").uniform(first), table["probability"]
+    uniform, probability = RandomStream(seed, "loss").uniform(first), table.probability
     return lambda: uniform() < probability

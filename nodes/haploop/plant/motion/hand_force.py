@@ -4,20 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from importlib.metadata import entry_points
-from typing import Any
 
 import numpy as np
 
+from haploop.protocol.scene import hand_force as tables
 from haploop.protocol.scene.scene import Scene
-from haploop.protocol.trees import tree_select
+from haploop.protocol.trees import tree_leaves, tree_select
 
 # The force is made in pieces on a fixed grid, so that how a run is cut into messages cannot change a bit of it.
 _PIECE_STEPS = 4096
 # Where every member of a batch has a force of its own, fewer steps of it are made at a time.
 _PIECE_STEPS_OF_EACH = 256
 
-# The tables of a scene that come with haploop, and the group in which other packages name their forces.
-_DECLARED, _GROUP = {field.name for field in Scene.fields()}, "haploop.forces"
+# Other packages name their forces in this group of entry points.
+_GROUP = "haploop.forces"
 
 Profile = Callable[[np.ndarray], np.ndarray]
 
@@ -36,16 +36,15 @@ class HandForce:
         is_shared: whether all members have the same force.
     """
 
-    def __init__(self, table: dict[str, Any] | None, plant_rate: int, members: int | None = None) -> None:
+    def __init__(self, table: tables.HandForce | None, plant_rate: int, members: int | None = None) -> None:
         self._table, self._plant_rate = table, plant_rate
         self._has_members = members is not None
-        self.is_shared = not any(getattr(value, "shape", ()) for value in (table or {}).values())
+        self.is_shared = not any(getattr(number, "shape", ()) for number in tree_leaves(table))
         self._piece_steps = _PIECE_STEPS if self.is_shared else _PIECE_STEPS_OF_EACH
         self._prepare()
 
     def _prepare(self) -> None:
-        table = self._table
-        self._profile = PROFILES[table["kind"]](table) if table else np.zeros_like
+        self._profile = _profile(self._table)
         self._pieces: dict[int, np.ndarray] = {}
 
     def add(self, constant_N: float) -> None:
@@ -76,69 +75,46 @@ class HandForce:
             self._prepare()
 
 
-def make_hand_force(scene: dict[str, Any], plant_rate: int, members: int | None = None) -> HandForce:
+def make_hand_force(scene: Scene, plant_rate: int, members: int | None = None) -> HandForce:
     """Makes the hand force of a resolved scene, or of the stacked scene of a batch.
 
     The constant forces of other packages are added to it, since they act on the same body; the books part them again.
     """
-    force = HandForce(scene.get("hand", {}).get("force"), plant_rate, members)
+    force = HandForce(scene.hand.force if scene.hand else None, plant_rate, members)
     if constant := constant_forces(scene):
         force.add(sum(constant.values()))
     return force
 
 
-def constant_forces(scene: dict[str, Any]) -> dict[str, float]:
+def constant_forces(scene: Scene) -> dict[str, float]:
     """Returns the constant forces on the last body that effects of other packages bring, N, by the key of their table.
 
     The group of entry points ``haploop.forces`` names, by that key, functions that make the force of a resolved scene.
     """
-    others = scene.keys() - _DECLARED
-    if not others:
+    if not scene.others:
         return {}
-    return {entry.name: entry.load()(scene) for entry in entry_points(group=_GROUP) if entry.name in others}
+    return {entry.name: entry.load()(scene) for entry in entry_points(group=_GROUP) if entry.name in scene.others}
 
 
-def _constant(table: dict[str, Any]) -> Profile:
-    """tau = value."""
-    return lambda t: np.zeros_like(t) + table["value"]
+def _profile(force: tables.HandForce | None) -> Profile:
+    """Returns tau(t) of a table."""
+    match force:
+        case None:
+            return np.zeros_like
+        case tables.Constant(value=value):
+            return lambda t: np.zeros_like(t) + value
+        case tables.Ramp(value=value, rise_time=rise_time):
+            return lambda t: value * np.minimum(t / rise_time, 1.0)
+        case tables.Step(value=value, at=at):
+            return lambda t: np.where(t >= at, value, 0.0)
+        case tables.Sine(amplitude=amplitude, frequency=frequency, offset=offset, phase=phase):
+            return lambda t: offset + amplitude * np.sin(2 * np.pi * frequency * t + phase)
+        case tables.MinimumJerk(value=value, rise_time=rise_time):
+            return lambda t: value * _minimum_jerk(np.minimum(t / rise_time, 1.0))
+        case tables.Trace(time=time, force=forces):
+            times, values = np.asarray(time, float), np.asarray(forces, float)
+            return lambda t: np.interp(t, times, values)
 
 
-def _ramp(table: dict[str, Any]) -> Profile:
-    """tau rises in a straight line from 0 at t = 0 to value at rise_time, then holds."""
-    return lambda t: table["value"] * np.minimum(t / table["rise_time"], 1.0)
-
-
-def _step(table: dict[str, Any]) -> Profile:
-    """tau = value from t = at on."""
-    return lambda t: np.where(t >= table["at"], table["value"], 0.0)
-
-
-def _sine(table: dict[str, Any]) -> Profile:
-    """tau = offset + amplitude sin(2 pi frequency t + phase)."""
-    return lambda t: table["offset"] + table["amplitude"] * np.sin(2 * np.pi * table["frequency"] * t + table["phase"])
-
-
-def _minimum_jerk(table: dict[str, Any]) -> Profile:
-    """tau = value (10 s^3 - 15 s^4 + 6 s^5), s = t / rise_time up to 1 (Flash and Hogan 1985)."""
-
-    def profile(t: np.ndarray) -> np.ndarray:
-        s = np.minimum(t / table["rise_time"], 1.0)
-        return table["value"] * (s * s * s * (10.0 + s * (6.0 * s - 15.0)))
-
-    return profile
-
-
-def _trace(table: dict[str, Any]) -> Profile:
-    """tau through recorded points, straight between them, held before the first and after the last."""
-    times, forces = np.asarray(table["time"], float), np.asarray(table["force"], float)
-    return lambda t: np.interp(t, times, forces)
-
-
-PROFILES: dict[str, Callable[[dict[str, Any]], Profile]] = {
-    "constant": _constant,
-    "ramp": _ramp,
-    "step": _step,
-    "sine": _sine,
-    "minimum-jerk": _minimum_jerk,
-    "trace": _trace,
-}
+def _minimum_jerk(s: np.ndarray) -> np.ndarray:
+    return s * s * s * (10.0 + s * (6.0 * s - 15.0))

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+
+from haploop.protocol.scene.scene import Scene
 
 
 @dataclass(frozen=True)
@@ -25,15 +26,14 @@ class Mechanics:
     start: tuple[float, float]
 
     @classmethod
-    def from_scene(cls, scene: dict[str, Any]) -> Mechanics:
+    def from_scene(cls, scene: Scene) -> Mechanics:
         """Reads the ``[device]`` and, where present, ``[hand]`` tables of a resolved scene."""
-        device = scene["device"]
-        start = device["position"], device["velocity"]
-        hand = scene.get("hand")
+        device, hand = scene.device, scene.hand
+        start = device.position, device.velocity
         if hand is None:
-            return cls(device["mass"], {"device": device["damping"]}, 0.0, 0.0, start)
-        dampers = {"device": device["damping"], "hand": hand["damping"]}
-        return cls(device["mass"] + hand["mass"], dampers, hand["stiffness"], hand["rest"], start)
+            return cls(device.mass, {"device": device.damping}, 0.0, 0.0, start)
+        dampers = {"device": device.damping, "hand": hand.damping}
+        return cls(device.mass + hand.mass, dampers, hand.stiffness, hand.rest, start)
 
     @property
     def damping(self) -> float:

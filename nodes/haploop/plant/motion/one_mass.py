@@ -13,6 +13,7 @@ from haploop.plant.motion.hand_force import make_hand_force
 from haploop.plant.motion.mechanics import Mechanics
 from haploop.plant.motion.record import record_of_holds
 from haploop.plant.motion.transition import make_foh_transition, make_zoh_transitions
+from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
 from haploop.protocol.trees import tree_select
 
@@ -84,7 +85,7 @@ class OneMassMotion:
         last: hold in effect last.
     """
 
-    def __init__(self, scene: dict[str, Any], time: Timebase, members: int | None = None) -> None:
+    def __init__(self, scene: Scene, time: Timebase, members: int | None = None) -> None:
         self.mechanics = m = Mechanics.from_scene(scene)
         self._steps = time.steps_per_tick
         system = m.mass_kg, m.damping, m.stiffness, time.step_s

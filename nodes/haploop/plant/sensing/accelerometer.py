@@ -12,6 +12,8 @@ from haploop.plant.random.streams import make_normal, select_draws
 from haploop.plant.sensing.encoder import accelerometer_is_used
 from haploop.plant.sensing.noise import Noise, make_noise
 from haploop.protocol.arrays import clipped, each, nearest_multiple
+from haploop.protocol.scene import effects
+from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
 from haploop.protocol.trees import tree_select
 
@@ -77,16 +79,16 @@ class Accelerometer:
         counters: the ticks at which the range clipped the reading, where there is a range.
     """
 
-    def __init__(self, table: dict[str, Any], seed: Any, time: Timebase, members: int | None = None) -> None:
+    def __init__(self, table: effects.Accelerometer, seed: Any, time: Timebase, members: int | None = None) -> None:
         self._seed, self._steps = seed, time.steps_per_tick
         self._read, self._noise = 0, None
-        noise = _noise(table, time) if np.any(table["noise_density"]) else None
+        noise = _noise(table, time) if np.any(table.noise_density) else None
         self.draw = make_normal(seed, "accelerometer") if noise else None
-        most, resolution = table.get("range"), table.get("resolution")
+        most, resolution = table.range, table.resolution
         last_count = (
             each(_last_count, resolution, math.inf if most is None else most) if resolution is not None else None
         )
-        bias = table["bias"] if np.any(table["bias"]) else None
+        bias = table.bias if np.any(table.bias) else None
         self.parameters = Reading(bias, noise, most, resolution, last_count)
         self._clipped = make_counter(members)
         self.counters: dict[str, Counter] = {} if most is None else {CLIPPED: self._clipped}
@@ -120,19 +122,19 @@ class Accelerometer:
         select_draws(self.draw, kept)
 
 
-def make_accelerometer(scene: dict[str, Any], time: Timebase, members: int | None = None) -> Accelerometer | None:
+def make_accelerometer(scene: Scene, time: Timebase, members: int | None = None) -> Accelerometer | None:
     """Makes what reads the true acceleration; None where it is read as it is, or not at all."""
-    if "accelerometer" not in scene or not accelerometer_is_used(scene):
+    if scene.accelerometer is None or not accelerometer_is_used(scene):
         return None
-    return Accelerometer(scene["accelerometer"], scene["seed"], time, members)
+    return Accelerometer(scene.accelerometer, scene.seed, time, members)
 
 
-def _noise(table: dict[str, Any], time: Timebase) -> Noise:
-    density = table["noise_density"]
-    if "bandwidth" not in table:
+def _noise(table: effects.Accelerometer, time: Timebase) -> Noise:
+    density = table.noise_density
+    if table.bandwidth is None:
         return Noise(density * math.sqrt(time.control_rate / 2.0))
-    deviation = density * each(math.sqrt, math.pi / 2.0 * table["bandwidth"])
-    return make_noise(deviation, table["bandwidth"], time.period_s)
+    deviation = density * each(math.sqrt, math.pi / 2.0 * table.bandwidth)
+    return make_noise(deviation, table.bandwidth, time.period_s)
 
 
 def _last_count(resolution: float, most: float) -> float:

@@ -8,12 +8,13 @@ from typing import Any
 import numpy as np
 
 from haploop.protocol.arrays import floor, rint
+from haploop.protocol.scene.scene import Encoder, Scene
 from haploop.protocol.trees import tree_select
 
 ROUNDINGS = {"nearest": rint, "floor": floor}
 
 
-def make_encoder(table: dict[str, Any] | None) -> Callable[[Any], Any]:
+def make_encoder(table: Encoder | None) -> Callable[[Any], Any]:
     """Makes the function from true to measured position: q rint(x / q) or q floor(x / q); without a table x itself.
 
     Args:
@@ -21,7 +22,7 @@ def make_encoder(table: dict[str, Any] | None) -> Callable[[Any], Any]:
     """
     if table is None:
         return lambda x: x
-    resolution, whole = table["resolution"], ROUNDINGS[table["rounding"]]
+    resolution, whole = table.resolution, ROUNDINGS[table.rounding]
     return lambda x: resolution * whole(x / resolution)
 
 
@@ -34,7 +35,7 @@ class PositionSensor:
         state: none, for a sensor without noise.
     """
 
-    def __init__(self, encoder: dict[str, Any] | None) -> None:
+    def __init__(self, encoder: Encoder | None) -> None:
         self.encoder = encoder
         self.reading = make_encoder(encoder)
 
@@ -51,7 +52,7 @@ class PositionSensor:
         self.reading = make_encoder(self.encoder)
 
 
-def accelerometer_is_used(scene: dict[str, Any]) -> bool:
+def accelerometer_is_used(scene: Scene) -> bool:
     """Tells whether samples carry the plant's acceleration beside the position."""
-    by_itself = scene.get("acceleration", {}).get("source") == "accelerometer"
-    return by_itself or scene.get("velocity", {}).get("accelerometer", False)
+    by_itself = scene.acceleration is not None and scene.acceleration.source == "accelerometer"
+    return by_itself or bool(scene.velocity and scene.velocity.accelerometer)

@@ -10,6 +10,8 @@ import numpy as np
 from haploop.plant.random.streams import make_normal, select_draws
 from haploop.plant.sensing.encoder import PositionSensor, make_encoder
 from haploop.protocol.arrays import each
+from haploop.protocol.scene import effects
+from haploop.protocol.scene.scene import Encoder
 from haploop.protocol.trees import tree_select
 
 
@@ -66,9 +68,9 @@ class NoisyPositionSensor(PositionSensor):
         state: (ticks measured so far, noise at the last one or None).
     """
 
-    def __init__(self, encoder: dict[str, Any] | None, table: dict[str, Any], seed: Any, period_s: float) -> None:
+    def __init__(self, encoder: Encoder | None, table: effects.Noise, seed: Any, period_s: float) -> None:
         super().__init__(encoder)
-        self.noise = make_noise(table["deviation"], table["cutoff"], period_s)
+        self.noise = make_noise(table.deviation, table.cutoff, period_s)
         self._seed, self.draw = seed, make_normal(seed, "noise")
         self._measured, self._last = 0, None
         self._prepare()
