@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
+from haploop.protocol.scene.paths import without
+from haploop.protocol.scene.scene import ElementTable, Scene
 from haploop.tools.linear.bounds import Bound, bounds_of
 from haploop.tools.linear.one_tick import NeverStable, OneTickMap
 from helpers.scenes.least import scene
@@ -17,7 +20,7 @@ COLGATE, GIL, EXACT, ABBOTT = "Colgate & Schenkel 1997", "Gil et al. 2009", "Exa
 ENCODER = {"resolution": 1e-5}
 
 
-def bound(made: dict[str, Any], name: str) -> Bound:
+def bound(made: Scene, name: str) -> Bound:
     return next(bound for bound in bounds_of(made) if bound.name == name)
 
 
@@ -72,11 +75,10 @@ def test_passivity_asks_nothing_of_the_hand_and_of_what_is_behind_the_motor() ->
 
 @pytest.mark.parametrize("seed", range(40))
 def test_what_is_passive_is_stable_whatever_the_chain_behind_it(seed: int) -> None:
-    made = linear_scene(seed)
-    for table in ("actuator", "accelerometer", "velocity", "acceleration"):
-        made.pop(table, None)
-    made["clock"]["round_trip_delay"] = seed % 3 / made["clock"]["control_rate"]
-    made["dissipation"] = [{"kind": "damping", "damping": seed * 1e-3, "acts": "in-contact"}]
+    made = without(linear_scene(seed), "actuator", "accelerometer", "velocity", "acceleration")
+    delay = seed % 3 / made.clock.control_rate
+    damping = ElementTable(name="damping", parameters={"damping": seed * 1e-3})
+    made = replace(made, clock=replace(made.clock, round_trip_delay=delay), dissipation=(damping,))
     passive = bound(made, COLGATE).stiffness_N_m
     assert passive is not None
     assert passive > 0.0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from itertools import pairwise
 from typing import Annotated, Any
 
@@ -10,6 +11,8 @@ import numpy as np
 import pytest
 
 from haploop.controller.dissipation import Element, Motion, Quantity
+from haploop.protocol.scene.paths import value_at, with_value
+from haploop.protocol.scene.scene import ElementTable, Scene
 from haploop.tools.linear.linearity import is_linear, left_out, why_not_linear
 from haploop.tools.linear.one_tick import NeverStable, OneTickMap
 from haploop.tools.linear.stiffness_limit import pressed_deep, smooth, stiffness_limit
@@ -27,9 +30,9 @@ def limit_or_soft(loop: OneTickMap) -> float:
     return ranges[0][1] if ranges else 50.0
 
 
-def positions(pressed: dict[str, Any]) -> np.ndarray:
+def positions(pressed: Scene) -> np.ndarray:
     """x at the ticks of a contact, after the push has set in and every memory has filled."""
-    ran = run({**pressed, "duration": 400 / pressed["clock"]["control_rate"]})
+    ran = run(replace(pressed, duration=400 / pressed.clock.control_rate))
     assert ran.controller["in_contact"].all()
     return ran.plant["x"][:: len(ran.plant["x"]) // (len(ran.controller["x"]))][60:360]
 
@@ -90,9 +93,13 @@ def test_a_run_grows_by_the_spectral_radius(tables: dict[str, Any], of_limit: fl
     loop = OneTickMap.from_scene(made)
     stiffness = of_limit * loop.stiffness_limit()
     pressed = pressed_deep(made, 0.97 * loop.stiffness_limit())
-    pressed["wall"]["stiffness"] = stiffness
-    pressed["hand"]["force"]["value"] *= of_limit / 0.97
-    assert growth_of(run({**pressed, "duration": 0.8})) == pytest.approx(loop.growth(stiffness), abs=1e-6)
+    for key, value in {
+        "wall.stiffness": stiffness,
+        "hand.force.value": value_at(pressed, "hand.force.value") * (of_limit / 0.97),
+        "duration": 0.8,
+    }.items():
+        pressed = with_value(pressed, key, value)
+    assert growth_of(run(pressed)) == pytest.approx(loop.growth(stiffness), abs=1e-6)
 
 
 @pytest.mark.slow
@@ -197,8 +204,7 @@ class Capped(Lagging):
 
 def test_an_element_of_a_plugin_that_says_it_is_linear_brings_its_memory_into_the_map() -> None:
     """A gain of 0.2 a tick is that of a velocity low-passed at -ln(0.8) / (2 pi T)."""
-    made = scene()
-    lagging = {**made, "dissipation": [{"kind": "lagging", "damping": 0.2, "acts": "in-contact"}]}
+    lagging = replace(scene(), dissipation=(ElementTable(name="lagging", parameters={"damping": 0.2}),))
     filtered = scene(
         velocity={"cutoff": -math.log(0.8) * 1000.0 / math.tau}, dissipation=[{"kind": "damping", "damping": 0.2}]
     )
@@ -230,7 +236,8 @@ def test_what_makes_a_loop_no_linear_map_is_named(tables: dict[str, Any], culpri
 
 @pytest.mark.parametrize("element", [Capped, Hoarding])
 def test_an_element_is_not_taken_for_linear_unless_it_says_so_and_declares_its_memory(element: type[Element]) -> None:
-    made = {**scene(), "dissipation": [{"kind": element.kind, "damping": 0.2, "acts": "always"}]}
+    table = ElementTable(name=element.kind, acts="always", parameters={"damping": 0.2})
+    made = replace(scene(), dissipation=(table,))
     assert why_not_linear(made, KINDS | {element.kind: element}) == [f"the element {element.kind}"]
 
 

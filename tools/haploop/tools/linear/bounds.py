@@ -5,15 +5,21 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Literal
 
+import numpy as np
+
+from haploop.plant.chain.chain import Chain
 from haploop.plant.motion.mechanics import Mechanics
 from haploop.plant.sensing.encoder import accelerometer_is_used
-from haploop.tools.linear.linearity import Kinds, why_not_linear
+from haploop.protocol.scene.scene import Scene
+from haploop.tools.linear.controller import LinearController
+from haploop.tools.linear.linearity import Kinds, installed_kinds, why_not_linear
 
-Scene = dict[str, Any]
 # Gil et al. leave out what grows with the square of this: the angle in rad by which the wall's swing turns in T/2 + td.
 _SMALL_ANGLE = 0.3
+# Angles theta = w T in rad at which passivity is looked at first; below the least nothing changes any more.
+_LEAST_ANGLE, _ANGLES = 1e-4, 1000
 
 
 @dataclass(frozen=True)
@@ -49,46 +55,81 @@ class _DoesNotApply(Exception):
 
 
 def bounds_of(scene: Scene, kinds: Kinds | None = None) -> list[Bound]:
-    """All known bounds of a resolved scene's wall, those that do not apply among them.
+    """Returns all known bounds of a resolved scene's wall, those that do not apply among them.
 
     Args:
         kinds: element kinds at hand; the installed ones when None.
     """
+    kinds = installed_kinds() if kinds is None else kinds
     return [_bound(about, stiffness, scene, kinds) for about, stiffness in _KNOWN]
 
 
-def _bound(about: Bound, stiffness: Callable[[Scene, Kinds | None], float], scene: Scene, kinds: Kinds | None) -> Bound:
+def _bound(about: Bound, stiffness: Callable[[Scene, Kinds], float], scene: Scene, kinds: Kinds) -> Bound:
     try:
         return replace(about, stiffness_N_m=stiffness(scene, kinds))
     except _DoesNotApply as error:
         return replace(about, why_not=str(error))
 
 
-def _passive(scene: Scene, kinds: Kinds | None) -> float:
-    from haploop.tools.linear.passivity import largest_passive_stiffness
-
+def _passive(scene: Scene, kinds: Kinds) -> float:
     _refuse_nonlinear(scene, kinds, allowed=("[friction]",))
     _refuse_lagging_force(scene)
     if accelerometer_is_used(scene):
         raise _DoesNotApply("The controller also reads an accelerometer, not the position alone.")
-    delay_s = scene["clock"]["round_trip_delay"]
-    ticks = delay_s * scene["clock"]["control_rate"]
+    delay_s = scene.clock.round_trip_delay
+    ticks = delay_s * scene.clock.control_rate
     if abs(ticks - round(ticks)) > 1e-6:
         raise _DoesNotApply(f"The delay of {delay_s * 1e3:g} ms is no whole number of ticks.")
-    return largest_passive_stiffness(scene, round(ticks), kinds)
+    return _largest_passive_stiffness(scene, round(ticks), kinds)
 
 
-def _soft(scene: Scene, kinds: Kinds | None) -> float:
+def _largest_passive_stiffness(scene: Scene, delay_ticks: int, kinds: Kinds) -> float:
+    """K in N/m at which the sampled wall with its elements is just passive; 0 where the elements alone are not.
+
+    With z = e^(j theta), H the elements' force over -x, L whole ticks of delay and b the damping of the sampled body
+    to ground, whatever passive hangs on it, the loop is passive if and only if at all 0 < theta <= pi
+        b > (T/2) / (1 - cos theta) Re{(1 - z^-1) (K + H(z)) z^-L} = Re{g (K + H(z))},
+        g = (T/2) j e^(-j theta (L + 1/2)) / sin(theta / 2)
+    """
+    from scipy.optimize import minimize_scalar
+
+    controller = LinearController.from_scene(scene, kinds)
+    damping = next(b for name, (body, b) in Chain.from_scene(scene).grounded.items() if body == 0 and name != "hand")
+    period_s = 1.0 / scene.clock.control_rate
+
+    def allowed(theta: np.ndarray) -> np.ndarray:
+        g = 0.5j * period_s * np.exp(-1j * theta * (delay_ticks + 0.5)) / np.sin(theta / 2.0)
+        left = damping - (g * _force_over_motion(controller, np.exp(1j * theta))).real
+        spring = np.where(g.real > 0.0, g.real, 1.0)
+        return np.where(left < 0.0, 0.0, np.where(g.real > 0.0, left / spring, np.inf))
+
+    grid = np.union1d(np.geomspace(_LEAST_ANGLE, np.pi, _ANGLES), np.linspace(_LEAST_ANGLE, np.pi, _ANGLES))
+    found = allowed(grid)
+    least = int(np.argmin(found))
+    around = grid[max(least - 1, 0)], grid[min(least + 1, len(grid) - 1)]
+    refined = minimize_scalar(lambda theta: float(allowed(np.array([theta]))[0]), bounds=around, method="bounded")
+    return float(min(found[least], refined.fun))
+
+
+def _force_over_motion(controller: LinearController, z: np.ndarray) -> np.ndarray:
+    """Returns H(z): the elements' force over -x, at every z."""
+    moved, force = controller
+    memory = len(moved)
+    of_memory = z[:, None, None] * np.eye(memory) - moved[:, :memory]
+    states = np.linalg.solve(of_memory, np.broadcast_to(moved[:, memory:], (len(z), memory, 1)))[..., 0]
+    return -(states @ force[:memory] + force[memory])
+
+
+def _soft(scene: Scene, kinds: Kinds) -> float:
     _refuse_nonlinear(scene, kinds)
     _refuse_lagging_force(scene)
     _refuse_bodies_in_a_row(scene)
-    elements = scene.get("dissipation", [])
-    if others := sorted({table["kind"] for table in elements} - {"damping"}):
+    if others := sorted({element.name for element in scene.dissipation} - {"damping"}):
         raise _DoesNotApply(f"It knows no element but damping; the scene has {', '.join(others)}.")
-    virtual = sum(table["damping"] for table in elements)
-    if virtual and scene.get("velocity"):
+    virtual = sum(element.parameters["damping"] for element in scene.dissipation)
+    if virtual and scene.velocity:
         raise _DoesNotApply("The velocity is no plain backward difference.")
-    mechanics, late_s = Mechanics.from_scene(scene), _half_period_s(scene) + scene["clock"]["round_trip_delay"]
+    mechanics, late_s = Mechanics.from_scene(scene), _half_period_s(scene) + scene.clock.round_trip_delay
     bound = (mechanics.damping + virtual) / late_s
     angle = math.sqrt((bound + mechanics.stiffness) / mechanics.mass_kg) * late_s
     if angle > _SMALL_ANGLE:
@@ -99,7 +140,7 @@ def _soft(scene: Scene, kinds: Kinds | None) -> float:
     return bound
 
 
-def _at_once(scene: Scene, kinds: Kinds | None) -> float:
+def _at_once(scene: Scene, kinds: Kinds) -> float:
     _refuse_nonlinear(scene, kinds)
     _refuse_lagging_force(scene)
     _refuse_bodies_in_a_row(scene)
@@ -123,43 +164,43 @@ def _jury(mass_kg: float, damping: float, period_s: float) -> float:
     return mass_kg / period_s**2 * min(swings_wider, alternates)
 
 
-def _over_an_encoder(scene: Scene, kinds: Kinds | None) -> float:
+def _over_an_encoder(scene: Scene, kinds: Kinds) -> float:
     _refuse_nonlinear(scene, kinds, allowed=("[friction]",))
     _refuse_lagging_force(scene)
     _refuse_more_than_a_wall(scene)
-    if "transmission" in scene:
+    if scene.transmission:
         raise _DoesNotApply("The device is not rigid: it has a [transmission].")
-    if "encoder" not in scene:
+    if not scene.encoder:
         raise _DoesNotApply("The scene has no [encoder].")
-    if "noise" in scene:
+    if scene.noise:
         raise _DoesNotApply("The position is noisy, not only rounded.")
-    friction_N = scene.get("friction", {}).get("kinetic", 0.0)
-    return min(scene["device"]["damping"] / _half_period_s(scene), 2.0 * friction_N / scene["encoder"]["resolution"])
+    friction_N = scene.friction.kinetic if scene.friction else 0.0
+    return min(scene.device.damping / _half_period_s(scene), 2.0 * friction_N / scene.encoder.resolution)
 
 
 def _half_period_s(scene: Scene) -> float:
-    return 0.5 / scene["clock"]["control_rate"]
+    return 0.5 / scene.clock.control_rate
 
 
-def _refuse_nonlinear(scene: Scene, kinds: Kinds | None, allowed: tuple[str, ...] = ()) -> None:
+def _refuse_nonlinear(scene: Scene, kinds: Kinds, allowed: tuple[str, ...] = ()) -> None:
     if curved := [what for what in why_not_linear(scene, kinds) if what not in allowed]:
         raise _DoesNotApply(f"The scene has {', '.join(curved)}.")
 
 
 def _refuse_lagging_force(scene: Scene) -> None:
-    if "bandwidth" in scene.get("actuator", {}):
+    if scene.actuator and scene.actuator.bandwidth is not None:
         raise _DoesNotApply("The actuator lags: its bandwidth is limited.")
 
 
 def _refuse_bodies_in_a_row(scene: Scene) -> None:
-    if "transmission" in scene or "grip" in scene.get("hand", {}):
+    if scene.transmission or (scene.hand and scene.hand.grip):
         raise _DoesNotApply("Device and hand are no single rigid mass.")
 
 
 def _refuse_more_than_a_wall(scene: Scene) -> None:
-    if scene.get("dissipation"):
+    if scene.dissipation:
         raise _DoesNotApply("It is of a wall alone; the scene has dissipation elements.")
-    if scene["clock"]["round_trip_delay"]:
+    if scene.clock.round_trip_delay:
         raise _DoesNotApply("It is of a loop without delay.")
 
 

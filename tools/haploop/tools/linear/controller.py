@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
 from haploop.controller.controller import make_params
 from haploop.controller.tick import ControllerParams, StateTuple, initial_state, tick
 from haploop.plant.sensing.encoder import accelerometer_is_used
-from haploop.protocol.scene.scene import Scene
+from haploop.protocol.scene.scene import Scene, Wall
 from haploop.protocol.trees import tree_leaves, tree_unflatten
 from haploop.tools.linear.linearity import Kinds
 
 # A wall without stiffness that is never left: the elements act, and its own force is added where it is known.
-_ALWAYS_INSIDE = {"position": 1e300, "stiffness": 0.0, "occupies": "below"}
+_ALWAYS_INSIDE = Wall(position=1e300, stiffness=0.0)
 
 
 class LinearController(NamedTuple):
@@ -31,14 +32,14 @@ class LinearController(NamedTuple):
     force: np.ndarray
 
     @classmethod
-    def from_scene(cls, scene: dict[str, Any], kinds: Kinds) -> LinearController:
+    def from_scene(cls, scene: Scene, kinds: Kinds) -> LinearController:
         """Finds that of a resolved scene of which ``why_not_linear`` has nothing to say.
 
         By superposition: a batch is ticked whose member i has a state, or a sample, of 1 in place i and 0 elsewhere.
         Its next state is A and B, row by row. Whole numbers of the state count ticks; they are run to where they stay.
         """
-        period_s, inputs = 1.0 / scene["clock"]["control_rate"], 1 + accelerometer_is_used(scene)
-        params = make_params(Scene.from_dict({**scene, "wall": _ALWAYS_INSIDE}), period_s, dict(kinds))
+        period_s, inputs = 1.0 / scene.clock.control_rate, 1 + accelerometer_is_used(scene)
+        params = make_params(replace(scene, wall=_ALWAYS_INSIDE), period_s, dict(kinds))
         state = _settled(params, (0.0,) * inputs)
         leaves = tree_leaves(state)
         numbers = [place for place, leaf in enumerate(leaves) if isinstance(leaf, float)]

@@ -5,23 +5,26 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
+from scipy.linalg import eigvals, matrix_balance
 
 from haploop.plant.chain.chain import Chain, sensor_body
 from haploop.plant.chain.transition import ChainTransition
 from haploop.plant.sensing.encoder import accelerometer_is_used
+from haploop.protocol.scene.effects import Accelerometer
+from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
 from haploop.tools.linear.controller import LinearController
 from haploop.tools.linear.linearity import Kinds, installed_kinds, why_not_linear
-from haploop.tools.linear.stable_ranges import crossings
 from haploop.tools.search.bisect import bisect
 
 # No wall is softer than this, and none stiffer is looked at.
 _LEAST_N_M, _MOST_N_M = 1e-3, 1e12
 # So near to a crossing as computed the end of a range is looked for first.
 _NEAR = 1e-9
+# Roots this near the unit circle are tried for crossings; what is none among them is harmless.
+_NEAR_THE_CIRCLE = 1e-3
 
 
 class NotLinear(ValueError):
@@ -53,7 +56,7 @@ class OneTickMap:
     pushed: np.ndarray
 
     @classmethod
-    def from_scene(cls, scene: dict[str, Any], kinds: Kinds | None = None) -> OneTickMap:
+    def from_scene(cls, scene: Scene, kinds: Kinds | None = None) -> OneTickMap:
         """Returns the map of a resolved scene in contact, with a wall or without; ``left_out`` says what it lacks.
 
         Args:
@@ -66,7 +69,7 @@ class OneTickMap:
         if curved := why_not_linear(scene, kinds):
             raise NotLinear(
                 "The stiffness limit is that of a linear loop: held forces on masses, springs and dampers. "
-                f"{scene['title']!r} also has {', '.join(curved)}; take it out to ask for the limit."
+                f"{scene.title!r} also has {', '.join(curved)}; take it out to ask for the limit."
             )
         after = _after_a_tick(scene, LinearController.from_scene(scene, kinds))
         return cls(after[:, :-1], after[:, -1])
@@ -91,7 +94,7 @@ class OneTickMap:
 
     def _ranges(self) -> Iterator[tuple[float, float]]:
         """The stable ranges, one after the other."""
-        inner = [k for k in crossings(self.without_wall, self.pushed) if _LEAST_N_M < k < _MOST_N_M]
+        inner = [k for k in _crossings(self.without_wall, self.pushed) if _LEAST_N_M < k < _MOST_N_M]
         edges = [_LEAST_N_M, *inner, _MOST_N_M]
         probes = [(low * high) ** 0.5 for low, high in pairwise(edges)]
         begin, before = 0.0, False
@@ -127,7 +130,7 @@ class OneTickMap:
         return bisect(lambda stiffness: self.growth(stiffness) < 1.0, stable, unstable)[0]
 
 
-def _after_a_tick(scene: dict[str, Any], controller: LinearController) -> np.ndarray:
+def _after_a_tick(scene: Scene, controller: LinearController) -> np.ndarray:
     """w after a tick from w and a force added to u[k], shape (w, w + 1); every quantity is its row over these."""
     time, chain = Timebase.from_scene(scene), Chain.from_scene(scene)
     states, felt = len(chain.states), _felt_steps(scene, time)
@@ -154,17 +157,50 @@ def _course(chain: Chain, time: Timebase, z: np.ndarray, commands: np.ndarray) -
     return np.array(course), np.array(held)
 
 
-def _felt_steps(scene: dict[str, Any], time: Timebase) -> int:
+def _felt_steps(scene: Scene, time: Timebase) -> int:
     """Counts the plant steps whose accelerations are remembered: as many as a reading is late, and the present one."""
     if not accelerometer_is_used(scene):
         return 0
-    return 1 + round(scene.get("accelerometer", {}).get("delay", 0.0) * time.plant_rate)
+    return 1 + round((scene.accelerometer or Accelerometer()).delay * time.plant_rate)
 
 
-def _feel(scene: dict[str, Any], chain: Chain) -> np.ndarray:
+def _feel(scene: Scene, chain: Chain) -> np.ndarray:
     """From the states and the command held over the step that ends there to what is felt, shape (states + 1,)."""
     size = len(chain.states)
     if chain.sensor:
         return np.eye(size + 1)[chain.states.index("accelerometer")]
     body = sensor_body(scene.get("accelerometer", {}), "transmission" in scene)
     return chain.accelerations()[body, : size + 1].astype(float)
+
+
+def _crossings(without_wall: np.ndarray, pushed: np.ndarray) -> list[float]:
+    """Every K > 0 for which M = A - K p q' may have an eigenvalue on the unit circle, rising; q' w = w[0].
+
+    det(z - M) = det(z - A) (1 + K G(z)) with G(z) = q' (z - A)^-1 p, so that on the circle G must be real there:
+    G(z) = G(1/z), which is a generalised eigenvalue problem in z, and K = -1 / G(z). Being exact it also finds windows
+    of stability however narrow. The list may hold more than crossings: what touches, and what rounding moves.
+    """
+    a, (scales, _) = matrix_balance(without_wall, permute=False, separate=True)  # numbers of like size, G kept
+    b, c = pushed / scales, np.zeros(len(pushed))
+    c[0] = scales[0]
+    found = []
+    for z in [*_real_on_the_circle(a, b, c), -1.0]:
+        try:
+            gain = c @ np.linalg.solve(z / abs(z) * np.eye(len(a)) - a, b)
+        except np.linalg.LinAlgError:
+            continue  # a pole of the loop without a wall: K = 0
+        if gain.real < 0.0:
+            found.append(float(-1.0 / gain.real))
+    return sorted(found)
+
+
+def _real_on_the_circle(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> list[complex]:
+    """The z near the unit circle, not below the real axis, with c (z - A)^-1 b = c z (1 - z A)^-1 b."""
+    n = len(a)
+    size, weight = np.abs(b).max(), np.abs(c).max()
+    of_z, constant = np.zeros((2, 2 * n + 1, 2 * n + 1))
+    of_z[:n, :n], of_z[n:-1, n:-1], of_z[-1, n:-1] = np.eye(n), -a, -c / weight
+    constant[:n, :n], constant[n:-1, n:-1], constant[-1, :n] = a, -np.eye(n), -c / weight
+    constant[:-1, -1] = np.tile(b, 2) / size
+    roots = eigvals(constant, of_z)
+    return [z for z in roots[np.isfinite(roots)] if abs(abs(z) - 1.0) < _NEAR_THE_CIRCLE and z.imag >= 0.0]
