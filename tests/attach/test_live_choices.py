@@ -9,6 +9,7 @@ from haploop.launch.clock.commands import capabilities
 from haploop.launch.processes.control import CommandRefused
 from haploop.launch.runs.replay import replay
 from haploop.logger import read
+from haploop.protocol.scene.scene import Wall
 from helpers.live.live_run import going
 from helpers.runs.clocks import clock, granted
 from helpers.scenes.least import KINDS, WALL, scene
@@ -46,12 +47,13 @@ def test_the_present_scene_has_every_change_that_has_taken_effect_and_none_that_
     )
     granted(subject, 0)
     now = subject.present()
-    assert [element["kind"] for element in now["dissipation"]] == ["unidirectional-inertia", "damping"]
-    assert now["dissipation"][0]["mass"] == 0.03
-    assert (now["wall"]["stiffness"], now["clock"]["round_trip_delay"]) == (200.0, 0.001)
+    assert [element.name for element in now.dissipation] == ["unidirectional-inertia", "damping"]
+    assert now.dissipation[0].parameters == {"mass": 0.03}
+    assert now.wall == Wall(position=-0.06, stiffness=200.0)
+    assert now.clock.round_trip_delay == 0.001
     granted(subject, 600)
-    assert [element["kind"] for element in subject.present()["dissipation"]] == ["damping"]
-    assert subject._scene["wall"]["stiffness"] == 150.0
+    assert [element.name for element in subject.present().dissipation] == ["damping"]
+    assert subject._scene.wall == Wall(position=-0.06, stiffness=150.0)
 
 
 def test_after_a_change_of_pace_time_goes_on_from_where_it_was_at_the_new_pace():

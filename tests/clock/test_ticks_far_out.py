@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 
 from haploop.plant.line.delay import DelayLine
+from haploop.protocol.scene.scene import Clock
 from haploop.protocol.ticks import Timebase
 
 RATE, CONTROL = 10_000, 1_000
 FAR = 100_000_000  # steps: 10 000 s
-LONG = {"plant_rate": RATE, "control_rate": CONTROL, "round_trip_delay": 0.0013}
+LONG = Clock(plant_rate=RATE, control_rate=CONTROL, round_trip_delay=0.0013)
 
 
 def test_every_tick_of_a_hundred_million_steps_falls_on_its_step_to_the_last_bit():

@@ -1,6 +1,7 @@
 """The one meaning of a change: what it does to a scene, from which tick on, and what is told of one refused."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -8,7 +9,7 @@ import pytest
 
 import haploop.logger
 from haploop.controller.dissipation import Element, Motion, Quantity
-from haploop.launch.clock.clock import Clock
+from haploop.launch.clock.clock import Clock as RunClock
 from haploop.launch.runs.in_process import run_in_process
 from haploop.protocol.changes import (
     Change,
@@ -21,16 +22,13 @@ from haploop.protocol.changes import (
     refusals_of,
     spans,
 )
+from haploop.protocol.scene.scene import Clock, ElementTable, EventTable, Scene, Wall
 from haploop.protocol.ticks import Timebase
-from helpers.scenes.least import KINDS, WALL, scene
+from helpers.scenes.least import KINDS, WALL, scene, typed
 
 DAMPING = {"kind": "damping", "damping": 1.0}
 INERTIA = {"kind": "inertia", "mass": 0.01, "acts": "always"}
-SCENE: dict[str, Any] = {
-    "clock": {"round_trip_delay": 0.0},
-    "wall": {"stiffness": 5.0, "position": 0.0},
-    "dissipation": [DAMPING],
-}
+SCENE = typed(wall={"stiffness": 5.0, "position": 0.0}, dissipation=[DAMPING])
 SWAP = {"swap": INERTIA, "element": 0}
 SET = {"set": {"wall.stiffness": 7.0, "dissipation.0.damping": 2.0, "clock.round_trip_delay": 0.001}}
 
@@ -54,23 +52,24 @@ def test_a_change_comes_back_from_its_map_also_through_json(event: dict[str, Any
 def test_a_swap_puts_an_element_into_its_place_adds_one_or_takes_one_out(
     event: dict[str, Any], elements: list[dict[str, Any]]
 ) -> None:
-    assert Change.from_dict(3, event).apply(SCENE)["dissipation"] == elements
-    assert SCENE["dissipation"] == [DAMPING]
+    made = Change.from_dict(3, event).apply(SCENE)
+    assert made.dissipation == tuple(map(ElementTable.from_dict, elements))
+    assert SCENE.dissipation == (ElementTable.from_dict(DAMPING),)
 
 
 def test_a_set_gives_wall_delay_and_elements_their_values_and_leaves_the_scene_before_as_it_was() -> None:
-    before = json.dumps(SCENE)
+    before = json.dumps(SCENE.as_dict())
     now = Change.from_dict(3, SET).apply(SCENE)
-    assert now["wall"] == {"stiffness": 7.0, "position": 0.0}
-    assert now["clock"] == {"round_trip_delay": 0.001}
-    assert now["dissipation"] == [{"kind": "damping", "damping": 2.0}]
-    assert json.dumps(SCENE) == before
+    assert now.wall == Wall(stiffness=7.0, position=0.0)
+    assert now.clock == Clock(round_trip_delay=0.001)
+    assert now.dissipation == (ElementTable(name="damping", parameters={"damping": 2.0}),)
+    assert json.dumps(SCENE.as_dict()) == before
 
 
 def test_an_element_that_stays_is_the_same_object_so_that_it_can_be_followed_through_places() -> None:
-    scene = {**SCENE, "dissipation": [DAMPING, INERTIA]}
-    now = Change.from_dict(3, {"swap": {"kind": "none"}, "element": 0}).apply(scene)
-    assert now["dissipation"][0] is INERTIA
+    both = typed(dissipation=[DAMPING, INERTIA])
+    now = Change.from_dict(3, {"swap": {"kind": "none"}, "element": 0}).apply(both)
+    assert now.dissipation[0] is both.dissipation[1]
 
 
 def test_spans_cover_the_run_without_gap_and_leave_out_what_was_refused() -> None:
@@ -78,7 +77,7 @@ def test_spans_cover_the_run_without_gap_and_leave_out_what_was_refused() -> Non
     events = [(3, SET), (4, SWAP), (9, refusal(refused)), (6, {"pause": True}), (8, SWAP)]
     found = spans(SCENE, changes_of(events))
     assert [(span.from_tick, span.to_tick) for span in found] == [(0, 3), (3, 8), (8, float("inf"))]
-    assert [span.scene["dissipation"][0]["kind"] for span in found] == ["damping", "damping", "inertia"]
+    assert [span.scene.dissipation[0].name for span in found] == ["damping", "damping", "inertia"]
     assert at_work(SCENE, changes_of(events)) == found[-1].scene
 
 
@@ -143,15 +142,18 @@ class Choosy(Element):
         return -self.force_N
 
 
-def choosy() -> dict[str, Any]:
+CHOOSY = {"kind": "choosy", "acts": "always", "force_N": 0.5}
+
+
+def choosy() -> Scene:
     """A scene whose first swap is refused and whose second is not."""
     events = [
-        {"at": at, "element": 0, "swap": {"kind": "choosy", "force_N": force, "acts": "always"}}
+        EventTable(at=at, element=0, swap=ElementTable(name="choosy", acts="always", parameters={"force_N": force}))
         for at, force in ((0.01, 0.5), (0.02, 0.1))
     ]
     damping = {"kind": "damping", "damping": 0.5}
     resolved = scene(duration=0.05, wall=WALL, dissipation=[damping])
-    return {**resolved, "event": events}
+    return replace(resolved, event=tuple(events))
 
 
 def test_a_refusal_in_the_log_is_a_field_that_names_the_change(tmp_path: Path) -> None:
@@ -159,7 +161,7 @@ def test_a_refusal_in_the_log_is_a_field_that_names_the_change(tmp_path: Path) -
     run_in_process(made, KINDS | {"choosy": Choosy}, out=tmp_path)
     events = [(event["tick"], event) for event in haploop.logger.read(tmp_path)["/events"]]
     (refused,) = [event for _, event in events if "refused" in event]
-    assert refused["change"] == {"tick": 10, "swap": made["event"][0]["swap"], "element": 0}
+    assert refused["change"] == {"tick": 10, "swap": CHOOSY, "element": 0}
     reason = "ElementError: The element choosy cannot be made with force_N = 0.5: ValueError: too strong"
     assert refused["refused"].endswith(f"was refused: {reason}")
     assert [(change.tick, change.refused is None) for change in changes_of(events)] == [(10, False), (20, True)]
@@ -167,8 +169,8 @@ def test_a_refusal_in_the_log_is_a_field_that_names_the_change(tmp_path: Path) -
 
 def test_the_clock_does_not_take_a_refused_change_for_one_that_was_made() -> None:
     made = choosy()
-    clock = Clock(made, Timebase.from_scene(made), KINDS | {"choosy": Choosy})
+    clock = RunClock(made, Timebase.from_scene(made), KINDS | {"choosy": Choosy})
     clock.grant(0, 0.0)
-    clock.note(refusal(Change.from_dict(10, made["event"][0]).refuse(ValueError("too strong"))))
-    clock.note(refusal(Change.from_dict(20, made["event"][1]).refuse(ValueError("no"))))
-    assert [table["kind"] for table in clock.present()["dissipation"]] == ["damping"]
+    clock.note(refusal(Change.from_dict(10, made.event[0].as_dict()).refuse(ValueError("too strong"))))
+    clock.note(refusal(Change.from_dict(20, made.event[1].as_dict()).refuse(ValueError("no"))))
+    assert [table.name for table in clock.present().dissipation] == ["damping"]

@@ -22,20 +22,20 @@ SCENES = Path(__file__).parents[2] / "launch/scenes"
 # The nodes' cores, built from scenes on stdin as their processes build them. Each scene is built in a fork of a fresh
 # interpreter that has built none, and a line tells what of haploop is loaded then.
 CORES = {
-    "plant": "from haploop.plant.plant import Plant as Core; rest, typed = (), dict",
+    "plant": "from haploop.plant.plant import Plant as Core; rest = ()",
     "controller": "from haploop.controller.controller import Controller as Core\n"
-    "from haploop.controller.dissipation import registry; rest, typed = (registry(),), Scene.from_dict",
+    "from haploop.controller.dissipation import registry; rest = (registry(),)",
 }
 BUILD = """
 import json, os, sys
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
 {core}
-for scene in json.load(sys.stdin):
+for scene in map(Scene.from_dict, json.load(sys.stdin)):
     if child := os.fork():
         assert os.waitpid(child, 0)[1] == 0
         continue
-    Core(typed(scene), Timebase.from_scene(scene), *rest)
+    Core(scene, Timebase.from_scene(scene), *rest)
     loaded = [module for name, module in sys.modules.items() if name.startswith("haploop.")]
     print(*(module.__name__ for module in loaded if not hasattr(module, "__path__")), flush=True)
     os._exit(0)
@@ -54,7 +54,7 @@ Loaded = dict[str, dict[str, set[str]]]
 @pytest.fixture(scope="module")
 def loaded() -> Loaded:
     """Node -> name of the scene -> the modules of haploop that are loaded once its core is built."""
-    scenes = json.dumps([scene(**tables) for tables in BUILT.values()])
+    scenes = json.dumps([scene(**tables).as_dict() for tables in BUILT.values()])
     told: Loaded = {}
     for node, core in CORES.items():
         command = [sys.executable, "-c", BUILD.format(core=core)]

@@ -11,6 +11,9 @@ import pytest
 from haploop.launch.scene.check import resolve
 from haploop.launch.scene.file import load
 from haploop.launch.scene.layers import read_layers
+from haploop.protocol.scene.effects import Actuator, Grip
+from haploop.protocol.scene.paths import value_at, without
+from haploop.protocol.scene.scene import Encoder, Hand, Scene
 from helpers.scenes.least import KINDS
 
 LAUNCH = Path(__file__).parents[2] / "launch"
@@ -36,7 +39,7 @@ PEN_HOLD = {
 }
 
 
-def preset(*paths: Path) -> dict[str, Any]:
+def preset(*paths: Path) -> Scene:
     """Presets laid over one another with the least of a task, resolved."""
     layers = read_layers(paths[0])
     for path in paths[1:]:
@@ -55,27 +58,27 @@ def value_lines(path: Path) -> list[str]:
 @pytest.mark.parametrize("device", DEVICES, ids=lambda path: path.stem)
 def test_every_device_goes_with_every_hand(device, hand):
     read = preset(device, hand)
-    assert read["device"]["mass"] > 0
-    assert read["hand"]["mass"] > 0
+    assert read.device.mass > 0
+    assert value_at(read, "hand.mass") > 0
 
 
 @pytest.mark.parametrize("name", PUBLISHED)
 def test_a_device_holds_what_was_published_and_says_where_it_assumes(name):
     path = LAUNCH / f"devices/{name}.toml"
     read = preset(path)
-    held = (read["device"]["mass"], read["device"]["damping"], read["friction"]["kinetic"])
+    held = (read.device.mass, read.device.damping, value_at(read, "friction.kinetic"))
     for value, published, line in zip(held, PUBLISHED[name], value_lines(path), strict=False):
         assert (value == published) if published is not None else ("ASSUMPTION" in line)
         assert ("ASSUMPTION" in line) == (published is None)
-    assert read["encoder"] == {"resolution": PUBLISHED[name][3], "rounding": "nearest"}
-    assert read["actuator"] == {"saturation": PUBLISHED[name][4]}
-    assert "transmission" not in read
+    assert read.encoder == Encoder(resolution=PUBLISHED[name][3], rounding="nearest")
+    assert read.actuator == Actuator(saturation=PUBLISHED[name][4])
+    assert read.transmission is None
     assert "peak" in next(line for line in value_lines(path) if line.startswith("saturation"))
 
 
 def test_the_encoder_of_the_premium_makes_the_accelerations_that_the_paper_avoids():
     """One count is 28.7 mm/s of velocity, 28.7 m/s^2 of twice differenced position: 0.26 N with 9 g of inertia."""
-    count = preset(LAUNCH / "devices/premium15.toml")["encoder"]["resolution"]
+    count = value_at(preset(LAUNCH / "devices/premium15.toml"), "encoder.resolution")
     assert count / 1e-3 == pytest.approx(0.0287)
     assert 0.009 * count / 1e-3**2 == pytest.approx(0.26, abs=0.005)
 
@@ -83,32 +86,32 @@ def test_the_encoder_of_the_premium_makes_the_accelerations_that_the_paper_avoid
 def test_motor_and_encoder_of_the_premium_follow_from_their_data_sheets():
     """1024 lines and a stall torque of 129 mN m behind 11.2 to 1 on a link of 0.2095 m."""
     read = preset(LAUNCH / "devices/premium15.toml")
-    assert read["encoder"]["resolution"] == pytest.approx(2 * math.pi * 0.2095 / (4 * 1024 * 11.2), rel=2e-3)
-    assert read["actuator"]["saturation"] == pytest.approx(0.129 * 11.2 / 0.2095, rel=2e-3)
+    assert value_at(read, "encoder.resolution") == pytest.approx(2 * math.pi * 0.2095 / (4 * 1024 * 11.2), rel=2e-3)
+    assert value_at(read, "actuator.saturation") == pytest.approx(0.129 * 11.2 / 0.2095, rel=2e-3)
 
 
 def test_the_cable_of_the_premium_rings_near_200_Hz_and_adds_nothing_to_its_mass():
     """Choi and Tan 2004; two free masses on a spring ring at sqrt(k (1/m1 + 1/m2)) / (2 pi)."""
     cable, plain = (preset(LAUNCH / f"devices/{name}.toml") for name in ("premium15_cable", "premium15"))
-    motor, tip, stiffness = (
-        cable["transmission"]["motor_mass"],
-        cable["device"]["mass"],
-        cable["transmission"]["stiffness"],
-    )
-    assert motor + tip == pytest.approx(plain["device"]["mass"])
-    assert cable["transmission"]["motor_damping"] + cable["device"]["damping"] == plain["device"]["damping"]
+    assert cable.transmission is not None
+    motor, tip, stiffness = cable.transmission.motor_mass, cable.device.mass, cable.transmission.stiffness
+    assert motor + tip == pytest.approx(plain.device.mass)
+    assert cable.transmission.motor_damping + cable.device.damping == plain.device.damping
     assert math.sqrt(stiffness * (1 / motor + 1 / tip)) / (2 * math.pi) == pytest.approx(200, rel=0.01)
-    assert all(cable[table] == plain[table] for table in ("friction", "encoder", "actuator"))
+    assert (cable.friction, cable.encoder, cable.actuator) == (plain.friction, plain.encoder, plain.actuator)
 
 
 def test_the_accelerometer_is_of_the_class_of_the_MPU_9250():
     """300 ug/Hz^0.5, 16 bits, 420 Hz with 1.38 ms in all; 0.08 m/s^2 of noise, at the motor as in Choi et al. 2022."""
-    table = preset(LAUNCH / "devices/premium15_cable.toml")["accelerometer"]
-    assert table["mount"] == "motor"
-    assert table["noise_density"] == pytest.approx(300e-6 * G, rel=1e-3)
-    assert table["resolution"] == pytest.approx(2 * table["range"] / 2**16, rel=1e-3)
-    assert table["delay"] + 1 / (2 * math.pi * table["bandwidth"]) == pytest.approx(1.38e-3, rel=1e-2)
-    assert table["noise_density"] * math.sqrt(math.pi / 2 * table["bandwidth"]) == pytest.approx(0.08, abs=0.01)
+    table = preset(LAUNCH / "devices/premium15_cable.toml").accelerometer
+    assert table
+    assert table.bandwidth
+    assert table.range
+    assert table.mount == "motor"
+    assert table.noise_density == pytest.approx(300e-6 * G, rel=1e-3)
+    assert table.resolution == pytest.approx(2 * table.range / 2**16, rel=1e-3)
+    assert table.delay + 1 / (2 * math.pi * table.bandwidth) == pytest.approx(1.38e-3, rel=1e-2)
+    assert table.noise_density * math.sqrt(math.pi / 2 * table.bandwidth) == pytest.approx(0.08, abs=0.01)
 
 
 @pytest.mark.parametrize("axis", PEN_HOLD)
@@ -116,15 +119,14 @@ def test_the_pen_hold_has_the_numbers_of_fu_and_cavusoglu(axis):
     """Tip -(k1 || b1)- M -(k2 || b2)- ground."""
     mass, k1, b1, k2, b2 = PEN_HOLD[axis]
     path = LAUNCH / f"hands/fu_cavusoglu_{axis}.toml"
-    hand = preset(path)["hand"]
-    assert (hand["mass"], hand["stiffness"], hand["damping"]) == (mass, k2, b2)
-    assert hand["grip"] == {"stiffness": k1, "damping": b1}
+    grip = Grip(stiffness=k1, damping=b1)
+    assert preset(path).hand == Hand(mass=mass, stiffness=k2, damping=b2, grip=grip)
     assert "below 20 Hz" in path.read_text()
 
 
 def test_the_hand_of_the_paper_is_the_one_its_simulation_extends():
     alone, simulated = preset(LAUNCH / "hands/choi2022.toml"), preset(LAUNCH / "devices/choi2022_simulation.toml")
-    assert alone["hand"] == simulated["hand"] == {"mass": 0.01, "damping": 0.01, "stiffness": 10.0, "rest": 0.0}
+    assert alone.hand == simulated.hand == Hand(mass=0.01, damping=0.01, stiffness=10.0, rest=0.0)
 
 
 @pytest.mark.parametrize(
@@ -149,9 +151,8 @@ def leaves(table: dict[str, Any]):
 def test_the_tap_is_a_device_a_hand_and_a_task():
     tap = load(LAUNCH / "scenes/premium_tap.toml")
     parts = preset(LAUNCH / "devices/premium15.toml", LAUNCH / "hands/fu_cavusoglu_y.toml")
-    force = tap["hand"].pop("force")
-    assert {key: tap[key] for key in ("device", "friction", "encoder", "actuator", "hand")} == {
-        key: parts[key] for key in ("device", "friction", "encoder", "actuator", "hand")
-    }
-    assert force["frequency"] * tap["duration"] == 1
+    without_force = without(tap, "hand.force")
+    for table in ("device", "friction", "encoder", "actuator", "hand"):
+        assert value_at(without_force, table) == value_at(parts, table)
+    assert value_at(tap, "hand.force.frequency") * tap.duration == 1
     assert "[device]" not in (LAUNCH / "scenes/premium_tap.toml").read_text()

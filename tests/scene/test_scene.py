@@ -10,12 +10,13 @@ from haploop.controller.dissipation import Element, Quantity
 from haploop.launch.scene.check import resolve
 from haploop.launch.scene.layers import Layers
 from haploop.launch.scene.mistakes import SceneError
-from haploop.protocol.scene.scene import Scene
+from haploop.protocol.scene.paths import value_at
+from haploop.protocol.scene.scene import ElementTable, Encoder, Hand, Scene, Wall
 from helpers.scenes.least import KINDS, LEAST, WALL, mistakes, scene
 
 
 def test_defaults_are_filled_in_and_absent_tables_stay_absent():
-    assert scene() == {
+    assert scene().as_dict() == {
         "title": "least",
         "duration": 1.0,
         "seed": 0,
@@ -24,23 +25,23 @@ def test_defaults_are_filled_in_and_absent_tables_stay_absent():
         "device": {"mass": 0.01, "damping": 0.1, "position": 0.0, "velocity": 0.0},
         "run": {"log": "steps", "pin": True, "block_ticks": 1000, "window_blocks": 2, "deadline": 5.0},
     }
-    assert scene(wall=WALL)["wall"]["occupies"] == "below"
-    assert scene(encoder={"resolution": 1e-5})["encoder"]["rounding"] == "nearest"
-    assert scene(hand={})["hand"] == {"mass": 0.0, "damping": 0.0, "stiffness": 0.0, "rest": 0.0}
-    assert scene(dissipation=[{"kind": "damping", "damping": 1}])["dissipation"][0]["acts"] == "in-contact"
+    assert scene(wall=WALL).wall == Wall(position=-0.06, stiffness=150.0, occupies="below")
+    assert scene(encoder={"resolution": 1e-5}).encoder == Encoder(resolution=1e-5, rounding="nearest")
+    assert scene(hand={}).hand == Hand(mass=0.0, damping=0.0, stiffness=0.0, rest=0.0)
+    assert scene(dissipation=[{"kind": "damping", "damping": 1}]).dissipation[0].acts == "in-contact"
 
 
 def test_whole_numbers_become_floats_where_a_float_is_meant():
-    assert isinstance(scene(wall={"position": 0, "stiffness": 150})["wall"]["stiffness"], float)
+    assert isinstance(value_at(scene(wall={"position": 0, "stiffness": 150}), "wall.stiffness"), float)
 
 
 def test_an_empty_list_of_elements_is_no_list():
-    assert "dissipation" not in scene(dissipation=[])
+    assert "dissipation" not in scene(dissipation=[]).as_dict()
 
 
 def test_a_resolved_scene_resolves_to_itself():
     first = scene(wall=WALL, hand={"force": {"kind": "ramp", "value": -1, "rise_time": 1}}, velocity={"cutoff": 50})
-    assert scene(**first) == first
+    assert scene(**first.as_dict()) == first
 
 
 def test_every_mistake_is_reported_at_once():
@@ -127,11 +128,11 @@ def test_a_plugin_brings_its_own_parameters_units_and_defaults():
 
     def read(kinds, **parameters):
         data = {**LEAST, "dissipation": [{"kind": "limit", **parameters}]}
-        return resolve(Layers("scene.toml", data), kinds)["dissipation"][0]  # pyright: ignore[reportArgumentType]
+        return resolve(Layers("scene.toml", data), kinds).dissipation[0]  # pyright: ignore[reportArgumentType]
 
     for kinds in ({"limit": Brake}, KINDS | {"limit": Brake}):
-        assert read(kinds) == {"kind": "limit", "acts": "in-contact", "limit": 1.0}
-        assert read(kinds, limit="2 kN")["limit"] == 2000.0
+        assert read(kinds) == ElementTable(name="limit", acts="in-contact", parameters={"limit": 1.0})
+        assert read(kinds, limit="2 kN").parameters == {"limit": 2000.0}
         with pytest.raises(SceneError, match=r"dissipation\.0\.limit is 0\. It must be above 0 N\."):
             read(kinds, limit=0)
 

@@ -12,6 +12,8 @@ from haploop.launch.scene.file import load
 from haploop.launch.scene.layers import Layers
 from haploop.launch.scene.schema import json_schema
 from haploop.launch.scene.toml_writer import to_toml
+from haploop.protocol.scene.effects import Accelerometer, Friction, GammaJitter, Grip
+from haploop.protocol.scene.scene import Hand
 from haploop.tools.cli.main import app
 from helpers.scenes.least import KINDS, LEAST, mistakes, scene
 
@@ -28,7 +30,7 @@ LEAST_OF_EACH: dict[str, Any] = {
 
 
 def test_only_what_a_scene_names_is_in_it_and_only_what_has_a_default_is_filled_in():
-    assert {key: value for key, value in scene(**LEAST_OF_EACH).items() if key in LEAST_OF_EACH} == {
+    assert {key: value for key, value in scene(**LEAST_OF_EACH).as_dict().items() if key in LEAST_OF_EACH} == {
         "transmission": {"motor_mass": 0.003, "stiffness": 4000.0, "damping": 0.0, "motor_damping": 0.0},
         "friction": {"kinetic": 0.05},
         "hand": {
@@ -44,22 +46,21 @@ def test_only_what_a_scene_names_is_in_it_and_only_what_has_a_default_is_filled_
         "jitter": {"kind": "uniform", "most": 0.0005},
         "loss": {"probability": 0.1},
     }
-    assert not scene().keys() & LEAST_OF_EACH.keys()
-    assert "grip" not in scene(hand={"mass": 0.2})["hand"]
+    assert not scene().as_dict().keys() & LEAST_OF_EACH.keys()
+    assert scene(hand={"mass": 0.2}).hand == Hand(mass=0.2)
 
 
 def test_a_resolved_scene_with_every_effect_resolves_to_itself_and_runs_by_itself(tmp_path):
     resolved = scene(**LEAST_OF_EACH)
-    assert scene(**resolved) == resolved
-    (tmp_path / "scene.toml").write_text(to_toml(resolved))
+    assert scene(**resolved.as_dict()) == resolved
+    (tmp_path / "scene.toml").write_text(to_toml(resolved.as_dict()))
     assert load(tmp_path / "scene.toml") == resolved
 
 
 def test_the_density_of_noise_is_read_in_the_units_of_data_sheets():
     """300 ug/Hz^0.5, where g is the standard acceleration of free fall."""
-    read = scene(accelerometer={"noise_density": "300 microgravity/Hz^0.5", "range": "16 g_0"})["accelerometer"]
-    assert read["noise_density"] == 0.002941995
-    assert read["range"] == 156.9064
+    read = scene(accelerometer={"noise_density": "300 microgravity/Hz^0.5", "range": "16 g_0"}).accelerometer
+    assert read == Accelerometer(noise_density=0.002941995, range=156.9064)
     [mistake] = mistakes(accelerometer={"noise_density": "300 microgravity/Hz"})
     assert "has the dimension" in mistake
 
@@ -67,7 +68,7 @@ def test_the_density_of_noise_is_read_in_the_units_of_data_sheets():
 def test_the_schema_for_editors_knows_the_effects():
     validator = jsonschema.Draft202012Validator(json_schema(KINDS))
     validator.validate({**LEAST, **LEAST_OF_EACH})
-    validator.validate(scene(**LEAST_OF_EACH))
+    validator.validate(scene(**LEAST_OF_EACH).as_dict())
     for wrong in (
         {"friction": {"kinetic": -1}},
         {"jitter": {"kind": "uniform", "mean": 1}},
@@ -83,7 +84,7 @@ def test_jitter_of_another_kind_keeps_nothing_of_the_old_one():
     layers.lay({"jitter": {"kind": "uniform", "most": 0.001}}, "below.toml")
     layers.lay({"jitter": {"kind": "gamma", "mean": 0.001, "deviation": 0.001}}, "x.toml")
     assert layers.data["jitter"] == {"kind": "gamma", "mean": 0.001, "deviation": 0.001}
-    assert scene(**layers.data)["jitter"]["mean"] == 0.001
+    assert scene(**layers.data).jitter == GammaJitter(mean=0.001, deviation=0.001)
 
 
 @pytest.mark.parametrize(
@@ -202,9 +203,9 @@ def test_an_effect_can_be_named_on_the_command_line_alone(tmp_path):
     overrides = ["friction.kinetic=50 mN", "hand.mass=0.2", "hand.grip.stiffness=0.5 N/mm", "jitter.kind=gamma",
                  "jitter.mean=1 ms", "jitter.deviation=0.5 ms"]  # fmt: skip
     read = load(tmp_path / "least.toml", overrides)
-    assert read["friction"] == {"kinetic": 0.05}
-    assert read["hand"]["grip"] == {"stiffness": 500.0, "damping": 0.0}
-    assert read["jitter"] == {"kind": "gamma", "mean": 0.001, "deviation": 0.0005}
+    assert read.friction == Friction(kinetic=0.05)
+    assert read.hand == Hand(mass=0.2, grip=Grip(stiffness=500.0))
+    assert read.jitter == GammaJitter(mean=0.001, deviation=0.0005)
 
 
 def test_no_effect_can_be_changed_while_a_loop_runs():

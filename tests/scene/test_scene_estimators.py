@@ -7,6 +7,7 @@ import pytest
 from haploop.launch.scene.check import resolve
 from haploop.launch.scene.file import load
 from haploop.launch.scene.layers import Layers
+from haploop.protocol.scene.estimators import Acceleration, Velocity
 from helpers.runs.estimates import ENCODER, KALMAN
 from helpers.scenes.least import KINDS, LEAST, mistakes, scene
 
@@ -14,15 +15,15 @@ SCENE = Path(__file__).parents[2] / "launch/scenes/fig6c.toml"
 
 
 def test_a_scene_that_names_no_estimator_resolves_as_it_did():
-    assert scene(velocity={"cutoff": 50})["velocity"] == {"cutoff": 50.0}
-    assert scene(acceleration={"cutoff": "50 Hz"})["acceleration"] == {"source": "encoder", "cutoff": 50.0}
+    assert scene(velocity={"cutoff": 50}).velocity == Velocity(cutoff=50.0)
+    assert scene(acceleration={"cutoff": "50 Hz"}).acceleration == Acceleration(source="encoder", cutoff=50.0)
 
 
 def test_a_scene_that_names_one_resolves_to_si_numbers_and_to_itself():
     table = {"estimator": "kalman", "jerk_density": "50 mm/s^3/Hz^0.5", "measurement_noise": "3 um"}
     found = scene(velocity=table, acceleration={"source": "kalman"})
-    assert found["velocity"] == {"estimator": "kalman", "jerk_density": 0.05, "measurement_noise": 3e-6}
-    assert scene(**found) == found
+    assert found.velocity == Velocity(estimator="kalman", jerk_density=0.05, measurement_noise=3e-6)
+    assert scene(**found.as_dict()) == found
 
 
 @pytest.mark.parametrize(
@@ -107,7 +108,7 @@ def test_a_key_that_is_missing_or_out_of_place_is_a_mistake_with_a_sentence(tabl
 
 def test_the_command_line_can_name_an_estimator_and_its_numbers():
     resolved = load(SCENE, ["velocity.estimator=foaw", "velocity.ticks=8", "velocity.bound=20 um"])
-    assert resolved["velocity"] == {"estimator": "foaw", "ticks": 8, "bound": 2e-5}
+    assert resolved.velocity == Velocity(estimator="foaw", ticks=8, bound=2e-5)
 
 
 def test_another_estimator_drops_the_numbers_of_the_one_below_it_and_keeps_the_cutoff():
@@ -115,6 +116,6 @@ def test_another_estimator_drops_the_numbers_of_the_one_below_it_and_keeps_the_c
     below = {"estimator": "foaw", "ticks": 8, "bound": 1e-5, "cutoff": 100.0}
     layers.lay({**LEAST, "velocity": below}, "device.toml")
     layers.lay({"velocity": {"estimator": "window", "ticks": 3}}, "scene.toml")
-    assert resolve(layers, KINDS)["velocity"] == {"estimator": "window", "ticks": 3, "cutoff": 100.0}
+    assert resolve(layers, KINDS).velocity == Velocity(estimator="window", ticks=3, cutoff=100.0)
     layers.lay({"velocity": {"estimator": "difference"}}, "--set")
-    assert resolve(layers, KINDS)["velocity"] == {"estimator": "difference", "cutoff": 100.0}
+    assert resolve(layers, KINDS).velocity == Velocity(estimator="difference", cutoff=100.0)

@@ -4,6 +4,7 @@ import pytest
 
 from haploop.launch.scene.check import resolve_event
 from haploop.launch.scene.mistakes import SceneError
+from haploop.protocol.scene.scene import ElementTable, EventTable
 from helpers.scenes.least import KINDS, WALL, mistakes, scene
 
 DAMPING = {"kind": "damping", "damping": 0.8}
@@ -15,14 +16,14 @@ def with_events(*events):
 
 
 def test_a_swap_is_resolved_like_an_element():
-    [event] = scene(**with_events({"at": "500 ms", "swap": INERTIA}))["event"]
-    swap = {"kind": "unidirectional-inertia", "acts": "in-contact", "mass": 0.01}
-    assert event == {"at": 0.5, "element": 0, "swap": swap}
+    [event] = scene(**with_events({"at": "500 ms", "swap": INERTIA})).event
+    swap = ElementTable(name="unidirectional-inertia", acts="in-contact", parameters={"mass": 0.01})
+    assert event == EventTable(at=0.5, element=0, swap=swap)
 
 
 def test_set_values_are_converted_and_bounded():
     resolved = scene(**with_events({"at": 0, "set": {"wall.stiffness": "0.2 N/mm", "dissipation.0.damping": 1}}))
-    assert resolved["event"][0]["set"] == {"wall.stiffness": 200.0, "dissipation.0.damping": 1.0}
+    assert resolved.event[0].set == {"wall.stiffness": 200.0, "dissipation.0.damping": 1.0}
     assert mistakes(**with_events({"at": 0, "set": {"wall.stiffness": -1}})) == [
         "event.0.set.wall.stiffness is -1. It must be at least 0 N/m."
     ]
@@ -85,7 +86,7 @@ def test_a_wall_that_is_not_there_cannot_be_set():
 def test_a_live_event_is_checked_after_what_has_happened_and_before_what_is_to_come():
     running = scene(**with_events({"at": 0.2, "swap": INERTIA}, {"at": 0.8, "set": {"dissipation.0.mass": 0.02}}))
     change = {"at": 0.5, "set": {"dissipation.0.mass": "20 g"}}
-    assert resolve_event(change, running, KINDS) == {"at": 0.5, "set": {"dissipation.0.mass": 0.02}}
+    assert resolve_event(change, running, KINDS) == EventTable(at=0.5, set={"dissipation.0.mass": 0.02})
     with pytest.raises(SceneError, match=r"live event: event.2.swap.kind is \"dampin\"; did you mean damping\?"):
         resolve_event({"at": 0.5, "swap": {"kind": "dampin"}}, running, KINDS)
     with pytest.raises(SceneError, match=r"event.1.set.dissipation.0.mass cannot be set"):

@@ -4,6 +4,8 @@ import pytest
 
 from haploop.launch.scene.file import load
 from haploop.launch.scene.mistakes import SceneError
+from haploop.protocol.scene.hand_force import Constant, Sine, Trace
+from haploop.protocol.scene.scene import Device, Hand, Wall
 from helpers.scenes.least import LEAST_TOML, file_mistakes
 
 
@@ -21,8 +23,8 @@ def files(tmp_path, monkeypatch):
 
 
 def test_the_title_is_the_name_of_the_file_unless_given(files):
-    assert load(files(tap=LEAST_TOML))["title"] == "tap"
-    assert load(files(tap=f'title = "A tap"\n{LEAST_TOML}'))["title"] == "A tap"
+    assert load(files(tap=LEAST_TOML)).title == "tap"
+    assert load(files(tap=f'title = "A tap"\n{LEAST_TOML}')).title == "A tap"
 
 
 def test_extends_merges_key_by_key_and_the_file_itself_wins(files):
@@ -33,9 +35,9 @@ def test_extends_merges_key_by_key_and_the_file_itself_wins(files):
         base=LEAST_TOML,
     )
     scene = load(path)
-    assert scene["wall"] == {"position": 1.0, "stiffness": 3.0, "occupies": "above"}
-    assert scene["device"] == {"mass": 0.01, "damping": 0.1, "position": 0.5, "velocity": 0.0}
-    assert "extends" not in scene
+    assert scene.wall == Wall(position=1.0, stiffness=3.0, occupies="above")
+    assert scene.device == Device(mass=0.01, damping=0.1, position=0.5, velocity=0.0)
+    assert scene.others == {}
 
 
 def test_lists_of_tables_are_replaced_whole(files):
@@ -44,7 +46,7 @@ def test_lists_of_tables_are_replaced_whole(files):
         top='extends = "base.toml"\n' + element.format("bidirectional-inertia", "mass"),
         base=LEAST_TOML + 2 * element.format("damping", "damping"),
     )
-    assert [e["kind"] for e in load(path)["dissipation"]] == ["bidirectional-inertia"]
+    assert [element.name for element in load(path).dissipation] == ["bidirectional-inertia"]
 
 
 def test_a_table_of_another_kind_keeps_nothing_of_the_old_one(files):
@@ -52,10 +54,9 @@ def test_a_table_of_another_kind_keeps_nothing_of_the_old_one(files):
         top='extends = "base.toml"\n[hand.force]\nkind = "constant"\nvalue = 2.0\n',
         base=LEAST_TOML + '[hand.force]\nkind = "ramp"\nvalue = 1.0\nrise_time = 1.0\n',
     )
-    assert load(path)["hand"]["force"] == {"kind": "constant", "value": 2.0}
+    assert load(path).hand == Hand(force=Constant(value=2.0))
     sine = ["hand.force.amplitude=1", "hand.force.kind=sine", "hand.force.frequency=1"]
-    expected = {"kind": "sine", "amplitude": 1.0, "frequency": 1.0, "offset": 0.0, "phase": 0.0}
-    assert load(path, sine)["hand"]["force"] == expected
+    assert load(path, sine).hand == Hand(force=Sine(amplitude=1.0, frequency=1.0, offset=0.0, phase=0.0))
 
 
 def test_a_mistake_names_the_file_that_made_it(files, tmp_path):
@@ -78,7 +79,7 @@ def test_a_scene_that_extends_itself_is_told_the_circle(files, tmp_path):
 
 def test_two_paths_to_one_base_are_no_circle(files):
     path = files(a='extends = ["b.toml", "c.toml"]\n', b='extends = "d.toml"\n', c='extends = "d.toml"\n', d=LEAST_TOML)
-    assert load(path)["duration"] == 1.0
+    assert load(path).duration == 1.0
 
 
 @pytest.mark.parametrize("extends", ["3", '["x.toml", 3]', '""', "{}"])
@@ -118,7 +119,7 @@ def test_all_files_that_cannot_be_read_are_reported_at_once(files):
 
 def test_a_byte_order_mark_is_no_mistake(tmp_path):
     (tmp_path / "x.toml").write_text(LEAST_TOML, encoding="utf-8-sig")
-    assert load(tmp_path / "x.toml")["duration"] == 1.0
+    assert load(tmp_path / "x.toml").duration == 1.0
 
 
 def test_a_recorded_force_is_read_in_whole_relative_to_the_file_that_names_it(files, tmp_path):
@@ -126,7 +127,7 @@ def test_a_recorded_force_is_read_in_whole_relative_to_the_file_that_names_it(fi
     (tmp_path / "devices/push.csv").write_text("time,force\n0.0,0.0\n\n0.5,-1.0\n")
     (tmp_path / "devices/base.toml").write_text(LEAST_TOML + '[hand.force]\nkind = "trace"\nfile = "push.csv"\n')
     scene = load(files(top='extends = "devices/base.toml"\n'))
-    assert scene["hand"]["force"] == {"kind": "trace", "time": [0.0, 0.5], "force": [0.0, -1.0]}
+    assert scene.hand == Hand(force=Trace(time=(0.0, 0.5), force=(0.0, -1.0)))
 
 
 @pytest.mark.parametrize(

@@ -8,6 +8,9 @@ from haploop.launch.scene.file import load
 from haploop.launch.scene.layers import Layers
 from haploop.launch.scene.mistakes import SceneError
 from haploop.launch.scene.overrides import lay_overrides
+from haploop.protocol.scene.hand_force import Constant
+from haploop.protocol.scene.paths import value_at
+from haploop.protocol.scene.scene import Encoder, EventTable
 from helpers.scenes.least import LEAST_TOML, file_mistakes
 
 SCENE = (
@@ -32,39 +35,36 @@ def path(tmp_path):
 @pytest.mark.parametrize(
     ("override", "key", "value"),
     [
-        ("dissipation.0.mass=0.02", ["dissipation", 0, "mass"], 0.02),
-        ("wall.stiffness=0.15 N/mm", ["wall", "stiffness"], 150.0),
-        ('wall.stiffness = "0.2 N/mm"', ["wall", "stiffness"], 200.0),
-        ("wall.occupies=above", ["wall", "occupies"], "above"),
-        ("title=a = b", ["title"], "a = b"),
-        ("seed=7", ["seed"], 7),
-        ("run.pin=false", ["run", "pin"], False),
-        ("encoder.resolution=1e-5", ["encoder"], {"resolution": 1e-5, "rounding": "nearest"}),
-        ('hand.force={kind="constant", value=1}', ["hand", "force"], {"kind": "constant", "value": 1.0}),
-        ('dissipation.1={kind="damping", damping=1}', ["dissipation", 1, "damping"], 1.0),
-        ("dissipation=[]", ["wall", "position"], -0.06),
+        ("dissipation.0.mass=0.02", "dissipation.0.mass", 0.02),
+        ("wall.stiffness=0.15 N/mm", "wall.stiffness", 150.0),
+        ('wall.stiffness = "0.2 N/mm"', "wall.stiffness", 200.0),
+        ("wall.occupies=above", "wall.occupies", "above"),
+        ("title=a = b", "title", "a = b"),
+        ("seed=7", "seed", 7),
+        ("run.pin=false", "run.pin", False),
+        ("encoder.resolution=1e-5", "encoder", Encoder(resolution=1e-5)),
+        ('hand.force={kind="constant", value=1}', "hand.force", Constant(value=1.0)),
+        ('dissipation.1={kind="damping", damping=1}', "dissipation.1.damping", 1.0),
+        ("dissipation=[]", "wall.position", -0.06),
     ],
 )
 def test_a_key_is_set(path, override, key, value):
-    node = load(path, [override])
-    for part in key:
-        node = node[part]
-    assert node == value
+    assert value_at(load(path, [override]), key) == value
 
 
 def test_one_past_the_end_of_a_list_adds_to_it(path):
     scene = load(path, ["dissipation.1.kind=damping", "dissipation.1.damping=0.8"])
-    assert [e["kind"] for e in scene["dissipation"]] == ["unidirectional-inertia", "damping"]
+    assert [element.name for element in scene.dissipation] == ["unidirectional-inertia", "damping"]
 
 
 def test_a_list_that_is_absent_is_made(path):
     scene = load(path, ["event.0.at=0.5", "event.0.pause=true"])
-    assert scene["event"] == [{"at": 0.5, "pause": True}]
+    assert scene.event == (EventTable(at=0.5, pause=True),)
 
 
 def test_a_quoted_part_of_a_key_may_hold_dots(path):
     scene = load(path, ["event.0.at=0.5", 'event.0.set."wall.stiffness"=1'])
-    assert scene["event"][0]["set"] == {"wall.stiffness": 1.0}
+    assert scene.event[0].set == {"wall.stiffness": 1.0}
 
 
 @pytest.mark.parametrize(

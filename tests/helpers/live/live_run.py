@@ -6,6 +6,7 @@ import tempfile
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,7 @@ from haploop.launch.processes.run_directory import LiveRun
 from haploop.launch.runs.in_process import run_in_process
 from haploop.launch.runs.start import prepare, run
 from haploop.launch.spec import RunSpec
+from haploop.protocol.scene.scene import EventTable
 
 SCENE = Path(__file__).parents[3] / "launch" / "scenes" / "fig6c.toml"
 
@@ -99,8 +101,9 @@ def going(
     with tempfile.TemporaryDirectory(prefix="hl", dir="/tmp") as base, pytest.MonkeyPatch.context() as patch:
         patch.setenv("XDG_RUNTIME_DIR", base)
         prepared = prepare(SCENE, overrides, out=tmp_path / "out")
-        prepared.scene["event"] = [{"at": tick / 1000, "pause": True} for tick in pauses]
-        subject = Going(prepared, announced, options)
+        standing = tuple(EventTable(at=tick / 1000, pause=True) for tick in pauses)
+        scene = replace(prepared.scene, event=standing)
+        subject = Going(replace(prepared, scene=scene), announced, options)
         try:
             yield subject
         finally:

@@ -15,7 +15,7 @@ LEAST: dict[str, Any] = {"title": "least", "duration": 1.0, "device": {"mass": 0
 WALL = {"position": -0.06, "stiffness": 150.0}
 
 
-def scene(**tables: Any) -> dict[str, Any]:
+def scene(**tables: Any) -> Scene:
     """The least scene with these tables, resolved."""
     return resolve(Layers(Path("scene.toml"), {**LEAST, **tables}), KINDS)
 

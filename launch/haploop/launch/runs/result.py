@@ -118,7 +118,7 @@ def run(
     with _directory(out) as directory:
         target = make_output(Path(directory), scene.path)
         files = dict.fromkeys(scene.plugin_files.values())
-        prepared = start.lay_out(scene.tables, dict(scene.kinds), target, list(files), dict(scene.plugin_files))
+        prepared = start.lay_out(scene.scene, dict(scene.kinds), target, list(files), dict(scene.plugin_files))
         summary = start.run(prepared, in_process=not processes, pace=pace)
         kept = _read(target) if out is None else None
     return Result(scene, summary, None if out is None else target, kept)
@@ -126,7 +126,7 @@ def run(
 
 def _in_memory(scene: Scene) -> Result:
     memory = MemoryLog()
-    summary = run_in_process(scene.tables, dict(scene.kinds), attachments={SCENE: str(scene)}, memory=memory)
+    summary = run_in_process(scene.scene, dict(scene.kinds), attachments={SCENE: str(scene)}, memory=memory)
     return Result(scene, summary, None, memory.recording())
 
 
@@ -143,8 +143,8 @@ def _read(directory: Path) -> Recording:
 def _check_files(scene: Scene) -> None:
     """Processes load their elements themselves: every one must be installed, or have a file."""
     installed = registry()
-    for table in elements_of(scene.tables):
-        kind = table["kind"]
+    for element in elements_of(scene.scene):
+        kind = element.name
         if kind not in scene.plugin_files and installed.get(kind) is not scene.kinds[kind]:
             raise PluginError(
                 f"The element {kind} was given as a class, which other processes cannot load; "

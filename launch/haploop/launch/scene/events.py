@@ -10,7 +10,7 @@ from pydantic_core import PydanticCustomError
 from haploop.controller.active_elements import make_element
 from haploop.launch.scene.layers import KeyPath, Layers
 from haploop.launch.scene.mistakes import counted, nearest
-from haploop.launch.scene.models import EventModel, number_in, number_of
+from haploop.launch.scene.models import number_of
 from haploop.launch.scene.number import Number
 from haploop.protocol.scene.scene import NO_ELEMENT, Clock, ElementTable, EventTable, Scene, Wall
 from haploop.protocol.ticks import DELAY, Timebase, whole_count
@@ -125,7 +125,7 @@ def _nearest_key(name: str, settable: dict[str, Number]) -> str | None:
 def _read(event: dict[str, Any], key: str) -> Any:
     """Returns a number of an event; 0 where it is missing, or wrong, which is a mistake reported elsewhere."""
     try:
-        return number_in(EventModel, key).read(event.get(key))
+        return number_of(EventTable, key).read(event.get(key))
     except PydanticCustomError:
         return 0
 

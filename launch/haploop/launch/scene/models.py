@@ -20,7 +20,7 @@ from haploop.plant.integrators.registry import integrator_names
 from haploop.protocol.quantity import Quantity
 from haploop.protocol.scene.estimators import Acceleration, Velocity
 from haploop.protocol.scene.hand_force import Trace
-from haploop.protocol.scene.scene import Clock, Scene
+from haploop.protocol.scene.scene import NO_ELEMENT, Clock, EventTable, Scene
 from haploop.protocol.scene.table import Table
 
 if TYPE_CHECKING:
@@ -34,6 +34,8 @@ class Model(BaseModel):
 
 
 TableType = TypeVar("TableType", bound=Table)
+# Of a model that is to be made: key -> (type, default).
+Keys = dict[str, Any]
 
 
 class FunctionOfTime(Model):
@@ -47,18 +49,6 @@ class FunctionOfTime(Model):
         return self
 
 
-class EventModel(Model):
-    """What changes during the run; exactly one of swap, set, pause and stop."""
-
-    at: Annotated[float, Number(Quantity("s", at_least=0, about="time; the first tick at or after it sees the change"))]
-    element: Annotated[
-        int | None, Number(Quantity("", at_least=0, about="which element a swap replaces", whole=True))
-    ] = None
-    set: dict[str, Any] | None = Field(None, description='new values: { "wall.stiffness" = 200.0 }')
-    pause: Literal[True] | None = None
-    stop: Literal[True] | None = None
-
-
 # Tables with a rule beyond that of each key.
 _BASES: dict[type[Table], type[Model]] = {Trace: FunctionOfTime}
 
@@ -66,19 +56,22 @@ _BASES: dict[type[Table], type[Model]] = {Trace: FunctionOfTime}
 @cache
 def model_of(table: type[Table]) -> type[Model]:
     """Makes the model that validates a table: bounds and units at every number, no unknown keys."""
-    return _model(table.__name__, _BASES.get(table, Model), table.__doc__, _keys_of(table))
+    return _model(table.__name__, table.__doc__, _keys_of(table, _registered(table)), _BASES.get(table, Model))
 
 
-def _keys_of(table: type[Table]) -> dict[str, Any]:
-    keys: dict[str, Any] = {"kind": (Literal[table.kind], ...)} if table.kind else {}
+def _keys_of(table: type[Table], others: Keys) -> Keys:
+    """Returns the declared keys of a table, with others beside or in place of them."""
+    keys: Keys = {"kind": (Literal[table.kind], ...)} if table.kind else {}
     hints = get_type_hints(table, include_extras=True)
     for field in table.fields():
-        if field.name != "others":
+        if field.name in others:
+            keys[field.name] = others[field.name]
+        elif field.name != "others":
             keys[field.name] = _validated(hints[field.name]), _default(field)
-    return keys | _registered(table)
+    return keys | others
 
 
-def _registered(table: type[Table]) -> dict[str, Any]:
+def _registered(table: type[Table]) -> Keys:
     """Returns the keys that registries give: names, keys of estimators of other packages, tables of their effects."""
     if table is Scene:
         return {effect.key: (model_of(effect.table) | None, None) for effect in all_effects() if effect.table}
@@ -87,7 +80,7 @@ def _registered(table: type[Table]) -> dict[str, Any]:
     if table not in (Velocity, Acceleration):
         return {}
     kinds = estimators_for(table.__name__.lower())
-    keys: dict[str, Any] = {"estimator": (_one_name(kinds) | None, None)}
+    keys: Keys = {"estimator": (_one_name(kinds) | None, None)}
     for kind in kinds.values():
         keys |= {key: (Annotated[float | None, Number(quantity)], None) for key, quantity in kind.keys.items()}
     return keys
@@ -123,12 +116,7 @@ def _validated(hint: Any) -> Any:
 
 def number_of(table: type[Table], key: str) -> Number:
     """Returns the number declared at ``key`` of a table."""
-    return number_in(model_of(table), key)
-
-
-def number_in(model: type[Model], key: str) -> Number:
-    """Returns the number that a model reads at ``key``."""
-    return next(mark for mark in model.model_fields[key].metadata if isinstance(mark, Number))
+    return next(mark for mark in model_of(table).model_fields[key].metadata if isinstance(mark, Number))
 
 
 def read_table(table: type[TableType], data: Any) -> TableType | None:
@@ -146,26 +134,31 @@ def scene_model(kinds: Mapping[str, type[Element]]) -> type[Model]:
 
 @cache
 def _scene_model(kinds: tuple[tuple[str, type[Element]], ...]) -> type[Model]:
-    nothing = _model("none", Model, "Removes the element.", {"kind": (Literal["none"], ...)})
+    nothing = _model(NO_ELEMENT, "Removes the element.", {"kind": (Literal["none"], ...)})
     elements = [_element_model(kind, element) for kind, element in kinds]
-    event = _model("Event", EventModel, EventModel.__doc__, {"swap": (_one_of([*elements, nothing]) | None, None)})
-    keys = _keys_of(Scene)
-    keys["dissipation"] = list[_one_of(elements or [nothing])] | None, None
-    keys["event"] = list[event] | None, None
-    return _model("Scene", Model, Scene.__doc__, keys)
+    changes: Keys = {
+        "swap": (_one_of([*elements, nothing]) | None, None),
+        "set": (dict[str, Any] | None, Field(None, description='new values: { "wall.stiffness" = 200.0 }')),
+    }
+    event = _model("Event", EventTable.__doc__, _keys_of(EventTable, changes))
+    lists: Keys = {
+        "dissipation": (list[_one_of(elements or [nothing])] | None, None),
+        "event": (list[event] | None, None),
+    }
+    return _model("Scene", Scene.__doc__, _keys_of(Scene, lists | _registered(Scene)))
 
 
 def _element_model(kind: str, element: type[Element]) -> type[Model]:
-    keys: dict[str, Any] = {
+    keys: Keys = {
         "kind": (Literal[kind], ...),  # pyright: ignore[reportInvalidTypeForm]
         "acts": (Literal["in-contact", "always"], "in-contact"),
     }
     for name, (quantity, default) in element.parameters().items():
         keys[name] = (Annotated[float, Number(quantity)], ... if default is dataclasses.MISSING else default)
-    return _model(kind, Model, element.__doc__, keys)
+    return _model(kind, element.__doc__, keys)
 
 
-def _model(name: str, base: type[Model], about: str | None, keys: dict[str, Any]) -> type[Model]:
+def _model(name: str, about: str | None, keys: Keys, base: type[Model] = Model) -> type[Model]:
     return create_model(name, __base__=base, __doc__=about, **keys)
 
 

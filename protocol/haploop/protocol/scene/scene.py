@@ -106,15 +106,12 @@ class ElementTable(Table):
 
 
 class EventTable(Table):
-    """What changes during the run; exactly one of swap, set, pause and stop.
-
-    Attributes:
-        set: settable key -> value in SI units.
-    """
+    """What changes during the run; exactly one of swap, set, pause and stop."""
 
     at: Annotated[float, si("s", "time; the first tick at or after it sees the change", at_least=0)]
     swap: ElementTable | None = None
     element: Annotated[int | None, si("", "which element a swap replaces", at_least=0, whole=True)] = None
+    # Settable key -> value in SI units.
     set: dict[str, float] | None = None
     pause: Literal[True] | None = None
     stop: Literal[True] | None = None

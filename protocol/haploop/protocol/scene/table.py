@@ -80,7 +80,7 @@ class Table:
         if isinstance(data, cls):
             return data
         tables = _tables_of(cls)
-        given = {key: _read(tables[key], value) if key in tables else value for key, value in data.items()}
+        given = {key: _read(tables.get(key, ()), value) for key, value in data.items()}
         if cls.kind:
             given.pop("kind", None)
         return cls(**given)
@@ -137,7 +137,7 @@ def _tables_in(hint: Any) -> list[type[Table]]:
 def _read(tables: tuple[type[Table], ...], value: Any) -> Any:
     if isinstance(value, list | tuple):
         return tuple(_read(tables, item) for item in value)
-    if not isinstance(value, Mapping) or isinstance(value, Table):
+    if not tables or not isinstance(value, Mapping) or isinstance(value, Table):
         return value
     kind = value.get("kind", "")
     return next((table for table in tables if table.kind == kind), tables[0]).from_dict(value)

@@ -11,6 +11,7 @@ from haploop.tools.cli.exit_codes import WRONG_USE, leave, plain_errors, print_j
 
 if TYPE_CHECKING:
     from haploop.controller.dissipation import Element
+    from haploop.protocol.scene.scene import Scene
 
 
 def kinds_with(plugins: list[Path]) -> dict[str, type[Element]]:
@@ -29,13 +30,13 @@ def check_scene(scene_path: Path, overrides: list[str], plugins: list[Path], as_
         scene = load(scene_path, overrides, kinds_with(plugins))
     print_notes(scene)
     if as_json:
-        print_json(scene)
+        print_json(scene.as_dict())
     else:
-        print(to_toml(scene), end="")
+        print(to_toml(scene.as_dict()), end="")
         print(f"{scene_path} can be run.", file=sys.stderr)
 
 
-def print_notes(scene: dict[str, Any]) -> None:
+def print_notes(scene: Scene) -> None:
     """Prints on stderr what in a resolved scene may not be what was meant."""
     from haploop.launch.plan.effects import notes
 
