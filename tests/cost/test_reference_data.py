@@ -1,8 +1,8 @@
 """The stored references are what they say, of the scenes they name; and what is made on the spot says so."""
 
-import copy
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,8 +10,9 @@ import pytest
 from mpmath import mpf
 
 from haploop.launch.scene.file import load
-from haploop.tools.reference.loop import close_loop, make_timebase
-from haploop.tools.reference.make import SCENES, in_digits
+from haploop.protocol.scene.paths import with_value
+from haploop.protocol.scene.scene import Scene
+from haploop.tools.reference.make import SCENES, close_loop, in_digits, make_timebase
 from haploop.tools.reference.nearest import (
     MOST_GROWTH,
     REFERENCES,
@@ -35,7 +36,7 @@ CHAOTIC = ["wall_limit_cycle"]
 ROUNDING_M = np.spacing(0.06)
 
 
-def accuracy_scene(name: str, *overrides: str) -> dict:
+def accuracy_scene(name: str, *overrides: str) -> Scene:
     return load(SCENES / f"{name}.toml", overrides)
 
 
@@ -100,8 +101,8 @@ def test_a_start_moved_by_a_tenth_of_a_micrometre_stays_as_near_unless_the_scene
 
 
 def test_of_the_chaotic_scene_the_swings_can_be_compared_though_not_the_positions():
-    reference, moved = stored("wall_limit_cycle"), accuracy_scene("wall_limit_cycle")
-    moved["device"]["position"] += 1e-7
+    reference, posed = stored("wall_limit_cycle"), accuracy_scene("wall_limit_cycle")
+    moved = with_value(posed, "device.position", posed.device.position + 1e-7)
     ran = trajectory(moved)
     assert furthest(ran.x_m, reference.x_m) > 1e-3
     swings = statistics(moved, ran.x_m, ran.v_m_s)
@@ -129,10 +130,10 @@ def test_fifty_digits_give_all_stored_numbers_again(name):
 class Independent:
     """The tests' own bodies, integrated by DOP853, as a continuous plant."""
 
-    def __init__(self, posed: dict) -> None:
+    def __init__(self, posed: Scene) -> None:
         self.bodies = Bodies(posed)
         self.force = self.tau = 0.0
-        self.rest_N = posed.get("hand", {}).get("stiffness", 0.0) * posed.get("hand", {}).get("rest", 0.0)
+        self.rest_N = posed.hand.stiffness * posed.hand.rest if posed.hand else 0.0
 
     @property
     def x(self) -> float:
@@ -240,8 +241,8 @@ def test_reading_a_reference_needs_no_mpmath():
 
 def test_a_trajectory_is_the_runs_own():
     posed = accuracy_scene("wall_steady", "duration=0.05")
-    ran, again = trajectory(posed), trajectory(copy.deepcopy(posed))
-    assert ran.x_m[0] == posed["device"]["position"]
+    ran, again = trajectory(posed), trajectory(replace(posed))
+    assert ran.x_m[0] == posed.device.position
     assert ran.x_m[-1] == ran.summary["final"]["x_m"]
     assert ran.v_m_s[-1] == ran.summary["final"]["v_m_s"]
     assert ran.summary["trajectory_sha256"] == again.summary["trajectory_sha256"]

@@ -33,7 +33,7 @@ def exact_reference(path: Path, _scene: dict[str, Any] | None = None) -> Referen
     scene = load_scene(path, ["clock.integrator=exact", "clock.plant_rate=100000"])
     ran = trajectory(scene)
     swings, verdict = statistics(scene, ran.x_m, ran.v_m_s), ran.summary["verdict"]
-    return Reference(path.stem, ran.x_m, ran.v_m_s, 1e-15, swings, True, "Exact at 100 kHz.", verdict)
+    return Reference(path.stem, "Exact at 100 kHz.", verdict, True, 1e-15, swings, ran.x_m, ran.v_m_s)
 
 
 def outcomes(path: Path, methods: list[str], rates: list[int], reference: Reference | None = None) -> dict[Any, Any]:

@@ -14,9 +14,34 @@ import json
 import os
 import sys
 from pathlib import Path
-from typing import Any
+from types import ModuleType
+from typing import Literal, NotRequired, TypedDict
 
-Notebook = dict[str, Any]
+
+class Cell(TypedDict):
+    """A cell; one of code has the last two."""
+
+    cell_type: str
+    source: list[str]
+    execution_count: NotRequired[int]
+    outputs: NotRequired[list[Output]]
+
+
+class Notebook(TypedDict):
+    """A notebook of format 4, of which only the cells are looked at."""
+
+    cells: list[Cell]
+
+
+class Output(TypedDict, total=False):
+    """An output of a cell."""
+
+    output_type: Literal["stream", "execute_result", "display_data"]
+    name: Literal["stdout"]
+    text: list[str]
+    execution_count: int
+    metadata: dict[str, str]
+    data: dict[str, str | list[str]]
 
 
 def run_cells(notebook: Notebook) -> None:
@@ -28,25 +53,27 @@ def run_cells(notebook: Notebook) -> None:
     import matplotlib
 
     matplotlib.use("Agg")
-    names: dict[str, Any] = {"__name__": "__main__"}
+    main_module = ModuleType("__main__")
     for number, cell in enumerate((c for c in notebook["cells"] if c["cell_type"] == "code"), start=1):
         cell["execution_count"] = number
-        cell["outputs"] = _outputs("".join(cell["source"]), names, number)
+        cell["outputs"] = _outputs("".join(cell["source"]), main_module, number)
 
 
-def _outputs(source: str, names: dict[str, Any], number: int) -> list[dict[str, Any]]:
+def _outputs(source: str, module: ModuleType, number: int) -> list[Output]:
     """Runs the code of cell ``number`` and returns its outputs."""
     tree, file = ast.parse(source), f"cell {number}"
     shows = bool(tree.body) and isinstance(tree.body[-1], ast.Expr) and not source.rstrip().endswith(";")
     last = tree.body.pop() if shows else None
     with contextlib.redirect_stdout(io.StringIO()) as printed:
-        exec(compile(tree, file, "exec"), names)
-        value = eval(compile(ast.Expression(last.value), file, "eval"), names) if isinstance(last, ast.Expr) else None
-    outputs: list[dict[str, Any]] = []
+        exec(compile(tree, file, "exec"), vars(module))
+        value = None
+        if isinstance(last, ast.Expr):
+            value = eval(compile(ast.Expression(last.value), file, "eval"), vars(module))
+    outputs: list[Output] = []
     if text := printed.getvalue():
         outputs.append({"output_type": "stream", "name": "stdout", "text": text.splitlines(keepends=True)})
     if value is not None:
-        data = {"text/plain": repr(value).splitlines(keepends=True)}
+        data: dict[str, str | list[str]] = {"text/plain": repr(value).splitlines(keepends=True)}
         outputs.append({"output_type": "execute_result", "execution_count": number, "metadata": {}, "data": data})
     return outputs + [{"output_type": "display_data", "metadata": {}, "data": {"image/png": png}} for png in _figures()]
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -11,6 +10,9 @@ from haploop.controller.dissipation import registry
 from haploop.launch.runs.in_process import Loop, scene_events
 from haploop.logger.logger import Logger
 from haploop.logger.session import LogSession
+from haploop.logger.summary import Summary
+from haploop.protocol.scene.scene import Scene
+from haploop.protocol.telemetry import Block
 from haploop.protocol.ticks import Timebase
 
 
@@ -20,29 +22,28 @@ class Trajectory:
 
     Attributes:
         x_m, v_m_s: at every tick and at the end, shape (ticks + 1,); fewer where the run diverged.
-        summary: what a run's ``summary.json`` holds.
     """
 
     x_m: np.ndarray
     v_m_s: np.ndarray
-    summary: dict[str, Any]
+    summary: Summary
 
 
 class _Remembering(Logger):
     """A logger that keeps what the plant reports at ticks."""
 
-    def __init__(self, scene: dict[str, Any], time: Timebase) -> None:
+    def __init__(self, scene: Scene, time: Timebase) -> None:
         super().__init__(scene, time, None)
         self.motion: list[np.ndarray] = []
 
-    def plant_block(self, block: dict[str, Any]) -> None:
+    def plant_block(self, block: Block) -> None:
         columns = (np.frombuffer(block["columns"][name], "<f8") for name in ("x", "v"))
         at_ticks = np.stack([column[:: self.time.steps_per_tick] for column in columns])
         self.motion.append(at_ticks[:, 1 if self.motion else 0 :])
         super().plant_block(block)
 
 
-def trajectory(scene: dict[str, Any]) -> Trajectory:
+def trajectory(scene: Scene) -> Trajectory:
     """Runs a resolved scene of installed elements to its end; nothing is written.
 
     Raises:

@@ -12,6 +12,8 @@ from typing import Any
 import numpy as np
 from mpmath import mp, mpf
 
+from haploop.protocol.scene.scene import Hand, Scene
+
 Row = list[Any]
 Matrix = list[Row]
 COMMAND, FRICTION, LOAD, SLOPE = -4, -3, -2, -1
@@ -25,7 +27,7 @@ class Bodies:
     and y' = 2 pi bandwidth (a - y); both are absent where the scene has no bandwidth.
 
     Args:
-        scene: resolved, with any of its tables.
+        scene: resolved.
 
     Attributes:
         count: bodies.
@@ -35,25 +37,25 @@ class Bodies:
         begin: w at t = 0, with nothing acting.
     """
 
-    def __init__(self, scene: dict[str, Any]) -> None:
-        device, hand, cable = scene["device"], scene.get("hand", {}), scene.get("transmission")
-        grip, meter = hand.get("grip"), scene.get("accelerometer", {})
-        masses, ground, links = [mpf(device["mass"])], [mpf(device["damping"])], []
+    def __init__(self, scene: Scene) -> None:
+        device, hand, cable, meter = scene.device, scene.hand or Hand(), scene.transmission, scene.accelerometer
+        masses, ground, links = [mpf(device.mass)], [mpf(device.damping)], []
         if cable:
-            masses.insert(0, mpf(cable["motor_mass"]))
-            ground.insert(0, mpf(cable["motor_damping"]))
-            links.append((cable["stiffness"], cable["damping"]))
+            masses.insert(0, mpf(cable.motor_mass))
+            ground.insert(0, mpf(cable.motor_damping))
+            links.append((cable.stiffness, cable.damping))
         tip = len(masses) - 1
-        if grip:
+        if hand.grip:
             masses.append(mpf(0))
             ground.append(mpf(0))
-            links.append((grip["stiffness"], grip["damping"]))
-        masses[-1] += mpf(hand.get("mass", 0.0))
-        ground[-1] += mpf(hand.get("damping", 0.0))
+            links.append((hand.grip.stiffness, hand.grip.damping))
+        masses[-1] += mpf(hand.mass)
+        ground[-1] += mpf(hand.damping)
         n = self.count = len(masses)
-        actuator, output = scene.get("actuator", {}).get("bandwidth"), meter.get("bandwidth")
+        actuator = scene.actuator.bandwidth if scene.actuator else None
+        output = meter.bandwidth if meter else None
         size = 2 * n + bool(actuator) + bool(output) + 4
-        sensor = 0 if meter.get("mount") == "motor" else tip
+        sensor = 0 if meter and meter.mount == "motor" else tip
 
         forces = [[mpf(0)] * size for _ in masses]
         for i, (stiffness, damping) in enumerate(links):
@@ -63,7 +65,7 @@ class Bodies:
                     forces[body][state + 1] += sign * mpf(value)
         for body in range(n):
             forces[body][n + body] -= ground[body]
-        forces[-1][n - 1] -= mpf(hand.get("stiffness", 0.0))
+        forces[-1][n - 1] -= mpf(hand.stiffness)
         forces[-1][LOAD] += 1
         forces[0][2 * n if actuator else COMMAND] += 1
         self.force = forces[0].copy()
@@ -86,7 +88,7 @@ class Bodies:
             return [*rows, zero, zero, [mpf(j == size + SLOPE) for j in range(size)], zero]
 
         self.free, self.stuck = rates(free, False), rates(held, True)
-        self.begin = [mpf(device["position"])] * n + [mpf(device["velocity"])] * n + [mpf(0)] * (size - 2 * n)
+        self.begin = [mpf(device.position)] * n + [mpf(device.velocity)] * n + [mpf(0)] * (size - 2 * n)
 
 
 class Flow:

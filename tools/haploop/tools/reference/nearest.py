@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-import copy
 import hashlib
 import json
 import math
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
 from functools import cache
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from haploop.logger.verdict.measures import WINDOW_S
 from haploop.logger.verdict.verdict import SMALLEST_SWING_M
+from haploop.protocol.scene.scene import Hand, Scene
 from haploop.tools.trajectory import trajectory
 
 REFERENCES = Path(__file__).parent / "stored"
@@ -35,91 +35,89 @@ class Reference:
 
     Attributes:
         scene: its name.
-        x_m, v_m_s: position and velocity of body 0 at every tick and at the end, shape (ticks + 1,).
-        error_m: how far off they may be, the largest at any tick.
-        statistics: see ``statistics``.
-        pointwise: whether positions at a time can be compared; if not, the scene's swings can.
         how: how it was made and checked, a sentence.
         verdict: the word.
+        pointwise: whether positions at a time can be compared; if not, the scene's swings can.
+        error_m: how far off they may be, the largest at any tick.
+        statistics: see ``statistics``.
+        x_m, v_m_s: position and velocity of body 0 at every tick and at the end, shape (ticks + 1,).
     """
 
     scene: str
-    x_m: np.ndarray
-    v_m_s: np.ndarray
-    error_m: float
-    statistics: dict[str, float | None]
-    pointwise: bool
     how: str
     verdict: str
+    pointwise: bool
+    error_m: float
+    statistics: dict[str, float | None]
+    x_m: np.ndarray
+    v_m_s: np.ndarray
 
 
-def reference_for(scene_path: Path, scene: dict[str, Any]) -> Reference:
+def reference_for(scene_path: Path, scene: Scene) -> Reference:
     """Returns the stored reference of the problem that a resolved scene poses at any plant rate, or makes one."""
-    stored = _stored().get(problem_hash(scene))
-    return stored or made_now(scene_path.stem, scene)
+    return _stored().get(problem_hash(scene)) or made_now(scene_path.stem, scene)
 
 
-def problem_hash(scene: dict[str, Any]) -> str:
+def problem_hash(scene: Scene) -> str:
     """Returns the SHA-256 of a resolved scene without plant rate, integrator, title and ``[run]``."""
-    problem = {key: value for key, value in scene.items() if key not in _OF_THE_RUN}
-    problem["clock"] = {key: value for key, value in scene["clock"].items() if key not in _OF_THE_METHOD}
+    problem = {key: value for key, value in scene.as_dict().items() if key not in _OF_THE_RUN}
+    problem["clock"] = {key: value for key, value in problem["clock"].items() if key not in _OF_THE_METHOD}
     return hashlib.sha256(json.dumps(problem, sort_keys=True).encode()).hexdigest()
 
 
 @cache
 def _stored() -> dict[str, Reference]:
-    return {data.pop("problem"): _read(data) for data in map(_load, sorted(REFERENCES.glob("*.json")))}
+    found = {}
+    for path in sorted(REFERENCES.glob("*.json")):
+        kept = json.loads(path.read_text(encoding="utf-8"))
+        arrays = {name: np.array(kept[name]) for name in ("x_m", "v_m_s")}
+        found[kept["problem"]] = Reference(**{key.name: kept[key.name] for key in fields(Reference)} | arrays)
+    return found
 
 
-def _load(path: Path) -> dict[str, Any]:
-    return json.loads(path.read_text(encoding="utf-8"))
-
-
-def _read(data: dict[str, Any]) -> Reference:
-    arrays = {name: np.array(data[name]) for name in ("x_m", "v_m_s")}
-    rest = ("scene", "error_m", "statistics", "pointwise", "how", "verdict")
-    return Reference(**arrays, **{name: data[name] for name in rest})
-
-
-def made_now(name: str, scene: dict[str, Any]) -> Reference:
+def made_now(name: str, scene: Scene) -> Reference:
     """Runs the exact method at 100 kHz or above; its distance from half that rate is the error."""
-    rate = scene["clock"]["plant_rate"]
+    rate = scene.clock.plant_rate
     half = rate * max(1, math.ceil(_LEAST_RATE / 2 / rate))
     fine, coarse = (trajectory(exactly(scene, r)) for r in (2 * half, half))
-    apart = difference_m(fine.x_m, coarse.x_m)
-    pointwise = compares_pointwise(growths(scene, rate))
     how = (
         f"Made on the spot by the exact method at {2 * half / 1000:g} kHz; its error is how far the exact method "
         f"at {half / 1000:g} kHz is from it."
     )
-    if "jitter" in scene:
-        pointwise = False
+    if scene.jitter:
         how += " Jitter is drawn in whole plant steps, so every plant rate poses another problem."
-    figures = statistics(scene, fine.x_m, fine.v_m_s)
-    return Reference(name, fine.x_m, fine.v_m_s, apart, figures, pointwise, how, fine.summary["verdict"])
+    return Reference(
+        scene=name,
+        how=how,
+        verdict=fine.summary["verdict"],
+        pointwise=compares_pointwise(growths(scene, rate)) and not scene.jitter,
+        error_m=difference_m(fine.x_m, coarse.x_m),
+        statistics=statistics(scene, fine.x_m, fine.v_m_s),
+        x_m=fine.x_m,
+        v_m_s=fine.v_m_s,
+    )
 
 
-def exactly(scene: dict[str, Any], plant_rate: int) -> dict[str, Any]:
+def exactly(scene: Scene, plant_rate: int) -> Scene:
     """Returns the scene with the exact method at a plant rate."""
-    return {**scene, "clock": {**scene["clock"], "plant_rate": plant_rate, "integrator": "exact"}}
+    return replace(scene, clock=replace(scene.clock, plant_rate=plant_rate, integrator="exact"))
 
 
-def difference_m(x: Any, other: Any) -> float:
+def difference_m(x: Sequence[float] | np.ndarray, other: Sequence[float] | np.ndarray) -> float:
     """Returns the largest distance at any tick that both reached; infinite where only one got to the end."""
     if len(x) != len(other):
         return math.inf
     return float(np.abs(np.asarray(x) - np.asarray(other)).max())
 
 
-def growths(scene: dict[str, Any], plant_rate: int) -> dict[str, float]:
+def growths(scene: Scene, plant_rate: int) -> dict[str, float]:
     """Returns by each move of the start (m, as text) how many times as far apart the runs get at most."""
-    start = trajectory(exactly(scene, plant_rate))
+    exact = exactly(scene, plant_rate)
+    start = trajectory(exact)
     found = {}
     for move in MOVES_M:
-        moved = copy.deepcopy(scene)
-        moved["device"]["position"] += move
-        end = trajectory(exactly(moved, plant_rate))
-        found[f"{move:g}"] = difference_m(start.x_m, end.x_m) / abs(move)
+        moved = replace(exact, device=replace(exact.device, position=exact.device.position + move))
+        found[f"{move:g}"] = difference_m(start.x_m, trajectory(moved).x_m) / abs(move)
     return found
 
 
@@ -128,7 +126,7 @@ def compares_pointwise(growth: dict[str, float]) -> bool:
     return max(growth.values()) <= MOST_GROWTH
 
 
-def statistics(scene: dict[str, Any], x_m: np.ndarray, v_m_s: np.ndarray) -> dict[str, float | None]:
+def statistics(scene: Scene, x_m: np.ndarray, v_m_s: np.ndarray) -> dict[str, float | None]:
     """Measures the swings over the verdict's window: the last half second, or the second half of a shorter run.
 
     ``amplitude_m`` is half of peak to peak. ``frequency_Hz`` counts upward crossings of the mean, and
@@ -139,26 +137,27 @@ def statistics(scene: dict[str, Any], x_m: np.ndarray, v_m_s: np.ndarray) -> dic
     Args:
         x_m, v_m_s: of body 0 at every tick and at the end, shape (ticks + 1,).
     """
-    rate, ticks = scene["clock"]["control_rate"], len(x_m) - 1
+    rate, ticks = scene.clock.control_rate, len(x_m) - 1
     window = round(WINDOW_S * rate)
     first = ticks - (window if ticks >= window else ticks // 2)
     x, v = x_m[first:], v_m_s[first:]
     figures: dict[str, float | None] = {"amplitude_m": float(np.ptp(x)) / 2.0}
     offset = x - x.mean()
     below = np.flatnonzero((offset[:-1] < 0.0) & (offset[1:] >= 0.0))
-    smallest = max(scene.get("encoder", {}).get("resolution", 0.0), SMALLEST_SWING_M)
+    smallest = max(scene.encoder.resolution if scene.encoder else 0.0, SMALLEST_SWING_M)
     if len(below) < 2 or not np.ptp(x) > 2.0 * smallest:
         return figures | {"frequency_Hz": None, "energy_per_cycle_J": None}
     crossings = below + offset[below] / (offset[below] - offset[below + 1])
     period_s = float(crossings[-1] - crossings[0]) / (len(crossings) - 1) / rate
     inside = v[below[0] + 1 : below[-1] + 1]
-    power = _damping(scene) * inside**2 + scene.get("friction", {}).get("kinetic", 0.0) * np.abs(inside)
+    kinetic_N = scene.friction.kinetic if scene.friction else 0.0
+    power = _damping(scene) * inside**2 + kinetic_N * np.abs(inside)
     return figures | {"frequency_Hz": 1.0 / period_s, "energy_per_cycle_J": float(power.mean()) * period_s}
 
 
-def _damping(scene: dict[str, Any]) -> float:
+def _damping(scene: Scene) -> float:
     """Returns the damping between body 0 and ground, N s/m."""
-    if "transmission" in scene:
-        return scene["transmission"]["motor_damping"]
-    hand = scene.get("hand", {})
-    return scene["device"]["damping"] + (0.0 if "grip" in hand else hand.get("damping", 0.0))
+    if scene.transmission:
+        return scene.transmission.motor_damping
+    hand = scene.hand or Hand()
+    return scene.device.damping + (0.0 if hand.grip else hand.damping)

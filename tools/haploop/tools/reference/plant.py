@@ -11,6 +11,7 @@ import numpy as np
 from mpmath import mp, mpf
 from scipy.integrate import solve_ivp
 
+from haploop.protocol.scene.scene import Scene
 from haploop.tools.reference.bodies import COMMAND, FRICTION, LOAD, SLOPE, Bodies, Flow, Row, fastest_rate, sign_changes
 
 # Pieces in which a switch is looked for are no longer than this part of the fastest time constant or radian ...
@@ -37,15 +38,14 @@ class StickSlipPlant(ABC, Generic[Vector]):
         is_stuck: whether body 0 is held by friction.
     """
 
-    def __init__(self, scene: dict[str, Any], bodies: Bodies, w: Vector, number: Any) -> None:
-        friction = scene.get("friction")
+    def __init__(self, scene: Scene, bodies: Bodies, w: Vector, number: Any) -> None:
         self.w: Vector = w
         self.is_stuck = False
         self._bodies, self._v, self._direction = bodies, bodies.count, 0
-        self._has_friction = bool(friction)
-        if friction:
-            self._kinetic = number(friction["kinetic"])
-            self._breakaway = number(friction.get("breakaway", friction["kinetic"]))
+        self._has_friction = scene.friction is not None
+        if scene.friction:
+            kinetic, breakaway = scene.friction.kinetic, scene.friction.breakaway
+            self._kinetic, self._breakaway = number(kinetic), number(kinetic if breakaway is None else breakaway)
 
     @abstractmethod
     def _force(self) -> Any:
@@ -99,7 +99,7 @@ class ContinuousPlant(StickSlipPlant[Row]):
         period_s: one tick, as an exact number.
     """
 
-    def __init__(self, scene: dict[str, Any], period_s: Any) -> None:
+    def __init__(self, scene: Scene, period_s: Any) -> None:
         bodies = Bodies(scene)
         super().__init__(scene, bodies, list(bodies.begin), mpf)
         self._period_s, self._parts, self.switches = period_s, 1, 0
@@ -160,7 +160,7 @@ class IntegratedPlant(StickSlipPlant[np.ndarray]):
         scene, period_s: as of ``ContinuousPlant``.
     """
 
-    def __init__(self, scene: dict[str, Any], period_s: Any) -> None:
+    def __init__(self, scene: Scene, period_s: Any) -> None:
         bodies = Bodies(scene)
         relative, absolute = _coordinates(bodies.count, len(bodies.begin))
         super().__init__(scene, bodies, _floats(relative * mp.matrix(bodies.begin))[:, 0], float)
