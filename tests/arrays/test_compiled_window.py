@@ -39,7 +39,7 @@ def test_windows_read_by_a_program_show_what_they_show_by_themselves() -> None:
             by_program = list(window.measures(range(16)))
         for one, other in zip(by_itself, by_program, strict=True):
             assert (one.window.touched, one.window.crossings) == (other.window.touched, other.window.crossings)
-            assert agree(one.window.figures, other.window.figures, 1e-9)
+            assert agree(one.window.figures._asdict(), other.window.figures._asdict(), 1e-9)
             assert one.window.growth == pytest.approx(other.window.growth, rel=1e-9)
             assert (one.extremes, one.swing_m) == (other.extremes, other.swing_m)
         assert any(one.window.crossings > 3 for one in by_itself)

@@ -35,9 +35,9 @@ def judged(x_of_t, seconds: float = 1.0, resolution: float = 0.0, pieces: int = 
 def test_a_device_at_rest_in_the_wall_is_steady_and_shows_the_stiffness_of_the_wall():
     word, figures, extremes = judged(lambda t: np.full_like(t, -0.061))
     assert word == "steady"
-    assert figures["oscillation_m"] == 0.0
-    assert figures["outside_fraction"] == 0.0
-    assert figures["displayed_stiffness_N_m"] == pytest.approx(100.0)
+    assert figures.oscillation_m == 0.0
+    assert figures.outside_fraction == 0.0
+    assert figures.displayed_stiffness_N_m == pytest.approx(100.0)
     assert (extremes.x_min_m, extremes.x_max_m) == (-0.061, -0.061)
     assert extremes.force_max_N == pytest.approx(0.1)
 
@@ -46,7 +46,7 @@ def test_a_device_at_rest_in_the_wall_is_steady_and_shows_the_stiffness_of_the_w
 def test_a_swing_that_goes_on_is_a_limit_cycle_and_its_width_is_the_oscillation(hz):
     word, figures, _ = judged(lambda t: -0.061 + 1e-3 * np.sin(2 * math.pi * hz * t))
     assert word == "limit-cycle"
-    assert figures["oscillation_m"] == pytest.approx(2e-3, rel=1e-3)
+    assert figures.oscillation_m == pytest.approx(2e-3, rel=1e-3)
 
 
 def test_a_swing_that_dies_away_is_steady():
@@ -69,8 +69,8 @@ def test_swings_within_one_encoder_step_either_way_do_not_count():
 def test_a_device_that_has_left_for_good_is_not_called_steady():
     word, figures, _ = judged(lambda t: -0.061 + 0.1 * np.maximum(0, t - 0.3))
     assert word == "no-contact"
-    assert figures["outside_fraction"] == 1.0
-    assert figures["displayed_stiffness_N_m"] is None
+    assert figures.outside_fraction == 1.0
+    assert figures.displayed_stiffness_N_m is None
 
 
 def test_a_plant_that_ended_by_itself_has_diverged_whatever_the_window_shows():
@@ -80,16 +80,16 @@ def test_a_plant_that_ended_by_itself_has_diverged_whatever_the_window_shows():
 @pytest.mark.parametrize(("seconds", "start"), [(2.0, 1.5), (0.5, 0.0), (0.6, 0.1), (0.4, 0.2), (0.001, 0.0005)])
 def test_the_window_is_the_last_half_second_or_the_second_half_of_a_shorter_run(seconds, start):
     _, figures, _ = judged(lambda t: -0.061 + 1e-3 * t, seconds, pieces=1 if seconds < 0.01 else 7)
-    assert figures["from_s"] == pytest.approx(start)
-    assert figures["oscillation_m"] == pytest.approx(1e-3 * (seconds - start), rel=1e-6)
+    assert figures.from_s == pytest.approx(start)
+    assert figures.oscillation_m == pytest.approx(1e-3 * (seconds - start), rel=1e-6)
 
 
 @pytest.mark.parametrize("rate", [-3.0, 0.0, 2.0])
 def test_the_rate_at_which_swings_grow_is_that_of_their_envelope(rate):
     """Within 0.1 / s: the halves of the window hold no whole number of swings."""
     figures = judged(lambda t: -0.061 + 1e-3 * np.exp(rate * (t - 1.0)) * np.sin(2000 * t), 1.0)[1]
-    assert figures["growth_1_s"] == pytest.approx(rate, abs=0.1)
-    assert judged(lambda t: -0.061 + 1e-3 * t, 1.0)[1]["growth_1_s"] is None
+    assert figures.growth_1_s == pytest.approx(rate, abs=0.1)
+    assert judged(lambda t: -0.061 + 1e-3 * t, 1.0)[1].growth_1_s is None
 
 
 @pytest.mark.parametrize("pieces", [1, 3, 100])
@@ -107,7 +107,7 @@ def test_a_position_on_the_face_but_for_rounding_counts_for_no_stiffness():
     rows = {"x": x[:-1:N], "total": np.full(600, 0.3), "in_contact": np.ones(600), "wall_position": np.full(600, WALL)}
     window.add(x[:, None], np.zeros((6000, 1)), {name: column[:, None] for name, column in rows.items()})
     (measures,) = window.measures()
-    assert measures.window.figures["displayed_stiffness_N_m"] is None
+    assert measures.window.figures.displayed_stiffness_N_m is None
 
 
 def test_crossings_are_counted_from_beyond_one_side_to_beyond_the_other():

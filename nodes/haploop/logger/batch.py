@@ -11,7 +11,7 @@ import numpy as np
 
 from haploop.logger.books.books import Books
 from haploop.logger.books.buffers import Commanded
-from haploop.logger.summary import energy, finite, outcome
+from haploop.logger.summary import Account, energy, finite, note_accounts, outcome
 from haploop.logger.verdict.window import CONTROLLER_COLUMNS, Window
 from haploop.protocol.arrays import rows_of
 from haploop.protocol.ticks import Timebase
@@ -81,7 +81,7 @@ class BatchLogger:
         self.books = Books(scene, time, members) if energy else None
         self.window = Window(time, scene.get("encoder", {}).get("resolution", 0.0), members)
         self.rows: list[Row] = []
-        self._accounts: dict[int, dict[str, Any]] = {}
+        self._accounts: dict[int, Account] = {}
         self._trajectories = Trajectories(members) if trajectories else None
         self.tick = 0
 
@@ -130,8 +130,7 @@ class BatchLogger:
 
     def note_accounts(self, elements: Sequence[dict[str, Any]]) -> None:
         """Takes note that these elements have been at work up to ``tick``."""
-        for element in elements:
-            self._accounts.setdefault(element["book"], dict(element))["to_tick"] = self.tick
+        note_accounts(self._accounts, elements, self.tick)
 
     def outcomes(self, ends: Sequence[MemberEnd], ended: str, counted: dict[str, Any]) -> Iterator[dict[str, Any]]:
         """Yields the entries of the summary of each of these members but for the machine's, as they stand now.
@@ -170,7 +169,7 @@ class BatchLogger:
         if not self.books or not ends:
             return [{} for _ in ends]
         accounts = tree_take([*self._accounts.values()], places)
-        entry = energy(tree_take(self.books.state, places), accounts, "wall" in ends[0].scene)
+        entry = energy(tree_take(self.books.state, places), accounts, ends[0].scene.wall is not None)
         entries = tree_by_member({"energy": entry}, len(places))
         return entries if _is_finite(entry) else [finite(entry) for entry in entries]
 

@@ -4,21 +4,24 @@ from __future__ import annotations
 
 import hashlib
 import time as wall_clock
+from bisect import insort
+from collections import Counter
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 
 from haploop.logger.books.books import Books, moved_J, residual_J
 from haploop.logger.books.buffers import ControllerBuffer, PlantBuffer
 from haploop.logger.log.channels import Channels, motion_columns
-from haploop.logger.summary import summary
-from haploop.logger.verdict.verdict import RunMeasures
+from haploop.logger.summary import Account, Summary, energy, note_accounts, outcome, versions
+from haploop.logger.verdict.measures import RunMeasures
 from haploop.logger.verdict.window import CONTROLLER_COLUMNS, Window
 from haploop.plant.counters import COUNTERS
+from haploop.protocol.changes import Event
+from haploop.protocol.scene.scene import Scene
+from haploop.protocol.telemetry import Block
 from haploop.protocol.ticks import Timebase
-
-Block = dict[str, Any]
+from haploop.protocol.wire import Message
 
 
 class Logger:
@@ -34,16 +37,15 @@ class Logger:
         booked: called with the first of some ticks and the running books at each, name -> array, once they are booked.
     """
 
-    def __init__(self, scene: dict[str, Any], time: Timebase, channels: Channels | None) -> None:
+    def __init__(self, scene: Scene, time: Timebase, channels: Channels | None) -> None:
         self._scene, self.time, self._channels = scene, time, channels
         self.books = Books(scene, time)
-        resolution = scene.get("encoder", {}).get("resolution", 0.0)
-        self.window = Window(time, resolution)
+        self.window = Window(time, scene.encoder.resolution if scene.encoder else 0.0)
         self._measures: RunMeasures | None = None
         self._into_wall = 0.0
-        self._accounts: dict[int, dict[str, Any]] = {}
-        self._events: list[tuple[int, dict[str, Any]]] = []
-        self._counted: dict[str, int] = {}
+        self._accounts: dict[int, Account] = {}
+        self._events: list[tuple[int, Event]] = []
+        self._counted: Counter[str] = Counter()
         self._digest = hashlib.sha256()
         self.booked: Callable[[int, dict[str, np.ndarray]], object] = lambda first, books: None
         self.tick = self._first_tick = 0
@@ -60,8 +62,7 @@ class Logger:
         self._plant = PlantBuffer(self.time.steps_per_tick, int(plant["tick"]))
         self._controller = ControllerBuffer(history[0]["from_tick"] if history else self.tick)
         for block in history:
-            self._controller.add(block)
-            self._note_accounts(block)
+            self._buffer(block)
         self._end_state = {name: np.array([plant[name]]) for name in ("x", "v", "force")}
         self._started = False
 
@@ -72,16 +73,19 @@ class Logger:
 
     def controller_block(self, block: Block) -> None:
         """Takes a block of the controller."""
-        self._controller.add(block)
-        self._note_accounts(block)
+        self._buffer(block)
         if self._channels:
             self._channels.controller(block)
         self._book_common()
 
-    def event(self, tick: int, event: dict[str, Any]) -> None:
+    def _buffer(self, block: Block) -> None:
+        self._controller.add(block)
+        self._into_wall = block["wall"]["into_wall"]
+        note_accounts(self._accounts, block["elements"], block["from_tick"] + block["ticks"])
+
+    def event(self, tick: int, event: Event) -> None:
         """Takes note of something that changes the run at ``tick``; it is logged once the books get there."""
-        self._events.append((tick, event))
-        self._events.sort(key=lambda item: item[0])
+        insort(self._events, (tick, event), key=lambda item: item[0])
         self._log_events()
 
     def _log_events(self) -> None:
@@ -89,12 +93,6 @@ class Logger:
             tick, event = self._events.pop(0)
             if self._channels:
                 self._channels.event(tick, event)
-
-    def _note_accounts(self, block: Block) -> None:
-        self._into_wall = block["wall"]["into_wall"]
-        end = block["from_tick"] + block["ticks"]
-        for element in block["elements"]:
-            self._accounts.setdefault(element["book"], dict(element))["to_tick"] = end
 
     def _book_common(self) -> None:
         """Books the intervals of which both sides are known, block by block of the controller.
@@ -112,25 +110,23 @@ class Logger:
         """Books the intervals before ``end``."""
         if self._plant.tick < self.tick:
             self._plant.take(self.tick)
-        plant = self._plant.take(end)
-        x, v, force = plant["x"], plant["v"], plant["force"]
+        plant, controller = self._plant.take(end), self._controller
+        states = np.stack([plant["x"], plant["v"]], axis=1)
         if not self._started:
             self.books.start(plant)
-            self._digest.update(np.stack([x[:1], v[:1]], axis=1).tobytes())
+            self._digest.update(states[:1].tobytes())
             self._started = True
-        controller = self._controller
         rows = self.books.book(self.tick, plant, controller.commanded(self.tick, end, self._into_wall))
         columns = {name: controller.rows(name, self.tick, end)[:, None] for name in CONTROLLER_COLUMNS}
-        self.window.add(x[:, None], force[:-1, None], columns)
+        self.window.add(plant["x"][:, None], plant["force"][:-1, None], columns)
         self._measures = None
-        self._digest.update(np.stack([x[1:], v[1:]], axis=1).tobytes())
+        self._digest.update(states[1:].tobytes())
         for name in plant.keys() & COUNTERS:
-            self._counted[name] = self._counted.get(name, 0) + int(plant[name][-1] - plant[name][0])
-        motion = motion_columns(plant)
-        first, books = self.tick, self._named(rows)
+            self._counted[name] += int(plant[name][-1] - plant[name][0])
+        motion, first, books = motion_columns(plant), self.tick, self._named(rows)
         self._end_state = {name: column[-1:] for name, column in motion.items()}
         if self._channels:
-            self._channels.plant(self.tick, end - self.tick, motion)
+            self._channels.plant(first, end - first, motion)
             self._channels.energy(first, books)
         self.tick = end
         self.booked(first, books)
@@ -146,11 +142,11 @@ class Logger:
         book, dot, side = name.partition(".")
         if not book.isdigit():
             return name
-        kind = self._accounts[int(book)]["kind"]
-        same = [b for b in sorted(self._accounts) if self._accounts[b]["kind"] == kind]
-        return f"{kind}{f'-{same.index(int(book)) + 1}' if same[0] != int(book) else ''}{dot}{side}"
+        kind = self._accounts[int(book)].kind
+        number = [known for known in sorted(self._accounts) if self._accounts[known].kind == kind].index(int(book)) + 1
+        return f"{kind}{f'-{number}' if number > 1 else ''}{dot}{side}"
 
-    def summary(self, ended: str, why: str, diverged: str | None, telemetry_gaps: int) -> dict[str, Any]:
+    def summary(self, ended: str, why: str, diverged: str | None, telemetry_gaps: int) -> Summary:
         """Returns the summary of what was booked so far.
 
         Args:
@@ -159,38 +155,36 @@ class Logger:
             diverged: why the plant ended by itself, or None.
             telemetry_gaps: ticks whose telemetry did not come.
         """
-        ticks = self.tick - self._first_tick
-        ran = {
-            "duration_s": ticks / self.time.control_rate,
+        ticks, wall_s = self.tick - self._first_tick, wall_clock.perf_counter() - self._began
+        duration_s = ticks / self.time.control_rate
+        ran: Summary = {
+            "duration_s": duration_s,
             "ticks": ticks,
             "steps": ticks * self.time.steps_per_tick,
             "from_tick": self._first_tick,
             "ended": ended,
             "why": why,
-            "wall_s": wall_clock.perf_counter() - self._began,
             "final": {"x_m": float(self._end_state["x"][0]), "v_m_s": float(self._end_state["v"][0])},
-            **self._counts(telemetry_gaps),
-            "trajectory_sha256": self._digest.hexdigest(),
+            "lost": {"commands_dropped": 0, "commands_lost": 0, "telemetry_gaps": telemetry_gaps},
         }
-        return summary(self._scene, ran, self._measured(), self.books.state, self._covered_accounts(), diverged)
-
-    def _counts(self, telemetry_gaps: int) -> dict[str, dict[str, int]]:
-        """Returns counts of what was lost, and of the scene's effects, by entry of the summary."""
-        entries = {"lost": {"commands_dropped": 0, "commands_lost": 0, "telemetry_gaps": telemetry_gaps}}
         for name in COUNTERS:
             if name in self._counted:
                 entry, _, what = name.partition(".")
-                entries.setdefault(entry, {})[what] = self._counted[name]
-        return entries
-
-    def _covered_accounts(self) -> list[dict[str, Any]]:
-        """Returns every element of which anything was booked, with the ticks that were."""
-        booked = set(self.books.names)
-        return [
-            {**a, "from_tick": max(a["from_tick"], self._first_tick), "to_tick": min(a["to_tick"], self.tick)}
+                ran.setdefault(entry, {})[what] = self._counted[name]
+        ran |= {
+            "trajectory_sha256": self._digest.hexdigest(),
+            "versions": versions(),
+            "wall_s": wall_s,
+            "real_time_factor": duration_s / wall_s if wall_s else 0.0,
+        }
+        books = self.books.state
+        accounts = [
+            a._replace(from_tick=max(a.from_tick, self._first_tick), to_tick=min(a.to_tick, self.tick))
             for a in self._accounts.values()
-            if f"{a['book']}.true" in booked
+            if f"{a.book}.true" in books.names
         ]
+        has_wall = self._scene.wall is not None
+        return outcome(self._scene, ran, self._measured(), diverged) | {"energy": energy(books, accounts, has_wall)}
 
     def _measured(self) -> RunMeasures:
         """Returns the measures of the run as it stands, worked out once."""
@@ -198,20 +192,20 @@ class Logger:
             (self._measures,) = self.window.measures()
         return self._measures
 
-    def status(self) -> dict[str, Any]:
+    def status(self) -> Message:
         """Returns where the run is and its measures, for progress lines and viewers."""
-        if not self.tick - self._first_tick:
+        if self.tick == self._first_tick:
             return {}
-        measures = self._measured()
+        measures, books = self._measured(), self.books.state
         verdict, figures = measures.verdict(None), measures.window.figures
         return {
             "t_s": self.tick / self.time.control_rate,
             "verdict": verdict.word,
             "verdict_rule": verdict.rule,
-            "oscillation_m": figures["oscillation_m"],
-            "displayed_stiffness_N_m": figures["displayed_stiffness_N_m"],
-            "residual_J": residual_J(self.books.state),
-            "moved_J": moved_J(self.books.state),
+            "oscillation_m": figures.oscillation_m,
+            "displayed_stiffness_N_m": figures.displayed_stiffness_N_m,
+            "residual_J": residual_J(books),
+            "moved_J": moved_J(books),
         }
 
     def end(self) -> None:

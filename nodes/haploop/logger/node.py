@@ -6,14 +6,14 @@ import contextlib
 import time as wall_clock
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import zmq
 
 from haploop.logger.books.buffers import TelemetryGap
 from haploop.logger.log import LogError
-from haploop.logger.session import LogSession, open_session
+from haploop.logger.session import open_session
+from haploop.logger.summary import Summary
 from haploop.protocol.clock_client import REPORT_MS, Aborted, ClockClient
 from haploop.protocol.node import NodeError, run_node
 from haploop.protocol.processes import PROCESSES
@@ -21,8 +21,10 @@ from haploop.protocol.scene.scene import Scene
 from haploop.protocol.sockets import bind
 from haploop.protocol.telemetry import Publisher, Subscriber
 from haploop.protocol.ticks import Timebase
+from haploop.protocol.wire import Frame, Message
 
 ROLE = "logger"
+_LISTENS = ("plant", "controller")
 # How often books go out to viewers and the verdict is judged anew, at most.
 _STATUS_S = 0.1
 
@@ -31,6 +33,13 @@ class LoggerNode:
     """Takes every block there is; its progress bounds how far the loop may run ahead.
 
     The run's own logger is one; any number of others may join later, each with a directory of its own.
+
+    Args:
+        leave: asked at every turn: None to stay, why it is no use to stay, or "" to go in order.
+
+    Attributes:
+        out: directory of log and summary.
+        session: the logger and its files.
     """
 
     def __init__(
@@ -40,29 +49,29 @@ class LoggerNode:
         publisher: Publisher | None,
         leave: Callable[[], str | None] = lambda: None,
     ) -> None:
-        """``leave`` is asked at every turn: None to stay, why it is no use to stay, or "" to go in order."""
         self._client, self._context, self._publisher, self._leave = client, context, publisher, leave
         self._ended: dict[str, tuple[int, str, str | None]] = {}
-        self._status: dict[str, Any] = {}
+        self._status: Message = {}
         self._status_due = 0.0
         self._judged_at = 0
         self._started = False
 
-    def start(self, welcome: dict[str, Any], out: Path) -> None:
+    @property
+    def _tick(self) -> int:
+        return self.session.logger.tick
+
+    def start(self, welcome: Message, out: Path) -> None:
         """Subscribes to plant and controller, takes their state, and reports to be ready."""
         self.out = out
-        endpoints = welcome["endpoints"]
-        self._streams = Subscriber(
-            self._context, {role: endpoints[role]["telemetry"] for role in ("plant", "controller")}
-        )
-        time = Timebase(**welcome["timebase"])
-        self.session: LogSession = open_session(
-            Scene.from_dict(welcome["scene"]), time, out, welcome["context"].get("attachments", {})
-        )
+        addresses = {role: welcome["endpoints"][role]["telemetry"] for role in _LISTENS}
+        self._streams = Subscriber(self._context, addresses)
+        attachments = welcome["context"].get("attachments", {})
+        scene, time = Scene.from_dict(welcome["scene"]), Timebase(**welcome["timebase"])
+        self.session = open_session(scene, time, out, attachments)
         self.session.logger.booked = self._publish_energy
-        states: dict[str, dict[str, Any]] = {}
+        states: dict[str, Message] = {}
         early = []
-        while len(states) < 2:
+        while len(states) < len(_LISTENS):
             received = self._streams.receive(REPORT_MS)
             for role, frame in received:
                 if frame.name == "STATE":
@@ -78,29 +87,28 @@ class LoggerNode:
         self._started = True
         for role, frame in early:
             self._take(role, frame)
-        self._client.ready(self.session.logger.tick)
+        self._client.ready(self._tick)
 
-    def run(self) -> tuple[int, dict[str, Any]]:
+    def run(self) -> tuple[int, Summary]:
         """Takes blocks until plant and controller have ended, then closes the log and writes the summary."""
         poller = zmq.Poller()
         poller.register(self._client.socket, zmq.POLLIN)
         self._streams.register(poller)
         reported = -1
-        while len(self._ended) < 2 or not self._client.last:  # the last grant brings the last events
+        while len(self._ended) < len(_LISTENS) or not self._client.last:  # the last grant brings the last events
             idle = not poller.poll(REPORT_MS)
             if not self._client.until:  # the run has not begun
                 self.session.logger.count_wall_time()
             if idle:
-                self._client.waiting(self.session.logger.tick, "plant")
+                self._client.waiting(self._tick, "plant")
             self._drain()
             self._client.poll()
             self._note_events()
             if (why := self._leave()) is not None:
                 return self.finish(why)
-            tick = self.session.logger.tick
-            if tick != reported or (idle and tick != self._judged_at):
-                self._report(tick)
-                reported = tick
+            if self._tick != reported or (idle and self._tick != self._judged_at):
+                reported = self._tick
+                self._report(reported)
             if self._publisher:
                 self._publisher.serve()
             self.session.flush_when_due()
@@ -110,7 +118,7 @@ class LoggerNode:
         for role, frame in self._streams.drain():
             self._take(role, frame)
 
-    def _take(self, role: str, frame: Any) -> None:
+    def _take(self, role: str, frame: Frame) -> None:
         if frame.name == "PLANT_BLOCK":
             self.session.logger.plant_block(frame.as_dict())
         elif frame.name == "CONTROLLER_BLOCK":
@@ -125,19 +133,19 @@ class LoggerNode:
 
     def _report(self, tick: int) -> None:
         now = wall_clock.monotonic()
-        if now >= self._status_due:
-            self._status_due = now + _STATUS_S
-            self._status, self._judged_at = self.session.logger.status(), tick
-            self._client.progress(tick, self._status)
-        else:
+        if now < self._status_due:
             self._client.progress(tick)
+            return
+        self._status_due = now + _STATUS_S
+        self._status, self._judged_at = self.session.logger.status(), tick
+        self._client.progress(tick, self._status)
 
     def _publish_energy(self, first: int, books: dict[str, np.ndarray]) -> None:
         if self._publisher and self._publisher.subscribed:
             columns = {name: column.tobytes() for name, column in books.items()}
-            self._publisher.publish("ENERGY_BLOCK", first, self.session.logger.tick - first, columns, self._status)
+            self._publisher.publish("ENERGY_BLOCK", first, self._tick - first, columns, self._status)
 
-    def save(self, failed: str) -> dict[str, Any] | None:
+    def save(self, failed: str) -> Summary | None:
         """Finishes because of what ``failed`` says, with the blocks that have come; None if nothing has begun."""
         if not self._started:
             return None
@@ -145,7 +153,7 @@ class LoggerNode:
             self._drain()
         return self.finish(failed)[1]
 
-    def finish(self, failed: str) -> tuple[int, dict[str, Any]]:
+    def finish(self, failed: str) -> tuple[int, Summary]:
         """Closes the log and writes the summary of what ran; ``failed`` says why it ended early, if it did."""
         self._note_events()
         self._streams.close()
@@ -153,18 +161,14 @@ class LoggerNode:
         trouble = next((trouble for _, _, trouble in self._ended.values() if trouble), None)
         result = self.session.close(failed, reason, trouble, sum(self._streams.gaps.values()))
         if self._publisher:
-            self._publisher.publish("END", self.session.logger.tick, reason or "", trouble)
-        return self.session.logger.tick, result
+            self._publisher.publish("END", self._tick, reason or "", trouble)
+        return self._tick, result
 
 
-def work(client: ClockClient, context: zmq.Context[zmq.Socket[bytes]], directory: Path) -> tuple[int, dict[str, Any]]:
+def work(client: ClockClient, context: zmq.Context[zmq.Socket[bytes]], directory: Path) -> tuple[int, Summary]:
     """Runs the run's own logger."""
     node: LoggerNode
-
-    def state() -> tuple[int, dict[str, Any]]:
-        return node.session.logger.tick, node.session.logger.status()
-
-    publisher = Publisher(context, ROLE, state)
+    publisher = Publisher(context, ROLE, lambda: (node.session.logger.tick, node.session.logger.status()))
     address = bind(publisher.socket, directory, PROCESSES[ROLE].binds["telemetry"])
     welcome = client.join({"telemetry": address})
     node = LoggerNode(client, context, publisher)

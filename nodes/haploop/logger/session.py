@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import time as wall_clock
 from pathlib import Path
-from typing import Any
 
-from haploop.logger import summary as summaries
 from haploop.logger.log import LogError
 from haploop.logger.log.channels import Channels
 from haploop.logger.log.recording import MemoryLog
 from haploop.logger.log.writer import Log
 from haploop.logger.logger import Logger
+from haploop.logger.summary import Summary, finite, write
+from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
 
 LOG, SUMMARY = "log.mcap", "summary.json"
@@ -34,7 +34,7 @@ class LogSession:
             self._log.flush()
             self._flush_due = now + _FLUSH_S
 
-    def close(self, failed: str, reason: str | None, trouble: str | None, telemetry_gaps: int) -> dict[str, Any]:
+    def close(self, failed: str, reason: str | None, trouble: str | None, telemetry_gaps: int) -> Summary:
         """Writes the end state, closes the log and writes the summary; returns the summary.
 
         Args:
@@ -53,18 +53,14 @@ class LogSession:
         result = logger.summary(ended, failed or diverged or "", diverged, telemetry_gaps)
         if self._out:
             try:
-                summaries.write(result, self._out / SUMMARY)
+                write(result, self._out / SUMMARY)
             except OSError as error:
                 raise LogError(f"The summary {self._out / SUMMARY} could not be written: {error.strerror}.") from error
-        return summaries.finite(result)
+        return finite(result)
 
 
 def open_session(
-    scene: dict[str, Any],
-    time: Timebase,
-    out: Path | None,
-    attachments: dict[str, str],
-    memory: MemoryLog | None = None,
+    scene: Scene, time: Timebase, out: Path | None, attachments: dict[str, str], memory: MemoryLog | None = None
 ) -> LogSession:
     """Makes a logger with its files in directory ``out``, or without any when None.
 
@@ -76,7 +72,7 @@ def open_session(
     Raises:
         LogError: the log cannot be made.
     """
-    detail = scene["run"]["log"]
+    detail = scene.run.log
     log = None if detail == "none" else Log(out / LOG) if out else memory
     if log is None:
         return LogSession(Logger(scene, time, None), None, out)

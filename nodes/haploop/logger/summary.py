@@ -6,18 +6,38 @@ import contextlib
 import json
 import math
 import platform
+from collections.abc import Iterable, Sequence
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from haploop.logger.books.books import BooksState, moved_J, residual_J, stored_J, total_J
-from haploop.logger.verdict.verdict import RunMeasures
+from haploop.logger.verdict.measures import RunMeasures
+from haploop.protocol.scene.scene import Scene
+from haploop.protocol.telemetry import Block
 
-# A summary as summary.json holds it.
+# A summary as summary.json holds it, or an entry of it.
 Summary = dict[str, Any]
 # Entries that differ between two runs of the same scene.
 OF_THE_MACHINE = ("wall_s", "real_time_factor", "versions")
 _FINITE = (str, int, bool)
+
+
+class Account(NamedTuple):
+    """The book of one element with one set of parameters, at work from ``from_tick`` up to ``to_tick``."""
+
+    book: int
+    kind: str
+    parameters: dict[str, Any]
+    from_tick: int
+    to_tick: int
+
+
+def note_accounts(accounts: dict[int, Account], elements: Iterable[Block], to_tick: int) -> None:
+    """Notes by book that these elements, as telemetry describes them, have been at work up to a tick."""
+    for element in elements:
+        known = accounts.get(element["book"]) or Account(**element, to_tick=to_tick)
+        accounts[known.book] = known._replace(to_tick=to_tick)
 
 
 def versions() -> dict[str, str]:
@@ -26,79 +46,60 @@ def versions() -> dict[str, str]:
     return {**packages, "python": platform.python_version()}
 
 
-def energy(books: BooksState, accounts: list[dict[str, Any]], has_wall: bool) -> dict[str, Any]:
+def energy(books: BooksState, accounts: Sequence[Account], has_wall: bool) -> Summary:
     """Returns the ``energy`` entry: every book as it stands; arrays over the members where the books are of a batch.
 
     The wall's leak is its true book less what an ideal spring would hold now (``ideal_J``, against the start), but for
     what changes of the wall in contact put into that spring (``changes_J``).
     """
 
-    def total(name: str) -> Any:
-        return total_J(books, name)
+    def pair(account: str | int) -> Summary:
+        return {f"{side}_J": total_J(books, f"{account}.{side}") for side in ("sampled", "true")}
 
-    elements = []
-    for account in accounts:
-        pair = {"sampled_J": total(f"{account['book']}.sampled"), "true_J": total(f"{account['book']}.true")}
-        elements.append({key: value for key, value in account.items() if key != "book"} | pair)
-    wall: dict[str, Any] = {"sampled_J": total("wall.sampled"), "true_J": total("wall.true")}
+    wall = pair("wall")
     if has_wall:
-        steps = [total("ideal"), total("sampled_and_held"), total("quantised"), wall["true_J"]]
+        steps = [*(total_J(books, name) for name in ("ideal", "sampled_and_held", "quantised")), wall["true_J"]]
         causes = ("sampling_and_hold_J", "quantisation_J", "delay_J")
         parts = {cause: after - before for cause, before, after in zip(causes, steps[:-1], steps[1:], strict=True)}
         wall |= {"ideal_J": steps[0] + books.wall_changes_J, "changes_J": books.wall_changes_J}
         wall |= {"leak": {"total_J": steps[-1] - steps[0], **parts}}
     beside = [name for name in books.names if name.endswith(("_heat", "_work")) or name == "actuator"]
-    plants = {f"{name}_J": total(name) for name in beside if name != "hand_work"}
     return {
-        "elements": elements,
+        "elements": [
+            {"kind": kind, "parameters": parameters, "from_tick": first, "to_tick": end, **pair(book)}
+            for book, kind, parameters, first, end in accounts
+        ],
         "wall": wall,
-        "hand_work_J": total("hand_work"),
-        **plants,
+        "hand_work_J": total_J(books, "hand_work"),
+        **{f"{name}_J": total_J(books, name) for name in beside if name != "hand_work"},
         "stored_J": stored_J(books),
         "moved_J": moved_J(books),
         "residual_J": residual_J(books),
     }
 
 
-def summary(
-    scene: dict[str, Any],
-    ran: dict[str, Any],
-    measures: RunMeasures,
-    books: BooksState,
-    accounts: list[dict[str, Any]],
-    diverged: str | None,
-) -> dict[str, Any]:
-    """Returns all entries of ``summary.json``.
+def outcome(scene: Scene, ran: Summary, measures: RunMeasures, diverged: str | None) -> Summary:
+    """Returns the entries of ``summary.json`` but for energies: what was run, the verdict and what it rests on.
 
     Args:
-        scene: the resolved scene.
-        ran: entries on the run: duration_s, ticks, steps, wall_s, ended, final, lost and what else was counted,
-            trajectory_sha256.
-        measures, books: as they stand at the end.
-        accounts: every element's book: kind, parameters, from_tick, to_tick.
+        scene: that was run, resolved.
+        ran: duration_s, ticks, steps, ended, final, lost and what else was counted, trajectory_sha256.
+        measures: as they stand at the end.
         diverged: why the plant ended by itself, or None.
     """
-    wall_s = ran.pop("wall_s")
-    factor = ran["duration_s"] / wall_s if wall_s else 0.0
-    ran |= {"versions": versions(), "wall_s": wall_s, "real_time_factor": factor}
-    return outcome(scene, ran, measures, diverged) | {"energy": energy(books, accounts, "wall" in scene)}
-
-
-def outcome(scene: dict[str, Any], ran: dict[str, Any], measures: RunMeasures, diverged: str | None) -> dict[str, Any]:
-    """Returns the entries of the summary but for energies: ``ran``, the verdict and what it rests on."""
     verdict = measures.verdict(diverged)
     return {
-        "title": scene["title"],
-        "seed": scene["seed"],
+        "title": scene.title,
+        "seed": scene.seed,
         **ran,
         "verdict": verdict.word,
         "verdict_rule": verdict.rule,
         "extremes": measures.extremes._asdict(),
-        "window": measures.window.figures,
+        "window": measures.window.figures._asdict(),
     }
 
 
-def write(summary: dict[str, Any], path: Path) -> None:
+def write(summary: Summary, path: Path) -> None:
     """Writes as JSON, in one piece: a reader never sees half a file. Numbers that are not finite become null."""
     temporary = path.with_suffix(".part")
     try:

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from haploop.logger.books.buffers import as_float64
 from haploop.logger.log.table import Floats
+from haploop.protocol.changes import Event
+from haploop.protocol.telemetry import Block
 from haploop.protocol.ticks import Timebase
 
 UNITS = {
@@ -37,7 +39,7 @@ class Sink(Protocol):
 
     def write(self, channel: int, log_times_ns: NDArray[np.int64], values: Floats) -> None: ...
 
-    def message(self, channel: int, log_time_ns: int, obj: dict[str, Any]) -> None: ...
+    def message(self, channel: int, log_time_ns: int, obj: Event) -> None: ...
 
 
 class Channels:
@@ -74,7 +76,7 @@ class Channels:
         times, _ = self._tick_times(first, ticks)
         self._log.write(channel, times, values.reshape(ticks, samples, len(units)))
 
-    def controller(self, block: dict[str, Any]) -> None:
+    def controller(self, block: Block) -> None:
         """Writes one message a tick: estimates, the force of wall and elements, their total."""
         names = list(block["columns"])
         kinds = ", ".join(f"dissipation.{i} is {e['kind']}" for i, e in enumerate(block["elements"])) or "no element"
@@ -91,7 +93,7 @@ class Channels:
         times, stamps = self._tick_times(first, len(next(iter(columns.values()))))
         self._log.write(channel, times, np.stack([stamps, *columns.values()], axis=1))
 
-    def event(self, tick: int, event: dict[str, Any]) -> None:
+    def event(self, tick: int, event: Event) -> None:
         """Writes one message: the tick, its time in s, and the event as it was given."""
         self._log.message(
             self._events, self._time.tick_ns(tick), {"timestamp": tick / self._time.control_rate, "tick": tick, **event}

@@ -16,7 +16,7 @@ from mcap.records import Attachment, Channel, Schema
 from numpy.typing import NDArray
 
 from haploop.logger.log import LogError
-from haploop.logger.log.closing import MAGIC
+from haploop.logger.log.mcap_file import MAGIC
 from haploop.logger.log.recording import Recording, Table, join, merge_columns
 from haploop.logger.log.records import LogChannel, MessageRun, chunk_body, lone_message, parts, records
 from haploop.logger.log.table import TableLayout

@@ -7,26 +7,25 @@ library's writer takes a Python call, and some microseconds, for every message.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Hashable, Mapping
 from pathlib import Path
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
-from mcap.data_stream import RecordBuilder
-from mcap.records import Attachment, AttachmentIndex, Channel, Header, McapRecord, Schema
+from mcap.records import Attachment, AttachmentIndex, Channel, Schema
 from numpy.typing import NDArray
 
-from haploop.logger.log.append_file import AppendFile
-from haploop.logger.log.chunk import Compression, FreeRows, TableRows, chunk, compressor
-from haploop.logger.log.closing import MAGIC, Summary
+from haploop.logger.log.chunk import Compression, FreeRows, TableRows, chunk
+from haploop.logger.log.mcap_file import McapFile, bytes_of
 from haploop.logger.log.table import Floats, TableLayout, pack
+from haploop.protocol.changes import Event
 
 # Bytes of messages after which a chunk is closed: what a reader must at least unpack to reach one message.
 _CHUNK_BYTES = 1 << 20
 
 
 class Log:
-    """One MCAP file.
+    """One MCAP file; whatever writes to it raises LogError where the operating system refuses.
 
     Messages gather in a chunk, which reaches the operating system when it passes 1 MB or at :meth:`flush`; from then
     on the end of this process takes nothing of it away. Inside a chunk messages stand channel by channel; readers
@@ -34,19 +33,12 @@ class Log:
     """
 
     def __init__(self, path: str | Path, *, compression: Compression = "lz4") -> None:
-        """Begins the file, over any file of that name.
-
-        Raises:
-            LogError: the file cannot be made.
-        """
+        """Begins the file, over any file of that name."""
         self._compression: Compression = compression
-        self._compress = compressor(compression)
-        self._summary = Summary()
         self._tables: dict[int, TableLayout] = {}
-        self._known: dict[tuple[Any, ...], int] = {}
+        self._known: dict[Hashable, int] = {}
         self._rows: dict[int, TableRows | FreeRows] = {}
-        self._file = AppendFile(path)
-        self._file.append(MAGIC + _bytes_of(Header(profile="", library="haploop")))
+        self._file = McapFile(path)
 
     def channel(
         self, topic: str, columns: Mapping[str, str], *, samples_per_message: int | None = None, title: str
@@ -66,7 +58,6 @@ class Log:
             The channel's number, for :meth:`write` and :meth:`message`.
 
         Raises:
-            LogError: the file cannot be written.
             ValueError: ``samples_per_message`` is less than 1.
         """
         key = (topic, tuple(columns.items()), samples_per_message, title)
@@ -76,10 +67,10 @@ class Log:
         number = len(self._known) + 1
         schema = Schema(id=number, data=layout.json_schema(title), encoding="jsonschema", name=title)
         channel = Channel(id=number, topic=topic, message_encoding="msgpack", metadata={}, schema_id=number)
-        self._file.append(_bytes_of(schema, channel))
-        self._summary.schemas.append(schema)
-        self._summary.channels.append(channel)
-        self._summary.message_counts[number] = 0
+        self._file.append(bytes_of(schema, channel))
+        self._file.schemas.append(schema)
+        self._file.channels.append(channel)
+        self._file.message_counts[number] = 0
         if columns:
             self._tables[number] = layout
         self._known[key] = number
@@ -94,8 +85,7 @@ class Log:
             values: shape (messages, columns), or (messages, samples, columns) where the channel has samples.
 
         Raises:
-            LogError: the file cannot be written.
-            ValueError: a wrong shape, or a time before 0.
+            ValueError: a channel without columns, a wrong shape, or a time before 0.
         """
         layout, messages = self._tables.get(channel), len(log_times_ns)
         if layout is None:
@@ -110,33 +100,28 @@ class Log:
         rows = self._rows.get(channel)
         if not isinstance(rows, TableRows):
             rows = self._rows[channel] = TableRows(channel, layout)
-        rows.append(self._summary.message_counts[channel] + rows.count, log_times_ns, values)
+        rows.append(self._file.message_counts[channel] + rows.count, log_times_ns, values)
         self._close_full_chunk()
 
-    def message(self, channel: int, log_time_ns: int, obj: dict[str, Any]) -> None:
+    def message(self, channel: int, log_time_ns: int, obj: Event) -> None:
         """Adds one map to a channel without columns; ``obj`` holds what msgpack can carry.
 
         Raises:
-            LogError: the file cannot be written.
-            ValueError: the channel has columns; its messages come through :meth:`write`.
+            ValueError: the channel has columns.
         """
         if channel in self._tables:
             raise ValueError(f"Channel {channel} has columns: its messages come through write().")
         rows = self._rows.get(channel)
         if not isinstance(rows, FreeRows):
             rows = self._rows[channel] = FreeRows(channel)
-        rows.append(self._summary.message_counts[channel] + rows.count, log_time_ns, pack(obj))
+        rows.append(self._file.message_counts[channel] + rows.count, log_time_ns, pack(obj))
         self._close_full_chunk()
 
     def attach(self, name: str, media_type: str, data: bytes) -> None:
-        """Puts a whole file, such as the scene, into the log.
-
-        Raises:
-            LogError: the file cannot be written.
-        """
+        """Puts a whole file, such as the scene, into the log."""
         start = self._file.size
-        self._file.append(_bytes_of(Attachment(create_time=0, log_time=0, name=name, media_type=media_type, data=data)))
-        self._summary.attachments.append(
+        self._file.append(bytes_of(Attachment(create_time=0, log_time=0, name=name, media_type=media_type, data=data)))
+        self._file.attachments.append(
             AttachmentIndex(start, self._file.size - start, 0, 0, len(data), name=name, media_type=media_type)
         )
 
@@ -145,33 +130,25 @@ class Log:
             self.flush()
 
     def flush(self) -> None:
-        """Closes the chunk and hands it to the operating system: every message up to now can be read from the file.
-
-        Raises:
-            LogError: the file cannot be written.
-        """
+        """Closes the chunk and hands it to the operating system: every message up to now can be read from the file."""
         held = [rows for rows in self._rows.values() if rows.count]
         if not held:
             return
-        piece, index = chunk(held, self._file.size, self._compression, self._compress)
+        piece, index = chunk(held, self._file.size, self._compression)
         self._file.append(piece)
-        self._summary.chunks.append(index)
+        self._file.chunks.append(index)
         # A channel that was silent in this chunk (replaced at a swap, say) gives its memory back.
         self._rows = {rows.channel: rows for rows in held}
         for rows in held:
-            self._summary.message_counts[rows.channel] += rows.count
+            self._file.message_counts[rows.channel] += rows.count
             rows.clear()
 
     def close(self) -> None:
-        """Closes the chunk, adds the summary and closes the file; nothing is left to do after a LogError or a close.
-
-        Raises:
-            LogError: the file cannot be written.
-        """
+        """Closes the chunk, adds the summary and closes the file; nothing is left to do after a LogError or a close."""
         try:
             if self._file.writable:
                 self.flush()
-                self._file.append(self._summary.closing(self._file.size))
+                self._file.append_summary()
         finally:
             self._file.close()
 
@@ -180,10 +157,3 @@ class Log:
 
     def __exit__(self, *_: object) -> None:
         self.close()
-
-
-def _bytes_of(*records: McapRecord) -> bytes:
-    builder = RecordBuilder()
-    for record in records:
-        record.write(builder)
-    return builder.end()

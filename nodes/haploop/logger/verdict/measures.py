@@ -1,35 +1,49 @@
-"""Measures of the last half second of some runs, worked out for all of them at once."""
+"""Measures of the last half second of some runs, and the word for each: does it rest, swing, or stay off the wall?"""
 
 from __future__ import annotations
 
 import math
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 WINDOW_S = 0.5
 CROSSINGS = 4
+# Below this, swinging is no limit cycle whatever the encoder: a thousandth of what a wall of 1 N/mm gives way to 1 N.
+SMALLEST_SWING_M = 1e-6
 # A quantised position on the wall's face may lie inside by this much, relative to the face's position.
 ROUNDING = 1e-12
 
 
-class WindowMeasures(NamedTuple):
-    """Measures of the window of one run.
+class Figures(NamedTuple):
+    """The ``window`` entry of the summary.
 
     Attributes:
-        touched: whether any tick was in contact.
-        crossings, growth: of ``swings``.
-        figures: the ``window`` entry of the summary. The displayed stiffness is the mean of total force over
-            penetration, ticks in contact (Choi et al. 2022, V.B.2); ticks whose penetration is a rounding error of the
-            wall's position are left out of it. ``growth_1_s`` is the r of e^(r t) by which the swings grow (decay
-            where negative); None where nothing swings.
+        from_s: where the window begins.
+        oscillation_m: peak to peak.
+        growth_1_s: the r of e^(r t) by which the swings grow (decay where negative); None where nothing swings.
+        outside_fraction: share of its ticks that are out of contact.
+        displayed_stiffness_N_m: mean of total force over penetration, ticks in contact (Choi et al. 2022, V.B.2), but
+            those whose penetration is a rounding error of the wall's position; None of none.
+        penetration_mean_m: ticks in contact; None of none.
     """
+
+    from_s: float
+    oscillation_m: float
+    growth_1_s: float | None
+    outside_fraction: float
+    displayed_stiffness_N_m: float | None
+    penetration_mean_m: float | None
+
+
+class WindowMeasures(NamedTuple):
+    """Measures of the window of one run: whether any tick was in contact, what ``swings`` counts, and the figures."""
 
     touched: bool
     crossings: int
     growth: float
-    figures: dict[str, Any]
+    figures: Figures
 
 
 class MeasuredColumns(NamedTuple):
@@ -50,6 +64,49 @@ class MeasuredColumns(NamedTuple):
     depth_m: list[float | None]
 
 
+class Extremes(NamedTuple):
+    """Extremes of a whole run: least and greatest position in m, greatest force in N."""
+
+    x_min_m: float
+    x_max_m: float
+    force_max_N: float
+
+
+class Verdict(NamedTuple):
+    """One word and the rule that gave it."""
+
+    word: str
+    rule: str
+
+
+class RunMeasures(NamedTuple):
+    """Measures of a run so far: of its window, of all of it, and what does not count as a swing."""
+
+    window: WindowMeasures
+    extremes: Extremes
+    swing_m: float
+
+    def is_finite(self) -> bool:
+        """Tells whether every number is finite, and no sum of them is beyond what a float holds."""
+        return math.isfinite(sum(self.extremes) + sum(filter(None, self.window.figures)))
+
+    def verdict(self, diverged: str | None) -> Verdict:
+        """Judges the run; ``diverged`` is why the plant ended by itself, if it did."""
+        if diverged:
+            return Verdict("diverged", f"{diverged}.")
+        window = self.window
+        if not window.touched:
+            return Verdict(
+                "no-contact", f"No tick of the last {WINDOW_S:g} s (second half of a shorter run) was in contact."
+            )
+        rule = (
+            f"In the last {WINDOW_S:g} s (second half of a shorter run) x crossed its trend line {window.crossings} "
+            f"times by more than {self.swing_m * 1e6:.3g} um, its second half {window.growth:.2f} times as wide as its "
+            f"first; a limit cycle is at least {CROSSINGS} crossings and 0.5 times."
+        )
+        return Verdict("limit-cycle" if window.crossings >= CROSSINGS and window.growth >= 0.5 else "steady", rule)
+
+
 class Span(NamedTuple):
     """The part of a run that a window covers: its plant steps, its ticks, and its first step."""
 
@@ -64,18 +121,6 @@ def window_span(ran: int, keep: int, steps_per_tick: int) -> Span:
     first = ran - steps
     ticks = ran // steps_per_tick + bool(ran % steps_per_tick)
     return Span(steps, ticks - -(-first // steps_per_tick), first)
-
-
-def _rate(growth: float, seconds: float) -> float | None:
-    """Returns r in 1/s if what is ``growth`` times as wide in the second half of ``seconds`` follows e^(r t)."""
-    return 2.0 * math.log(growth) / seconds if growth > 0.0 else None
-
-
-@lru_cache(maxsize=4)
-def _centred(count: int) -> tuple[np.ndarray, float]:
-    """Returns so many equal steps around 0, and the sum of their squares."""
-    t = np.arange(count) - (count - 1) / 2.0
-    return t, np.dot(t, t)
 
 
 def measure_window(
@@ -111,14 +156,10 @@ def window_measures(measured: MeasuredColumns, span: Span, rate: int) -> list[Wi
     start_s, seconds = span.first / rate, (span.steps + 1) / rate
     measures = []
     for crossings, growth, width_m, inside, stiffness_N_m, depth_m in zip(*measured, strict=True):
-        figures = {
-            "from_s": start_s,
-            "oscillation_m": width_m,
-            "growth_1_s": _rate(growth, seconds) if crossings >= CROSSINGS else None,
-            "outside_fraction": (span.ticks - inside) / span.ticks if span.ticks else 1.0,
-            "displayed_stiffness_N_m": stiffness_N_m,
-            "penetration_mean_m": depth_m,
-        }
+        # What is `growth` times as wide in the second half of the window follows e^(r t).
+        rate_1_s = 2.0 * math.log(growth) / seconds if crossings >= CROSSINGS and growth > 0.0 else None
+        outside = (span.ticks - inside) / span.ticks if span.ticks else 1.0
+        figures = Figures(start_s, width_m, rate_1_s, outside, stiffness_N_m, depth_m)
         measures.append(WindowMeasures(inside > 0, crossings, growth, figures))
     return measures
 
@@ -127,6 +168,13 @@ def _means(values: np.ndarray, counted: np.ndarray) -> list[float | None]:
     """Returns the mean of those counted in each row; None of none."""
     chosen = [row[mask] for row, mask in zip(values, counted, strict=True)]
     return [float(np.add.reduce(row)) / len(row) if len(row) else None for row in chosen]
+
+
+@lru_cache(maxsize=4)
+def _centred(count: int) -> tuple[np.ndarray, float]:
+    """Returns so many equal steps around 0, and the sum of their squares."""
+    t = np.arange(count) - (count - 1) / 2.0
+    return t, np.dot(t, t)
 
 
 def swings(x: np.ndarray, swing_m: np.ndarray) -> tuple[list[int], list[float]]:

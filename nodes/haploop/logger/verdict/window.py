@@ -8,8 +8,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from haploop.logger.verdict.measures import WINDOW_S, measure_window, window_span
-from haploop.logger.verdict.verdict import SMALLEST_SWING_M, Extremes, RunMeasures
+from haploop.logger.verdict.measures import (
+    SMALLEST_SWING_M,
+    WINDOW_S,
+    Extremes,
+    RunMeasures,
+    measure_window,
+    window_span,
+)
 from haploop.protocol.ticks import Timebase
 from haploop.protocol.trees import tree_select
 

@@ -10,7 +10,7 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
 
 from haploop.launch.batch.run import groups
-from haploop.logger.verdict.verdict import SMALLEST_SWING_M
+from haploop.logger.verdict.measures import SMALLEST_SWING_M
 from haploop.tools.advise.runs import Runs, execution_mode
 from haploop.tools.advise.tasks import is_held_by
 from haploop.tools.linear.linearity import is_linear

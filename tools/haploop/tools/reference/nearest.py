@@ -12,8 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from haploop.logger.verdict.measures import WINDOW_S
-from haploop.logger.verdict.verdict import SMALLEST_SWING_M
+from haploop.logger.verdict.measures import SMALLEST_SWING_M, WINDOW_S
 from haploop.protocol.scene.scene import Hand, Scene
 from haploop.tools.trajectory import trajectory
 

@@ -11,8 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from haploop.launch.batch.jax.block import Rings
-from haploop.logger.verdict.measures import ROUNDING, MeasuredColumns, window_measures, window_span
-from haploop.logger.verdict.verdict import RunMeasures
+from haploop.logger.verdict.measures import ROUNDING, MeasuredColumns, RunMeasures, window_measures, window_span
 from haploop.logger.verdict.window import Window, keep_steps
 
 

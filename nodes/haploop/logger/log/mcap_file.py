@@ -1,0 +1,150 @@
+"""An MCAP file that only grows, piece by whole piece, and ends with a summary that lets a reader seek in it.
+
+What it holds is never half a piece, even when the disk is full.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import zlib
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NoReturn
+
+from mcap.data_stream import RecordBuilder
+from mcap.opcode import Opcode
+from mcap.records import (
+    AttachmentIndex,
+    Channel,
+    ChunkIndex,
+    DataEnd,
+    Footer,
+    Header,
+    McapRecord,
+    Schema,
+    Statistics,
+    SummaryOffset,
+)
+
+from haploop.logger.log import LogError
+
+MAGIC = b"\x89MCAP0\r\n"
+_CRC_BYTES = 4
+
+
+class McapFile:
+    """A new file, over any file of that name.
+
+    Attributes:
+        path: where it is.
+        size: bytes of the pieces written.
+        schemas, channels, chunks, attachments, message_counts: what its summary will tell of it.
+    """
+
+    def __init__(self, path: str | Path) -> None:
+        """Makes the file and begins it.
+
+        Raises:
+            LogError: the operating system refuses.
+        """
+        self.path = Path(path)
+        self.size = 0
+        self.schemas: list[Schema] = []
+        self.channels: list[Channel] = []
+        self.chunks: list[ChunkIndex] = []
+        self.attachments: list[AttachmentIndex] = []
+        self.message_counts: dict[int, int] = {}
+        self._failure: LogError | None = None
+        try:
+            # Unbuffered: pieces are large, and an error then belongs to the piece that met it.
+            self._file = self.path.open("wb", buffering=0)
+        except OSError as error:
+            raise LogError(
+                f"The log {self.path} cannot be made ({error.strerror}); name a directory that exists and is writable."
+            ) from error
+        self.append(MAGIC + bytes_of(Header(profile="", library="haploop")))
+
+    def append(self, piece: bytes) -> None:
+        """Hands a piece to the operating system.
+
+        Raises:
+            LogError: the operating system refuses, now or at an earlier piece; the file is cut back to the whole
+                pieces before it and stays so.
+        """
+        if self._failure:
+            raise self._failure
+        rest = memoryview(piece)
+        try:
+            # An interrupt may have left part of a piece, or all of it, uncounted behind the last one: write over it.
+            self._file.seek(self.size)
+            while rest:
+                rest = rest[self._file.write(rest) or 0 :]
+        except OSError as error:
+            self._fail(error)
+        self.size += len(piece)
+
+    def _fail(self, error: OSError) -> NoReturn:
+        # A device or a pipe cannot be cut back; it was never a log that could be read again.
+        with contextlib.suppress(OSError):
+            self._file.truncate(self.size)
+        self._file.close()
+        self._failure = LogError(
+            f"Writing the log {self.path} failed after {self.size} bytes ({error.strerror}). "
+            f"What was written before that stays and can be read with haploop.logger.read; "
+            f"make room there, or write the run to another directory, and run again."
+        )
+        raise self._failure from error
+
+    @property
+    def writable(self) -> bool:
+        """Tells whether another piece may be appended: neither closed nor refused by the operating system."""
+        return not self._file.closed
+
+    def close(self) -> None:
+        """Closes the file as it is."""
+        self._file.close()
+
+    def append_summary(self) -> None:
+        """Ends the file, from the DataEnd record on.
+
+        Raises:
+            LogError: as of ``append``.
+        """
+        data_end = bytes_of(DataEnd(data_section_crc=0))
+        start = self.size + len(data_end)
+        statistics = Statistics(
+            attachment_count=len(self.attachments),
+            channel_count=len(self.channels),
+            channel_message_counts=self.message_counts,
+            chunk_count=len(self.chunks),
+            message_count=sum(self.message_counts.values()),
+            message_end_time=max((chunk.message_end_time for chunk in self.chunks), default=0),
+            message_start_time=min((chunk.message_start_time for chunk in self.chunks), default=0),
+            metadata_count=0,
+            schema_count=len(self.schemas),
+        )
+        groups: list[tuple[Opcode, Sequence[McapRecord]]] = [
+            (Opcode.SCHEMA, self.schemas),
+            (Opcode.CHANNEL, self.channels),
+            (Opcode.STATISTICS, [statistics]),
+            (Opcode.CHUNK_INDEX, self.chunks),
+            (Opcode.ATTACHMENT_INDEX, self.attachments),
+        ]
+        covered, offsets = b"", []
+        for opcode, records in groups:
+            group = bytes_of(*records)
+            if group:
+                offsets.append(SummaryOffset(opcode, start + len(covered), len(group)))
+            covered += group
+        # The checksum covers the footer as well, up to the checksum itself.
+        footer = bytes_of(Footer(start, start + len(covered), summary_crc=0))[:-_CRC_BYTES]
+        covered += bytes_of(*offsets) + footer
+        self.append(data_end + covered + zlib.crc32(covered).to_bytes(_CRC_BYTES, "little") + MAGIC)
+
+
+def bytes_of(*records: McapRecord) -> bytes:
+    """Returns records end to end."""
+    builder = RecordBuilder()
+    for record in records:
+        record.write(builder)
+    return builder.end()
