@@ -194,7 +194,7 @@ def ran(directory: Path, log: str = "steps", **tables: Any) -> dict[str, Any]:
     }
     made = scene(**(base | tables), run={"log": log})
     directory.mkdir()
-    attached = {"scene.toml": to_toml(made)}
+    attached = {"scene.toml": to_toml(made.as_dict())}
     return run_in_process(made, KINDS, out=directory, attachments=attached)
 
 
@@ -202,7 +202,7 @@ def ran(directory: Path, log: str = "steps", **tables: Any) -> dict[str, Any]:
 def test_on_a_runs_log_its_own_elements_have_its_own_books(tables: dict[str, Any], tmp_path: Path) -> None:
     elements = ran(tmp_path / "run", **tables)["energy"]["elements"]
     found = outcome(tmp_path / "run", dampings=["0.3"], masses=["0.002"])
-    assert found.between == "plant steps"
+    assert found.recording.between == "plant steps"
     for ours, theirs in zip(found.elements, elements, strict=True):
         scale = ours.taken_J + ours.given_J
         assert scale > 0.0
@@ -223,8 +223,8 @@ def test_estimates_made_anew_as_the_run_made_them_are_the_same(tmp_path: Path) -
     taken = outcome(tmp_path / "run", dampings=["0.3"], masses=["0.002"])
     anew = outcome(tmp_path / "run", dampings=["0.3"], masses=["0.002"], overrides=["velocity.cutoff=70.0"])
     other = outcome(tmp_path / "run", dampings=["0.3"], masses=["0.002"], overrides=["velocity.cutoff=20.0"])
-    assert taken.recorded == ["acceleration", "velocity"]
-    assert anew.recorded == []
+    assert taken.recording.recorded == {"acceleration", "velocity"}
+    assert anew.recording.recorded == set()
     assert [e.true_J for e in anew.elements] == pytest.approx([e.true_J for e in taken.elements], rel=1e-12)
     assert [e.true_J for e in other.elements] != pytest.approx([e.true_J for e in taken.elements], rel=1e-3)
 
@@ -256,7 +256,7 @@ def test_a_kalman_filter_reads_recorded_accelerations_as_in_a_run(tmp_path: Path
 def test_a_log_of_ticks_alone_is_booked_on_straight_lines_and_says_so(tmp_path: Path) -> None:
     elements = ran(tmp_path / "run", log="ticks")["energy"]["elements"]
     found = outcome(tmp_path / "run", dampings=["0.3"], masses=["0.002"])
-    assert found.between == "straight lines"
+    assert found.recording.between == "straight lines"
     for ours, theirs in zip(found.elements, elements, strict=True):
         assert ours.sampled_J == pytest.approx(theirs["sampled_J"], rel=1e-9)
 
@@ -267,6 +267,6 @@ def test_a_log_that_was_cut_off_is_booked_as_far_as_it_goes(tmp_path: Path) -> N
     whole = outcome(log, dampings=["0.3"])
     (tmp_path / "cut.mcap").write_bytes(log.read_bytes()[: log.stat().st_size * 3 // 4])
     found = outcome(tmp_path / "cut.mcap", dampings=["0.3"])
-    assert 0 < found.notes.rows < whole.notes.rows == 6000
-    assert any("cut off" in remark for remark in found.notes.remarks)
-    assert not whole.notes.remarks
+    assert 0 < found.recording.notes.rows < whole.recording.notes.rows == 6000
+    assert any("cut off" in remark for remark in found.recording.notes.remarks)
+    assert not whole.recording.notes.remarks

@@ -91,8 +91,8 @@ def test_the_log_of_a_run_takes_no_more_than_its_directory(tmp_path: Path) -> No
     made = scene(duration=0.2, hand={"stiffness": 50.0, "force": {"kind": "constant", "value": -1.0}})
     directory = tmp_path / "run"
     directory.mkdir()
-    run_in_process(made, KINDS, out=directory, attachments={"scene.toml": to_toml(made)})
-    (directory / "scene.toml").write_text(to_toml(made))
+    run_in_process(made, KINDS, out=directory, attachments={"scene.toml": to_toml(made.as_dict())})
+    (directory / "scene.toml").write_text(to_toml(made.as_dict()))
     for path in (directory, directory / "log.mcap"):
         result = dissipate(path, "--damping", "0.5", "--out", tmp_path / "f.svg")
         assert result.exit_code == 0, result.output
@@ -102,7 +102,7 @@ def test_the_log_of_a_run_takes_no_more_than_its_directory(tmp_path: Path) -> No
 def test_a_log_has_columns_of_its_own(tmp_path: Path) -> None:
     made = scene(duration=0.2)
     (tmp_path / "run").mkdir()
-    run_in_process(made, KINDS, out=tmp_path / "run", attachments={"scene.toml": to_toml(made)})
+    run_in_process(made, KINDS, out=tmp_path / "run", attachments={"scene.toml": to_toml(made.as_dict())})
     refused(dissipate(tmp_path / "run", "--damping", "1", "--position", "x"), "for text files alone")
 
 
@@ -110,7 +110,7 @@ def test_an_export_of_a_run_is_a_recording(tmp_path: Path) -> None:
     made = scene(duration=0.2, hand={"stiffness": 50.0, "force": {"kind": "constant", "value": -1.0}})
     directory = tmp_path / "run"
     directory.mkdir()
-    run_in_process(made, KINDS, out=directory, attachments={"scene.toml": to_toml(made)})
+    run_in_process(made, KINDS, out=directory, attachments={"scene.toml": to_toml(made.as_dict())})
     assert CliRunner().invoke(app, ["export", str(directory), "--to", "csv"]).exit_code == 0
     log, csv = (outcome(directory / name, dampings=["0.5"]).elements[0] for name in ("log.mcap", "controller.csv"))
     assert csv.sampled_J == pytest.approx(log.sampled_J, rel=1e-9)

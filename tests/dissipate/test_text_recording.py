@@ -84,7 +84,7 @@ def test_recorded_rates_have_the_units_of_the_lengths(tmp_path: Path) -> None:
     in_mm = Layout(velocity="v", acceleration="a", length="mm", acceleration_unit="mm/s^2")
     found = outcome(mm, layout=in_mm, **selection)
     assert [element.true_J for element in found.elements] == pytest.approx(expected, rel=1e-9)
-    assert found.recorded == ["acceleration", "velocity"]
+    assert found.recording.recorded == {"acceleration", "velocity"}
 
 
 def test_what_is_missing_is_a_gap_and_counted(tmp_path: Path) -> None:
@@ -93,7 +93,7 @@ def test_what_is_missing_is_a_gap_and_counted(tmp_path: Path) -> None:
     keep = np.r_[0:100, 130:200]
     path = write(tmp_path / "gaps.csv", {"t": t[keep], "x": x[keep]})
     path.write_text(path.read_text().replace("nan", ""))
-    notes = outcome(path, dampings=["1.0"]).notes
+    notes = outcome(path, dampings=["1.0"]).recording.notes
     assert (notes.rows, notes.unusable_rows, notes.gaps) == (168, 2, 3)
     assert notes.missing_s == pytest.approx(2e-3 + 2e-3 + 31e-3)
     assert notes.gaps_s[2] == pytest.approx((0.099, 0.130))
@@ -110,7 +110,9 @@ def test_a_gap_is_booked_as_two_recordings(tmp_path: Path) -> None:
 def test_with_a_rate_a_row_without_a_number_is_a_gap_too(tmp_path: Path) -> None:
     x = X.copy()
     x[40] = np.nan
-    notes = outcome(write(tmp_path / "x.csv", {"x": x}), layout=Layout(rate_Hz=1000.0), dampings=["1.0"]).notes
+    notes = outcome(
+        write(tmp_path / "x.csv", {"x": x}), layout=Layout(rate_Hz=1000.0), dampings=["1.0"]
+    ).recording.notes
     assert (notes.rows, notes.unusable_rows, notes.gaps) == (199, 1, 1)
     assert notes.gaps_s == [pytest.approx((0.039, 0.041))]
 
@@ -119,17 +121,17 @@ def test_uneven_times_are_counted_and_change_nothing(plain: Path, tmp_path: Path
     t = T + 3e-4 * np.sin(np.arange(200.0) * 1.3)
     path = write(tmp_path / "uneven.csv", {"t": t, "x": X})
     found = outcome(path, layout=Layout(), dampings=["2.7"])
-    assert found.notes.uneven > 50
-    assert found.notes.gaps == 0
+    assert found.recording.notes.uneven > 50
+    assert found.recording.notes.gaps == 0
     even = true_J(plain)
-    assert found.elements[0].true_J == pytest.approx(even * 1e-3 / found.period_s, rel=1e-9)
+    assert found.elements[0].true_J == pytest.approx(even * 1e-3 / found.recording.period_s, rel=1e-9)
 
 
 def test_a_rate_need_be_no_whole_number_of_hertz(tmp_path: Path) -> None:
     period_s = 1.0 / 833.3
     path = write(tmp_path / "odd.csv", {"t": np.arange(200) * period_s, "x": X})
     found = outcome(path, dampings=["2.7"])
-    assert found.period_s == pytest.approx(period_s, rel=1e-9)
+    assert found.recording.period_s == pytest.approx(period_s, rel=1e-9)
     by_hand = float(2.7 * np.diff(X)[:-1] @ np.diff(X)[1:]) / period_s
     assert found.elements[0].true_J == pytest.approx(by_hand, rel=1e-9)
 
@@ -194,7 +196,7 @@ def test_whatever_stands_in_a_file_it_is_booked_or_refused(
         found = outcome(path, layout=Layout("2", "1"), dampings=["1.0"])
     except (RecordingError, ElementError):
         return
-    assert found.notes.rows >= 2
+    assert found.recording.notes.rows >= 2
 
 
 def test_disorder_is_found_wherever_it_is(tmp_path: Path) -> None:
@@ -208,7 +210,7 @@ def test_disorder_is_found_wherever_it_is(tmp_path: Path) -> None:
 def test_a_row_that_was_cut_off_at_the_end_is_left_out(plain: Path) -> None:
     last = plain.read_text().rindex(",")
     plain.write_text(plain.read_text()[:last])
-    notes = outcome(plain, dampings=["1.0"]).notes
+    notes = outcome(plain, dampings=["1.0"]).recording.notes
     assert (notes.rows, notes.unusable_rows) == (199, 1)
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -15,6 +14,7 @@ from haploop.controller.estimators.base import Sample, Unchanged
 from haploop.logger.books.buffers import as_float64
 from haploop.logger.books.sums import add_columns, no_sums
 from haploop.logger.books.work import sampled_work
+from haploop.protocol.changes import Event
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
 from haploop.tools.dissipate.samples import Floats, Samples
@@ -24,12 +24,10 @@ if TYPE_CHECKING:
 
 
 class Booked(NamedTuple):
-    """The books at some samples.
+    """The books at some samples: t_s and x_m of shape (samples,), the others (elements, samples).
 
     Attributes:
-        t_s, x_m: of the samples, shape (samples,).
-        sampled_J, true_J: of every element, shape (elements, samples).
-        added_J: gain of the true books since the sample before, shape (elements, samples).
+        added_J: gain of the true books since the sample before.
     """
 
     t_s: Floats
@@ -63,18 +61,18 @@ class Booking:
 
     def __init__(
         self,
-        scene: dict[str, Any],
+        scene: Scene,
         period_s: float,
         delay_s: float,
-        kinds: Mapping[str, type[Element]],
+        kinds: dict[str, type[Element]],
         recorded: frozenset[str],
     ) -> None:
-        self._scene, self._kinds, self._recorded = scene, dict(kinds), recorded
+        self._scene, self._kinds, self._recorded = scene, kinds, recorded
         periods = delay_s / period_s
         self._lookahead = math.floor(periods + 1e-9)
         self._late = max(0.0, periods - self._lookahead)
         self._time = MeasuredTime.from_period(period_s, self._lookahead)
-        self._count = len(scene["dissipation"])
+        self._count = len(scene.dissipation)
         self._sums = no_sums(2 * self._count)
         self._events = _wall_events(scene, self._time)
         self.taken_J, self.given_J, self.strongest_N = np.zeros((3, self._count))
@@ -164,23 +162,18 @@ def _held(old: Floats, new: Floats, true_x: Floats, between: Floats) -> Floats:
     return -(old * (between - true_x[:-1]) + new * (true_x[1:] - between))
 
 
-def _wall_events(scene: dict[str, Any], time: Timebase) -> list[tuple[int, dict[str, Any]]]:
+def _wall_events(scene: Scene, time: Timebase) -> list[tuple[int, Event]]:
     """Returns the events that change the wall, by tick: its position decides when elements act."""
     found = []
-    for event in scene.get("event", []):
-        of_wall = {key: value for key, value in event.get("set", {}).items() if key.startswith("wall.")}
-        if of_wall:
-            found.append((time.first_tick_at(event["at"]), {"set": of_wall}))
+    for event in scene.event:
+        if of_wall := {key: value for key, value in (event.set or {}).items() if key.startswith("wall.")}:
+            found.append((time.first_tick_at(event.at), {"set": of_wall}))
     return found
 
 
 @dataclass(frozen=True)
 class MeasuredTime(Timebase):
-    """The timebase of samples whose rate is no whole number of Hz.
-
-    Attributes:
-        measured_s: the period, s.
-    """
+    """The timebase of samples whose rate is no whole number of Hz, but that of their measured period."""
 
     measured_s: float
 
@@ -197,11 +190,7 @@ class MeasuredTime(Timebase):
 
 @dataclass(frozen=True)
 class Recorded(Unchanged):
-    """The estimator that returns a recorded value of the sample.
-
-    Attributes:
-        place: of the value in the sample.
-    """
+    """The estimator that returns the recorded value at a place of the sample."""
 
     place: int
 
@@ -211,10 +200,10 @@ class Recorded(Unchanged):
 
 
 def _recorded_controller(
-    scene: dict[str, Any], time: Timebase, kinds: dict[str, type[Element]], recorded: frozenset[str]
+    scene: Scene, time: Timebase, kinds: dict[str, type[Element]], recorded: frozenset[str]
 ) -> Controller:
     """Makes a controller of samples (x, acceleration, velocity) that takes recorded values in place of estimates."""
-    controller = Controller(Scene.from_dict(scene), time, kinds)
+    controller = Controller(scene, time, kinds)
     places = {"acceleration": 1, "velocity": 2}
     controller.params = replace(controller.params, **{of: Recorded(places[of]) for of in recorded})
     return controller

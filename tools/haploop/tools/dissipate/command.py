@@ -7,17 +7,18 @@ import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from haploop.tools.cli.exit_codes import FAILED, WRONG_USE, leave, plain_errors, print_json
 from haploop.tools.cli.scenes import kinds_with
 
 if TYPE_CHECKING:
     from haploop.controller.dissipation import Element
+    from haploop.protocol.scene.scene import Scene
     from haploop.tools.dissipate.controller_scene import Selection
     from haploop.tools.dissipate.outcome import Outcome
+    from haploop.tools.dissipate.samples import Recording
     from haploop.tools.dissipate.text_recording import Layout
-
 
 _LONGEST_DELAY_S = 60.0
 
@@ -88,28 +89,26 @@ def compute_outcome(request: Request, kinds: dict[str, type[Element]]) -> Outcom
     return make_outcome(recording, booking, trace, scene, kinds)
 
 
-def _open(request: Request, kinds: dict[str, type[Element]]) -> tuple[Any, dict[str, Any]]:
+def _open(request: Request, kinds: dict[str, type[Element]]) -> tuple[Recording, Scene]:
     """Returns the recording and the scene of the controller."""
-    from haploop.tools.dissipate.controller_scene import holds_readings, make_scene_for_log, make_scene_for_text
+    from haploop.tools.dissipate.controller_scene import make_scene_for_log, make_scene_for_text
     from haploop.tools.dissipate.samples import RecordingError
     from haploop.tools.dissipate.text_recording import Layout, TextRecording
 
     if request.delay_s is not None and not 0.0 <= request.delay_s <= _LONGEST_DELAY_S:
         raise RecordingError(f"The delay must be from 0 to {_LONGEST_DELAY_S:g} s, but is {request.delay_s:g} s.")
-    if _is_log(request.path):
+    path, selection = request.path, request.selection
+    if path.is_dir() or path.suffix == ".mcap":
         if request.layout != Layout():
             raise RecordingError("A log has its own columns, times and units; columns are named for text files alone.")
         from haploop.tools.dissipate.log_recording import LogRecording, read_scene
 
-        scene = read_scene(request.path)
-        estimated = request.selection.estimated_anew()
-        recording = LogRecording(request.path, scene, request.delay_s, estimated, holds_readings(scene))
-        return recording, make_scene_for_log(request.selection, request.path, scene, kinds)
+        scene = read_scene(path)
+        recording = LogRecording(path, scene, request.delay_s, selection.estimated_anew())
+        return recording, make_scene_for_log(selection, path, scene, kinds)
 
-    recording = TextRecording(request.path, request.layout, request.delay_s or 0.0)
-    return recording, make_scene_for_text(
-        request.selection, request.path, recording.period_s, recording.recorded, kinds
-    )
+    recording = TextRecording(path, request.layout, request.delay_s or 0.0)
+    return recording, make_scene_for_text(selection, path, recording.period_s, recording.recorded, kinds)
 
 
 @contextlib.contextmanager
@@ -123,10 +122,6 @@ def _shown(name: str) -> Iterator[Callable[[float], None]]:
         return
     with shown.status(f"reading {name}") as line:
         yield lambda to_s: line.update(f"{name}: booked to {to_s:.6g} s")
-
-
-def _is_log(path: Path) -> bool:
-    return path.is_dir() or path.suffix == ".mcap"
 
 
 def _draw(outcome: Outcome, request: Request) -> Path | None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,7 +12,9 @@ from haploop.launch.scene.file import resolved
 from haploop.launch.scene.layers import Layers
 from haploop.launch.scene.overrides import key_path
 from haploop.plant.sensing.encoder import accelerometer_is_used
+from haploop.protocol.scene.scene import Clock, Device, Scene
 from haploop.tools.cli.options import parse_assignments
+from haploop.tools.dissipate.log_recording import holds_readings
 from haploop.tools.dissipate.samples import RecordingError
 
 if TYPE_CHECKING:
@@ -40,7 +42,7 @@ class Selection:
     elements: Sequence[str] = ()
     wall: str | None = None
     occupies: str = "below"
-    overrides: Sequence[str] = field(default_factory=tuple)
+    overrides: Sequence[str] = ()
 
     def tables(self) -> frozenset[str]:
         """Returns the tables that the overrides change.
@@ -66,7 +68,7 @@ class Selection:
 
 def make_scene_for_text(
     selection: Selection, path: Path, period_s: float, recorded: frozenset[str], kinds: Kinds
-) -> dict[str, Any]:
+) -> Scene:
     """Makes the scene for a recording in a text file.
 
     Raises:
@@ -76,64 +78,50 @@ def make_scene_for_text(
     if clash := sorted(selection.tables() & recorded):
         raise RecordingError(f"Give either a column of the {clash[0]} or --set for its estimate, not both.")
     rate = max(1, round(1.0 / period_s))
-    device = {"mass": 1.0, "damping": 0.0}
-    data = {"title": path.stem, "duration": 1.0 / rate, "device": device}
-    made = _make_scene({**data, "clock": {"plant_rate": rate, "control_rate": rate}}, selection, path, kinds)
+    clock, device = Clock(plant_rate=rate, control_rate=rate), Device(mass=1.0, damping=0.0)
+    bare = Scene(title=path.stem, duration=1.0 / rate, clock=clock, device=device)
+    made = _make_scene(bare, selection, path, kinds)
     if accelerometer_is_used(made) and "acceleration" not in recorded:
         raise RecordingError("The estimates read an accelerometer; say with --acceleration which column that is.")
     return made
 
 
-def make_scene_for_log(selection: Selection, path: Path, scene: dict[str, Any], kinds: Kinds) -> dict[str, Any]:
+def make_scene_for_log(selection: Selection, path: Path, scene: Scene, kinds: Kinds) -> Scene:
     """Makes the scene for a run's log: its own estimators and wall unless others are selected, its events of the wall.
 
     Raises:
         RecordingError: the selection does not fit the recording.
         SceneError: a number or a kind is wrong.
     """
-    keys = ("title", "duration", "clock", "device", "encoder", "noise", "accelerometer", *_ESTIMATED, "wall")
-    data = {key: scene[key] for key in keys if key in scene}
-    made = _make_scene(data, selection, path, kinds)
+    kept = ("title", "duration", "clock", "device", "encoder", "noise", "accelerometer", *_ESTIMATED, "wall")
+    made = _make_scene(Scene(**{key: getattr(scene, key) for key in kept}), selection, path, kinds)
     if selection.overrides and accelerometer_is_used(made) and not holds_readings(scene):
         raise RecordingError("The estimates read an accelerometer, but its readings are not in the log.")
-    walls = [event for event in scene.get("event", []) if any(key.startswith("wall.") for key in event.get("set", {}))]
-    return {**made, "event": [] if selection.wall else walls}
+    walls = tuple(event for event in scene.event if any(key.startswith("wall.") for key in event.set or ()))
+    return replace(made, event=() if selection.wall else walls)
 
 
-def holds_readings(scene: dict[str, Any]) -> bool:
-    """Tells whether the accelerations in a run's log are readings of an accelerometer, unfiltered."""
-    table = scene.get("acceleration", {})
-    return table.get("source") == "accelerometer" and "cutoff" not in table
-
-
-def _make_scene(data: dict[str, Any], selection: Selection, path: Path, kinds: Kinds) -> dict[str, Any]:
+def _make_scene(bare: Scene, selection: Selection, path: Path, kinds: Kinds) -> Scene:
+    """Resolves a scene with the selected wall, elements and estimates, in the words in which they were given."""
+    layers = Layers(path, bare.as_dict())
     if selection.wall is not None:
-        position = next(iter(parse_assignments([f"wall={selection.wall}"]).values()))
-        data["wall"] = {"position": position, "stiffness": 0.0, "occupies": selection.occupies}
-    tables = _elements(selection)
-    if "wall" not in data:
-        _refuse_what_needs_a_wall(tables)
-        tables = [{"acts": "always", **table} for table in tables]
-    return resolved(Layers(path, {**data, "dissipation": tables}), selection.overrides, kinds)
-
-
-def _elements(selection: Selection) -> list[dict[str, Any]]:
-    """Returns a ``[[dissipation]]`` table for each element."""
-    tables = [{"kind": "damping", "damping": _value(text)} for text in selection.dampings]
+        wall = {"position": _value(selection.wall), "stiffness": 0.0, "occupies": selection.occupies}
+        layers.data["wall"] = wall
+    elements = [{"kind": "damping", "damping": _value(text)} for text in selection.dampings]
     for kind in ("bidirectional-inertia", "unidirectional-inertia"):
-        tables += [{"kind": kind, "mass": _value(text)} for text in selection.masses]
+        elements += [{"kind": kind, "mass": _value(text)} for text in selection.masses]
     for text in selection.elements:
         kind, *parameters = shlex.split(text) or [""]
-        tables.append({"kind": kind, **parse_assignments(parameters)})
-    if not tables:
+        elements.append({"kind": kind, **parse_assignments(parameters)})
+    if not elements:
         raise RecordingError("Say which elements: --damping 2.7, --mass 0.0018, or --element KIND KEY=VALUE in quotes.")
-    return tables
+    if "wall" not in layers.data:
+        if any(table["kind"] == "unidirectional-damping" for table in elements):
+            raise RecordingError("Unidirectional damping acts on the way into a wall; say where it begins with --wall.")
+        elements = [{"acts": "always", **table} for table in elements]
+    layers.data["dissipation"] = elements
+    return resolved(layers, selection.overrides, kinds)
 
 
 def _value(text: str) -> Any:
     return parse_assignments([f"value={text}"])["value"]
-
-
-def _refuse_what_needs_a_wall(tables: list[dict[str, Any]]) -> None:
-    if any(table["kind"] == "unidirectional-damping" for table in tables):
-        raise RecordingError("Unidirectional damping acts on the way into a wall; say where it begins with --wall.")

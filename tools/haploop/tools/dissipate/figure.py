@@ -81,13 +81,13 @@ def _motion(ax: Axes, outcome: Outcome, lines: Floats, title: str, whole: bool) 
     factor, letter = prefix_for([float(np.abs(lines[1]).max())])
     t, x = lines[0], lines[1] / factor
     low, high = float(x.min()), float(x.max())
-    wall = None if outcome.scene.get("event") else outcome.scene.get("wall")
-    surface = wall["position"] / factor if wall else low
+    wall = None if outcome.scene.event else outcome.scene.wall
+    surface = wall.position / factor if wall else low
     if whole:
         low, high = min(low, surface), max(high, surface)
     margin = 0.06 * (high - low) or 1.0
     if wall:
-        far = min(low - margin, surface) if wall["occupies"] == "below" else max(high + margin, surface)
+        far = min(low - margin, surface) if wall.occupies == "below" else max(high + margin, surface)
         ax.axhspan(far, surface, color=WALL_FILL, zorder=0, linewidth=0, gid="wall")
         ax.axhline(surface, color=WALL, linewidth=1.0, zorder=1)
     ax.plot(t, x, color=INK, linewidth=1.0, gid="position")
@@ -117,7 +117,7 @@ def _energies(ax: Axes, outcome: Outcome, lines: Floats, title: str) -> None:
 
 def _common(ax: Axes, outcome: Outcome, t: Floats) -> None:
     """Sets the limits of time and marks the gaps."""
-    for from_s, to_s in outcome.notes.gaps_s:
+    for from_s, to_s in outcome.recording.notes.gaps_s:
         if from_s < t[-1] and to_s > t[0]:
             ax.axvspan(from_s, to_s, color=FAINT, alpha=0.45, zorder=0.4, linewidth=0, gid="gap")
     ax.set_xlim(float(t[0]), float(t[-1]))
@@ -148,7 +148,7 @@ def _words(ax: Axes, outcome: Outcome) -> None:
 
 
 def _header(figure: SubFigure, outcome: Outcome) -> None:
-    figure.text(0.008, 0.72, outcome.name, fontsize=LARGE, color=INK, va="center", gid="title")
+    figure.text(0.008, 0.72, outcome.recording.name, fontsize=LARGE, color=INK, va="center", gid="title")
     words = textwrap.shorten(_capital(conclusion(outcome)), _LINE_LETTERS, placeholder=" …")
     figure.text(0.008, 0.2, words, fontsize=TEXT + 1, color=INK, va="center", gid="answer")
 

@@ -4,20 +4,23 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
-from typing import Any, cast
+from typing import cast
 
 import numpy as np
 
 from haploop.logger.log.recording import Table
 from haploop.logger.log.stream import Batch, LogStream
+from haploop.protocol.scene.effects import Actuator
+from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import DELAY, Timebase, TimebaseError
 from haploop.tools.dissipate.samples import Floats, Notes, RecordingError, Samples
 
 _COLUMNS = {"/controller": ("timestamp", "x", "v", "a"), "/plant": ("x",)}
 
 
-def read_scene(path: Path) -> dict[str, Any]:
+def read_scene(path: Path) -> Scene:
     """Reads the resolved scene in a run's log.
 
     Raises:
@@ -32,7 +35,13 @@ def read_scene(path: Path) -> dict[str, Any]:
     if "scene.toml" not in log.attachments and not beside.exists():
         raise RecordingError(f"The log {log.path} holds no scene, so its rates and estimates are not known.")
     text = log.attachments.get("scene.toml")
-    return tomllib.loads(text.decode() if text else beside.read_text(encoding="utf-8"))
+    return Scene.from_dict(tomllib.loads(text.decode() if text else beside.read_text(encoding="utf-8")))
+
+
+def holds_readings(scene: Scene) -> bool:
+    """Tells whether the accelerations in a run's log are readings of an accelerometer, unfiltered."""
+    table = scene.acceleration
+    return table is not None and table.source == "accelerometer" and table.cutoff is None
 
 
 class LogRecording:
@@ -45,34 +54,29 @@ class LogRecording:
         scene: the scene in it.
         delay_s: delay of the forces; that of the scene when None.
         estimated: which of "velocity" and "acceleration" are to be estimated again, not taken from the run.
-        readings: whether the accelerations in the log are readings of an accelerometer, for estimates to read.
     """
 
-    def __init__(
-        self, path: Path, scene: dict[str, Any], delay_s: float | None, estimated: frozenset[str], readings: bool
-    ) -> None:
-        self._path, self.name = path, scene["title"]
-        delay_s = scene["clock"]["round_trip_delay"] if delay_s is None else delay_s
+    def __init__(self, path: Path, scene: Scene, delay_s: float | None, estimated: frozenset[str]) -> None:
+        self._path, self.name = path, scene.title
+        delay_s = scene.clock.round_trip_delay if delay_s is None else delay_s
         try:
-            time = Timebase.from_clock({**scene["clock"], "round_trip_delay": delay_s}, scene["duration"])
+            time = Timebase.from_clock(replace(scene.clock, round_trip_delay=delay_s), scene.duration)
         except TimebaseError as error:
             raise RecordingError(f"The {error}") from error
         self.period_s, self.delay_s, self.notes = time.period_s, delay_s, Notes()
-        self._readings = readings
+        self._readings = holds_readings(scene)
         self._n, self._late = time.steps_per_tick, time.delay_steps % time.steps_per_tick
         self.recorded = frozenset({"velocity", "acceleration"}) - estimated
-        self.between = "plant steps" if scene["run"]["log"] == "steps" else "straight lines"
+        self.between = "plant steps" if scene.run.log == "steps" else "straight lines"
         self._remark(scene)
 
-    def _remark(self, scene: dict[str, Any]) -> None:
+    def _remark(self, scene: Scene) -> None:
         remarks = self.notes.remarks
-        uncertain = [f"[{table}]" for table in ("jitter", "loss") if table in scene]
-        if uncertain:
+        if uncertain := [f"[{table}]" for table in ("jitter", "loss") if getattr(scene, table) is not None]:
             remarks.append(f"The forces are taken to arrive after the delay alone, without {' and '.join(uncertain)}.")
-        if any(DELAY in event.get("set", {}) for event in scene.get("event", [])):
+        if any(DELAY in (event.set or {}) for event in scene.event):
             remarks.append("The delay changed during the run; the forces are taken to arrive after that of the scene.")
-        limits = [key for key in ("resolution", "saturation", "bandwidth") if key in scene.get("actuator", {})]
-        if limits:
+        if scene.actuator not in (None, Actuator()):
             remarks.append("The forces are those commanded, without what the actuator would have made of them.")
 
     def samples(self) -> Iterator[Samples]:

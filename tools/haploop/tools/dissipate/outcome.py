@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from haploop.protocol.scene.scene import ElementTable, Scene
 from haploop.tools.dissipate.booking import Booked, Booking
-from haploop.tools.dissipate.samples import Floats, Notes, Recording
+from haploop.tools.dissipate.samples import Floats, Recording
 from haploop.tools.render.units import amount
 from haploop.view.store.lod_level import extremes
 
 if TYPE_CHECKING:
-    from haploop.controller.dissipation import Element
+    from haploop.controller.dissipation import Element, Quantity
 
 # Points above which the trace is decimated.
 _MOST = 8192
@@ -85,15 +86,15 @@ class ElementOutcome:
     """The numbers of one element.
 
     Attributes:
-        kind, parameters: as in a scene.
-        label: both, in short.
+        kind, parameters: as in a scene, with when it acts.
+        label: kind and parameters in short: "damping 2.7 N s/m", "my element (mass 1.80 g, damping 0.1 N s/m)".
         sampled_J, true_J: its books at the end; positive: taken out of the device.
         taken_J, given_J: energy taken in the periods in which it dissipates, and given back in the others (true books).
         strongest_N: its largest force.
     """
 
     kind: str
-    parameters: dict[str, Any]
+    parameters: dict[str, float | str]
     label: str
     sampled_J: float
     true_J: float
@@ -107,25 +108,16 @@ class Outcome:
     """The outcome of all elements on one recording.
 
     Attributes:
-        name: of the recording.
-        period_s, delay_s: control period, and delay of the forces.
-        between: what the motion between samples is taken from: "plant steps" or "straight lines".
-        recorded: which of velocity and acceleration were recorded.
+        recording: that was read.
         elements: in the order in which they were selected.
-        notes: on the recording.
         trace: for the figure.
         scene: the resolved scene of the controller.
     """
 
-    name: str
-    period_s: float
-    delay_s: float
-    between: str
-    recorded: list[str]
+    recording: Recording
     elements: list[ElementOutcome]
-    notes: Notes
     trace: Trace
-    scene: dict[str, Any]
+    scene: Scene
 
     @property
     def span_s(self) -> tuple[float, float]:
@@ -143,16 +135,16 @@ class Outcome:
 
     def as_data(self) -> dict[str, Any]:
         """Returns everything but the trace, for JSON."""
-        from_s, to_s = self.span_s
-        notes = asdict(self.notes)
+        recording, (from_s, to_s) = self.recording, self.span_s
+        notes = asdict(recording.notes)
         return {
-            "recording": self.name,
+            "recording": recording.name,
             "from_s": from_s,
             "to_s": to_s,
-            "rate_Hz": 1.0 / self.period_s,
-            "delay_s": self.delay_s,
-            "between_samples": self.between,
-            "recorded": self.recorded,
+            "rate_Hz": 1.0 / recording.period_s,
+            "delay_s": recording.delay_s,
+            "between_samples": recording.between,
+            "recorded": sorted(recording.recorded),
             "samples": notes.pop("rows"),
             **notes,
             "elements": [asdict(element) for element in self.elements],
@@ -160,38 +152,27 @@ class Outcome:
 
 
 def make_outcome(
-    recording: Recording, booking: Booking, trace: Trace, scene: dict[str, Any], kinds: Mapping[str, type[Element]]
+    recording: Recording, booking: Booking, trace: Trace, scene: Scene, kinds: Mapping[str, type[Element]]
 ) -> Outcome:
     """Makes the outcome once all samples are booked."""
-    elements = []
-    for index, table in enumerate(scene["dissipation"]):
-        parameters = {key: value for key, value in table.items() if key != "kind"}
-        numbers = (booking.sampled_J, booking.true_J, booking.taken_J, booking.given_J, booking.strongest_N)
-        label = make_label(table, kinds)
-        elements.append(ElementOutcome(table["kind"], parameters, label, *(float(of[index]) for of in numbers)))
-    return Outcome(
-        recording.name,
-        recording.period_s,
-        recording.delay_s,
-        recording.between,
-        sorted(recording.recorded),
-        elements,
-        recording.notes,
-        trace,
-        scene,
-    )
-
-
-def make_label(table: dict[str, Any], kinds: Mapping[str, type[Element]]) -> str:
-    """Returns kind and parameters: "damping 2.7 N s/m", "my element (mass 1.80 g, damping 0.1 N s/m)"."""
-    declared = kinds[table["kind"]].parameters()
-    values = [
-        _parameter_words(name, table[name], quantity.unit, len(declared)) for name, (quantity, _) in declared.items()
+    books = (booking.sampled_J, booking.true_J, booking.taken_J, booking.given_J, booking.strongest_N)
+    elements = [
+        ElementOutcome(
+            table.name,
+            {"acts": table.acts, **table.parameters},
+            _label(table, kinds[table.name].parameters()),
+            *(float(of[index]) for of in books),
+        )
+        for index, table in enumerate(scene.dissipation)
     ]
-    name = table["kind"].replace("-", " ")
-    return " ".join([name, *values]) if len(values) < 2 else f"{name} ({', '.join(values)})"
+    return Outcome(recording, elements, trace, scene)
 
 
-def _parameter_words(name: str, value: float, unit: str, parameters: int) -> str:
-    words = amount(1e3 * value, "g") if unit == "kg" else f"{value:g} {unit}".rstrip()
-    return words if parameters == 1 else f"{name} {words}"
+def _label(table: ElementTable, declared: Mapping[str, tuple[Quantity, object]]) -> str:
+    words = []
+    for name, (quantity, _) in declared.items():
+        value = table.parameters[name]
+        number = amount(1e3 * value, "g") if quantity.unit == "kg" else f"{value:g} {quantity.unit}".rstrip()
+        words.append(number if len(declared) == 1 else f"{name} {number}")
+    kind = table.name.replace("-", " ")
+    return " ".join([kind, *words]) if len(words) < 2 else f"{kind} ({', '.join(words)})"

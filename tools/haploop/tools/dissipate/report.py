@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
+from haploop.protocol.scene.estimators import Acceleration
+from haploop.protocol.scene.scene import Scene
 from haploop.tools.dissipate.outcome import ElementOutcome, Outcome
 from haploop.tools.render.terminal import make_table
 from haploop.tools.render.units import amount, fixed
@@ -21,7 +23,7 @@ def make_report(outcome: Outcome) -> RenderableType:
     table = make_table("would have taken out of the device", *numbers, numbers=numbers)
     for element in outcome.elements:
         table.add_row(*make_row(element))
-    head = Text(f"{outcome.name}: {conclusion(outcome)}", style="bold")
+    head = Text(f"{outcome.recording.name}: {conclusion(outcome)}", style="bold")
     return Group(head, table, *(Text(sentence, style="dim") for sentence in note_sentences(outcome)))
 
 
@@ -57,13 +59,14 @@ def _times(best: ElementOutcome, other: ElementOutcome) -> str:
 
 def note_sentences(outcome: Outcome) -> list[str]:
     """Returns notes on the recording and on the books, a sentence each."""
-    notes, (from_s, to_s) = outcome.notes, outcome.span_s
-    rate = 1.0 / outcome.period_s
-    sentences = [f"{notes.rows} samples at {rate:.6g} Hz, {from_s:g} to {to_s:g} s."]
-    estimated = [name for name in ("velocity", "acceleration") if name not in outcome.recorded]
-    taken = " and ".join(outcome.recorded)
-    sentences.append((f"Taken as recorded: {taken}. " if taken else "") + _estimates(outcome.scene, estimated))
-    sentences.append(_truth(outcome))
+    recording, (from_s, to_s) = outcome.recording, outcome.span_s
+    notes, taken = recording.notes, " and ".join(sorted(recording.recorded))
+    estimated = [name for name in ("velocity", "acceleration") if name not in recording.recorded]
+    sentences = [
+        f"{notes.rows} samples at {1.0 / recording.period_s:.6g} Hz, {from_s:g} to {to_s:g} s.",
+        (f"Taken as recorded: {taken}. " if taken else "") + _estimates(outcome.scene, estimated),
+        _truth(outcome),
+    ]
     if notes.gaps:
         sentences.append(
             f"{notes.gaps} gap{'s' * (notes.gaps != 1)} of {amount(notes.missing_s, 's')} in all: what happened there "
@@ -79,21 +82,22 @@ def note_sentences(outcome: Outcome) -> list[str]:
     return [sentence for sentence in [*sentences, *notes.remarks] if sentence]
 
 
-def _estimates(scene: dict[str, Any], names: list[str]) -> str:
+def _estimates(scene: Scene, names: list[str]) -> str:
     words = []
     for name in names:
-        table = scene.get(name, {})
-        source = table.get("source", "encoder")
-        how = table.get("estimator") or ("backward difference" if source == "encoder" else source)
-        cutoff = f", low-passed at {table['cutoff']:g} Hz" if "cutoff" in table else ""
+        table = scene.estimate(name)
+        source = table.source if isinstance(table, Acceleration) else "encoder"
+        how = table.estimator or ("backward difference" if source == "encoder" else source)
+        cutoff = f", low-passed at {table.cutoff:g} Hz" if table.cutoff is not None else ""
         words.append(f"{name} by {how}{cutoff}")
     return f"Estimated: {'; '.join(words)}." if words else ""
 
 
 def _truth(outcome: Outcome) -> str:
     """Returns a sentence on how the true books were made."""
-    delay = f"{amount(outcome.delay_s, 's')} after their sample" if outcome.delay_s else "at once"
-    if outcome.between == "plant steps":
+    delay_s = outcome.recording.delay_s
+    delay = f"{amount(delay_s, 's')} after their sample" if delay_s else "at once"
+    if outcome.recording.between == "plant steps":
         return f"True books: forces that act {delay}, over every step of the plant."
     if outcome.books_agree:
         return f"True books: forces that act {delay} on the recorded positions; they agree with the sampled ones."

@@ -18,15 +18,15 @@ class RecordingError(ValueError):
 
 @dataclass(frozen=True)
 class Samples:
-    """Consecutive samples, one control period apart.
+    """Consecutive samples, one control period apart; arrays of shape (samples,).
 
     Attributes:
-        t_s: time of every sample, shape (samples,).
-        x_m: position measured by the controller, shape (samples,).
+        t_s: time of every sample.
+        x_m: position measured by the controller.
         v_m_s, a_m_s2: velocity and acceleration as recorded; None where they are to be estimated.
-        true_x_m: position of the device, shape (samples,).
-        between_x_m: its position within the period after each sample, when a delayed force changes, shape (samples,);
-            None for a straight line from sample to sample.
+        true_x_m: position of the device.
+        between_x_m: its position within the period after each sample, when a delayed force changes; None for a straight
+            line from sample to sample.
         begins: whether a gap lies before it, or it is the first.
         end_x_m: position a period after the last sample; None where it is in the next piece, or not known.
     """
