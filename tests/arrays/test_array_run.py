@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import math
+from dataclasses import replace
 from typing import Annotated, Any
 
 import numpy as np
@@ -19,8 +20,12 @@ from haploop.logger.batch import BatchLogger
 from haploop.logger.verdict.window import Window
 from haploop.plant import choose
 from haploop.plant.motion.one_mass import OneMassMotion
-from helpers.runs.batches import PUSH, Stiffening, alone, diverging, pressed, together
-from helpers.scenes.least import KINDS, WALL
+from haploop.protocol.scene.effects import Friction
+from haploop.protocol.scene.estimators import Velocity
+from haploop.protocol.scene.paths import with_value
+from haploop.protocol.scene.scene import ElementTable, EventTable, Scene
+from helpers.runs.batches import PUSH, Stiffening, alone, diverging, pressed, together, with_element, with_stiffness
+from helpers.scenes.least import KINDS
 from helpers.scenes.varied_scenes import drawn_base, varied
 
 
@@ -52,8 +57,7 @@ def test_so_has_one_of_very_few(count: int) -> None:
 
 def test_one_number_by_one_bit_is_another_trajectory() -> None:
     made = pressed()
-    other = copy.deepcopy(made)
-    other["wall"]["stiffness"] = math.nextafter(300.0, math.inf)
+    other = with_stiffness(made, math.nextafter(300.0, math.inf))
     first, second, third = (result["trajectory_sha256"] for result in together([made, other, made]) if result)
     assert first == third != second
 
@@ -129,7 +133,7 @@ class Counting(Element):
 def test_an_element_that_takes_no_arrays_is_run_loop_by_loop() -> None:
     kinds = KINDS | {"stiffening": Stiffening}
     made = pressed()
-    scenes = [{**made, "dissipation": [{"kind": "stiffening", "force_N": f, "acts": "always"}]} for f in (0.1, 0.2)]
+    scenes = [with_element(made, "stiffening", force_N=f) for f in (0.1, 0.2)]
     results = run_batch(scenes, kinds, trajectories=True, fewest=1)
     assert results == [alone(each, kinds) for each in scenes]
 
@@ -138,7 +142,7 @@ def test_a_loop_whose_force_is_no_finite_number_fails_as_it_does_alone() -> None
     kinds = KINDS | {"counting": Counting}
     made = pressed()
     forces = (0.001, 0.002, 0.5, 0.003)
-    scenes = [{**made, "dissipation": [{"kind": "counting", "force_N": f, "acts": "always"}]} for f in forces]
+    scenes = [with_element(made, "counting", force_N=f) for f in forces]
     expected = [alone(each, kinds) for each in scenes]
     assert [result["ended"] for result in expected] == ["done", "done", "failed", "done"]
     assert [result is None for result in together(scenes, kinds)] == [False, False, True, False]
@@ -161,10 +165,8 @@ def test_a_change_that_is_refused_for_one_loop_is_made_in_the_others() -> None:
 
     kinds = KINDS | {"choosy": Choosy}
     made = pressed()
-    scenes = [
-        {**made, "event": [{"at": 0.05, "element": 0, "swap": {"kind": "choosy", "force_N": f, "acts": "always"}}]}
-        for f in (0.1, 0.2, 0.3)
-    ]
+    swaps = [ElementTable(name="choosy", acts="always", parameters={"force_N": f}) for f in (0.1, 0.2, 0.3)]
+    scenes = [replace(made, event=(EventTable(at=0.05, element=0, swap=swap),)) for swap in swaps]
     results = run_batch(scenes, kinds, trajectories=True, fewest=1)
     assert results == [alone(each, kinds) for each in scenes]
     assert [len(result["energy"]["elements"]) for result in results] == [2, 2, 1]
@@ -180,8 +182,7 @@ def test_a_loop_that_cannot_go_on_is_a_result_with_its_reason() -> None:
             raise RuntimeError("out of order")
 
     made = pressed()
-    broken = {**made, "dissipation": [{"kind": "broken", "acts": "always"}]}
-    first, second = run_batch([broken, made], KINDS | {"broken": Broken}, fewest=1)
+    first, second = run_batch([with_element(made, "broken"), made], KINDS | {"broken": Broken}, fewest=1)
     assert (first["ended"], second["ended"]) == ("failed", "done")
     assert "out of order" in first["why"]
 
@@ -217,7 +218,7 @@ def test_chunks_cover_a_group_and_none_is_longer_than_allowed(monkeypatch: pytes
     seen = []
 
     class Spy(Batch):
-        def __init__(self, chunk: list[dict[str, Any]], *args: Any, **kwargs: Any) -> None:
+        def __init__(self, chunk: list[Scene], *args: Any, **kwargs: Any) -> None:
             seen.append(len(chunk))
             super().__init__(chunk, *args, **kwargs)
 
@@ -229,33 +230,34 @@ def test_chunks_cover_a_group_and_none_is_longer_than_allowed(monkeypatch: pytes
 
 def test_only_numbers_and_titles_may_differ_within_a_structure() -> None:
     base = pressed(event=[{"at": 0.05, "set": {"wall.stiffness": 100.0}}])
-    same = copy.deepcopy(base) | {"title": "another", "seed": 9}
-    same["device"]["mass"] *= 2
-    same["event"][0]["set"]["wall.stiffness"] = 50.0
+    (event,) = base.event
+    same = with_value(replace(base, title="another", seed=9), "device.mass", 2.0 * base.device.mass)
+    same = replace(same, event=(replace(event, set={"wall.stiffness": 50.0}),))
     assert structure(base) == structure(same)
     for key, value in {
         "duration": 0.2,
-        "wall": WALL | {"occupies": "above"},
-        "clock": {**base["clock"], "round_trip_delay": 0.0},
-        "event": [{**base["event"][0], "at": 0.06}],
-        "device": {**base["device"], "damping": 0.0},
-        "velocity": {"cutoff": 50.0},
+        "wall.occupies": "above",
+        "clock.round_trip_delay": 0.0,
+        "event": (replace(event, at=0.06),),
+        "device.damping": 0.0,
+        "velocity": Velocity(cutoff=50.0),
     }.items():
-        assert structure(base) != structure({**base, key: value}), key
+        assert structure(base) != structure(with_value(base, key, value)), key
 
 
 def test_the_structures_of_many_scenes_are_those_of_each_whatever_they_share() -> None:
     """Tables that go from scene to scene as one object, in all orders, with friction and without."""
     base, rng = pressed(), np.random.default_rng(3)
-    pools = {
-        "device": [base["device"], {**base["device"], "damping": 0.0}, dict(base["device"])],
-        "wall": [base["wall"], {**base["wall"], "stiffness": 7.0}, {**base["wall"], "occupies": "above"}],
-        "friction": [None, {"kinetic": 0.01}, {"kinetic": 0.02}],
+    device, wall = base.device, base.wall
+    assert wall
+    pools: dict[str, list[Any]] = {
+        "device": [device, replace(device, damping=0.0), replace(device)],
+        "wall": [wall, replace(wall, stiffness=7.0), replace(wall, occupies="above")],
+        "friction": [None, Friction(kinetic=0.01), Friction(kinetic=0.02)],
     }
     scenes = []
     for _ in range(200):
-        drawn = {key: pool[rng.integers(len(pool))] for key, pool in pools.items()}
-        scenes.append({key: entry for key, entry in {**base, **drawn}.items() if entry is not None})
+        scenes.append(replace(base, **{key: pool[rng.integers(len(pool))] for key, pool in pools.items()}))
     found = list(structures(scenes))
     assert found == [structure(copy.deepcopy(each)) for each in scenes]
     assert len(set(found)) > 10
@@ -264,6 +266,6 @@ def test_the_structures_of_many_scenes_are_those_of_each_whatever_they_share() -
 def test_numbers_that_are_equal_stay_one_number() -> None:
     scenes = [pressed(wall={"position": -0.002, "stiffness": k}) for k in (100.0, 200.0)]
     made = stacked(scenes)
-    assert made["wall"]["stiffness"].tolist() == [100.0, 200.0]
-    assert made["wall"]["position"] == -0.002
-    assert made.keys() == scenes[0].keys()
+    assert made.wall
+    assert np.asarray(made.wall.stiffness).tolist() == [100.0, 200.0]
+    assert replace(made, wall=replace(made.wall, stiffness=100.0)) == scenes[0]

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import copy
-from typing import Any
-
 import numpy as np
 import pytest
 
 from haploop.launch.batch.batch import Batch
 from haploop.launch.batch.run import run_batch
+from haploop.protocol.scene.paths import with_value
+from haploop.protocol.scene.scene import Scene
 from helpers.runs.batches import pressed
 from helpers.runs.compiled import agree, compiled
 from helpers.scenes.least import KINDS
@@ -19,7 +18,7 @@ from helpers.scenes.varied_scenes import drawn_base, varied
 TOLERANCE = 1e-11
 
 
-def loops_of(scenes: list[dict[str, Any]], by_program: bool) -> Batch:
+def loops_of(scenes: list[Scene], by_program: bool) -> Batch:
     """All loops run to their ends, none dropped."""
     if not by_program:
         loops = Batch(scenes, KINDS)
@@ -40,11 +39,9 @@ def positions(loops: Batch, ticks: int) -> np.ndarray:
     return loops._logger.window.state.x[: ticks * loops._time.steps_per_tick]
 
 
-def nudged(scene: dict[str, Any], by: float) -> dict[str, Any]:
+def nudged(scene: Scene, by: float) -> Scene:
     """The scene with the device's start moved by a last digit."""
-    beside = copy.deepcopy(scene)
-    beside["device"]["position"] += by
-    return beside
+    return with_value(scene, "device.position", scene.device.position + by)
 
 
 def check_motion(seed: int) -> None:
@@ -63,7 +60,7 @@ def check_motion(seed: int) -> None:
     assert np.count_nonzero(steady) >= 8, "few of these loops can be compared; the test needs another scene"
     away = np.abs(x - truth).max(axis=0)[steady] / scale[steady]
     # Whether a window of FOAW's passes may be a tie between whole counts, which the last digit decides.
-    ties = any(base.get(table, {}).get("estimator") == "foaw" for table in ("velocity", "acceleration"))
+    ties = any(base.estimate(of).estimator == "foaw" for of in ("velocity", "acceleration"))
     assert away.max() < (1e-2 if ties else TOLERANCE)
     assert np.median(away) < TOLERANCE
     for loop in np.flatnonzero(steady):

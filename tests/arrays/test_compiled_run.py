@@ -13,7 +13,7 @@ import pytest
 from haploop.controller.dissipation import Element, Motion, Quantity, where
 from haploop.launch.batch.jax.run import compiled_results, compiling
 from haploop.launch.batch.run import run_batch
-from helpers.runs.batches import PUSH, Stiffening, alone, pressed
+from helpers.runs.batches import PUSH, Stiffening, alone, pressed, with_element
 from helpers.runs.compiled import agree, compiled, jax, many
 from helpers.scenes.least import KINDS
 
@@ -135,7 +135,7 @@ def test_an_element_of_any_kind_comes_to_what_it_comes_to_alone(element: type[El
     kinds, count = KINDS | {element.kind: element}, compiling()[0]
     made = pressed(duration=0.1)
     forces = (0.1, 0.2, 0.3)
-    scenes = [{**made, "dissipation": [{"kind": element.kind, "force_N": f, "acts": "always"}]} for f in forces]
+    scenes = [with_element(made, element.kind, force_N=f) for f in forces]
     for result, exact in zip(compiled(scenes, kinds), [alone(each, kinds) for each in scenes], strict=True):
         del exact["trajectory_sha256"]
         assert agree(result, exact)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from haploop.protocol.scene.scene import Clock
 from haploop.protocol.ticks import Timebase
 from helpers.runs.compiled import agree
 
@@ -15,7 +16,7 @@ def test_windows_read_by_a_program_show_what_they_show_by_themselves() -> None:
     from haploop.launch.batch.jax.programs import in_double
     from haploop.launch.batch.jax.window import CompiledWindow
 
-    time = Timebase.from_clock({"control_rate": 200, "plant_rate": 800, "round_trip_delay": 0.0}, 10.0)
+    time = Timebase.from_clock(Clock(control_rate=200, plant_rate=800), 10.0)
     rng = np.random.default_rng(5)
     for ticks in (101, 150, 317):
         window = CompiledWindow(time, np.array([0.0, 1e-5, 1e-4, 1e-3] * 4), 16, spare_ticks=40)

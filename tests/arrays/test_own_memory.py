@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+from dataclasses import replace
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
@@ -11,7 +12,8 @@ import pytest
 from haploop.controller import active_elements
 from haploop.controller.dissipation import Element, ElementError, Motion, Quantity
 from haploop.launch.batch.run import run_batch
-from helpers.runs.batches import alone, diverging, pressed, together
+from haploop.protocol.scene.scene import ElementTable, EventTable, Scene
+from helpers.runs.batches import alone, diverging, pressed, together, with_element
 from helpers.scenes.least import KINDS
 
 
@@ -63,23 +65,18 @@ class Shared(Element):
         return -self.damping * motion.v
 
 
-def scenes(**tables: Any) -> list[dict[str, Any]]:
-    elements = ([{"kind": "fading", "damping": 0.2 + 0.05 * i, "acts": "always"}] for i in range(4))
-    return [{**pressed(**tables), "dissipation": element} for element in elements]
+def scenes() -> list[Scene]:
+    return [with_element(pressed(), "fading", damping=0.2 + 0.05 * i) for i in range(4)]
 
 
-EVENTS = [
-    {"at": 0.04, "set": {"dissipation.0.damping": 0.3}},
-    {"at": 0.08, "element": 0, "swap": {"kind": "fading", "damping": 0.25, "acts": "in-contact"}},
-]
-
-
-def with_events() -> list[dict[str, Any]]:
-    return [{**one, "event": EVENTS} for one in scenes()]
+def with_events() -> list[Scene]:
+    swap = ElementTable(name="fading", parameters={"damping": 0.25})
+    events = EventTable(at=0.04, set={"dissipation.0.damping": 0.3}), EventTable(at=0.08, element=0, swap=swap)
+    return [replace(one, event=events) for one in scenes()]
 
 
 @pytest.mark.parametrize("made", [scenes(), with_events()], ids=["as it is", "set and swapped"])
-def test_a_declared_memory_has_the_bits_alone_and_in_a_batch(made: list[dict[str, Any]]) -> None:
+def test_a_declared_memory_has_the_bits_alone_and_in_a_batch(made: list[Scene]) -> None:
     kinds = KINDS | {"fading": Fading}
     expected = [alone(each, kinds) for each in made]
     assert together(made, kinds) == expected
@@ -88,10 +85,8 @@ def test_a_declared_memory_has_the_bits_alone_and_in_a_batch(made: list[dict[str
 
 
 def test_a_declared_memory_follows_its_members_when_others_are_dropped() -> None:
-    made = [
-        {**one, "dissipation": [*one["dissipation"], {"kind": "fading", "damping": 0.1, "acts": "always"}]}
-        for one in diverging()
-    ]
+    fading = ElementTable(name="fading", acts="always", parameters={"damping": 0.1})
+    made = [replace(one, dissipation=(*one.dissipation, fading)) for one in diverging()]
     kinds = KINDS | {"fading": Fading}
     expected = [alone(each, kinds) for each in made]
     assert {"diverged", "done"} == {result["ended"] for result in expected}
@@ -101,7 +96,7 @@ def test_a_declared_memory_follows_its_members_when_others_are_dropped() -> None
 @pytest.mark.slow
 @pytest.mark.skipif(not importlib.util.find_spec("jax"), reason="needs jax")
 @pytest.mark.parametrize("made", [scenes(), with_events()], ids=["as it is", "set and swapped"])
-def test_a_declared_memory_compiles(made: list[dict[str, Any]]) -> None:
+def test_a_declared_memory_compiles(made: list[Scene]) -> None:
     from haploop.launch.batch.jax.run import compiling
     from helpers.runs.compiled import agree, compiled
 

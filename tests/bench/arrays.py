@@ -16,26 +16,24 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from haploop.controller.dissipation import registry
+from haploop.controller.dissipation import Element, registry
 from haploop.launch.batch.run import run_batch
 from haploop.launch.runs.in_process import run_in_process
 from haploop.launch.scene.file import load
+from haploop.protocol.scene.paths import with_value
+from haploop.protocol.scene.scene import Scene
 from haploop.tools.machine import machine
 
 sys.path.append(str(Path(__file__).parents[1]))  # where the oracles are
 SCENE = Path(__file__).parents[2] / "launch" / "scenes" / "fig6b.toml"
 
 
-def paper_scenes(count: int, duration_s: float | None = None) -> list[dict[str, Any]]:
+def paper_scenes(count: int, duration_s: float | None = None) -> list[Scene]:
     """Figure 6(b) over a square of stiffness and damping, from steady contacts to wide limit cycles."""
     base = load(SCENE, [f"duration={duration_s}"] if duration_s else [])
     side = round(count**0.5)
     return [
-        {
-            **base,
-            "wall": {**base["wall"], "stiffness": stiffness},
-            "dissipation": [{**base["dissipation"][0], "damping": damping}],
-        }
+        with_value(with_value(base, "wall.stiffness", stiffness), "dissipation.0.damping", damping)
         for stiffness in np.linspace(20.0, 400.0, side).tolist()
         for damping in np.linspace(0.02, 2.0, side).tolist()
     ]
@@ -48,7 +46,7 @@ def measured_us(run: Callable[[], Any], ticks: int) -> float:
     return (time.process_time() - began) / ticks * 1e6
 
 
-def check_kernel(scenes: list[dict[str, Any]], kinds: dict[str, Any]) -> None:
+def check_kernel(scenes: list[Scene], kinds: dict[str, type[Element]]) -> None:
     """That the yardstick does the same work: its books are those of the arrays."""
     from oracles.array_kernel import BOOKS, FIGURES, run_kernel
 
@@ -73,7 +71,7 @@ def main() -> None:
     options = parser.parse_args()
     scenes, kinds = paper_scenes(options.scenes, options.duration), registry()
     few = scenes[:: max(1, len(scenes) // 20)]
-    ticks_of = round(scenes[0]["duration"] * scenes[0]["clock"]["control_rate"])
+    ticks_of = round(scenes[0].duration * scenes[0].clock.control_rate)
     rows: dict[str, tuple[Callable[[], Any], int]] = {
         "one process, with the books": (lambda: [run_in_process(scene, kinds) for scene in few], len(few)),
         "arrays, with the books": (lambda: run_batch(scenes, kinds), len(scenes)),
@@ -99,7 +97,7 @@ def main() -> None:
         for name, (run, count) in rows.items():
             seen[name].append(measured_us(run, count * ticks_of))
     table = Table(
-        title=f"{len(scenes)} scenes of {scenes[0]['duration']:g} s, medians of {options.repeats}; {machine()}",
+        title=f"{len(scenes)} scenes of {scenes[0].duration:g} s, medians of {options.repeats}; {machine()}",
         title_justify="left",
     )
     for heading in ("what", "µs per tick", "least - most", "in one process / this", "this / kernel"):

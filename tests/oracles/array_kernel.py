@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numba  # pyright: ignore[reportMissingImports]
 import numpy as np
 
@@ -11,6 +9,8 @@ from haploop.logger.books.one_mass import as_squares
 from haploop.plant.motion.mechanics import Mechanics
 from haploop.plant.motion.one_mass import OneMassMotion
 from haploop.plant.motion.transition import make_zoh_transitions, motion_integrals, natural_rate
+from haploop.protocol.scene.paths import value_at
+from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
 
 BOOKS: tuple[str, ...] = (
@@ -147,7 +147,7 @@ def _loops(  # pragma: no cover
         out[cell, FIGURES:] = books + errors
 
 
-def run_kernel(scenes: list[dict[str, Any]], energy: bool) -> np.ndarray:
+def run_kernel(scenes: list[Scene], energy: bool) -> np.ndarray:
     """Extremes, what the window shows and ``BOOKS``, as in a summary; shape (scenes, FIGURES + books)."""
     first = scenes[0]
     time = Timebase.from_scene(first)
@@ -159,10 +159,10 @@ def run_kernel(scenes: list[dict[str, Any]], energy: bool) -> np.ndarray:
     scales = np.array([1.0, push, push])
     out, kept = np.zeros((len(scenes), FIGURES + len(BOOKS))), min(time.control_rate // 2, time.ticks)
     _loops(
-        np.array([scene["wall"]["stiffness"] for scene in scenes]),
-        np.array([scene["dissipation"][0]["damping"] for scene in scenes]),
-        first["wall"]["position"],
-        first["encoder"]["resolution"],
+        np.array([value_at(scene, "wall.stiffness") for scene in scenes]),
+        np.array([value_at(scene, "dissipation.0.damping") for scene in scenes]),
+        value_at(first, "wall.position"),
+        value_at(first, "encoder.resolution"),
         time.period_s,
         time.ticks,
         time.lookahead_ticks,

@@ -4,28 +4,32 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
 from haploop.logger.books.books import Books
 from haploop.logger.books.buffers import Commanded
-from haploop.logger.summary import Account, energy, finite, note_accounts, outcome
+from haploop.logger.summary import Account, Summary, energy, finite, note_accounts, outcome
 from haploop.logger.verdict.window import CONTROLLER_COLUMNS, Window
 from haploop.protocol.arrays import rows_of
+from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
 from haploop.protocol.trees import tree_by_member, tree_select, tree_take
+from haploop.protocol.wire import Message
 
 # Steps of a trajectory that are hashed together.
 _HASHED_STEPS = 320
+# Numbers, or arrays of shape (members,), by name.
+Columns = dict[str, Any]
 
 
 class Row(Protocol):
     """One tick of a batch; numbers, or arrays of shape (members,)."""
 
     @property
-    def columns(self) -> dict[str, Any]:
+    def columns(self) -> Columns:
         """x, v, a, wall, total, in_contact, wall_position, wall_stiffness."""
         ...
 
@@ -35,7 +39,7 @@ class Row(Protocol):
         ...
 
     @property
-    def elements(self) -> list[dict[str, Any]]:
+    def elements(self) -> list[Message]:
         """Descriptions of the elements at work; parameters may be arrays."""
         ...
 
@@ -51,7 +55,7 @@ class MemberEnd(NamedTuple):
     """
 
     place: int
-    scene: dict[str, Any]
+    scene: Scene
     x_m: float
     v_m_s: float
     reason: str | None
@@ -74,12 +78,10 @@ class BatchLogger:
         tick: every interval before it is booked.
     """
 
-    def __init__(
-        self, scene: dict[str, Any], time: Timebase, members: int, *, energy: bool, trajectories: bool
-    ) -> None:
+    def __init__(self, scene: Scene, time: Timebase, members: int, *, energy: bool, trajectories: bool) -> None:
         self._time = time
         self.books = Books(scene, time, members) if energy else None
-        self.window = Window(time, scene.get("encoder", {}).get("resolution", 0.0), members)
+        self.window = Window(time, scene.encoder.resolution if scene.encoder else 0.0, members)
         self.rows: list[Row] = []
         self._accounts: dict[int, Account] = {}
         self._trajectories = Trajectories(members) if trajectories else None
@@ -128,11 +130,11 @@ class BatchLogger:
             if part:
                 part.select(kept)
 
-    def note_accounts(self, elements: Sequence[dict[str, Any]]) -> None:
+    def note_accounts(self, elements: Sequence[Message]) -> None:
         """Takes note that these elements have been at work up to ``tick``."""
         note_accounts(self._accounts, elements, self.tick)
 
-    def outcomes(self, ends: Sequence[MemberEnd], ended: str, counted: dict[str, Any]) -> Iterator[dict[str, Any]]:
+    def outcomes(self, ends: Sequence[MemberEnd], ended: str, counted: Mapping[str, np.ndarray]) -> Iterator[Summary]:
         """Yields the entries of the summary of each of these members but for the machine's, as they stand now.
 
         Args:
@@ -146,7 +148,7 @@ class BatchLogger:
             (name.partition("."), tree_by_member(tree_take(of, places), len(ends))) for name, of in counted.items()
         ]
         for index, (end, one, energies) in enumerate(zip(ends, measures, self._energies(ends, places), strict=True)):
-            ran: dict[str, Any] = {
+            ran: Summary = {
                 "duration_s": self.tick / self._time.control_rate,
                 "ticks": self.tick,
                 "steps": self.tick * self._time.steps_per_tick,
@@ -164,7 +166,7 @@ class BatchLogger:
             is_finite = one.is_finite() and math.isfinite(end.v_m_s)
             yield (entries if is_finite else finite(entries)) | energies
 
-    def _energies(self, ends: Sequence[MemberEnd], places: np.ndarray) -> list[dict[str, Any]]:
+    def _energies(self, ends: Sequence[MemberEnd], places: np.ndarray) -> list[Summary]:
         """Returns the ``energy`` entry of each summary; none without books."""
         if not self.books or not ends:
             return [{} for _ in ends]

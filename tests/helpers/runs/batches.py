@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Annotated, Any
 
 import numpy as np
@@ -10,24 +11,26 @@ import numpy as np
 from haploop.controller.dissipation import Element, Motion, Quantity
 from haploop.launch.batch.batch import Batch
 from haploop.launch.runs.in_process import run_in_process
-from haploop.logger.summary import OF_THE_MACHINE
+from haploop.logger.summary import OF_THE_MACHINE, Summary
+from haploop.protocol.scene.paths import with_value
+from haploop.protocol.scene.scene import ElementTable, Scene
 from helpers.scenes.least import KINDS, scene
 
 PUSH = {"mass": 0.01, "stiffness": 10.0, "damping": 0.01, "force": {"kind": "ramp", "value": -0.8, "rise_time": 0.05}}
 
 
-def alone(made: dict[str, Any], kinds: dict[str, type[Element]] = KINDS) -> dict[str, Any]:
+def alone(made: Scene, kinds: dict[str, type[Element]] = KINDS) -> Summary:
     summary = run_in_process(made, kinds)
     return {key: value for key, value in summary.items() if key not in OF_THE_MACHINE}
 
 
-def together(scenes: list[dict[str, Any]], kinds: dict[str, type[Element]] = KINDS) -> list[dict[str, Any] | None]:
+def together(scenes: list[Scene], kinds: dict[str, type[Element]] = KINDS) -> list[Summary | None]:
     loops = Batch(scenes, kinds, trajectories=True)
     loops.run()
     return loops.results
 
 
-def pressed(**tables: Any) -> dict[str, Any]:
+def pressed(**tables: Any) -> Scene:
     """A hand pushes the device into a wall with a damper."""
     whole: dict[str, Any] = {
         "duration": 0.15,
@@ -40,7 +43,7 @@ def pressed(**tables: Any) -> dict[str, Any]:
     return scene(**{**whole, **tables})
 
 
-def diverging() -> list[dict[str, Any]]:
+def diverging() -> list[Scene]:
     """Some of these swing up and away, each at its time; some do not."""
     return [
         pressed(
@@ -52,6 +55,16 @@ def diverging() -> list[dict[str, Any]]:
         )
         for damping in np.linspace(1.0, 12.0, 16).tolist()
     ]
+
+
+def with_stiffness(made: Scene, stiffness: float) -> Scene:
+    """The scene with another stiffness of its wall."""
+    return with_value(made, "wall.stiffness", stiffness)
+
+
+def with_element(made: Scene, kind: str, **parameters: float) -> Scene:
+    """The scene with one element that always acts, in place of its own."""
+    return replace(made, dissipation=(ElementTable(name=kind, acts="always", parameters=parameters),))
 
 
 class Stiffening(Element):

@@ -9,18 +9,19 @@ import pytest
 
 from haploop.controller.dissipation import Element
 from haploop.launch.batch.jax.run import compiled_results
+from haploop.protocol.scene.scene import Scene
 from helpers.runs.batches import pressed
 from helpers.scenes.least import KINDS
 
 jax = pytest.importorskip("jax")
 
 
-def compiled(scenes: list[dict[str, Any]], kinds: dict[str, type[Element]] = KINDS, **options: Any) -> list[Any]:
+def compiled(scenes: list[Scene], kinds: dict[str, type[Element]] = KINDS, **options: Any) -> list[Any]:
     results = dict(compiled_results(scenes, kinds, fewest=1, least=0, most=16, **options))
     return [results[index] for index in range(len(scenes))]
 
 
-def many(count: int, **tables: Any) -> list[dict[str, Any]]:
+def many(count: int, **tables: Any) -> list[Scene]:
     """Loops that differ in their walls alone; one program serves all of this structure."""
     return [pressed(wall={"position": -0.002, "stiffness": 200.0 + i}, **tables) for i in range(count)]
 

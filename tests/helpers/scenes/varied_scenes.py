@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
+from haploop.protocol.scene.scene import Scene
+from haploop.protocol.scene.table import Table
 from helpers.scenes.least import scene
 from helpers.scenes.random_scenes import tables_of
 
@@ -23,7 +26,7 @@ ESTIMATORS: list[dict[str, Any]] = [
 ]
 
 
-def drawn_base(seed: int) -> dict[str, Any]:
+def drawn_base(seed: int) -> Scene:
     """A scene with all that runs in arrays; what is random in it, too."""
     rng = np.random.default_rng(seed)
     tables = tables_of(seed, rng)
@@ -36,7 +39,7 @@ def drawn_base(seed: int) -> dict[str, Any]:
     return scene(**tables)
 
 
-def drawn_chain(seed: int) -> dict[str, Any]:
+def drawn_chain(seed: int) -> Scene:
     """Bodies in a row, with any of a cable, a grip, an actuator's bandwidth and an accelerometer that is not ideal."""
     rng = np.random.default_rng([seed, 1])
     tables = tables_of(seed, rng)
@@ -58,14 +61,16 @@ def drawn_chain(seed: int) -> dict[str, Any]:
     return scene(**tables)
 
 
-def varied(base: dict[str, Any], rng: np.random.Generator) -> dict[str, Any]:
+def varied(base: Scene, rng: np.random.Generator) -> Scene:
     """Returns a scene of equal structure, every number by up to a tenth another one, and another seed."""
-    return _varied(base, rng) | {"seed": int(rng.integers(2**62)), "title": f"varied {rng.integers(1000)}"}
+    return replace(_varied(base, rng), seed=int(rng.integers(2**62)), title=f"varied {rng.integers(1000)}")
 
 
 def _varied(value: Any, rng: np.random.Generator) -> Any:
     if isinstance(value, dict):
         return {key: entry if key in _SHARED else _varied(entry, rng) for key, entry in value.items()}
-    if isinstance(value, list):
-        return [_varied(entry, rng) if isinstance(entry, dict) else entry for entry in value]
+    if isinstance(value, Table):
+        return type(value)(**_varied(vars(value), rng))
+    if isinstance(value, tuple):
+        return tuple(_varied(entry, rng) if isinstance(entry, Table) else entry for entry in value)
     return value * rng.uniform(0.9, 1.1) if isinstance(value, float) else value

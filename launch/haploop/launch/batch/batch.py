@@ -16,6 +16,7 @@ from haploop.controller.recorder import BatchRecorder
 from haploop.launch.batch.stacking import stacked
 from haploop.launch.runs.in_process import scene_events
 from haploop.logger.batch import BatchLogger, MemberEnd
+from haploop.logger.summary import Summary
 from haploop.plant.choose import make_motion, make_position_sensor
 from haploop.plant.line.delay import make_line
 from haploop.plant.plant import beyond
@@ -58,7 +59,7 @@ class Batch:
 
     def __init__(
         self,
-        scenes: Sequence[dict[str, Any]],
+        scenes: Sequence[Scene],
         kinds: dict[str, type[Element]],
         *,
         energy: bool = True,
@@ -71,19 +72,19 @@ class Batch:
         self._position, self._sensor = make_position_sensor(scene, time), make_accelerometer(scene, time, members)
         self._feels = accelerometer_is_used(scene)
         self._rows = BatchRecorder()
-        self._controller = Controller(Scene.from_dict(scene), time, kinds, self._rows)
+        self._controller = Controller(scene, time, kinds, self._rows)
         self._elements = Unchanged(self._controller.params.elements)
         self._logger = BatchLogger(scene, time, len(scenes), energy=energy, trajectories=trajectories)
         self._positions_only = not (energy or trajectories)
         self._in_flight: deque[Any] = deque(maxlen=time.lookahead_ticks + 1)
-        self._limit_m, self._usual_buffer = scene["diverged_beyond"], np.getbufsize()
+        self._limit_m, self._usual_buffer = scene.diverged_beyond, np.getbufsize()
         self._scene_of = np.arange(len(scenes))
         self._ended = np.zeros(len(scenes), bool)
-        self._unheeded = 0.0 if "friction" in scene else _UNHEEDED
+        self._unheeded = 0.0 if scene.friction else _UNHEEDED
         self._schedule(scene)
-        self.results: list[dict[str, Any] | None] = [None] * len(scenes)
+        self.results: list[Summary | None] = [None] * len(scenes)
 
-    def _schedule(self, scene: dict[str, Any]) -> None:
+    def _schedule(self, scene: Scene) -> None:
         self._end, self._changes = self._time.ticks, set[int]()
         for tick, event in scene_events(scene, self._time):
             if "swap" in event or "set" in event:

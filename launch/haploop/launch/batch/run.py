@@ -11,18 +11,18 @@ from haploop.launch.batch.batch import Batch
 from haploop.launch.batch.stacking import is_batchable, structures
 from haploop.launch.runs.in_process import run_in_process
 from haploop.launch.spec import RunFailed
-from haploop.logger.summary import OF_THE_MACHINE
+from haploop.logger.summary import OF_THE_MACHINE, Summary
+from haploop.protocol.scene.scene import Scene
 
 if TYPE_CHECKING:
     from haploop.controller.dissipation import Element
 
-Scene = dict[str, Any]
 Kinds = dict[str, "type[Element]"]
 # Fewer members of one structure are sooner run one by one; more than so many at once outgrow the cache.
 FEWEST, MOST = 16, 2048
 
 
-def run_batch(scenes: Sequence[Scene], kinds: Kinds, **options: Any) -> list[dict[str, Any]]:
+def run_batch(scenes: Sequence[Scene], kinds: Kinds, **options: Any) -> list[Summary]:
     """Returns the results of ``batch_results``, in the order of the scenes."""
     results = dict(batch_results(scenes, kinds, **options))
     return [results[index] for index in range(len(scenes))]
@@ -36,7 +36,7 @@ def batch_results(
     trajectories: bool = False,
     fewest: int = FEWEST,
     most: int = MOST,
-) -> Iterator[tuple[int, dict[str, Any]]]:
+) -> Iterator[tuple[int, Summary]]:
     """Runs resolved scenes to their ends; results are yielded part by part, so that none of them need be kept.
 
     Args:
@@ -80,9 +80,7 @@ def _chunks(group: list[int], fewest: int, most: int) -> list[list[int]]:
     return [group[first:last] for first, last in pairwise(bounds)]
 
 
-def _together(
-    scenes: Sequence[Scene], kinds: Kinds, energy: bool, trajectories: bool
-) -> Sequence[dict[str, Any] | None]:
+def _together(scenes: Sequence[Scene], kinds: Kinds, energy: bool, trajectories: bool) -> Sequence[Summary | None]:
     """The results of scenes of one structure; None where a scene has to be run alone.
 
     An element that takes no arrays, or keeps attributes of its own, raises here, and whatever raises for one member
@@ -96,10 +94,10 @@ def _together(
     return batch.results
 
 
-def _alone(scene: Scene, kinds: Kinds, energy: bool, trajectories: bool) -> dict[str, Any]:
+def _alone(scene: Scene, kinds: Kinds, energy: bool, trajectories: bool) -> Summary:
     aside = {*OF_THE_MACHINE, *(() if energy else ("energy",)), *(() if trajectories else ("trajectory_sha256",))}
     try:
         summary = run_in_process(scene, kinds)
     except RunFailed as error:
-        return {"title": scene["title"], "seed": scene["seed"], "ended": "failed", "why": str(error)}
+        return {"title": scene.title, "seed": scene.seed, "ended": "failed", "why": str(error)}
     return {key: value for key, value in summary.items() if key not in aside}

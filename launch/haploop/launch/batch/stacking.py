@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterable, Iterator, Sequence
+from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -10,6 +10,8 @@ import numpy as np
 from haploop.launch.plan.effects import alone_perhaps
 from haploop.plant.chain.chain import Chain
 from haploop.plant.choose import needs_chain
+from haploop.protocol.scene.scene import Scene
+from haploop.protocol.scene.table import Table
 from haploop.protocol.ticks import DELAY
 
 # What says nothing of what is simulated.
@@ -19,7 +21,7 @@ _TIMES = ("clock", "duration", "at", "delay")
 _BODIES = ("device", "hand", "transmission", "friction", "actuator", "accelerometer")
 
 
-def is_batchable(scene: dict[str, Any]) -> bool:
+def is_batchable(scene: Scene) -> bool:
     """Tells whether a resolved scene takes the same way whatever its numbers, so that many can be run as one batch.
 
     Not so: jitter, loss, another integrator than the exact flow; a delay that changes; a chain whose damping needs the
@@ -27,12 +29,12 @@ def is_batchable(scene: dict[str, Any]) -> bool:
     """
     if any(effect.is_in(scene) and not effect.batches_in(scene) for effect in alone_perhaps()):
         return False
-    if any(DELAY in event.get("set", {}) for event in scene.get("event", [])):
+    if any(event.set and DELAY in event.set for event in scene.event):
         return False
-    return not needs_chain(scene) or Chain.from_scene(scene).real_for(1.0 / scene["clock"]["plant_rate"]) is np.float64
+    return not needs_chain(scene) or Chain.from_scene(scene).real_for(1.0 / scene.clock.plant_rate) is np.float64
 
 
-def structure(scene: dict[str, Any]) -> Hashable:
+def structure(scene: Scene) -> Hashable:
     """Returns what scenes that are stacked must have in common: all but the values of their numbers.
 
     Times are common, too: the clock, the duration, delays, when events come, the points of a recorded force. So is
@@ -41,46 +43,51 @@ def structure(scene: dict[str, Any]) -> Hashable:
     return next(structures([scene]))
 
 
-def structures(scenes: Iterable[dict[str, Any]]) -> Iterator[Hashable]:
+def structures(scenes: Iterable[Scene]) -> Iterator[Hashable]:
     """Yields the structure of each scene; an entry that is the object of the scene before is not looked at again."""
-    before: dict[str, Any] = {}
+    before: Mapping[str, object] = {}
     parts: dict[str, Hashable] = {}
     for scene in scenes:
-        by_value = _TIMES + _BODIES if "friction" in scene else _TIMES
-        if "friction" in scene or "friction" in before:
+        entries = vars(scene)
+        by_value = _TIMES + _BODIES if scene.friction else _TIMES
+        if scene.friction or before.get("friction"):
             before = {}
-        for key, value in scene.items():
-            if key not in before or before[key] is not value:
-                parts[key] = key, _structure(value, key in by_value)
-        before = scene
-        yield tuple([parts[key] for key in scene if key not in _ASIDE])
+        for key, value in entries.items():
+            if key not in _ASIDE and (key not in before or before[key] is not value):
+                parts[key] = _structure(value, key in by_value)
+        before = entries
+        yield tuple(parts.values())
 
 
 def _structure(value: Any, by_value: bool) -> Hashable:
     if value.__class__ is float:
         return value if by_value else value != 0.0
-    if value.__class__ is dict:
-        parts: list[Hashable] = []
-        for key, entry in value.items():
-            parts += (key, _structure(entry, by_value or key in _TIMES))
-        return tuple(parts)
-    if value.__class__ is list:
-        of_numbers = bool(value) and value[0].__class__ is not dict
+    if isinstance(value, Table | dict):
+        entries = value if isinstance(value, dict) else vars(value)
+        parts = [(key, _structure(entry, by_value or key in _TIMES)) for key, entry in entries.items()]
+        return value.__class__, *parts
+    if isinstance(value, tuple | list):
+        of_numbers = bool(value) and not isinstance(value[0], Table | dict)
         return tuple([_structure(item, by_value or of_numbers) for item in value])
     return value
 
 
-def stacked(scenes: Sequence[dict[str, Any]]) -> dict[str, Any]:
+def stacked(scenes: Sequence[Scene]) -> Scene:
     """Returns one scene of many with the same structure; numbers that differ are arrays of shape (members,)."""
-    return {key: _stacked([scene[key] for scene in scenes]) for key in scenes[0]}
+    return _stacked(scenes)
 
 
 def _stacked(values: Sequence[Any]) -> Any:
     first = values[0]
+    if all(value is first for value in values):
+        return first
+    if isinstance(first, Table):
+        columns = zip(*(vars(value).values() for value in values), strict=True)
+        return type(first)(**{key: _stacked(column) for key, column in zip(vars(first), columns, strict=True)})
     if isinstance(first, dict):
-        return {key: _stacked([value[key] for value in values]) for key in first}
-    if isinstance(first, list):
-        return [_stacked(items) for items in zip(*values, strict=True)]
+        return type(first)((key, _stacked([value[key] for value in values])) for key in first)
+    if isinstance(first, tuple | list):
+        return type(first)(_stacked(items) for items in zip(*values, strict=True))
     if isinstance(first, bool) or not isinstance(first, int | float):
         return first
     column = np.array(values)

@@ -29,6 +29,7 @@ from haploop.logger.books.work import (
     sampled_work,
 )
 from haploop.protocol.arrays import first_row
+from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
 from haploop.protocol.trees import tree_select
 
@@ -75,10 +76,10 @@ class Books:
         state: all that changes from block to block.
     """
 
-    def __init__(self, scene: dict[str, Any], time: Timebase, members: int | None = None) -> None:
+    def __init__(self, scene: Scene, time: Timebase, members: int | None = None) -> None:
         self._time = time
         self.plant = plant_books(scene, time, members)
-        self._has_wall = "wall" in scene
+        self._has_wall = scene.wall is not None
         names = [*self.plant.names, *(CAUSES if self._has_wall else ()), "moved"]
         self.state = BooksState((), no_sums(0, members), 0.0, None, 0.0)
         self._open([*names, *_of_account("wall")])
@@ -190,14 +191,15 @@ class Books:
         return sum_rows(sign * at_ticks[row] for sign, row in balance(self.state.names))
 
 
-def plant_books(scene: dict[str, Any], time: Timebase, members: int | None = None) -> OneMassBooks | ChainBooks:
+def plant_books(scene: Scene, time: Timebase, members: int | None = None) -> OneMassBooks | ChainBooks:
     """Returns the books of a scene's plant: one mass under held forces, or a chain of bodies.
 
     Their integrals are those of the exact motion from each recorded state on. Where ``clock.integrator`` is another,
     what its next state has more or less is in no book: the residual is then the energy error of the method.
     """
-    bandwidth = "bandwidth" in scene.get("actuator", {})
-    if bandwidth or "grip" in scene.get("hand", {}) or scene.keys() & {"friction", "transmission"}:
+    lags = scene.actuator is not None and scene.actuator.bandwidth is not None
+    grips = scene.hand is not None and scene.hand.grip is not None
+    if lags or grips or scene.friction or scene.transmission:
         from haploop.logger.books.chain import ChainBooks
 
         return ChainBooks(scene, time, members)

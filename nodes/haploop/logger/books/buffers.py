@@ -6,6 +6,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from haploop.protocol.telemetry import Block
+
 # Columns of pieces of steps have a row for each piece, in order; ``pieces.step`` says of which step it is.
 PIECES = "pieces."
 
@@ -31,7 +33,7 @@ class PlantBuffer:
         self.tick = self.end = tick
         self._columns: dict[str, np.ndarray] = {}
 
-    def add(self, block: dict[str, Any]) -> None:
+    def add(self, block: Block) -> None:
         """Appends a block.
 
         Raises:
@@ -99,7 +101,7 @@ class ControllerBuffer:
         self._opened: dict[int, int] = {}
         self._part_ends: list[int] = []
 
-    def add(self, block: dict[str, Any]) -> None:
+    def add(self, block: Block) -> None:
         """Appends a block.
 
         Raises:

@@ -13,12 +13,13 @@ import numpy as np
 
 from haploop.logger.books.chain_integrals import ChainForms
 from haploop.logger.books.one_mass import beyond_limits
-from haploop.logger.books.segments import Columns, Segments, end_to_end
+from haploop.logger.books.segments import BatchColumns, Columns, Segments, end_to_end
 from haploop.logger.books.sums import sum_rows, sum_steps
 from haploop.logger.books.work import Displacement, by_interval
 from haploop.plant.chain.chain import Chain
 from haploop.plant.motion.hand_force import constant_forces, make_hand_force
 from haploop.protocol.arrays import first_row
+from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
 from haploop.protocol.trees import tree_select
 
@@ -44,11 +45,11 @@ class ChainBooks:
         names: the books, in the order in which ``increments`` yields them; heats end in ``_heat``.
     """
 
-    def __init__(self, scene: dict[str, Any], time: Timebase, members: int | None = None) -> None:
+    def __init__(self, scene: Scene, time: Timebase, members: int | None = None) -> None:
         # A sensor takes no energy.
         self._chain = replace(Chain.from_scene(scene), sensor=None)
         self._n, self._tau = time.steps_per_tick, make_hand_force(scene, time.plant_rate, members)
-        self._rubs, self._is_limited = "friction" in scene, "actuator" in scene
+        self._rubs, self._is_limited = scene.friction is not None, scene.actuator is not None
         self._forms = ChainForms(self._chain, time.step_s, of_batch=members is not None and not self._rubs)
         self._heats = [name for name in self._forms.names if name.endswith("_heat")]
         friction, actuator = ["friction_heat"] * self._rubs, ["actuator"] * self._is_limited
@@ -57,7 +58,7 @@ class ChainBooks:
         self.names = ["hand_work", *self._heats, *friction, "kinetic", "spring", *actuator, *works]
 
     def increments(
-        self, first_step: int, columns: dict[str, Any], moved: Displacement, commanded: Iterable[np.ndarray]
+        self, first_step: int, columns: BatchColumns, moved: Displacement, commanded: Iterable[np.ndarray]
     ) -> Iterator[np.ndarray]:
         """Yields the energy each interval adds to each book, J; see ``OneMassBooks.increments``.
 
@@ -68,7 +69,7 @@ class ChainBooks:
             yield sum_steps(by_interval(book, self._n))
 
     def by_step(
-        self, first_step: int, columns: dict[str, Any], dx: np.ndarray, commanded: Iterable[np.ndarray]
+        self, first_step: int, columns: BatchColumns, dx: np.ndarray, commanded: Iterable[np.ndarray]
     ) -> Iterator[np.ndarray]:
         """Yields the energy each step adds to each book, J, shape (steps,), or (steps, batch), each."""
         tau = self._tau.at_steps(first_step, first_step + len(dx) + 1)
@@ -77,7 +78,7 @@ class ChainBooks:
         return self._with_cut_steps(first_step, columns, tau, dx, list(commanded))
 
     def _with_cut_steps(
-        self, first_step: int, columns: dict[str, Any], tau: np.ndarray, dx: np.ndarray, commanded: list[np.ndarray]
+        self, first_step: int, columns: BatchColumns, tau: np.ndarray, dx: np.ndarray, commanded: list[np.ndarray]
     ) -> Iterator[np.ndarray]:
         pieces = dict[int, list[Columns]]()
         for place, cut in columns["pieces"]:

@@ -13,6 +13,7 @@ from haploop.plant.motion.hand_force import constant_forces, make_hand_force
 from haploop.plant.motion.mechanics import Mechanics
 from haploop.plant.motion.transition import motion_integrals, natural_rate
 from haploop.protocol.arrays import each, first_row
+from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
 from haploop.protocol.trees import tree_select
 
@@ -60,7 +61,7 @@ class Ticks(NamedTuple):
     dx: Any
 
 
-def one_mass_params(scene: dict[str, Any], time: Timebase, members: int | None = None) -> OneMassParams:
+def one_mass_params(scene: Scene, time: Timebase, members: int | None = None) -> OneMassParams:
     """Returns the parameters of a resolved scene, or of a batch of so many in a stacked scene."""
     m, step_s = Mechanics.from_scene(scene), time.step_s
 
@@ -181,10 +182,10 @@ class OneMassBooks:
         is_limited: whether an actuator has limits.
     """
 
-    def __init__(self, scene: dict[str, Any], time: Timebase, members: int | None = None) -> None:
+    def __init__(self, scene: Scene, time: Timebase, members: int | None = None) -> None:
         self.params = one_mass_params(scene, time, members)
         self._n, self._tau = time.steps_per_tick, make_hand_force(scene, time.plant_rate, members)
-        self.is_limited = "actuator" in scene
+        self.is_limited = scene.actuator is not None
         dampers = self.params.mechanics.dampers
         self.names = ["hand_work", *(f"{name}_heat" for name in dampers), "kinetic", "spring"]
         self.names += ["actuator"] * self.is_limited + [f"{name}_work" for name in constant_forces(scene)]

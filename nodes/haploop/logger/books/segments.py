@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -10,6 +11,8 @@ from haploop.logger.books.buffers import PIECES
 from haploop.plant.chain.chain import Chain
 
 Columns = dict[str, np.ndarray]
+# Those of a batch; with friction ``pieces``, a list of (place of a member, columns of its pieces), stands beside them.
+BatchColumns = dict[str, Any]
 # A part of a step is counted in 2^-62 of it: whole numbers, whose sums over many steps may overflow unharmed.
 _FINEST = 62
 

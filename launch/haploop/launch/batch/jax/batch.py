@@ -26,6 +26,7 @@ from haploop.plant.plant import beyond
 from haploop.plant.random.streams import Draw, NormalRows
 from haploop.plant.sensing.noise import NoisyPositionSensor
 from haploop.protocol.arrays import rows_of
+from haploop.protocol.scene.scene import Scene
 from haploop.protocol.trees import tree_leaves, tree_map, tree_unflatten
 
 if TYPE_CHECKING:
@@ -50,7 +51,7 @@ class CompiledBatch(Batch):
     """
 
     def __init__(
-        self, scenes: Sequence[dict[str, Any]], kinds: dict[str, type[Element]], *, energy: bool, size: int,
+        self, scenes: Sequence[Scene], kinds: dict[str, type[Element]], *, energy: bool, size: int,
         programs: Programs,
     ) -> None:  # fmt: skip
         super().__init__([*scenes, *[scenes[-1]] * (size - len(scenes))], kinds, energy=energy)
@@ -61,7 +62,7 @@ class CompiledBatch(Batch):
         self._ended[len(scenes) :] = True
         self._programs = programs
         self._key: Hashable = structure(scenes[0]), frozenset(kinds.items()), energy
-        self._has_wall = "wall" in scenes[0]
+        self._has_wall = scenes[0].wall is not None
         self._noisy = self._position if isinstance(self._position, NoisyPositionSensor) else None
         self._actuated = self._line if isinstance(self._line, ActuatedLine) else None
         self._delay: Any = self._actuated.line if self._actuated else self._line

@@ -52,7 +52,7 @@ class Rings(NamedTuple):
     """
 
     x: Any
-    rows: dict[str, Any]
+    rows: dict[str, jax.Array]
 
 
 class BlockInputs(NamedTuple):
@@ -155,7 +155,7 @@ class Block:
 
     def _booked(
         self, params: BatchParams, told: TickOutputs, x_m_before: Any, before: list[Forces], go: Any
-    ) -> tuple[dict[str, Any], Forces]:
+    ) -> tuple[Forces, Forces]:
         """Returns a tick's additions to the books, and its forces; ``before``: of commands that act, and the last."""
         command = {"command": told.row["total"]}
         if not self._book_names:
@@ -163,7 +163,7 @@ class Block:
         apart, now = partial(_apart, go), told.forces
         acting = [before[0], before[1] if params.lookahead else now]
 
-        def added() -> dict[str, Any]:
+        def added() -> Forces:
             return added_in_tick(
                 params.books, self._book_names, told, acting, before[2], x_m_before, self._wall(params), apart
             )

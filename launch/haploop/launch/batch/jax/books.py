@@ -8,6 +8,8 @@ from itertools import accumulate
 from operator import add
 from typing import Any
 
+import jax
+
 from haploop.controller.wall import Wall
 from haploop.launch.batch.jax.rows import Rows
 from haploop.launch.batch.jax.tick import TickOutputs
@@ -16,7 +18,7 @@ from haploop.logger.books.sums import sum_rows
 from haploop.logger.books.work import CAUSES, displacement, ideal_springs, sampled_work
 
 # Force of the wall and of every element at one tick.
-Forces = dict[str, Any]
+Forces = dict[str, jax.Array]
 # Gives what a function gives, made once for all that needs it.
 Apart = Callable[[Callable[[], Any]], Any]
 
@@ -24,7 +26,7 @@ Apart = Callable[[Callable[[], Any]], Any]
 def added_in_tick(
     params: OneMassParams, names: Sequence[str], told: TickOutputs, acting: Sequence[Forces], before: Forces,
     x_m_before: Any, wall: Wall | None, apart: Apart,
-) -> dict[str, Any]:  # fmt: skip
+) -> dict[str, jax.Array]:  # fmt: skip
     """Returns what a tick adds to each book, J, by the names of ``Books``; shape (members,).
 
     Args:

@@ -7,10 +7,12 @@ from importlib import import_module
 from typing import Any
 
 from haploop.controller.dissipation import ElementError
-from haploop.launch.batch.run import FEWEST, Kinds, Scene, batch_results, groups
+from haploop.launch.batch.run import FEWEST, Kinds, batch_results, groups
 from haploop.launch.batch.stacking import structure
+from haploop.logger.summary import Summary
 from haploop.plant.choose import needs_chain
 from haploop.plant.sensing.encoder import accelerometer_is_used
+from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
 
 # Arrays are of the greatest size, or of a half, a quarter or an eighth of it: few sizes have to be compiled.
@@ -22,7 +24,7 @@ LEAST = 5_000_000
 def compiled_results(
     scenes: Sequence[Scene], kinds: Kinds, *, energy: bool = True, fewest: int = FEWEST, most: int | None = None,
     least: int = LEAST,
-) -> Iterator[tuple[int, dict[str, Any]]]:  # fmt: skip
+) -> Iterator[tuple[int, Summary]]:  # fmt: skip
     """Runs resolved scenes to their ends, by one compiled program for all scenes that differ in numbers alone.
 
     The tick of a batch, a function of its parameters and its state, is traced on jax's placeholders, compiled, and kept
@@ -74,14 +76,14 @@ def compiling() -> tuple[int, float]:
 
 
 def _is_worth_compiling(scene: Scene, members: int, least: int) -> bool:
-    if needs_chain(scene) or ("accelerometer" in scene and accelerometer_is_used(scene)):
+    if needs_chain(scene) or (scene.accelerometer and accelerometer_is_used(scene)):
         return False
     asked = _programs().PROGRAMS.asked
     asked[structure(scene)] += members * Timebase.from_scene(scene).ticks
     return asked[structure(scene)] >= least
 
 
-def _together(scenes: list[Scene], kinds: Kinds, energy: bool, most: int) -> list[dict[str, Any] | None]:
+def _together(scenes: list[Scene], kinds: Kinds, energy: bool, most: int) -> list[Summary | None]:
     """The results of scenes of one structure; None where a scene has to be run by ``batch_results``."""
     from haploop.launch.batch.jax.batch import CompiledBatch
     from haploop.launch.batch.jax.tick import NotCompilable

@@ -104,8 +104,8 @@ class TickOutputs(NamedTuple):
     x_comp: Rows
     tau: Rows
     held: list[tuple[int, Any]]
-    row: dict[str, Any]
-    forces: dict[str, Any]
+    row: dict[str, jax.Array]
+    forces: dict[str, jax.Array]
 
 
 def batch_tick(params: BatchParams, state: BatchState, inputs: TickInputs) -> tuple[BatchState, TickOutputs]:

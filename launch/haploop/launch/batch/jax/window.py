@@ -62,7 +62,7 @@ class _Swings(NamedTuple):
 
 
 @partial(jax.jit, static_argnames=("steps", "ticks"))
-def _look(x: Any, rows: dict[str, Any], ran: Any, swing_m: Any, *, steps: int, ticks: int) -> list[Any]:
+def _look(x: Any, rows: dict[str, jax.Array], ran: Any, swing_m: Any, *, steps: int, ticks: int) -> list[Any]:
     """Returns the columns of ``MeasuredColumns``, with the counts before each mean; see ``measure_window``.
 
     Args:
@@ -100,7 +100,7 @@ def _look(x: Any, rows: dict[str, Any], ran: Any, swing_m: Any, *, steps: int, t
     return [second.crossings, growth, high - low, *_in_contact(rows, ran // n, ticks)]
 
 
-def _in_contact(rows: dict[str, Any], ran: Any, ticks: int) -> list[Any]:
+def _in_contact(rows: dict[str, jax.Array], ran: Any, ticks: int) -> list[Any]:
     """Returns, of the last ticks: those in contact; how many show a stiffness, its mean; and the mean depth."""
     length, members = rows["x"].shape
 
