@@ -11,6 +11,7 @@ from haploop.controller.controller import make_params
 from haploop.controller.tick import StateTuple, initial_state, tick
 from haploop.plant.random.streams import RandomStream, make_normal
 from haploop.plant.sensing.noise import NoisyPositionSensor
+from haploop.protocol.scene.effects import Noise
 from haploop.protocol.trees import tree_select
 from helpers.scenes.least import typed
 
@@ -43,11 +44,12 @@ def test_estimators_go_on_with_the_loops_that_are_kept(tables: dict[str, Any]) -
 
 @pytest.mark.parametrize("before", [0, 100, 128, 5000])
 def test_each_loop_draws_what_it_draws_alone_also_after_others_have_left(before: int) -> None:
-    seeds, table = np.array([3, 1, 4, 1, 5]), {"deviation": 2.0, "cutoff": np.linspace(10, 50, 5)}
-    noise = NoisyPositionSensor(None, table, seeds, 1e-3)
+    seeds, cutoffs = np.array([3, 1, 4, 1, 5]), np.linspace(10, 50, 5)
+    of_batch = Noise.from_dict({"deviation": 2.0, "cutoff": cutoffs})
+    noise = NoisyPositionSensor(None, of_batch, seeds, 1e-3)
     alone = [
-        NoisyPositionSensor(None, {"deviation": 2.0, "cutoff": cutoff}, int(seed), 1e-3)
-        for seed, cutoff in zip(seeds, table["cutoff"].tolist(), strict=True)
+        NoisyPositionSensor(None, Noise(deviation=2.0, cutoff=cutoff), int(seed), 1e-3)
+        for seed, cutoff in zip(seeds, cutoffs.tolist(), strict=True)
     ]
     for _ in range(before):
         assert noise.reading(0.0).tolist() == [one.reading(0.0) for one in alone]

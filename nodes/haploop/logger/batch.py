@@ -17,19 +17,16 @@ from haploop.protocol.arrays import rows_of
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
 from haploop.protocol.trees import tree_by_member, tree_select, tree_take
-from haploop.protocol.wire import Message
 
 # Steps of a trajectory that are hashed together.
 _HASHED_STEPS = 320
-# Numbers, or arrays of shape (members,), by name.
-Columns = dict[str, Any]
 
 
 class Row(Protocol):
     """One tick of a batch; numbers, or arrays of shape (members,)."""
 
     @property
-    def columns(self) -> Columns:
+    def columns(self) -> Mapping[str, float | np.ndarray]:
         """x, v, a, wall, total, in_contact, wall_position, wall_stiffness."""
         ...
 
@@ -39,7 +36,7 @@ class Row(Protocol):
         ...
 
     @property
-    def elements(self) -> list[Message]:
+    def elements(self) -> Sequence[Any]:
         """Descriptions of the elements at work; parameters may be arrays."""
         ...
 
@@ -130,7 +127,7 @@ class BatchLogger:
             if part:
                 part.select(kept)
 
-    def note_accounts(self, elements: Sequence[Message]) -> None:
+    def note_accounts(self, elements: Sequence[Any]) -> None:
         """Takes note that these elements have been at work up to ``tick``."""
         note_accounts(self._accounts, elements, self.tick)
 

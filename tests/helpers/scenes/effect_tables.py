@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 
+from haploop.protocol.scene.scene import Scene
 from helpers.scenes.least import scene
 
 EFFECTS: dict[str, dict[str, Any]] = {
@@ -44,7 +45,7 @@ def subsets(least: int, most: int, of: Iterable[str] = tuple(EFFECTS)) -> list[t
     return [chosen for size in range(least, most + 1) for chosen in combinations(of, size)]
 
 
-def tap(effects: Iterable[str], **more: Any) -> dict[str, Any]:
+def tap(effects: Iterable[str], **more: Any) -> Scene:
     """A hand presses the device into a wall with every kind of element in a third of a second, with these effects."""
     push = {"kind": "ramp", "value": -1.5, "rise_time": 0.1}
     tables: dict[str, Any] = {

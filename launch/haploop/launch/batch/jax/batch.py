@@ -295,7 +295,7 @@ class CompiledBatch(Batch):
         if self._logger.books:
             elements, self._logger.rows = self._rows.elements, []
             for forces in self._last(carry, tick):
-                columns = {"x": np.array(carry.x_m), "wall": forces.pop("wall")}
+                columns: dict[str, float | np.ndarray] = {"x": np.array(carry.x_m), "wall": forces.pop("wall")}
                 del forces["command"]
                 of_books = {int(book): force for book, force in forces.items()}
                 self._logger.rows.append(Row(columns, of_books, elements))

@@ -52,7 +52,7 @@ class Rings(NamedTuple):
     """
 
     x: Any
-    rows: dict[str, jax.Array]
+    rows: dict[str, Any]
 
 
 class BlockInputs(NamedTuple):
