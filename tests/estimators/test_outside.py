@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from haploop.controller.estimators.choose import ESTIMATORS, estimator_class
-from haploop.tools.linear.controller import LinearController
+from haploop.tools.linear.linearity import LinearController
 from helpers.outside.haploop_outside import AlphaBeta
 from helpers.runs.batches import alone, pressed, together
 from helpers.runs.estimates import T, estimates, floats

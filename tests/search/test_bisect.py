@@ -8,8 +8,7 @@ from collections.abc import Mapping, Sequence
 from hypothesis import given
 from hypothesis import strategies as st
 
-from haploop.tools.search.bisect import Tolerance, bisect, bisect_many
-from haploop.tools.search.ladder import climb, rungs_held
+from haploop.tools.search.bisect import Tolerance, bisect, bisect_many, climb, rungs_held
 
 
 @given(st.floats(-99.0, 99.0), st.booleans())

@@ -13,8 +13,7 @@ from haploop.plant.chain.chain import Chain
 from haploop.plant.motion.mechanics import Mechanics
 from haploop.plant.sensing.encoder import accelerometer_is_used
 from haploop.protocol.scene.scene import Scene
-from haploop.tools.linear.controller import LinearController
-from haploop.tools.linear.linearity import Kinds, installed_kinds, why_not_linear
+from haploop.tools.linear.linearity import Kinds, LinearController, installed_kinds, why_not_linear
 
 # Gil et al. leave out what grows with the square of this: the angle in rad by which the wall's swing turns in T/2 + td.
 _SMALL_ANGLE = 0.3

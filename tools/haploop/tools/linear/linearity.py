@@ -1,22 +1,34 @@
-"""Linearity of a scene's loop in contact, and the effects that a linear map leaves out."""
+"""Linearity of a scene's loop in contact, what a linear map leaves out, and the controller as a linear system.
+
+The controller's matrices are found by running the program's own controller on unit vectors.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
 
 from haploop.controller.active_elements import keeps_attributes, make_element
+from haploop.controller.controller import make_params
 from haploop.controller.dissipation import registry
+from haploop.controller.tick import ControllerParams, StateTuple, initial_state, tick
 from haploop.launch.plan.effect import as_written
 from haploop.launch.plan.effects import all_effects
+from haploop.plant.sensing.encoder import accelerometer_is_used
 from haploop.protocol.scene.paths import value_at
-from haploop.protocol.scene.scene import Scene
+from haploop.protocol.scene.scene import Scene, Wall
+from haploop.protocol.trees import tree_leaves, tree_unflatten
 
 if TYPE_CHECKING:
     from haploop.controller.dissipation import Element
 
 Kinds = Mapping[str, "type[Element]"]
+# A wall without stiffness that is never left: the elements act, and its own force is added where it is known.
+_ALWAYS_INSIDE = Wall(position=1e300, stiffness=0.0)
 
 
 @cache
@@ -46,3 +58,57 @@ def left_out(scene: Scene) -> list[str]:
     """Returns the effects of a resolved scene that a map of small, smooth swings in lasting contact leaves out."""
     keys = [key for effect in all_effects() for key in effect.left_out if value_at(scene, key)]
     return [as_written(key) for key in keys] + (["[[event]]"] if scene.event else [])
+
+
+class LinearController(NamedTuple):
+    """c[k+1] = A c[k] + B y[k], force[k] = C c[k] + D y[k] for samples y = (x,) or (x, acceleration).
+
+    c is all that estimators and elements remember, and the force that of the elements, without the wall's spring.
+
+    Attributes:
+        moved: (A B), shape (memory, memory + inputs).
+        force: (C D), shape (memory + inputs,).
+    """
+
+    moved: np.ndarray
+    force: np.ndarray
+
+    @classmethod
+    def from_scene(cls, scene: Scene, kinds: Kinds) -> LinearController:
+        """Finds that of a resolved scene of which ``why_not_linear`` has nothing to say.
+
+        By superposition: a batch is ticked whose member i has a state, or a sample, of 1 in place i and 0 elsewhere.
+        Its next state is A and B, row by row. Whole numbers of the state count ticks; they are run to where they stay.
+        """
+        period_s, inputs = 1.0 / scene.clock.control_rate, 1 + accelerometer_is_used(scene)
+        params = make_params(replace(scene, wall=_ALWAYS_INSIDE), period_s, dict(kinds))
+        state = _settled(params, (0.0,) * inputs)
+        leaves = tree_leaves(state)
+        numbers = [place for place, leaf in enumerate(leaves) if isinstance(leaf, float)]
+        units = np.eye(len(numbers) + inputs)
+        for row, place in zip(units, numbers, strict=False):
+            leaves[place] = row
+        after, row = tick(params, tree_unflatten(state, leaves), tuple(units[len(numbers) :]))
+        found = tree_leaves(after)
+        moved = np.array([np.broadcast_to(found[place], len(units)) for place in numbers]).reshape(-1, len(units))
+        return cls(moved, np.broadcast_to(row[-2], len(units)))._without_what_is_not_used()
+
+    def _without_what_is_not_used(self) -> LinearController:
+        """The system without what neither the force nor any other memory depends on, until none of that is left."""
+        moved, force = self
+        memory = len(moved)
+        used = (np.vstack([moved, force]) != 0.0).any(axis=0)[:memory]
+        if used.all():
+            return self
+        columns = np.append(used, np.ones(len(force) - memory, bool))
+        return LinearController(moved[used][:, columns], force[columns])._without_what_is_not_used()
+
+
+def _settled(params: ControllerParams, at_rest: tuple[float, ...]) -> StateTuple:
+    """The state at rest once no whole number in it changes any more."""
+    state: StateTuple = initial_state(params, at_rest)
+    while True:
+        after, _ = tick(params, state, at_rest)
+        if tree_leaves(after) == tree_leaves(state):
+            return state
+        state = after

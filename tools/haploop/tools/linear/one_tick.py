@@ -15,8 +15,7 @@ from haploop.plant.sensing.encoder import accelerometer_is_used
 from haploop.protocol.scene.effects import Accelerometer
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
-from haploop.tools.linear.controller import LinearController
-from haploop.tools.linear.linearity import Kinds, installed_kinds, why_not_linear
+from haploop.tools.linear.linearity import Kinds, LinearController, installed_kinds, why_not_linear
 from haploop.tools.search.bisect import bisect
 
 # No wall is softer than this, and none stiffer is looked at.
@@ -169,7 +168,7 @@ def _feel(scene: Scene, chain: Chain) -> np.ndarray:
     size = len(chain.states)
     if chain.sensor:
         return np.eye(size + 1)[chain.states.index("accelerometer")]
-    body = sensor_body(scene.get("accelerometer", {}), "transmission" in scene)
+    body = sensor_body(scene)
     return chain.accelerations()[body, : size + 1].astype(float)
 
 

@@ -1,14 +1,16 @@
-"""Bisection of the boundary between where a property holds and where it does not, for many members at once."""
+"""Bisection of the boundary of a property, and ladders of rungs climbed until one fails, for many members at once."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import count
+from itertools import count, takewhile
 from typing import TypeVar
 
 Member = TypeVar("Member")
+Rung = TypeVar("Rung")
+Answer = TypeVar("Answer")
 # Two values: the property holds at the first, and does not at the second.
 Bracket = tuple[float, float]
 
@@ -72,3 +74,36 @@ def bisect_many(
 def bisect(holds: Callable[[float], bool], near: float, far: float, tolerance: Tolerance = EXACT) -> Bracket:
     """Halves one bracket; the property holds at ``near`` and does not at ``far``."""
     return bisect_many({0: (near, far)}, lambda middles: {0: holds(middles[0])}, tolerance)[0]
+
+
+def climb(
+    members: Iterable[Member],
+    rungs: Iterable[Rung],
+    ask: Callable[[Rung, Sequence[Member]], Iterable[Answer]],
+    passes: Callable[[Answer], object] = bool,
+) -> dict[Member, list[Answer]]:
+    """Asks all members at each rung; one that fails is not asked at later rungs.
+
+    Args:
+        members: distinct.
+        rungs: in the order in which they are tried.
+        ask: from a rung and the members that have passed all rungs before to their answers, in their order.
+        passes: from an answer to whether the member goes on.
+
+    Returns:
+        The answers of each member from the first rung on; only the last of them may be a failure.
+    """
+    answers: dict[Member, list[Answer]] = {member: [] for member in members}
+    going = list(answers)
+    for rung in rungs:
+        if not going:
+            break
+        for member, answer in zip(going, ask(rung, going), strict=True):
+            answers[member].append(answer)
+        going = [member for member in going if passes(answers[member][-1])]
+    return answers
+
+
+def rungs_held(held: Iterable[object]) -> int:
+    """Counts the rungs that hold before the first that does not."""
+    return sum(1 for _ in takewhile(bool, held))

@@ -13,8 +13,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
-from haploop.tools.search.bisect import Bracket, Tolerance, bisect_many
-from haploop.tools.search.ladder import rungs_held
+from haploop.tools.search.bisect import Bracket, Tolerance, bisect_many, rungs_held
 
 Result = dict[str, Any]
 Holds = Callable[[Result], bool | None]

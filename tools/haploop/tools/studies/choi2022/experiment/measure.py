@@ -11,7 +11,7 @@ import numpy as np
 
 from haploop.controller.dissipation import registry
 from haploop.launch.batch.run import run_batch
-from haploop.tools.search.ladder import climb, rungs_held
+from haploop.tools.search.bisect import climb, rungs_held
 from haploop.tools.studies.choi2022.experiment.setup import KINDS, Elements, Setup, both, elements_of
 
 # From 2.5 N/mm in steps of 0.5 (Choi et al. 2022, V.B.3).
