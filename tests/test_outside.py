@@ -129,7 +129,7 @@ def test_the_plan_and_explain_say_what_they_do_and_cost(scene: Path) -> None:
 
 def test_each_is_taken_out_and_the_scene_without_all_is_the_one_that_never_named_them(scene: Path) -> None:
     code = """
-from haploop.tools.ablation import NONE, ablations
+from haploop.tools.operations import NONE, ablations
 print(json.dumps(ablations(scene)))
 """
     left = found(code, scene)

@@ -18,8 +18,8 @@ from rich.table import Table
 from haploop.controller.dissipation import registry
 from haploop.launch.runs.in_process import run_in_process
 from haploop.launch.scene.file import load
-from haploop.tools.ablation import AGAIN, NONE, WHOLE, ablations
 from haploop.tools.machine import machine
+from haploop.tools.operations import AGAIN, NONE, WHOLE, ablations
 
 SCENE = Path(__file__).parents[2] / "launch" / "scenes" / "all_effects.toml"
 

@@ -12,13 +12,12 @@ from pathlib import Path
 
 import pytest
 
-from haploop.tools.ablation import AGAIN, NONE, WHOLE
 from haploop.tools.cost import findings as findings_module
-from haploop.tools.cost.advice import length
 from haploop.tools.cost.data import Cost, CostFileError, Point, PriceGroup, Spread, price, save
-from haploop.tools.cost.findings import FindingTable, findings
+from haploop.tools.cost.findings import FindingTable, findings, length
 from haploop.tools.cost.page import page, write
 from haploop.tools.linear.stiffness_limit import StiffnessLimit
+from haploop.tools.operations import AGAIN, NONE, WHOLE
 from helpers.data.costs import METHODS, RATES, fake_cost
 
 HOUSE = Path(__file__).parents[2]

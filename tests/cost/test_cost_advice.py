@@ -5,8 +5,8 @@ from dataclasses import replace
 import pytest
 from rich.console import Console
 
-from haploop.tools.cost.advice import advice, cheapest
 from haploop.tools.cost.data import Load, Point, ReferenceNote, SceneCost, Spread
+from haploop.tools.cost.findings import advice, cheapest
 from haploop.tools.cost.report import report
 from helpers.data.costs import fake_cost, fake_error
 

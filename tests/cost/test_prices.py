@@ -16,18 +16,14 @@ from haploop.controller.controller import Controller
 from haploop.launch.plan.effects import effects_of
 from haploop.launch.runs.in_process import run_in_process
 from haploop.launch.scene.file import load
-from haploop.tools.ablation import AGAIN, NONE, WHOLE, ablations
+from haploop.tools.cost import prices, prices_figure
 from haploop.tools.cost.data import PriceGroup, chance_in, price, save
 from haploop.tools.cost.data import load as load_cost
-from haploop.tools.cost.prices import figure as prices_figure
-from haploop.tools.cost.prices import jobs as price_jobs
-from haploop.tools.cost.prices import prices
-from haploop.tools.cost.store import Store
-from haploop.tools.cost.times import IN_PROCESS, PROCESSES
+from haploop.tools.cost.times import IN_PROCESS, PROCESSES, Store
 from haploop.tools.figure.data import FigureError
 from haploop.tools.linear.one_tick import OneTickMap
 from haploop.tools.linear.stiffness_limit import StiffnessLimit
-from haploop.tools.operations import Operations
+from haploop.tools.operations import AGAIN, NONE, WHOLE, Operations, ablations
 from helpers.data.costs import fake_cost
 from helpers.scenes.least import KINDS, scene
 from helpers.shown import artists
@@ -72,11 +68,11 @@ def test_groups_survive_cost_json(tmp_path: Path) -> None:
 
 
 @pytest.fixture(scope="module")
-def jobs() -> price_jobs.Jobs:
-    return price_jobs.price_jobs(SCENES, [])
+def jobs() -> prices.Jobs:
+    return prices.price_jobs(SCENES, [])
 
 
-def test_each_group_has_its_jobs_baseline_first(jobs: price_jobs.Jobs) -> None:
+def test_each_group_has_its_jobs_baseline_first(jobs: prices.Jobs) -> None:
     effects = [effect.name for effect in effects_of(load(SCENES / "all_effects.toml"))]
     assert {group: list(members) for group, members in jobs.items()} == {
         "books": ["without", "with"],
@@ -88,7 +84,7 @@ def test_each_group_has_its_jobs_baseline_first(jobs: price_jobs.Jobs) -> None:
     }
 
 
-def test_what_is_the_same_run_is_timed_once_and_nothing_else_is(jobs: price_jobs.Jobs) -> None:
+def test_what_is_the_same_run_is_timed_once_and_nothing_else_is(jobs: prices.Jobs) -> None:
     assert jobs["books"]["with"].key == jobs["processes"]["one process"].key == jobs["control rate"]["1 kHz"].key
     assert jobs["log"]["none"].key == jobs["processes"]["three processes"].key
     assert jobs["log"]["steps"].key == jobs["delay"]["0 ms"].key
@@ -96,7 +92,7 @@ def test_what_is_the_same_run_is_timed_once_and_nothing_else_is(jobs: price_jobs
     assert len(every) - len(set(every)) == 4
 
 
-def test_stiffness_falls_with_delay_and_grows_with_control_rate(jobs: price_jobs.Jobs) -> None:
+def test_stiffness_falls_with_delay_and_grows_with_control_rate(jobs: prices.Jobs) -> None:
     def limits(group: str) -> list[float]:
         return [OneTickMap.from_scene(job.scene).stiffness_limit() for job in jobs[group].values()]
 
@@ -125,9 +121,9 @@ def test_without_books_plant_and_controller_do_just_what_they_do_in_a_run(monkey
 
         return Spy
 
-    monkeypatch.setattr(price_jobs, "Controller", spy("bare"))
+    monkeypatch.setattr(prices, "Controller", spy("bare"))
     monkeypatch.setattr("haploop.launch.runs.in_process.Controller", spy("run"))
-    price_jobs.bare_us(made)
+    prices.bare_us(made)
     run_in_process(made, KINDS)
     assert answered["bare"] == answered["run"]
     assert len(answered["run"]) == 300
@@ -141,9 +137,9 @@ class Measuring:
         limit = StiffnessLimit(100.0, "steady", "limit-cycle")
         monkeypatch.setattr(prices, "stiffness_limit", lambda scene, kinds: limit)
         monkeypatch.setattr(prices, "operations", lambda scene, kinds: Operations(400, 100, 1))
-        monkeypatch.setattr(price_jobs, "loop_us", lambda scene: self.clock(5.0))
-        monkeypatch.setattr(price_jobs, "bare_us", lambda scene: self.clock(4.0))
-        monkeypatch.setattr(price_jobs, "run_us", lambda path, overrides, ticks: self.clock(40.0))
+        monkeypatch.setattr(prices, "loop_us", lambda scene: self.clock(5.0))
+        monkeypatch.setattr(prices, "bare_us", lambda scene: self.clock(4.0))
+        monkeypatch.setattr(prices, "run_us", lambda path, overrides, ticks: self.clock(40.0))
 
     def clock(self, us: float) -> float | None:
         if self.runs >= self.stop_after:

@@ -4,8 +4,8 @@ from pathlib import Path
 from typing import Any
 
 from haploop.launch.scene.file import load as load_scene
-from haploop.tools.cost.grid import grid
-from haploop.tools.cost.points import outcome
+from haploop.protocol.scene.scene import Scene
+from haploop.tools.cost.grid import grid, outcome
 from haploop.tools.reference.nearest import Reference, statistics
 from haploop.tools.trajectory import trajectory
 
@@ -28,7 +28,7 @@ rise_time = 0.02
 """
 
 
-def exact_reference(path: Path, _scene: dict[str, Any] | None = None) -> Reference:
+def exact_reference(path: Path, _scene: Scene | None = None) -> Reference:
     """The exact method at 100 kHz, in the shape of a stored reference."""
     scene = load_scene(path, ["clock.integrator=exact", "clock.plant_rate=100000"])
     ran = trajectory(scene)

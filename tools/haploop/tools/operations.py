@@ -1,4 +1,4 @@
-"""The cost of a scene, counted and not timed: bytecode instructions of the loop, effect by effect.
+"""The cost of a scene, counted and not timed, effect by effect: bytecode instructions of the loop.
 
 A count is the same on every machine. A call into NumPy counts as one instruction, whatever the size of its arrays.
 """
@@ -8,12 +8,13 @@ from __future__ import annotations
 import statistics
 import sys
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import FrameType
 from typing import TYPE_CHECKING, Any
 
 from haploop.controller.controller import Controller
 from haploop.launch.plan.effect import Effect
+from haploop.launch.plan.effects import effects_of
 from haploop.launch.plan.plan import multiplications
 from haploop.plant.plant import Plant
 from haploop.protocol.scene.scene import Scene
@@ -23,6 +24,8 @@ if TYPE_CHECKING:
     from haploop.controller.dissipation import Element
 
 Kinds = dict[str, type["Element"]]
+# The scenes of ``ablations`` that are not named by the effect that is left out.
+WHOLE, AGAIN, NONE = "all effects", "all effects again", "no effect"
 # Exchanges that are left out, since they build caches, and exchanges that are counted.
 _FIRST, _COUNTED = 20, 101
 
@@ -65,13 +68,13 @@ class _Counter:
         return count
 
 
-def operations(scene: dict[str, Any], kinds: Kinds) -> Operations:
+def operations(scene: Scene, kinds: Kinds) -> Operations:
     """Runs the loop of a resolved scene in this process for some ticks and counts; events are left out.
 
     A shorter run is counted over its second half.
     """
     time = Timebase.from_scene(scene)
-    plant, controller = Plant(scene, time), Controller(Scene.from_dict(scene), time, kinds)
+    plant, controller = Plant(scene, time), Controller(scene, time, kinds)
     counter = _Counter()
     counts: list[tuple[int, int]] = []
 
@@ -111,19 +114,31 @@ class Bill:
     multiplications: tuple[int, dict[str, int]]
 
 
-def bill(scene: dict[str, Any], named: Iterable[Effect], kinds: Kinds) -> Bill:
+def bill(scene: Scene, named: Iterable[Effect], kinds: Kinds) -> Bill:
     """Counts the loop as it is, then without each effect and each element in turn."""
     whole = operations(scene, kinds)
 
-    def saved(other: dict[str, Any]) -> float:
+    def saved(other: Scene) -> float:
         return whole.per_tick - operations(other, kinds).per_tick
 
-    elements = scene.get("dissipation", [])
+    elements = scene.dissipation
     others = {effect.name: effect.without(scene) for effect in named}
     moving = multiplications(scene)
     return Bill(
         whole,
         {name: saved(other) for name, other in others.items()},
-        [saved({**scene, "dissipation": elements[:i] + elements[i + 1 :]}) for i in range(len(elements))],
+        [saved(replace(scene, dissipation=elements[:i] + elements[i + 1 :])) for i in range(len(elements))],
         (moving, {name: moving - multiplications(other) for name, other in others.items()}),
     )
+
+
+def ablations(scene: Scene) -> dict[str, Scene]:
+    """Returns the resolved scene, twice; without each of its effects, by the effect's name; and with none left.
+
+    Measured alike, the first two differ by chance alone, which is what a difference between others must exceed.
+    """
+    parts = {effect.name: effect.without(scene) for effect in effects_of(scene)}
+    bare = scene
+    while named := effects_of(bare):
+        bare = named[0].without(bare)
+    return {WHOLE: scene, AGAIN: scene, **parts, NONE: bare}

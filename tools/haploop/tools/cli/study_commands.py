@@ -26,10 +26,9 @@ def cost(
 
     Can be stopped; the same command goes on.
     """
-    from haploop.tools.cost.command import Request
     from haploop.tools.cost.command import cost as measure
 
-    measure(Request(scenes or [], methods, rates, out, tolerance, repeats, processes), json)
+    measure(scenes or [], methods, rates, out, tolerance, repeats, processes, json)
 
 
 def sweep(

@@ -11,8 +11,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from haploop.tools.ablation import AGAIN
 from haploop.tools.linear.stiffness_limit import StiffnessLimit
+from haploop.tools.operations import AGAIN
 
 COST_FILE = "cost.json"
 # A machine on which nothing else runs: the calibration loop varies less, and no second process waits for a core.
@@ -76,11 +76,9 @@ class Errors:
 
 @dataclass(frozen=True)
 class Point:
-    """One method at one plant rate.
+    """One method, as ``clock.integrator`` names it, at one plant rate in Hz.
 
     Attributes:
-        method: ``clock.integrator``.
-        plant_rate: Hz.
         error: None where the run failed.
         failure: why there is no error, as a sentence; None where there is one.
         us_per_tick: time of a simulated tick in one process, books on, no log; of a run that diverged, of the ticks it
@@ -107,7 +105,8 @@ class ReferenceNote:
         how: it was made, as a sentence.
         error_m: its own uncertainty.
         pointwise: whether positions can be compared, or amplitudes only.
-        verdict: of the reference."""
+        verdict: of the reference.
+    """
 
     how: str
     error_m: float
@@ -134,6 +133,21 @@ class SceneCost:
     points: list[Point]
     advice: str = ""
 
+    @property
+    def own(self) -> Point | None:
+        """The point of the scene's own method and plant rate."""
+        return self.point(self.own_method, self.own_rate)
+
+    def point(self, method: str, plant_rate: int) -> Point | None:
+        """Returns the point of a method and a plant rate, None where there is none."""
+        return next((p for p in self.points if (p.method, p.plant_rate) == (method, plant_rate)), None)
+
+    @property
+    def short_title(self) -> str:
+        """The title without the words that all scenes of this comparison begin with."""
+        title = self.title.removeprefix("Accuracy: ")
+        return title[:1].upper() + title[1:]
+
 
 @dataclass(frozen=True)
 class Load:
@@ -158,7 +172,6 @@ class Price:
     """The price of one thing that can be had or left.
 
     Attributes:
-        what: its name.
         time: measured, in the unit of its group.
         ratio: the median over that of the group's baseline.
         costs: what it adds to a run, in the unit of its group: the median less the baseline's; of an effect, the
@@ -182,10 +195,8 @@ class PriceGroup:
     """Prices of one kind; the first of them is the baseline.
 
     Attributes:
-        name: "books", "log", "effects", "processes", "delay" or "control rate".
-        title: in words.
-        unit: of the times.
-        repeats: of each.
+        name: "books", "log", "effects", "processes", "delay" or "control rate"; ``title`` says it in words.
+        unit, repeats: of the times.
         how: in one process or as processes, which scene, what is logged.
     """
 
@@ -263,8 +274,7 @@ def load(directory: Path) -> Cost:
     try:
         return TypeAdapter(Cost).validate_python(json.loads(path.read_text(encoding="utf-8")))
     except OSError as error:
-        raise CostFileError(
-            f"{path} could not be read: {error.strerror}. Run haploop cost --out {directory}."
-        ) from error
+        why = f"{path} could not be read: {error.strerror}. Run haploop cost --out {directory}."
+        raise CostFileError(why) from error
     except (ValidationError, ValueError) as error:
         raise CostFileError(f"{path} is no cost.json of this version: {error}") from error

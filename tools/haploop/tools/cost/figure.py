@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from haploop.tools.cost.advice import name_of
 from haploop.tools.cost.data import Cost, Point, SceneCost
 from haploop.tools.figure.data import FigureError
 from haploop.tools.figure.labels import Label, place_labels
@@ -139,7 +138,7 @@ def draw_panel(ax: Axes, scene: SceneCost, tolerance_m: float) -> None:
 
 def _title(scene: SceneCost) -> str:
     """Returns the scene's name, in two lines where it is long."""
-    return "\n".join(wrap(name_of(scene), _TITLE_LETTERS))
+    return "\n".join(wrap(scene.short_title, _TITLE_LETTERS))
 
 
 def _limits(scene: SceneCost, tolerance_m: float) -> tuple[float, float]:

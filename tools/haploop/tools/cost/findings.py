@@ -1,4 +1,4 @@
-"""Findings about what accuracy costs: tables of scenes, methods and the other prices."""
+"""Findings about what accuracy costs: advice for a scene in a sentence, tables of scenes, methods and other prices."""
 
 from __future__ import annotations
 
@@ -6,9 +6,8 @@ from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from haploop.tools.ablation import NONE
-from haploop.tools.cost.advice import cheapest, length, meets, name_of, rate, setting
-from haploop.tools.cost.data import Cost, Point, Price, PriceGroup, SceneCost, chance_in
+from haploop.tools.cost.data import Cost, Point, Price, PriceGroup, SceneCost, Spread, chance_in
+from haploop.tools.operations import NONE
 from haploop.tools.render.units import amount, fixed
 
 _NONE = "–"
@@ -22,14 +21,7 @@ _PRICES = {
 
 @dataclass(frozen=True)
 class FindingTable:
-    """A table of findings, with the sentences that belong to it.
-
-    Attributes:
-        title: of the table.
-        heads: of its columns.
-        rows: cells, as text.
-        notes: sentences below the table.
-    """
+    """A table of findings, its cells as text, with the sentences that belong below it."""
 
     title: str
     heads: tuple[str, ...]
@@ -37,14 +29,83 @@ class FindingTable:
     notes: tuple[str, ...] = ()
 
 
+def cheapest(scene: SceneCost, tolerance_m: float, method: str | None = None) -> Point | None:
+    """Returns the point of least time in one process among those that meet the tolerance, of one method or of all."""
+    points = [point for point in scene.points if method in (None, point.method)]
+    return min((p for p in points if p.us_per_tick and meets(p, tolerance_m)), key=_us, default=None)
+
+
+def meets(point: Point, tolerance_m: float) -> bool:
+    """Tells whether a run is within the tolerance and its verdict is that of the reference."""
+    return point.error is not None and point.error.verdict_right and point.error.size_m <= tolerance_m
+
+
+def advice(scene: SceneCost, tolerance_m: float) -> str:
+    """Makes the sentence for a scene: the cheapest setting that is accurate enough, and the cost of its own beyond it.
+
+    Times are medians in one process. Amplitudes are named where they are compared in place of positions.
+    """
+    measure = "" if scene.reference.pointwise else " in amplitude"
+    within = f"within {amount(tolerance_m, 'm')} of the reference{measure}"
+    if scene.reference.error_m > tolerance_m:
+        known = amount(scene.reference.error_m, "m")
+        return f"No setting can be said to be {within}: the reference itself is only known to {known}."
+    if best := cheapest(scene, tolerance_m):
+        return f"Cheapest {within}: {setting(best)}, {_time(best)} a tick; {_own_setting(scene, best, tolerance_m)}."
+    if not any(point.us_per_tick for point in scene.points if point.error):
+        return f"Nothing was timed, so no setting can be called the cheapest {within}."
+    compared = [(p.error.size_m, setting(p)) for p in scene.points if p.error and p.error.verdict_right]
+    if not compared:
+        return f"No setting is {within}: none ran to the end with the right verdict."
+    size_m, nearest = min(compared, key=lambda found: found[0])
+    return f"No setting is {within}; {nearest} comes nearest, {amount(size_m, 'm')}."
+
+
+def _own_setting(scene: SceneCost, best: Point, tolerance_m: float) -> str:
+    """Makes the clause about the scene's own setting against the cheapest one."""
+    own = scene.own
+    if own is best:
+        return "it is the scene's own setting"
+    name = f"the scene's own, {scene.own_method} at {rate(scene.own_rate)},"
+    if own is None or own.error is None or own.us_per_tick is None:
+        return f"{name} fails"
+    if not meets(own, tolerance_m):
+        wrong = "" if own.error.verdict_right else f", {own.error.verdict} instead of {scene.reference.verdict}"
+        return f"{name} takes {_time(own)} and is off by {amount(own.error.size_m, 'm')}{wrong}"
+    more = _us(own) / _us(best)
+    beyond = f"{fixed(more, 2)} times as long" if more >= 2 else f"{100 * (more - 1):.0f} % more"
+    doubt = ", which these measurements cannot tell apart" if _overlap(own.us_per_tick, best.us_per_tick) else ""
+    return f"{name} takes {_time(own)}, {beyond}{doubt}"
+
+
+def _overlap(a: Spread, b: Spread | None) -> bool:
+    """Tells whether the middle halves of two measurements overlap."""
+    return b is not None and a.q1 <= b.q3 and b.q1 <= a.q3
+
+
+def setting(point: Point) -> str:
+    """Formats method and plant rate: ``exact at 10 kHz``."""
+    return f"{point.method} at {rate(point.plant_rate)}"
+
+
+def rate(plant_rate: int) -> str:
+    """Formats a rate in Hz: ``10 kHz``."""
+    return f"{plant_rate / 1000:g} kHz" if plant_rate >= 1000 else f"{plant_rate} Hz"
+
+
+def length(metres: float) -> str:
+    """Formats a length in m with a prefix, below 1 nm with a power of ten."""
+    return amount(metres, "m") if metres == 0.0 or metres >= 1e-9 else f"{metres:.1e} m".replace("-", "−")
+
+
 def findings(cost: Cost) -> list[FindingTable]:
     """Returns the tables for which there are data."""
     groups = {group.name: group for group in cost.prices}
-    tables = (scene_table(cost), method_table(cost), price_table(groups))
+    tables = (_scene_table(cost), _method_table(cost), _price_table(groups))
     return [table for table in tables if table.rows]
 
 
-def comparable(cost: Cost) -> list[SceneCost]:
+def _comparable(cost: Cost) -> list[SceneCost]:
     """Returns the scenes whose reference is known to within the tolerance, and of which times are known."""
     return [
         scene
@@ -53,76 +114,66 @@ def comparable(cost: Cost) -> list[SceneCost]:
     ]
 
 
-def cheapest_method(cost: Cost) -> str | None:
-    """Returns the method that is the cheapest within the tolerance in most scenes."""
-    best = [found.method for scene in comparable(cost) if (found := cheapest(scene, cost.tolerance_m))]
-    return Counter(best).most_common(1)[0][0] if best else None
-
-
-def scene_table(cost: Cost) -> FindingTable:
+def _scene_table(cost: Cost) -> FindingTable:
     """Makes a row a scene: its cheapest setting within the tolerance, and its own."""
     rows = []
-    for scene in comparable(cost):
-        best, own = cheapest(scene, cost.tolerance_m), own_point(scene)
+    for scene in _comparable(cost):
+        best, own = cheapest(scene, cost.tolerance_m), scene.own
         rows.append([
-            name_of(scene),
+            scene.short_title,
             setting(best) if best else "none",
             _median(best),
             setting(own) if own else _NONE,
             _median(own) + ("" if own and meets(own, cost.tolerance_m) else ", too far off"),
-            _ratio(own, best),
+            fixed(_us(own) / _us(best)) if own and own.us_per_tick and best else _NONE,
         ])  # fmt: skip
-    left_out = [name_of(scene) for scene in cost.scenes if scene.reference.error_m > cost.tolerance_m]
-    note = "Left out, since the reference itself is not known that well: {}."
+    left_out = [scene.short_title for scene in cost.scenes if scene.reference.error_m > cost.tolerance_m]
+    note = f"Left out, since the reference itself is not known that well: {'; '.join(left_out)}."
     return FindingTable(
         f"The cheapest setting within {amount(cost.tolerance_m, 'm')} of the reference",
         ("scene", "cheapest setting", "µs a tick", "the scene's own", "µs a tick", "own over cheapest"),
         rows,
-        (note.format("; ".join(left_out)),) if left_out else (),
+        (note,) if left_out else (),
     )
 
 
-def method_table(cost: Cost) -> FindingTable:
-    """Makes a row a method: where it meets the tolerance and in what time, its largest error, and its failures."""
-    scenes, least = comparable(cost), cheapest_method(cost)
+def _method_table(cost: Cost) -> FindingTable:
+    """Makes a row a method: where it meets the tolerance and in what time, its largest error, and its failures.
+
+    Times are over those of the method that is the cheapest within the tolerance in most scenes.
+    """
+    scenes, tolerance_m = _comparable(cost), cost.tolerance_m
+    best = [found.method for scene in scenes if (found := cheapest(scene, tolerance_m))]
+    least = Counter(best).most_common(1)[0][0] if best else None
     rows = []
     for method in dict.fromkeys(point.method for scene in cost.scenes for point in scene.points):
-        own = {scene.name: [point for point in scene.points if point.method == method] for scene in cost.scenes}
-        every = [point for points in own.values() for point in points]
-        met = [found for scene in scenes if (found := _cheapest_of(scene, method, cost.tolerance_m))]
-        pairs = [(_cheapest_of(scene, method, cost.tolerance_m), _cheapest_of(scene, least, cost.tolerance_m))
-                 for scene in scenes]  # fmt: skip
-        errors = [point.error.size_m for scene in scenes for point in own[scene.name] if point.error]
+        every = [point for scene in cost.scenes for point in scene.points if point.method == method]
+        met = [found for scene in scenes if (found := cheapest(scene, tolerance_m, method))]
+        pairs = [(cheapest(scene, tolerance_m, method), cheapest(scene, tolerance_m, least)) for scene in scenes]
+        errors = [p.error.size_m for scene in scenes for p in scene.points if p.error and p.method == method]
         rows.append([
             method,
             f"{len(met)} of {len(scenes)}",
-            span_of_rates(met),
-            span(_us(a) / _us(b) for a, b in pairs if a and b),
+            _span_of_rates(met),
+            _span(_us(a) / _us(b) for a, b in pairs if a and b),
             length(max(errors)) if errors else _NONE,
             f"{sum(point.error is None for point in every)} of {len(every)}",
             f"{sum(bool(point.error and not point.error.verdict_right) for point in every)} of {len(every)}",
         ])  # fmt: skip
+    heads = "method", "scenes within", "at a plant rate of", "time over cheapest", "largest error", "failed"
     note = (
-        "Times are over those of {}, the cheapest method in most scenes, each at its cheapest plant rate within the "
-        "tolerance."
+        f"Times are over those of {least}, the cheapest method in most scenes, each at its cheapest plant rate within "
+        "the tolerance."
     )
     return FindingTable(
         "Methods",
-        (
-            "method",
-            "scenes within",
-            "at a plant rate of",
-            "time over cheapest",
-            "largest error",
-            "failed",
-            "wrong verdict",
-        ),
+        (*heads, "wrong verdict"),
         rows,
-        (note.format(least) if least else "No setting came within the tolerance in any scene.",),
+        (note if least else "No setting came within the tolerance in any scene.",),
     )
 
 
-def price_table(groups: dict[str, PriceGroup]) -> FindingTable:
+def _price_table(groups: dict[str, PriceGroup]) -> FindingTable:
     """Makes a row for books, log, processes and all effects at once, the dearest first."""
     found = [(entry.ratio, *words) for (name, what), words in _PRICES.items() if (entry := _entry(groups, name, what))]
     notes: tuple[str, ...] = ()
@@ -137,32 +188,21 @@ def price_table(groups: dict[str, PriceGroup]) -> FindingTable:
     return FindingTable("The other prices", ("", "against", "ratio of times"), rows, notes)
 
 
-def own_point(scene: SceneCost) -> Point | None:
-    """Returns the point of the method and plant rate that the scene itself names."""
-    return next((p for p in scene.points if (p.method, p.plant_rate) == (scene.own_method, scene.own_rate)), None)
+def _entry(groups: dict[str, PriceGroup], name: str, what: str) -> Price | None:
+    return next((price for price in groups[name].prices if price.what == what), None) if name in groups else None
 
 
-def span(values: Iterable[float]) -> str:
+def _span(values: Iterable[float]) -> str:
     """Formats the least and the largest value: ``1.2 to 6.9``; one number where they are the same, a dash for none."""
-    found = list(values)
-    if not found:
-        return _NONE
-    low, high = fixed(min(found), 2), fixed(max(found), 2)
-    return low if low == high else f"{low} to {high}"
+    found = sorted(values)
+    ends = [fixed(value, 2) for value in (*found[:1], *found[-1:])]
+    return " to ".join(dict.fromkeys(ends)) or _NONE
 
 
-def span_of_rates(points: Iterable[Point]) -> str:
+def _span_of_rates(points: Iterable[Point]) -> str:
     """Formats the least and the largest plant rate; a dash for none."""
-    rates = sorted({point.plant_rate for point in points})
-    if not rates:
-        return _NONE
-    return rate(rates[0]) if len(rates) == 1 else f"{rate(rates[0])} to {rate(rates[-1])}"
-
-
-def _cheapest_of(scene: SceneCost, method: str | None, tolerance_m: float) -> Point | None:
-    """Returns the method's point of least time within the tolerance."""
-    points = [p for p in scene.points if p.method == method and p.us_per_tick and meets(p, tolerance_m)]
-    return min(points, key=_us, default=None)
+    rates = sorted(point.plant_rate for point in points)
+    return " to ".join(dict.fromkeys(rate(hertz) for hertz in (*rates[:1], *rates[-1:]))) or _NONE
 
 
 def _us(point: Point) -> float:
@@ -170,14 +210,9 @@ def _us(point: Point) -> float:
     return point.us_per_tick.median
 
 
+def _time(point: Point) -> str:
+    return f"{fixed(_us(point))} µs"
+
+
 def _median(point: Point | None) -> str:
     return fixed(_us(point)) if point and point.us_per_tick else _NONE
-
-
-def _ratio(point: Point | None, other: Point | None) -> str:
-    timed = point and other and point.us_per_tick and other.us_per_tick
-    return fixed(_us(point) / _us(other)) if timed and point and other else _NONE
-
-
-def _entry(groups: dict[str, PriceGroup], name: str, what: str) -> Price | None:
-    return next((price for price in groups[name].prices if price.what == what), None) if name in groups else None

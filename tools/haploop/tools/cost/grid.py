@@ -1,20 +1,30 @@
-"""The grid of ``haploop cost``: a scene with every method at every plant rate, and with its own setting."""
+"""The grid of ``haploop cost``: a scene with every method at every plant rate, and how far off each run is."""
 
 from __future__ import annotations
 
 import hashlib
+import itertools
 import json
+import math
+import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from haploop.controller.dissipation import ElementError, registry
 from haploop.launch.scene.file import load
 from haploop.launch.scene.mistakes import COMMAND_LINE, SceneError
 from haploop.plant.integrators.registry import INTEGRATORS
+from haploop.protocol.scene.scene import Scene
+from haploop.tools.cost.data import Errors
+from haploop.tools.operations import operations
+from haploop.tools.reference.nearest import Reference, statistics
+from haploop.tools.trajectory import Trajectory, trajectory
 
 METHODS = tuple(INTEGRATORS)
-RATES = (1_000, 2_000, 5_000, 10_000, 20_000, 50_000, 100_000)
 
 
 @dataclass(frozen=True)
@@ -31,8 +41,8 @@ class Candidate:
     path: Path
     method: str
     plant_rate: int
-    scene: dict[str, Any] | None
-    refusal: str
+    scene: Scene | None = None
+    refusal: str = ""
 
     @property
     def overrides(self) -> list[str]:
@@ -54,7 +64,7 @@ class Grid:
     """
 
     path: Path
-    scene: dict[str, Any]
+    scene: Scene
     candidates: list[Candidate]
 
     @property
@@ -65,7 +75,7 @@ class Grid:
     @property
     def own(self) -> tuple[str, int]:
         """The method and the plant rate that the scene itself names."""
-        return self.scene["clock"]["integrator"], self.scene["clock"]["plant_rate"]
+        return self.scene.clock.integrator, self.scene.clock.plant_rate
 
 
 def grid(path: Path, methods: Sequence[str], rates: Sequence[int]) -> Grid:
@@ -74,31 +84,27 @@ def grid(path: Path, methods: Sequence[str], rates: Sequence[int]) -> Grid:
     Raises:
         SceneError: the scene cannot be run as it is.
     """
-    scene = load(path)
-    settings = [(method, rate) for method in methods for rate in sorted(set(rates))]
-    bare = Grid(path, scene, [])
-    if bare.own not in settings:
-        settings.append(bare.own)
-        settings.sort(key=lambda setting: (_place(setting[0], methods), setting[1]))
-    return Grid(path, scene, [_candidate(path, *setting) for setting in settings])
-
-
-def _place(method: str, methods: Sequence[str]) -> int:
-    return methods.index(method) if method in methods else len(methods)
+    made = Grid(path, load(path), [])
+    order = [*methods, made.own[0]]
+    settings = {*itertools.product(methods, rates), made.own}
+    for method, rate in sorted(settings, key=lambda setting: (order.index(setting[0]), setting[1])):
+        made.candidates.append(_candidate(path, method, rate))
+    return made
 
 
 def _candidate(path: Path, method: str, rate: int) -> Candidate:
-    bare = Candidate(path, method, rate, None, "")
+    bare = Candidate(path, method, rate)
     try:
-        return Candidate(path, method, rate, load(path, [*bare.overrides, "run.log=none"]), "")
+        return replace(bare, scene=load(path, [*bare.overrides, "run.log=none"]))
     except SceneError as error:
         reasons = [str(mistake).removeprefix(f"{COMMAND_LINE}: ") for mistake in error.mistakes]
-        return Candidate(path, method, rate, None, f"Refused by the check: {' '.join(reasons)}")
+        return replace(bare, refusal=f"Refused by the check: {' '.join(reasons)}")
 
 
 def digest(data: Any) -> str:
-    """Returns a short hash of what JSON can hold."""
-    return hashlib.sha256(json.dumps(data, sort_keys=True).encode()).hexdigest()[:20]
+    """Returns a short hash of what JSON can hold, and of scenes."""
+    text = json.dumps(data, sort_keys=True, default=Scene.as_dict)
+    return hashlib.sha256(text.encode()).hexdigest()[:20]
 
 
 def scenes_folder() -> Path:
@@ -113,3 +119,82 @@ def scenes_folder() -> Path:
 def accuracy_scenes() -> list[Path]:
     """Returns the scenes made for this comparison."""
     return sorted((scenes_folder() / "accuracy").glob("*.toml"))
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """The outcome of one candidate, in one run that is not timed.
+
+    Attributes:
+        error: against the reference; None where it failed.
+        failure: why it did, as a sentence.
+        ticks: that the run had; 0 for one that could not be run at all.
+        instructions_per_tick: bytecode instructions of plant and controller.
+    """
+
+    error: Errors | None
+    failure: str | None
+    ticks: int
+    instructions_per_tick: float | None
+
+
+def outcome(candidate: Candidate, reference: Reference) -> Outcome:
+    """Runs a candidate and compares it; a failure is an outcome like any other."""
+    if candidate.scene is None:
+        return Outcome(None, candidate.refusal, 0, None)
+    try:
+        # A method that blows up overflows on the way; that is said once, as the reason of the failure.
+        with warnings.catch_warnings(), np.errstate(all="ignore"):
+            warnings.simplefilter("ignore", RuntimeWarning)
+            ran = trajectory(candidate.scene)
+    except (ElementError, ArithmeticError, np.linalg.LinAlgError) as error:
+        return Outcome(None, f"Could not go on: {error}", 0, None)
+    ticks = ran.summary["ticks"]
+    if failure := _failure(ran, reference):
+        return Outcome(None, failure, ticks, None)
+    counted = operations(candidate.scene, registry()).per_tick
+    return Outcome(_errors(ran, candidate.scene, reference), None, ticks, counted)
+
+
+def _failure(ran: Trajectory, reference: Reference) -> str | None:
+    """Returns why a run cannot be compared, or None."""
+    if ran.summary["ended"] in ("diverged", "failed"):
+        return f"Diverged: {ran.summary['why']}."
+    if not np.isfinite(ran.x_m).all():
+        return "Not finite: a position is no number."
+    if len(ran.x_m) != len(reference.x_m):
+        return f"Ended after {len(ran.x_m) - 1} ticks, the reference after {len(reference.x_m) - 1}."
+    return None
+
+
+def _errors(ran: Trajectory, scene: Scene, reference: Reference) -> Errors:
+    """Compares a run that went to its end.
+
+    Positions are compared at the ticks after the start and at the end: sqrt(mean((x - x_ref)^2)) and the like. Where a
+    chaotic reference forbids that, the swings in the verdict's window are: |a - a_ref| / |a_ref|.
+    """
+    verdict, energy = ran.summary["verdict"], ran.summary["energy"]
+    residual = _share(_apart(energy["residual_J"], 0.0), energy["moved_J"])
+    common = {"residual": residual, "verdict": verdict, "verdict_right": verdict == reference.verdict}
+    if reference.pointwise:
+        off = np.abs(ran.x_m - np.asarray(reference.x_m))[1:]
+        rms_m = math.sqrt(np.mean(off**2))
+        return Errors(final_m=float(off[-1]), rms_m=rms_m, max_m=float(off.max()), **common)
+    theirs, ours = reference.statistics, statistics(scene, ran.x_m, ran.v_m_s)
+    off_by = {name: _apart(ours[name], theirs[name]) for name in theirs}
+    return Errors(
+        amplitude=_share(off_by["amplitude_m"], theirs["amplitude_m"]),
+        frequency=_share(off_by["frequency_Hz"], theirs["frequency_Hz"]),
+        energy_per_cycle=_share(off_by["energy_per_cycle_J"], theirs["energy_per_cycle_J"]),
+        amplitude_m=off_by["amplitude_m"],
+        **common,
+    )
+
+
+def _apart(value: float | None, reference: float | None) -> float | None:
+    """Returns the distance of two values; None where there is nothing to compare."""
+    return None if value is None or reference is None else abs(value - reference)
+
+
+def _share(off_by: float | None, reference: float | None) -> float | None:
+    return off_by / abs(reference) if off_by is not None and reference else None

@@ -4,31 +4,26 @@ from __future__ import annotations
 
 import dataclasses
 import random
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from pathlib import Path
-from types import TracebackType
-from typing import TYPE_CHECKING, Any, Self
+from typing import Self
 
+from haploop.protocol.scene.scene import Scene
+from haploop.protocol.ticks import Timebase
 from haploop.tools.cost import times
-from haploop.tools.cost.advice import advice
-from haploop.tools.cost.data import Cost, Errors, Load, Point, ReferenceNote, SceneCost, Spread
-from haploop.tools.cost.grid import Candidate, Grid, digest, scenes_folder
-from haploop.tools.cost.points import Outcome, outcome
-from haploop.tools.cost.prices.prices import Prices
-from haploop.tools.cost.store import Store
-from haploop.tools.cost.times import IN_PROCESS, PROCESSES, Job
+from haploop.tools.cost.data import Cost, Errors, Point, ReferenceNote, SceneCost, Spread
+from haploop.tools.cost.findings import advice
+from haploop.tools.cost.grid import Candidate, Grid, Outcome, digest, outcome, scenes_folder
+from haploop.tools.cost.prices import Prices
+from haploop.tools.cost.times import IN_PROCESS, PROCESSES, Job, Store
 from haploop.tools.machine import commit, machine, source_digest, versions
+from haploop.tools.reference.nearest import Reference, reference_for
 from haploop.tools.render.progress import Stage
-
-if TYPE_CHECKING:
-    from haploop.tools.reference.nearest import Reference
 
 _OUTCOME, _REFERENCE = "outcome", "reference"
 # What the errors and the times depend on, beside the scenes: packages whole, and of this one these files.
 _PACKAGES = ("haploop.protocol", "haploop.plant", "haploop.controller", "haploop.logger", "haploop.launch")
-_FILES = ("cost/points.py", "cost/times.py", "operations.py", "trajectory.py", "reference/nearest.py")
-# From a scene file and its resolved scene to what its runs are compared with.
-ReferenceFor = Callable[[Path, dict[str, Any]], "Reference"]
+_FILES = ("cost/grid.py", "cost/times.py", "operations.py", "trajectory.py", "reference/nearest.py")
 
 
 class Measurement:
@@ -38,7 +33,7 @@ class Measurement:
         grids: what to compare.
         out: the directory, made.
         repeats, processes_repeats: of each time in one process and as processes; 0 for not at all.
-        reference_for: makes or finds a scene's reference; the stored ones and those made on the fly when None.
+        find_reference: makes or finds what the runs of a scene, given by its file and resolved, are compared with.
     """
 
     def __init__(
@@ -47,11 +42,11 @@ class Measurement:
         out: Path,
         repeats: int,
         processes_repeats: int,
-        reference_for: ReferenceFor | None = None,
+        find_reference: Callable[[Path, Scene], Reference] = reference_for,
     ) -> None:
         self._grids = grids
         self._repeats = {IN_PROCESS: repeats, PROCESSES: processes_repeats}
-        self._reference_for = reference_for
+        self._find_reference = find_reference
         self._made_with = [machine(), versions(), _sources()]
         self._store = Store(out)
 
@@ -59,10 +54,8 @@ class Measurement:
         self._store.__enter__()
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
-        self._store.__exit__(kind, error, traceback)
+    def __exit__(self, *_: object) -> None:
+        self._store.__exit__()
 
     def _key(self, candidate: Candidate) -> str:
         return candidate.key(*self._made_with)
@@ -80,28 +73,18 @@ class Measurement:
             if not left and self._store.has(_REFERENCE, self._reference_key(grid)):
                 continue
             advance = stage(f"{grid.name}: errors", len(left))
-            reference = self._find_reference(grid)
+            reference = self._find_reference(grid.path, grid.scene)
+            note = ReferenceNote(reference.how, reference.error_m, reference.pointwise, reference.verdict)
+            self._store.add(_REFERENCE, self._reference_key(grid), dataclasses.asdict(note))
             for candidate in random.Random(0).sample(left, len(left)):
                 came = outcome(candidate, reference)
                 self._store.add(_OUTCOME, self._key(candidate), dataclasses.asdict(came))
                 advance()
 
-    def _find_reference(self, grid: Grid) -> Reference:
-        if self._reference_for is None:
-            from haploop.tools.reference.nearest import reference_for
-
-            self._reference_for = reference_for
-        reference = self._reference_for(grid.path, grid.scene)
-        note = ReferenceNote(reference.how, reference.error_m, reference.pointwise, reference.verdict)
-        self._store.add(_REFERENCE, self._reference_key(grid), dataclasses.asdict(note))
-        return reference
-
     def times(self, stage: Stage) -> None:
         """Makes every measurement of time that is missing; errors come first."""
         for way, repeats in self._repeats.items():
-            jobs = self._jobs(way)
-            if count := times.missing(self._store, jobs, repeats):
-                times.measure(self._store, jobs, repeats, stage(f"times, {way}", count))
+            times.measure(self._store, self._jobs(way), repeats, f"times, {way}", stage)
 
     def other_prices(self, stage: Stage) -> None:
         """Measures the prices of books, log, effects, processes, delay and control rate."""
@@ -130,8 +113,8 @@ class Measurement:
 
     def cost(self, tolerance_m: float) -> Cost:
         """Returns all that is known so far, the prices included."""
-        scenes = [self._scene_cost(grid, tolerance_m) for grid in self._grids if self._note(grid)]
         loads = [times.quiet(self._store, self._jobs(way), n) for way, n in self._repeats.items()]
+        busiest = max(filter(None, loads), key=lambda load: (load.busy, load.calibration_spread), default=None)
         return Cost(
             machine=machine(),
             versions=versions(),
@@ -139,25 +122,21 @@ class Measurement:
             repeats=self._repeats[IN_PROCESS],
             processes_repeats=self._repeats[PROCESSES],
             tolerance_m=tolerance_m,
-            load=_worst(load for load in loads if load),
-            scenes=scenes,
+            load=busiest,
+            scenes=[made for grid in self._grids if (made := self._scene_cost(grid, tolerance_m))],
             prices=self._prices().groups(),
         )
 
-    def _note(self, grid: Grid) -> dict[str, Any] | None:
-        return self._store.get(_REFERENCE, self._reference_key(grid))
-
-    def _scene_cost(self, grid: Grid, tolerance_m: float) -> SceneCost:
-        method, rate = grid.own
-        note = ReferenceNote(**(self._note(grid) or {}))
+    def _scene_cost(self, grid: Grid, tolerance_m: float) -> SceneCost | None:
+        """Returns what is known of a scene, with advice once that is all; None before its reference is there."""
+        if (note := self._store.get(_REFERENCE, self._reference_key(grid))) is None:
+            return None
         points = [point for candidate in grid.candidates if (point := self._point(candidate))]
-        complete = len(points) == len(grid.candidates) and not self._untimed()
-        ticks = round(grid.scene["duration"] * grid.scene["clock"]["control_rate"])
-        made = SceneCost(grid.name, grid.scene["title"], method, rate, ticks, note, points)
+        ticks = Timebase.from_scene(grid.scene).ticks
+        made = SceneCost(grid.name, grid.scene.title, *grid.own, ticks, ReferenceNote(**note), points)
+        untimed = times.missing(self._store, self._jobs(IN_PROCESS), self._repeats[IN_PROCESS])
+        complete = len(points) == len(grid.candidates) and not untimed
         return dataclasses.replace(made, advice=advice(made, tolerance_m)) if complete else made
-
-    def _untimed(self) -> int:
-        return times.missing(self._store, self._jobs(IN_PROCESS), self._repeats[IN_PROCESS])
 
     def _point(self, candidate: Candidate) -> Point | None:
         came = self._outcome(candidate)
@@ -180,10 +159,6 @@ class Measurement:
 
 
 def _sources() -> str:
-    here = Path(__file__).parents[1]
-    return source_digest(_PACKAGES, [*(here / name for name in _FILES), *sorted((here / "reference/stored").glob("*"))])
-
-
-def _worst(loads: Iterable[Load]) -> Load | None:
-    """Returns the busiest."""
-    return max(loads, key=lambda load: (load.busy, load.calibration_spread), default=None)
+    tools = Path(__file__).parents[1]
+    files = [*(tools / name for name in _FILES), *sorted((tools / "reference/stored").glob("*"))]
+    return source_digest(_PACKAGES, files)

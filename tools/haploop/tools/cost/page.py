@@ -6,11 +6,9 @@ import sys
 from pathlib import Path
 
 from haploop.tools.cli.exit_codes import WRONG_USE, leave
-from haploop.tools.cost import figure
-from haploop.tools.cost.advice import length, name_of, rate
+from haploop.tools.cost import figure, prices_figure
 from haploop.tools.cost.data import Cost, CostFileError, Point, Price, PriceGroup, SceneCost, load
-from haploop.tools.cost.findings import FindingTable, findings
-from haploop.tools.cost.prices import figure as prices_figure
+from haploop.tools.cost.findings import FindingTable, findings, length, rate
 from haploop.tools.cost.report import made_with
 from haploop.tools.figure.data import FigureError
 from haploop.tools.render.markdown import markdown_table
@@ -72,14 +70,13 @@ def _scene(scene: SceneCost) -> list[str]:
     rows = [[method, *(_cell(scene, method, hertz) for hertz in rates)] for method in methods]
     swings = "" if reference.pointwise else " It is chaotic: compared by its swings, not by positions."
     about = f"*Reference:* {reference.how} It is known to {length(reference.error_m)}.{swings}"
-    parts = [f"### {name_of(scene)}", about, _table(["error, µs", *map(rate, rates)], rows)]
+    parts = [f"### {scene.short_title}", about, _table(["error, µs", *map(rate, rates)], rows)]
     return [*parts, *([_failures(scene)] if any(p.failure for p in scene.points) else []), scene.advice]
 
 
 def _cell(scene: SceneCost, method: str, hertz: int) -> str:
     """Formats error, wrong verdict and time of a point; the scene's own setting in bold."""
-    point = next((p for p in scene.points if (p.method, p.plant_rate) == (method, hertz)), None)
-    if point is None:
+    if (point := scene.point(method, hertz)) is None:
         return ""
     words = "failed" if point.error is None else _power(point.error.size_m)
     if point.error and not point.error.verdict_right:
@@ -106,15 +103,8 @@ def _prices(groups: list[PriceGroup]) -> list[str]:
     parts = ["## The other prices", f"![What books, log, effects, processes, delay and rate cost]({PRICES_FIGURE})"]
     for group in groups:
         about = f"Medians of {group.repeats} repeats, {group.unit}: {group.how}. The first row is the baseline."
-        heads = [
-            "left out" if group.name == "effects" else "",
-            "median",
-            "quartiles",
-            "ratio",
-            "costs",
-            "instructions",
-            "buys",
-        ]
+        first = "left out" if group.name == "effects" else ""
+        heads = [first, "median", "quartiles", "ratio", "costs", "instructions", "buys"]
         parts += [f"### {group.title}", about, _table(heads, [_price(price) for price in group.prices])]
     return parts
 

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 from rich.console import Group
 from rich.text import Text
 
-from haploop.tools.cost.advice import rate
 from haploop.tools.cost.data import QUIET_LOAD, QUIET_SPREAD, Cost, Errors, Point, PriceGroup, SceneCost, Spread
+from haploop.tools.cost.findings import rate
 from haploop.tools.render.terminal import make_table
 from haploop.tools.render.units import amount, fixed
 

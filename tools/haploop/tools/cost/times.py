@@ -1,23 +1,24 @@
 """Times of a simulated tick: warm, interleaved in random order, repeated, with the garbage collector off.
 
 A round times every candidate once, in an order drawn anew for each round from a fixed seed: what drifts or disturbs
-meets all of them alike. Each time is stored at once, so a round that was stopped goes on where it was.
+meets all of them alike. Each time is stored at once, so that a command that was stopped goes on where it was.
 """
 
 from __future__ import annotations
 
 import gc
+import json
 import os
 import random
 import statistics
 import tempfile
 import time
 import warnings
-from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Hashable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -26,11 +27,13 @@ from haploop.launch.runs.in_process import Loop, scene_events
 from haploop.launch.runs.start import prepare, run
 from haploop.launch.spec import RunFailed
 from haploop.logger.session import open_session
+from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
-from haploop.tools.cost.data import Load
+from haploop.tools.cost.data import Load, Spread
 from haploop.tools.cost.grid import Candidate
-from haploop.tools.cost.store import Store
+from haploop.tools.render.progress import Stage
 
+POINTS_FILE = "points.jsonl"
 IN_PROCESS, PROCESSES = "us in one process", "us as processes"
 _SEED = 20_220_711
 # Far enough for some ticks more, near enough for squares to stay finite.
@@ -39,6 +42,52 @@ _FAR_M = 1e40
 _LEAST_BLOCK = 20
 _QUIET = "quiet for "
 _STEPS = 100_000
+
+
+class Store:
+    """DIR/points.jsonl: records by (what, key, repeat), a line each, appended and never rewritten; a context manager.
+
+    A line that was cut off when the program was killed is passed over: its record is measured again.
+    """
+
+    def __init__(self, directory: Path) -> None:
+        self._path = directory / POINTS_FILE
+        self._records: dict[tuple[str, str, int], Any] = {}
+
+    def __enter__(self) -> Self:
+        text = self._path.read_text(encoding="utf-8") if self._path.exists() else ""
+        for line in text.splitlines():
+            try:
+                record = json.loads(line)
+                self._records[record["what"], record["key"], record["repeat"]] = record["value"]
+            except (ValueError, LookupError, TypeError):
+                continue
+        self._file = self._path.open("a", encoding="utf-8")
+        if text and not text.endswith("\n"):
+            self._file.write("\n")
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._file.close()
+
+    def add(self, what: str, key: str, value: Any, repeat: int = 0) -> None:
+        """Keeps a record, on disk at once."""
+        self._records[what, key, repeat] = value
+        record = {"what": what, "key": key, "repeat": repeat, "value": value}
+        self._file.write(json.dumps(record) + "\n")
+        self._file.flush()
+
+    def get(self, what: str, key: str) -> Any:
+        """Returns a record, or None where there is none."""
+        return self._records.get((what, key, 0))
+
+    def has(self, what: str, key: str, repeat: int = 0) -> bool:
+        """Tells whether there is a record."""
+        return (what, key, repeat) in self._records
+
+    def all(self, what: str, key: str, repeats: int) -> list[Any]:
+        """Returns the records of the first ``repeats`` repeats, as far as there are any."""
+        return [self._records[what, key, i] for i in range(repeats) if (what, key, i) in self._records]
 
 
 @dataclass(frozen=True)
@@ -56,7 +105,7 @@ class Job:
     way: str
     family: Hashable
     key: str
-    scene: dict[str, Any]
+    scene: Scene
     clock: Callable[[], float | None]
 
 
@@ -69,8 +118,8 @@ def in_process_job(candidate: Candidate, key: str, ticks: int, diverges: bool) -
     assert candidate.scene is not None
     scene = candidate.scene
     if diverges:
-        short = {**scene["run"], "block_ticks": max(_LEAST_BLOCK, ticks // 2)}
-        scene = {**scene, "diverged_beyond": _FAR_M, "run": short}
+        short = replace(scene.run, block_ticks=max(_LEAST_BLOCK, ticks // 2))
+        scene = replace(scene, diverged_beyond=_FAR_M, run=short)
     return Job(IN_PROCESS, (candidate.path, candidate.method), key, scene, lambda: loop_us(scene))
 
 
@@ -81,7 +130,7 @@ def processes_job(candidate: Candidate, key: str, ticks: int) -> Job:
     return Job(PROCESSES, "", key, candidate.scene, lambda: run_us(candidate.path, overrides, ticks))
 
 
-def loop_us(scene: dict[str, Any]) -> float | None:
+def loop_us(scene: Scene) -> float | None:
     """Returns the time of a tick in this process, with books, without log, µs; None where the run could not go on.
 
     Neither building plant and controller nor the first block is counted, which makes what later ones only use; a run of
@@ -91,21 +140,21 @@ def loop_us(scene: dict[str, Any]) -> float | None:
     session = open_session(scene, base, None, {})
     loop = Loop(scene, base, registry(), session)
     loop.schedule(scene_events(scene, base))
+
+    def finish() -> None:
+        while loop.block():
+            pass
+
     going: list[bool] = []
     try:
         took_s = timed_s(lambda: going.append(loop.block()))
         first = ticks = session.logger.tick
         if going[0]:
-            took_s = timed_s(lambda: _finish(loop))
+            took_s = timed_s(finish)
             ticks = session.logger.tick - first
     except (ElementError, ArithmeticError):
         return None
     return took_s / ticks * 1e6 if ticks else None
-
-
-def _finish(loop: Loop) -> None:
-    while loop.block():
-        pass
 
 
 def timed_s(work: Callable[[], object]) -> float:
@@ -141,27 +190,22 @@ def missing(store: Store, jobs: Sequence[Job], repeats: int) -> int:
     return sum(not store.has(job.way, job.key, repeat) for job in jobs for repeat in range(repeats))
 
 
-def time_job(job: Job) -> float | None:
-    """Runs a job once and returns the time of a tick, µs; None where the run failed."""
-    return job.clock()
-
-
-def measure(store: Store, jobs: Sequence[Job], repeats: int, advance: Callable[[], None]) -> None:
-    """Makes every measurement of jobs of one way that is missing; ``advance`` is called after each.
+def measure(store: Store, jobs: Sequence[Job], repeats: int, name: str, stage: Stage) -> None:
+    """Makes every measurement of jobs of one way that is missing; where there are any, they are a stage of this name.
 
     With each goes into the store the load of the machine in its round.
     """
-    if not missing(store, jobs, repeats):
+    if not (count := missing(store, jobs, repeats)):
         return
-    way = jobs[0].way
+    way, advance = jobs[0].way, stage(name, count)
     with _still():
         if way == IN_PROCESS:
             _warm(store, jobs, repeats)
         for repeat in range(repeats):
-            seen = observe_machine(alone=way == IN_PROCESS)
+            seen = _observe_machine(alone=way == IN_PROCESS)
             for job in random.Random(_SEED + repeat).sample(jobs, len(jobs)):
                 if not store.has(way, job.key, repeat):
-                    took = time_job(job)
+                    took = job.clock()
                     store.add(_QUIET + way, job.key, seen, repeat)
                     store.add(way, job.key, took, repeat)
                     advance()
@@ -183,42 +227,30 @@ def _still() -> Iterator[None]:
 def _warm(store: Store, jobs: Sequence[Job], repeats: int) -> None:
     """Runs one of every family once untimed: imports, first calls, the interpreter's adaptive code."""
     for job in {job.family: job for job in jobs if missing(store, [job], repeats)}.values():
-        time_job(job)
+        job.clock()
 
 
 def quiet(store: Store, jobs: Sequence[Job], repeats: int) -> Load | None:
     """Returns the load of the machine in the rounds of these jobs; None where nothing was measured."""
-    return machine_load(seen for job in jobs for seen in store.all(_QUIET + job.way, job.key, repeats))
+    seen = [one for job in jobs for one in store.all(_QUIET + job.way, job.key, repeats)]
+    if not seen:
+        return None
+    loops = Spread.from_values([one["loop_s"] for one in seen])
+    loads = [one["load"] for one in seen if one["load"] is not None]
+    return Load(statistics.median(loads) if loads else None, (loops.q3 - loops.q1) / loops.median)
 
 
-def observe_machine(alone: bool) -> dict[str, Any]:
-    """Returns the time of a fixed calibration loop, s, and the load average.
+def _observe_machine(alone: bool) -> dict[str, float | None]:
+    """Returns the time of a fixed calibration loop, s, and the load average, None where the system tells none.
+
+    The load average counts the processes that run or wait for a core in the last minute.
 
     Args:
         alone: this process is all that should run; otherwise the load average tells nothing.
     """
-    return {"loop_s": _loop_s(), "load": _load_average() if alone else None}
-
-
-def _loop_s() -> float:
     value = 1.0
     began = time.perf_counter()
     for _ in range(_STEPS):
         value = 0.5 * value + 0.25
-    return time.perf_counter() - began
-
-
-def _load_average() -> float | None:
-    """Returns the processes running or waiting for a core in the last minute, where the system tells."""
-    return os.getloadavg()[0] if hasattr(os, "getloadavg") else None
-
-
-def machine_load(observations: Iterable[dict[str, Any]]) -> Load | None:
-    """Returns the load that several observations come to; None for none."""
-    seen = list(observations)
-    if not seen:
-        return None
-    loops = [one["loop_s"] for one in seen]
-    loads = [one["load"] for one in seen if one["load"] is not None]
-    q1, middle, q3 = statistics.quantiles(loops, n=4, method="inclusive") if len(loops) > 1 else loops * 3
-    return Load(statistics.median(loads) if loads else None, (q3 - q1) / middle)
+    took_s = time.perf_counter() - began
+    return {"loop_s": took_s, "load": os.getloadavg()[0] if alone and hasattr(os, "getloadavg") else None}

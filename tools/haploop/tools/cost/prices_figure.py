@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from haploop.tools.ablation import AGAIN, NONE
 from haploop.tools.cost.data import Cost, Price, PriceGroup, chance_in
 from haploop.tools.cost.figure import UNCERTAIN
 from haploop.tools.figure.data import FigureError
@@ -26,6 +25,7 @@ from haploop.tools.figure.style import (
     plain_numbers,
     write_figure,
 )
+from haploop.tools.operations import AGAIN, NONE
 from haploop.tools.render.units import fixed
 
 if TYPE_CHECKING:

@@ -1,0 +1,218 @@
+"""The prices of books, log, effects, processes, delay and control rate: what is timed, and the gain of each in words.
+
+Each job is one loop with one thing more or less, or with one number changed.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from haploop.controller.controller import Controller
+from haploop.controller.dissipation import registry
+from haploop.launch.plan.effects import EFFECTS
+from haploop.launch.scene.file import load
+from haploop.plant.plant import Plant
+from haploop.protocol.block_length import BlockLength
+from haploop.protocol.scene.scene import Scene
+from haploop.protocol.ticks import Timebase
+from haploop.tools.cost.data import Price, PriceGroup, price
+from haploop.tools.cost.grid import digest
+from haploop.tools.cost.times import IN_PROCESS, PROCESSES, Job, Store, loop_us, measure, run_us, timed_s
+from haploop.tools.linear.stiffness_limit import StiffnessLimit, stiffness_limit
+from haploop.tools.machine import machine, source_digest, versions
+from haploop.tools.operations import AGAIN, NONE, WHOLE, ablations, operations
+from haploop.tools.render.progress import Stage
+from haploop.tools.render.units import spring
+
+_DELAYS_S = (0.0, 0.001, 0.002, 0.005, 0.010)
+_CONTROL_RATES_HZ = (1_000, 500, 2_000, 5_000, 10_000)
+_LOGS = ("none", "ticks", "steps")
+# Held long enough that a time is no accident; a scene that swings apart runs to its end all the same.
+_IN_PROCESS_S, _EFFECTS_S, _PROCESSES_S = 4.0, 0.5, 2.0
+_FREE, _PROMPT = "diverged_beyond=1e9", "clock.round_trip_delay=0.0"
+_PACKAGES = ("haploop.protocol", "haploop.plant", "haploop.controller", "haploop.logger", "haploop.launch")
+_FILES = ("cost/prices.py", "cost/times.py", "linear/one_tick.py", "linear/stiffness_limit.py", "operations.py")
+_LIMIT, _INSTRUCTIONS = "stiffness limit", "instructions"
+_WITH_LIMIT, _COUNTED = ("delay", "control rate"), ("effects", "delay", "control rate")
+_WALL = "fig6a.toml without delay"
+# Group -> title, unit, way, how it was measured.
+_GROUPS = {
+    "books": ("Energy books of every plant step", "µs per tick", IN_PROCESS, f"one process, {_WALL}, no log"),
+    "log": ("What is logged", "µs per tick", PROCESSES, f"three processes, {_WALL}"),
+    "effects": ("Each effect", "µs per tick", IN_PROCESS, "one process, all_effects.toml with one effect left out"),
+    "processes": ("Processes", "µs per tick", PROCESSES, f"{_WALL}, no log"),
+    "delay": ("Delay as lookahead", "µs per tick", PROCESSES, "three processes, fig6a.toml, every step logged"),
+    "control rate": ("Control rate", "ms per simulated second", IN_PROCESS, f"one process, {_WALL}, no log"),
+}
+_BUYS = {
+    "without": "forces and motion, but no energy and no verdict",
+    "with": "where every joule goes, exactly, the residual that proves it, and the verdict",
+    "none": "the summary alone",
+    "ticks": "what the controller saw and did, to be drawn and replayed",
+    "steps": "the motion between the ticks as well",
+    "one process": "the same bits, as fast as it goes",
+    "three processes": "swaps, viewers and loggers while it runs, nodes in any language, on other machines",
+    WHOLE: "a loop as real as it gets",
+    AGAIN: "nothing: how far it is from the row above is chance",
+    NONE: "the mass, the hand and the wall that are left without any effect",
+}
+
+
+# Group -> what -> job; jobs of the same key are the same and timed once.
+Jobs = dict[str, dict[str, Job]]
+
+
+def price_jobs(scenes: Path, made_with: Sequence[Any]) -> Jobs:
+    """Makes every job of every group, baselines first; its key is made of all that its time depends on.
+
+    Args:
+        scenes: the folder of the scenes: the paper's wall, fig6a.toml, without delay, and all_effects.toml.
+        made_with: what the times depend on beside the scenes, as JSON can hold it.
+    """
+    wall = scenes / "fig6a.toml"
+
+    def in_process(*settings: str) -> Job:
+        return _in_process(load(wall, [f"duration={_IN_PROCESS_S}", _FREE, _PROMPT, "run.log=none", *settings]))
+
+    def as_processes(*settings: str) -> Job:
+        overrides = [f"duration={_PROCESSES_S}", _FREE, _PROMPT, *settings]
+        scene = load(wall, overrides)
+        ticks = Timebase.from_scene(scene).ticks
+        return Job(PROCESSES, "", "processes", scene, lambda: run_us(wall, overrides, ticks))
+
+    with_books = in_process()
+    effects = load(scenes / "all_effects.toml", [f"duration={_EFFECTS_S}", _FREE, "run.log=none"])
+    jobs = {
+        "books": {"without": _bare(with_books.scene), "with": with_books},
+        "log": {log: as_processes(f"run.log={log}") for log in _LOGS},
+        "effects": {name: _in_process(scene, name) for name, scene in ablations(effects).items()},
+        "processes": {"one process": with_books, "three processes": as_processes("run.log=none")},
+        "delay": {f"{s * 1e3:g} ms": as_processes("run.log=steps", f"clock.round_trip_delay={s}") for s in _DELAYS_S},
+        "control rate": {f"{hz / 1e3:g} kHz": in_process(f"clock.control_rate={hz}") for hz in _CONTROL_RATES_HZ},
+    }
+    return {
+        group: {what: replace(job, key=digest([job.key, job.scene, *made_with])) for what, job in members.items()}
+        for group, members in jobs.items()
+    }
+
+
+def _in_process(scene: Scene, name: str = "") -> Job:
+    """Makes a job of plant, controller and books in one process; a name keeps equal jobs apart."""
+    return Job(IN_PROCESS, f"books {name}", f"books {name}", scene, lambda: loop_us(scene))
+
+
+def _bare(scene: Scene) -> Job:
+    """Makes a job of plant and controller alone: their telemetry is made and thrown away."""
+    return Job(IN_PROCESS, "bare", "bare", scene, lambda: bare_us(scene))
+
+
+def bare_us(scene: Scene) -> float:
+    """Returns the time of a tick of plant and controller in this process without any books, µs.
+
+    In blocks as in a run, the first of them not counted either where there are more.
+    """
+    time = Timebase.from_scene(scene)
+    plant, controller = Plant(scene, time), Controller(scene, time, registry())
+    length = BlockLength(scene.run.block_ticks)
+
+    def block() -> None:
+        until = min(plant.tick + length.ticks, time.ticks)
+        plant.run_until(until, lambda _, samples: [float(force) for force in controller.answer(samples)])
+        plant.take_block()
+        controller.recorder.take()
+        length.next()
+
+    def finish() -> None:
+        while plant.tick < time.ticks and plant.stop_reason is None:
+            block()
+
+    took_s, first = timed_s(block), plant.tick
+    if first < time.ticks:
+        return timed_s(finish) / (plant.tick - first) * 1e6
+    return took_s / first * 1e6
+
+
+class Prices:
+    """Measures what is missing in a store, and puts together what is there.
+
+    Args:
+        scenes: the folder of the scenes that come with haploop.
+        store: where measurements are kept, open.
+        repeats: of each time, by way; prices of a way with 0 repeats are left out.
+    """
+
+    def __init__(self, scenes: Path, store: Store, repeats: Mapping[str, int]) -> None:
+        tools = Path(__file__).parents[1]
+        sources = source_digest(_PACKAGES, [tools / name for name in _FILES])
+        jobs = price_jobs(scenes, [machine(), versions(), sources])
+        self._store, self._repeats = store, repeats
+        self._jobs = {
+            name: members for name, members in jobs.items() if all(repeats[job.way] for job in members.values())
+        }
+
+    def measure(self, stage: Stage) -> None:
+        """Makes every measurement that is missing: limits and counts first, since they do not depend on the hour."""
+        self._limits_and_counts(stage)
+        every = {job.key: job for members in self._jobs.values() for job in members.values()}
+        for way, repeats in self._repeats.items():
+            jobs = [job for job in every.values() if job.way == way]
+            measure(self._store, jobs, repeats, f"other prices, {way}", stage)
+
+    def _limits_and_counts(self, stage: Stage) -> None:
+        kinds = registry()
+        makers = {
+            (_LIMIT, _WITH_LIMIT): lambda scene: dataclasses.asdict(stiffness_limit(scene, kinds)),
+            (_INSTRUCTIONS, _COUNTED): lambda scene: operations(scene, kinds).per_tick,
+        }
+        for (what, groups), make in makers.items():
+            jobs = {job.key: job for name in groups for job in self._jobs.get(name, {}).values()}
+            left = [job for job in jobs.values() if not self._store.has(what, job.key)]
+            advance = stage(f"other prices, {what}", len(left)) if left else lambda: None
+            for job in left:
+                self._store.add(what, job.key, make(job.scene))
+                advance()
+
+    def groups(self) -> list[PriceGroup]:
+        """Returns the groups of which every time is known."""
+        return [self._group(name) for name, jobs in self._jobs.items() if all(map(self._times, jobs.values()))]
+
+    def _times(self, job: Job) -> list[float]:
+        """Returns the times of a job in µs per tick, as far as there are any; none for a run that failed."""
+        values = self._store.all(job.way, job.key, self._repeats[job.way])
+        return [] if None in values else values
+
+    def _group(self, name: str) -> PriceGroup:
+        title, unit, way, how = _GROUPS[name]
+        prices: list[Price] = []
+        for what, job in self._jobs[name].items():
+            scale = job.scene.clock.control_rate / 1000.0 if name == "control rate" else 1.0
+            found = self._store.get(_LIMIT, job.key) if name in _WITH_LIMIT else None
+            limit = StiffnessLimit(**found) if found else None
+            made = price(
+                what,
+                [value * scale for value in self._times(job)],
+                prices[0].time if prices else None,
+                _BUYS.get(what) or (_steady_up_to(limit) if limit else _does(what)),
+                is_left_out=name == "effects",
+                instructions_per_tick=self._store.get(_INSTRUCTIONS, job.key) if name in _COUNTED else None,
+                stiffness=limit,
+            )
+            prices.append(made)
+        return PriceGroup(name, title, unit, self._repeats[way], how, prices)
+
+
+def _steady_up_to(limit: StiffnessLimit) -> str:
+    """Returns the stiffness that a delay or a control rate allows, in words."""
+    if limit.confirmed:
+        return f"a wall of up to {spring(limit.stiffness_N_m)} stays steady"
+    ran = f"but runs at 0.97 and 1.03 of it were {limit.below} and {limit.above}"
+    return f"in theory a wall of up to {spring(limit.stiffness_N_m)} stays steady, {ran}"
+
+
+def _does(effect: str) -> str:
+    """Returns what an effect does, as the table of effects says it."""
+    return next(found.does for found in EFFECTS if found.name == effect)

@@ -1,1 +1,0 @@
-"""Prices of books, log, effects, processes, delay and control rate: jobs to time, measurements, figure."""
