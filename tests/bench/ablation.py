@@ -10,7 +10,6 @@ import random
 import statistics
 import time
 from pathlib import Path
-from typing import Any
 
 from rich.console import Console
 from rich.table import Table
@@ -18,13 +17,14 @@ from rich.table import Table
 from haploop.controller.dissipation import registry
 from haploop.launch.runs.in_process import run_in_process
 from haploop.launch.scene.file import load
+from haploop.protocol.scene.scene import Scene
 from haploop.tools.machine import machine
-from haploop.tools.operations import AGAIN, NONE, WHOLE, ablations
+from haploop.tools.operations import AGAIN, NONE, WHOLE, Kinds, ablations
 
 SCENE = Path(__file__).parents[2] / "launch" / "scenes" / "all_effects.toml"
 
 
-def measured_us(scene: dict[str, Any], kinds: dict[str, Any]) -> float:
+def measured_us(scene: Scene, kinds: Kinds) -> float:
     """Wall time of a tick, µs."""
     began = time.perf_counter()
     summary = run_in_process(scene, kinds)

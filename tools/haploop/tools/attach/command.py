@@ -5,7 +5,6 @@ from __future__ import annotations
 import signal
 import sys
 from pathlib import Path
-from typing import Any
 
 from haploop.launch.output import make_output, write_scene
 from haploop.launch.processes import run_directory
@@ -13,8 +12,10 @@ from haploop.launch.processes.children import interrupts
 from haploop.launch.processes.run_directory import LiveRun
 from haploop.logger.books.buffers import TelemetryGap
 from haploop.logger.node import LoggerNode
+from haploop.logger.summary import Summary
 from haploop.protocol.clock_client import Aborted, ClockClient, Refused
 from haploop.protocol.processes import OBSERVER
+from haploop.protocol.scene.scene import Scene
 from haploop.protocol.transport import SecureContext
 from haploop.tools.attach.live_table import attach_print
 from haploop.tools.attach.plotjuggler import PORT, attach_plotjuggler
@@ -62,7 +63,7 @@ def attach_logger(run_id: str | None, out: Path | None) -> None:
         leave(summary["why"], FAILED)
 
 
-def _log(run: LiveRun, context: SecureContext, directory: Path, received: list[int]) -> dict[str, Any] | None:
+def _log(run: LiveRun, context: SecureContext, directory: Path, received: list[int]) -> Summary | None:
     """Logs until the run ends or a signal comes; returns the summary, or None if no telemetry came."""
 
     def reason_to_leave() -> str | None:
@@ -74,7 +75,7 @@ def _log(run: LiveRun, context: SecureContext, directory: Path, received: list[i
     node = LoggerNode(client, context, None, reason_to_leave)
     try:
         welcome = client.join({})
-        write_scene(welcome["scene"], directory)
+        write_scene(Scene.from_dict(welcome["scene"]), directory)
         node.start(welcome, directory)
         print(f"logging run {run.id} from tick {node.session.logger.tick} on; Ctrl-C leaves", file=sys.stderr)
         tick, summary = node.run()

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterable
-from typing import Any
 
 import numpy as np
 
+from haploop.logger.summary import Summary
+from haploop.protocol.changes import Event
+from haploop.protocol.telemetry import Block
 from haploop.protocol.ticks import Timebase
-from haploop.protocol.wire import Frame
+from haploop.protocol.wire import Frame, Message
 
 # Wall time over which the real-time factor is taken.
 _FACTOR_OVER_S = 2.0
@@ -34,18 +36,18 @@ class LiveStatus:
         why: a sentence on that; "" for none.
     """
 
-    def __init__(self, run_id: str, welcome: dict[str, Any]) -> None:
+    def __init__(self, run_id: str, welcome: Message) -> None:
         self.run_id = run_id
         self.time = Timebase(**welcome["timebase"])
         self.title: str = welcome["scene"]["title"]
         self.tick = 0
         self.paused = False
         self.factor: float | None = None
-        self.changes: list[tuple[int, dict[str, Any]]] = []
+        self.changes: list[tuple[int, Event]] = []
         self.skipped_ticks = 0
         self.ended = self.why = ""
-        self._newest: dict[str, dict[str, Any]] = {}
-        self._figures: dict[str, Any] = {}
+        self._newest: dict[str, Block] = {}
+        self._figures: Message = {}
         self._motion_at_start: dict[str, float] = {}
         self._marks: deque[tuple[float, int]] = deque()
 
@@ -65,7 +67,7 @@ class LiveStatus:
         self._figures = self._newest.get("ENERGY_BLOCK", {}).get("status") or self._figures
         self._count_time(now)
 
-    def _note_state(self, role: str, tick: int, state: dict[str, Any]) -> None:
+    def _note_state(self, role: str, tick: int, state: Message) -> None:
         """Notes the STATE of a publisher, all there is to see of a run that stands still."""
         self.tick = max(self.tick, tick)
         if role == "plant":
@@ -83,7 +85,7 @@ class LiveStatus:
         moved = self.tick - tick
         self.factor = moved / self.time.control_rate / (now - began) if moved and now > began else None
 
-    def note_event(self, tick: int, event: dict[str, Any]) -> None:
+    def note_event(self, tick: int, event: Event) -> None:
         """Notes an event."""
         self.changes.append((tick, event))
         if "pause" in event or "step" in event:
@@ -91,7 +93,7 @@ class LiveStatus:
         elif "resume" in event:
             self.paused = False
 
-    def end(self, failure: str, summary: dict[str, Any] | None) -> None:
+    def end(self, failure: str, summary: Summary | None) -> None:
         """Ends the run, with the figures of its summary if there is one; ``failure`` says why it ended early."""
         self.paused, self.factor = False, None
         if summary is None:  # on another machine, or never written
@@ -131,6 +133,6 @@ class LiveStatus:
         """Returns the energy books at present, J, by the names of the log."""
         return self._last("ENERGY_BLOCK")
 
-    def figures(self) -> dict[str, Any]:
+    def figures(self) -> Message:
         """Returns verdict, oscillation_m and residual_J so far, in the end those of the summary; empty before any."""
         return self._figures

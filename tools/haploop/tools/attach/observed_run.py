@@ -6,14 +6,15 @@ import json
 import time
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any, Self
+from typing import Self
 
 from haploop.launch.processes import run_directory
 from haploop.launch.processes.run_directory import LiveRun, RunNotFound
+from haploop.logger.summary import Summary
 from haploop.protocol.clock_client import Aborted, Refused
 from haploop.protocol.observer import Observer
 from haploop.protocol.processes import PROCESSES
-from haploop.protocol.wire import Frame
+from haploop.protocol.wire import Frame, Message
 
 # Intervals at which to look for a run that starts, and to ask again to join one that is about to begin.
 _LOOK_S, _ASK_AGAIN_S = 0.05, 0.02
@@ -133,7 +134,7 @@ class ObservedRun:
         self._context.destroy(linger=0)
 
 
-def read_summary(welcome: dict[str, Any]) -> dict[str, Any] | None:
+def read_summary(welcome: Message) -> Summary | None:
     """Returns the summary that a run has written; None where there is none, or it is on another machine."""
     try:
         return json.loads((Path(welcome["context"]["out"]) / "summary.json").read_text(encoding="utf-8"))

@@ -15,7 +15,6 @@ import errno
 import sys
 from collections.abc import Iterator, Mapping
 from itertools import groupby
-from typing import Any
 
 import msgpack
 import numpy as np
@@ -26,6 +25,7 @@ from haploop.launch.processes.run_directory import LiveRun, RunNotFound
 from haploop.logger.books.buffers import as_float64
 from haploop.logger.log.channels import Channels, motion_columns
 from haploop.logger.log.table import Floats, TableLayout
+from haploop.protocol.changes import Event
 from haploop.protocol.clock_client import Refused
 from haploop.protocol.sockets import has_message, open_socket
 from haploop.protocol.ticks import Timebase
@@ -71,7 +71,7 @@ class MessageBatches:
         """Gathers rows, ``values`` of shape (..., columns)."""
         self._rows.append((channel, values.reshape(-1, values.shape[-1])))
 
-    def message(self, channel: int, log_time_ns: int, obj: dict[str, Any]) -> None:
+    def message(self, channel: int, log_time_ns: int, obj: Event) -> None:
         """Ignores an event: it is no number."""
 
     def take_messages(self, wanted: bool = True) -> Iterator[tuple[str, bytes]]:
@@ -200,7 +200,7 @@ class SampleStream:
     def __init__(self, time: Timebase) -> None:
         self.batches = MessageBatches()
         self._channels = Channels(self.batches, time, every_step=True)
-        self._reached: tuple[int, dict[str, Any]] | None = None
+        self._reached: tuple[int, dict[str, np.ndarray]] | None = None
 
     def ingest(self, role: str, frame: Frame) -> None:
         """Takes a message of a publisher."""

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from haploop.launch.plan.plan import Plan, Step
+    from haploop.protocol.scene.scene import Scene
     from haploop.tools.operations import Bill
 
 _READING = (
@@ -43,11 +44,11 @@ def explain_scene(scene_path: Path, overrides: list[str], plugins: list[Path], a
     console().print(explanation(scene, planned, costs))
 
 
-def as_data(scene: dict[str, Any], planned: Plan, costs: Bill) -> dict[str, Any]:
+def as_data(scene: Scene, planned: Plan, costs: Bill) -> dict[str, Any]:
     """Returns the plan and its costs as one JSON object."""
     whole = costs.whole
     return {
-        "title": scene["title"],
+        "title": scene.title,
         "bodies_kg": planned.bodies,
         "states": planned.states,
         "memory": planned.memory,
@@ -72,19 +73,16 @@ def as_data(scene: dict[str, Any], planned: Plan, costs: Bill) -> dict[str, Any]
             for effect in planned.named
         ],
         "elements": [
-            {"kind": table["kind"], "instructions_per_tick": cost}
-            for table, cost in zip(scene.get("dissipation", []), costs.elements, strict=True)
+            {"kind": element.name, "instructions_per_tick": cost}
+            for element, cost in zip(scene.dissipation, costs.elements, strict=True)
         ],
         "absent": [effect.name for effect in planned.absent],
-        "instructions_per_tick": {
-            "plant": whole.plant / whole.ticks,
-            "controller": whole.controller / whole.ticks,
-        },
+        "instructions_per_tick": {"plant": whole.plant / whole.ticks, "controller": whole.controller / whole.ticks},
         "multiplications_per_tick": costs.multiplications[0],
     }
 
 
-def explanation(scene: dict[str, Any], planned: Plan, costs: Bill) -> RenderableType:
+def explanation(scene: Scene, planned: Plan, costs: Bill) -> RenderableType:
     """Returns the plan and its costs as tables for the terminal."""
     from rich.console import Group
     from rich.text import Text
@@ -93,15 +91,12 @@ def explanation(scene: dict[str, Any], planned: Plan, costs: Bill) -> Renderable
     moving = costs.multiplications[0]
     loop = f"plant {whole.plant / whole.ticks:.0f}, controller {whole.controller / whole.ticks:.0f}"
     return Group(
-        Text(scene["title"], style="bold"),
+        Text(scene.title, style="bold"),
         _facts(planned),
         _order("in every plant step", planned.plant_step),
         _order("in every tick", planned.tick),
         _costs(scene, planned, costs),
-        Text(
-            f"Per tick: {moving} multiplications move the bodies; bytecode instructions: {loop}. {_READING}",
-            style="dim",
-        ),
+        Text(f"Per tick: {moving} multiplications move the bodies; bytecode instructions: {loop}. {_READING}", "dim"),
     )
 
 
@@ -131,7 +126,7 @@ def _order(title: str, steps: tuple[Step, ...]) -> Table:
     return table
 
 
-def _costs(scene: dict[str, Any], planned: Plan, costs: Bill) -> Table:
+def _costs(scene: Scene, planned: Plan, costs: Bill) -> Table:
     """Makes the table of what each effect and each element adds."""
     numbers = ("states", "multiplications", "instructions")
     table = make_table("what is named", "written in", "every", *numbers, numbers=numbers)
@@ -140,6 +135,6 @@ def _costs(scene: dict[str, Any], planned: Plan, costs: Bill) -> Table:
         module = _short(modules[0]) if modules else effect.node
         numbers = f"{costs.multiplications[1][effect.name]:+d}", f"{costs.effects[effect.name]:+.0f}"
         table.add_row(effect.name, module, effect.acts.removeprefix("every "), str(effect.states_in(scene)), *numbers)
-    for element, cost in zip(scene.get("dissipation", []), costs.elements, strict=True):
-        table.add_row(element["kind"], "controller.dissipation", "tick", "–", "–", f"{cost:+.0f}")
+    for element, cost in zip(scene.dissipation, costs.elements, strict=True):
+        table.add_row(element.name, "controller.dissipation", "tick", "–", "–", f"{cost:+.0f}")
     return table

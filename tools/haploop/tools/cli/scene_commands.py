@@ -25,7 +25,7 @@ def run(
     json: Json = False,
 ) -> None:
     """Run a scene to its end; other terminals can steer and watch it meanwhile."""
-    from haploop.tools.cli.run import run_scene
+    from haploop.tools.cli.scenes import run_scene
     from haploop.tools.cli.view import viewing
 
     rate = pace or ("1" if view else "free")
@@ -74,7 +74,7 @@ def plot(directory: Directory) -> None:
 
 def replay(directory: Directory, json: Json = False) -> None:
     """Repeat a run from its own log and say whether every bit agreed."""
-    from haploop.tools.cli.run import replay_run
+    from haploop.tools.cli.scenes import replay_run
 
     replay_run(directory, json)
 

@@ -9,7 +9,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from haploop.tools.cli.exit_codes import WRONG_USE, leave, plain_errors
 
@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     import asyncio
 
     from haploop.launch.processes.run_directory import LiveRun
+    from haploop.protocol.wire import Message
     from haploop.view.serve.guard import Guard
 
 SINCE = ("start", "now")
@@ -34,7 +35,7 @@ class LiveRuns:
 
         return run_directory.live_runs()
 
-    def ask(self, run: LiveRun, verb: str, arguments: dict[str, Any]) -> tuple[str, dict[str, Any]]:
+    def ask(self, run: LiveRun, verb: str, arguments: Message) -> tuple[str, Message]:
         """Has a run carry out a command."""
         from haploop.launch.processes.control import CommandRefused, ask
         from haploop.launch.processes.run_directory import RunNotFound

@@ -6,8 +6,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from types import TracebackType
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Self
 
 from haploop.tools.render.terminal import console, verdict_style
 from haploop.tools.render.units import amount, fixed
@@ -16,6 +15,8 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.live import Live
     from rich.text import Text
+
+    from haploop.protocol.wire import Message
 
 # Names a stage of so many parts; what it returns is called after each of them.
 Stage = Callable[[str, int], Callable[[], None]]
@@ -50,9 +51,7 @@ class ProgressLine:
             self._live.start()
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         if self._live:
             self._live.stop()
 
@@ -60,7 +59,7 @@ class ProgressLine:
         """Names the run, as other terminals may call it."""
         self._run_id = run_id
 
-    def update(self, status: dict[str, Any]) -> None:
+    def update(self, status: Message) -> None:
         """Takes the logger's status; cheap, and shown a few times a second at most."""
         now = time.monotonic()
         if not status or now < self._due:
@@ -73,7 +72,7 @@ class ProgressLine:
             factor = done_s / elapsed_s if elapsed_s > 0 else 0.0
             self._live.update(self.line(status, factor, self._live.console.width), refresh=True)
 
-    def line(self, status: dict[str, Any], factor: float, width: int) -> Text:
+    def line(self, status: Message, factor: float, width: int) -> Text:
         """Makes the line for a status, cut to ``width`` columns.
 
         Args:

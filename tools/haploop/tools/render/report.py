@@ -15,7 +15,9 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from haploop.controller.dissipation import Element
+    from haploop.logger.summary import Summary
     from haploop.protocol.quantity import Quantity
+    from haploop.protocol.wire import Message
 
 # Entry of the summary, the count in it, and its words.
 _COUNTS = (
@@ -29,7 +31,7 @@ _COUNTS = (
 LEAK_CAUSES = {"sampling_and_hold_J": "sampling and hold", "quantisation_J": "quantisation", "delay_J": "delay"}
 
 
-def plant_books(energy: dict[str, Any]) -> dict[str, str]:
+def plant_books(energy: Summary) -> dict[str, str]:
     """Returns the words for each key of the summary's ``energy`` that is a book of the plant: work, then every heat."""
     words = {"hand_work_J": "work of the hand"}
     words |= {key: f"heat in the {key.removesuffix('_heat_J')}" for key in energy if key.endswith("_heat_J")}
@@ -37,18 +39,18 @@ def plant_books(energy: dict[str, Any]) -> dict[str, str]:
     return {key: name for key, name in words.items() if key in energy}
 
 
-def count_losses(summary: dict[str, Any]) -> dict[str, int]:
+def count_losses(summary: Summary) -> dict[str, int]:
     """Returns what was lost or limited, and how often; what never happened is left out."""
     found = {words: summary.get(entry, {}).get(key, 0) for entry, key, words in _COUNTS}
     return {words: count for words, count in found.items() if count}
 
 
-def print_summary(summary: dict[str, Any]) -> None:
+def print_summary(summary: Summary) -> None:
     """Shows the summary of a run on stderr."""
     console(stderr=True).print(summary_table(summary))
 
 
-def summary_table(summary: dict[str, Any]) -> RenderableType:
+def summary_table(summary: Summary) -> RenderableType:
     """Makes the report of a run from its summary: verdict, key numbers and every book of energy."""
     from rich.console import Group
     from rich.text import Text
@@ -67,11 +69,11 @@ def _rule_in_short(rule: str) -> str:
     return f"{seen[:1].upper()}{seen[1:]}."
 
 
-def _control_rate(summary: dict[str, Any]) -> float:
+def _control_rate(summary: Summary) -> float:
     return summary["ticks"] / summary["duration_s"] if summary["duration_s"] else 1.0
 
 
-def _key_figures(summary: dict[str, Any]) -> list[tuple[str, str]]:
+def _key_figures(summary: Summary) -> list[tuple[str, str]]:
     window = summary["window"]
     ran = f"{summary['duration_s']:g} s, {summary['ticks']} ticks"
     if summary["wall_s"]:
@@ -88,7 +90,7 @@ def _key_figures(summary: dict[str, Any]) -> list[tuple[str, str]]:
     return figures
 
 
-def _growth(window: dict[str, Any]) -> str:
+def _growth(window: Summary) -> str:
     """Returns the growth of the swings in words; nothing where they grow as little as a limit cycle's."""
     rate = window.get("growth_1_s") or 0.0
     if abs(rate) < 0.5:
@@ -96,7 +98,7 @@ def _growth(window: dict[str, Any]) -> str:
     return f", {'growing' if rate > 0 else 'dying away'} as e^({rate:+.2g} t/s)"
 
 
-def _books(energy: dict[str, Any], control_rate: float) -> Table:
+def _books(energy: Summary, control_rate: float) -> Table:
     """Makes the table of energy books: wall with its leak, elements, then the plant's."""
     numbers = ("at work", "true", "sampled")
     table = make_table("energy taken out of the device by", *numbers, numbers=numbers)
@@ -109,7 +111,7 @@ def _books(energy: dict[str, Any], control_rate: float) -> Table:
     return table
 
 
-def _virtual_rows(energy: dict[str, Any], control_rate: float) -> list[tuple[str, str, str, str]]:
+def _virtual_rows(energy: Summary, control_rate: float) -> list[tuple[str, str, str, str]]:
     wall, rows = energy["wall"], []
     if "leak" in wall:
         rows.append(("wall", "", amount(wall["true_J"], "J"), amount(wall["sampled_J"], "J")))
@@ -123,7 +125,7 @@ def _virtual_rows(energy: dict[str, Any], control_rate: float) -> list[tuple[str
     return rows
 
 
-def _plant_rows(energy: dict[str, Any]) -> list[tuple[str, str]]:
+def _plant_rows(energy: Summary) -> list[tuple[str, str]]:
     rows = [(words, amount(energy[key], "J")) for key, words in plant_books(energy).items()]
     rows.append(("stored at the end", amount(energy["stored_J"], "J")))
     residual, moved = energy["residual_J"], energy["moved_J"]
@@ -136,7 +138,7 @@ def _rounded(value: float | None, beside: float | None) -> float | None:
     return 0.0 if value is not None and beside is not None and abs(value) < 1e-9 * abs(beside) else value
 
 
-def status_table(data: dict[str, Any]) -> RenderableType:
+def status_table(data: Message) -> RenderableType:
     """Makes the report of a live run: progress, verdict so far, and the lag of every node."""
     from rich.console import Group
     from rich.text import Text
@@ -154,7 +156,7 @@ def status_table(data: dict[str, Any]) -> RenderableType:
     return Group(*parts, _nodes(data["nodes"], rate))
 
 
-def _nodes(nodes: list[dict[str, Any]], control_rate: float) -> Table:
+def _nodes(nodes: list[Message], control_rate: float) -> Table:
     from rich.text import Text
 
     numbers = ("pid", "tick", "behind", "skipped")
