@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from haploop.launch.runs.start import prepare, run
 from haploop.plant.sensing.encoder import accelerometer_is_used
 from helpers.runs.estimates import COUNT, ENCODER, EVERYTHING, FUSED, KALMAN, SIGMA, T, estimates, floats
+from helpers.scenes.least import typed
 
 SCENE = Path(__file__).parents[2] / "launch/scenes/fig6c.toml"
 
@@ -112,7 +113,7 @@ EVERY: dict[str, dict[str, Any]] = {
 def test_many_loops_in_arrays_give_the_bits_of_each_loop_alone(tables):
     rng = np.random.default_rng(9)
     x = COUNT * np.cumsum(rng.integers(-2, 4, (80, 7)), axis=0)
-    readings = rng.normal(0, 3.0, x.shape) if accelerometer_is_used(tables) else np.zeros((0, 7))
+    readings = rng.normal(0, 3.0, x.shape) if accelerometer_is_used(typed(**tables)) else np.zeros((0, 7))
     together = estimates([*x], [*readings], encoder=ENCODER, **tables)
     for loop in range(x.shape[1]):
         alone = estimates(floats(x[:, loop]), floats(readings[:, loop]), encoder=ENCODER, **tables)
@@ -122,14 +123,15 @@ def test_many_loops_in_arrays_give_the_bits_of_each_loop_alone(tables):
 
 @pytest.mark.parametrize("tables", EVERY.values(), ids=EVERY)
 def test_both_estimates_are_0_at_the_first_tick_and_an_accelerometers_its_reading(tables):
-    readings = [2.5, 1.0] if accelerometer_is_used(tables) else []
+    readings = [2.5, 1.0] if accelerometer_is_used(typed(**tables)) else []
     v, a = estimates([-0.06, -0.0598], readings, encoder=ENCODER, **tables)
     assert (v[0], a[0]) == (0.0, readings[0] if readings else 0.0)
     assert v[1] != 0.0
 
 
 def test_only_an_estimate_that_reads_the_accelerometer_has_it_sampled():
-    assert [name for name, tables in EVERY.items() if accelerometer_is_used(tables)] == ["accelerometer", "fused"]
+    using = [name for name, tables in EVERY.items() if accelerometer_is_used(typed(**tables))]
+    assert using == ["accelerometer", "fused"]
 
 
 @pytest.mark.parametrize(
@@ -162,7 +164,7 @@ def test_a_scene_that_names_no_estimator_loads_none():
         device = {"mass": 0.01, "damping": 0.1}
         scene = Scene.from_dict({"title": "", "duration": 0.01, "device": device, **tables})
         Controller(scene, Timebase(10_000, 1_000, 0, 10), {}).answer([(0.0, 0.0)])
-        print([name for name in sys.modules if name.split(".")[-1] in ("window_difference", "foaw", "kalman", "scipy")])
+        print([name for name in sys.modules if name.split(".")[-1] in ("window", "foaw", "kalman", "scipy")])
     """
     ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert ran.stdout == "[]\n"

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import importlib.util
-from typing import Any
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from haploop.controller.estimators.choose import ESTIMATORS, estimator_class
+from haploop.protocol.scene.estimators import Acceleration, Velocity
+from haploop.protocol.scene.scene import Scene
 from haploop.tools.linear.linearity import LinearController
 from helpers.outside.haploop_outside import AlphaBeta
 from helpers.runs.batches import alone, pressed, together
@@ -39,10 +41,10 @@ def test_it_follows_a_constant_velocity_and_lags_an_acceleration_as_its_gains_sa
     assert t[-1] - v[-1] == pytest.approx((ALPHA / BETA - 0.5) * T, rel=1e-6)
 
 
-def scenes() -> list[dict[str, Any]]:
+def scenes() -> list[Scene]:
     made = pressed(duration=0.1)
-    tables = ({**TABLE, "cutoff": 300.0, "beta": beta} for beta in (0.05, 0.1, 0.15))
-    return [{**made, "velocity": table, "acceleration": {"source": "encoder"}} for table in tables]
+    tables = [Velocity.from_dict({**TABLE, "cutoff": 300.0, "beta": beta}) for beta in (0.05, 0.1, 0.15)]
+    return [replace(made, velocity=table, acceleration=Acceleration()) for table in tables]
 
 
 def test_members_of_a_batch_have_the_bits_of_each_alone() -> None:
@@ -65,7 +67,7 @@ def test_it_compiles() -> None:
 
 def test_its_memory_is_found_by_unit_vectors() -> None:
     """The poles of the filter are the roots of z^2 - (2 - alpha - beta) z + 1 - alpha."""
-    made = {**pressed(), "velocity": TABLE}
+    made = replace(pressed(), velocity=Velocity.from_dict(TABLE))
     moved, _ = LinearController.from_scene(made, KINDS)
     poles = np.sort_complex(np.linalg.eigvals(moved[:, : len(moved)]))
     assert poles == pytest.approx(np.sort_complex(np.roots([1.0, ALPHA + BETA - 2.0, 1.0 - ALPHA])), abs=1e-9)

@@ -17,7 +17,7 @@ from haploop.protocol.trees import tree_leaves, tree_map, tree_unflatten
 from helpers.runs.estimates import COUNT, ENCODER, FUSED, KALMAN
 from helpers.scenes.least import KINDS, typed
 
-TIME = Timebase.from_clock({"plant_rate": 10_000, "control_rate": 1_000, "round_trip_delay": 0.0}, 1.0)
+TIME = Timebase(plant_rate=10_000, control_rate=1_000, delay_steps=0, ticks=1000)
 TABLES: dict[str, dict[str, Any]] = {
     "difference": {},
     "low-passed": {"velocity": {"cutoff": 80.0}, "acceleration": {"source": "encoder", "cutoff": 50.0}},
@@ -70,7 +70,7 @@ def samples() -> list[tuple[float, ...]]:
 @pytest.mark.parametrize("at", [2, 5, 40])
 def test_a_controller_goes_on_from_a_packed_state_to_the_same_bits(tables: dict[str, Any], at: int) -> None:
     scene, kinds = {**SCENE, **tables}, KINDS | {"bristle": Bristle}
-    whole = [sample[: 1 + accelerometer_is_used(scene)] for sample in samples()]
+    whole = [sample[: 1 + accelerometer_is_used(typed(**tables))] for sample in samples()]
     controller, other = Controller(typed(**scene), TIME, kinds), Controller(typed(**scene), TIME, kinds)
     controller.answer(whole[:at])
     packed = msgpack.packb(tree_leaves(controller.state))

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from scipy.linalg import expm
 
+from haploop.protocol.scene.scene import Scene
 from helpers.scenes.least import scene
 from oracles.effects_reference import Bodies
 
@@ -23,7 +24,7 @@ TAU = {"kind": "sine", "amplitude": 1.5, "frequency": 43.0}
 _LENGTHS = 500.0
 
 
-def chain_scene(rng: np.random.Generator, effects: str) -> dict[str, Any]:
+def chain_scene(rng: np.random.Generator, effects: str) -> Scene:
     """A scene with some of cable, grip, friction, bandwidth, saturation; its fastest mode is slower than the steps."""
     tables: dict[str, Any] = {
         "duration": STEPS / RATE,
@@ -67,7 +68,7 @@ class Made:
 
 @dataclass
 class _Maker:
-    scene: dict[str, Any]
+    scene: Scene
     rng: np.random.Generator
     rows: list[dict[str, float]] = field(default_factory=list)
     pieces: list[dict[str, float]] = field(default_factory=list)
@@ -75,10 +76,11 @@ class _Maker:
     is_stuck: bool = False
 
     def __post_init__(self) -> None:
-        self.bodies = Bodies(self.scene)
+        assert self.scene.hand
+        self.bodies, self.hand = Bodies(self.scene), self.scene.hand
         self.count = self.bodies.count
-        self.rubs, self.lags = "friction" in self.scene, bool(self.bodies.actuator_rate)
-        self.links = ["cable"] * ("transmission" in self.scene) + ["grip"] * ("grip" in self.scene["hand"])
+        self.rubs, self.lags = self.scene.friction is not None, bool(self.bodies.actuator_rate)
+        self.links = ["cable"] * bool(self.scene.transmission) + ["grip"] * bool(self.hand.grip)
         self.z = self.bodies.z[: 2 * self.count + 1].copy()
         self.rest, self.bodies.rest = self.bodies.rest, 0.0
         self.inputs = 4  # command, friction, load, its slope
@@ -132,7 +134,7 @@ class _Maker:
         force = at[2 * n] if self.lags else command
         names = ["motor", "device"] if "cable" in self.links else ["device"]
         by_body = dict(zip(names, bodies.ground[: len(names)] * v[: len(names)] ** 2, strict=True))
-        hand = self.scene["hand"]["damping"] * v[-1] ** 2
+        hand = self.hand.damping * v[-1] ** 2
         if "grip" in self.links:
             by_body["hand"] = bodies.ground[-1] * v[-1] ** 2
         else:
@@ -142,7 +144,7 @@ class _Maker:
         stretching = bodies.link_b * np.diff(v) ** 2
         powers |= {f"{link}_heat": power for link, power in zip(self.links, stretching, strict=True)}
         powers["hand_work"] = (load - self.bodies.hand_k * self.rest) * v[-1]
-        if "actuator" in self.scene:
+        if self.scene.actuator:
             powers["actuator"] = (commanded - force) * v[0]
         if self.rubs:
             powers["friction_heat"] = -friction * v[0]
@@ -165,14 +167,14 @@ class _Maker:
         return taken
 
 
-def make(scene: dict[str, Any], rng: np.random.Generator) -> Made:
+def make(scene: Scene, rng: np.random.Generator) -> Made:
     """Move the chain of a scene under random forces and random friction."""
     maker = _Maker(scene, rng)
     tau = TAU["amplitude"] * np.sin(2 * np.pi * TAU["frequency"] * (np.arange(STEPS + 1) / RATE))
     loads = tau + maker.bodies.hand_k * maker.rest
     commanded = [np.repeat(rng.normal(0, 2.0, STEPS // 5), 5) for _ in range(2)]
     asked = commanded[0] + commanded[1]
-    force = np.clip(asked, -MOST_N, MOST_N) if "saturation" in scene.get("actuator", {}) else asked
+    force = np.clip(asked, -MOST_N, MOST_N) if scene.actuator and scene.actuator.saturation else asked
     energies: list[dict[str, float]] = []
     for step in range(STEPS):
         levels, moved = maker.cut(), {}

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
+from haploop.protocol.scene.scene import Scene
 from oracles.effects_reference import Bodies
 from oracles.one_tick_map import OneTickMap
 
@@ -15,17 +15,16 @@ from oracles.one_tick_map import OneTickMap
 class ChainLoop(OneTickMap):
     """The plant of a resolved scene without friction: A and b are its rates at every unit state."""
 
-    scene: dict[str, Any]
+    scene: Scene
 
     @classmethod
-    def of(cls, scene: dict[str, Any]) -> ChainLoop:
-        clock = scene["clock"]
-        rate = clock["plant_rate"]
+    def of(cls, scene: Scene) -> ChainLoop:
+        clock, rate = scene.clock, scene.clock.plant_rate
         return cls(
             scene,
-            delay_steps=round(clock["round_trip_delay"] * rate),
-            virtual_damping=sum(table["damping"] for table in scene.get("dissipation", [])),
-            steps_per_tick=rate // clock["control_rate"],
+            delay_steps=round(clock.round_trip_delay * rate),
+            virtual_damping=sum(table.parameters["damping"] for table in scene.dissipation),
+            steps_per_tick=rate // clock.control_rate,
             step_s=1.0 / rate,
         )
 

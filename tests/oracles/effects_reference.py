@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 from scipy.integrate import solve_ivp
 
-NO_HAND: dict[str, Any] = {"mass": 0.0, "damping": 0.0, "stiffness": 0.0, "rest": 0.0}
+from haploop.protocol.scene.effects import Accelerometer
+from haploop.protocol.scene.scene import Hand, Scene
 
 
 class Bodies:
@@ -22,51 +23,49 @@ class Bodies:
     band-limited accelerometer (both 0 where the scene has none), energies as named by ``books``.
     """
 
-    def __init__(self, scene: dict[str, Any]) -> None:
-        device, hand, cable = scene["device"], scene.get("hand", NO_HAND), scene.get("transmission")
-        grip, friction, meter = hand.get("grip"), scene.get("friction"), scene.get("accelerometer", {})
-        masses, ground, links = [device["mass"]], [device["damping"]], []
+    def __init__(self, scene: Scene) -> None:
+        device, hand, cable = scene.device, scene.hand or Hand(), scene.transmission
+        grip, meter = hand.grip, scene.accelerometer or Accelerometer()
+        masses, ground, links = [device.mass], [device.damping], []
         if cable:
-            masses.insert(0, cable["motor_mass"])
-            ground.insert(0, cable["motor_damping"])
-            links.append((cable["stiffness"], cable["damping"]))
+            masses.insert(0, cable.motor_mass)
+            ground.insert(0, cable.motor_damping)
+            links.append((cable.stiffness, cable.damping))
         tip = len(masses) - 1
         if grip:
-            masses.append(hand["mass"])
-            ground.append(hand["damping"])
-            links.append((grip["stiffness"], grip["damping"]))
+            masses.append(hand.mass)
+            ground.append(hand.damping)
+            links.append((grip.stiffness, grip.damping))
         else:
-            masses[-1] += hand["mass"]
-            ground[-1] += hand["damping"]
+            masses[-1] += hand.mass
+            ground[-1] += hand.damping
         self.m, self.ground = np.array(masses), np.array(ground)
         self.link_k, self.link_b = np.array(links).reshape(-1, 2).T
-        self.hand_k, self.rest = hand["stiffness"], hand["rest"]
-        self.actuator_rate = math.tau * scene.get("actuator", {}).get("bandwidth", 0.0)
-        self.meter_rate = math.tau * meter.get("bandwidth", 0.0)
-        self.meter_body = 0 if meter.get("mount") == "motor" else tip
-        self.friction = friction
+        self.hand_k, self.rest = hand.stiffness, hand.rest
+        self.actuator_rate = math.tau * ((scene.actuator and scene.actuator.bandwidth) or 0.0)
+        self.meter_rate = math.tau * (meter.bandwidth or 0.0)
+        self.meter_body = 0 if meter.mount == "motor" else tip
+        self.friction = scene.friction
         self.count = n = len(masses)
         self.books = ["hand_work", "actuator_work", "friction_heat"]
         self.books += [f"ground_heat.{i}" for i in range(n)] + [f"link_heat.{i}" for i in range(n - 1)]
         self.z = np.zeros(2 * n + 2 + len(self.books))
-        self.z[:n], self.z[n : 2 * n] = device["position"], device["velocity"]
-        self.sliding = 0.0 if friction is None else float(np.sign(device["velocity"]))
+        self.z[:n], self.z[n : 2 * n] = device.position, device.velocity
+        self.sliding = 0.0 if scene.friction is None else float(np.sign(device.velocity))
 
     def friction_N(self, speed: float) -> float:
         """Magnitude of the friction force in motion."""
         table = self.friction
         if table is None:
             return 0.0
-        if "stribeck_velocity" not in table:
-            return table["kinetic"]
-        return table["kinetic"] + (table["breakaway"] - table["kinetic"]) * math.exp(
-            -((speed / table["stribeck_velocity"]) ** 2)
-        )
+        if table.stribeck_velocity is None:
+            return table.kinetic
+        return table.kinetic + (self.breakaway_N - table.kinetic) * math.exp(-((speed / table.stribeck_velocity) ** 2))
 
     @property
     def breakaway_N(self) -> float:
         assert self.friction is not None
-        return self.friction.get("breakaway", self.friction["kinetic"])
+        return self.friction.kinetic if self.friction.breakaway is None else self.friction.breakaway
 
     def net(self, z: np.ndarray, command: float, tau: float) -> np.ndarray:
         """All forces on every body but friction, N."""

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
+from haploop.protocol.scene.scene import Scene
 from oracles.effects_reference import Bodies
 from oracles.reference import Controller, hand_force_N
 
@@ -22,9 +22,9 @@ class EffectsTruth:
         controller: what closed the loop, if anything did.
     """
 
-    def __init__(self, scene: dict[str, Any], steps: int) -> None:
-        rate = scene["clock"]["plant_rate"]
-        table = scene.get("hand", {}).get("force")
+    def __init__(self, scene: Scene, steps: int) -> None:
+        rate = scene.clock.plant_rate
+        table = scene.hand.force if scene.hand else None
         self.tau = [hand_force_N(table, s / rate) for s in range(steps + 1)]
         self.step_s = 1.0 / rate
         self.bodies = Bodies(scene)
@@ -65,7 +65,7 @@ class EffectsTruth:
         return math.fsum([self.stored[0], e["hand_work"], e["actuator_work"], *heats, -self.stored[-1]])
 
 
-def follow(scene: dict[str, Any], forces: Sequence[float]) -> EffectsTruth:
+def follow(scene: Scene, forces: Sequence[float]) -> EffectsTruth:
     """The plant under a given force over every step."""
     truth = EffectsTruth(scene, len(forces))
     for force in forces:
@@ -73,13 +73,13 @@ def follow(scene: dict[str, Any], forces: Sequence[float]) -> EffectsTruth:
     return truth
 
 
-def simulate(scene: dict[str, Any]) -> EffectsTruth:
+def simulate(scene: Scene) -> EffectsTruth:
     """The whole loop, as long as nothing in it is random and no actuator limits it."""
-    clock = scene["clock"]
-    n = clock["plant_rate"] // clock["control_rate"]
-    delay = round(clock["round_trip_delay"] * clock["plant_rate"])
-    age = round(scene.get("accelerometer", {}).get("delay", 0.0) * clock["plant_rate"])
-    steps = round(scene["duration"] * clock["control_rate"]) * n
+    clock = scene.clock
+    n = clock.plant_rate // clock.control_rate
+    delay = round(clock.round_trip_delay * clock.plant_rate)
+    age = round((scene.accelerometer.delay if scene.accelerometer else 0.0) * clock.plant_rate)
+    steps = round(scene.duration * clock.control_rate) * n
     truth = EffectsTruth(scene, steps)
     truth.controller = controller = Controller(scene)
     commands: list[float] = []

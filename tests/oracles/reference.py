@@ -9,7 +9,7 @@ two ticks change alike. Books: exact sums (``math.fsum``) over the whole run.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from itertools import pairwise
 from typing import Any
@@ -17,43 +17,46 @@ from typing import Any
 import numpy as np
 from scipy.linalg import expm
 
+from haploop.protocol.scene.hand_force import Constant, HandForce, MinimumJerk, Ramp, Sine, Step, Trace
+from haploop.protocol.scene.paths import with_value
+from haploop.protocol.scene.scene import ElementTable, EventTable, Hand, Scene
 
-def hand_force_N(table: dict[str, Any] | None, t: float) -> float:
-    """tau(t) of a resolved ``[hand.force]`` table."""
+
+def hand_force_N(table: HandForce | None, t: float) -> float:
+    """tau(t) of a ``[hand.force]`` table."""
     match table:
         case None:
             return 0.0
-        case {"kind": "constant"}:
-            return table["value"]
-        case {"kind": "ramp"}:
-            return table["value"] * (t / table["rise_time"] if t < table["rise_time"] else 1.0)
-        case {"kind": "step"}:
-            return table["value"] if t >= table["at"] else 0.0
-        case {"kind": "sine"}:
-            return table["offset"] + table["amplitude"] * math.sin(math.tau * table["frequency"] * t + table["phase"])
-        case {"kind": "minimum-jerk"}:
-            s = min(1.0, t / table["rise_time"])
-            return table["value"] * (10 * s**3 - 15 * s**4 + 6 * s**5)
-        case {"kind": "trace"}:
-            points = list(zip(table["time"], table["force"], strict=True))
+        case Constant():
+            return table.value
+        case Ramp():
+            return table.value * (t / table.rise_time if t < table.rise_time else 1.0)
+        case Step():
+            return table.value if t >= table.at else 0.0
+        case Sine():
+            return table.offset + table.amplitude * math.sin(math.tau * table.frequency * t + table.phase)
+        case MinimumJerk():
+            s = min(1.0, t / table.rise_time)
+            return table.value * (10 * s**3 - 15 * s**4 + 6 * s**5)
+        case Trace():
+            points = list(zip(table.time, table.force, strict=True))
             if t <= points[0][0]:
                 return points[0][1]
             for (t0, f0), (t1, f1) in pairwise(points):
                 if t <= t1:
                     return f0 + (f1 - f0) * (t - t0) / (t1 - t0)
             return points[-1][1]
-    raise ValueError(table)
 
 
 class Mechanics:
     """(x, v, F, dF/dt) over a step, F all forces but damper and spring; x from the hand's rest position."""
 
-    def __init__(self, scene: dict[str, Any]) -> None:
-        device, hand = scene["device"], scene.get("hand", {"mass": 0.0, "damping": 0.0, "stiffness": 0.0, "rest": 0.0})
-        self.m, self.k, self.rest = device["mass"] + hand["mass"], hand["stiffness"], hand["rest"]
-        self.b_device, self.b_hand = device["damping"], hand["damping"]
+    def __init__(self, scene: Scene) -> None:
+        device, hand = scene.device, scene.hand or Hand()
+        self.m, self.k, self.rest = device.mass + hand.mass, hand.stiffness, hand.rest
+        self.b_device, self.b_hand = device.damping, hand.damping
         self.b = self.b_device + self.b_hand
-        self.h = 1.0 / scene["clock"]["plant_rate"]
+        self.h = 1.0 / scene.clock.plant_rate
         rates = np.zeros((4, 4))
         rates[0, 1] = 1.0
         rates[1, :3] = -self.k / self.m, -self.b / self.m, 1.0 / self.m
@@ -71,7 +74,7 @@ class Mechanics:
 class Element:
     """One element of the scene's list, with the force it gave at every tick."""
 
-    table: dict[str, Any]
+    table: ElementTable
     from_tick: int
     forces: dict[int, float] = field(default_factory=dict)
     to_tick: int = 0
@@ -80,25 +83,25 @@ class Element:
 class Controller:
     """Estimates, wall and elements, tick by tick."""
 
-    def __init__(self, scene: dict[str, Any]) -> None:
+    def __init__(self, scene: Scene) -> None:
         self.scene = scene
-        self.rate = scene["clock"]["control_rate"]
-        self.wall = dict(scene["wall"]) if "wall" in scene else None
-        self.slots = [Element(dict(table), 0) for table in scene.get("dissipation", [])]
+        self.rate = scene.clock.control_rate
+        self.wall = scene.wall
+        self.slots = [Element(table, 0) for table in scene.dissipation]
         self.all_elements = list(self.slots)
         # Ticks are counted from the decimal number in the scene.
-        events = [(math.ceil(Fraction(repr(e["at"])) * self.rate), e) for e in scene.get("event", [])]
+        events = [(math.ceil(Fraction(repr(e.at)) * self.rate), e) for e in scene.event]
         self.events = sorted(events, key=lambda event: event[0])
-        self.filters = {name: scene.get(name, {}).get("cutoff") for name in ("velocity", "acceleration")}
-        self.accelerometer = scene.get("acceleration", {}).get("source") == "accelerometer"
+        self.filters = {name: scene.estimate(name).cutoff for name in ("velocity", "acceleration")}
+        self.accelerometer = scene.acceleration is not None and scene.acceleration.source == "accelerometer"
         self.rows: list[tuple[Any, Any, Any, float, float, bool]] = []
 
     def measure(self, x: float) -> Any:
-        encoder = self.scene.get("encoder")
+        encoder = self.scene.encoder
         if not encoder:
             return x
-        q = encoder["resolution"]
-        count = round(x / q) if encoder["rounding"] == "nearest" else math.floor(x / q)
+        q = encoder.resolution
+        count = round(x / q) if encoder.rounding == "nearest" else math.floor(x / q)
         return q * count
 
     def command(self, tick: int, x_true: float, acceleration: float) -> float:
@@ -113,13 +116,13 @@ class Controller:
         a_before = before[2] if before else 0
         contact, f_wall, inwards = False, 0.0, 0
         if self.wall:
-            surface = self.wall["position"]
-            inwards = -1 if self.wall["occupies"] == "below" else 1
+            surface = self.wall.position
+            inwards = -1 if self.wall.occupies == "below" else 1
             contact = inwards * (x - surface) > 0
-            f_wall = float(self.wall["stiffness"] * (surface - x)) if contact else 0.0
+            f_wall = float(self.wall.stiffness * (surface - x)) if contact else 0.0
         total = f_wall
         for slot in self.slots:
-            acting = contact or slot.table["acts"] == "always"
+            acting = contact or slot.table.acts == "always"
             force = float(_element_force(slot.table, v, a, a_before, inwards)) if acting else 0.0
             slot.forces[tick], slot.to_tick = force, tick + 1
             total += force
@@ -133,30 +136,30 @@ class Controller:
         keep = math.exp(-math.tau * cutoff / self.rate)
         return keep * y + (1.0 - keep) * u
 
-    def _change(self, tick: int, event: dict[str, Any]) -> None:
-        if "swap" in event:
-            new = [] if event["swap"]["kind"] == "none" else [Element(dict(event["swap"]), tick)]
-            self.slots[event["element"] : event["element"] + 1] = new
+    def _change(self, tick: int, event: EventTable) -> None:
+        if event.swap:
+            new, place = [] if event.swap.name == "none" else [Element(event.swap, tick)], event.element or 0
+            self.slots[place : place + 1] = new
             self.all_elements += new
-        for key, value in event.get("set", {}).items():
+        for key, value in (event.set or {}).items():
             table, *rest = key.split(".")
             if table == "wall":
                 assert self.wall is not None
-                self.wall[rest[0]] = value
+                self.wall = replace(self.wall, **{rest[0]: value})
             else:
                 slot = self.slots[int(rest[0])]
-                self.slots[int(rest[0])] = changed = Element({**slot.table, rest[1]: value}, tick)
+                self.slots[int(rest[0])] = changed = Element(with_value(slot.table, rest[1], value), tick)
                 self.all_elements.append(changed)
 
 
-def _element_force(table: dict[str, Any], v: Any, a: Any, a_before: Any, inwards: int) -> Any:
-    match table["kind"]:
+def _element_force(table: ElementTable, v: Any, a: Any, a_before: Any, inwards: int) -> Any:
+    match table.name:
         case "damping":
-            return -table["damping"] * v
+            return -table.parameters["damping"] * v
         case "unidirectional-damping":
-            return -table["damping"] * v if v * inwards > 0 else 0.0
+            return -table.parameters["damping"] * v if v * inwards > 0 else 0.0
         case "bidirectional-inertia":
-            return -table["mass"] * a
+            return -table.parameters["mass"] * a
         case "unidirectional-inertia":
-            return -table["mass"] * a if v * a_before >= 0 else 0.0
+            return -table.parameters["mass"] * a if v * a_before >= 0 else 0.0
     raise ValueError(table)

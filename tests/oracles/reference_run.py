@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from haploop.protocol.scene.scene import Scene
 from oracles.reference import Controller, Mechanics, hand_force_N
 
 
@@ -23,22 +24,22 @@ class Truth:
     books: dict[str, Any]
 
 
-def simulate(scene: dict[str, Any], start_beside: float = 0.0) -> Truth:
+def simulate(scene: Scene, start_beside: float = 0.0) -> Truth:
     """Run a resolved scene, started so many metres and metres per second beside where it says."""
     mechanics, controller = Mechanics(scene), Controller(scene)
-    clock = scene["clock"]
-    n = clock["plant_rate"] // clock["control_rate"]
-    delay = round(clock["round_trip_delay"] * clock["plant_rate"])
-    steps = round(scene["duration"] * clock["control_rate"]) * n
-    force_table = scene.get("hand", {}).get("force")
-    tau = [hand_force_N(force_table, s / clock["plant_rate"]) for s in range(steps + 1)]
-    x, v = scene["device"]["position"] + start_beside, scene["device"]["velocity"] + start_beside
+    clock = scene.clock
+    n = clock.plant_rate // clock.control_rate
+    delay = round(clock.round_trip_delay * clock.plant_rate)
+    steps = round(scene.duration * clock.control_rate) * n
+    force_table = scene.hand.force if scene.hand else None
+    tau = [hand_force_N(force_table, s / clock.plant_rate) for s in range(steps + 1)]
+    x, v = scene.device.position + start_beside, scene.device.velocity + start_beside
     commands: list[float] = []
     states, held = [(x, v)], []
     force = 0.0
     for s in range(steps):
         if s % n == 0:
-            if abs(x) > scene["diverged_beyond"]:
+            if abs(x) > scene.diverged_beyond:
                 break
             acceleration = (force + tau[s] - mechanics.b * v - mechanics.k * (x - mechanics.rest)) / mechanics.m
             commands.append(controller.command(s // n, x, acceleration))
@@ -94,7 +95,7 @@ def _books(
         "moved_J": start + math.fsum(np.abs(np.reshape(parts, (len(parts), -1, n)).sum(axis=2)).sum(axis=0)) / 2.0,
         "wall": account(wall_forces) | _leak(controller, x, dx, n, wall_forces, applied(wall_forces)),
         "elements": [
-            {"kind": e.table["kind"], "from_tick": e.from_tick, "to_tick": e.to_tick} | account(e.forces)
+            {"kind": e.table.name, "from_tick": e.from_tick, "to_tick": e.to_tick} | account(e.forces)
             for e in controller.all_elements
         ],
     }
@@ -104,13 +105,13 @@ def _leak(
     controller: Controller, x: np.ndarray, dx: np.ndarray, n: int, forces: dict[int, float], applied: np.ndarray
 ) -> dict[str, float]:
     """The leak of a wall that does not change, cause by cause; nothing without a wall or where an event sets one."""
-    wall = controller.scene.get("wall")
-    if wall is None or any("set" in event for _, event in controller.events):
+    wall = controller.scene.wall
+    if wall is None or any(event.set for _, event in controller.events):
         return {}
-    inwards = -1 if wall["occupies"] == "below" else 1
-    depth = [max(0.0, inwards * (x_s - wall["position"])) for x_s in x.tolist()]
-    ideal = wall["stiffness"] / 2 * (depth[-1] ** 2 - depth[0] ** 2)
-    held = math.fsum(inwards * wall["stiffness"] * depth[s // n * n] * dx[s] for s in range(len(dx)))
+    inwards = -1 if wall.occupies == "below" else 1
+    depth = [max(0.0, inwards * (x_s - wall.position)) for x_s in x.tolist()]
+    ideal = wall.stiffness / 2 * (depth[-1] ** 2 - depth[0] ** 2)
+    held = math.fsum(inwards * wall.stiffness * depth[s // n * n] * dx[s] for s in range(len(dx)))
     prompt = math.fsum(-forces[s // n] * dx[s] for s in range(len(dx)))
     late = math.fsum(-applied * dx)
     return {

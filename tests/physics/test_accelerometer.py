@@ -13,12 +13,12 @@ from scipy import integrate
 
 from haploop.plant.counters import CLIPPED
 from haploop.plant.sensing.accelerometer import Accelerometer
+from haploop.protocol.scene import effects
 from haploop.protocol.ticks import Timebase
 from helpers.runs.captured import in_blocks, of_the_scene, run
 from helpers.scenes.least import WALL, scene
 
 TIME = Timebase(plant_rate=10_000, control_rate=1000, delay_steps=0, ticks=10**6)
-IDEAL = {"noise_density": 0.0, "delay": 0.0, "bias": 0.0, "mount": "tip"}
 MANY = 200_000
 # Five standard errors: a right program meets another 999 999 of a million seeds as well.
 ERRORS = 5.0
@@ -27,7 +27,7 @@ ACCELERATIONS = st.lists(st.floats(-200, 200), min_size=1, max_size=30)
 
 def readings(accelerations, seed: int = 1, **table: Any) -> tuple[np.ndarray, float]:
     """What is read of each, and how many were clipped."""
-    sensor = Accelerometer({**IDEAL, **table}, seed, TIME)
+    sensor = Accelerometer(effects.Accelerometer(**table), seed, TIME)
     read = np.array([sensor.reading(a) for a in accelerations])
     return read, sensor.counters[CLIPPED].column(0, 10 * len(read))[-1] if "range" in table else 0
 

@@ -13,9 +13,10 @@ from haploop.plant.counters import SATURATED
 from haploop.plant.line.actuator import ActuatedLine
 from haploop.plant.line.delay import DelayLine, make_line
 from haploop.plant.plant import Plant
+from haploop.protocol.scene import effects
 from haploop.protocol.ticks import Timebase
 from helpers.runs.captured import in_blocks, of_the_scene, run
-from helpers.scenes.least import WALL, scene
+from helpers.scenes.least import WALL, scene, typed
 
 FORCES = st.floats(-1e3, 1e3)
 
@@ -23,7 +24,7 @@ FORCES = st.floats(-1e3, 1e3)
 def driven(forces: list[float], table: dict[str, float], delay: int = 3) -> tuple[list[float], float]:
     """Force at the step at which each command takes effect, and how many were clipped."""
     time = Timebase(plant_rate=10_000, control_rate=1000, delay_steps=delay, ticks=len(forces) + 1)
-    line = ActuatedLine(DelayLine(time), table, time)
+    line = ActuatedLine(DelayLine(time), effects.Actuator(**table), time)
     line.receive([*forces, 0.0])
     by_step = [force for tick in range(time.ticks) for count, force, _ in line.holds(tick) for _ in range(count)]
     clipped = line.counters[SATURATED].column(0, 10 * time.ticks)[-1] if "saturation" in table else 0
@@ -92,7 +93,7 @@ def test_a_command_that_is_no_finite_number_ends_the_run_where_it_would_act(forc
     """Neither is it clipped to a force, nor rounded away."""
     limits = {"actuator": actuator} if actuator else {}
     tables = scene(duration=0.1, clock={"round_trip_delay": 0.0023}, **limits, **late)
-    plant = Plant(tables, Timebase.from_clock(tables["clock"], 0.1))
+    plant = Plant(tables, Timebase.from_scene(tables))
     plant.run_until(100, lambda tick, samples: [force if tick + i == 20 else 0.1 for i in range(len(samples))])
     assert plant.stop_reason == f"command 20 was {force}, which no device can apply, at tick 22"
     assert plant.reached == 22
@@ -113,7 +114,7 @@ def test_counts_are_the_same_for_blocks_of_any_size_also_when_the_run_is_stopped
 
 def test_a_command_that_never_acts_is_never_clipped():
     time = Timebase(plant_rate=10_000, control_rate=1000, delay_steps=0, ticks=10)
-    line = make_line({"seed": 1, "loss": {"probability": 1.0}, "actuator": {"saturation": 1.0}}, time)
+    line = make_line(typed(loss={"probability": 1.0}, actuator={"saturation": 1.0}), time)
     line.receive([5.0] * 10)
     assert [line.holds(tick) for tick in range(10)] == [[(10, 0.0, -1)]] * 10
     assert not line.counters[SATURATED].column(0, 100).any()

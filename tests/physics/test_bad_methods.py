@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 import pytest
 
+from haploop.protocol.scene.paths import value_at
+from haploop.protocol.scene.scene import Scene
 from helpers.runs.captured import run
 from helpers.scenes.least import scene
 from oracles.effects_reference import Bodies
@@ -32,7 +33,7 @@ def runge_kutta_4(rates: Rates, z: np.ndarray, h: float) -> np.ndarray:
 
 
 def stepped(
-    resolved: dict[str, Any],
+    resolved: Scene,
     method: Method,
     steps: int,
     h: float,
@@ -44,8 +45,8 @@ def stepped(
     Friction is f sign(v), or f tanh(v / creep). ``speeds`` is given v of body 0 at every step.
     """
     bodies = Bodies(resolved)
-    push = resolved.get("hand", {}).get("force", {}).get("value", 0.0)
-    friction = resolved.get("friction", {}).get("kinetic", 0.0)
+    push = value_at(resolved, "hand.force.value") or 0.0
+    friction = value_at(resolved, "friction.kinetic") or 0.0
     bodies.friction = None
     speed = bodies.count
 
@@ -62,7 +63,7 @@ def stepped(
     return bodies
 
 
-def swinging_cable(motor_mass: float, stiffness: float) -> dict[str, Any]:
+def swinging_cable(motor_mass: float, stiffness: float) -> Scene:
     """A tip of 50 g pushed, without any loss."""
     return scene(
         duration=0.1,
@@ -123,7 +124,7 @@ def test_friction_by_tanh_creeps_under_a_load_that_haploop_holds_without_moving_
     assert not run(held).plant["x"].any()
 
 
-def swing_with_friction() -> tuple[dict[str, Any], float]:
+def swing_with_friction() -> tuple[Scene, float]:
     """A swing of 1 cm that sticks, and where: it loses 2 f / k every half swing."""
     k, f, end = 40.0, 0.039, 0.0101
     device = {"mass": 0.05, "damping": 0.0, "position": end}
@@ -158,5 +159,5 @@ def test_a_stop_set_at_the_end_of_its_step_is_off_by_a_part_in_a_million_and_hap
         x, left = x + left * h - f / mass * h * h / 2, left - f / mass * h
     way = mass * v * v / (2 * f)
     assert abs(x - way) > 1e-8 * way
-    ran = run(scene(device={"mass": mass, "damping": 0.0, "velocity": v}, friction={"kinetic": f}) | {"duration": 0.5})
+    ran = run(scene(device={"mass": mass, "damping": 0.0, "velocity": v}, friction={"kinetic": f}, duration=0.5))
     assert ran.plant["x"][-1] == pytest.approx(way, rel=1e-13)

@@ -10,6 +10,9 @@ import pytest
 
 from haploop.logger.books.books import Books
 from haploop.logger.verdict.window import Window
+from haploop.protocol.scene.effects import Grip
+from haploop.protocol.scene.paths import with_value
+from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
 from haploop.protocol.trees import tree_leaves, tree_select, tree_unflatten
 from helpers.runs.batches import together
@@ -22,7 +25,7 @@ SCENES: dict[str, dict[str, Any]] = {
 }
 
 
-def busy(tables: dict[str, Any]) -> dict[str, Any]:
+def busy(tables: dict[str, Any]) -> Scene:
     """A tap on a wall whose stiffness changes, with an element that is put in on the way."""
     push = {"kind": "ramp", "value": -1.0, "rise_time": 0.1}
     return scene(
@@ -72,7 +75,7 @@ def test_books_go_on_from_a_packed_state_to_the_same_bits(
     resolved, name = busy(tables), "book_batch" if of_batch else "book"
     made, calls = calls_of(monkeypatch, Books, "__init__"), calls_of(monkeypatch, Books, name)
     if of_batch:
-        together([{**resolved, "wall": {**resolved["wall"], "stiffness": 100.0 + i}} for i in range(5)])
+        together([with_value(resolved, "wall.stiffness", 100.0 + i) for i in range(5)])
     else:
         run(resolved)
     monkeypatch.undo()
@@ -91,24 +94,19 @@ def test_books_go_on_from_a_packed_state_to_the_same_bits(
     assert bits(forgetful.state) != bits(one.state)
 
 
-@pytest.mark.parametrize("grip", [{}, {"grip": {"stiffness": 500.0, "damping": 3.0}}], ids=["one mass", "a chain"])
+@pytest.mark.parametrize("grip", [None, Grip(stiffness=500.0, damping=3.0)], ids=["one mass", "a chain"])
 def test_books_of_the_members_that_are_kept_have_the_bits_they_have_when_none_is_dropped(
-    grip: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+    grip: Grip | None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     made, calls = calls_of(monkeypatch, Books, "__init__"), calls_of(monkeypatch, Books, "book_batch")
     resolved, kept = busy({}), np.array([True, False, False, True, True, False])
-    hand = {**resolved["hand"], **grip}
-    together(
-        [
-            {
-                **resolved,
-                "device": {**resolved["device"], "mass": 0.01 + 0.001 * i},
-                "hand": {**hand, "force": {**hand["force"], "value": -1.0 - 0.1 * i}},
-                "wall": {**resolved["wall"], "stiffness": 100.0 + i},
-            }
-            for i in range(len(kept))
-        ]
-    )
+    members = []
+    for i in range(len(kept)):
+        member = with_value(resolved, "hand.grip", grip)
+        for key, value in (("device.mass", 0.01 + 0.001 * i), ("hand.force.value", -1.0 - 0.1 * i)):
+            member = with_value(member, key, value)
+        members.append(with_value(member, "wall.stiffness", 100.0 + i))
+    together(members)
     monkeypatch.undo()
     (_, *arguments), half = made[0], len(calls) // 2
     dropped = Books(*arguments)

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from haploop.protocol.scene.paths import with_value
 from helpers.runs.captured import Captured, bodies, run
 from helpers.scenes.effect_tables import slowly
 from helpers.scenes.least import scene
@@ -250,6 +251,6 @@ def test_under_late_and_lost_commands_too_the_bodies_move_as_these_forces_move_t
 
 def test_the_comparison_sees_a_cable_a_part_in_a_million_softer():
     pressed = scene(**PRESSED | LOOPS["transmission"])
-    softer = pressed | {"transmission": pressed["transmission"] | {"stiffness": 5e4 * (1 - 1e-6)}}
+    softer = with_value(pressed, "transmission.stiffness", 5e4 * (1 - 1e-6))
     with pytest.raises(AssertionError):
         assert_same_motion(run(pressed), simulate(softer))

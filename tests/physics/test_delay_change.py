@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from haploop.protocol.scene.scene import Scene
 from helpers.runs.captured import Captured, in_blocks, run
 from helpers.scenes.least import WALL, mistakes, scene
 
@@ -25,11 +26,13 @@ N, TICKS = 10, 120
 FRICTION = {"friction": {"kinetic": 0.02}}
 
 
-def changing(delays: list[tuple[int, int]], **tables: Any) -> dict[str, Any]:
+def changing(delays: list[tuple[int, int]], integrator: str = "exact", **tables: Any) -> Scene:
     """The pressed device with the delay in plant steps from each of these ticks on; the first from 0 on."""
     (_, first), *later = delays
     events = [{"at": tick / 1000, "set": {"clock.round_trip_delay": steps / 10_000}} for tick, steps in later]
-    return scene(**{**PRESSED, **tables}, clock={"round_trip_delay": first / 10_000}, event=events)
+    return scene(
+        **{**PRESSED, **tables}, clock={"round_trip_delay": first / 10_000, "integrator": integrator}, event=events
+    )
 
 
 def by_the_rule(delays: list[tuple[int, int]]) -> tuple[list[int], int]:
@@ -62,13 +65,10 @@ def test_every_step_feels_the_command_of_the_rule_and_the_books_close(delays):
     assert_by_the_rule(run(changing(delays)), delays)
 
 
-@pytest.mark.parametrize("tables", [FRICTION, {"actuator": {"saturation": 0.4}}, {"clock_integrator": "rk4"}])
+@pytest.mark.parametrize("tables", [FRICTION, {"actuator": {"saturation": 0.4}}, {"integrator": "rk4"}])
 def test_the_rule_holds_for_every_kind_of_motion_and_for_an_actuator_at_the_end_of_the_line(tables):
     delays = [(0, 40), (40, 3), (80, 37)]
-    resolved = changing(delays, **{key: value for key, value in tables.items() if key != "clock_integrator"})
-    if "clock_integrator" in tables:
-        resolved["clock"]["integrator"] = tables["clock_integrator"]
-    ran = run(resolved)
+    ran = run(changing(delays, **tables))
     command, dropped = by_the_rule(delays)
     assert dropped == 3
     assert ran.plant["command"][:-1].tolist() == command
@@ -83,9 +83,7 @@ def test_a_delay_set_to_what_it_was_changes_no_bit():
 def test_the_exact_flow_and_another_method_agree_about_a_motion_whose_delay_changes():
     """DOP853 knows nothing of the parts in which the exact flow fills in what it recorded."""
     delays = [(0, 40), (40, 3), (80, 37)]
-    other = changing(delays)
-    other["clock"]["integrator"] = "dop853"
-    exact, integrated = run(changing(delays)), run(other)
+    exact, integrated = (run(changing(delays, method)) for method in ("exact", "dop853"))
     assert np.abs(exact.plant["x"] - integrated.plant["x"]).max() < 1e-9
     assert np.abs(exact.plant["v"] - integrated.plant["v"]).max() < 1e-6
 

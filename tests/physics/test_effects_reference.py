@@ -38,7 +38,7 @@ def test_the_reference_stops_a_sliding_mass_where_and_when_coulomb_friction_does
 
 
 def test_the_reference_closes_its_own_books_with_every_effect_at_once():
-    truth = simulate(scene(device={"mass": 0.05, "damping": 0.0}, **EVERY_EFFECT) | {"duration": 0.1})
+    truth = simulate(scene(duration=0.1, device={"mass": 0.05, "damping": 0.0}, **EVERY_EFFECT))
     heats = {name: value for name, value in truth.energies.items() if "heat" in name}
     assert min(heats.values()) >= 0.0
     assert sum(value > 1e-9 for value in heats.values()) >= 5

@@ -7,13 +7,14 @@ from typing import Any
 import numpy as np
 import pytest
 
+from haploop.protocol.scene.scene import Scene
 from helpers.runs.captured import run
 from helpers.scenes.effect_tables import slowly
 from helpers.scenes.least import scene
 from helpers.scenes.random_scenes import log_uniform
 
 
-def extreme(seed: int) -> dict[str, Any]:
+def extreme(seed: int) -> Scene:
     """Any subset of the effects of the plant, on any scale, thrown at a wall and shaken."""
     rng = np.random.default_rng(seed)
     rate, n = int(rng.choice([1_000, 10_000, 50_000])), int(rng.choice([1, 2, 10]))

@@ -83,7 +83,7 @@ def test_what_is_loaded_by_no_more_than_the_breakaway_force_does_not_move_by_a_b
 def test_a_force_a_millionth_above_breakaway_sets_it_in_motion():
     device = {"mass": 0.05, "damping": 0.0}
     force = {"kind": "constant", "value": 0.06 * (1 + 1e-6)}
-    ran = run(scene(device=device, hand={"force": force}, friction={"kinetic": 0.06}) | {"duration": 0.1})
+    ran = run(scene(duration=0.1, device=device, hand={"force": force}, friction={"kinetic": 0.06}))
     assert (ran.plant["v"][1:] > 0.0).all()
     assert ran.plant["x"][-1] == pytest.approx(0.06e-6 / 0.05 * 0.1**2 / 2, rel=1e-9)
 

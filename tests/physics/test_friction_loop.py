@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from haploop.protocol.scene.paths import with_value
 from helpers.runs.captured import run
 from helpers.scenes.effect_tables import slowly
 from helpers.scenes.least import scene
@@ -171,7 +172,7 @@ def swing_ends_at(plant_rate: int) -> tuple[float, float]:
         hand={"stiffness": 20.0},
         friction={"kinetic": 0.02, "breakaway": 0.05, "stribeck_velocity": 0.2},
     )
-    truth = follow(swing | {"clock": swing["clock"] | {"plant_rate": 100}}, [0.0] * 30)
+    truth = follow(with_value(swing, "clock.plant_rate", 100), [0.0] * 30)
     return float(run(swing).plant["x"][-1]), float(truth.x[-1, 0])
 
 

@@ -10,6 +10,8 @@ import numpy as np
 import pytest
 
 from haploop.controller.dissipation import Element, Motion
+from haploop.protocol.scene.paths import without
+from haploop.protocol.scene.scene import Hand, Scene
 from helpers.runs.captured import Captured, run
 from helpers.scenes.effect_tables import EFFECTS, slowly, subsets, tap
 from helpers.scenes.least import KINDS, scene
@@ -24,35 +26,33 @@ def assert_sound(ran: Captured) -> None:
     assert ran.relative_residual < 1e-12 or ran.energy["moved_J"] == 0.0
 
 
-def stored_at_steps(ran: Captured, resolved: dict[str, Any]) -> np.ndarray:
+def stored_at_steps(ran: Captured, resolved: Scene) -> np.ndarray:
     """Energy of motion and of all springs at every step, from the states alone."""
-    device, hand, drive = resolved["device"], resolved.get("hand", {}), resolved.get("transmission")
+    device, hand, drive = resolved.device, resolved.hand or Hand(), resolved.transmission
     plant = ran.plant
     x, v = [plant["x"]], [plant["v"]]
-    masses = [drive["motor_mass"], device["mass"]] if drive else [device["mass"]]
+    masses = [drive.motor_mass, device.mass] if drive else [device.mass]
     stored = np.zeros(len(plant["x"]))
-    links = {"cable": drive, "grip": hand.get("grip")}
+    links = {"cable": drive, "grip": hand.grip}
     for name, link in links.items():
         if link:
-            stored += link["stiffness"] * plant[f"{name}.stretch"] ** 2
+            stored += link.stiffness * plant[f"{name}.stretch"] ** 2
             x.append(x[-1] + plant[f"{name}.stretch"])
             v.append(v[-1] + plant[f"{name}.rate"])
-    if hand.get("grip"):
-        masses.append(hand["mass"])
+    if hand.grip:
+        masses.append(hand.mass)
     else:
-        masses[-1] += hand.get("mass", 0.0)
+        masses[-1] += hand.mass
     stored += sum(mass * speed**2 for mass, speed in zip(masses, v, strict=True))
-    return (stored + hand.get("stiffness", 0.0) * (x[-1] - hand.get("rest", 0.0)) ** 2) / 2
+    return (stored + hand.stiffness * (x[-1] - hand.rest) ** 2) / 2
 
 
 # A free plant
 
 
-def free(effects: tuple[str, ...]) -> dict[str, Any]:
+def free(effects: tuple[str, ...], **more: Any) -> Scene:
     """Nothing but friction and dampers acts: no wall, no element, no push."""
-    loose = tap(effects)
-    del loose["wall"], loose["dissipation"], loose["hand"]["force"]
-    return loose
+    return without(tap(effects, **more), "wall", "dissipation", "hand.force")
 
 
 @pytest.mark.parametrize("effects", subsets(0, 4, FREE_EFFECTS), ids="+".join)
@@ -97,7 +97,7 @@ EXTREME: dict[str, dict[str, Any]] = {
 RATES = [(1, 1), (10, 10), (1_000, 1_000), (10_000, 1_000), (10_000_000, 1_000_000)]
 
 
-def extreme(case: str, rates: tuple[int, int] = (10_000, 1_000), **more: Any) -> dict[str, Any]:
+def extreme(case: str, rates: tuple[int, int] = (10_000, 1_000), **more: Any) -> Scene:
     """Set in motion at 0.1 m/s and left alone."""
     plant_rate, control_rate = rates
     tables = {"device": {"mass": 0.05, "damping": 0.02}} | EXTREME[case]
@@ -217,11 +217,9 @@ def test_acceleration_that_changes_its_sign_with_every_sample_is_sound(effects, 
 @pytest.mark.parametrize("effects", [("transmission",), ("grip",), ("transmission", "grip")], ids="+".join)
 def test_motion_that_decays_below_the_least_normal_number_stays_sound(damping, effects):
     """Nothing pulls: every stretch and speed dies away, past 1e-308."""
-    loose = free(effects)
-    loose["device"] |= {"damping": damping, "position": 0.0}
-    loose["hand"] |= {"damping": 50.0, "stiffness": 0.0, "rest": 0.0, "mass": 1e-3}
-    loose["duration"] = 3.0
-    ran = run(loose)
+    device = {"damping": damping, "position": 0.0}
+    hand = {"damping": 50.0, "stiffness": 0.0, "rest": 0.0, "mass": 1e-3}
+    ran = run(free(effects, device=device, hand=hand, duration=3.0))
     assert_sound(ran)
     assert np.abs(ran.plant["v"][-1]) < 1e-12
 

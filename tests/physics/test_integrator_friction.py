@@ -12,8 +12,9 @@ from typer.testing import CliRunner
 import haploop.launch.runs.start as start
 from haploop.launch.plan.effects import notes
 from haploop.plant.integrators.stability import growth
+from haploop.protocol.scene.scene import Scene
 from haploop.tools.cli.main import app
-from helpers.runs.captured import run, summarise
+from helpers.runs.captured import in_blocks, run, summarise
 from helpers.scenes.effect_tables import EFFECTS, tap
 from helpers.scenes.every_effect import EVERYTHING, METHODS
 from helpers.scenes.least import mistakes, scene
@@ -23,7 +24,7 @@ ONE_STEP = METHODS[:-1]
 MASS, KINETIC = 0.05, 0.0487
 
 
-def made(method: str, duration: float, plant_rate: int = 10_000, **tables: Any) -> dict[str, Any]:
+def made(method: str, duration: float, plant_rate: int = 10_000, **tables: Any) -> Scene:
     return scene(**tables, duration=duration, clock={"integrator": method, "plant_rate": plant_rate})
 
 
@@ -84,7 +85,7 @@ def test_dop853_stops_where_friction_stops_a_body():
     assert sliding("dop853", 1000)[0, -1] == pytest.approx(1, rel=1e-12)
 
 
-def pressed(method: str, **more: Any) -> dict[str, Any]:
+def pressed(method: str, **more: Any) -> Scene:
     """Every part of a chain, friction and a wall, without anything that rounds."""
     push = {"kind": "ramp", "value": -1.5, "rise_time": 0.1}
     return scene(
@@ -131,9 +132,7 @@ def test_dop853_follows_a_friction_that_depends_on_the_speed_better_than_the_exa
 @pytest.mark.parametrize("method", METHODS)
 def test_all_effects_at_once_run_by_every_method_and_blocks_change_no_bit(method):
     resolved = tap(EFFECTS, duration=0.1, clock={"integrator": method, "round_trip_delay": 0.0013})
-    one, many = (
-        summarise(resolved | {"run": resolved["run"] | {"block_ticks": ticks, "window_blocks": 1}}) for ticks in (1, 40)
-    )
+    one, many = (in_blocks(resolved, ticks) for ticks in (1, 40))
     assert one["trajectory_sha256"] == many["trajectory_sha256"]
     assert one["energy"] == many["energy"]
     assert one["verdict"] in ("steady", "limit-cycle")

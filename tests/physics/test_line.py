@@ -16,9 +16,10 @@ from haploop.plant.counters import DROPPED, LOST
 from haploop.plant.line.base import Line
 from haploop.plant.line.delay import DelayLine, make_line
 from haploop.plant.line.lossy import LossyLine, make_jitter, make_loss
+from haploop.protocol.scene import effects
 from haploop.protocol.ticks import Timebase
 from helpers.runs.captured import in_blocks, run
-from helpers.scenes.least import WALL, scene
+from helpers.scenes.least import WALL, scene, typed
 
 MANY = 100_000
 # Five standard errors: a right program meets another 999 999 of a million seeds as well.
@@ -126,10 +127,10 @@ def test_a_command_for_the_same_step_as_a_later_one_is_dropped_by_a_third_that_a
 
 
 @pytest.mark.parametrize("delay", [0, 3, 10, 13, 50])
-@pytest.mark.parametrize("effect", [{"jitter": {"kind": "uniform", "most": 0.0}}, {"loss": {"probability": 0.0}}])
+@pytest.mark.parametrize("effect", [typed(jitter={"kind": "uniform", "most": 0.0}), typed(loss={"probability": 0.0})])
 def test_neutral_jitter_and_loss_hold_what_a_plain_line_holds(delay, effect):
     time = Timebase(plant_rate=10_000, control_rate=1000, delay_steps=delay, ticks=300)
-    plain, neutral = DelayLine(time), make_line({"seed": 1, **effect}, time)
+    plain, neutral = DelayLine(time), make_line(effect, time)
     assert isinstance(neutral, LossyLine)
     for tick in range(time.ticks):
         for line in (plain, neutral):
@@ -148,8 +149,8 @@ def test_a_delay_beyond_the_run_and_the_loss_of_all_leave_the_device_alone():
     time = Timebase(plant_rate=10_000, control_rate=1000, delay_steps=0, ticks=50)
     never = {"jitter": {"kind": "gamma", "mean": 1e3, "deviation": 1e-3}}
     all_lost = {"loss": {"probability": 1.0}}
-    for effect, lost in ((never, 0), (all_lost, 50), ({**never, **all_lost}, 0)):
-        fate = by_the_line(make_line({"seed": 1, **effect}, time), time, [0] * 50)
+    for effects_of, lost in ((never, 0), (all_lost, 50), ({**never, **all_lost}, 0)):
+        fate = by_the_line(make_line(typed(**effects_of), time), time, [0] * 50)
         assert fate == Fate([-1] * 500, 0, lost)
 
 
@@ -157,7 +158,7 @@ def test_a_delay_beyond_the_run_and_the_loss_of_all_leave_the_device_alone():
 def test_a_line_remembers_no_more_than_is_on_its_way(mean, deviation, way):
     """Over half a minute: what is overtaken waits to be counted alone, what would come after the run is forgotten."""
     time = Timebase(plant_rate=10_000, control_rate=1000, delay_steps=0, ticks=30_000)
-    line = make_line({"seed": 1, "jitter": {"kind": "gamma", "mean": mean, "deviation": deviation}}, time)
+    line = make_line(typed(jitter={"kind": "gamma", "mean": mean, "deviation": deviation}), time)
     assert isinstance(line, LossyLine)
     coming = counted = uncounted = 0
     for tick in range(time.ticks):
@@ -177,7 +178,7 @@ def taken(draw) -> np.ndarray:
 
 
 def test_uniform_jitter_is_every_step_up_to_the_most_equally_often():
-    delays = taken(make_jitter({"kind": "uniform", "most": 0.0012}, 1, 10_000))
+    delays = taken(make_jitter(effects.UniformJitter(most=0.0012), 1, 10_000))
     counts = np.bincount(delays)
     assert len(counts) == 13
     assert stats.chisquare(counts).pvalue > 1e-6
@@ -186,7 +187,7 @@ def test_uniform_jitter_is_every_step_up_to_the_most_equally_often():
 @pytest.mark.parametrize(("mean", "deviation"), [(0.002, 0.001), (0.001, 0.003), (0.01, 1e-5)])
 def test_gamma_jitter_has_its_mean_and_deviation_and_is_rounded_to_the_nearest_step(mean, deviation):
     """Every step against the integral of the density over half a step to either side."""
-    delays = taken(make_jitter({"kind": "gamma", "mean": mean, "deviation": deviation}, 1, 10_000))
+    delays = taken(make_jitter(effects.GammaJitter(mean=mean, deviation=deviation), 1, 10_000))
     gamma = stats.gamma((mean / deviation) ** 2, scale=deviation**2 / mean * 10_000)
     steps = np.arange(delays.max() + 2)
     expected = MANY * (gamma.cdf(steps + 0.5) - gamma.cdf(np.maximum(steps - 0.5, 0.0)))
@@ -201,7 +202,7 @@ def test_gamma_jitter_has_its_mean_and_deviation_and_is_rounded_to_the_nearest_s
 
 @pytest.mark.parametrize("probability", [0.0, 0.01, 0.9, 1.0])
 def test_each_command_is_lost_by_itself_with_its_probability(probability):
-    lost = taken(make_loss({"probability": probability}, 1))
+    lost = taken(make_loss(effects.Loss(probability=probability), 1))
     assert stats.binomtest(int(lost.sum()), MANY, probability).pvalue > 1e-6
     after_a_loss = lost[1:][lost[:-1]]
     if len(after_a_loss):
@@ -219,15 +220,15 @@ PRESSED = {
 LATE = {"jitter": {"kind": "gamma", "mean": 0.002, "deviation": 0.002}, "loss": {"probability": 0.3}}
 
 
-def expected_fate(delays: int, seed: int, jitter: dict[str, Any], probability: float, ticks: int) -> Fate:
+def expected_fate(delays: int, seed: int, jitter: effects.Jitter, probability: float, ticks: int) -> Fate:
     time = Timebase(plant_rate=10_000, control_rate=1000, delay_steps=delays, ticks=ticks)
-    late, lost = make_jitter(jitter, seed, 10_000), make_loss({"probability": probability}, seed)
+    late, lost = make_jitter(jitter, seed, 10_000), make_loss(effects.Loss(probability=probability), seed)
     return by_the_rule(time, [late() for _ in range(ticks)], [lost() for _ in range(ticks)])
 
 
 def test_a_run_applies_the_commands_by_the_rule_and_counts_what_was_dropped_and_lost():
     ran = run(scene(**PRESSED, **LATE))
-    fate = expected_fate(13, 5, LATE["jitter"], 0.3, 400)
+    fate = expected_fate(13, 5, effects.GammaJitter(mean=0.002, deviation=0.002), 0.3, 400)
     command = ran.plant["command"][:-1]
     assert np.array_equal(command, fate.command)
     total = np.append(ran.controller["total"], 0.0)  # at -1: before the first

@@ -12,7 +12,6 @@ from haploop.controller.controller import Controller
 from haploop.controller.dissipation import registry
 from haploop.launch.scene.file import load
 from haploop.plant.plant import Plant
-from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
 
 SCENES = Path(__file__).parents[2] / "launch/scenes"
@@ -24,7 +23,7 @@ def test_plant_and_controller_hold_no_more_in_their_sixth_thousand_ticks_than_in
     """Blocks are taken as a node takes them; the responses to the hand's force, kept for a while, come and go."""
     scene = load(SCENES / f"{name}.toml", ["duration=60", "diverged_beyond=1e9"])
     time, kinds = Timebase.from_scene(scene), registry()
-    plant, controller = Plant(scene, time), Controller(Scene.from_dict(scene), time, kinds)
+    plant, controller = Plant(scene, time), Controller(scene, time, kinds)
     held = []
     tracemalloc.start()
     try:

@@ -12,6 +12,7 @@ from haploop.launch.runs.replay import replay
 from haploop.launch.runs.start import prepare
 from haploop.launch.runs.start import run as run_prepared
 from haploop.plant.sensing.noise import NoisyPositionSensor
+from haploop.protocol.scene import effects
 from helpers.runs.captured import in_blocks, of_the_scene, run
 from helpers.scenes.least import WALL, scene
 
@@ -22,7 +23,7 @@ ERRORS = 5.0
 
 
 def noise(cutoff: float, deviation: float = 1.0, seed: int = 1, count: int = MANY) -> np.ndarray:
-    sensor = NoisyPositionSensor(None, {"deviation": deviation, "cutoff": cutoff}, seed, PERIOD_S)
+    sensor = NoisyPositionSensor(None, effects.Noise(deviation=deviation, cutoff=cutoff), seed, PERIOD_S)
     return np.array([sensor.reading(0.0) for _ in range(count)])
 
 
@@ -87,7 +88,7 @@ def test_it_is_added_before_the_encoder_rounds(rounding):
     resolution = 1e-5
     ran = run(scene(**PRESSED, noise=NOISE, encoder={"resolution": resolution, "rounding": rounding}))
     x, seen = ran.plant["x"][:-1:10], ran.controller["x"]
-    sensor = NoisyPositionSensor(None, NOISE, 5, PERIOD_S)
+    sensor = NoisyPositionSensor(None, effects.Noise(**NOISE), 5, PERIOD_S)
     whole = np.rint if rounding == "nearest" else np.floor
     assert np.array_equal(seen, [resolution * whole(sensor.reading(at) / resolution) for at in x])
     assert np.std(seen - x) > 1.5e-5

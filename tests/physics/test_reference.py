@@ -14,6 +14,8 @@ import pytest
 
 from haploop.launch.plan.effects import effects_of
 from haploop.launch.scene.file import load
+from haploop.protocol.scene.paths import value_at
+from haploop.protocol.scene.scene import Scene
 from helpers.runs.captured import Captured, run
 from helpers.scenes.random_scenes import drawn, is_comparable
 from oracles.reference_run import Truth, simulate
@@ -30,7 +32,7 @@ SCENES = [
 
 
 @cache
-def both(seed: int) -> tuple[dict[str, Any], Truth, Captured]:
+def both(seed: int) -> tuple[Scene, Truth, Captured]:
     scene, truth = drawn(seed)
     return scene, truth, run(scene)
 
@@ -105,27 +107,21 @@ def test_the_scenes_of_the_paper_are_among_them():
 def test_the_drawn_scenes_hold_everything_a_scene_can_hold():
     scenes = [both(seed)[0] for seed in SEEDS]
 
-    def seen(*path: str) -> set[Any]:
-        found = set()
-        for scene in scenes:
-            value: Any = scene
-            for key in path:
-                value = value.get(key, {})
-            found.add(value if isinstance(value, str | int | float) else bool(value))
-        return found
+    def seen(key: str) -> set[Any]:
+        return {value_at(scene, key) or False for scene in scenes}
 
-    assert seen("wall", "occupies") == {"below", "above"}
-    assert seen("encoder", "rounding") == {"nearest", "floor", False}
-    assert seen("hand", "force", "kind") >= {"constant", "ramp", "step", "sine", "minimum-jerk", "trace", False}
-    assert seen("acceleration", "source") == {"encoder", "accelerometer", False}
-    assert len(seen("velocity", "cutoff")) > 3
-    assert len(seen("acceleration", "cutoff")) > 3
-    assert seen("clock", "control_rate") == {500, 1_000, 1_500, 2_000, 5_000}
-    steps = {round(s["clock"]["round_trip_delay"] * s["clock"]["plant_rate"]) for s in scenes}
+    assert seen("wall.occupies") == {"below", "above"}
+    assert seen("encoder.rounding") == {"nearest", "floor", False}
+    assert seen("hand.force.kind") >= {"constant", "ramp", "step", "sine", "minimum-jerk", "trace", False}
+    assert seen("acceleration.source") == {"encoder", "accelerometer", False}
+    assert len(seen("velocity.cutoff")) > 3
+    assert len(seen("acceleration.cutoff")) > 3
+    assert seen("clock.control_rate") == {500, 1_000, 1_500, 2_000, 5_000}
+    steps = {round(s.clock.round_trip_delay * s.clock.plant_rate) for s in scenes}
     assert steps == {0, 3, 10, 20, 25, 50}
-    elements = [element for scene in scenes for element in scene.get("dissipation", [])]
+    elements = [element for scene in scenes for element in scene.dissipation]
     kinds = ("damping", "unidirectional-damping", "bidirectional-inertia", "unidirectional-inertia")
-    assert {(e["kind"], e["acts"]) for e in elements} == {(k, a) for k in kinds for a in ("always", "in-contact")}
-    assert sum("event" in scene for scene in scenes) >= 8
+    assert {(e.name, e.acts) for e in elements} == {(k, a) for k in kinds for a in ("always", "in-contact")}
+    assert sum(bool(scene.event) for scene in scenes) >= 8
     contacts = [(ran.controller["in_contact"] > 0).any() for _, _, ran in map(both, SEEDS)]
     assert sum(contacts) >= len(SEEDS) * 2 // 3

@@ -13,6 +13,8 @@ from haploop.plant.choose import make_motion, make_position_sensor
 from haploop.plant.line.delay import make_line
 from haploop.plant.plant import Plant
 from haploop.plant.sensing.accelerometer import make_accelerometer
+from haploop.protocol.scene.paths import value_at, with_value
+from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
 from helpers.scenes.every_effect import EVERYTHING
 from helpers.scenes.least import scene
@@ -80,7 +82,7 @@ def test_the_motion_of_another_tick_goes_on_otherwise(name: str) -> None:
 class Batch:
     """The plants of a batch, driven by forces made of what they measure."""
 
-    def __init__(self, scenes: list[dict[str, Any]]) -> None:
+    def __init__(self, scenes: list[Scene]) -> None:
         made, members = stacked(scenes), len(scenes)
         time = Timebase.from_scene(made)
         self.motion, self.line = make_motion(made, time, members), make_line(made, time, members)
@@ -103,14 +105,14 @@ class Batch:
         return self.motion.take_record(first) | counts
 
 
-def members(tables: dict[str, Any], *, alike: bool) -> list[dict[str, Any]]:
+def members(tables: dict[str, Any], *, alike: bool) -> list[Scene]:
     """Five scenes; their bodies and forces differ, unless they have friction, whose bodies must be alike."""
     scenes = []
     for seed in range(5):
         made = scene(duration=0.3, seed=seed, **tables)
         if not alike:
-            made["device"]["mass"] *= 1.0 + 0.1 * seed
-            made["hand"]["force"]["amplitude"] *= 1.0 + 0.1 * seed
+            for key in ("device.mass", "hand.force.amplitude"):
+                made = with_value(made, key, value_at(made, key) * (1.0 + 0.1 * seed))
         scenes.append(made)
     return scenes
 

@@ -11,13 +11,15 @@ import pytest
 from haploop.logger.books import books, one_mass
 from haploop.plant.motion import one_mass as of_plant
 from haploop.plant.motion.transition import FohTransition
+from haploop.protocol.scene.paths import with_value
+from haploop.protocol.scene.scene import ElementTable, Scene
 from helpers.runs.captured import run
 from helpers.scenes.least import scene
 from helpers.scenes.random_scenes import is_comparable
 from oracles.reference_run import simulate
 
 
-def busy() -> dict:
+def busy() -> Scene:
     """A tap on a wall with an element, by a hand: every book has something in it."""
     push = {"kind": "ramp", "value": -1.0, "rise_time": 0.1}
     return scene(
@@ -109,7 +111,7 @@ def step_by(method: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(of_plant, "make_zoh_transitions", held)
 
 
-def swinging() -> dict:
+def swinging() -> Scene:
     device = {"mass": 0.02, "damping": 0.0, "position": 0.01}
     return scene(duration=2.0, device=device, hand={"stiffness": 10.0})
 
@@ -131,17 +133,17 @@ def test_an_approximate_step_does_not_close_the_books_of_the_busy_scene(method, 
 
 
 @pytest.mark.parametrize(
-    "change",
+    ("key", "value"),
     [
-        {"clock": {"plant_rate": 10_000, "control_rate": 1_000, "round_trip_delay": 0.0012}},
-        {"encoder": {"resolution": 1e-5, "rounding": "floor"}},
-        {"wall": {"position": -0.005, "stiffness": 100.01, "occupies": "below"}},
-        {"dissipation": [{"kind": "damping", "damping": 0.1, "acts": "always"}]},
+        ("clock.round_trip_delay", 0.0012),
+        ("encoder.rounding", "floor"),
+        ("wall.stiffness", 100.01),
+        ("dissipation", (ElementTable(name="damping", acts="always", parameters={"damping": 0.1}),)),
     ],
-    ids=lambda change: next(iter(change)),
+    ids=["clock", "encoder", "wall", "dissipation"],
 )
-def test_the_comparison_with_the_reference_sees_a_step_of_delay_a_rounding_a_gain_and_a_gate(change):
-    ours, other = run(busy()).plant["x"], simulate(busy() | change).x
+def test_the_comparison_with_the_reference_sees_a_step_of_delay_a_rounding_a_gain_and_a_gate(key, value):
+    ours, other = run(busy()).plant["x"], simulate(with_value(busy(), key, value)).x
     assert np.abs(ours - other).max() > 1e-6 * np.abs(ours).max()
 
 

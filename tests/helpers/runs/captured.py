@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -10,6 +10,7 @@ import numpy as np
 from haploop.launch.runs.in_process import Loop, scene_events
 from haploop.logger.logger import Block, Logger
 from haploop.logger.session import LogSession
+from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
 from helpers.scenes.least import KINDS
 
@@ -42,7 +43,7 @@ class Captured:
 class _CapturingLogger(Logger):
     """A logger that also remembers the blocks it was given."""
 
-    def __init__(self, scene: dict[str, Any], time: Timebase) -> None:
+    def __init__(self, scene: Scene, time: Timebase) -> None:
         super().__init__(scene, time, None)
         self.plant_blocks: list[Block] = []
         self.controller_blocks: list[Block] = []
@@ -56,7 +57,7 @@ class _CapturingLogger(Logger):
         super().controller_block(block)
 
 
-def run(scene: dict[str, Any]) -> Captured:
+def run(scene: Scene) -> Captured:
     """Run a resolved scene in this process and keep everything."""
     time = Timebase.from_scene(scene)
     logger = _CapturingLogger(scene, time)
@@ -69,7 +70,7 @@ def run(scene: dict[str, Any]) -> Captured:
     return Captured(_joined_states(logger.plant_blocks), controller, forces, summary)
 
 
-def summarise(scene: dict[str, Any]) -> dict[str, Any]:
+def summarise(scene: Scene) -> dict[str, Any]:
     """The summary of a run of a resolved scene."""
     return run(scene).summary
 
@@ -106,9 +107,9 @@ def of_the_scene(summary: dict[str, Any]) -> dict[str, Any]:
     return {name: value for name, value in summary.items() if name not in OF_THE_MACHINE}
 
 
-def in_blocks(scene: dict[str, Any], block_ticks: int, window_blocks: int = 1) -> dict[str, Any]:
-    cut = {"block_ticks": block_ticks, "window_blocks": window_blocks}
-    return of_the_scene(summarise(scene | {"run": scene["run"] | cut}))
+def in_blocks(scene: Scene, block_ticks: int, window_blocks: int = 1) -> dict[str, Any]:
+    cut = replace(scene.run, block_ticks=block_ticks, window_blocks=window_blocks)
+    return of_the_scene(summarise(replace(scene, run=cut)))
 
 
 def bodies(ran: Captured) -> dict[str, np.ndarray]:

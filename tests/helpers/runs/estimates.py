@@ -8,6 +8,7 @@ import numpy as np
 from haploop.controller.controller import make_params
 from haploop.controller.tick import StateTuple, initial_state, tick
 from haploop.plant.sensing.encoder import make_encoder
+from haploop.protocol.scene.scene import Encoder
 from helpers.scenes.least import typed
 
 T = 1e-3
@@ -38,5 +39,5 @@ def floats(values: np.ndarray) -> list[float]:
 
 
 def measured(x: np.ndarray, rounding: str = "nearest") -> list[float]:
-    measure = make_encoder({"resolution": COUNT, "rounding": rounding})
+    measure = make_encoder(Encoder.from_dict(ENCODER | {"rounding": rounding}))
     return [measure(at) for at in floats(x)]

@@ -15,7 +15,7 @@ from haploop.protocol.ticks import Timebase
 from helpers.scenes.least import KINDS
 
 
-def books_along(scene: dict[str, Any], x: np.ndarray) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
+def books_along(scene: Scene, x: np.ndarray) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
     """Have the controller of a scene see a motion, its delayed commands act on it, and the books written.
 
     Args:
@@ -29,8 +29,8 @@ def books_along(scene: dict[str, Any], x: np.ndarray) -> tuple[dict[str, np.ndar
     time = Timebase.from_scene(scene)
     n, steps = time.steps_per_tick, time.ticks * time.steps_per_tick
     assert len(x) == steps + 1
-    measure = make_encoder(scene.get("encoder"))
-    controller = Controller(Scene.from_dict(scene), time, KINDS)
+    measure = make_encoder(scene.encoder)
+    controller = Controller(scene, time, KINDS)
     commands = controller.answer([(measure(float(at)),) for at in x[:-1:n]])
     in_effect = np.maximum((np.arange(steps + 1) - time.delay_steps) // n, -1)
     in_effect[-1] = in_effect[-2]
@@ -50,4 +50,4 @@ def books_along(scene: dict[str, Any], x: np.ndarray) -> tuple[dict[str, np.ndar
     logger.plant_block({"from_tick": 0, "ticks": time.ticks, "columns": blocks})
     for block in controller.recorder.take():
         logger.controller_block(block)
-    return latest, energy(logger.books.state, [], "wall" in scene)
+    return latest, energy(logger.books.state, [], scene.wall is not None)

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from haploop.protocol.scene.scene import Scene
 from helpers.scenes.least import scene
 from oracles.reference_run import Truth, simulate
 
@@ -38,7 +39,7 @@ def elements(rng: np.random.Generator) -> list[dict[str, Any]]:
     return [{**table, "acts": str(rng.choice(["always", "in-contact"]))} for table in tables]
 
 
-def drawn(seed: int) -> tuple[dict[str, Any], Truth]:
+def drawn(seed: int) -> tuple[Scene, Truth]:
     """The first comparable scene of this seed, and what the reference makes of it.
 
     Roundings, contacts and gates are decisions: where one hangs on the last bit, or where the motion is chaotic, two
@@ -54,7 +55,7 @@ def drawn(seed: int) -> tuple[dict[str, Any], Truth]:
     raise AssertionError(f"Seed {seed} gives no comparable scene; draw gentler ones.")
 
 
-def is_comparable(candidate: dict[str, Any], truth: Truth) -> bool:
+def is_comparable(candidate: Scene, truth: Truth) -> bool:
     """Tells whether a scene's outcome hangs on no last bit."""
     beside = simulate(candidate, start_beside=1e-16)
     if len(truth.x) != len(beside.x):
