@@ -69,8 +69,8 @@ def _stored() -> dict[str, Reference]:
     found = {}
     for path in sorted(REFERENCES.glob("*.json")):
         kept = json.loads(path.read_text(encoding="utf-8"))
-        arrays = {name: np.array(kept[name]) for name in ("x_m", "v_m_s")}
-        found[kept["problem"]] = Reference(**{key.name: kept[key.name] for key in fields(Reference)} | arrays)
+        kept |= {name: np.array(kept[name]) for name in ("x_m", "v_m_s")}
+        found[kept["problem"]] = Reference(**{key.name: kept[key.name] for key in fields(Reference)})
     return found
 
 
