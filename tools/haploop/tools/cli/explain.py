@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from haploop.tools.cli.exit_codes import plain_errors, print_json
+from haploop.tools.cli.options import Json, Plugin, SceneFile, Set
 from haploop.tools.cli.scenes import kinds_with, print_notes
-from haploop.tools.render.terminal import console, make_facts, make_table
+from haploop.tools.render.terminal import make_facts, make_table
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -24,24 +24,25 @@ _READING = (
 )
 
 
-def explain_scene(scene_path: Path, overrides: list[str], plugins: list[Path], as_json: bool) -> None:
-    """Prints the plan of a scene and what it costs; no process is started."""
+def explain(scene: SceneFile, set: Set = None, plugin: Plugin = None, json: Json = False) -> None:
+    """Show what a scene comes to: bodies, states, what happens in which order, and what each effect costs."""
     from haploop.launch.plan.plan import plan
     from haploop.launch.scene.events import elements_of, try_out
     from haploop.launch.scene.file import load
     from haploop.tools.operations import bill
+    from haploop.tools.render.terminal import console
 
     with plain_errors():
-        kinds = kinds_with(plugins)
-        scene = load(scene_path, overrides, kinds)
-        try_out(elements_of(scene), kinds)
-        print_notes(scene)
-        planned = plan(scene)
-        costs = bill(scene, planned.named, kinds)
-    if as_json:
-        print_json(as_data(scene, planned, costs))
-        return
-    console().print(explanation(scene, planned, costs))
+        kinds = kinds_with(plugin or [])
+        resolved = load(scene, set or [], kinds)
+        try_out(elements_of(resolved), kinds)
+        print_notes(resolved)
+        planned = plan(resolved)
+        costs = bill(resolved, planned.named, kinds)
+    if json:
+        print_json(as_data(resolved, planned, costs))
+    else:
+        console().print(explanation(resolved, planned, costs))
 
 
 def as_data(scene: Scene, planned: Plan, costs: Bill) -> dict[str, Any]:

@@ -117,16 +117,3 @@ def attach(
     from haploop.tools.attach.command import attach_to
 
     attach_to(what, out, run, port)
-
-
-def view(
-    run: Annotated[str | None, typer.Option("--run", metavar="ID", help="which run to show first [the newest]")] = None,
-    port: Annotated[int, typer.Option(min=0, max=65535, metavar="PORT", help="of this machine; 0: any free one")] = 0,
-    since: Annotated[str, typer.Option(metavar="start|now", help="with what was logged before, or without")] = "start",
-    browser: Annotated[bool, typer.Option("--browser/--no-browser", help="open the page")] = True,
-    led: Annotated[bool, typer.Option("--led", hidden=True)] = False,
-) -> None:
-    """Look at runs of this machine in the browser as they go, and steer them; until Ctrl-C."""
-    from haploop.tools.cli.view import view as show
-
-    show(run, port, since, browser, led)

@@ -1,12 +1,15 @@
-"""The command line: every command, its arguments and its help; the work is done elsewhere and imported when needed."""
+"""The command line: every command in the order of the help; what a command works with is imported when it is called."""
 
 from __future__ import annotations
 
 import typer
 
-from haploop.tools.cli.live_commands import attach, pace, pause, resume, set_, status, step, stop, swap, view
-from haploop.tools.cli.scene_commands import check, explain, export, plot, plugins, replay, run
-from haploop.tools.cli.study_commands import advise, cost, dissipate, paper, sweep
+from haploop.tools.cli.explain import explain
+from haploop.tools.cli.live_commands import attach, pace, pause, resume, set_, status, step, stop, swap
+from haploop.tools.cli.scenes import check, export, plot, plugins, replay, run
+from haploop.tools.cli.study_commands import advise, dissipate, paper, sweep
+from haploop.tools.cli.view import view
+from haploop.tools.cost.command import cost
 
 app = typer.Typer(
     help="Simulate a haptic loop: a device in a hand, a sampled controller with a virtual wall, a line with delay.",

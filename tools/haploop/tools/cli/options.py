@@ -10,7 +10,7 @@ import typer
 
 from haploop.tools.cli.exit_codes import WRONG_USE, leave
 
-Scene = Annotated[Path, typer.Argument(help="scene file (TOML)", show_default=False)]
+SceneFile = Annotated[Path, typer.Argument(help="scene file (TOML)", show_default=False)]
 Directory = Annotated[Path, typer.Argument(help="directory of a run", show_default=False)]
 Set = Annotated[list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="change a key of the scene")]
 Plugin = Annotated[list[Path] | None, typer.Option("--plugin", metavar="FILE", help="Python file with elements")]

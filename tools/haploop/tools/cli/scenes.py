@@ -1,152 +1,120 @@
-"""The work of the commands that take a scene, or the directory of a run: run, check, plugins, plot and replay."""
+"""The commands that take a scene, or what runs have left; what they work with is imported when they are called."""
 
 from __future__ import annotations
 
 import dataclasses
-import json
 import math
 import sys
+from json import dumps
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
+
+import typer
 
 from haploop.tools.cli.exit_codes import FAILED, WRONG_USE, leave, plain_errors, print_json
-from haploop.tools.cli.options import parse_pace
+from haploop.tools.cli.options import Directory, Json, Plugin, SceneFile, Set, parse_pace
 
 if TYPE_CHECKING:
     from haploop.controller.dissipation import Element
     from haploop.protocol.scene.scene import Scene
-    from haploop.protocol.transport import Transport
-    from haploop.tools.cli.view import Viewing
 
 
-def run_scene(
-    scene_path: Path,
-    overrides: list[str],
-    out: Path | None,
-    in_process: bool,
-    pace: str,
-    plugins: list[Path],
-    tcp: str | None,
-    keys: Path | None,
-    as_json: bool,
-    viewing: Viewing,
+def run(
+    scene: SceneFile,
+    set: Set = None,
+    out: Annotated[Path | None, typer.Option(help="directory to write to, new or empty [runs/SCENE-TIME]")] = None,
+    in_process: Annotated[bool, typer.Option("--in-process", help="everything in one process, same bits")] = False,
+    pace: Annotated[
+        str | None, typer.Option(help="free, or simulated seconds per second [free; 1 with --view]", show_default=False)
+    ] = None,
+    view: Annotated[bool, typer.Option("--view", help="show it in the browser, which may steer it")] = False,
+    plugin: Plugin = None,
+    tcp: Annotated[str | None, typer.Option(metavar="ADDRESS", help="TCP sockets, such as 127.0.0.1")] = None,
+    keys: Annotated[Path | None, typer.Option(metavar="DIR", help="CURVE keys for TCP; made where missing")] = None,
+    json: Json = False,
 ) -> None:
-    """Runs a scene with progress, and shows its summary."""
-    from haploop.launch.runs.start import prepare, run
+    """Run a scene to its end; other terminals can steer and watch it meanwhile."""
+    from haploop.launch.runs import start
     from haploop.launch.spec import RunFailed
+    from haploop.protocol.transport import Transport, TransportError
+    from haploop.tools.cli.view import viewing
     from haploop.tools.render.progress import ProgressLine
     from haploop.tools.render.report import print_summary
 
-    with plain_errors():
-        rate = parse_pace(pace)
+    with viewing(view, in_process) as viewer, plain_errors():
+        rate = parse_pace(pace or ("1" if view else "free"))
         if rate != "free" and in_process:
             leave("--pace needs the clock of a run as processes; leave out --in-process.", WRONG_USE)
-        transport = _transport(tcp, keys, in_process)
-        prepared = prepare(scene_path, overrides, plugins, out)
+        if tcp and in_process:
+            leave("--tcp needs the sockets of a run as processes; leave out --in-process.", WRONG_USE)
+        try:
+            transport = Transport.from_options(tcp, keys)
+        except TransportError as error:
+            leave(str(error), WRONG_USE)
+        prepared = start.prepare(scene, set or [], plugin or [], out)
         print_notes(prepared.scene)
         try:
             with ProgressLine(prepared.scene.title, prepared.scene.duration) as line:
 
                 def told(run_id: str) -> None:
                     line.announce(run_id)
-                    viewing.on_started(run_id)
+                    viewer.on_started(run_id)
 
-                summary = run(
+                summary = start.run(
                     prepared,
                     in_process=in_process,
                     pace=math.inf if rate == "free" else rate,
                     transport=transport,
                     on_progress=line.update,
                     on_started=told,
-                    start_gate=viewing.may_start,
+                    start_gate=viewer.may_start,
                 )
         except RunFailed as error:
             leave(f"{error}\nWhat was logged is in {prepared.out}.", FAILED)
         except KeyboardInterrupt:
             leave(f"Interrupted at once; what was logged is in {prepared.out}.", FAILED)
-    if as_json:
-        print_json({**summary, "directory": str(prepared.out)})
-    else:
-        print_summary(summary)
-        print(f"{prepared.out}", file=sys.stderr)
-    if summary["ended"] == "failed":
-        leave(f"The run failed: {summary['why']}.", FAILED)
+        if json:
+            print_json({**summary, "directory": str(prepared.out)})
+        else:
+            print_summary(summary)
+            print(f"{prepared.out}", file=sys.stderr)
+        if summary["ended"] == "failed":
+            leave(f"The run failed: {summary['why']}.", FAILED)
 
 
-def _transport(host: str | None, keys: Path | None, in_process: bool) -> Transport:
-    """Returns the transport: local sockets, or TCP where an address was given."""
-    from haploop.protocol.transport import Transport, TransportError
-
-    if host and in_process:
-        leave("--tcp needs the sockets of a run as processes; leave out --in-process.", WRONG_USE)
-    try:
-        return Transport.from_options(host, keys)
-    except TransportError as error:
-        leave(str(error), WRONG_USE)
-
-
-def replay_run(directory: Path, as_json: bool) -> None:
-    """Repeats a run from its log; exit status 1 when a bit differs."""
-    from haploop.launch.runs.replay import ReplayError, replay
-
-    with plain_errors():
-        try:
-            result = replay(directory)
-        except ReplayError as error:
-            leave(str(error), WRONG_USE)
-    if as_json:
-        print_json({"agrees": not result.differences, "differences": result.differences, **result.summary})
-    elif result.differences:
-        print("\n".join(result.differences))
-    else:
-        print(f"Every bit of {result.summary['steps']} steps agreed: {result.summary['trajectory_sha256']}")
-    if result.differences:
-        raise SystemExit(FAILED)
-
-
-def kinds_with(plugins: list[Path]) -> dict[str, type[Element]]:
-    """Returns the installed elements and those of some files."""
-    from haploop.controller.dissipation import registry
-
-    return registry(plugins)
-
-
-def check_scene(scene_path: Path, overrides: list[str], plugins: list[Path], as_json: bool) -> None:
-    """Prints the resolved scene, and whether it can be run."""
+def check(
+    scene: Annotated[Path | None, typer.Argument(help="scene file (TOML)", show_default=False)] = None,
+    set: Set = None,
+    plugin: Plugin = None,
+    schema: Annotated[bool, typer.Option("--schema", help="print the JSON Schema of scenes instead")] = False,
+    json: Json = False,
+) -> None:
+    """Say everything that is wrong with a scene, or that nothing is; start nothing."""
     from haploop.launch.scene.file import load
+    from haploop.launch.scene.schema import json_schema
     from haploop.launch.scene.toml_writer import to_toml
 
     with plain_errors():
-        scene = load(scene_path, overrides, kinds_with(plugins))
-    print_notes(scene)
-    if as_json:
-        print_json(scene.as_dict())
+        kinds = kinds_with(plugin or [])
+        if schema:
+            print(dumps(json_schema(kinds), indent=2))
+            return
+        if scene is None:
+            raise typer.BadParameter("A scene file was expected, or --schema.")
+        resolved = load(scene, set or [], kinds)
+    print_notes(resolved)
+    if json:
+        print_json(resolved.as_dict())
     else:
-        print(to_toml(scene.as_dict()), end="")
-        print(f"{scene_path} can be run.", file=sys.stderr)
+        print(to_toml(resolved.as_dict()), end="")
+        print(f"{scene} can be run.", file=sys.stderr)
 
 
-def print_notes(scene: Scene) -> None:
-    """Prints on stderr what in a resolved scene may not be what was meant."""
-    from haploop.launch.plan.effects import notes
-
-    for note in notes(scene):
-        print(f"Note: {note}", file=sys.stderr)
-
-
-def print_schema(plugins: list[Path]) -> None:
-    """Prints the JSON Schema of scene files, for editors."""
-    from haploop.launch.scene.schema import json_schema
-
+def plugins(plugin: Plugin = None, json: Json = False) -> None:
+    """List the dissipation elements with their parameters."""
     with plain_errors():
-        print(json.dumps(json_schema(kinds_with(plugins)), indent=2))
-
-
-def list_plugins(plugins: list[Path], as_json: bool) -> None:
-    """Prints every kind of element with its parameters."""
-    with plain_errors():
-        kinds = kinds_with(plugins)
-    if as_json:
+        kinds = kinds_with(plugin or [])
+    if json:
         print_json({kind: _parameters(element) for kind, element in kinds.items()})
         return
     from haploop.tools.render.report import plugins_table
@@ -162,8 +130,8 @@ def _parameters(element: type[Element]) -> dict[str, dict[str, str | float | Non
     }
 
 
-def plot_directory(directory: Path) -> None:
-    """Draws the figure of a run, or the map of a sweep, and names its file."""
+def plot(directory: Directory) -> None:
+    """Draw a run, or the map of a sweep as far as it goes; the last line names the figure's file."""
     from haploop.tools.figure.data import FigureError
     from haploop.tools.sweep.table import is_sweep
 
@@ -178,3 +146,56 @@ def plot_directory(directory: Path) -> None:
         except FigureError as error:
             leave(str(error), WRONG_USE)
     print(target)
+
+
+def replay(directory: Directory, json: Json = False) -> None:
+    """Repeat a run from its own log and say whether every bit agreed."""
+    from haploop.launch.runs import replay as runs
+
+    with plain_errors():
+        try:
+            result = runs.replay(directory)
+        except runs.ReplayError as error:
+            leave(str(error), WRONG_USE)
+    if json:
+        print_json({"agrees": not result.differences, "differences": result.differences, **result.summary})
+    elif result.differences:
+        print("\n".join(result.differences))
+    else:
+        print(f"Every bit of {result.summary['steps']} steps agreed: {result.summary['trajectory_sha256']}")
+    if result.differences:
+        raise SystemExit(FAILED)
+
+
+def export(
+    directory: Annotated[Path, typer.Argument(help="directory of a run, or its log", show_default=False)],
+    to: Annotated[str, typer.Option(help="csv, npz, parquet or json-mcap (for Foxglove)", show_default=False)],
+    out: Annotated[
+        Path | None, typer.Option(help="directory (csv, parquet: a file a channel) or file [beside the log]")
+    ] = None,
+    topics: Annotated[str | None, typer.Option(help="only these channels, comma-separated [all]")] = None,
+    force: Annotated[bool, typer.Option("--force", help="write over files that exist")] = False,
+) -> None:
+    """Write a run's log in the format of other programs, names and units kept; stdout names the files.
+
+    Any length of log takes the same memory. A number that is not there, an element's before it was swapped in, is NaN
+    in npz and parquet, an empty cell in csv, and left out in json-mcap, as are numbers that are not finite.
+    """
+    from haploop.tools.export.command import export_run
+
+    export_run(directory, to, out, topics, force)
+
+
+def kinds_with(plugins: list[Path]) -> dict[str, type[Element]]:
+    """Returns the installed elements and those of some files."""
+    from haploop.controller.dissipation import registry
+
+    return registry(plugins)
+
+
+def print_notes(scene: Scene) -> None:
+    """Prints on stderr what in a resolved scene may not be what was meant."""
+    from haploop.launch.plan.effects import notes
+
+    for note in notes(scene):
+        print(f"Note: {note}", file=sys.stderr)

@@ -9,7 +9,9 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
+
+import typer
 
 from haploop.tools.cli.exit_codes import WRONG_USE, leave, plain_errors
 
@@ -49,8 +51,15 @@ class LiveRuns:
             raise CommandFailed(f"The arguments of {verb} cannot be used: {error}.") from error
 
 
-def view(run_id: str | None, port: int, since: str, browser: bool, led: bool) -> None:
-    """Serves the page until Ctrl-C; one led by another process gives it the link on stdout and ends with stdin."""
+def view(
+    run: Annotated[str | None, typer.Option("--run", metavar="ID", help="which run to show first [the newest]")] = None,
+    port: Annotated[int, typer.Option(min=0, max=65535, metavar="PORT", help="of this machine; 0: any free one")] = 0,
+    since: Annotated[str, typer.Option(metavar="start|now", help="with what was logged before, or without")] = "start",
+    browser: Annotated[bool, typer.Option("--browser/--no-browser", help="open the page")] = True,
+    led: Annotated[bool, typer.Option("--led", hidden=True)] = False,
+) -> None:
+    """Look at runs of this machine in the browser as they go, and steer them; until Ctrl-C."""
+    # One led by another process gives it the link on stdout and ends with stdin.
     if since not in SINCE:
         leave(f"--since must be {' or '.join(SINCE)}, but {since!r} was given.", WRONG_USE)
     check_extra()
@@ -60,7 +69,7 @@ def view(run_id: str | None, port: int, since: str, browser: bool, led: bool) ->
     from haploop.view.serve.server import PortTaken, listen, serve
 
     with plain_errors():
-        first = run_directory.find(run_id).id if run_id else None
+        first = run_directory.find(run).id if run else None
     try:
         listening = listen(port)
     except PortTaken as error:

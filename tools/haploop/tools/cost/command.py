@@ -6,10 +6,12 @@ import dataclasses
 import math
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
-from haploop.launch.scene.mistakes import nearest
+import typer
+
 from haploop.tools.cli.exit_codes import FAILED, WRONG_USE, leave, plain_errors, print_json
+from haploop.tools.cli.options import Json
 from haploop.tools.render.progress import bars
 
 if TYPE_CHECKING:
@@ -18,33 +20,28 @@ if TYPE_CHECKING:
 
 
 def cost(
-    scenes: list[Path],
-    methods: str | None,
-    rates: str,
-    out: Path,
-    tolerance_m: float,
-    repeats: int,
-    processes: bool,
-    as_json: bool,
+    scenes: Annotated[
+        list[Path] | None, typer.Argument(metavar="[SCENE]...", help="scene files [the accuracy scenes]")
+    ] = None,
+    rates: Annotated[str, typer.Option(help="plant rates, Hz")] = "1k,2k,5k,10k,20k,50k,100k",
+    methods: Annotated[str | None, typer.Option(help="integrators, comma-separated [all]")] = None,
+    out: Annotated[Path, typer.Option(help="directory; what it holds is not measured again")] = Path("runs/cost"),
+    tolerance: Annotated[float, typer.Option(help="RMS error the advice is for, m")] = 1e-6,
+    repeats: Annotated[int, typer.Option(help="of each time")] = 20,
+    processes: Annotated[bool, typer.Option("--processes/--no-processes", help="time runs as processes too")] = True,
+    json: Json = False,
 ) -> None:
-    """Measures what is missing, writes cost.json and the figure, and prints tables and advice.
+    """Measure what accuracy costs in time: error and time of every method at every plant rate, and advice.
 
-    Args:
-        scenes: scene files; where there are none, the scenes of the folder accuracy, and the other prices with them.
-        methods, rates: as comma-separated text, rates in Hz or with a k; every method when None.
-        out: directory, made where missing; what it holds already is not measured again.
-        tolerance_m: for the advice.
-        repeats: of each time.
-        processes: whether to time runs as processes at all.
-        as_json: prints cost.json in place of tables.
+    Can be stopped; the same command goes on.
     """
     from haploop.tools.cost.data import save
     from haploop.tools.cost.grid import accuracy_scenes, grid
     from haploop.tools.cost.measure import Measurement
 
     plant_rates, names = _rates(rates), _methods(methods)
-    if not (tolerance_m > 0 and math.isfinite(tolerance_m)):
-        leave(f"--tolerance must be above 0 m, but {tolerance_m} was given.", WRONG_USE)
+    if not (tolerance > 0 and math.isfinite(tolerance)):
+        leave(f"--tolerance must be above 0 m, but {tolerance} was given.", WRONG_USE)
     if repeats < 1:
         leave(f"--repeats must be at least 1, but {repeats} was given.", WRONG_USE)
     with plain_errors():
@@ -55,11 +52,11 @@ def cost(
             leave(f"The directory {out} cannot be used: {error.strerror}.", WRONG_USE)
         with Measurement(grids, out, repeats, repeats if processes else 0) as measurement:
             interrupted = _measure(measurement, with_prices=not scenes)
-            result = measurement.cost(tolerance_m)
+            result = measurement.cost(tolerance)
     save(result, out)
     if interrupted:
         leave(f"Stopped; what was measured is in {out}, and the same command takes it up again.", FAILED)
-    _show(result, out, as_json)
+    _show(result, out, json)
 
 
 def _measure(measurement: Measurement, with_prices: bool) -> bool:
@@ -115,6 +112,7 @@ def _rates(text: str) -> list[int]:
 
 def _methods(text: str | None) -> list[str]:
     """Reads names of integrators; all of them when None."""
+    from haploop.launch.scene.mistakes import nearest
     from haploop.tools.cost.grid import METHODS
 
     if text is None:
