@@ -9,8 +9,8 @@ import pytest
 
 from haploop.controller.controller import make_params
 from haploop.controller.tick import StateTuple, initial_state, tick
-from haploop.plant.random.streams import RandomStream, make_normal
 from haploop.plant.sensing.noise import NoisyPositionSensor
+from haploop.plant.streams import RandomStream, make_normal
 from haploop.protocol.scene.effects import Noise
 from haploop.protocol.trees import tree_select
 from helpers.scenes.least import typed

@@ -164,7 +164,7 @@ def test_a_scene_that_names_no_estimator_loads_none():
         device = {"mass": 0.01, "damping": 0.1}
         scene = Scene.from_dict({"title": "", "duration": 0.01, "device": device, **tables})
         Controller(scene, Timebase(10_000, 1_000, 0, 10), {}).answer([(0.0, 0.0)])
-        print([name for name in sys.modules if name.split(".")[-1] in ("window", "foaw", "kalman", "scipy")])
+        print([name for name in sys.modules if name.split(".")[-1] in ("windows", "kalman", "scipy")])
     """
     ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert ran.stdout == "[]\n"

@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 
 import haploop.launch.runs.start as start
 from haploop.launch.plan.effects import notes
-from haploop.plant.integrators.stability import growth
+from haploop.plant.integrators.stepwise import growth
 from haploop.protocol.scene.scene import Scene
 from haploop.tools.cli.main import app
 from helpers.runs.captured import in_blocks, run, summarise

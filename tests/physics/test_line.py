@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from haploop.plant.counters import DROPPED, LOST
-from haploop.plant.line.base import Line
+from haploop.plant.line import Line
 from haploop.plant.line.delay import DelayLine, make_line
 from haploop.plant.line.lossy import LossyLine, make_jitter, make_loss
 from haploop.protocol.scene import effects

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from haploop.plant.random.streams import RandomStream
+from haploop.plant.streams import RandomStream
 
 MANY = 100_000
 # Five standard errors: a right program meets another 999 999 of a million seeds as well.

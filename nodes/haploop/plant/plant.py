@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 from haploop.plant.choose import make_motion, make_position_sensor
-from haploop.plant.line.base import Hold
+from haploop.plant.line import Hold
 from haploop.plant.line.delay import make_line
 from haploop.plant.sensing.encoder import accelerometer_is_used
 from haploop.protocol.changes import Event

@@ -22,7 +22,7 @@ _EXACT_RUBBING = tuple(f"haploop.plant.friction.{name}" for name in ("motion", "
 RUBBING = _EXACT_RUBBING
 # Shared by the one-step methods.
 LINEAR_RATES = ("haploop.plant.integrators.linear_rates",)
-DRAWN = ("haploop.plant.random.streams",)
+DRAWN = ("haploop.plant.streams",)
 NOISY = ("haploop.plant.sensing.noise", *DRAWN)
 COUNTED = ("haploop.plant.counters",)
 LINE = ("haploop.plant.line.lossy", *DRAWN, *COUNTED, *CHAIN)

@@ -46,7 +46,7 @@ def _check_rate(draft: Draft, scene: Scene) -> None:
             expected = f"With friction on bodies that swing this fast it must be at least {least} Hz."
             draft.complain(("clock", "plant_rate"), expected, f"is {rate} Hz")
         return
-    from haploop.plant.integrators.stability import friction_brakes
+    from haploop.plant.integrators.stepwise import friction_brakes
 
     if not friction_brakes(scene):
         expected = f"Friction on bodies that swing this fast does not brake them by {integrator}; raise it."
@@ -115,7 +115,7 @@ def note_growth(scene: Scene) -> list[str]:
     clock = scene.clock
     if find_integrator(clock.integrator).method is None:
         return []
-    from haploop.plant.integrators.stability import growth
+    from haploop.plant.integrators.stepwise import growth
 
     factor = growth(scene)
     if factor <= 1.0 + _ROUNDING:

@@ -13,8 +13,8 @@ from haploop.protocol.scene.scene import Scene
 # Every estimator by the name that a scene gives it: the class, or "module:class", which is imported where it is used.
 ESTIMATORS: dict[str, str | type[Estimator]] = {
     "difference": Difference,
-    "window": "haploop.controller.estimators.window:WindowDifference",
-    "foaw": "haploop.controller.estimators.foaw:EndFit",
+    "window": "haploop.controller.estimators.windows:WindowDifference",
+    "foaw": "haploop.controller.estimators.windows:EndFit",
     "kalman": "haploop.controller.estimators.kalman:Kalman",
 }
 # Other packages name theirs in this group of entry points.

@@ -10,7 +10,7 @@ import numpy as np
 
 from haploop.plant.chain.chain import Chain
 from haploop.plant.chain.sensed_acceleration import SensedAcceleration
-from haploop.plant.line.base import Hold
+from haploop.plant.line import Hold
 from haploop.plant.motion.hand_force import make_hand_force
 from haploop.protocol.arrays import first_row, rows_of
 from haploop.protocol.scene.scene import Scene

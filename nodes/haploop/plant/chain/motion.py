@@ -8,7 +8,7 @@ import numpy as np
 
 from haploop.plant.chain.history import ChainHistory, Interval
 from haploop.plant.chain.transition import ChainResponse, make_chain_tables
-from haploop.plant.line.base import Hold
+from haploop.plant.line import Hold
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
 

@@ -1,4 +1,4 @@
-"""The motion of a chain whose first body sticks and slips."""
+"""The motion of a chain whose first body sticks and slips, alone and in a batch."""
 
 from __future__ import annotations
 
@@ -6,14 +6,15 @@ from typing import Any
 
 import numpy as np
 
-from haploop.plant.chain.history import HELD, Interval
+from haploop.plant.chain.history import HELD, ChainState, Interval
 from haploop.plant.chain.motion import ChainMotion, follow
 from haploop.plant.chain.transition import ChainTransition
 from haploop.plant.friction.stick_slip import Friction, StickSlip, StickSlipState
 from haploop.plant.friction.substeps import SubstepSolver, pieces_record
-from haploop.plant.line.base import Hold
+from haploop.plant.line import Hold
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
+from haploop.protocol.trees import tree_member, tree_take
 
 
 class FrictionMotion(ChainMotion):
@@ -109,3 +110,90 @@ class FrictionMotion(ChainMotion):
     def take_interval(self) -> Interval:
         """Returns the last interval, which is then in no record."""
         return self._done.pop()
+
+
+class BatchFrictionMotion(ChainMotion):
+    """``FrictionMotion`` of the members of a batch with the same chain and the same friction.
+
+    In an interval all members go as far as they would if nothing switched, those that stick and those that slip apart.
+    Most do. For each of the others the interval is solved anew by the motion of one run.
+    """
+
+    held_names = (*HELD, "friction", "stuck")
+
+    def __init__(self, scene: Scene, time: Timebase, members: int) -> None:
+        self._one = FrictionMotion(tree_member(scene, 0), time)
+        self._pieces: list[tuple[int, dict[str, np.ndarray]]] = []
+        super().__init__(scene, time, members)
+        self._stick_slip = StickSlip(self.chain, self._one.friction, self._step_s)
+        self._clamped = self._response(stuck=True)
+
+    def _begun(self, z: np.ndarray) -> tuple[np.ndarray, StickSlipState | None]:
+        held, mode = self._one.state.held, self._one.state.mode
+        assert mode
+        return held, StickSlipState(*(np.full(z.shape[1:], part) for part in mode))
+
+    def advance(self, tick: int, holds: list[Hold]) -> Any:
+        """Moves through interval ``tick`` under the forces held in it; returns x at its end, m."""
+        interval, loads = self._begin(holds), self.loads(tick * self._n, (tick + 1) * self._n + 1)
+        is_stuck, direction = self._decided(interval, loads)
+        holds_through = np.empty(is_stuck.shape, bool)
+        for kind in (False, True):
+            places = np.flatnonzero(is_stuck == kind)
+            if len(places):
+                mode = StickSlipState(kind, direction[places])
+                holds_through[places] = self._follow(mode, interval, places, holds, tick, loads)
+        for place in np.flatnonzero(~holds_through).tolist():
+            is_stuck[place], direction[place] = self._solve(interval, place, holds, tick)
+        return self._accept(tick, interval, StickSlipState(is_stuck, direction))
+
+    def _begin(self, holds: list[Hold]) -> Interval:
+        return super()._begin(holds)._replace(at_ends=np.zeros((self._n, 2, *self.state.z.shape[1:])))
+
+    def _decided(self, interval: Interval, loads: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Returns the modes at the beginning; see ``StickSlip.decide_at_rest``."""
+        z, mode = interval.states[0], self.state.mode
+        assert mode
+        at_rest, is_at_rest = self._stick_slip.at_rest(z, interval.held[0, 0], loads[0]), z[self._v] == 0.0
+        is_stuck = np.where(is_at_rest, at_rest.is_stuck, mode.is_stuck)
+        return is_stuck, np.where(is_at_rest, at_rest.direction, mode.direction)
+
+    def _follow(
+        self, mode: StickSlipState, interval: Interval, places: np.ndarray, holds: list[Hold], tick: int,
+        loads: np.ndarray,
+    ) -> np.ndarray:  # fmt: skip
+        """Lets some members, of which all stick or all slip, follow their mode; returns which of them it holds for."""
+        some = Interval(*(np.ascontiguousarray(part[..., places]) for part in interval))
+        friction = self._stick_slip.slipping(mode)
+        follow(self._clamped if mode.is_stuck else self._free, some, 0, tree_take(holds, places), tick, friction)
+        some.held[:, 2], some.held[:, 3] = friction, mode.is_stuck
+        some.at_ends[:, 0], some.at_ends[:, 1] = friction, mode.is_stuck
+        for part, of_these in zip(interval, some, strict=True):
+            part[..., places] = of_these
+        return np.all(self._one.holds_through(mode, some, 0, friction, loads), axis=0)
+
+    def _solve(self, interval: Interval, place: int, holds: list[Hold], tick: int) -> StickSlipState:
+        """Takes one member through the interval alone; returns its mode at the end."""
+        one, state = self._one, self.state
+        held, mode = one.state.held, tree_member(state.mode, place)
+        one.state = ChainState(state.z[:, place].copy(), state.z_comp[:, place].copy(), held, one.state.sensed, mode)
+        one.advance(tick, tree_member(holds, place))
+        for part, of_this in zip(interval, one.take_interval(), strict=True):
+            part[..., place] = of_this
+        pieces = one.take_pieces()
+        if len(pieces["pieces.step"]):
+            self._pieces.append((place, pieces))
+        assert one.state.mode
+        return one.state.mode
+
+    def take_record(self, tick: int, *, positions_only: bool = False) -> dict[str, Any]:
+        """Returns the record as without friction; ``pieces``: (member, its pieces) wherever friction switched within an
+        interval."""
+        pieces, self._pieces = self._pieces, []
+        record = super().take_record(tick, positions_only=positions_only)
+        return record if positions_only else record | {"pieces": pieces}
+
+    def select(self, kept: np.ndarray) -> None:
+        """Drops the members that are not kept, shape (members,); the record must have been taken."""
+        super().select(kept)
+        self._clamped.select(kept)

@@ -10,7 +10,7 @@ import numpy as np
 from haploop.plant.chain.chain import Chain
 from haploop.plant.chain.history import ChainHistory, Interval
 from haploop.plant.integrators.registry import Integrator
-from haploop.plant.line.base import Hold
+from haploop.plant.line import Hold
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
 

@@ -12,7 +12,7 @@ import numpy as np
 from haploop.plant.chain.history import HELD, Interval
 from haploop.plant.friction.stick_slip import Friction, StickSlip, StickSlipState
 from haploop.plant.integrators.dop853 import Dop853Motion, Rates, System
-from haploop.plant.line.base import Hold
+from haploop.plant.line import Hold
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
 

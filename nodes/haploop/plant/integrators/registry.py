@@ -15,10 +15,10 @@ if TYPE_CHECKING:
 # Name in ``clock.integrator`` -> module and name of its ``Integrator``, imported when it is asked for.
 INTEGRATORS = {
     "exact": "haploop.plant.integrators.registry:EXACT",
-    "semi-implicit-euler": "haploop.plant.integrators.euler:SEMI_IMPLICIT_EULER",
-    "euler": "haploop.plant.integrators.euler:EULER",
-    "rk4": "haploop.plant.integrators.rk4:RK4",
-    "implicit-midpoint": "haploop.plant.integrators.implicit_midpoint:IMPLICIT_MIDPOINT",
+    "semi-implicit-euler": "haploop.plant.integrators.one_step:SEMI_IMPLICIT_EULER",
+    "euler": "haploop.plant.integrators.one_step:EULER",
+    "rk4": "haploop.plant.integrators.one_step:RK4",
+    "implicit-midpoint": "haploop.plant.integrators.one_step:IMPLICIT_MIDPOINT",
     "dop853": "haploop.plant.integrators.dop853:DOP853",
 }
 # Other packages name theirs in this group of entry points, as here.

@@ -1,4 +1,50 @@
 """The line from the controller to the device: delay, jitter, loss, and the actuator at its end.
 
-``delay.make_line`` makes the line of a scene.
+``delay.make_line`` makes the line of a scene; here stands what all lines have in common.
 """
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from haploop.plant.counters import Counter
+
+# (number of steps, force in N, tick of the command); a force holds over its steps.
+Hold = tuple[int, Any, int]
+
+
+class Line(Protocol):
+    """The path of the commands to the device.
+
+    Attributes:
+        counters: of what may befall a command, by the name of its column.
+    """
+
+    @property
+    def counters(self) -> dict[str, Counter]: ...
+
+    @property
+    def state(self) -> Any:
+        """A tree of numbers and forces, enough to go on from."""
+        ...
+
+    def restore(self, state: Any, /) -> None:
+        """Goes on from a state."""
+
+    def receive(self, forces: list[Any], /) -> None:
+        """Takes the next commands, in order of their ticks."""
+
+    def holds(self, tick: int, /) -> list[Hold]:
+        """Returns the forces held in interval ``tick``, in order: all its steps, no hold of none."""
+        ...
+
+    def retimed(self, delay_steps: int, tick: int, /) -> Line:
+        """Returns a line on which the commands from ``tick`` on have another delay, in plant steps; the others are on
+        it."""
+        ...
+
+    def select(self, kept: np.ndarray, /) -> None:
+        """Drops the members of a batch that are not kept, shape (members,)."""

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from haploop.plant.counters import SATURATED, make_counter
-from haploop.plant.line.base import Hold, Line
+from haploop.plant.line import Hold, Line
 from haploop.protocol.arrays import clipped, nearest_multiple, where
 from haploop.protocol.scene import effects
 from haploop.protocol.ticks import Timebase

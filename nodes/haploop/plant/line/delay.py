@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from haploop.plant.line.base import Hold, Line
+from haploop.plant.line import Hold, Line
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
 from haploop.protocol.trees import tree_select

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from haploop.plant.counters import DROPPED, LOST, Counter
-from haploop.plant.line.base import Hold
-from haploop.plant.random.streams import Draw, RandomStream
+from haploop.plant.line import Hold
+from haploop.plant.streams import Draw, RandomStream
 from haploop.protocol.scene.effects import Jitter, Loss, UniformJitter
 from haploop.protocol.ticks import Timebase
 

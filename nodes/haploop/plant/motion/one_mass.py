@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from haploop.plant.line.base import Hold
+from haploop.plant.line import Hold
 from haploop.plant.motion.forced_response import ForcedResponse
 from haploop.plant.motion.hand_force import make_hand_force
 from haploop.plant.motion.mechanics import Mechanics

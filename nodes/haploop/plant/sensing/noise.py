@@ -7,8 +7,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from haploop.plant.random.streams import make_normal, select_draws
 from haploop.plant.sensing.encoder import PositionSensor, make_encoder
+from haploop.plant.streams import make_normal, select_draws
 from haploop.protocol.arrays import each
 from haploop.protocol.scene import effects
 from haploop.protocol.scene.scene import Encoder

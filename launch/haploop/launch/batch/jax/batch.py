@@ -23,8 +23,8 @@ from haploop.logger.books.sums import Sums
 from haploop.plant.line.actuator import ActuatedLine
 from haploop.plant.motion.one_mass import OneMassMotion
 from haploop.plant.plant import beyond
-from haploop.plant.random.streams import Draw, NormalRows
 from haploop.plant.sensing.noise import NoisyPositionSensor
+from haploop.plant.streams import Draw, NormalRows
 from haploop.protocol.arrays import rows_of
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.trees import tree_leaves, tree_map, tree_unflatten

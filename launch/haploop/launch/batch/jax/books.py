@@ -10,7 +10,7 @@ from typing import Any
 
 import jax
 
-from haploop.controller.wall import Wall
+from haploop.controller.tick import Wall
 from haploop.launch.batch.jax.rows import Rows
 from haploop.launch.batch.jax.tick import TickOutputs
 from haploop.logger.books.one_mass import OneMassParams, Steps, Ticks, increments

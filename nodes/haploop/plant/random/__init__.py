@@ -1,1 +1,0 @@
-"""Random streams: a function of the seed and a name alone."""
