@@ -8,8 +8,7 @@ import pytest
 from rich.console import Console
 
 from haploop.tools.figure.style import empty_figure, fit_text
-from haploop.tools.render.markdown import markdown_table
-from haploop.tools.render.terminal import console, make_facts, make_table
+from haploop.tools.render.terminal import console, make_facts, make_table, markdown_table
 
 
 def printed(table: object, width: int = 100) -> list[str]:

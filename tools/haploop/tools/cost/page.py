@@ -11,7 +11,7 @@ from haploop.tools.cost.data import Cost, CostFileError, Point, Price, PriceGrou
 from haploop.tools.cost.findings import FindingTable, findings, length, rate
 from haploop.tools.cost.report import made_with
 from haploop.tools.figure.data import FigureError
-from haploop.tools.render.markdown import markdown_table
+from haploop.tools.render.terminal import markdown_table
 from haploop.tools.render.units import amount, fixed
 
 PAGE, FIGURE, PRICES_FIGURE = "accuracy.md", "accuracy.png", "accuracy_prices.png"

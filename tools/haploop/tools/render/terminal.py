@@ -1,8 +1,8 @@
-"""The terminal: a console, the colours of verdicts, and tables of one look."""
+"""The terminal: a console, the colours of verdicts, and tables of one look; tables in Markdown."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Sequence
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -75,3 +75,16 @@ def make_facts(rows: Iterable[tuple[str, str | Text]], least_width: int | None =
     for row in rows:
         grid.add_row(*row)
     return grid
+
+
+def markdown_table(heads: Sequence[str], rows: Iterable[Sequence[str]], numbers: Collection[int] = ()) -> str:
+    """Returns a table in Markdown.
+
+    Args:
+        heads: of the columns.
+        rows: cells in the order of the heads; a bar in a cell is escaped.
+        numbers: places of the columns that are set to the right, counted from 0.
+    """
+    rule = ["---:" if place in numbers else "---" for place in range(len(heads))]
+    lines = [[cell.replace("\\|", "|").replace("|", "\\|") for cell in line] for line in (heads, rule, *rows)]
+    return "\n".join(f"| {' | '.join(line)} |" for line in lines)

@@ -12,8 +12,8 @@ from typing import Any
 
 from haploop.tools.cli.exit_codes import WRONG_USE, leave, plain_errors
 from haploop.tools.figure.data import FigureError
-from haploop.tools.render.markdown import markdown_table
 from haploop.tools.render.progress import Stage, bars, silent
+from haploop.tools.render.terminal import markdown_table
 from haploop.tools.studies.choi2022.claims import ASSUMING, VERDICTS, Finding, claims_of, sections, texts_of
 from haploop.tools.studies.choi2022.figures import figure, numbers
 from haploop.tools.studies.choi2022.work import Work

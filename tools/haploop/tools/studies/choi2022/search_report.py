@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from haploop.tools.figure.style import INK, SMALL, TEXT, empty_figure
-from haploop.tools.render.markdown import markdown_table
+from haploop.tools.render.terminal import markdown_table
 from haploop.tools.studies.choi2022.interpretations import (
     InterpretationSpace,
     Option,

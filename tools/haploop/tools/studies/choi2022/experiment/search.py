@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
-from haploop.tools.render.markdown import markdown_table
+from haploop.tools.render.terminal import markdown_table
 from haploop.tools.search.random import Effort, Point, Scale, random_search
 from haploop.tools.studies.choi2022.experiment.measure import CLAIMS, NAMES, PAPER, gap_N_m, measure
 from haploop.tools.studies.choi2022.experiment.setup import FRICTION_N, SCENE_FILE, UNITS, VELOCITIES, Setup

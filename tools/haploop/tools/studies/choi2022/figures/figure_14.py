@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from haploop.tools.figure.style import INK, SMALL, dress, empty_figure
-from haploop.tools.render.markdown import markdown_table
+from haploop.tools.render.terminal import markdown_table
 from haploop.tools.studies.choi2022.claims import Finding, claims_of
 from haploop.tools.studies.choi2022.drawing import COLOURS, SHORT, legend_of_colours
 from haploop.tools.studies.choi2022.experiment.limits import Best, limits

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from haploop.tools.render.markdown import markdown_table
+from haploop.tools.render.terminal import markdown_table
 from haploop.tools.render.units import amount
 from haploop.tools.search.random import Effort, Point, evaluated, random_search
 from haploop.tools.studies.choi2022.interpretations import Found, Row, holds, options, percent, share
