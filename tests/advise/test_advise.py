@@ -10,6 +10,7 @@ from typer.testing import CliRunner
 
 from haploop.launch.runs.in_process import run_in_process
 from haploop.launch.scene.file import load
+from haploop.protocol.scene.paths import value_at, with_value, without
 from haploop.tools.advise.gains import COARSE, DAMPING, beside, first_choices
 from haploop.tools.advise.margins import rounded_down
 from haploop.tools.advise.subject import DEFAULT_HAND, InvalidRequest, apply_events, make_subject
@@ -45,13 +46,13 @@ def test_a_delay_that_no_task_outlasts_is_refused_and_a_forgotten_unit_is_suspec
 def test_a_standard_task_lasts_for_twenty_round_trips_at_least(delay_steps):
     read = scene(clock={"round_trip_delay": delay_steps / 10_000}, wall={"position": 0.0, "stiffness": 1.0})
     for task in make_tasks(read, has_task=False).scenes:
-        assert task["duration"] >= max(1.0, 20 * task["clock"]["round_trip_delay"])
+        assert task.duration >= max(1.0, 20 * task.clock.round_trip_delay)
 
 
 def test_a_scene_too_short_for_its_delay_is_judged_by_the_standard_tasks():
     fig6a = load(SCENES / "fig6a.toml")
     assert len(make_tasks(fig6a, has_task=True).scenes) == 1
-    late = {**fig6a, "clock": {**fig6a["clock"], "round_trip_delay": 0.2}}
+    late = with_value(fig6a, "clock.round_trip_delay", 0.2)
     assert len(make_tasks(late, has_task=True).scenes) == 2
 
 
@@ -66,7 +67,7 @@ def test_a_preset_gets_a_hand_and_standard_tasks_and_says_so():
     asked = make_subject("touch", None, "1 ms", None, [], KINDS)
     assert not asked.has_task
     assert DEFAULT_HAND in asked.notes[0]
-    assert asked.scene["clock"]["round_trip_delay"] == 0.001
+    assert asked.scene.clock.round_trip_delay == 0.001
     made = make_tasks(asked.scene, asked.has_task)
     assert len(made.scenes) == 2
     assert "a tap at 0.2 m/s" in made.words
@@ -74,16 +75,16 @@ def test_a_preset_gets_a_hand_and_standard_tasks_and_says_so():
 
 def test_another_hand_keeps_the_force_of_the_scene():
     asked = make_subject(str(SCENES / "fig6a.toml"), "fu_cavusoglu_x", None, None, [], KINDS)
-    assert asked.scene["hand"]["grip"]["stiffness"] == 379.5
-    assert asked.scene["hand"]["force"]["value"] == -0.65
+    assert value_at(asked.scene, "hand.grip.stiffness") == 379.5
+    assert value_at(asked.scene, "hand.force.value") == -0.65
 
 
 def test_what_the_events_of_a_scene_change_is_changed_from_the_start():
     asked = load(SCENES / "swap.toml")
-    assert asked["dissipation"][0]["kind"] == "damping"
+    assert asked.dissipation[0].name == "damping"
     done = apply_events(asked)
-    assert [table["kind"] for table in done["dissipation"]] == ["unidirectional-inertia"]
-    assert "event" not in done
+    assert [table.name for table in done.dissipation] == ["unidirectional-inertia"]
+    assert not done.event
 
 
 def test_a_scene_whose_force_comes_and_goes_is_not_judged_by_it():
@@ -95,14 +96,14 @@ def test_noise_is_judged_with_several_seeds():
     noisy = scene(wall={"position": 0.0, "stiffness": 1.0}, noise={"deviation": 1e-6, "cutoff": 100.0})
     runs = make_tasks(noisy, False).make_runs(100.0, [])
     assert len(runs) == 2 * SEEDS
-    assert len({run["seed"] for run in runs}) == SEEDS
+    assert len({run.seed for run in runs}) == SEEDS
 
 
 def test_a_delay_a_fifth_more_is_rounded_to_whole_steps_and_never_to_what_it_was():
     late = scene(clock={"round_trip_delay": 0.002}, wall={"position": 0.0, "stiffness": 1.0})
-    assert scale_quantities(late, {"delay": 1.2})["clock"]["round_trip_delay"] == pytest.approx(0.0024)
+    assert scale_quantities(late, {"delay": 1.2}).clock.round_trip_delay == pytest.approx(0.0024)
     short = scene(clock={"round_trip_delay": 0.0001}, wall={"position": 0.0, "stiffness": 1.0})
-    assert [scale_quantities(short, {"delay": f})["clock"]["round_trip_delay"] for f in (0.8, 1.2)] == [0.0, 0.0002]
+    assert [scale_quantities(short, {"delay": f}).clock.round_trip_delay for f in (0.8, 1.2)] == [0.0, 0.0002]
 
 
 def test_corners_take_every_quantity_both_ways():
@@ -136,12 +137,11 @@ def test_the_advised_scene_is_steady_and_one_beyond_the_largest_is_not(tmp_path)
     assert done.exit_code == 0, done.output
     found = json.loads(done.stdout.splitlines()[-1])
     advised = load(tmp_path / "a" / "advice.toml")
-    assert advised["wall"]["stiffness"] == found["recommended"]["stiffness_N_m"]
+    assert value_at(advised, "wall.stiffness") == found["recommended"]["stiffness_N_m"]
     assert run_in_process(advised, KINDS)["verdict"] == "steady"
     nothing = found["elements"][0]
     assert nothing["largest"]["stiffness_N_m"] == pytest.approx(nothing["exact_N_m"], rel=0.03)
-    beyond = {key: table for key, table in advised.items() if key != "dissipation"}
-    beyond["wall"] = {**advised["wall"], "stiffness": 1.3 * nothing["largest"]["stiffness_N_m"]}
+    beyond = with_value(without(advised, "dissipation"), "wall.stiffness", 1.3 * nothing["largest"]["stiffness_N_m"])
     assert run_in_process(beyond, KINDS)["verdict"] in ("limit-cycle", "diverged")
     assert (tmp_path / "a" / "figure.png").stat().st_size > 10_000
     assert found["why"]["because"].startswith("It buzzes")

@@ -1,13 +1,16 @@
 """What is advised holds: the limit is that of the exact map, and the margin is where it is said to be."""
 
-from typing import Any
+from collections.abc import Sequence
+from dataclasses import replace
 
 import pytest
 
 from haploop.launch.runs.in_process import run_in_process
+from haploop.protocol.scene.scene import ElementTable, Scene
 from haploop.tools.advise.advice import Advice, advice
 from haploop.tools.advise.judge import Judge
 from haploop.tools.advise.subject import Subject
+from haploop.tools.advise.tasks import with_wall
 from haploop.tools.advise.variations import Change, corners, scale_quantities
 from haploop.tools.linear.one_tick import NeverStable, OneTickMap
 from helpers.scenes.least import KINDS, scene
@@ -27,9 +30,9 @@ def found() -> Advice:
         return advice(Subject("loop", LOOP, has_task=False, notes=()), KINDS, judge)
 
 
-def exact_N_m(read: dict[str, Any], elements: list[dict[str, Any]]) -> float:
+def exact_N_m(read: Scene, elements: Sequence[ElementTable]) -> float:
     try:
-        return OneTickMap.from_scene({**read, "dissipation": elements}, KINDS).stiffness_limit()
+        return OneTickMap.from_scene(replace(read, dissipation=tuple(elements)), KINDS).stiffness_limit()
     except NeverStable:
         return 0.0
 
@@ -58,7 +61,7 @@ def test_where_the_exact_map_allows_more_than_is_steady_the_tap_goes_on_bouncing
 @pytest.mark.slow
 def test_no_other_damping_allows_a_much_stiffer_wall_by_the_exact_map(found: Advice):
     def allows(damping: float) -> float:
-        return exact_N_m(LOOP, [{"kind": "damping", "acts": "in-contact", "damping": damping}])
+        return exact_N_m(LOOP, [ElementTable(name="damping", parameters={"damping": damping})])
 
     [(best,)] = [gains.values for gains in found.gains if gains.family.name == "damping"]
     most = max(allows(best * 1.05**i) for i in range(-40, 41))
@@ -75,15 +78,7 @@ def test_the_advised_wall_is_steady_in_every_corner_and_not_beyond_the_nearest_i
     assert safe.corners == 1 + 2 ** len(found.uncertain)
 
     def verdicts(change) -> set[str]:
-        placed = [
-            {
-                **task,
-                "wall": {**task["wall"], "stiffness": safe.stiffness_N_m},
-                "dissipation": elements,
-                "duration": 4.0,
-            }
-            for task in (tap, press)
-        ]
+        placed = [replace(with_wall(task, safe.stiffness_N_m, elements), duration=4.0) for task in (tap, press)]
         return {run_in_process(change(task), KINDS)["verdict"] for task in placed}
 
     for corner in corners(LOOP):

@@ -1,11 +1,13 @@
 """The largest steady stiffness, found by trying."""
 
+from dataclasses import replace
 from typing import Any
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from haploop.protocol.scene.scene import ElementTable
 from haploop.tools.advise.judge import Judge, Judgement
 from haploop.tools.advise.largest import LEAST_N_M, NEAR, WIDE, Limit, Pace, StiffnessQuery, largest_steady
 from haploop.tools.advise.tasks import make_tasks
@@ -93,8 +95,8 @@ def test_what_one_run_tells_for_good_is_not_run_again(is_one_run):
 def test_a_softer_wall_that_is_not_steady_lowers_the_limit_and_what_lies_above_is_told():
     found = limit_of(lambda k: k < 150.0 or 250.0 < k < 400.0, 300.0, SLOW)
     assert found.stiffness_N_m == pytest.approx(150.0, rel=0.05)
-    assert found.islands_N_m
-    assert all(250.0 < k < 400.0 for k in found.islands_N_m)
+    assert found.steady_above_N_m
+    assert all(250.0 < k < 400.0 for k in found.steady_above_N_m)
 
 
 def test_a_loop_that_is_never_steady_has_no_limit_and_one_that_always_is_has_no_end():
@@ -114,13 +116,13 @@ DEVICE = {
     "element", [None, {"kind": "damping", "damping": 2.0}, {"kind": "bidirectional-inertia", "mass": 0.01}]
 )
 def test_where_the_loop_is_linear_the_limit_found_by_runs_is_that_of_the_exact_map(element):
-    elements = [{"acts": "in-contact", **element}] if element else []
+    elements = [ElementTable.from_dict(element)] if element else []
     read = scene(**DEVICE, wall={"position": 0.0, "stiffness": 100.0})
     asked = make_tasks(read, has_task=False)
-    exact = OneTickMap.from_scene({**read, "dissipation": elements}).stiffness_limit()
+    exact = OneTickMap.from_scene(replace(read, dissipation=tuple(elements))).stiffness_limit()
     with Judge(KINDS, workers=1) as judge:
         found = largest_steady(
-            {"": StiffnessQuery(lambda k, thorough: asked.make_runs(k, elements, None, thorough), 300.0, 1e5)},
+            {"": StiffnessQuery(lambda k, thorough: asked.make_runs(k, elements, thorough=thorough), 300.0, 1e5)},
             judge.judge,
             QUICK,
         )[""]

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-from haploop.tools.advise.buzz import STEPS_BEYOND, Ablation, Buzz, explain_buzz
+from haploop.tools.advise.buzz import STEPS_BEYOND, Buzz, explain_buzz
 from haploop.tools.advise.gains import Gains, Search
-from haploop.tools.advise.largest import Limit
 from haploop.tools.advise.margins import MarginSearch, Recommendation
 from haploop.tools.advise.tasks import Tasks, make_tasks, with_wall
 from haploop.tools.advise.variations import DELAY, SHARE, delay_s, uncertain_quantities
@@ -19,12 +18,21 @@ from haploop.tools.linear.one_tick import NeverStable, OneTickMap
 
 if TYPE_CHECKING:
     from haploop.controller.dissipation import Element
+    from haploop.protocol.scene.scene import Scene
     from haploop.tools.advise.judge import Judge
+    from haploop.tools.advise.largest import Limit
     from haploop.tools.advise.subject import Subject
 
-Scene = dict[str, Any]
+# An advice as one JSON object.
+AdviceData = dict[str, Any]
 # How many times as long the scene of the advice may be made, until its last half second is at rest.
 _LONGER = (1, 4, 16, 64)
+_OTHER_TASK = "The scene's own task does not end pressed to the wall; a tap and a press take its place."
+_ROUNDED = "A delay a fifth less or more is rounded to whole plant steps: {:g} and {:g} ms."
+_STEADY_MEANS = (
+    "the summary's verdict of every run; swings that die away are followed longer, or, in a linear loop, by the exact "
+    "map"
+)
 
 
 @dataclass(frozen=True)
@@ -73,18 +81,17 @@ def advice(
         if itself.verdict == "no-contact":
             asked = make_tasks(subject.scene, False)
     if subject.has_task and len(asked.scenes) > 1:
-        notes.append("The scene's own task does not end pressed to the wall; a tap and a press take its place.")
+        notes.append(_OTHER_TASK)
     scene = asked.first
     search = Search(asked, judge, stage)
     gains = search.families()
     margins = MarginSearch(search)
     margins.uncertain(gains)
     safe = margins.safe(gains)
-    placed = [_placed(scene, found) for found in gains]
-    notes += _rounding(scene)
+    placed = [with_wall(scene, found.limit.stiffness_N_m, found.family.elements(found.values)) for found in gains]
     return Advice(
         name=subject.name,
-        notes=tuple(notes),
+        notes=(*notes, *_rounding(scene)),
         tasks=asked,
         tolerance=search.tolerance,
         uncertain=tuple(uncertain_quantities(scene)),
@@ -98,19 +105,15 @@ def advice(
     )
 
 
-def _placed(scene: Scene, found: Gains) -> Scene:
-    return with_wall(scene, found.limit.stiffness_N_m, found.family.elements(found.values))
-
-
 def _rounding(scene: Scene) -> list[str]:
     """Returns a note where a fifth of the delay is no whole number of plant steps."""
-    nominal = scene["clock"]["round_trip_delay"]
-    if DELAY not in uncertain_quantities(scene):
+    factors, nominal = (1.0 - SHARE, 1.0 + SHARE), scene.clock.round_trip_delay
+    rounded = [delay_s(scene, factor) for factor in factors]
+    if DELAY not in uncertain_quantities(scene) or all(
+        math.isclose(delay, nominal * factor) for delay, factor in zip(rounded, factors, strict=True)
+    ):
         return []
-    less, more = delay_s(scene, 1.0 - SHARE), delay_s(scene, 1.0 + SHARE)
-    if math.isclose(less, nominal * (1.0 - SHARE)) and math.isclose(more, nominal * (1.0 + SHARE)):
-        return []
-    return [f"A delay a fifth less or more is rounded to whole plant steps: {less * 1e3:g} and {more * 1e3:g} ms."]
+    return [_ROUNDED.format(*(delay * 1e3 for delay in rounded))]
 
 
 def _exact(scene: Scene, kinds: dict[str, type[Element]]) -> float | None:
@@ -126,25 +129,27 @@ def _shown(subject: Subject, asked: Tasks, safe: Recommendation, judge: Judge) -
     """Returns the first task with the advised gains, as long as its swings take to die away."""
     if not safe.stiffness_N_m:
         return None
-    best = safe.gains
-    scene = with_wall(asked.first, safe.stiffness_N_m, best.family.elements(best.safe_values))
-    scene["title"] = f"{subject.name}: {safe.stiffness_N_m / 1e3:g} N/mm with {best.family.phrase(best.safe_values)}"
+    family, values = safe.gains.family, safe.gains.safe_values
+    scene = with_wall(asked.first, safe.stiffness_N_m, family.elements(values))
+    title = f"{subject.name}: {safe.stiffness_N_m / 1e3:g} N/mm with {family.phrase(values)}"
+    scene = replace(scene, title=title)
     for factor in _LONGER:
-        longer = {**scene, "duration": scene["duration"] * factor}
+        longer = replace(scene, duration=scene.duration * factor)
         [judgement] = judge.judge([longer])
-        if judgement.verdict == "steady" and judgement.summary["duration_s"] == longer["duration"]:
-            return {**longer, "run": subject.scene["run"]}
-    return {**scene, "run": subject.scene["run"]}
+        if judgement.verdict == "steady" and judgement.summary["duration_s"] == longer.duration:
+            scene = longer
+            break
+    return replace(scene, run=subject.scene.run)
 
 
 def _buzz(
     subject: Subject, asked: Tasks, safe: Recommendation, judge: Judge, stage: Callable[[str], object]
 ) -> Buzz | None:
     """Explains the scene itself; of a preset, the advised gains with a wall just too stiff."""
-    if subject.has_task and "wall" in subject.scene and len(asked.scenes) == 1:
+    if subject.has_task and subject.scene.wall and len(asked.scenes) == 1:
         return explain_buzz(subject.scene, judge, stage)
     best = safe.gains
-    limit = best.tried[best.safe_values].not_steady_N_m if best.safe_values in best.tried else best.limit.not_steady_N_m
+    limit = best.tried.get(best.safe_values, best.limit).not_steady_N_m
     if not math.isfinite(limit):
         return None
     elements = best.family.elements(best.safe_values)
@@ -156,18 +161,17 @@ def _buzz(
     return None
 
 
-def as_data(found: Advice, advice_text: str, buzz_text: str) -> dict[str, Any]:
+def as_data(found: Advice, advice_text: str, buzz_text: str) -> AdviceData:
     """Returns the advice as one JSON object; the two texts are put in as they are."""
     safe, best = found.safe, found.safe.gains
     return {
         "name": found.name,
-        "notes": list(found.notes),
+        "notes": found.notes,
         "tasks": found.tasks.words,
         "seeds": found.tasks.seeds,
-        "steady_means": "the summary's verdict of every run; swings that die away are followed longer, or, in a linear "
-        "loop, by the exact map",
+        "steady_means": _STEADY_MEANS,
         "tolerance": found.tolerance,
-        "uncertain": list(found.uncertain),
+        "uncertain": found.uncertain,
         "elements": [
             _gains_data(gains, exact, bounds)
             for gains, exact, bounds in zip(found.gains, found.exact_N_m, found.bounds, strict=True)
@@ -185,22 +189,21 @@ def as_data(found: Advice, advice_text: str, buzz_text: str) -> dict[str, Any]:
     }
 
 
-def _gains_data(gains: Gains, exact_N_m: float | None, bounds: list[Bound]) -> dict[str, Any]:
+def _gains_data(gains: Gains, exact_N_m: float | None, bounds: list[Bound]) -> AdviceData:
     return {
         "element": gains.family.name,
         "parameters": _parameters(gains, gains.values),
-        "largest": _limit_data(gains.limit),
+        "largest": asdict(gains.limit),
         "exact_N_m": exact_N_m,
         "bounds": [asdict(bound) for bound in bounds],
         "with_a_fifth_more_or_less": {
             "parameters": _parameters(gains, gains.safe_values),
-            "alone": {change.words: _ends_data(limit) for change, limit in gains.alone.items()},
+            "alone": {change.words: _ends(limit) for change, limit in gains.alone.items()},
             "worst_corner": gains.corner,
             "stiffness_N_m": gains.safe.stiffness_N_m,
         },
         "tried": [
-            {"parameters": _parameters(gains, values), **_ends_data(limit)}
-            for values, limit in sorted(gains.tried.items())
+            {"parameters": _parameters(gains, values), **_ends(limit)} for values, limit in sorted(gains.tried.items())
         ],
     }
 
@@ -209,39 +212,12 @@ def _parameters(gains: Gains, values: tuple[float, ...]) -> dict[str, float]:
     return {f"{kind}.{key}": value for (kind, key), value in zip(gains.family.parts, values, strict=True)}
 
 
-def _limit_data(limit: Limit) -> dict[str, Any]:
-    return {**_ends_data(limit), "steady_above_N_m": list(limit.islands_N_m)}
-
-
-def _ends_data(limit: Limit) -> dict[str, Any]:
+def _ends(limit: Limit) -> dict[str, float]:
     """Returns both ends of a limit, as far apart as it took to tell it from the best, or the worst."""
     return {"stiffness_N_m": limit.stiffness_N_m, "not_steady_N_m": limit.not_steady_N_m}
 
 
-def _buzz_data(buzz: Buzz, text: str) -> dict[str, Any]:
-    return {
-        "title": buzz.scene["title"],
-        "stiffness_N_m": buzz.stiffness_N_m,
-        "steady": buzz.steady,
-        "verdict": buzz.verdict,
-        "oscillation_m": buzz.oscillation_m,
-        "largest": _limit_data(buzz.limit),
-        "elements_true_J": dict(buzz.elements_J),
-        "alone": [_without_data(without) for without in buzz.alone],
-        "together": [_without_data(without) for without in buzz.together],
-        "without_all": _without_data(buzz.all_off) if buzz.all_off else None,
-        "because": text,
-    }
-
-
-def _without_data(without: Ablation) -> dict[str, Any]:
-    return {
-        "without": list(without.names),
-        "instead": without.words,
-        "leak_J": without.leak_J,
-        "leak_share": without.leak_share,
-        "steady": without.steady,
-        "verdict": without.verdict,
-        "oscillation_m": without.oscillation_m,
-        "largest": _limit_data(without.limit) if without.limit else None,
-    }
+def _buzz_data(buzz: Buzz, text: str) -> AdviceData:
+    aside = ("scene", "is_element")
+    told = asdict(buzz, dict_factory=lambda items: {key: value for key, value in items if key not in aside})
+    return {"title": buzz.scene.title, **told, "because": text}

@@ -14,7 +14,7 @@ from haploop.tools.cli.exit_codes import FAILED, WRONG_USE, leave, plain_errors,
 from haploop.tools.cli.scenes import kinds_with, print_notes
 
 if TYPE_CHECKING:
-    from haploop.tools.advise.advice import Advice
+    from haploop.tools.advise.advice import Advice, AdviceData
 
 ADVICE, SCENE, FIGURE = "advice.json", "advice.toml", "figure.png"
 _STAGES = 9
@@ -86,7 +86,7 @@ def advise(request: Request, as_json: bool) -> None:
         print(path, file=sys.stderr)
 
 
-def _write(found: Advice, out: Path) -> dict:
+def _write(found: Advice, out: Path) -> AdviceData:
     """Writes scene, figure and data; returns the data with the files in it."""
     from haploop.launch.scene.toml_writer import to_toml
     from haploop.logger.summary import finite
@@ -100,7 +100,7 @@ def _write(found: Advice, out: Path) -> dict:
     data = as_data(found, " ".join(gain_sentences(found)), because)
     try:
         if found.scene:
-            (out / SCENE).write_text(to_toml(found.scene), encoding="utf-8")
+            (out / SCENE).write_text(to_toml(found.scene.as_dict()), encoding="utf-8")
             files["scene"] = str(out / SCENE)
         with contextlib.suppress(FigureError):
             files["figure"] = str(draw(found, out / FIGURE))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from haploop.tools.advise.report import buzz_sentences, format_limit, format_stiffness, gain_sentences
 from haploop.tools.figure.style import (
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from haploop.tools.advise.advice import Advice
-    from haploop.tools.advise.buzz import Buzz
+    from haploop.tools.advise.buzz import Ablation, Buzz
 
 _WIDTH_IN, _ROW_IN, _BESIDE_IN = 12.5, 0.44, 1.6
 _BAR = 0.62
@@ -105,7 +105,7 @@ def _once(row: int, label: str) -> str:
 
 def _bounds(ax: Axes, found: Advice) -> None:
     """Draws a line across the row of each family that a bound speaks of."""
-    colours: dict[str, Any] = {}
+    colours: dict[str, str] = {}
     for row, (bounds, exact) in enumerate(zip(found.bounds, found.exact_N_m, strict=True)):
         lines = [("exact map, ρ(M) = 1", exact)] + [(f"{b.name} ({b.kind})", b.stiffness_N_m) for b in bounds]
         for name, stiffness in lines:
@@ -127,8 +127,8 @@ def _bounds(ax: Axes, found: Advice) -> None:
 def _causes(ax: Axes, buzz: Buzz) -> None:
     """Draws the largest steady wall without each cause, against the wall of the scene."""
     rows = _rows(buzz)
-    names = ["as it is", *(" and ".join(f"without {name}" for name in without.names) for without in rows)]
-    limits = [buzz.limit, *(without.limit for without in rows)]
+    names = ["as it is", *(" and ".join(f"without {name}" for name in without.without) for without in rows)]
+    limits = [buzz.largest, *(without.largest for without in rows)]
     wall = buzz.stiffness_N_m / 1e3
     for row, limit in enumerate(limits):
         assert limit
@@ -148,12 +148,12 @@ def _causes(ax: Axes, buzz: Buzz) -> None:
 
 def _title(buzz: Buzz) -> str:
     question = "how far from buzzing" if buzz.steady else "why does it buzz?"
-    title = f"{buzz.scene['title']}: {question}"
+    title = f"{buzz.scene.title}: {question}"
     return title if len(title) < 110 else f"{title[:60]} ...: {question}"
 
 
-def _rows(buzz: Buzz) -> list[Any]:
-    return [without for without in (*buzz.alone, *buzz.together) if without.limit]
+def _rows(buzz: Buzz) -> list[Ablation]:
+    return [without for without in (*buzz.alone, *buzz.together) if without.largest]
 
 
 def _dress(ax: Axes, names: list[str], title: str) -> None:

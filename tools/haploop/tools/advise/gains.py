@@ -6,10 +6,11 @@ import itertools
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
+from haploop.protocol.scene.scene import ElementTable, Hand, Scene
+from haploop.tools.advise.judge import execution_mode
 from haploop.tools.advise.largest import BEYOND, LEAST_N_M, WIDE, Limit, StiffnessQuery, largest_steady
-from haploop.tools.advise.runs import execution_mode
 from haploop.tools.advise.tasks import Tasks
 from haploop.tools.advise.variations import Change
 from haploop.tools.render.units import amount
@@ -17,44 +18,37 @@ from haploop.tools.render.units import amount
 if TYPE_CHECKING:
     from haploop.tools.advise.judge import Judge
 
-Scene = dict[str, Any]
 Values = tuple[float, ...]
-
-
-_UNITS = {"damping": "N s/m", "mass": "kg"}
 
 
 @dataclass(frozen=True)
 class Family:
-    """A family of gains: one element, or two together.
-
-    Attributes:
-        name: for people.
-        parts: kind and parameter of each.
-    """
+    """A family of gains: one element, or two together, by its name and the kind and parameter of each."""
 
     name: str
     parts: tuple[tuple[str, str], ...]
 
-    def elements(self, values: tuple[float, ...]) -> list[dict[str, Any]]:
-        """Makes the scene's ``[[dissipation]]`` tables with these parameters."""
-        return [
-            {"kind": kind, "acts": "in-contact", key: value}
-            for (kind, key), value in zip(self.parts, values, strict=True)
-        ]
+    def elements(self, values: Values) -> list[ElementTable]:
+        """Makes the scene's elements with these parameters."""
+        pairs = zip(self.parts, values, strict=True)
+        return [ElementTable(name=kind, parameters={key: value}) for (kind, key), value in pairs]
 
-    def words(self, values: tuple[float, ...]) -> str:
+    def words(self, values: Values) -> str:
         """Formats the parameters: ``0.6 N s/m`` or ``9 g``; a dash for none."""
-        told = [_amount(value, key) for (_, key), value in zip(self.parts, values, strict=True)]
-        return " and ".join(told) or "–"
+        return " and ".join(self._amounts(values)) or "–"
 
-    def phrase(self, values: tuple[float, ...]) -> str:
+    def phrase(self, values: Values) -> str:
         """Formats the parameters for a sentence: ``0.6 N s/m of damping``."""
-        told = [
-            f"{_amount(value, key)} of {kind.replace('-', ' ')}"
-            for (kind, key), value in zip(self.parts, values, strict=True)
-        ]
-        return " and ".join(told) or "no element"
+        told = zip(self._amounts(values), self.parts, strict=True)
+        return " and ".join(f"{words} of {kind.replace('-', ' ')}" for words, (kind, _) in told) or "no element"
+
+    def _amounts(self, values: Values) -> list[str]:
+        def words(value: float, key: str) -> str:
+            if key == "damping":
+                return f"{value:.2g} N s/m"
+            return amount(value * 1e3, "g", 2) if value < 1.0 else amount(value, "kg", 2)
+
+        return [words(value, key) for (_, key), value in zip(self.parts, values, strict=True)]
 
 
 Choice = tuple[Family, Values]
@@ -91,7 +85,7 @@ COARSE = Grid(damping=(5, 3.0), mass=(4, 3.0), both=(2, 3.0), refined=1, finalis
 GRIDS = {"arrays": FINE, "friction": MIDDLE, "alone": COARSE}
 
 
-def first_choices(family: Family, scene: Scene, grid: Grid) -> list[tuple[float, ...]]:
+def first_choices(family: Family, scene: Scene, grid: Grid) -> list[Values]:
     """Returns parameters from about the largest that a loop can bear down: B = m / (T/2 + td), or the moved mass."""
     if len(family.parts) != 1:
         return [()]
@@ -101,7 +95,7 @@ def first_choices(family: Family, scene: Scene, grid: Grid) -> list[tuple[float,
     return [(_rounded(most / factor**i),) for i in range(count)]
 
 
-def around(family: Family, best: tuple[float, ...], grid: Grid) -> list[tuple[float, ...]]:
+def around(family: Family, best: Values, grid: Grid) -> list[Values]:
     """Returns every combination of some values around those that are best alone, which are the largest of each."""
     count, factor = grid.both
     above = count // 2
@@ -111,9 +105,7 @@ def around(family: Family, best: tuple[float, ...], grid: Grid) -> list[tuple[fl
     ]
 
 
-def beside(
-    family: Family, best: tuple[float, ...], tried: list[tuple[float, ...]], grid: Grid, times: int
-) -> list[tuple[float, ...]]:
+def beside(family: Family, best: Values, tried: list[Values], grid: Grid, times: int) -> list[Values]:
     """Returns parameters half a step from the best, a whole step where it is at the end of what was tried."""
     found = []
     for index, (_, key) in enumerate(family.parts):
@@ -127,26 +119,20 @@ def beside(
 
 def scale(scene: Scene, key: str) -> float:
     """Returns about the largest damping, or mass, that a loop can bear, in SI units."""
-    hand = scene.get("hand", {})
-    mass = scene["device"]["mass"] + scene.get("transmission", {}).get("motor_mass", 0.0)
-    mass += 0.0 if "grip" in hand else hand.get("mass", 0.0)
+    hand = scene.hand or Hand()
+    mass = scene.device.mass + (scene.transmission.motor_mass if scene.transmission else 0.0)
+    mass += 0.0 if hand.grip else hand.mass
     return mass / late_s(scene) if key == "damping" else mass
 
 
 def late_s(scene: Scene) -> float:
     """Returns T/2 + td, s: how late a held force is on average."""
-    return 0.5 / scene["clock"]["control_rate"] + scene["clock"]["round_trip_delay"]
+    return 0.5 / scene.clock.control_rate + scene.clock.round_trip_delay
 
 
 def _rounded(value: float) -> float:
     """Rounds to two digits, as one would set it."""
     return float(f"{value:.2g}")
-
-
-def _amount(value: float, key: str) -> str:
-    if key == "mass":
-        return amount(value * 1e3, "g", 2) if value < 1.0 else amount(value, "kg", 2)
-    return f"{value:.2g} {_UNITS[key]}"
 
 
 @dataclass
@@ -195,14 +181,14 @@ class Search:
         self.tolerance = self._wide.tolerance
         scene = tasks.first
         # Whatever the device, a sampled spring this stiff is unstable: the swing is beyond half the sampling rate.
-        mass = scene["device"]["mass"] + scene.get("hand", {}).get("mass", 0.0)
-        self.most_N_m = 8.0 * mass * float(scene["clock"]["control_rate"]) ** 2
+        mass = scene.device.mass + (scene.hand or Hand()).mass
+        self.most_N_m = 8.0 * mass * float(scene.clock.control_rate) ** 2
 
     def families(self) -> list[Gains]:
         """Returns the largest steady stiffness of every family, with its best parameters."""
         self.stage("the wall alone")
         scene = self.tasks.first
-        damping = scene["device"]["damping"] + scene.get("hand", {}).get("damping", 0.0)
+        damping = scene.device.damping + (scene.hand or Hand()).damping
         known = self.limits([(NOTHING, ())], max(20.0 * LEAST_N_M, damping / late_s(scene)))
         start = max(10.0 * LEAST_N_M, known[NOTHING, ()].stiffness_N_m)
         alone = [family for family in FAMILIES if len(family.parts) == 1]

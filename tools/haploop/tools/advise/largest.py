@@ -7,9 +7,9 @@ from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+from haploop.protocol.scene.scene import Scene
 from haploop.tools.advise.judge import Judgement
 
-Scene = dict[str, Any]
 # From scenes, and whether each is to be run to the end of its swings, to what they come to.
 Judged = Callable[[Sequence[Scene], Sequence[bool]], list[Judgement]]
 # No wall softer than this is a wall.
@@ -60,12 +60,12 @@ class Limit:
     Attributes:
         stiffness_N_m: the largest that is steady, as are all softer ones that were tried; 0 where none is.
         not_steady_N_m: the softest that is not; infinite where none was found.
-        islands_N_m: stiffer ones that are steady all the same.
+        steady_above_N_m: stiffer ones that are steady all the same.
     """
 
     stiffness_N_m: float
     not_steady_N_m: float
-    islands_N_m: tuple[float, ...] = ()
+    steady_above_N_m: tuple[float, ...] = ()
 
     def is_within(self, tolerance: float) -> bool:
         """Tells whether no more than this share lies between the two."""

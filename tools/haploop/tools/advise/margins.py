@@ -6,14 +6,13 @@ import itertools
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
 
+from haploop.protocol.scene.scene import Scene
 from haploop.tools.advise.gains import Gains, Search, Values
+from haploop.tools.advise.judge import execution_mode
 from haploop.tools.advise.largest import LEAST_N_M, NEAR, WIDE, Limit, StiffnessQuery, largest_steady
-from haploop.tools.advise.runs import execution_mode
 from haploop.tools.advise.variations import Change, corners, larger_changes, scale_quantities, single_changes
 
-Scene = dict[str, Any]
 Vary = Callable[[Scene], Scene]
 # An element that allows no more than this much beyond a simpler one is not worth having.
 _WORTH = 1.1

@@ -9,7 +9,7 @@ from rich.console import Group
 from rich.table import Table
 from rich.text import Text
 
-from haploop.tools.advise.causes import SAMPLING
+from haploop.tools.advise.variations import SAMPLING
 from haploop.tools.render.terminal import make_table, verdict_style
 from haploop.tools.render.units import amount, fixed
 
@@ -101,9 +101,9 @@ def _with(limit: Limit, gains: Gains, values: tuple[float, ...]) -> str:
 
 def _islands(found: list[Gains]) -> list[Text]:
     told = [
-        f"with {gains.family.name} up to {format_stiffness(max(gains.limit.islands_N_m))}"
+        f"with {gains.family.name} up to {format_stiffness(max(gains.limit.steady_above_N_m))}"
         for gains in found
-        if gains.limit.islands_N_m
+        if gains.limit.steady_above_N_m
     ]
     return [Text(f"Some stiffer walls are steady all the same: {', '.join(told)}.", style="dim")] if told else []
 
@@ -138,23 +138,23 @@ def _bound(bound: Bound) -> str:
 def why_table(buzz: Buzz) -> RenderableType:
     """Makes a row a cause."""
     state = "is steady" if buzz.steady else "buzzes"
-    head = f"{buzz.scene['title']}: a wall of {format_stiffness(buzz.stiffness_N_m)} {state}"
+    head = f"{buzz.scene.title}: a wall of {format_stiffness(buzz.stiffness_N_m)} {state}"
     table = _table("without", "instead")
     table.add_column("verdict", no_wrap=True)
     for name in ("swing", "largest\nsteady"):
         table.add_column(name, justify="right", no_wrap=True)
     table.add_column("its part\nof the leak", justify="right")
     table.add_row(
-        "as it is", "", _verdict(buzz.steady, buzz.verdict), _swing(buzz.oscillation_m), format_limit(buzz.limit), ""
+        "as it is", "", _verdict(buzz.steady, buzz.verdict), _swing(buzz.oscillation_m), format_limit(buzz.largest), ""
     )
     table.add_section()
-    every = [*buzz.alone, *buzz.together, *([buzz.all_off] if buzz.all_off else [])]
+    every = [*buzz.alone, *buzz.together, *([buzz.without_all] if buzz.without_all else [])]
     for without in every:
-        limit = format_limit(without.limit) if without.limit else "–"
+        limit = format_limit(without.largest) if without.largest else "–"
         swing = _swing(without.oscillation_m)
-        words = without.words if len(without.names) == 1 else ""
+        words = without.instead if len(without.without) == 1 else ""
         verdict = _verdict(without.steady, without.verdict)
-        table.add_row(" and ".join(without.names), words, verdict, swing, limit, _format_share(without))
+        table.add_row(" and ".join(without.without), words, verdict, swing, limit, _format_share(without))
     return Group(Text(), Text(head, style="bold"), table)
 
 
@@ -195,7 +195,7 @@ def gain_sentences(found: Advice) -> list[str]:
 
 def buzz_sentences(buzz: Buzz) -> list[str]:
     """Makes the explanation in sentences: the cause of the buzzing, or the distance from it."""
-    wall, limit = format_stiffness(buzz.stiffness_N_m), buzz.limit
+    wall, limit = format_stiffness(buzz.stiffness_N_m), buzz.largest
     if buzz.steady:
         if not math.isfinite(limit.not_steady_N_m):
             return [_NEVER_BUZZES.format(format_stiffness(limit.stiffness_N_m))]
@@ -207,8 +207,8 @@ def buzz_sentences(buzz: Buzz) -> list[str]:
     elements = _ranked([one for one in buzz.alone if one.steady and one.is_element])
     sets = _ranked(list(buzz.together))
     if cures:
-        said = [_CAUSE.format(cures[0].names[0], _up_to(cures[0]))]
-        others = [one for one in cures[1:] if one.limit and one.limit.stiffness_N_m > _MORE * buzz.stiffness_N_m]
+        said = [_CAUSE.format(cures[0].without[0], _up_to(cures[0]))]
+        others = [one for one in cures[1:] if one.largest and one.largest.stiffness_N_m > _MORE * buzz.stiffness_N_m]
         if others:
             said.append(_OTHER_CAUSES.format(_with_limits(others)))
         if elements:
@@ -216,13 +216,13 @@ def buzz_sentences(buzz: Buzz) -> list[str]:
     elif elements:
         said = [_ELEMENTS.format(_with_limits(elements))]
     elif sets:
-        said = [_TOGETHER.format(_up_to(sets[0]), " and ".join(sets[0].names))]
+        said = [_TOGETHER.format(_up_to(sets[0]), " and ".join(sets[0].without))]
         if sets[1:]:
-            said.append(_OTHER_SETS.format("; ".join(" and ".join(one.names) for one in sets[1:])))
+            said.append(_OTHER_SETS.format("; ".join(" and ".join(one.without) for one in sets[1:])))
     else:
-        said = [_TOO_STIFF if buzz.all_off else _NO_CAUSE]
-    helps = [one.names[0] for one in buzz.alone if one.limit and not one.steady
-             and one.limit.stiffness_N_m * _MORE < limit.stiffness_N_m]  # fmt: skip
+        said = [_TOO_STIFF if buzz.without_all else _NO_CAUSE]
+    helps = [one.without[0] for one in buzz.alone if one.largest and not one.steady
+             and one.largest.stiffness_N_m * _MORE < limit.stiffness_N_m]  # fmt: skip
     return [*said, _HELPS.format(", ".join(helps))] if helps else said
 
 
@@ -254,15 +254,15 @@ def _ranked(some: list[Ablation]) -> list[Ablation]:
     """Sorts by the stiffest steady wall; sampling, which every loop has, counts only where it stands out."""
 
     def stands_out(one: Ablation) -> float:
-        limit = one.limit.stiffness_N_m if one.limit else 0.0
-        return limit / _STANDS_OUT if SAMPLING in one.names else limit
+        limit = one.largest.stiffness_N_m if one.largest else 0.0
+        return limit / _STANDS_OUT if SAMPLING in one.without else limit
 
     return sorted(some, key=stands_out, reverse=True)
 
 
 def _with_limits(some: list[Ablation]) -> str:
-    return ", ".join(f"{one.names[0]} (up to {_up_to(one)})" for one in some)
+    return ", ".join(f"{one.without[0]} (up to {_up_to(one)})" for one in some)
 
 
 def _up_to(one: Ablation) -> str:
-    return format_limit(one.limit) if one.limit else "this"
+    return format_limit(one.largest) if one.largest else "this"

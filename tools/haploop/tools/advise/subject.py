@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from haploop.launch.scene.file import resolved
 from haploop.launch.scene.layers import Layers, read_layers
 from haploop.launch.scene.mistakes import nearest
-from haploop.protocol.changes import at_work, changes_of
+from haploop.protocol.changes import Change, at_work
+from haploop.protocol.scene.scene import Scene
 from haploop.tools.advise.tasks import MOST_DELAY_S
 from haploop.tools.cost.grid import scenes_folder
 
@@ -27,6 +28,10 @@ ESTIMATORS: dict[str, dict[str, dict[str, Any]]] = {
     "kalman": {"velocity": {"estimator": "kalman", "jerk_density": 100.0}, "acceleration": {"source": "kalman"}},
     "accelerometer": {"acceleration": {"source": "accelerometer"}},
 }
+_TOO_LATE = (
+    "The round-trip delay is {0:g} s; advice is given up to {1:g} s. A number without a unit is in seconds: write "
+    '"{0:g} ms" for milliseconds.'
+)
 
 
 class InvalidRequest(ValueError):
@@ -45,7 +50,7 @@ class Subject:
     """
 
     name: str
-    scene: dict[str, Any]
+    scene: Scene
     has_task: bool
     notes: tuple[str, ...]
 
@@ -79,17 +84,20 @@ def make_subject(
     if delay is not None:
         layers.lay({"clock": {"round_trip_delay": _number_or_text(delay)}}, "--delay")
     scene = resolved(layers, overrides, kinds)
-    _refuse_too_late(scene["clock"]["round_trip_delay"])
-    if scene.get("event"):
+    if (delay_s := scene.clock.round_trip_delay) > MOST_DELAY_S:
+        raise InvalidRequest(_TOO_LATE.format(delay_s, MOST_DELAY_S))
+    if scene.event:
         scene = apply_events(scene)
         notes.append("What the scene's events change is taken as changed from the start.")
     return Subject(path.stem, scene, not is_preset, tuple(notes))
 
 
-def apply_events(scene: dict[str, Any]) -> dict[str, Any]:
+def apply_events(scene: Scene) -> Scene:
     """Returns the scene with its swaps and sets made from the start, and without events."""
-    made = at_work(scene, changes_of([(0, event) for event in scene["event"]]))
-    return {key: value for key, value in made.items() if key != "event" and value != []}
+    changes = [
+        Change(0, event.swap, event.element or 0, event.set or {}) for event in scene.event if event.swap or event.set
+    ]
+    return replace(at_work(scene, changes), event=())
 
 
 def presets(folder: str) -> dict[str, Path]:
@@ -142,14 +150,6 @@ def _number_or_text(given: str) -> float | str:
         return float(given)
     except ValueError:
         return given
-
-
-def _refuse_too_late(delay_s: float) -> None:
-    if delay_s > MOST_DELAY_S:
-        raise InvalidRequest(
-            f"The round-trip delay is {delay_s:g} s; advice is given up to {MOST_DELAY_S:g} s. A number without a unit "
-            f'is in seconds: write "{delay_s:g} ms" for milliseconds.'
-        )
 
 
 def _unknown(what: str, name: str, allowed: list[str], other: str) -> str:

@@ -3,23 +3,26 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 
 from haploop.plant.sensing.encoder import accelerometer_is_used
+from haploop.protocol.scene.hand_force import MinimumJerk
+from haploop.protocol.scene.paths import value_at, with_value
+from haploop.protocol.scene.scene import ElementTable, Hand, Scene, Wall
 from haploop.tools.render.units import amount
 
-Scene = dict[str, Any]
 # Speed of a firm tap; more than that no task starts with.
 TAP_M_S = 0.2
+# Of each standard task the speed at which device and hand meet the wall, m/s, and the rise time of the push, s. The tap
+# bounces as it may; the press is not at rest, so that both run in one array.
+_STANDARD = {"a tap": (TAP_M_S, 0.1), "a press": (1e-3, 0.3)}
 # The hand presses with this, or with this share of what the actuator can give where that is less.
 PRESS_N, OF_THE_ACTUATOR = 1.0, 0.3
 # Seconds that a standard task lasts, of which the last half second is judged, and round trips at least: what swings
 # because of a delay does so in a few of them. A loop that is later than the last has no answer in a reasonable time.
 DURATION_S, ROUND_TRIPS, MOST_DELAY_S = 1.0, 20, 0.5
 SEEDS = 3
-_NO_HAND = {"mass": 0.0, "damping": 0.0, "stiffness": 0.0}
 # A force of these kinds stays in the end.
 _STAYS = (None, "constant", "ramp", "step", "minimum-jerk")
 
@@ -39,15 +42,19 @@ class Tasks:
     words: str
 
     def make_runs(
-        self, stiffness: float, elements: Sequence[dict[str, Any]], vary: Any = None, thorough: bool = True
+        self,
+        stiffness: float,
+        elements: Sequence[ElementTable],
+        vary: Callable[[Scene], Scene] = lambda scene: scene,
+        thorough: bool = True,
     ) -> list[Scene]:
         """Makes every run that judges a wall of this stiffness with these elements; ``vary`` is applied to each scene.
 
         Unless ``thorough``, only the first task with one seed, which is where most walls fail that fail at all.
         """
-        placed = [with_wall(scene, stiffness, elements) for scene in self.scenes[: None if thorough else 1]]
-        varied = [vary(scene) for scene in placed] if vary else placed
-        return [{**scene, "seed": scene["seed"] + i} for scene in varied for i in range(self.seeds if thorough else 1)]
+        tasks, seeds = (self.scenes, self.seeds) if thorough else (self.scenes[:1], 1)
+        varied = [vary(with_wall(scene, stiffness, elements)) for scene in tasks]
+        return [replace(scene, seed=scene.seed + i) for scene in varied for i in range(seeds)]
 
     @property
     def is_one_run(self) -> bool:
@@ -62,75 +69,43 @@ class Tasks:
 
 def make_tasks(scene: Scene, has_task: bool) -> Tasks:
     """Makes the tasks of a resolved scene: its own where its hand keeps pressing to the end, else tap and press."""
-    quiet = {**scene, "run": {**scene["run"], "log": "none"}}
-    seeds = SEEDS if is_random(scene) else 1
+    quiet = with_value(scene, "run.log", "none")
+    seeds = SEEDS if _is_random(scene) else 1
     of_seeds = f", each with {seeds} seeds" if seeds > 1 else ""
-    if has_task and keeps_pressing(scene):
-        return Tasks((quiet,), seeds, f"the scene's own task of {scene['duration']:g} s{of_seeds}")
-    force = press_N(scene)
-    words = (
-        f"a tap at {TAP_M_S:g} m/s and a slow press, both into a hold of {amount(force, 'N')} for "
-        f"{lasts_s(scene):g} s"
-        f"{of_seeds}"
+    lasts_s = max(DURATION_S, float(math.ceil(ROUND_TRIPS * scene.clock.round_trip_delay)))
+    keeps_pressing = value_at(scene, "hand.force.kind") in _STAYS
+    if has_task and scene.wall and scene.duration >= lasts_s and keeps_pressing:
+        return Tasks((quiet,), seeds, f"the scene's own task of {scene.duration:g} s{of_seeds}")
+    most_N = value_at(scene, "actuator.saturation")
+    force_N = PRESS_N if most_N is None else min(PRESS_N, OF_THE_ACTUATOR * most_N)
+    words = f"a tap at {TAP_M_S:g} m/s and a slow press, both into a hold of {amount(force_N, 'N')} for {lasts_s:g} s"
+    # Wall and rest of the hand's spring are at 0; the hand presses down, smoothly, and holds.
+    standard = tuple(
+        replace(
+            quiet,
+            title=f"{scene.title}: {name}",
+            duration=lasts_s,
+            device=replace(scene.device, position=2e-4, velocity=-speed),
+            hand=replace(scene.hand or Hand(), rest=0.0, force=MinimumJerk(value=-force_N, rise_time=rise_s)),
+            wall=Wall(position=0.0, stiffness=0.0),
+        )
+        for name, (speed, rise_s) in _STANDARD.items()
     )
-    return Tasks((_tap(quiet, force), _press(quiet, force)), seeds, words)
-
-
-def keeps_pressing(scene: Scene) -> bool:
-    """Tells whether a scene has a wall, lasts long enough to be judged and its force stays."""
-    kind = scene.get("hand", {}).get("force", {}).get("kind")
-    return "wall" in scene and scene["duration"] >= lasts_s(scene) and kind in _STAYS
-
-
-def lasts_s(scene: Scene) -> float:
-    """Returns the duration of the standard tasks of a scene, s."""
-    return max(DURATION_S, float(math.ceil(ROUND_TRIPS * scene["clock"]["round_trip_delay"])))
+    return Tasks(standard, seeds, words + of_seeds)
 
 
 def is_held_by(scene: Scene, time_s: float) -> bool:
     """Tells whether from then on the hand's force is what it stays at."""
-    force = scene.get("hand", {}).get("force", {})
-    return force.get("kind") in _STAYS and force.get("at", 0.0) + force.get("rise_time", 0.0) <= time_s
+    begins, rises = (value_at(scene, f"hand.force.{key}") or 0.0 for key in ("at", "rise_time"))
+    return value_at(scene, "hand.force.kind") in _STAYS and begins + rises <= time_s
 
 
-def press_N(scene: Scene) -> float:
-    """Returns the force of the hand in the standard tasks, N."""
-    most = scene.get("actuator", {}).get("saturation")
-    return PRESS_N if most is None else min(PRESS_N, OF_THE_ACTUATOR * most)
-
-
-def is_random(scene: Scene) -> bool:
+def _is_random(scene: Scene) -> bool:
     """Tells whether another seed gives another run."""
-    noisy = accelerometer_is_used(scene) and scene.get("accelerometer", {}).get("noise_density")
-    return bool(scene.get("noise") or scene.get("jitter") or scene.get("loss") or noisy)
+    noisy = accelerometer_is_used(scene) and value_at(scene, "accelerometer.noise_density")
+    return bool(scene.noise or scene.jitter or scene.loss or noisy)
 
 
-def with_wall(scene: Scene, stiffness: float, elements: Sequence[dict[str, Any]]) -> Scene:
+def with_wall(scene: Scene, stiffness: float, elements: Sequence[ElementTable]) -> Scene:
     """Returns the scene with a wall of this stiffness and these dissipation elements in place of its own."""
-    laid = {**scene, "wall": {**scene["wall"], "stiffness": stiffness}, "dissipation": list(elements)}
-    if not elements:
-        del laid["dissipation"]
-    return laid
-
-
-def _tap(scene: Scene, force_N: float) -> Scene:
-    """Makes the tap: device and hand meet the wall at full speed, bounce as they may, and are held to it."""
-    return _standard(scene, "a tap", force_N, rise_time=0.1, position=2e-4, velocity=-TAP_M_S)
-
-
-def _press(scene: Scene, force_N: float) -> Scene:
-    """Makes the press: it touches the wall at 1 mm/s; not at rest, so that both tasks run in one array."""
-    return _standard(scene, "a press", force_N, rise_time=0.3, position=2e-4, velocity=-1e-3)
-
-
-def _standard(scene: Scene, name: str, force_N: float, rise_time: float, position: float, velocity: float) -> Scene:
-    """Makes a task: wall and rest of the hand's spring at 0; the hand presses down, smoothly, and holds."""
-    push = {"kind": "minimum-jerk", "value": -force_N, "rise_time": rise_time}
-    return {
-        **scene,
-        "title": f"{scene['title']}: {name}",
-        "duration": lasts_s(scene),
-        "device": {**scene["device"], "position": position, "velocity": velocity},
-        "hand": {**scene.get("hand", _NO_HAND), "rest": 0.0, "force": push},
-        "wall": {"position": 0.0, "stiffness": 0.0, "occupies": "below"},
-    }
+    return replace(with_value(scene, "wall.stiffness", stiffness), dissipation=tuple(elements))

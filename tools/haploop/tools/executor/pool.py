@@ -5,14 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable, Generator, Hashable, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from pathlib import Path
-from types import TracebackType
 from typing import Any, Self
 
 from haploop.controller.dissipation import load_plugin
 from haploop.launch.batch.stacking import is_batchable, structure
+from haploop.logger.summary import Summary
+from haploop.protocol.scene.scene import Scene
 from haploop.tools.executor.executors import make_executor
 from haploop.tools.executor.parts import Group, Sizes, cut, grouped
-from haploop.tools.executor.work import Result, Scene, Work
+from haploop.tools.executor.work import Work
 
 _POLL_S = 0.3
 DIED = "The process that ran it died: it was killed, ran out of memory or crashed in compiled code."
@@ -35,10 +36,8 @@ class Pool:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
-        self._executor.__exit__(kind, error, traceback)
+    def __exit__(self, *error: Any) -> None:
+        self._executor.__exit__(*error)
 
     @property
     def count(self) -> int:
@@ -47,7 +46,7 @@ class Pool:
 
     def results(
         self, scenes: Iterable[Scene], plugins: Sequence[Path] = (), *, energy: bool = True, trajectories: bool = False
-    ) -> Iterator[tuple[int, Result]]:
+    ) -> Iterator[tuple[int, Summary]]:
         """Yields the index of each scene and its result, in the order in which they come in.
 
         A scene that fails, or kills its worker, has a result with its reason.

@@ -8,22 +8,21 @@ from dataclasses import dataclass
 from functools import lru_cache, partial
 from typing import TYPE_CHECKING, Any
 
+from haploop.logger.summary import Summary
+from haploop.protocol.scene.scene import Scene
+
 if TYPE_CHECKING:
     from haploop.controller.dissipation import Element
 
-Scene = dict[str, Any]
-Result = dict[str, Any]
 Sources = tuple[tuple[str, str], ...]
-Results = Callable[[list[Scene]], Iterator[tuple[int, Result]]]
+Results = Callable[[list[Scene]], Iterator[tuple[int, Summary]]]
 
 
-def scene_itself(item: Any) -> Any:
-    """Returns the item, which is a scene already."""
+def _scene_itself(item: Any) -> Any:
     return item
 
 
-def whole_result(_item: Any, _scene: Scene | None, result: Result) -> Result:
-    """Returns the whole result."""
+def _whole_result(_item: Any, _scene: Scene | None, result: Summary) -> Summary:
     return result
 
 
@@ -32,15 +31,16 @@ class Work:
     """A job that is sent to workers with every part: nothing but values and functions that can be imported.
 
     Attributes:
-        make: from an item to its resolved scene; an error that it raises is the reason why the item is refused.
-        keep: from an item, its scene (None where it was refused) and its result to what travels back.
+        make: from an item to its resolved scene, which it is by default; an error that it raises is the reason why the
+            item is refused.
+        keep: from an item, its scene (None where it was refused) and its result to what travels back: by default all.
         sources: plugin files as (name, text); a worker on another machine has no files of this one.
         energy, trajectories: as for ``batch_results``.
         compiled: whether to run compiled by JAX, which hashes no trajectories.
     """
 
-    make: Callable[[Any], Scene] = scene_itself
-    keep: Callable[[Any, Scene | None, Result], Any] = whole_result
+    make: Callable[[Any], Scene] = _scene_itself
+    keep: Callable[[Any, Scene | None, Summary], Any] = _whole_result
     sources: Sources = ()
     energy: bool = True
     trajectories: bool = False
@@ -89,7 +89,7 @@ class Work:
         return partial(batch_results, kinds=kinds, energy=self.energy, trajectories=self.trajectories)
 
 
-def _safely(results: Results, scenes: dict[int, Scene], left: list[int]) -> Iterator[tuple[int, Result]]:
+def _safely(results: Results, scenes: dict[int, Scene], left: list[int]) -> Iterator[tuple[int, Summary]]:
     """Yields every result; where a scene raises, those without a result are run in halves until it stands alone."""
     done: set[int] = set()
     try:
@@ -121,5 +121,5 @@ def load_kinds(sources: Sources) -> dict[str, type[Element]]:
     return kinds
 
 
-def _failed(scene: Scene, why: str) -> Result:
-    return {"title": scene["title"], "seed": scene["seed"], "ended": "failed", "why": why}
+def _failed(scene: Scene, why: str) -> Summary:
+    return {"title": scene.title, "seed": scene.seed, "ended": "failed", "why": why}
