@@ -5,8 +5,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from haploop.protocol.scene.scene import ElementTable, Wall
 from haploop.protocol.ticks import Timebase
-from haploop.view.store.history import History
+from haploop.view.store.history import AtWork, History
 from haploop.view.store.lod_level import Ring, extremes
 from haploop.view.store.lod_series import MOST_COLUMNS, LodSeries
 
@@ -145,11 +146,10 @@ def test_the_memory_of_a_history_stays_bounded_over_a_million_ticks():
     block = np.sin(np.arange(10_001) / 500.0)
     ticks = block[:1000]
     columns = {"x": ticks, "v": ticks, "wall": ticks, "total": ticks, "dissipation.0": ticks}
-    elements = [{"kind": "damping", "parameters": {"damping": 0.1, "acts": "in-contact"}}]
-    wall = {"position": 0.0, "stiffness": 100.0, "into_wall": -1.0}
+    at_work = AtWork((ElementTable(name="damping", parameters={"damping": 0.1}),), Wall(position=0.0, stiffness=100.0))
     for tick in range(0, 1_000_000, 1000):
         history.append_plant_block(tick, {"x": block, "v": block, "force": block})
-        history.append_ticks(tick, columns, elements, wall)
+        history.append_ticks(tick, columns, at_work)
         history.append_energy(tick, {"wall.true": ticks, "damping.true": ticks, "residual": ticks, "hand_work": ticks})
         sizes[tick] = size_bytes(history)
     assert sizes[999_000] < 1.25 * sizes[99_000]

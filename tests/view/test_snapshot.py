@@ -6,21 +6,20 @@ import numpy as np
 import pytest
 
 from haploop.protocol.changes import changes_of, spans
+from haploop.protocol.scene.scene import ElementTable, Wall
 from haploop.protocol.ticks import Timebase
-from haploop.view.draw.snapshot import snapshot
-from haploop.view.draw.state import event_lines
-from haploop.view.receive.ingest import elements_as_telemetry, wall_as_telemetry
-from haploop.view.serve.messages import Viewport
-from haploop.view.store.history import History
+from haploop.view.draw.messages import event_lines
+from haploop.view.draw.snapshot import Viewport, snapshot
+from haploop.view.store.history import AtWork, History
 from helpers.live.browsing import decode
+from helpers.scenes.least import typed
 
 TIME = Timebase(10_000, 1_000, 0, 100_000)
-WALL = {"position": 0.0, "stiffness": 100.0, "into_wall": -1.0}
-NO_WALL = {"position": 0.0, "stiffness": 0.0, "into_wall": 0.0}
+WALL = Wall(position=0.0, stiffness=100.0)
 
 
 def element(kind, **parameters):
-    return {"kind": kind, "parameters": {**parameters, "acts": "in-contact"}}
+    return ElementTable(name=kind, parameters=parameters)
 
 
 def made_up(ticks=100, elements=(), wall=WALL, books=None):
@@ -29,7 +28,8 @@ def made_up(ticks=100, elements=(), wall=WALL, books=None):
     row, steps = np.arange(float(ticks)), np.arange(ticks * 10 + 1.0)
     history.append_plant_block(0, {"x": steps, "v": steps, "force": -steps})
     forces = {f"dissipation.{place}": row * (place + 2) for place in range(len(elements))}
-    history.append_ticks(0, {"x": row, "v": row / 10, "wall": row, "total": row, **forces}, list(elements), wall)
+    columns = {"x": row, "v": row / 10, "wall": row, "total": row, **forces}
+    history.append_ticks(0, columns, AtWork(tuple(elements), wall))
     history.append_energy(0, {"wall.true": row, "residual": row * 1e-20, **(books or {})})
     return history
 
@@ -44,7 +44,7 @@ def test_no_telemetry_gives_an_empty_snapshot():
 
 
 def test_without_a_wall_there_is_none_to_draw_and_no_loop():
-    tables = drawn(made_up(wall=NO_WALL))["tables"]
+    tables = drawn(made_up(wall=None))["tables"]
     assert "loop" not in tables
     assert "wall" not in tables["force"]["values"]
     assert "wall" not in tables["energy"]["values"]
@@ -79,7 +79,7 @@ def test_a_book_that_is_closed_is_shown_only_while_its_energy_changes():
 def test_numbers_beyond_what_a_float32_holds_do_not_break_the_snapshot():
     history = History(TIME, 0)
     history.append_energy(0, {"wall.true": np.array([1e300, np.inf]), "residual": np.array([np.nan, 1e-320])})
-    history.append_ticks(0, {name: np.zeros(2) for name in ("x", "v", "wall", "total")}, [], WALL)
+    history.append_ticks(0, {name: np.zeros(2) for name in ("x", "v", "wall", "total")}, AtWork((), WALL))
     assert drawn(history)["tables"]["energy"]["values"]["wall"].tolist() == [math.inf, math.inf]
 
 
@@ -92,10 +92,8 @@ def test_bodies_beyond_the_device_are_shown_where_they_are():
 
 
 def test_a_swap_and_a_set_change_what_is_at_work_from_their_tick_on_and_a_refused_one_does_not():
-    scene = {
-        "wall": {"position": 0.1, "stiffness": 5.0, "occupies": "above"},
-        "dissipation": [{"kind": "damping", "damping": 1.0, "acts": "always"}],
-    }
+    wall = {"position": 0.1, "stiffness": 5.0, "occupies": "above"}
+    scene = typed(wall=wall, dissipation=[{"kind": "damping", "damping": 1.0, "acts": "always"}])
     swap = {"swap": {"kind": "bad", "mass": 1.0}, "element": 0}
     events = [
         (3, {"set": {"wall.stiffness": 7.0, "dissipation.0.damping": 2.0}}),
@@ -105,23 +103,26 @@ def test_a_swap_and_a_set_change_what_is_at_work_from_their_tick_on_and_a_refuse
         (6, {"pause": True}),
         (8, {"swap": {"kind": "none"}, "element": 0}),
     ]
-    found = [
-        (
-            span.from_tick,
-            [e["kind"] for e in elements_as_telemetry(span.scene)],
-            wall_as_telemetry(span.scene)["stiffness"],
-        )
-        for span in spans(scene, changes_of(events))
-    ]
-    assert found == [
+    found = [(span.from_tick, *AtWork.of_scene(span.scene)) for span in spans(scene, changes_of(events))]
+    assert [(tick, [one.name for one in elements], wall.stiffness) for tick, elements, wall in found] == [
         (0, ["damping"], 5.0),
         (3, ["damping"], 7.0),
         (5, ["damping", "inertia"], 7.0),
         (8, ["inertia"], 7.0),
     ]
-    set_scene = spans(scene, changes_of(events))[1].scene
-    assert elements_as_telemetry(set_scene)[0]["parameters"] == {"damping": 2.0, "acts": "always"}
-    assert wall_as_telemetry(scene) == {"position": 0.1, "stiffness": 5.0, "into_wall": 1.0}
+    assert found[1][1][0] == ElementTable(name="damping", acts="always", parameters={"damping": 2.0})
+
+
+def test_what_telemetry_says_is_at_work_is_what_its_scene_says():
+    wall = {"position": 0.1, "stiffness": 5.0, "into_wall": 1.0}
+    damping = {"book": 3, "kind": "damping", "parameters": {"damping": 2.0, "acts": "always"}, "from_tick": 7}
+    scene = typed(
+        wall={"position": 0.1, "stiffness": 5.0, "occupies": "above"},
+        dissipation=[{"kind": "damping", **damping["parameters"]}],
+    )
+    assert AtWork.of_block({"elements": [damping], "wall": wall}) == AtWork.of_scene(scene)
+    assert AtWork.of_scene(scene).into_wall == 1.0
+    assert AtWork.of_block({"elements": [], "wall": dict.fromkeys(wall, 0.0)}) == AtWork()
 
 
 DAMPING = {"swap": {"kind": "damping", "damping": 0.8, "acts": "in-contact"}}

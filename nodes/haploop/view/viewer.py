@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import asyncio
 import time as wall_clock
-from typing import Any
 
 from haploop.logger.log import LogError
 from haploop.protocol.clock_client import Aborted, Refused
-from haploop.view.draw.state import WAITING, event_lines, state
-from haploop.view.receive.backfill import Backfill
-from haploop.view.receive.clock_answers import ClockAnswers
+from haploop.protocol.wire import Message
+from haploop.view.draw.messages import WAITING, event_lines, state
+from haploop.view.receive.ingest import Backfill
 from haploop.view.receive.run_session import RunSession
-from haploop.view.receive.runs import Run, Runs
+from haploop.view.receive.runs import CommandFailed, Run, Runs
 
 # Updates a second: telemetry is received and shown so often.
 UPDATE_HZ = 31.5
@@ -38,7 +37,6 @@ class Viewer:
 
     def __init__(self, runs: Runs, first: str | None, from_start: bool) -> None:
         self._runs, self._first, self._from_start = runs, first, from_start
-        self._clock = ClockAnswers(runs)
         self._known: set[str] = set()
         self._updated = asyncio.Event()
         self.session: RunSession | None = None
@@ -58,8 +56,7 @@ class Viewer:
             if session is None:
                 continue
             self.session = session
-            self._clock.reset()
-            tasks = [asyncio.create_task(self._clock.keep_asking(session))]
+            tasks = [asyncio.create_task(session.clock.keep_asking())]
             if self._from_start:
                 tasks.append(asyncio.create_task(self._backfill(session)))
             try:
@@ -88,11 +85,14 @@ class Viewer:
             self._notify_pages()
             await asyncio.sleep(_IDLE_TURN_S)
 
+    def _is_live(self, run: Run) -> bool:
+        return run.id in [live.id for live in self._runs.live()]
+
     async def _join(self, run: Run) -> RunSession | None:
         """Joins a run as soon as it has begun; returns None if it is gone by then."""
-        while run.id in [live.id for live in self._runs.live()]:
+        while self._is_live(run):
             try:
-                return await asyncio.to_thread(RunSession, run)
+                return await asyncio.to_thread(RunSession, self._runs, run)
             except (Refused, Aborted):
                 await self._idle(_LOOK_S)
         return None
@@ -106,7 +106,7 @@ class Viewer:
             now = wall_clock.monotonic()
             if now >= gone_due:
                 gone_due = now + 1.0
-                if session.run.id not in [run.id for run in self._runs.live()]:
+                if not self._is_live(session.run):
                     self._end_vanished(session)
             due = max(due + 1.0 / UPDATE_HZ, now)
             await asyncio.sleep(due - now)
@@ -141,39 +141,47 @@ class Viewer:
             try:
                 await asyncio.to_thread(backfill.read)
             except (OSError, LogError):
-                return  # no log, or none that this process may read: what is received is all there is
+                if over:
+                    return  # no log, or none that this process may read: what is received is all there is
+                continue  # the logger may be about to make it
             if over or backfill.reaches(session.history):
                 session.prepend(backfill.history)
                 return
 
-    async def command(self, verb: str, arguments: dict[str, Any]) -> str:
+    async def command(self, verb: str, arguments: Message) -> str:
         """Sends a command to the run on show; returns its answer, a sentence.
 
         Raises:
             CommandFailed: the run refused it, is over, or there is none.
         """
-        return await self._clock.command(self.session, verb, arguments)
+        if self.session is None:
+            raise CommandFailed("No run is live; start one with haploop run SCENE.")
+        if self.session.outcome:
+            raise CommandFailed(f"Run {self.session.run.id} is over; nothing about it can change any more.")
+        return await self.session.clock.command(verb, arguments)
 
-    def state(self) -> dict[str, Any]:
+    def state(self) -> Message:
         """Returns the state message for pages."""
-        return state(self.session, self._clock.status, self._clock.options) if self.session else WAITING
+        return state(self.session) if self.session else WAITING
 
-    def events(self) -> dict[str, Any]:
+    def events(self) -> Message:
         """Returns the events message for pages."""
         session = self.session
-        lines = event_lines(session.events, session.time.control_rate, self._clock.options) if session else []
+        lines = event_lines(session.events, session.time.control_rate, session.clock.options) if session else []
         return {"type": "events", "events": lines}
 
     @property
     def state_version(self) -> tuple[object, ...]:
         """Returns a tuple that differs whenever the state has changed."""
-        session, status = self.session, self._clock.status
-        if session is None:
+        if (session := self.session) is None:
             return (None,)
-        at_work = (list(session.history.elements), dict(session.history.wall), session.delay_s)
-        return (session, session.outcome, session.summary is None, status.get("paused"), status.get("pace"), at_work)
+        status, at_work = session.clock.status, session.history.at_work
+        of_clock = status.get("paused"), status.get("pace")
+        return (session, session.outcome, session.summary is None, of_clock, at_work, session.delay_s)
 
     @property
     def events_version(self) -> tuple[object, ...]:
         """Returns a tuple that differs whenever there are new events."""
-        return (self.session, len(self.session.events) if self.session else 0, self._clock.options is None)
+        if (session := self.session) is None:
+            return (None,)
+        return (session, len(session.events), session.clock.options is None)

@@ -1,1 +1,1 @@
-"""Messages to the page: snapshots as tables packed into bytes, state and events as JSON."""
+"""What a page is sent: ``messages`` are how it is written, ``snapshot`` is what there is to draw."""

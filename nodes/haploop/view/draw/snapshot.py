@@ -4,19 +4,21 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
-from haploop.view.draw.frame import Column, Table, column, encode
-from haploop.view.draw.phase_plots import phase_plots
+from haploop.view.draw.messages import Column, Table, encode
 from haploop.view.store.history import TRUE, WALL_BOOK, History
 from haploop.view.store.lod_series import LodSeries
 
 # Rows per point of the page at most; beyond, the rows are summed up in so many buckets per point.
 _ROWS_A_POINT, _BUCKETS_A_POINT = 3.0, 0.75
-_ELEMENT = re.compile(r"element\.(\d+)\.(.*)")
+# Simulated time that the phase plots show, and their number of rows at most.
+_PHASE_S, _MOST_ROWS = 0.4, 8000
+_BODIES = {"x": "position", "tip_x": "position of the tip", "hand_x": "position of the hand"}
+_MEASURED = {"wall_position": Column("wall", "m", "wall"), "x_measured": Column("x_measured", "m", "measured position")}
 _MAKING = re.compile(r"-\d+$")
 
 
@@ -37,26 +39,27 @@ class Viewport:
 
 # Columns of one series by name, each with its header entry.
 Part = tuple[LodSeries, Mapping[str, Column]]
+# Whether a column is worth showing, from its values in the interval.
+IsShown = Callable[[Column, np.ndarray], bool]
 
 
 def snapshot(history: History, viewport: Viewport) -> bytes:
-    """Returns everything a page shows as bytes, packed by :mod:`haploop.view.draw.frame`.
+    """Returns everything a page shows as bytes, packed by :func:`haploop.view.draw.messages.encode`.
 
     Tables over time are position, force and energy; each row by row where the page has room for it, else as an envelope
-    whose rows are the two extremes of consecutive buckets in the order in which they came. Then come the
-    :mod:`haploop.view.draw.phase_plots`, row by row.
+    whose rows are the two extremes of consecutive buckets in the order in which they came. Then come the two phase
+    plots of Choi et al. 2022, row by row, from the last 0.4 s; a table without data is left out.
     """
     rate = history.time.control_rate
     from_tick, to_tick = _window(history, viewport)
     known_from = to_tick if history.first_tick is None else history.first_tick
     first, end = max(from_tick, known_from), min(to_tick, history.end_tick)
-    tables = []
+    tables: list[Table | None] = []
     if first < end:
         interval = _Interval(first, end, rate, viewport.points)
-        parts = (_position(history), _force(history), _energy(history))
-        tables = [table for part in parts if (table := interval.table(*part))]
-        tables += phase_plots(history, first, end)
-    return encode(from_tick / rate, to_tick / rate, tables)
+        tables = [interval.table(*made(history)) for made in (_position, _force, _energy)]
+        tables += _force_position(history, first, end), _momentum(history, first, end)
+    return encode(from_tick / rate, to_tick / rate, [table for table in tables if table])
 
 
 def _window(history: History, viewport: Viewport) -> tuple[int, int]:
@@ -76,34 +79,28 @@ class _Interval:
     def __init__(self, first: int, end: int, rate: int, points: int) -> None:
         self._first, self._end, self._rate, self._points = first, end, rate, points
 
-    def table(self, name: str, parts: list[Part], is_shown: Callable[[Column, np.ndarray], bool]) -> Table | None:
-        """Returns a table of columns of some series, the first of which has the most rows a tick; None for no column.
-
-        Args:
-            parts: per series, column -> its header entry.
-            is_shown: whether a column is worth showing, from its values in these ticks.
-        """
+    def table(self, name: str, parts: list[Part], is_shown: IsShown) -> Table | None:
+        """Returns a table of columns of some series, the first of which has the most rows a tick; None for no column."""
         all_series, most = [series for series, _ in parts], parts[0][0].rows_per_tick
         in_full = all(series.full_from_tick <= self._first for series in all_series)
         if in_full and (self._end - self._first) * most <= _ROWS_A_POINT * self._points:
             first, step = float(self._first), 1.0 / most
-            values = [self._rows(series, list(columns), most) for series, columns in parts]
+            rows = [series.rows(list(columns), self._first, self._end) for series, columns in parts]
+            values = [
+                np.repeat(of, most // series.rows_per_tick, axis=1) for of, series in zip(rows, all_series, strict=True)
+            ]
         else:
             in_full, bucket = False, self._bucket(all_series)
             begins = all_series[0].aligned(self._first, bucket)
             ends = self._end + (begins - self._end) % bucket
             values = [series.envelope(list(columns), begins, ends, bucket) for series, columns in parts]
             first, step = begins + bucket / 4.0, bucket / 2.0
-        table, columns = np.concatenate(values), [known for _, columns in parts for known in columns.values()]
-        shown = [i for i, known in enumerate(columns) if is_shown(known, table[i])]
+        rows, columns = np.concatenate(values), [known for _, columns in parts for known in columns.values()]
+        shown = [i for i, known in enumerate(columns) if is_shown(known, rows[i])]
         if not shown:
             return None
         columns = [columns[i] for i in shown]
-        return Table(name, first / self._rate, step / self._rate, columns, table[shown], envelope=not in_full)
-
-    def _rows(self, series: LodSeries, names: list[str], rows_per_tick: int) -> np.ndarray:
-        rows = series.rows(names, self._first, self._end)
-        return np.repeat(rows, rows_per_tick // series.rows_per_tick, axis=1)
+        return Table(name, first / self._rate, step / self._rate, columns, rows[shown], envelope=not in_full)
 
     def _bucket(self, all_series: list[LodSeries]) -> int:
         """Returns the ticks of a bucket: the least power of two that leaves no more buckets than there is room for."""
@@ -114,36 +111,39 @@ class _Interval:
         return bucket
 
 
-def _position(history: History) -> tuple[str, list[Part], Callable[[Column, np.ndarray], bool]]:
-    bodies = {"x": "position", "tip_x": "position of the tip", "hand_x": "position of the hand"}
-    moving = {name: column(name, "m", label) for name, label in bodies.items() if name in history.steps.names}
-    measured = {
-        "wall_position": column("wall", "m", "wall"),
-        "x_measured": column("x_measured", "m", "measured position"),
-    }
-    return "position", [(history.steps, moving), (history.ticks, measured)], _always
+def _position(history: History) -> tuple[str, list[Part], IsShown]:
+    moving = {name: Column(name, "m", label) for name, label in _BODIES.items() if name in history.steps.names}
+    return "position", [(history.steps, moving), (history.ticks, _MEASURED)], lambda *_: True
 
 
-def _force(history: History) -> tuple[str, list[Part], Callable[[Column, np.ndarray], bool]]:
+def _force(history: History) -> tuple[str, list[Part], IsShown]:
     """Lists wall, elements by place and total, each shown where it has values in the interval."""
-    columns = {"wall": column("wall", "N", "wall")} if history.inward else {}
-    elements = [(match, name) for name in history.ticks.names if (match := _ELEMENT.fullmatch(name))]
-    for match, name in sorted(elements, key=lambda element: int(element[0][1])):
-        columns[name] = column(name, "N", f"element {match[1]}: {match[2]}")
-    columns["total"] = column("total", "N", "total")
-    return "force", [(history.ticks, columns)], _is_known
+    columns = {"wall": Column("wall", "N", "wall")} if history.at_work.wall else {}
+    for name, place, kind in sorted(_by_place(history, "element"), key=lambda element: int(element[1])):
+        columns[name] = Column(name, "N", f"element {place}: {kind}")
+    columns["total"] = Column("total", "N", "total")
+    return "force", [(history.ticks, columns)], lambda _, values: bool(np.isfinite(values).any())
 
 
-def _energy(history: History) -> tuple[str, list[Part], Callable[[Column, np.ndarray], bool]]:
+def _by_place(history: History, what: str) -> Iterator[tuple[str, str, str]]:
+    """Yields name, place and kind of the columns ``<what>.<place>.<kind>``."""
+    for name in history.ticks.names:
+        if name.startswith(f"{what}."):
+            _, place, kind = name.split(".", 2)
+            yield name, place, kind
+
+
+def _energy(history: History) -> tuple[str, list[Part], IsShown]:
     """Lists the books of the wall, of the elements at work, and of those whose energy changes in the interval."""
-    columns = {WALL_BOOK: column("wall", "J", "wall")} if history.inward else {}
+    columns = {WALL_BOOK: Column("wall", "J", "wall")} if history.at_work.wall else {}
     books = [name.removesuffix(TRUE) for name in history.energy.names if name.endswith(TRUE) and name != WALL_BOOK]
-    columns |= {f"{name}{TRUE}": column(name, "J", name) for name in books}
-    columns["residual"] = column("residual", "J", "residual")
+    columns |= {f"{name}{TRUE}": Column(name, "J", name) for name in books}
+    columns["residual"] = Column("residual", "J", "residual")
     always = {"wall", "residual", *_books_at_work(history, books)}
 
     def is_shown(known: Column, values: np.ndarray) -> bool:
-        return _is_known(known, values) and (known["name"] in always or _changes(values))
+        finite = values[np.isfinite(values)]
+        return bool(len(finite)) and (known.name in always or bool(finite.min() < finite.max()))
 
     return "energy", [(history.energy, columns)], is_shown
 
@@ -151,19 +151,55 @@ def _energy(history: History) -> tuple[str, list[Part], Callable[[Column, np.nda
 def _books_at_work(history: History, books: list[str]) -> list[str]:
     """Returns the newest books of each kind, as many as elements of the kind are at work; the others are closed."""
     found: list[str] = []
-    for element in history.elements:
-        found += [name for name in books if name not in found and _MAKING.sub("", name) == element["kind"]][-1:]
+    for element in history.at_work.elements:
+        found += [name for name in books if name not in found and _MAKING.sub("", name) == element.name][-1:]
     return found
 
 
-def _always(_: Column, values: np.ndarray) -> bool:
-    return True
+def _last(history: History, series: LodSeries, first: int, end: int) -> tuple[int, int]:
+    """Returns the ticks of a phase plot, the last that a series holds in full, (first, end); (0, 0) for none."""
+    end = min(end, series.end_tick)
+    first = max(first, series.full_from_tick, end - round(_PHASE_S * history.time.control_rate))
+    return (first, end) if first < end else (0, 0)
 
 
-def _is_known(_: Column, values: np.ndarray) -> bool:
-    return bool(np.isfinite(values).any())
+def _force_position(history: History, first: int, end: int) -> Table | None:
+    """Returns penetration (m, positive inside) and force out of the wall (N) at every plant step (Fig. 3).
+
+    The force is the one applied, total of wall and elements, held while the position moves on. Where it runs
+    counter-clockwise, the area within is energy given to the device. ``stiffness`` (N/m) is that of the ideal spring.
+    """
+    first, end = _last(history, history.steps, first, end)
+    inward = history.at_work.into_wall
+    if first == end or not inward:
+        return None
+    n, time = history.time.steps_per_tick, history.time
+    x, force = history.steps.rows(("x", "force"), first, end)
+    position, stiffness = history.ticks.rows(("wall_position", "wall_stiffness"), first, end)
+    depth = ((x.reshape(-1, n) - position[:, None]) * inward).ravel()
+    each = n if len(x) > _MOST_ROWS else 1
+    values = np.stack([depth, -force * inward])[:, ::each]
+    columns = [Column("penetration", "m", "penetration"), Column("force", "N", "force out of the wall")]
+    known = stiffness[np.isfinite(stiffness)]
+    more = {"stiffness": float(known[-1]) if len(known) else None}
+    return Table("loop", first / time.control_rate, each / time.plant_rate, columns, values, more=more)
 
 
-def _changes(values: np.ndarray) -> bool:
-    known = values[np.isfinite(values)]
-    return bool(len(known)) and bool(known.min() < known.max())
+def _momentum(history: History, first: int, end: int) -> Table | None:
+    """Returns velocity v[k-1] and momentum m[k-1] v[k] of every virtual inertia at ticks (eq. 8 and Fig. 4).
+
+    m[k] is the mass while the inertia is at work and 0 while it is not. The rectangles of width v[k-1] - v[k-2] and
+    height m v[k] are the energy it takes in a step, so clockwise is dissipation.
+    """
+    series, rate = history.ticks, history.time.control_rate
+    first, end = _last(history, series, first, end)
+    inertias = [*_by_place(history, "mass")]
+    if not inertias or end - first < 2:
+        return None
+    v, *masses = series.rows(("v", *(name for name, _, _ in inertias)), first, end)
+    columns, values = [Column("v", "m/s", "velocity")], [v[:-1]]
+    for (_, place, kind), mass in zip(inertias, masses, strict=True):
+        if np.isfinite(mass).any():
+            columns.append(Column(f"p.{place}", "kg m/s", f"element {place}: {kind}"))
+            values.append(mass[:-1] * v[1:])
+    return Table("momentum", (first + 1) / rate, 1.0 / rate, columns, np.stack(values)) if len(values) > 1 else None

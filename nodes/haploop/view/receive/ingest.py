@@ -1,52 +1,62 @@
-"""Ingestion of telemetry into a history: blocks without a gap between them are taken at once."""
+"""What fills a history: telemetry as it comes, and the log of what came before, read while the run goes on."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from typing import Any
+from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
 
 import numpy as np
 
-from haploop.protocol.wire import Frame
-from haploop.view.store.history import TRUE, History
+from haploop.logger.log.recording import Table
+from haploop.logger.log.stream import Batch, LogStream
+from haploop.protocol.changes import Event, Span, changes_of, spans
+from haploop.protocol.scene.scene import Scene
+from haploop.protocol.telemetry import Block
+from haploop.protocol.ticks import Timebase
+from haploop.protocol.wire import Frame, Message
+from haploop.view.store.history import TRUE, AtWork, History
 
 # Columns from which positions and forces of the plant are made, and those of the controller that are shown.
 _OF_PLANT = ("x", "v", "force", "actuator", "cable.stretch", "cable.rate", "grip.stretch", "grip.rate")
 _OF_CONTROLLER = ("x", "v", "wall", "total")
+_LOGGED_POSITIONS = ("x", "tip_x", "hand_x")
 _STATE_BYTES = 8
 
 
-def ingest(history: History, frames: Sequence[tuple[str, Frame]]) -> dict[str, Any]:
-    """Appends the blocks of these messages to a history; returns the newest status of the logger, {} for none."""
-    blocks: dict[str, list[dict[str, Any]]] = {}
-    status: dict[str, Any] = {}
-    ends = [frame.fields[0] for role, frame in frames if (role, frame.name) == ("plant", "END")]
+def ingest(history: History, frames: Sequence[tuple[str, Frame]]) -> Message:
+    """Appends the blocks of these messages to a history; returns the newest status of the logger, {} for none.
+
+    Blocks without a gap between them are taken at once.
+    """
+    blocks: dict[str, list[Block]] = {}
+    status: Message = {}
     for role, frame in frames:
         if frame.name == "STATE":
-            history.begin(role, frame.fields[0])
-            status = _note_state(history, role, frame.fields[1]) or status
+            status = _note_state(history, role, *frame.fields) or status
         elif frame.name.endswith("_BLOCK"):
             blocks.setdefault(frame.name, []).append(block := frame.as_dict())
             status = block.get("status") or status
-    for name, take in _BY_MESSAGE.items():
-        for group in _contiguous(blocks.get(name, [])):
-            take(history, group)
-    for tick in ends:
-        history.end(tick)
+    for name, take in (("PLANT_BLOCK", _plant), ("CONTROLLER_BLOCK", _controller), ("ENERGY_BLOCK", _energy)):
+        for run in _contiguous(blocks.get(name, [])):
+            take(history, run)
+    for role, frame in frames:
+        if (role, frame.name) == ("plant", "END"):
+            history.end(frame.fields[0])
     return status
 
 
-def _note_state(history: History, role: str, state: dict[str, Any]) -> dict[str, Any]:
-    """Notes elements and wall from a STATE, all there is of a run that stands still; returns the logger's status."""
+def _note_state(history: History, role: str, tick: int, state: Message) -> Message:
+    """Notes where a stream begins and what is at work, all there is of a run that stands still; returns the status."""
+    series = {"plant": history.steps, "controller": history.ticks, "logger": history.energy}[role]
+    series.begin(tick)
     if role == "controller" and state["history"]:
-        block = state["history"][-1]
-        history.set_active(block["elements"], block["wall"])
+        history.at_work = AtWork.of_block(state["history"][-1])
     return state if role == "logger" else {}
 
 
-def _contiguous(blocks: list[dict[str, Any]]) -> list[list[dict[str, Any]]]:
+def _contiguous(blocks: Iterable[Block]) -> list[list[Block]]:
     """Groups blocks that follow each other without a gap and have the same columns, elements and wall."""
-    runs: list[list[dict[str, Any]]] = []
+    runs: list[list[Block]] = []
     for block in blocks:
         if runs and _follows(runs[-1][-1], block):
             runs[-1].append(block)
@@ -55,56 +65,112 @@ def _contiguous(blocks: list[dict[str, Any]]) -> list[list[dict[str, Any]]]:
     return runs
 
 
-def _follows(one: dict[str, Any], other: dict[str, Any]) -> bool:
-    return (
-        other["from_tick"] == one["from_tick"] + one["ticks"]
-        and other["columns"].keys() == one["columns"].keys()
-        and other.get("elements") == one.get("elements")
-        and other.get("wall") == one.get("wall")
+def _follows(one: Block, other: Block) -> bool:
+    alike = one["columns"].keys() == other["columns"].keys() and all(
+        one.get(name) == other.get(name) for name in ("elements", "wall")
     )
+    return alike and other["from_tick"] == one["from_tick"] + one["ticks"]
 
 
-def _joined(run: list[dict[str, Any]], names: Iterable[str]) -> dict[str, np.ndarray]:
-    return {name: np.frombuffer(b"".join([block["columns"][name] for block in run]), "<f8") for name in names}
-
-
-def _plant(history: History, run: list[dict[str, Any]]) -> None:
-    """Joins blocks of the plant; two neighbours share the state between them, so all but the last leave it out."""
+def _joined(run: list[Block], names: Iterable[str], shared: int = 0) -> dict[str, np.ndarray]:
+    """Joins columns of blocks, but for the last bytes of all but the last, which a neighbour shares."""
     columns = {}
-    for name in _OF_PLANT:
-        if name in run[0]["columns"]:
-            parts = [block["columns"][name] for block in run]
-            parts[:-1] = [part[:-_STATE_BYTES] for part in parts[:-1]]
-            columns[name] = np.frombuffer(b"".join(parts), "<f8")
-    history.append_plant_block(run[0]["from_tick"], columns)
+    for name in names:
+        *parts, last = [block["columns"][name] for block in run]
+        columns[name] = np.frombuffer(b"".join([*(part[: len(part) - shared] for part in parts), last]), "<f8")
+    return columns
 
 
-def _controller(history: History, run: list[dict[str, Any]]) -> None:
-    elements = run[0]["elements"]
-    names = [*_OF_CONTROLLER, *(f"dissipation.{place}" for place in range(len(elements)))]
-    history.append_ticks(run[0]["from_tick"], _joined(run, names), elements, run[0]["wall"])
+def _plant(history: History, run: list[Block]) -> None:
+    names = [name for name in _OF_PLANT if name in run[0]["columns"]]
+    history.append_plant_block(run[0]["from_tick"], _joined(run, names, shared=_STATE_BYTES))
 
 
-def _energy(history: History, run: list[dict[str, Any]]) -> None:
-    names = [name for name in run[0]["columns"] if name == "residual" or name.endswith(TRUE)]
-    history.append_energy(run[0]["from_tick"], _joined(run, names))
+def _controller(history: History, run: list[Block]) -> None:
+    names = [*_OF_CONTROLLER, *(f"dissipation.{place}" for place in range(len(run[0]["elements"])))]
+    history.append_ticks(run[0]["from_tick"], _joined(run, names), AtWork.of_block(run[0]))
 
 
-_BY_MESSAGE = {"PLANT_BLOCK": _plant, "CONTROLLER_BLOCK": _controller, "ENERGY_BLOCK": _energy}
+def _energy(history: History, run: list[Block]) -> None:
+    history.append_energy(run[0]["from_tick"], _joined(run, filter(_is_shown, run[0]["columns"])))
 
 
-def elements_as_telemetry(scene: dict[str, Any]) -> list[dict[str, Any]]:
-    """Returns kind and parameters of each element of a resolved scene, as CONTROLLER_BLOCK has them."""
-    return [
-        {"kind": table["kind"], "parameters": {name: value for name, value in table.items() if name != "kind"}}
-        for table in scene.get("dissipation", [])
-    ]
+def _is_shown(book: str) -> bool:
+    return book == "residual" or book.endswith(TRUE)
 
 
-def wall_as_telemetry(scene: dict[str, Any]) -> dict[str, float]:
-    """Returns position in m, stiffness in N/m and direction into the wall, all 0 without one, as CONTROLLER_BLOCK."""
-    if "wall" not in scene:
-        return {"position": 0.0, "stiffness": 0.0, "into_wall": 0.0}
-    wall = scene["wall"]
-    into_wall = 1.0 if wall.get("occupies") == "above" else -1.0
-    return {"position": wall["position"], "stiffness": wall["stiffness"], "into_wall": into_wall}
+class Backfill:
+    """Fills a history from the log of a run.
+
+    Args:
+        out: the run's directory.
+        scene, time: the resolved scene and its integers.
+        events: (tick, event) in order; may grow while the log does.
+
+    Attributes:
+        history: what was read so far.
+    """
+
+    def __init__(self, out: Path, scene: Scene, time: Timebase, events: Sequence[tuple[int, Event]]) -> None:
+        self._out, self._scene, self._time, self._events = out, scene, time, events
+        self._log: LogStream | None = None
+        self._known_events = -1
+        self._at_work: list[Span] = []
+        self.history = History(time, 0)
+
+    def read(self) -> None:
+        """Reads on, up to the present end of the log.
+
+        Raises:
+            FileNotFoundError, LogError: there is no log, or none that can be read.
+        """
+        self._log = self._log or LogStream(self._out, topics=("/plant", "/controller", "/energy"))
+        for batch in self._log:
+            self._take(batch)
+
+    def _take(self, batch: Batch) -> None:
+        rows = batch.rows
+        if not isinstance(rows, Table) or not len(batch.log_times_ns):
+            return
+        if batch.topic == "/plant":
+            self._plant(rows)
+            return
+        tick = round(float(rows["timestamp"][0]) * self._time.control_rate)
+        if batch.topic == "/energy":
+            self.history.append_energy(tick, {name: rows[name] for name in filter(_is_shown, rows)})
+            return
+        for first, end, scene in self._spans(tick, tick + len(rows["timestamp"])):
+            columns = {name: column[first - tick : end - tick] for name, column in rows.items()}
+            self.history.append_ticks(first, columns, AtWork.of_scene(scene))
+
+    def _plant(self, rows: Table) -> None:
+        """Takes the steps of whole ticks, after which the end state of the run may follow."""
+        n = self._time.steps_per_tick
+        columns = {name: rows[name] for name in _LOGGED_POSITIONS if name in rows}
+        columns["force"] = rows["actuator" if "actuator" in rows else "force"]
+        tick = round(float(rows["t"][0]) * self._time.plant_rate) // n
+        whole = len(rows["t"]) // n * n
+        if whole:
+            self.history.append_steps(tick, {name: column[:whole] for name, column in columns.items()})
+        if whole < len(rows["t"]):
+            self.history.end(tick + whole // n, {name: column[whole:] for name, column in columns.items()})
+
+    def _spans(self, tick: int, end: int) -> Iterator[tuple[int, int, Scene]]:
+        """Yields the scenes at work within some ticks: (from, to, scene)."""
+        if len(self._events) != self._known_events:
+            self._known_events = len(self._events)
+            self._at_work = spans(self._scene, changes_of(self._events))
+        for span in self._at_work:
+            first, last = max(tick, span.from_tick), int(min(end, span.to_tick))
+            if first < last:
+                yield first, last, span.scene
+
+    def reaches(self, live: History) -> bool:
+        """Tells whether the log has been read up to where a live history begins and still holds every row."""
+        pairs = zip(self.history.all_series, live.all_series, strict=True)
+        every_step = self._scene.run.log == "steps"
+        return all(
+            its.first_tick is not None and own.end_tick >= max(its.first_tick, its.full_from_tick)
+            for own, its in pairs
+            if every_step or own is not self.history.steps
+        )

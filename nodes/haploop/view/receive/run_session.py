@@ -7,17 +7,19 @@ import json
 import time as wall_clock
 from collections import deque
 from pathlib import Path
-from typing import Any
 
 import zmq
 
-from haploop.protocol.changes import at_work, changes_of
+from haploop.logger.summary import Summary
+from haploop.protocol.changes import Event, at_work, changes_of
 from haploop.protocol.clock_client import Aborted, Refused
 from haploop.protocol.observer import Observer
+from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import DELAY, Timebase
-from haploop.view.receive.ingest import elements_as_telemetry, ingest, wall_as_telemetry
-from haploop.view.receive.runs import Run
-from haploop.view.store.history import History
+from haploop.protocol.wire import Message
+from haploop.view.receive.ingest import ingest
+from haploop.view.receive.runs import ClockAnswers, Run, Runs
+from haploop.view.store.history import AtWork, History
 
 ROLE = "view"
 _STREAMS = ("plant", "controller", "logger")
@@ -30,6 +32,7 @@ class RunSession:
 
     Attributes:
         run: the run that was joined.
+        clock: what its clock answers.
         scene, time, out: the resolved scene, its integers, the run's directory.
         history: telemetry received, and what was logged before once ``prepend`` has been called.
         status: newest status of the logger.
@@ -37,12 +40,13 @@ class RunSession:
         delay_s: the round-trip delay at present.
         outcome: "" while the run goes on, then "ended" or "failed"; ``why`` is a sentence, if there is one.
         summary: of the run, once it is there.
+        skipped_ticks: how many never came.
 
     Raises:
         Refused, Aborted: the run did not let this viewer in.
     """
 
-    def __init__(self, run: Run) -> None:
+    def __init__(self, runs: Runs, run: Run) -> None:
         self.run = run
         self._context = run.make_context()
         try:
@@ -51,16 +55,17 @@ class RunSession:
             self._context.destroy(linger=0)
             raise
         welcome = self._observer.welcome
-        self.scene: dict[str, Any] = welcome["scene"]
+        self.scene = Scene.from_dict(welcome["scene"])
         self.time = Timebase(**welcome["timebase"])
         self.out = Path(welcome["context"]["out"])
-        window = self.scene["run"]["window_blocks"] * self.scene["run"]["block_ticks"]
+        window = self.scene.run.window_blocks * self.scene.run.block_ticks
         self.history = History(self.time, max(0, welcome["granted"] - window))
-        self.status: dict[str, Any] = {}
-        self.events: list[tuple[int, dict[str, Any]]] = []
-        self.delay_s: float = self.scene["clock"]["round_trip_delay"]
+        self.status: Message = {}
+        self.events: list[tuple[int, Event]] = []
+        self.clock = ClockAnswers(runs, run, self.events)
+        self.delay_s = self.scene.clock.round_trip_delay
         self.outcome = self.why = ""
-        self.summary: dict[str, Any] | None = None
+        self.summary: Summary | None = None
         self.skipped_ticks = 0
         self._seen: deque[tuple[float, int]] = deque()
 
@@ -75,9 +80,8 @@ class RunSession:
             return
         self.status |= ingest(self.history, frames)
         self._note_events()
-        if not self.history.wall:
-            now = at_work(self.scene, changes_of(self.events))
-            self.history.set_active(elements_as_telemetry(now), wall_as_telemetry(now))
+        if self.history.at_work == AtWork():
+            self.history.at_work = AtWork.of_scene(at_work(self.scene, changes_of(self.events)))
         self.skipped_ticks = sum(self._observer.skipped.values())
         self._count_time()
         if "logger" in self._observer.ended:
@@ -120,13 +124,10 @@ class RunSession:
 
     def read_summary(self) -> None:
         """Reads the run's summary if it is there; a run that failed may still be writing it."""
-        try:
-            summary = json.loads((self.out / "summary.json").read_text(encoding="utf-8"))
-        except (OSError, ValueError):
-            return
-        self.summary = summary
-        self.outcome = "failed" if summary.get("ended") == "failed" else self.outcome
-        self.why = self.why or summary.get("why", "")
+        with contextlib.suppress(OSError, ValueError):
+            self.summary = summary = json.loads((self.out / "summary.json").read_text(encoding="utf-8"))
+            self.outcome = "failed" if summary.get("ended") == "failed" else self.outcome
+            self.why = self.why or summary.get("why", "")
 
     @property
     def is_complete(self) -> bool:

@@ -1,11 +1,20 @@
-"""Interfaces through which a viewer finds and steers live runs; implemented by whoever starts it."""
+"""Live runs: the interfaces through which a viewer finds and steers them, and what their clock answers."""
 
 from __future__ import annotations
 
+import asyncio
+import contextlib
 from collections.abc import Sequence
 from typing import Any, Protocol
 
+from haploop.protocol.changes import Event
 from haploop.protocol.transport import SecureContext
+from haploop.protocol.wire import Message
+
+# How often the clock is asked for its status.
+_ASK_S = 0.5
+# Kinds of events after which the options may be others.
+_CHANGES = ("swap", "set", "refused")
 
 
 class CommandFailed(Exception):
@@ -25,32 +34,68 @@ class Run(Protocol):
         """Address of the clock."""
         ...
 
-    @property
-    def title(self) -> str:
-        """Title of the scene."""
-        ...
-
-    @property
-    def out(self) -> str:
-        """Directory of the run's log and summary."""
-        ...
-
     def make_context(self) -> SecureContext:
         """Makes a context whose sockets may connect to the run."""
         ...
 
 
 class Runs(Protocol):
-    """All runs of this user."""
+    """All runs of this user; implemented by whoever starts a viewer."""
 
     def live(self) -> Sequence[Run]:
         """Returns the runs that live now, the oldest first."""
         ...
 
-    def ask(self, run: Any, verb: str, arguments: dict[str, Any]) -> tuple[str, dict[str, Any]]:
+    def ask(self, run: Any, verb: str, arguments: Message) -> tuple[str, Message]:
         """Sends a command to a run; returns its answer, a sentence and data.
 
         Raises:
             CommandFailed: the run refused, or does not answer.
         """
         ...
+
+
+class ClockAnswers:
+    """Keeps the latest answers of the clock of a run, asked for now and then beside the task that draws.
+
+    Args:
+        runs, run: how to ask, and whom.
+        events: of the run, (tick, event); may grow meanwhile.
+
+    Attributes:
+        status: the answer to ``status``, {} before the first.
+        options: the answer to ``options``, what can be changed; None before the first.
+    """
+
+    def __init__(self, runs: Runs, run: Run, events: Sequence[tuple[int, Event]]) -> None:
+        self._runs, self._run, self._events = runs, run, events
+        self._ask_now = asyncio.Event()
+        self.status: Message = {}
+        self.options: Message | None = None
+
+    async def _ask(self, verb: str, arguments: Message) -> tuple[str, Message]:
+        return await asyncio.to_thread(self._runs.ask, self._run, verb, arguments)
+
+    async def keep_asking(self) -> None:
+        """Asks every 0.5 s and at once after a command, until it is cancelled."""
+        seen = -1
+        while True:
+            changes = sum(any(kind in event for kind in _CHANGES) for _, event in self._events)
+            with contextlib.suppress(CommandFailed):  # it is about to end
+                _, self.status = await self._ask("status", {})
+                if changes != seen:
+                    _, self.options = await self._ask("options", {})
+                    seen = changes
+            self._ask_now.clear()
+            with contextlib.suppress(TimeoutError):
+                await asyncio.wait_for(self._ask_now.wait(), _ASK_S)
+
+    async def command(self, verb: str, arguments: Message) -> str:
+        """Sends a command to the run; returns its answer, a sentence.
+
+        Raises:
+            CommandFailed: the run refused it.
+        """
+        text, _ = await self._ask(verb, arguments)
+        self._ask_now.set()
+        return text

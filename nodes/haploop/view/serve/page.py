@@ -5,21 +5,26 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import json
+import math
 import time as wall_clock
-from typing import Any
+from dataclasses import dataclass
 
 from aiohttp import WSCloseCode, WSMsgType, web
 
-from haploop.view.draw.snapshot import snapshot
+from haploop.protocol.wire import Message
+from haploop.view.draw.snapshot import Viewport, snapshot
 from haploop.view.receive.runs import CommandFailed
 from haploop.view.serve.guard import Guard
-from haploop.view.serve.messages import VERBS, BadMessage, Command, Viewport, parse_message
 from haploop.view.viewer import Viewer
 
 # The state goes out at least so often.
 _STATE_S = 0.4
 # A close frame has no room for a longer reason, in bytes.
 _LONGEST_REASON = 120
+_FEWEST_POINTS, _MOST_POINTS = 50, 8000
+_LONGEST_S = 1e9
+# Commands that a page may send; the clock answers more.
+_VERBS = ("pause", "resume", "step", "stop", "swap", "set", "pace")
 
 
 class Page:
@@ -49,8 +54,6 @@ class Page:
             with contextlib.suppress(asyncio.CancelledError):
                 await showing
 
-    # In
-
     async def _take(self, message: Viewport | Command) -> None:
         if isinstance(message, Viewport):
             self._viewport = message
@@ -64,11 +67,9 @@ class Page:
     async def _carry_out(self, command: Command) -> str:
         if not self._guard.may_steer(command.token):
             raise CommandFailed("This page only watches: open the link that haploop view printed to steer.")
-        if command.verb not in VERBS:
-            raise CommandFailed(f"{command.verb[:40]!r} is no command; these are: {', '.join(VERBS)}.")
+        if command.verb not in _VERBS:
+            raise CommandFailed(f"{command.verb[:40]!r} is no command; these are: {', '.join(_VERBS)}.")
         return await self._viewer.command(command.verb, command.arguments)
-
-    # Out
 
     async def _send_updates(self) -> None:
         """Sends what is new after every update; a page that does not read blocks this task alone."""
@@ -93,13 +94,66 @@ class Page:
             await self._send(viewer.state())
 
     async def _send_snapshot(self) -> None:
-        session = self._viewer.session
-        if session is None:
+        if (session := self._viewer.session) is None:
             return
         showing = (session.history, session.history.version, self._viewport)
         if showing != self._sent_snapshot:
             self._sent_snapshot = showing
             await self._socket.send_bytes(snapshot(session.history, self._viewport))
 
-    async def _send(self, message: dict[str, Any]) -> None:
+    async def _send(self, message: Message) -> None:
         await self._socket.send_str(json.dumps(message, allow_nan=False))
+
+
+class BadMessage(ValueError):
+    """Raised where a page sent no valid message; the text says what was expected."""
+
+
+@dataclass(frozen=True)
+class Command:
+    """A command of a page: number of the message, token, verb and arguments."""
+
+    id: int
+    token: str
+    verb: str
+    arguments: Message
+
+
+def parse_message(text: str) -> Viewport | Command:
+    """Returns the message in a text: ``watch`` as a viewport, ``command`` as a command.
+
+    Raises:
+        BadMessage: it is neither of the two.
+    """
+    try:
+        message = json.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise BadMessage(f"A message must be JSON: {error}.") from error
+    match message:
+        case {"type": "watch"}:
+            return _watch(message)
+        case {"type": "command", "id": int(number), "verb": str(verb)}:
+            token, arguments = message.get("token"), message.get("arguments", {})
+            if isinstance(arguments, dict):
+                return Command(number, token if isinstance(token, str) else "", verb, arguments)
+    if isinstance(message, dict) and message.get("type") == "command":
+        raise BadMessage("A command must have a whole number as id, a verb, and a table of arguments.")
+    raise BadMessage("A message must be a JSON object whose type is watch or command.")
+
+
+def _watch(message: Message) -> Viewport:
+    span_s, end_s = (_seconds(message.get(key), key) for key in ("span_s", "end_s"))
+    points = message.get("points", Viewport.points)
+    if span_s is not None and span_s <= 0.0:
+        raise BadMessage("watch.span_s must be above 0, or null.")
+    if isinstance(points, bool) or not isinstance(points, int | float) or not math.isfinite(points):
+        raise BadMessage("watch.points must be a number.")
+    return Viewport(span_s, int(min(max(points, _FEWEST_POINTS), _MOST_POINTS)), end_s)
+
+
+def _seconds(value: object, key: str) -> float | None:
+    if value is None:
+        return None
+    if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 <= value <= _LONGEST_S:
+        raise BadMessage(f"watch.{key} must be a number of seconds from 0 to {_LONGEST_S:g}, or null.")
+    return float(value)

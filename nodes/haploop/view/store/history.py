@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Mapping
+from typing import NamedTuple
 
 import numpy as np
 
 from haploop.logger.log.channels import motion_columns
+from haploop.protocol.scene.scene import ElementTable, Scene, Wall
+from haploop.protocol.telemetry import Block
 from haploop.protocol.ticks import Timebase
 from haploop.view.store.lod_series import LodSeries
 
@@ -17,6 +19,34 @@ _RECENT_TICKS, _RECENT_STEPS, _LEAST_TICKS = 16_384, 131_072, 512
 # Books of elements that are kept, the newest: every change of a parameter opens one.
 _MOST_BOOKS = 16
 TRUE, WALL_BOOK = ".true", "wall.true"
+
+
+class AtWork(NamedTuple):
+    """The elements by place, and the wall, that are at work; none before anything is known."""
+
+    elements: tuple[ElementTable, ...] = ()
+    wall: Wall | None = None
+
+    @classmethod
+    def of_scene(cls, scene: Scene) -> AtWork:
+        """Returns those of a scene."""
+        return cls(scene.dissipation, scene.wall)
+
+    @classmethod
+    def of_block(cls, block: Block) -> AtWork:
+        """Returns those of a CONTROLLER_BLOCK."""
+        elements = [
+            ElementTable.from_dict({"kind": element["kind"], **element["parameters"]}) for element in block["elements"]
+        ]
+        wall, into_wall = block["wall"], block["wall"]["into_wall"]
+        occupies = "above" if into_wall > 0.0 else "below"
+        there_is = Wall(position=wall["position"], stiffness=wall["stiffness"], occupies=occupies)
+        return cls(tuple(elements), there_is if into_wall else None)
+
+    @property
+    def into_wall(self) -> float:
+        """Returns the direction that leads into the wall, +1.0 or -1.0; 0.0 without one."""
+        return 0.0 if self.wall is None else 1.0 if self.wall.occupies == "above" else -1.0
 
 
 class History:
@@ -32,8 +62,8 @@ class History:
             their total, the wall's position and stiffness (NaN without one), and the mass of each virtual inertia while
             it is at work, else 0 (``mass.<place>.<kind>``).
         energy: at ticks: the true book of the wall and of each element (``<name>.true``), and the residual.
-        elements, wall: those of the newest ticks of the controller.
-        into_wall: direction that leads into the wall, +1.0 or -1.0; 0.0 without one.
+        all_series: these three.
+        at_work: at the newest ticks of the controller.
         stop_tick: tick at which the plant has ended; None before.
         version: changes with every row that is appended.
     """
@@ -44,17 +74,11 @@ class History:
         self.steps = LodSeries(time.steps_per_tick, recent, origin)
         self.ticks = LodSeries(1, _RECENT_TICKS, origin)
         self.energy = LodSeries(1, _RECENT_TICKS, origin)
-        self.elements: Sequence[Mapping[str, Any]] = ()
-        self.wall: Mapping[str, float] = {}
-        self.inward = 0.0
+        self.all_series = self.steps, self.ticks, self.energy
+        self.at_work = AtWork()
         self.stop_tick: int | None = None
         self.version = 0
         self._end_state: dict[str, np.ndarray] = {}
-
-    @property
-    def all_series(self) -> tuple[LodSeries, LodSeries, LodSeries]:
-        """Returns steps, ticks and energy."""
-        return self.steps, self.ticks, self.energy
 
     @property
     def first_tick(self) -> int | None:
@@ -66,18 +90,14 @@ class History:
         """Returns the tick from which on nothing is known."""
         return max(self.first_tick or 0, *(series.end_tick for series in self.all_series))
 
-    def begin(self, role: str, tick: int) -> None:
-        """Notes that the telemetry of a node begins at ``tick``."""
-        {"plant": self.steps, "controller": self.ticks, "logger": self.energy}[role].begin(tick)
-
     def _append(self, series: LodSeries, tick: int, columns: Columns) -> None:
         if tick + len(next(iter(columns.values()))) // series.rows_per_tick > series.end_tick:
             self.version += 1
             series.append(tick, columns)
 
-    def append_plant_block(self, tick: int, columns: Columns) -> None:
+    def append_plant_block(self, tick: int, columns: dict[str, np.ndarray]) -> None:
         """Appends telemetry of the plant: ``ticks * n + 1`` rows, the end state included."""
-        motion = motion_columns(dict(columns))
+        motion = motion_columns(columns)
         kept = {name: motion[name] for name in ("x", "tip_x", "hand_x") if name in motion}
         kept["force"] = motion.get("actuator", motion["force"])
         self.append_steps(tick, {name: column[:-1] for name, column in kept.items()})
@@ -95,33 +115,23 @@ class History:
             beyond = np.full(self.time.steps_per_tick - 1, np.nan)
             self.append_steps(tick, {name: np.concatenate([value, beyond]) for name, value in state.items()})
 
-    def append_ticks(
-        self, tick: int, columns: Columns, elements: Sequence[Mapping[str, Any]], wall: Mapping[str, float]
-    ) -> None:
-        """Appends rows of the controller during which the elements and the wall stayed the same.
+    def append_ticks(self, tick: int, columns: Columns, at_work: AtWork) -> None:
+        """Appends rows of the controller, x, v, wall, total and ``dissipation.<place>``, during which this was at work.
 
-        Args:
-            tick: the first of them.
-            columns: x, v, wall, total and ``dissipation.<place>``.
-            elements: kind and parameters by place.
-            wall: position, stiffness and into_wall, which is 0 without one.
+        An element without a column has not come yet.
         """
-        rows = len(columns["x"])
+        self.at_work, wall = at_work, at_work.wall
         kept = {"x_measured": columns["x"], "v": columns["v"], "wall": columns["wall"], "total": columns["total"]}
-        for name in ("position", "stiffness"):
-            kept[f"wall_{name}"] = np.full(rows, wall[name] if wall["into_wall"] else np.nan)
-        for place, element in enumerate(elements):
-            force = columns[f"dissipation.{place}"]
-            kept[f"element.{place}.{element['kind']}"] = force
-            if "inertia" in element["kind"] and "mass" in element["parameters"]:
-                mass = element["parameters"]["mass"]
-                kept[f"mass.{place}.{element['kind']}"] = np.where(force != 0.0, mass, 0.0)
-        self.set_active(elements, wall)
+        for name, value in (("position", wall and wall.position), ("stiffness", wall and wall.stiffness)):
+            kept[f"wall_{name}"] = np.full(len(columns["x"]), np.nan if value is None else value)
+        for place, element in enumerate(at_work.elements):
+            force = columns.get(f"dissipation.{place}")
+            if force is None:
+                continue
+            kept[f"element.{place}.{element.name}"] = force
+            if "inertia" in element.name and "mass" in element.parameters:
+                kept[f"mass.{place}.{element.name}"] = np.where(force != 0.0, element.parameters["mass"], 0.0)
         self._append(self.ticks, tick, kept)
-
-    def set_active(self, elements: Sequence[Mapping[str, Any]], wall: Mapping[str, float]) -> None:
-        """Sets the elements and the wall that are at work now."""
-        self.elements, self.wall, self.inward = elements, wall, wall["into_wall"]
 
     def append_energy(self, tick: int, columns: Columns) -> None:
         """Appends running books, by name."""
@@ -133,8 +143,8 @@ class History:
         """Appends from another history of the same run what this one has not reached."""
         for own, its in zip(self.all_series, other.all_series, strict=True):
             own.extend_from(its)
-        if other.wall:
-            self.set_active(other.elements, other.wall)
+        if other.ticks.first_tick is not None:
+            self.at_work = other.at_work
         self._end_state = other._end_state
         self.stop_tick = other.stop_tick if self.stop_tick is None else self.stop_tick
         self.version += other.version + 1

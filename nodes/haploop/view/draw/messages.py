@@ -1,0 +1,147 @@
+"""The messages to a page: snapshots packed into bytes, the state of the run and the events that changed it as JSON."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from typing import NamedTuple, TypedDict
+
+import numpy as np
+
+from haploop.logger.summary import finite
+from haploop.protocol.changes import KINDS, Event, describe
+from haploop.protocol.wire import Message
+from haploop.view.receive.run_session import RunSession
+
+# A page lists no more events than these, the newest.
+_MOST_EVENTS = 1000
+WAITING = {"type": "state", "phase": "waiting", "why": "", "run": None, "options": None, "summary": None, "nodes": []}
+# Entries of the summary, of its window and of its energy; the logger's status has them side by side.
+_JUDGED = (
+    ("verdict", "verdict_rule"),
+    ("oscillation_m", "displayed_stiffness_N_m"),
+    ("residual_J", "moved_J"),
+)
+
+
+class Column(NamedTuple):
+    """The header entry of a column: its short name, its SI unit and its label in the legend."""
+
+    name: str
+    unit: str
+    label: str
+
+
+@dataclass(frozen=True)
+class Table:
+    """One table of a snapshot: columns of equal length at equal steps of time.
+
+    Attributes:
+        name: under which the page finds it.
+        t0_s, dt_s: row i is at ``t0_s + i dt_s``, s.
+        columns: header entry of each column.
+        values: shape (columns, rows).
+        envelope: whether each two rows are the extremes of one interval of time, instead of samples.
+        more: further numbers of the header.
+    """
+
+    name: str
+    t0_s: float
+    dt_s: float
+    columns: Sequence[Column]
+    values: np.ndarray
+    envelope: bool = False
+    more: dict[str, float | None] = field(default_factory=dict)
+
+
+def encode(from_s: float, to_s: float, tables: Sequence[Table]) -> bytes:
+    """Returns the snapshot of an interval of time as bytes.
+
+    uint32 length of the header | header in JSON, padded with spaces | of each table its columns one by one as 32-bit
+    floats, padded with zeros; all little-endian. Header and tables each begin at a multiple of 8 bytes, so that a
+    browser reads the columns in place.
+    """
+    entries = [
+        {
+            "name": table.name,
+            "t0_s": table.t0_s,
+            "dt_s": table.dt_s,
+            "rows": table.values.shape[1],
+            "columns": [column._asdict() for column in table.columns],
+            "envelope": table.envelope,
+            **table.more,
+        }
+        for table in tables
+    ]
+    header = {"from_s": from_s, "to_s": to_s, "tables": entries}
+    head = json.dumps(header, separators=(",", ":"), allow_nan=False).encode()
+    head += b" " * (-(4 + len(head)) % 8)
+    parts = [len(head).to_bytes(4, "little"), head]
+    with np.errstate(over="ignore", invalid="ignore"):  # beyond what a float32 holds is infinite on the screen too
+        for table in tables:
+            data = table.values.astype("<f4").tobytes()
+            parts += [data, bytes(-len(data) % 8)]
+    return b"".join(parts)
+
+
+def state(session: RunSession) -> Message:
+    """Returns the state message of a run."""
+    history, time, summary, status = session.history, session.time, session.summary, session.clock.status
+    elements, wall = history.at_work
+    message: Message = {
+        "type": "state",
+        "phase": session.outcome or ("paused" if status.get("paused") else "running"),
+        "why": session.why,
+        "run": session.run.id,
+        "title": session.scene.title,
+        "out": str(session.out),
+        "tick": history.end_tick if history.stop_tick is None else history.stop_tick,
+        "end_tick": time.ticks,
+        "control_rate": time.control_rate,
+        "plant_rate": time.plant_rate,
+        "pace": status.get("pace"),
+        "real_time_factor": session.real_time_factor,
+        "nodes": [] if session.outcome else status.get("nodes", []),
+        "skipped_ticks": session.skipped_ticks,
+        "first_s": (history.first_tick or 0) / time.control_rate,
+        "options": None if session.outcome else session.clock.options,
+        "elements": [{"kind": one.name, "parameters": {**one.parameters, "acts": one.acts}} for one in elements],
+        "wall": wall
+        and {"position": wall.position, "stiffness": wall.stiffness, "into_wall": history.at_work.into_wall},
+        "delay_s": session.delay_s,
+        "summary": summary,
+    }
+    # Verdict and figures are those of the summary once there is one, else of the newest status of the logger.
+    judged = (summary, summary["window"], summary["energy"]) if summary else (session.status,) * 3
+    for entry, names in zip(judged, _JUDGED, strict=True):
+        message |= {name: entry.get(name) for name in names}
+    return finite(message)
+
+
+class EventLine(TypedDict):
+    """A line of the page's list of events: its tick and time in s, which kind of event it is, and what it says."""
+
+    tick: int
+    t_s: float
+    kind: str
+    text: str
+
+
+def event_lines(events: Iterable[tuple[int, Event]], rate: int, options: Message | None) -> list[EventLine]:
+    """Returns the newest of these events as lines.
+
+    Args:
+        events: (tick, event) in order.
+        rate: ticks per second, Hz.
+        options: what the run lets people choose, for units by parameter of a kind (``damping.damping``) and by settable
+            key; None before it is known.
+    """
+    kinds, settable = (options or {}).get("kinds", {}), (options or {}).get("settable", {})
+    units = {f"{kind}.{name}": p["unit"] for kind, about in kinds.items() for name, p in about["parameters"].items()}
+    units |= {key: about["unit"] for key, about in settable.items()}
+    lines: list[EventLine] = []
+    for tick, event in events:
+        if kind := next((kind for kind in KINDS if kind in event), None):
+            lines.append({"tick": tick, "t_s": tick / rate, "kind": kind, "text": describe(event, units)})
+    return lines[-_MOST_EVENTS:]
