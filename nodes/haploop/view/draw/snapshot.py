@@ -80,14 +80,14 @@ class _Interval:
         self._first, self._end, self._rate, self._points = first, end, rate, points
 
     def table(self, name: str, parts: list[Part], is_shown: IsShown) -> Table | None:
-        """Returns a table of columns of some series, the first of which has the most rows a tick; None for no column."""
+        """Returns a table of columns of some series, the first of which has the most rows a tick; None for none."""
         all_series, most = [series for series, _ in parts], parts[0][0].rows_per_tick
         in_full = all(series.full_from_tick <= self._first for series in all_series)
         if in_full and (self._end - self._first) * most <= _ROWS_A_POINT * self._points:
             first, step = float(self._first), 1.0 / most
-            rows = [series.rows(list(columns), self._first, self._end) for series, columns in parts]
             values = [
-                np.repeat(of, most // series.rows_per_tick, axis=1) for of, series in zip(rows, all_series, strict=True)
+                series.rows(list(columns), self._first, self._end).repeat(most // series.rows_per_tick, axis=1)
+                for series, columns in parts
             ]
         else:
             in_full, bucket = False, self._bucket(all_series)
