@@ -13,9 +13,9 @@ import pytest
 
 from haploop.tools.cost.data import Cost, Point, Spread
 from haploop.tools.cost.figure import LOOKS, drawn_m, figure_of
-from haploop.tools.cost.figure import draw as draw_cost
 from haploop.tools.figure.data import FigureError
 from haploop.tools.figure.labels import Label, place_labels
+from haploop.tools.figure.style import write_figure
 from helpers.data.costs import METHODS, RATES, SCENES, fake_cost, fake_point
 from helpers.shown import artists
 
@@ -137,7 +137,7 @@ def test_the_tolerance_is_drawn_and_the_signs_are_explained(figure: Any, cost: C
 def test_one_scene_or_an_unknown_method_draws_too(cost: Cost, tmp_path: Path) -> None:
     other = dataclasses.replace(fake_point("stick_slip", "rk4", 5000), method="leapfrog")
     scene = dataclasses.replace(cost.scenes[2], points=[*cost.scenes[2].points, other])
-    target = draw_cost(dataclasses.replace(cost, scenes=[scene]), tmp_path / "cost.png")
+    target = write_figure(figure_of(dataclasses.replace(cost, scenes=[scene])), tmp_path / "cost.png")
     assert target.read_bytes().startswith(b"\x89PNG")
 
 
@@ -147,7 +147,7 @@ def test_what_cannot_be_drawn_says_why(cost: Cost, tmp_path: Path, monkeypatch: 
     with pytest.raises(FigureError, match="nothing to draw"):
         figure_of(untimed)
     with pytest.raises(FigureError, match="cannot be written"):
-        draw_cost(cost, tmp_path / "cost.nonsense")
+        write_figure(figure_of(cost), tmp_path / "cost.nonsense")
     monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
     with pytest.raises(FigureError, match=r"pip install 'haploop\[plot\]'"):
         figure_of(cost)

@@ -260,6 +260,6 @@ def test_the_figure_draws_stiffness_against_time_and_what_runs_did_not_confirm_h
     assert {label.get_text() for label in artists(curve, "rate")} == {"1 kHz", "0.5 kHz"}
 
 
-def test_without_prices_there_is_nothing_to_draw(tmp_path: Path) -> None:
+def test_without_prices_there_is_nothing_to_draw() -> None:
     with pytest.raises(FigureError, match="nothing to draw"):
-        prices_figure.draw(fake_cost(), tmp_path / "prices.png")
+        prices_figure.figure_of(fake_cost().prices)

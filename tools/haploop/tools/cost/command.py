@@ -79,6 +79,7 @@ def _show(result: Cost, out: Path, as_json: bool) -> None:
     from haploop.tools.cost.data import COST_FILE
     from haploop.tools.cost.report import report
     from haploop.tools.figure.data import FigureError
+    from haploop.tools.figure.style import write_figure
     from haploop.tools.render.terminal import console
 
     if as_json:
@@ -87,9 +88,9 @@ def _show(result: Cost, out: Path, as_json: bool) -> None:
         console().print(report(result))
     print(out / COST_FILE, file=sys.stderr)
     try:
-        print(figure.draw(result, out / "cost.png"), file=sys.stderr)
+        print(write_figure(figure.figure_of(result), out / "cost.png"), file=sys.stderr)
         if result.prices:
-            print(prices_figure.draw(result, out / "prices.png"), file=sys.stderr)
+            print(write_figure(prices_figure.figure_of(result.prices), out / "prices.png"), file=sys.stderr)
     except FigureError as error:
         print(f"Note: {error}", file=sys.stderr)
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 from textwrap import wrap
 from typing import TYPE_CHECKING, Any
 
@@ -24,7 +23,6 @@ from haploop.tools.figure.style import (
     empty_figure,
     fix_layout,
     plain_numbers,
-    write_figure,
 )
 from haploop.tools.render.units import amount
 
@@ -49,15 +47,6 @@ LOOKS: dict[str, tuple[str, str]] = {
 _WITHIN = 0.3
 # The share of a panel's height that the failures of one method take at its top edge.
 _ROW = 0.045
-
-
-def draw(cost: Cost, target: Path) -> Path:
-    """Draws all measurements into a file, in the format of its suffix.
-
-    Raises:
-        FigureError: matplotlib is missing, nothing was measured, or the file cannot be written.
-    """
-    return write_figure(figure_of(cost), target)
 
 
 def figure_of(cost: Cost) -> Figure:

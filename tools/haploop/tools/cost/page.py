@@ -8,9 +8,10 @@ from pathlib import Path
 from haploop.tools.cli.exit_codes import WRONG_USE, leave
 from haploop.tools.cost import figure, prices_figure
 from haploop.tools.cost.data import Cost, CostFileError, Point, Price, PriceGroup, SceneCost, load
-from haploop.tools.cost.findings import FindingTable, findings, length, rate
+from haploop.tools.cost.findings import FindingTable, findings, length, rate, setting
 from haploop.tools.cost.report import made_with
 from haploop.tools.figure.data import FigureError
+from haploop.tools.figure.style import write_figure
 from haploop.tools.render.terminal import markdown_table
 from haploop.tools.render.units import amount, fixed
 
@@ -32,9 +33,9 @@ def write(directory: Path, docs: Path) -> Path:
     """
     cost = load(directory)
     docs.mkdir(parents=True, exist_ok=True)
-    figure.draw(cost, docs / FIGURE)
+    write_figure(figure.figure_of(cost), docs / FIGURE)
     if cost.prices:
-        prices_figure.draw(cost, docs / PRICES_FIGURE)
+        write_figure(prices_figure.figure_of(cost.prices), docs / PRICES_FIGURE)
     target = docs / PAGE
     target.write_text(page(cost), encoding="utf-8")
     return target
@@ -70,8 +71,11 @@ def _scene(scene: SceneCost) -> list[str]:
     rows = [[method, *(_cell(scene, method, hertz) for hertz in rates)] for method in methods]
     swings = "" if reference.pointwise else " It is chaotic: compared by its swings, not by positions."
     about = f"*Reference:* {reference.how} It is known to {length(reference.error_m)}.{swings}"
-    parts = [f"### {scene.short_title}", about, _table(["error, µs", *map(rate, rates)], rows)]
-    return [*parts, *([_failures(scene)] if any(p.failure for p in scene.points) else []), scene.advice]
+    # Of the failures of a method the reason is told once, that of its highest rate.
+    failed: dict[str, Point] = {point.method: point for point in scene.points if point.failure}
+    reasons = [f"- Failed: {setting(point)}: {point.failure}" for point in failed.values()]
+    table = _table(["error, µs", *map(rate, rates)], rows)
+    return [f"### {scene.short_title}", about, table, *(["\n".join(reasons)] if reasons else []), scene.advice]
 
 
 def _cell(scene: SceneCost, method: str, hertz: int) -> str:
@@ -82,18 +86,11 @@ def _cell(scene: SceneCost, method: str, hertz: int) -> str:
     if point.error and not point.error.verdict_right:
         words += f" ({point.error.verdict})"
     words += f", {fixed(point.us_per_tick.median)}" if point.us_per_tick else ""
-    return f"**{words}**" if (method, hertz) == (scene.own_method, scene.own_rate) else words
+    return f"**{words}**" if point is scene.own else words
 
 
 def _power(metres: float) -> str:
     return f"{metres:.1e} m".replace("-", "−") if metres else "0 m"
-
-
-def _failures(scene: SceneCost) -> str:
-    """Returns why points failed: for each method one reason, that of its highest rate."""
-    last: dict[str, Point] = {point.method: point for point in scene.points if point.failure}
-    reasons = [f"{method} at {rate(point.plant_rate)}: {point.failure}" for method, point in last.items()]
-    return "\n".join(f"- Failed: {reason}" for reason in reasons)
 
 
 def _prices(groups: list[PriceGroup]) -> list[str]:

@@ -21,7 +21,7 @@ from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
 from haploop.tools.cost.data import Price, PriceGroup, price
 from haploop.tools.cost.grid import digest
-from haploop.tools.cost.times import IN_PROCESS, PROCESSES, Job, Store, loop_us, measure, run_us, timed_s
+from haploop.tools.cost.times import IN_PROCESS, PROCESSES, Job, Store, loop_us, measure, run_us, tick_us
 from haploop.tools.linear.stiffness_limit import StiffnessLimit, stiffness_limit
 from haploop.tools.machine import machine, source_digest, versions
 from haploop.tools.operations import AGAIN, NONE, WHOLE, ablations, operations
@@ -110,30 +110,21 @@ def _bare(scene: Scene) -> Job:
     return Job(IN_PROCESS, "bare", "bare", scene, lambda: bare_us(scene))
 
 
-def bare_us(scene: Scene) -> float:
-    """Returns the time of a tick of plant and controller in this process without any books, µs.
-
-    In blocks as in a run, the first of them not counted either where there are more.
-    """
+def bare_us(scene: Scene) -> float | None:
+    """Returns the time of a tick of plant and controller in this process without books, µs, in blocks as in a run."""
     time = Timebase.from_scene(scene)
     plant, controller = Plant(scene, time), Controller(scene, time, registry())
     length = BlockLength(scene.run.block_ticks)
 
-    def block() -> None:
+    def block() -> bool:
         until = min(plant.tick + length.ticks, time.ticks)
         plant.run_until(until, lambda _, samples: [float(force) for force in controller.answer(samples)])
         plant.take_block()
         controller.recorder.take()
         length.next()
+        return plant.tick < time.ticks and plant.stop_reason is None
 
-    def finish() -> None:
-        while plant.tick < time.ticks and plant.stop_reason is None:
-            block()
-
-    took_s, first = timed_s(block), plant.tick
-    if first < time.ticks:
-        return timed_s(finish) / (plant.tick - first) * 1e6
-    return took_s / first * 1e6
+    return tick_us(block, lambda: plant.tick)
 
 
 class Prices:

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from haploop.tools.cost.data import Cost, Price, PriceGroup, chance_in
+from haploop.tools.cost.data import Price, PriceGroup, chance_in
 from haploop.tools.cost.figure import UNCERTAIN
 from haploop.tools.figure.data import FigureError
 from haploop.tools.figure.labels import Label, place_labels
@@ -23,7 +22,6 @@ from haploop.tools.figure.style import (
     empty_figure,
     fix_layout,
     plain_numbers,
-    write_figure,
 )
 from haploop.tools.operations import AGAIN, NONE
 from haploop.tools.render.units import fixed
@@ -36,15 +34,6 @@ _SIZE_IN = 15.0, 8.0
 # Where each group stands: (row, rows, column) of six rows and three columns.
 _PLACES = {"books": (0, 2, 0), "log": (2, 2, 0), "processes": (4, 2, 0), "effects": (0, 6, 1)}
 _CURVES = {"delay": (0, 3, 2), "control rate": (3, 3, 2)}
-
-
-def draw(cost: Cost, target: Path) -> Path:
-    """Draws the prices into a file, in the format of its suffix.
-
-    Raises:
-        FigureError: matplotlib is missing, no price was measured, or the file cannot be written.
-    """
-    return write_figure(figure_of(cost.prices), target)
 
 
 def figure_of(groups: list[PriceGroup]) -> Figure:
@@ -81,7 +70,7 @@ def _bars(ax: Axes, group: PriceGroup) -> None:
     _rows(ax, [price.what for price in prices], [price.time.median for price in prices], colours, group.title)
     for row, price in enumerate(prices):
         ax.plot([price.time.q1, price.time.q3], [row, row], color=INK, linewidth=1.6, gid="quartiles")
-    ax.set_xlabel(_about(group), fontsize=SMALL, color=INK)
+    ax.set_xlabel(f"{group.unit}\n{group.how}", fontsize=SMALL, color=INK)
     _write(ax, [(price.time.q3, f"{fixed(price.time.median)}, {fixed(price.ratio)} ×") for price in prices])
 
 
@@ -97,11 +86,6 @@ def _effects(ax: Axes, group: PriceGroup) -> None:
     bare = next((f" and {fixed(p.time.median)} with none" for p in group.prices if p.what == NONE), "")
     ax.set_xlabel(f"{whole}{bare}; shaded: chance\n{group.how}", fontsize=SMALL, color=INK)
     _write(ax, [(max(price.costs, 0.0), _counted(price, group)) for price in named])
-
-
-def _about(group: PriceGroup) -> str:
-    """Returns the label of the axis: unit, and how it was measured."""
-    return f"{group.unit}\n{group.how}"
 
 
 def _counted(price: Price, group: PriceGroup) -> str:
@@ -132,7 +116,7 @@ def _write(ax: Axes, ends: list[tuple[float, str]]) -> None:
 
 def _curve(ax: Axes, group: PriceGroup) -> None:
     """Draws the largest steady stiffness against time; hollow where runs did not agree with it."""
-    dress(ax, group.title, _about(group), "largest steady stiffness (N/m)")
+    dress(ax, group.title, f"{group.unit}\n{group.how}", "largest steady stiffness (N/m)")
     ax.xaxis.label.set_fontsize(SMALL)
     ax.set_xscale("log")
     ax.set_yscale("log")

@@ -8,7 +8,7 @@ from rich.console import Group
 from rich.text import Text
 
 from haploop.tools.cost.data import QUIET_LOAD, QUIET_SPREAD, Cost, Errors, Point, PriceGroup, SceneCost, Spread
-from haploop.tools.cost.findings import rate
+from haploop.tools.cost.findings import rate, setting
 from haploop.tools.render.terminal import make_table
 from haploop.tools.render.units import amount, fixed
 
@@ -45,12 +45,13 @@ def scene_table(scene: SceneCost) -> RenderableType:
         if point.method != before:
             table.add_section()
             table.add_row(point.method)
-        own = (point.method, point.plant_rate) == (scene.own_method, scene.own_rate)
-        table.add_row(*_row(point), style="bold" if own else "")
+        table.add_row(*_row(point), style="bold" if point is scene.own else "")
         before = point.method
     about = scene.reference
     known = f"{about.how} Known to {amount(about.error_m, 'm')}." if about.pointwise else about.how
-    return Group(Text(scene.title, style="bold"), Text(f"Reference: {known}", style="dim"), table, *_reasons(scene))
+    failed = [point for point in scene.points if point.failure]
+    reasons = [Text(f"✗ {setting(point)}: {point.failure}", style="dim") for point in failed]
+    return Group(Text(scene.title, style="bold"), Text(f"Reference: {known}", style="dim"), table, *reasons)
 
 
 def _row(point: Point) -> list[str | Text]:
@@ -104,12 +105,6 @@ def price_table(group: PriceGroup) -> RenderableType:
     for price in group.prices:
         table.add_row(price.what, fixed(price.time.median), _spread(price.time), f"{price.ratio:.2f}", price.buys)
     return Group(Text(group.title, style="bold"), Text(f"{group.how}.", style="dim"), table)
-
-
-def _reasons(scene: SceneCost) -> list[Text]:
-    """Returns the reasons of failures, a line each."""
-    failed = [point for point in scene.points if point.failure]
-    return [Text(f"✗ {p.method} at {rate(p.plant_rate)}: {p.failure}", style="dim") for p in failed]
 
 
 def made_with(cost: Cost) -> str:

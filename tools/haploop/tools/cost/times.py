@@ -133,27 +133,40 @@ def processes_job(candidate: Candidate, key: str, ticks: int) -> Job:
 def loop_us(scene: Scene) -> float | None:
     """Returns the time of a tick in this process, with books, without log, µs; None where the run could not go on.
 
-    Neither building plant and controller nor the first block is counted, which makes what later ones only use; a run of
-    a single block is counted whole. A method that blows up overflows: its warnings are kept back by the caller.
+    Building plant and controller is not counted. A method that blows up overflows: the caller keeps its warnings back.
     """
     base = Timebase.from_scene(scene)
     session = open_session(scene, base, None, {})
     loop = Loop(scene, base, registry(), session)
     loop.schedule(scene_events(scene, base))
-
-    def finish() -> None:
-        while loop.block():
-            pass
-
-    going: list[bool] = []
     try:
-        took_s = timed_s(lambda: going.append(loop.block()))
-        first = ticks = session.logger.tick
-        if going[0]:
-            took_s = timed_s(finish)
-            ticks = session.logger.tick - first
+        return tick_us(loop.block, lambda: session.logger.tick)
     except (ElementError, ArithmeticError):
         return None
+
+
+def tick_us(block: Callable[[], bool], tick: Callable[[], int]) -> float | None:
+    """Returns the time of a tick of a loop, µs; None where there was none.
+
+    The first block, which makes what later ones only use, is not counted; a run of a single block is counted whole.
+
+    Args:
+        block: works through one block; False when the run has ended.
+        tick: tells the tick that the loop has reached.
+    """
+    going = True
+
+    def first() -> None:
+        nonlocal going
+        going = block()
+
+    def rest() -> None:
+        while block():
+            pass
+
+    took_s, before, ticks = timed_s(first), tick(), tick()
+    if going:
+        took_s, ticks = timed_s(rest), tick() - before
     return took_s / ticks * 1e6 if ticks else None
 
 
