@@ -17,7 +17,7 @@ from haploop.tools.executor.parts import MOST, Group
 from haploop.tools.executor.pool import Pool
 from haploop.tools.executor.work import Work
 from haploop.tools.machine import machine
-from haploop.tools.sweep.file.sweep_file import load
+from haploop.tools.sweep.sweep_file import load
 
 SCENE = Path(__file__).parents[2] / "launch" / "scenes" / "fig6b.toml"
 
@@ -92,7 +92,7 @@ def beside_another_s(path: Path) -> float:
 _PEAK = """
 import resource, sys
 from pathlib import Path
-from haploop.tools.sweep.run.command import Request, sweep
+from haploop.tools.sweep.command import Request, sweep
 if __name__ == "__main__":
     sweep(Request(Path(sys.argv[1]), out=Path(sys.argv[2]), workers=2), as_json=True)
     print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3)

@@ -16,12 +16,12 @@ from hypothesis import strategies as st
 
 from haploop.launch.runs.start import prepare, run
 from haploop.logger import read
-from haploop.tools.figure.data import TOGETHER, RunData
-from haploop.tools.figure.history import History
+from haploop.tools.figure.data import TOGETHER, History, RunData
 from haploop.tools.figure.loops import force_position_loop, momentum_loop
 from haploop.tools.figure.run_figure import FigureError, draw, make_figure
 from haploop.tools.figure.text_panels import event_lines, key_numbers
 from haploop.tools.figure.time import extremes
+from helpers.scenes.least import scene
 from helpers.shown import artists
 
 SCENES = Path(__file__).parents[2] / "launch/scenes"
@@ -52,12 +52,12 @@ event = [
 """
 
 
-def made(directory: Path, scene: str, *overrides: str) -> Path:
+def made(directory: Path, name: str, *overrides: str) -> Path:
     """A run of a scene that comes with haploop, or of a TOML text."""
-    path = SCENES / f"{scene}.toml"
-    if "\n" in scene:
+    path = SCENES / f"{name}.toml"
+    if "\n" in name:
         path = directory.parent / f"{directory.name}.toml"
-        path.write_text(scene, encoding="utf-8")
+        path.write_text(name, encoding="utf-8")
     run(prepare(path, overrides, out=directory), in_process=True)
     return directory
 
@@ -106,7 +106,7 @@ def test_every_energy_ends_with_the_value_of_its_true_book(runs: dict[str, Path]
     energy = json.loads((runs[name] / "summary.json").read_text())["energy"]
     ends = {"wall": energy["wall"]} if data.history.walls else {}
     ends |= dict(zip([span.name for span in data.history.elements], energy["elements"], strict=True))
-    assert [span.kind for span in data.history.elements] == [element["kind"] for element in energy["elements"]]
+    assert [span.element.name for span in data.history.elements] == [element["kind"] for element in energy["elements"]]
     largest = max(float(np.abs([book.true_J, book.sampled_J]).max()) for book in data.books())
     factor = 1e-3 if largest >= 1e-3 else 1e-6
     for account, end in ends.items():
@@ -126,7 +126,7 @@ def test_history_covers_the_ticks_of_the_summary_and_finds_the_forces_that_add_u
     for span, element in zip(data.history.elements, elements, strict=True):
         times, force = data.element_force(span)
         assert (span.from_tick, len(times)) == (element["from_tick"], element["to_tick"] - element["from_tick"])
-        assert span.parameters == element["parameters"]
+        assert {"acts": span.element.acts, **span.element.parameters} == element["parameters"]
         total[np.rint(times * data.control_rate).astype(int)] += force
     np.testing.assert_allclose(total, data.controller["total"], atol=1e-15)
 
@@ -185,7 +185,7 @@ def test_events_are_marked_at_their_times_and_named(runs: dict[str, Path]) -> No
 
 
 def test_a_change_that_was_refused_leaves_history_as_it_was() -> None:
-    scene = {"dissipation": [{"kind": "damping", "damping": 1.0}]}
+    before = scene(dissipation=[{"kind": "damping", "damping": 1.0}])
     swap = {"tick": 5, "timestamp": 0.005, "element": 0, "swap": {"kind": "none"}}
     refusal = {
         "tick": 7,
@@ -193,8 +193,8 @@ def test_a_change_that_was_refused_leaves_history_as_it_was() -> None:
         "refused": "No.",
         "change": {"tick": 5, "element": 0, "swap": swap["swap"]},
     }
-    assert [span.to_tick for span in History(scene, [swap]).elements] == [5]
-    assert [span.to_tick for span in History(scene, [swap, refusal]).elements] == [np.inf]
+    assert [span.to_tick for span in History(before, [swap]).elements] == [5]
+    assert [span.to_tick for span in History(before, [swap, refusal]).elements] == [np.inf]
 
 
 def test_the_wall_is_drawn_where_it_stood(runs: dict[str, Path]) -> None:
@@ -215,7 +215,7 @@ def test_the_header_tells_verdict_and_numbers(runs: dict[str, Path]) -> None:
     data = RunData.from_directory(runs["swap"])
     figure = make_figure(data)
     assert [text.get_text() for text in artists(figure, "verdict")] == [data.summary["verdict"]]
-    assert [text.get_text() for text in artists(figure, "title")] == [data.scene["title"]]
+    assert [text.get_text() for text in artists(figure, "title")] == [data.scene.title]
     assert any("residual" in words for words in key_numbers(data))
     assert any(words.startswith("displayed stiffness") for words in key_numbers(data))
 
@@ -227,7 +227,7 @@ def test_a_run_that_was_killed_still_draws(runs: dict[str, Path], tmp_path: Path
     (tmp_path / "log.mcap").write_bytes(log[: int(len(log) * share)])
     data = RunData.from_directory(tmp_path)
     assert data.cut
-    assert data.scene["title"] == RunData.from_directory(runs["swap"]).scene["title"]
+    assert data.scene.title == RunData.from_directory(runs["swap"]).scene.title
     assert draw(tmp_path).read_bytes().startswith(PNG)
     assert key_numbers(data)[0].startswith("log cut off")
 

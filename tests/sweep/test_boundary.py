@@ -12,9 +12,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from haploop.launch.batch.run import batch_results
+from haploop.protocol.scene.scene import Scene
 from haploop.tools.linear.one_tick import OneTickMap
 from haploop.tools.search.bisect import Tolerance
-from haploop.tools.sweep.run.boundary import Boundary, Candidate, find_boundaries, verdict_is
+from haploop.tools.sweep.boundary import Boundary, Candidate, find_boundaries, verdict_is
 from helpers.scenes.least import KINDS, scene
 
 POINTS = [0.0, 25.0, 50.0, 75.0, 100.0]
@@ -105,7 +106,7 @@ def test_points_that_go_no_way_are_refused(points: list[float]) -> None:
         found([lambda x: True], points)
 
 
-def pressed(damping: float, delay: float, stiffness: float) -> dict[str, Any]:
+def pressed(damping: float, delay: float, stiffness: float) -> Scene:
     """A linear loop, long enough that what grows has grown."""
     return scene(
         duration=6.0,

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from haploop.tools.sweep.file.sweep_file import load
+from haploop.tools.sweep.sweep_file import load
 
 SWEEPS = sorted((Path(__file__).parents[2] / "launch/sweeps").glob("*.toml"))
 

@@ -15,6 +15,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from haploop.launch.scene.toml_writer import inline
+from haploop.protocol.scene.scene import Scene
 from haploop.tools.figure.data import FigureError
 from haploop.tools.figure.style import write_figure
 from haploop.tools.linear.one_tick import OneTickMap
@@ -346,7 +347,7 @@ def test_the_file_of_a_map_is_a_picture(data: MapData, tmp_path: Path) -> None:
 def test_runs_of_the_program_make_a_map_that_the_exact_limit_divides() -> None:
     """Walls well below the limit of their linear loop come out steady, well above it not."""
 
-    def made(cell: dict[str, Any]) -> dict[str, Any]:
+    def made(cell: dict[str, Any]) -> Scene:
         loop = scene(device={"mass": 0.02, "damping": 0.4}, dissipation=[{"kind": "damping", "damping": cell[B]}])
         return pressed_deep(loop, cell[K] * OneTickMap.from_scene(loop).stiffness_limit())
 

@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
-import copy
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
+from haploop.protocol.scene.paths import with_value, without
+from haploop.protocol.scene.scene import ElementTable, Scene
 from haploop.tools.linear.bounds import bounds_of
 from haploop.tools.linear.one_tick import NotLinear, OneTickMap
 from haploop.tools.sweep.map.axis import Ruler
-from haploop.tools.sweep.map.contour import zero_lines
 from haploop.tools.sweep.map.data import Axis
 from haploop.tools.sweep.map.figure import make_figure
 from haploop.tools.sweep.map.lines import EXACT, bound_lines, exact_limit
-from haploop.tools.sweep.map.plane import Plane, set_key
+from haploop.tools.sweep.map.plane import Plane, zero_lines
 from helpers.data.sweep_tables import UNITS, cells_of, said, table
 from helpers.scenes.least import scene
 from helpers.shown import artists
@@ -27,7 +28,7 @@ DEVICE = {"mass": 0.02, "damping": 0.3}
 ON = (True, True)
 
 
-def loop(**tables: Any) -> dict[str, Any]:
+def loop(**tables: Any) -> Scene:
     return scene(**{"device": DEVICE, "wall": WALL, "dissipation": [{"kind": "damping", "damping": 0.1}], **tables})
 
 
@@ -35,7 +36,7 @@ def ruler(key: str, values: list[float]) -> Ruler:
     return Ruler.from_axis(Axis.from_column(key, UNITS.get(key, ""), values))
 
 
-def plane(made: dict[str, Any], **axes: list[float]) -> Plane:
+def plane(made: Scene, **axes: list[float]) -> Plane:
     names = {"k": K, "b": B, "m": M, "delay": DELAY, "rate": "clock.control_rate"}
     return Plane(made, [ruler(names[name], values) for name, values in axes.items()])
 
@@ -44,11 +45,10 @@ def points(lines: list[np.ndarray]) -> np.ndarray:
     return np.concatenate(lines)
 
 
-def with_values(made: dict[str, Any], **values: float) -> dict[str, Any]:
-    changed = copy.deepcopy(made)
+def with_values(made: Scene, **values: float) -> Scene:
     for name, value in values.items():
-        set_key(changed, {"b": B, "m": M, "delay": DELAY}[name], value)
-    return changed
+        made = with_value(made, {"b": B, "m": M, "delay": DELAY}[name], value)
+    return made
 
 
 @pytest.mark.parametrize("values", [[0.05, 0.1, 0.2, 0.4], [0.01, 0.1, 1.0, 10.0], [0.0, 0.01, 0.1, 1.0]])
@@ -111,7 +111,7 @@ def test_rates_are_only_asked_for_at_their_own_values() -> None:
     found = points(exact_limit(plane(made, rate=[500.0, 1000.0, 2000.0], k=[10.0, 500.0, 5000.0])).pieces)
     assert {x for x, _ in found} <= {500.0, 1000.0, 2000.0}
     for rate, k in found:
-        there = {**made, "clock": {**made["clock"], "control_rate": int(rate)}}
+        there = with_value(made, "clock.control_rate", int(rate))
         assert k == pytest.approx(OneTickMap.from_scene(there).stiffness_limit(), rel=1e-7)
 
 
@@ -139,14 +139,12 @@ def test_a_limit_that_runs_outside_the_panel_is_told() -> None:
 
 
 def test_a_scene_without_a_wall_or_of_a_plugin_has_no_lines() -> None:
-    made = loop()
-    del made["wall"]
-    assert "there is no wall" in legend(figure_over(made, {B: [0.1, 0.2], DELAY: [0.0, 0.001]}))
-    foreign = {**loop(), "dissipation": [{"kind": "brake", "acts": "in-contact", "damping": 0.1}]}
+    assert "there is no wall" in legend(figure_over(without(loop(), "wall"), {B: [0.1, 0.2], DELAY: [0.0, 0.001]}))
+    foreign = replace(loop(), dissipation=(ElementTable(name="brake", parameters={"damping": 0.1}),))
     assert "the element brake comes from a plugin" in legend(figure_over(foreign, {K: [1.0, 2.0], DELAY: [0.0, 0.001]}))
 
 
-def figure_over(made: dict[str, Any], axes: dict[str, list[float]]) -> Any:
+def figure_over(made: Scene, axes: dict[str, list[float]]) -> Any:
     cells = cells_of(axes)
     return make_figure(table(axes, cells, [said("steady", 1e-7)] * len(cells), [made] * len(cells)))
 

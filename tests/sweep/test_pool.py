@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ import pytest
 
 from haploop.controller.dissipation import PluginError
 from haploop.launch.batch.run import run_batch
+from haploop.protocol.scene.scene import ElementTable, Scene
 from haploop.tools.executor.executors import make_executor, map_parallel
 from haploop.tools.executor.parts import Group, Sizes, cut, grouped
 from haploop.tools.executor.pool import DIED, Pool
@@ -42,14 +44,14 @@ class Deadly(Element):
 
 
 def results(
-    scenes: list[dict[str, Any]], plugins: Sequence[Path] = (), *, workers: int = 2, trajectories: bool = False
+    scenes: list[Scene], plugins: Sequence[Path] = (), *, workers: int = 2, trajectories: bool = False
 ) -> list[tuple[int, dict[str, Any]]]:
     """Results of scenes as a pool of so many workers gives them."""
     with Pool(workers) as pool:
         return list(pool.results(scenes, plugins, trajectories=trajectories))
 
 
-def of_many_structures() -> list[dict[str, Any]]:
+def of_many_structures() -> list[Scene]:
     """Some run in arrays, some alone, in no order."""
     effects: list[dict[str, Any]] = [
         {},
@@ -79,9 +81,8 @@ def deadly(tmp_path: Path) -> Path:
 def test_of_the_scenes_that_were_under_way_when_a_worker_died_only_the_culprits_have_no_result(deadly: Path) -> None:
     strengths = [0.1 + 0.001 * k for k in range(40)]
     strengths[5] = strengths[17] = 0.9
-    scenes = [pressed(200.0, dissipation=[]) | {"dissipation": [{"kind": "deadly", "force_N": f}]} for f in strengths]
-    for each in scenes:
-        each["dissipation"][0]["acts"] = "in-contact"
+    elements = [ElementTable(name="deadly", parameters={"force_N": strength}) for strength in strengths]
+    scenes = [replace(pressed(200.0), dissipation=(element,)) for element in elements]
     came = dict(results(scenes, [deadly], workers=2))
     assert [index for index in range(40) if came[index]["ended"] != "done"] == [5, 17]
     assert came[5] == {"title": "least", "seed": 0, "ended": "failed", "why": DIED}
@@ -124,12 +125,11 @@ def test_an_item_that_cannot_be_made_is_a_result_with_its_reason() -> None:
 
 
 def test_a_scene_that_raises_costs_no_other_its_result() -> None:
-    broken = pressed(100.0)
-    del broken["wall"]["stiffness"]
+    broken = replace(pressed(100.0), dissipation=(ElementTable(name="damping"),))
     scenes = [*(pressed(100.0 + k) for k in range(30)), broken]
     came = dict(results(scenes, workers=1))
     assert {index for index, result in came.items() if result["ended"] != "done"} == {30}
-    assert "stiffness" in came[30]["why"]
+    assert "damping" in came[30]["why"]
 
 
 def test_stopped_the_parts_under_way_are_still_told() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -10,8 +11,10 @@ import pytest
 from haploop.launch.scene.file import load as scene_of
 from haploop.launch.scene.mistakes import SceneError
 from haploop.launch.scene.toml_writer import to_toml
-from haploop.tools.sweep.file.cells import Extra
-from haploop.tools.sweep.file.sweep_file import load
+from haploop.protocol.scene.paths import value_at
+from haploop.protocol.scene.scene import ElementTable
+from haploop.tools.sweep.cells import Extra
+from haploop.tools.sweep.sweep_file import load
 from helpers.scenes.least import KINDS
 from helpers.scenes.sweep_files import GRID, PRESS, loaded, mistakes, sweep_file
 
@@ -52,24 +55,24 @@ def test_the_scene_of_a_cell_is_the_base_but_for_its_values_and_seed(tmp_path: P
     made = loaded(tmp_path, "repeat = 2\n" + GRID)
     cell = made.number({"wall.stiffness": 2, "dissipation.0.damping": 4}, 1)
     scene = made.scene(cell)
-    assert scene["wall"]["stiffness"] == 300.0
-    assert scene["dissipation"][0]["damping"] == 1.0
-    assert scene["seed"] == 8
-    assert {**scene, "wall": 0, "dissipation": 0, "seed": 0} == {**made.base, "wall": 0, "dissipation": 0, "seed": 0}
-    assert made.base["wall"]["stiffness"] == 150.0
+    assert value_at(scene, "wall.stiffness") == 300.0
+    assert value_at(scene, "dissipation.0.damping") == 1.0
+    assert scene.seed == 8
+    assert scene == replace(made.base, wall=scene.wall, dissipation=scene.dissipation, seed=8)
+    assert value_at(made.base, "wall.stiffness") == 150.0
 
 
 def test_a_cell_is_the_scene_with_its_values_set_and_its_text_too_though_it_shares_tables(tmp_path: Path) -> None:
     """Every cell, one after the other: none leaves anything in the base or in those after it."""
     made = loaded(tmp_path, GRID)
-    before = to_toml(made.base)
+    before = to_toml(made.base.as_dict())
     for cell in range(made.count):
         scene, (values, seed) = made.scene(cell), made.values(cell)
         by_itself = scene_of(tmp_path / "press.toml", [f"{key}={value!r}" for key, value in values.items()], KINDS)
-        assert to_toml(scene) == to_toml(by_itself | {"seed": seed})
-        assert made.row(cell, scene, {"ended": "done"})["scene"] == to_toml(scene)
-        assert scene["hand"] is made.base["hand"]
-    assert to_toml(made.base) == before
+        assert to_toml(scene.as_dict()) == to_toml(replace(by_itself, seed=seed).as_dict())
+        assert made.row(cell, scene, {"ended": "done"})["scene"] == to_toml(scene.as_dict())
+        assert scene.hand is made.base.hand
+    assert to_toml(made.base.as_dict()) == before
 
 
 def test_cells_that_differ_in_structure_are_apart_and_their_columns_in_the_order_of_the_file(tmp_path: Path) -> None:
@@ -93,7 +96,7 @@ def test_names_and_whole_tables_can_be_an_axis(tmp_path: Path) -> None:
 "dissipation" = [[], [{ kind = "unidirectional-inertia", mass = 0.01 }]]
 """,
     )
-    kinds = [[table["kind"] for table in made.scene(cell).get("dissipation", [])] for cell in range(4)]
+    kinds = [[element.name for element in made.scene(cell).dissipation] for cell in range(4)]
     assert kinds == [[], ["unidirectional-inertia"], [], ["unidirectional-inertia"]]
     assert made.axes[1].entry(made.axes[1].values[1]) == '[{ kind = "unidirectional-inertia", mass = 0.01 }]'
 
@@ -106,14 +109,14 @@ def test_a_name_may_bring_the_key_of_another_axis(tmp_path: Path) -> None:
 """
     made = loaded(tmp_path, text)
     assert made.axes[1].unit == "kg"
-    assert made.scene(3)["dissipation"] == [{"kind": "unidirectional-inertia", "mass": 0.02, "acts": "in-contact"}]
+    assert made.scene(3).dissipation == (ElementTable(name="unidirectional-inertia", parameters={"mass": 0.02}),)
 
 
 def test_the_resolved_sweep_reads_back_to_itself_without_the_scene_file(tmp_path: Path) -> None:
     text = 'title = "t"\nrepeat = 2\n[set]\n"wall.position" = "-2 mm"\n' + GRID
     text += '[bisect]\naxis = "wall.stiffness"\ntolerance = "1 N/m"\nholds = "no-contact"\n'
     made = loaded(tmp_path, text, ["hand.mass=0.02"])
-    assert (made.base["wall"]["position"], made.base["hand"]["mass"]) == (-0.002, 0.02)
+    assert (value_at(made.base, "wall.position"), value_at(made.base, "hand.mass")) == (-0.002, 0.02)
     alone = tmp_path / "alone"
     alone.mkdir()
     (alone / "resolved.toml").write_text(made.toml())
@@ -199,7 +202,7 @@ def test_an_axis_that_cannot_be_used_is_one_mistake_that_says_why(axes: str, sai
 def test_a_table_that_is_not_in_the_base_scene_can_be_swept_as_it_can_be_set(tmp_path: Path) -> None:
     made = loaded(tmp_path, '[axes]\n"velocity.cutoff" = ["100 Hz", "200 Hz"]\n')
     assert "velocity" not in made.base
-    assert made.scene(1)["velocity"]["cutoff"] == 200.0
+    assert value_at(made.scene(1), "velocity.cutoff") == 200.0
 
 
 @pytest.mark.parametrize(

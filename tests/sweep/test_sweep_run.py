@@ -13,13 +13,15 @@ import pytest
 
 from haploop.launch.runs.in_process import run_in_process
 from haploop.launch.scene.file import load as load_scene
+from haploop.protocol.scene.paths import value_at, with_value
+from haploop.protocol.scene.scene import Scene
 from haploop.tools.executor.pool import Pool
 from haploop.tools.linear.one_tick import OneTickMap
-from haploop.tools.sweep.run.boundary import Boundary
-from haploop.tools.sweep.run.command import Request, sweep
-from haploop.tools.sweep.run.engine import Engine, Stopped
-from haploop.tools.sweep.run.progress import SweepProgress
-from haploop.tools.sweep.run.store import Store
+from haploop.tools.sweep.boundary import Boundary
+from haploop.tools.sweep.command import Request, sweep
+from haploop.tools.sweep.engine import Engine, Stopped
+from haploop.tools.sweep.progress import SweepProgress
+from haploop.tools.sweep.store import Store
 from haploop.tools.sweep.table import TableError, make_schema, read
 from helpers.scenes.least import KINDS
 from helpers.scenes.sweep_files import GRID, PRESS, loaded, sweep_file, swept
@@ -66,15 +68,14 @@ def test_every_row_has_the_bits_of_its_scene_run_alone(tmp_path: Path) -> None:
     assert len(table) == 4 * 5 * 2 * 2
     assert table["cell"].tolist() == list(range(80))
     for index in range(0, 80, 7):
-        scene = tomllib.loads(table["scene"][index])
+        scene = Scene.from_dict(tomllib.loads(table["scene"][index]))
         alone = run_in_process(scene, KINDS)
         assert table["trajectory_sha256"][index] == alone["trajectory_sha256"]
         assert table["energy.residual_J"][index] == alone["energy"]["residual_J"]
         assert table["final.x_m"][index] == alone["final"]["x_m"]
         assert (table["verdict"][index], table["ticks"][index]) == (alone["verdict"], alone["ticks"])
-        assert scene["wall"]["stiffness"] == table["wall.stiffness"][index]
-        assert scene["dissipation"][0]["damping"] == table["dissipation.0.damping"][index]
-        assert (scene["seed"], scene["encoder"]["rounding"]) == (table["seed"][index], table["encoder.rounding"][index])
+        for key in ("wall.stiffness", "dissipation.0.damping", "seed", "encoder.rounding"):
+            assert value_at(scene, key) == table[key][index]
     assert len(set(table["trajectory_sha256"])) == 40  # the seed changes nothing without noise
 
 
@@ -235,8 +236,8 @@ def test_bisect_finds_where_the_spectral_radius_of_a_linear_loop_is_one(tmp_path
     assert len(found["boundary"]) == 2
     for k in range(2):
         scene = made.scene(0)
-        scene["dissipation"][0]["damping"] = found["dissipation.0.damping"][k]
-        scene["clock"]["round_trip_delay"] = found["clock.round_trip_delay"][k]
+        for key in ("dissipation.0.damping", "clock.round_trip_delay"):
+            scene = with_value(scene, key, found[key][k])
         limit = OneTickMap.from_scene(scene).stiffness_limit()
         assert found["boundary"][k] == pytest.approx(limit, rel=0.03)
         assert found["high"][k] - found["low"][k] <= 0.005 * found["high"][k]

@@ -8,6 +8,7 @@ from typing import Any
 
 from haploop.launch.batch.run import run_batch
 from haploop.launch.scene.toml_writer import to_toml
+from haploop.protocol.scene.scene import Scene
 from haploop.tools.sweep.map.data import AMPLITUDE, MapData, make_map_data
 from helpers.scenes.least import KINDS
 
@@ -21,7 +22,6 @@ UNITS = {
     "hand.force.value": "N",
 }
 Result = dict[str, Any]
-Scene = dict[str, Any]
 
 
 def cells_of(axes: Mapping[str, Sequence[Any]], seeds: int = 1) -> list[dict[str, Any]]:
@@ -52,10 +52,10 @@ def table(
     columns[AMPLITUDE] = [result.get("window", {}).get("oscillation_m") for result in results]
     columns["ended"] = [result.get("ended", "done") for result in results]
     columns["why"] = [result.get("why", "") for result in results]
-    columns["scene"] = [None if scene is None else to_toml(scene) for scene in scenes]
-    base = next((scene for scene in scenes if scene is not None), {"title": "none"})
-    sweep = {"title": title, "base": base, "axes": {key: [*values] for key, values in axes.items()}}
-    return make_map_data(columns, UNITS, sweep)
+    columns["scene"] = [None if scene is None else to_toml(scene.as_dict()) for scene in scenes]
+    base = next((scene.title for scene in scenes if scene is not None), "none")
+    axes_of_file = {key: [*values] for key, values in axes.items()}
+    return make_map_data(columns, UNITS, {"title": title, "base": {"title": base}, "axes": axes_of_file})
 
 
 def said(verdict: str | None, oscillation_m: float | None = None) -> Result:

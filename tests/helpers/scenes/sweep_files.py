@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any
 
 from haploop.launch.scene.mistakes import SceneError
-from haploop.tools.sweep.file.cells import Sweep
-from haploop.tools.sweep.file.sweep_file import load
-from haploop.tools.sweep.run.command import Request, sweep
+from haploop.tools.sweep.cells import Sweep
+from haploop.tools.sweep.command import Request, sweep
+from haploop.tools.sweep.sweep_file import load
 from haploop.tools.sweep.table import SweepTable, read
 
 PRESS = """

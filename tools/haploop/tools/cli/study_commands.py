@@ -26,8 +26,8 @@ def sweep(
 
     Can be stopped or killed; the same command with the same --out goes on. `haploop plot DIR` draws the map.
     """
-    from haploop.tools.sweep.run.command import Request
-    from haploop.tools.sweep.run.command import sweep as run_sweep
+    from haploop.tools.sweep.command import Request
+    from haploop.tools.sweep.command import sweep as run_sweep
 
     run_sweep(Request(sweep, set or [], out, workers, dask, jax, plugin or []), json)
 

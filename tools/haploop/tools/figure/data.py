@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import json
+import math
 import tomllib
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 
 from haploop.logger import read
-from haploop.tools.figure.history import ElementSpan, History
+from haploop.logger.summary import Summary
+from haploop.protocol.changes import Event, changes_of, spans
+from haploop.protocol.scene.scene import ElementTable, Scene, Wall
 
 Floats = np.ndarray
 # The close view shows at most this much of the last contact.
@@ -23,6 +26,78 @@ TOGETHER = "together"
 
 class FigureError(Exception):
     """The figure cannot be drawn; the message says why and what to do."""
+
+
+@dataclass(eq=False)
+class ElementSpan:
+    """An element with one set of parameters and the ticks it covers; it has one book of energy.
+
+    Attributes:
+        element: as in the scene.
+        from_tick, to_tick: ticks covered, half-open; the end is infinite while it is at work.
+        slots: (place in the list of elements, from_tick, to_tick): where its force is in the log.
+        name: as its book is called in the log: the kind, numbered from the second of a kind on.
+    """
+
+    element: ElementTable
+    from_tick: int
+    to_tick: float
+    slots: list[tuple[int, float, float]]
+    name: str = ""
+
+
+class WallSpan(NamedTuple):
+    """The wall as it stood from a tick on."""
+
+    from_tick: int
+    wall: Wall
+
+
+class History:
+    """Follows wall and elements of a scene through the events that took effect.
+
+    Attributes:
+        elements: every element that was ever at work, in the order of their books.
+        walls: the wall and what became of it; empty without one.
+        into_wall: direction that leads into the wall, +1.0 or -1.0.
+    """
+
+    def __init__(self, scene: Scene, events: list[Event]) -> None:
+        self.walls: list[WallSpan] = []
+        self.into_wall = 1.0 if scene.wall and scene.wall.occupies == "above" else -1.0
+        self.elements: list[ElementSpan] = []
+        changes = changes_of((int(event.get("tick", 0)), event) for event in events)
+        at_work: list[ElementSpan] = []
+        for span in spans(scene, (single for change in changes for single in change.singly())):
+            wall = span.scene.wall
+            if wall and (not self.walls or self.walls[-1].wall != wall):
+                self.walls.append(WallSpan(span.from_tick, wall))
+            at_work = self._follow(span.scene.dissipation, at_work, span.from_tick)
+        # What was replaced in the tick of its coming has no book.
+        self.elements = [span for span in self.elements if span.to_tick > span.from_tick]
+        for number, span in enumerate(self.elements):
+            kind = span.element.name
+            same = sum(before.element.name == kind for before in self.elements[:number])
+            span.name = f"{kind}-{same + 1}" if same else kind
+
+    def _follow(self, elements: tuple[ElementTable, ...], before: list[ElementSpan], tick: int) -> list[ElementSpan]:
+        """Ends the spans of elements that are gone, begins those of new ones, and follows all that change places."""
+        now = []
+        for element in elements:
+            span = next((span for span in before if span.element is element), None)
+            if span is None:
+                span = ElementSpan(element, tick, math.inf, [])
+                self.elements.append(span)
+            now.append(span)
+        for place, span in enumerate(before):
+            if span not in now:
+                span.to_tick = tick
+            if now[place : place + 1] != [span]:
+                span.slots[-1] = (*span.slots[-1][:2], tick)
+        for place, span in enumerate(now):
+            if before[place : place + 1] != [span]:
+                span.slots.append((place, tick, math.inf))
+        return now
 
 
 @dataclass
@@ -45,7 +120,7 @@ class RunData:
     """The scene, summary and log of a run.
 
     Attributes:
-        scene, summary: empty when they are not there.
+        summary: empty where there is none.
         events: as logged, each with its ``tick`` and its time ``timestamp``.
         controller, energy: columns at every tick, with ``timestamp``.
         t_s, x_m, v_m_s, force_N: the motion at every plant step and the force applied from there on; at every tick
@@ -55,10 +130,10 @@ class RunData:
         cut: where the log ends if it was cut off, else "".
     """
 
-    scene: dict[str, Any]
-    summary: dict[str, Any]
+    scene: Scene
+    summary: Summary
     history: History
-    events: list[dict[str, Any]]
+    events: list[Event]
     controller: dict[str, Floats]
     energy: dict[str, Floats]
     t_s: Floats
@@ -79,19 +154,18 @@ class RunData:
             LogError: the log is no log.
         """
         scene_file, summary_file = directory / "scene.toml", directory / "summary.json"
-        scene_text = scene_file.read_text(encoding="utf-8") if scene_file.exists() else ""
+        text = scene_file.read_text(encoding="utf-8") if scene_file.exists() else ""
         if not (directory / "log.mcap").exists():
-            raise FigureError(_no_log(directory, tomllib.loads(scene_text)))
+            raise FigureError(_no_log(directory, _scene(text)))
         log = read(directory)
-        scene_text = scene_text or log.attachments.get("scene.toml", b"").decode()
-        scene = tomllib.loads(scene_text)
+        scene = _scene(text or log.attachments.get("scene.toml", b"").decode())
         controller, energy = log.get("/controller", {}), log.get("/energy", {})
-        if not len(controller.get("timestamp", ())) or not len(energy.get("timestamp", ())):
+        if scene is None or not len(controller.get("timestamp", ())) or not len(energy.get("timestamp", ())):
             raise FigureError(f"The log in {directory} holds no tick yet, so there is nothing to draw.")
         plant = log.get("/plant")
         motion = plant or {**controller, "t": controller["timestamp"], "force": controller["total"]}
         forces = {name: motion[name] for name in ("actuator", "friction") if name in motion}
-        if plant and "actuator" in scene:
+        if plant and scene.actuator:
             forces.setdefault("actuator", plant["force"])
         events = log.get("/events", [])
         return cls(
@@ -119,7 +193,7 @@ class RunData:
     @property
     def control_rate(self) -> int:
         """Ticks per second, Hz."""
-        return self.scene.get("clock", {}).get("control_rate", 1000)
+        return self.scene.clock.control_rate
 
     @property
     def span_s(self) -> tuple[float, float]:
@@ -150,22 +224,21 @@ class RunData:
     def wall_at(self, t_s: Floats) -> tuple[Floats, Floats]:
         """Returns position (m) and stiffness (N/m) of the wall at some times."""
         walls = self.history.walls
-        index = np.searchsorted([wall.from_tick / self.control_rate for wall in walls], t_s, side="right") - 1
-        index = np.maximum(index, 0)
-        positions = np.array([wall.position_m for wall in walls])
-        return positions[index], np.array([wall.stiffness_N_m for wall in walls])[index]
+        index = np.searchsorted([span.from_tick / self.control_rate for span in walls], t_s, side="right") - 1
+        stood = np.array([(span.wall.position, span.wall.stiffness) for span in walls])[np.maximum(index, 0)]
+        return stood[:, 0], stood[:, 1]
 
     def element_force(self, span: ElementSpan) -> tuple[Floats, Floats]:
         """Returns times (s) and force (N) of an element at the ticks it covers."""
         ticks = np.rint(self.ticks_s * self.control_rate)
-        times, forces = [], []
+        times, forces = [np.empty(0)], [np.empty(0)]
         for slot, first, end in span.slots:
             inside = (ticks >= first) & (ticks < end)
             column = self.controller.get(f"dissipation.{slot}")
             if column is not None and inside.any():
                 times.append(self.ticks_s[inside])
                 forces.append(column[inside])
-        return np.concatenate([*times, np.empty(0)]), np.concatenate([*forces, np.empty(0)])
+        return np.concatenate(times), np.concatenate(forces)
 
     def books(self) -> list[Book]:
         """Returns the books of the wall and of the elements, then their sum; each ends with the end state."""
@@ -174,15 +247,19 @@ class RunData:
         ends = [*ended.get("elements", []), *[None] * len(self.history.elements)]
         accounts += [(span.name, span.from_tick, end) for span, end in zip(self.history.elements, ends, strict=False)]
         books = [self._book(*account) for account in accounts if f"{account[0]}.true" in self.energy]
-        books = [
-            book for book in books if len(book.t_s)
-        ]  # a log may end between an element's start and its first books
+        # A log may end between an element's start and its first books.
+        books = [book for book in books if len(book.t_s)]
         if len(books) < 2:
             return books
-        longest = max(books, key=lambda book: len(book.t_s))
-        return [*books, _sum(TOGETHER, longest.t_s, books)]
+        # All end together, each counting from its first tick on.
+        t_s = max((book.t_s for book in books), key=len)
+        true, sampled = np.zeros(len(t_s)), np.zeros(len(t_s))
+        for book in books:
+            true[len(t_s) - len(book.t_s) :] += book.true_J
+            sampled[len(t_s) - len(book.t_s) :] += book.sampled_J
+        return [*books, Book(TOGETHER, t_s, true, sampled)]
 
-    def _book(self, name: str, from_tick: int, end: dict[str, Any] | None) -> Book:
+    def _book(self, name: str, from_tick: int, end: dict[str, float | None] | None) -> Book:
         t = self.energy["timestamp"]
         curves = [t, self.energy[f"{name}.true"], self.energy[f"{name}.sampled"]]
         kept = (t >= from_tick / self.control_rate) & ~np.isnan(curves[1])
@@ -193,18 +270,13 @@ class RunData:
         return Book(name, *curves)
 
 
-def _sum(name: str, t_s: Floats, books: list[Book]) -> Book:
-    """Returns the sum of books that end together, each counting from its first tick on."""
-    true, sampled = np.zeros(len(t_s)), np.zeros(len(t_s))
-    for book in books:
-        true[len(t_s) - len(book.t_s) :] += book.true_J
-        sampled[len(t_s) - len(book.t_s) :] += book.sampled_J
-    return Book(name, t_s, true, sampled)
+def _scene(text: str) -> Scene | None:
+    return Scene.from_dict(tomllib.loads(text)) if text else None
 
 
-def _no_log(directory: Path, scene: dict[str, Any]) -> str:
+def _no_log(directory: Path, scene: Scene | None) -> str:
     if not directory.exists():
         return f"There is no {directory}; give the directory of a run."
-    if scene.get("run", {}).get("log") == "none":
+    if scene and scene.run.log == "none":
         return f'The run in {directory} was made with run.log = "none" and kept no log; run it again with "steps".'
     return f"The directory {directory} holds no log.mcap; it is not the directory of a logged run."

@@ -23,10 +23,7 @@ _AROUND_STAR_PX, _STAR_HALF_PX = (3.0, 13.0, 27.0, 45.0), 7.0
 _MARGIN_PX = 1.5
 # Places tried along a line, and points looked at along each of its segments.
 _PLACES, _SAMPLES = 60, 60
-_FRAMED: dict[str, Any] = {
-    "bbox": {"boxstyle": "round,pad=0.18", "facecolor": "white", "edgecolor": "none", "alpha": 0.85},
-    "zorder": 6,
-}
+_FRAME = {"boxstyle": "round,pad=0.18", "facecolor": "white", "edgecolor": "none", "alpha": 0.85}
 
 
 class LabelRoom:
@@ -136,7 +133,7 @@ class LabelRoom:
 
     def _written(self, box: Box | None, text: str, colour: str, gid: str, **look: Any) -> bool:
         if box:
-            self.write(box, text, color=colour, gid=gid, **_FRAMED, **look)
+            self.write(box, text, color=colour, gid=gid, bbox=_FRAME, zorder=6, **look)
         return box is not None
 
     def _covers_avoided(self, box: Box) -> bool:

@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from haploop.tools.figure.data import Floats, RunData
-from haploop.tools.figure.history import ElementSpan
+from haploop.tools.figure.data import ElementSpan, Floats, RunData
 from haploop.tools.figure.style import (
     EARLY,
     FAINT,
@@ -49,13 +48,13 @@ def momentum_loop(run: RunData, span: ElementSpan) -> tuple[Floats, Floats, Floa
     times, force = run.element_force(span)
     at = np.searchsorted(run.ticks_s, times)
     v = run.controller["v"][at]
-    mass = np.where(force != 0.0, span.parameters["mass"], 0.0)
+    mass = np.where(force != 0.0, span.element.parameters["mass"], 0.0)
     return times[1:], v[:-1], mass[:-1] * v[1:]
 
 
 def is_inertia(span: ElementSpan) -> bool:
     """Tells whether an element has a virtual momentum."""
-    return "inertia" in span.kind and "mass" in span.parameters
+    return "inertia" in span.element.name and "mass" in span.element.parameters
 
 
 def draw_force_position(ax: Axes, run: RunData, span_s: tuple[float, float]) -> None:
@@ -110,7 +109,7 @@ def draw_momentum(ax: Axes, run: RunData, span_s: tuple[float, float]) -> None:
         ax.plot(velocity, momentum * GRAMS, color=colour, linewidth=0.8, alpha=0.4)
         ax.plot(velocity, momentum * GRAMS, color=colour, label=span.name, gid=span.name, **dots)
         ends = np.array([velocity.min(), velocity.max()])
-        ax.plot(ends, ends * span.parameters["mass"] * GRAMS, color=INK, linewidth=1.0, dashes=(4, 2))
+        ax.plot(ends, ends * span.element.parameters["mass"] * GRAMS, color=INK, linewidth=1.0, dashes=(4, 2))
     ax.plot([], [], color=INK, linewidth=1.0, dashes=(4, 2), label="ideal inertia")
     ax.axhline(0.0, color=FAINT, linewidth=0.8, zorder=0)
     corner_legend(ax)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from haploop.logger.summary import Summary
 from haploop.protocol.changes import describe
 from haploop.tools.figure.data import Book, RunData
 from haploop.tools.figure.style import GREY, INK, LARGE, SMALL, TEXT, VERDICTS, fit_text
@@ -30,8 +31,7 @@ def draw_header(figure: Figure | SubFigure, run: RunData) -> None:
         bbox={"boxstyle": "round,pad=0.35", "facecolor": VERDICTS.get(word, GREY), "linewidth": 0},
     )  # fmt: skip
     right = sign.get_window_extent().x1 / figure.bbox.width
-    words = run.scene.get("title", "untitled run")
-    title = figure.text(right + 0.018, 0.66, words, fontsize=LARGE, color=INK, va="center", gid="title")
+    title = figure.text(right + 0.018, 0.66, run.scene.title, fontsize=LARGE, color=INK, va="center", gid="title")
     fit_text(title, figure.bbox.width * (0.97 - right), smallest=1.0)
     figure.text(0.006, 0.16, "   ·   ".join(key_numbers(run)), fontsize=TEXT + 1, color=INK, va="center", gid="numbers")
 
@@ -41,13 +41,13 @@ def key_numbers(run: RunData) -> list[str]:
     if not run.summary:
         first, last = run.span_s
         why = "log cut off" if run.cut else "no summary"
-        return [f"{why}: {last - first:g} s of {run.scene.get('duration', last):g} s"]
+        return [f"{why}: {last - first:g} s of {run.scene.duration:g} s"]
     window, energy = run.summary["window"], run.summary["energy"]
     last_s = run.span_s[1] - window["from_s"]
     words = [f"in the last {last_s:.3g} s: oscillation {amount(window['oscillation_m'], 'm')}"]
     if run.history.walls and run.summary["verdict"] != "no-contact":
         words.append(f"outside the wall {100 * window['outside_fraction']:.0f} %")
-        displayed, wanted = window["displayed_stiffness_N_m"], run.history.walls[-1].stiffness_N_m
+        displayed, wanted = window["displayed_stiffness_N_m"], run.history.walls[-1].wall.stiffness
         words += [f"displayed stiffness {spring(displayed)} of {spring(wanted)}"] if displayed is not None else []
     words.append(f"residual {amount(energy['residual_J'], 'J')} of {amount(energy['moved_J'], 'J')} moved")
     return words
@@ -95,7 +95,7 @@ def book_rows(run: RunData, books: list[Book]) -> list[Row]:
     for book in [*shown[:_MOST_BOOKS], *together]:
         name, at_work = book.name, ""
         if span := spans.get(book.name):
-            name = f"{book.name} ({parameters(span.parameters)})"
+            name = f"{book.name} ({parameters(span.element.as_dict())})"
             end_s = min(span.to_tick / run.control_rate, run.span_s[1])
             at_work = f"{span.from_tick / run.control_rate:g}–{end_s:g}"
         true, sampled = (amount(value, "J") for value in book.ends_J)
@@ -109,7 +109,7 @@ def book_rows(run: RunData, books: list[Book]) -> list[Row]:
     return rows + [Row(words, f"{count}") for words, count in count_losses(run.summary).items()]
 
 
-def _leak_rows(wall: dict[str, Any]) -> list[Row]:
+def _leak_rows(wall: Summary) -> list[Row]:
     if "leak" not in wall:
         return []
     rows = [Row(f"    leak by {words}", amount(wall["leak"][key], "J")) for key, words in LEAK_CAUSES.items()]

@@ -35,8 +35,7 @@ def line(ax: Axes, t: Floats, y: Floats, label: str, colour: str, held: bool = F
     """Draws a line over time, reduced to its extremes; ``held`` for a value that holds until the next."""
     keep = extremes(y)
     steps = "steps-post" if held else "default"
-    look: dict[str, Any] = {"linewidth": 1.2, "label": label, "color": colour, "drawstyle": steps} | style
-    ax.plot(t[keep], y[keep], **look)
+    ax.plot(t[keep], y[keep], **{"linewidth": 1.2, "label": label, "color": colour, "drawstyle": steps, **style})
 
 
 def position_panel(ax: Axes, run: RunData, span_s: tuple[float, float], title: str) -> None:
@@ -105,7 +104,7 @@ def force_panel(ax: Axes, run: RunData, span_s: tuple[float, float], title: str)
     at_steps = (run.t_s >= span_s[0]) & (run.t_s <= span_s[1])
     for name, force in run.plant_forces_N.items():
         line(ax, run.t_s[at_steps], force[at_steps], name, OF_THE_PLANT[name], linewidth=1.0, gid=name)
-    most = run.scene.get("actuator", {}).get("saturation")
+    most = run.scene.actuator and run.scene.actuator.saturation
     if most is not None and np.abs(run.controller["total"][inside]).max(initial=0.0) > most:
         for limit in (-most, most):
             ax.axhline(limit, color=OF_THE_PLANT["actuator"], linewidth=0.8, dashes=(1, 2), zorder=0, gid="saturation")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import tomllib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -17,6 +17,10 @@ from haploop.logger.summary import versions
 CELL, SEED, ENDED, WHY, SCENE = "cell", "seed", "ended", "why", "scene"
 # Kinds of column, and the types they have in Parquet.
 NUMBER, WHOLE, TEXT, TRUTH = "float64", "int64", "string", "bool"
+# A row by column: numbers, text, truth values, None where there is nothing.
+Row = dict[str, Any]
+# What sweep.toml holds: title, repeat, record, axes (values by key), bisect and base, the tables of the scene.
+ResolvedSweep = dict[str, Any]
 
 
 class NeedsPyarrow(ImportError):
@@ -60,7 +64,7 @@ def make_schema(columns: Iterable[Column], sweep: str) -> Any:
     return arrow.schema(fields, metadata={"sweep": sweep, "versions": json.dumps(versions())})
 
 
-def make_table(rows: Sequence[Mapping[str, Any]], schema: Any) -> Any:
+def make_table(rows: Sequence[Row], schema: Any) -> Any:
     """Makes an Arrow table of rows; what a row does not have is null."""
     arrow = pyarrow()
     arrays = [arrow.array([row.get(field.name) for row in rows], type=field.type) for field in schema]
@@ -89,7 +93,7 @@ class SweepTable:
 
     columns: dict[str, np.ndarray]
     units: dict[str, str]
-    sweep: dict[str, Any]
+    sweep: ResolvedSweep
     boundary: dict[str, np.ndarray]
     finished: bool
 

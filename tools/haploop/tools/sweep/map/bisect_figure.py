@@ -10,11 +10,18 @@ import numpy as np
 from haploop.tools.figure.labels import LabelRoom
 from haploop.tools.figure.style import ELEMENTS, FAINT, INK, WALL, fix_layout
 from haploop.tools.sweep.map.axis import Ruler
-from haploop.tools.sweep.map.curves import draw_line, draw_star, line_styles, name_lines
 from haploop.tools.sweep.map.data import Axis, MapData
 from haploop.tools.sweep.map.edges import ALL_HOLD, FOUND, NONE_HOLDS, UNKNOWN, Edges, find_edges
 from haploop.tools.sweep.map.legend import LOOKS, Legend
-from haploop.tools.sweep.map.lines import PanelLines, find_lines
+from haploop.tools.sweep.map.lines import (
+    LineStyle,
+    PanelLines,
+    draw_line,
+    draw_star,
+    find_lines,
+    line_styles,
+    name_lines,
+)
 from haploop.tools.sweep.map.sentences import edge_description, edge_notes, furthest
 from haploop.tools.sweep.map.sheet import Sheet
 
@@ -51,11 +58,11 @@ def bisect_figure(data: MapData) -> Figure:
     signs = []
     for number in range(count):
         part = (slice(None), number) if second else (slice(None),)
-        look = {"color": _COLOURS[number] if second else INK, "marker": _MARKERS[number]}
+        colour = _COLOURS[number] if second else INK
         if not second:
             _fill(ax, x, y, edges)
-        _line(ax, x, y, edges, part, number, look)
-        signs.append((second.word(number) if second else "boundary", look))
+        _line(ax, x, y, edges, part, number, colour)
+        signs.append((second.word(number) if second else "boundary", colour, _MARKERS[number]))
     legend = Legend(sheet.side, *sheet.side_in)
     legend.lines(f"{second.key}" if second else "", signs)
     legend.map_lines(styles, {line.name: line.words for over in overs for line in over.lines})
@@ -73,19 +80,21 @@ def _over(data: MapData, rulers: Sequence[Ruler], second: Axis | None, number: i
     return find_lines((data.columns["scene"][row] for row in rows), rulers, bounds=second is None)
 
 
-def _draw_over(ax: Axes, overs: Sequence[PanelLines], rulers: Sequence[Ruler]) -> dict[str, dict[str, Any]]:
+def _draw_over(ax: Axes, overs: Sequence[PanelLines], rulers: Sequence[Ruler]) -> dict[str, LineStyle]:
     """Draws the exact limit of every line in its colour, and the bounds where there is one line; returns the styles."""
     names = [line.name for over in overs for line in over.lines if line.pieces]
     styles = line_styles(list(dict.fromkeys(names)))
     for number, over in enumerate(overs):
         for line in over.lines:
             if line.pieces:
-                own = {"color": _COLOURS[number], "linewidth": 1.5} if len(overs) > 1 else {}
-                over.drawn[line.name] = draw_line(ax, line, rulers, styles[line.name] | own)
+                style = styles[line.name]
+                if len(overs) > 1:
+                    style: LineStyle = {**style, "color": _COLOURS[number], "linewidth": 1.5}
+                over.drawn[line.name] = draw_line(ax, line, rulers, style)
     return styles
 
 
-def _line(ax: Axes, x: Ruler, y: Ruler, edges: Edges, part: tuple[Any, ...], number: int, look: dict[str, Any]) -> None:
+def _line(ax: Axes, x: Ruler, y: Ruler, edges: Edges, part: tuple[Any, ...], number: int, colour: str) -> None:
     """Draws the boundaries of one line with their brackets; arrows at the edge where there is none."""
     from matplotlib.transforms import offset_copy
 
@@ -93,19 +102,23 @@ def _line(ax: Axes, x: Ruler, y: Ruler, edges: Edges, part: tuple[Any, ...], num
     found = state == FOUND
     places = np.where(found, y.place(edges.nearest[part]), np.nan)
     joined = "none" if x.axis.names else "-"
-    white = {"markeredgecolor": "white", "markeredgewidth": 0.6}
-    ax.plot(at, places, linestyle=joined, linewidth=0.8, markersize=5.5, zorder=4.5, gid="boundary", **look, **white)
+    ax.plot(
+        at, places, color=colour, linestyle=joined, linewidth=0.8, zorder=4.5, gid="boundary", marker=_MARKERS[number],
+        markersize=5.5, markeredgecolor="white", markeredgewidth=0.6,
+    )  # fmt: skip
     ends = y.place(edges.low[part][found]), y.place(edges.high[part][found])
-    ax.vlines(at[found], *ends, color=look["color"], linewidth=2.4, alpha=0.5, zorder=4.4, gid="brackets")
+    ax.vlines(at[found], *ends, color=colour, linewidth=2.4, alpha=0.5, zorder=4.4, gid="brackets")
     bottom, top = ax.get_ylim()
     far, near = (top, bottom) if edges.rising else (bottom, top)
     arrow = "^" if edges.rising else "v"
     for kind, where, marker in ((ALL_HOLD, far, arrow), (NONE_HOLDS, near, "x"), (UNKNOWN, near, "$?$")):
         here = at[state == kind]
-        sign = {"color": look["color"], "marker": marker, "markersize": 6, "linestyle": "none", "zorder": 6}
         inwards = (1.0 if where == bottom else -1.0) * (_STACK_PT * (number + 0.6))
         shifted = offset_copy(ax.transData, ax.get_figure(root=True), y=inwards, units="points")
-        ax.plot(here, np.full(len(here), where), gid=f"state {kind}", transform=shifted, **sign)
+        ax.plot(
+            here, np.full(len(here), where), color=colour, marker=marker, markersize=6, linestyle="none", zorder=6,
+            gid=f"state {kind}", transform=shifted,
+        )  # fmt: skip
 
 
 def _make_room(ax: Axes, y: Ruler, edges: Edges, lines: int) -> None:
@@ -135,7 +148,7 @@ def _fill(ax: Axes, x: Ruler, y: Ruler, edges: Edges) -> None:
 
 
 def _names(
-    ax: Axes, x: Ruler, y: Ruler, edges: Edges, overs: Sequence[PanelLines], styles: dict[str, dict[str, Any]]
+    ax: Axes, x: Ruler, y: Ruler, edges: Edges, overs: Sequence[PanelLines], styles: dict[str, LineStyle]
 ) -> None:
     """Writes the furthest boundary, and the names of the lines where there is one line of cells."""
     room = LabelRoom(ax)

@@ -13,6 +13,7 @@ import numpy as np
 from haploop.launch.scene.toml_writer import inline
 from haploop.tools.figure.data import FigureError
 from haploop.tools.render.units import prefix_for
+from haploop.tools.sweep.table import ResolvedSweep
 
 AMPLITUDE, STIFFNESS = "window.oscillation_m", "wall.stiffness"
 # The worse later: of several seeds a cell shows the worst. A failed run says nothing, a swinging one that it swings.
@@ -113,7 +114,7 @@ class MapData:
     base: str
     axes: tuple[Axis, ...]
     columns: Columns
-    sweep: dict[str, Any]
+    sweep: ResolvedSweep
     boundary: Columns
 
     @property
@@ -198,7 +199,7 @@ def verdict_number(word: str | None) -> int:
 def make_map_data(
     columns: Columns,
     units: Mapping[str, str],
-    sweep: dict[str, Any],
+    sweep: ResolvedSweep,
     boundary: Columns | None = None,
 ) -> MapData:
     """Makes the data of a map from a sweep's table.
@@ -226,7 +227,7 @@ def make_map_data(
     return MapData(sweep.get("title", base), base, axes, columns, sweep, boundary or {})
 
 
-def _planned_alone(columns: Columns, sweep: dict[str, Any]) -> Columns:
+def _planned_alone(columns: Columns, sweep: ResolvedSweep) -> Columns:
     """Returns the rows at the planned points of a search that goes on; those in between are no cells of a map."""
     key = sweep["bisect"]["axis"]
     rows = np.flatnonzero(np.isin(np.asarray(columns[key], dtype=float), sweep["axes"][key])).tolist()

@@ -4,18 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Literal
 
 from haploop.tools.figure.data import FigureError
 from haploop.tools.figure.labels import LabelRoom
 from haploop.tools.figure.style import fix_layout, write_figure
 from haploop.tools.sweep.map.axis import Ruler
 from haploop.tools.sweep.map.bisect_figure import bisect_figure
-from haploop.tools.sweep.map.curves import draw_line, draw_star, line_styles, name_lines
 from haploop.tools.sweep.map.data import LIMIT_CYCLE, Axis, MapData, make_map_data
 from haploop.tools.sweep.map.edges import stiffest_steady
 from haploop.tools.sweep.map.legend import Legend, amplitude_scale
-from haploop.tools.sweep.map.lines import PanelLines, find_lines
+from haploop.tools.sweep.map.lines import (
+    LineStyle,
+    PanelLines,
+    draw_line,
+    draw_star,
+    find_lines,
+    line_styles,
+    name_lines,
+)
 from haploop.tools.sweep.map.panels import (
     SwingScale,
     count_disagreement,
@@ -86,7 +93,7 @@ def _label(
     panel: Panel,
     over: PanelLines,
     swings: SwingScale,
-    styles: dict[str, dict[str, Any]],
+    styles: dict[str, LineStyle],
 ) -> None:
     """Writes star and names, once the panel has its place."""
     room = LabelRoom(ax)

@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from matplotlib.colors import Colormap, LogNorm
     from matplotlib.figure import SubFigure
 
+    from haploop.tools.sweep.map.lines import LineStyle
+
 
 class Look(NamedTuple):
     """Fill of a cell, hatching and its colour, marker of a point and its colour."""
@@ -127,7 +129,7 @@ class Legend:
         bar.set_gid("amplitude scale")
         self._y += 0.14 + 0.28 + _GAP_IN
 
-    def map_lines(self, styles: Mapping[str, dict[str, Any]], words: Mapping[str, str]) -> None:
+    def map_lines(self, styles: Mapping[str, LineStyle], words: Mapping[str, str]) -> None:
         """Writes the names of the lines over the map and what they say."""
         for name, style in styles.items():
             middle = self._y + _LINE_IN / 2
@@ -138,14 +140,14 @@ class Legend:
             self._y += 0.07
         self._y += _GAP_IN if styles else 0.0
 
-    def lines(self, heading: str, signs: Sequence[tuple[str, dict[str, Any]]]) -> None:
-        """Writes the values that the lines through cells stand for."""
+    def lines(self, heading: str, signs: Sequence[tuple[str, str, str]]) -> None:
+        """Writes the values that the lines through cells stand for, each with its colour and marker."""
         if heading:
             self._heading(heading)
-        for words, look in signs:
-            middle = self._y + _LINE_IN / 2
-            self._ax.plot([0.0, _SIGN_IN / 2, _SIGN_IN], [middle] * 3, markevery=[1], markersize=6, **look)
-            self._write(words, middle)
+        for words, colour, marker in signs:
+            places = [0.0, _SIGN_IN / 2, _SIGN_IN], [self._y + _LINE_IN / 2] * 3
+            self._ax.plot(*places, markevery=[1], markersize=6, color=colour, marker=marker)
+            self._write(words, self._y + _LINE_IN / 2)
             self._y += _LINE_IN + 0.06
         self._y += _GAP_IN
 

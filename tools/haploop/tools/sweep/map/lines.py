@@ -1,23 +1,36 @@
-"""The lines over a map that need no run: the exact limit of the linear loop, and analytic bounds."""
+"""The lines over a map that need no run: the exact limit of the linear loop and analytic bounds, and their drawing."""
 
 from __future__ import annotations
 
 import math
 import tomllib
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, NotRequired, TypedDict
 
 import numpy as np
 
-from haploop.protocol.scene.paths import value_at
+from haploop.protocol.scene.scene import Scene
+from haploop.tools.figure.style import INK
 from haploop.tools.linear.bounds import Bound, bounds_of
 from haploop.tools.linear.linearity import installed_kinds, left_out, why_not_linear
 from haploop.tools.linear.one_tick import NotLinear, OneTickMap
 from haploop.tools.sweep.map.axis import Ruler
-from haploop.tools.sweep.map.data import STIFFNESS
-from haploop.tools.sweep.map.plane import Plane
+from haploop.tools.sweep.map.plane import Level, Plane
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from haploop.tools.figure.labels import LabelRoom
 
 EXACT = "ρ(M) = 1"
+_MEANING = {"passivity": "passive, whatever passive hand holds it", "stability": "stable with the scene's own hand"}
+_MOST_LOG = 50.0
+# Of a straight line, so that its name finds room.
+_POINTS = 41
+_DASHES = ((5, 2), (2, 1.5), (7, 2, 1.5, 2), (1, 1), (9, 3), (4, 1.5, 1, 1.5, 1, 1.5))
+_COLOURS = ("#0B5FA5", "#7A1FA2", "#00664A", "#5B3A29", "#8A0F3C", "#3C3C8F")
+_STAR = "#C00000"
 
 
 @dataclass(frozen=True)
@@ -33,71 +46,6 @@ class MapLine:
     name: str
     words: str
     pieces: list[np.ndarray]
-
-
-def exact_limit(plane: Plane) -> MapLine:
-    """Finds where rho(M) = 1 for the linear loop; without lines where it grows nowhere or everywhere.
-
-    Raises:
-        NotLinear: the loop of some place is no linear map; the message names what makes it none, in a few words.
-    """
-    scenes = plane.own_scenes()
-    if any("wall" not in scene for scene in scenes):
-        raise NotLinear("there is no wall")
-    if curved := [reason for scene in scenes for reason in why_not_linear(scene)]:
-        raise NotLinear(", ".join(dict.fromkeys(curved)))
-    loops: dict[tuple[float, ...], OneTickMap] = {}
-
-    def level(x: float, y: float) -> float:
-        key = plane.but_for_stiffness(x, y)
-        if key not in loops:
-            loops[key] = OneTickMap.from_scene(plane.at(x, y))
-        return math.log(loops[key].growth(plane.stiffness(x, y)))
-
-    without = f", without {', '.join(left)}" if (left := left_out(plane.scene)) else ""
-    return MapLine(EXACT, f"exact, linear loop in contact{without}", plane.zero_lines(level))
-
-
-_MEANING = {"passivity": "passive, whatever passive hand holds it", "stability": "stable with the scene's own hand"}
-_MOST_LOG = 50.0
-
-
-def bound_lines(plane: Plane) -> list[MapLine]:
-    """Finds for every bound that applies at some place of a panel the line on which the wall is as stiff as it allows.
-
-    A bound that applies but allows no wall of the panel, or every one, has no lines.
-    """
-    if value_at(plane.scene, STIFFNESS) is None:
-        return []
-    known: dict[tuple[float, ...], dict[str, Bound]] = {}
-
-    def bounds_at(x: float, y: float) -> dict[str, Bound]:
-        key = plane.but_for_stiffness(x, y)
-        if key not in known:
-            known[key] = {bound.name: bound for bound in bounds_of(plane.at(x, y))}
-        return known[key]
-
-    first = {bound.name: bound for bound in bounds_of(plane.scene)}
-    lines = {name: plane.zero_lines(_level(plane, bounds_at, name), whole_ticks=True) for name in first}
-    applied = {name for bounds in known.values() for name, bound in bounds.items() if bound.applies}
-    return [MapLine(name, _MEANING[bound.kind], lines[name]) for name, bound in first.items() if name in applied]
-
-
-def _level(
-    plane: Plane, bounds_at: Callable[[float, float], dict[str, Bound]], name: str
-) -> Callable[[float, float], float]:
-    """Returns the logarithm of the wall's stiffness over what a bound allows; NaN where the bound does not apply."""
-
-    def level(x: float, y: float) -> float:
-        allowed = bounds_at(x, y)[name].stiffness_N_m
-        if allowed is None:
-            return math.nan
-        stiffness = plane.stiffness(x, y)
-        if not allowed or not stiffness:
-            return _MOST_LOG if stiffness > allowed else -_MOST_LOG
-        return float(np.clip(math.log(stiffness / allowed), -_MOST_LOG, _MOST_LOG))
-
-    return level
 
 
 @dataclass
@@ -116,8 +64,8 @@ def find_lines(texts: Iterable[str | None], rulers: Sequence[Ruler], bounds: boo
         return PanelLines(why_none="none of its cells has a scene")
     if any(ruler.axis.names for ruler in rulers):
         return PanelLines()
-    scene = tomllib.loads(text)
-    elements = {table["kind"] for table in scene.get("dissipation", [])}
+    scene = Scene.from_dict(tomllib.loads(text))
+    elements = {element.name for element in scene.dissipation}
     if foreign := sorted(elements - set(installed_kinds())):
         return PanelLines(why_none=f"the element {foreign[0]} comes from a plugin")
     plane = Plane(scene, rulers)
@@ -126,3 +74,132 @@ def find_lines(texts: Iterable[str | None], rulers: Sequence[Ruler], bounds: boo
         return PanelLines([exact_limit(plane), *known])
     except NotLinear as error:
         return PanelLines(known, str(error))
+
+
+def exact_limit(plane: Plane) -> MapLine:
+    """Finds where rho(M) = 1 for the linear loop; without lines where it grows nowhere or everywhere.
+
+    Raises:
+        NotLinear: the loop of some place is no linear map; the message names what makes it none, in a few words.
+    """
+    scenes = plane.own_scenes()
+    if any(scene.wall is None for scene in scenes):
+        raise NotLinear("there is no wall")
+    if curved := [reason for scene in scenes for reason in why_not_linear(scene)]:
+        raise NotLinear(", ".join(dict.fromkeys(curved)))
+    loops: dict[tuple[float, ...], OneTickMap] = {}
+
+    def level(x: float, y: float) -> float:
+        key = plane.but_for_stiffness(x, y)
+        if key not in loops:
+            loops[key] = OneTickMap.from_scene(plane.at(x, y))
+        return math.log(loops[key].growth(plane.stiffness(x, y)))
+
+    without = f", without {', '.join(left)}" if (left := left_out(plane.scene)) else ""
+    return MapLine(EXACT, f"exact, linear loop in contact{without}", plane.zero_lines(level))
+
+
+def bound_lines(plane: Plane) -> list[MapLine]:
+    """Finds for every bound that applies at some place of a panel the line on which the wall is as stiff as it allows.
+
+    A bound that applies but allows no wall of the panel, or every one, has no lines.
+    """
+    if plane.scene.wall is None:
+        return []
+    known: dict[tuple[float, ...], dict[str, Bound]] = {}
+
+    def stiffness_over(name: str) -> Level:
+        """Makes the logarithm of the wall's stiffness over what a bound allows; NaN where it does not apply."""
+
+        def level(x: float, y: float) -> float:
+            key = plane.but_for_stiffness(x, y)
+            if key not in known:
+                known[key] = {bound.name: bound for bound in bounds_of(plane.at(x, y))}
+            allowed, stiffness = known[key][name].stiffness_N_m, plane.stiffness(x, y)
+            if allowed is None:
+                return math.nan
+            if not allowed or not stiffness:
+                return _MOST_LOG if stiffness > allowed else -_MOST_LOG
+            return float(np.clip(math.log(stiffness / allowed), -_MOST_LOG, _MOST_LOG))
+
+        return level
+
+    first = bounds_of(plane.scene)
+    lines = [plane.zero_lines(stiffness_over(bound.name), whole_ticks=True) for bound in first]
+    applied = {name for bounds in known.values() for name, bound in bounds.items() if bound.applies}
+    return [
+        MapLine(bound.name, _MEANING[bound.kind], pieces)
+        for bound, pieces in zip(first, lines, strict=True)
+        if bound.name in applied
+    ]
+
+
+class LineStyle(TypedDict):
+    """The look of a line, as matplotlib takes it."""
+
+    color: str
+    linewidth: float
+    dashes: NotRequired[tuple[float, ...]]
+
+
+def line_styles(names: Sequence[str]) -> dict[str, LineStyle]:
+    """Returns the look of every line by its name, each with dashes of its own; the exact limit is solid and black."""
+    styles: dict[str, LineStyle] = {EXACT: {"color": INK, "linewidth": 2.0}} if EXACT in names else {}
+    for number, name in enumerate(name for name in names if name != EXACT):
+        turn = number % len(_COLOURS)
+        styles[name] = {"color": _COLOURS[turn], "dashes": _DASHES[turn], "linewidth": 1.8}
+    return styles
+
+
+def draw_line(ax: Axes, line: MapLine, rulers: Sequence[Ruler], style: LineStyle) -> list[np.ndarray]:
+    """Draws all pieces of a line; a piece that is one value of the only axis stands upright.
+
+    Returns:
+        The pieces in the coordinates of the panel.
+    """
+    from matplotlib.patheffects import Normal, withStroke
+
+    look = {
+        **style,
+        "zorder": 4 if len(rulers) == 2 else 1.5,
+        "path_effects": [withStroke(linewidth=style["linewidth"] + 1.8, foreground="white"), Normal()],
+        "gid": f"boundary {line.name}",
+        "solid_capstyle": "round",
+    }
+    drawn = []
+    for piece in line.pieces:
+        places = np.column_stack([ruler.place(piece[:, number]) for number, ruler in enumerate(rulers)])
+        if len(rulers) == 1:
+            for (x,) in places:
+                ax.axvline(x, **look)
+            low, high = np.log(ax.get_ylim())
+            upper = np.exp(np.linspace(high, low + 0.75 * (high - low), _POINTS))
+            places = np.column_stack([np.full(_POINTS, places[0, 0]), upper])
+        else:
+            if len(places) == 1:
+                places = _across(places[0], rulers)
+            ax.plot(places[:, 0], places[:, 1], **look)
+        drawn.append(places)
+    return drawn
+
+
+def _across(place: np.ndarray, rulers: Sequence[Ruler]) -> np.ndarray:
+    """Returns a point as a line across the only cell there is along an axis."""
+    points = np.tile(place, (_POINTS, 1))
+    for number, ruler in enumerate(rulers):
+        if len(ruler.axis.values) == 1:
+            points[:, number] = np.linspace(ruler.edges[0], ruler.edges[-1], _POINTS)
+    return points
+
+
+def draw_star(ax: Axes, room: LabelRoom, x: float, y: float, texts: Sequence[str]) -> None:
+    """Draws the star of the answer, and beside it the first of some texts that has room."""
+    ax.plot(x, y, "*", color=_STAR, markersize=13, markeredgecolor="white", zorder=6, gid="star")
+    room.beside(x, y, texts, _STAR, "star words")
+
+
+def name_lines(room: LabelRoom, drawn: Mapping[str, Sequence[np.ndarray]], styles: Mapping[str, LineStyle]) -> None:
+    """Writes the name of each line on its longest piece, where there is room."""
+    for name, pieces in drawn.items():
+        if pieces:
+            room.on_line(max(pieces, key=len), name, styles[name]["color"], "name of a line")

@@ -1,23 +1,28 @@
-"""The scenes of a map's panel: one resolved scene, and the keys that the panel's axes set in it."""
+"""The scenes of a map's panel, and the lines on which a function of its axes is zero, every point of them exact."""
 
 from __future__ import annotations
 
-import copy
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
 import numpy as np
 
-from haploop.protocol.scene.paths import value_at
-from haploop.protocol.ticks import TimebaseError
+from haploop.protocol.scene.paths import value_at, with_value
+from haploop.protocol.scene.scene import Scene
+from haploop.protocol.ticks import DELAY, TimebaseError
 from haploop.tools.sweep.map.axis import Ruler
-from haploop.tools.sweep.map.contour import FEW_POINTS, POINTS, Level, fine_values, zero_lines
 from haploop.tools.sweep.map.data import STIFFNESS
 
-_DELAY = "clock.round_trip_delay"
+# Points along an axis between which a line is looked for; windows narrower than that are not seen. Few where every
+# point takes a map of its own.
+POINTS, FEW_POINTS = 41, 21
+# Bends of a line, in rad where every cell of the grid is a square, that ask for another point.
+_SHARP = 0.15
+Level = Callable[[float, float], float]
 
 
 @dataclass(frozen=True)
@@ -29,14 +34,15 @@ class Plane:
         rulers: of its axes, x first; one of them where there is one axis, whose y is of no account.
     """
 
-    scene: dict[str, Any]
+    scene: Scene
     rulers: Sequence[Ruler]
 
-    def value_at(self, x: float, y: float) -> dict[str, Any]:
-        """Returns the resolved scene at a place."""
-        scene = copy.deepcopy(self.scene)
+    def at(self, x: float, y: float) -> Scene:
+        """Returns the scene at a place; a whole number stays whole."""
+        scene = self.scene
         for ruler, value in zip(self.rulers, (x, y), strict=False):
-            set_key(scene, ruler.axis.key, value)
+            number = type(value_at(scene, ruler.axis.key))
+            scene = with_value(scene, ruler.axis.key, number(value))
         return scene
 
     def but_for_stiffness(self, x: float, y: float) -> tuple[float, ...]:
@@ -46,9 +52,9 @@ class Plane:
     def stiffness(self, x: float, y: float) -> float:
         """Returns the wall's stiffness at a place, in N/m."""
         here = [v for r, v in zip(self.rulers, (x, y), strict=False) if r.axis.key == STIFFNESS]
-        return here[0] if here else self.scene["wall"]["stiffness"]
+        return here[0] if here else value_at(self.scene, STIFFNESS)
 
-    def own_scenes(self) -> list[dict[str, Any]]:
+    def own_scenes(self) -> list[Scene]:
         """Returns the scenes along the axes' own values, one axis after the other: all that may differ in kind."""
         ends = [ruler.axis.values for ruler in self.rulers] + [np.zeros(1)]
         along_x = [self.at(x, ends[1][0]) for x in ends[0]]
@@ -61,27 +67,35 @@ class Plane:
             level: NaN where there is none.
             whole_ticks: whether it is only asked for delays of whole control ticks; else of whole plant steps.
         """
+
+        @cache
+        def where_it_runs(x: float, y: float) -> float:
+            try:
+                return level(x, y)
+            except TimebaseError:  # the clock's numbers make no scene
+                return math.nan
+
         (xs, x_exact), (ys, y_exact) = self._grid(0), self._grid(1)
-        rate = self.scene["clock"]["control_rate" if whole_ticks else "plant_rate"]
-        lines = zero_lines(self._between(cache(_where_it_runs(level)), rate), xs, ys, (x_exact, y_exact))
-        return [line[:, : len(self.rulers)] for line in lines]
+        clock = self.scene.clock
+        between = self._between(where_it_runs, clock.control_rate if whole_ticks else clock.plant_rate)
+        return [line[:, : len(self.rulers)] for line in zero_lines(between, xs, ys, (x_exact, y_exact))]
 
     def _grid(self, which: int) -> tuple[np.ndarray, bool]:
         """Returns values along an axis, and whether those between them are scenes as well."""
         if which >= len(self.rulers):
             return np.zeros(1), False
         ruler = self.rulers[which]
-        key = ruler.axis.key
-        own = bool(ruler.axis.names) or isinstance(value_at(self.scene, key), int)
+        if ruler.axis.names or isinstance(value_at(self.scene, ruler.axis.key), int):
+            return ruler.axis.values, False
         swept = any(other.axis.key == STIFFNESS for other in self.rulers)
-        return fine_values(ruler, POINTS if swept else FEW_POINTS, own), not own
+        return _fine_values(ruler, POINTS if swept else FEW_POINTS), True
 
     def _between(self, level: Level, rate: float) -> Level:
         """Returns the level, interpolated between delays that are whole multiples of 1/rate, where delay is an axis."""
         keys = [ruler.axis.key for ruler in self.rulers]
-        if _DELAY not in keys:
+        if DELAY not in keys:
             return level
-        delay = keys.index(_DELAY)
+        delay = keys.index(DELAY)
 
         def between(x: float, y: float) -> float:
             at = [x, y]
@@ -95,23 +109,117 @@ class Plane:
         return between
 
 
-def _where_it_runs(level: Level) -> Level:
-    """Returns the level, NaN where the clock's numbers make no scene."""
+def _fine_values(ruler: Ruler, points: int) -> np.ndarray:
+    """Returns about so many values along an axis between its cells' outermost edges, even in its scale."""
+    values = ruler.axis.values
+    if len(values) < 2:
+        return values
+    if ruler.scale == "even":
+        between = max(2, points // len(values))
+        places = np.arange((len(values) - 1) * between + 1) / between
+        found = np.interp(places, np.arange(len(values)), values)
+    else:
+        space = np.geomspace if ruler.scale == "log" else np.linspace
+        found = space(ruler.edges[0], ruler.edges[-1], points) * ruler.factor
+        found = found[found >= 0.0] if values[0] >= 0.0 else found
+    return np.unique([values[0], *found, values[-1]])
 
-    def known(x: float, y: float) -> float:
-        try:
-            return level(x, y)
-        except TimebaseError:
-            return math.nan
 
-    return known
+def zero_lines(level: Level, xs: np.ndarray, ys: np.ndarray, exact: tuple[bool, bool]) -> list[np.ndarray]:
+    """Returns the lines on which ``level`` is zero.
+
+    A contour of the grid meets its edges where interpolation has it; along the edge, Brent's method puts the point
+    where the level itself is zero, so that only the way from one edge to the next is a guess.
+
+    Args:
+        level: of x and y; NaN where there is none.
+        xs, ys: the grid, ascending.
+        exact: whether a point may be moved along x, along y; not where values between the grid's are not allowed.
+
+    Returns:
+        Points of each line, shape (n, 2).
+    """
+    heights = np.array([[level(x, y) for x in xs] for y in ys])
+    grid = xs, ys
+    if min(heights.shape) < 2:
+        return _along_one(level, heights.ravel(), grid, exact)
+    from contourpy import contour_generator
+
+    x_places, y_places = np.arange(len(xs), dtype=float), np.arange(len(ys), dtype=float)
+    contour = contour_generator(x_places, y_places, np.ma.masked_invalid(heights))
+    lines = []
+    for line in contour.lines(0.0):
+        points = [_exact(level, place, grid, exact) for place in _at_scenes(np.asarray(line), exact)]
+        lines.append(_rounded(level, np.array(points), grid, exact))
+    return lines
 
 
-def set_key(scene: dict[str, Any], key: str, value: float) -> None:
-    """Sets a number of a resolved scene by its dotted key; a whole number where the scene has one."""
-    *path, last = key.split(".")
-    node: Any = scene
-    for part in path:
-        node = node[int(part)] if isinstance(node, list) else node[part]
-    place: Any = int(last) if isinstance(node, list) else last
-    node[place] = int(value) if isinstance(node[place], int) else float(value)
+Grid = tuple[np.ndarray, np.ndarray]
+
+
+def _at_scenes(places: np.ndarray, exact: tuple[bool, bool]) -> np.ndarray:
+    """Returns the places that lie on the values of an axis that has no others between; all where none do."""
+    whole = np.abs(places - np.rint(places)) == 0.0
+    kept = places[(whole | np.array(exact)).all(axis=1)]
+    return kept if len(kept) else places
+
+
+def _along_one(level: Level, heights: np.ndarray, grid: Grid, exact: tuple[bool, bool]) -> list[np.ndarray]:
+    """Finds the zeros along the one axis that has several values, each a line of one point."""
+    found = []
+    for first in np.flatnonzero(heights[:-1] * heights[1:] < 0.0):
+        share = heights[first] / (heights[first] - heights[first + 1])
+        place = np.array([first + share, 0.0] if len(grid[0]) > 1 else [0.0, first + share])
+        found.append(_exact(level, place, grid, exact)[None, :])
+    return found
+
+
+def _exact(level: Level, place: np.ndarray, grid: Grid, exact: tuple[bool, bool]) -> np.ndarray:
+    """Returns the zero on the edge of the grid on which ``place`` (counted in grid lines) lies."""
+    whole = np.rint(place)
+    off = np.abs(place - whole)
+    moving = int(off[1] > off[0])
+    point = np.array([np.interp(place[i], np.arange(len(grid[i])), grid[i]) for i in (0, 1)])
+    if not exact[moving] or off[moving] == 0.0:
+        return point
+    point[1 - moving] = grid[1 - moving][int(whole[1 - moving])]
+    low, high = (grid[moving][int(end(place[moving]))] for end in (np.floor, np.ceil))
+    return _root(level, point, moving, float(low), float(high))
+
+
+def _rounded(level: Level, line: np.ndarray, grid: Grid, exact: tuple[bool, bool]) -> np.ndarray:
+    """Returns the line with a point more on either side of each sharp bend, looked for across the line."""
+    cells = np.column_stack([np.interp(line[:, i], values, np.arange(len(values))) for i, values in enumerate(grid)])
+    steps = np.diff(cells, axis=0)
+    angles = np.abs(np.diff(np.unwrap(np.arctan2(steps[:, 1], steps[:, 0]))))
+    sharp = np.flatnonzero(angles > _SHARP)
+    points = [line[:1]]
+    for number, step in enumerate(steps):
+        across = int(abs(step[0]) >= abs(step[1]))
+        if exact[across] and (number in sharp or number - 1 in sharp):
+            points.append(_across(level, line[number : number + 2], across, grid[across])[None, :])
+        points.append(line[number + 1 : number + 2])
+    return np.concatenate(points)
+
+
+def _across(level: Level, ends: np.ndarray, moving: int, values: np.ndarray) -> np.ndarray:
+    """Returns the zero half way between two points, moved along one axis within a cell of the grid."""
+    point = ends.mean(axis=0)
+    place = int(np.clip(np.searchsorted(values, point[moving]), 1, len(values) - 1))
+    reach = values[place] - values[place - 1]
+    low, high = max(point[moving] - reach, values[0]), min(point[moving] + reach, values[-1])
+    return _root(level, point, moving, float(low), float(high))
+
+
+def _root(level: Level, point: np.ndarray, moving: int, low: float, high: float) -> np.ndarray:
+    """Moves a point along one axis to the zero by Brent's method; leaves it where the ends do not enclose one."""
+    from scipy.optimize import brentq
+
+    def along(value: float) -> float:
+        return level(value, float(point[1])) if moving == 0 else level(float(point[0]), value)
+
+    moved: Any = point.copy()
+    if along(low) * along(high) < 0.0:
+        with suppress(ValueError):  # the level is not a number somewhere in between
+            moved[moving] = brentq(along, low, high, xtol=1e-11 * max(abs(low), abs(high)))
+    return moved

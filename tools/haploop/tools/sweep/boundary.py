@@ -11,15 +11,14 @@ import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
 
 from haploop.tools.search.bisect import Bracket, Tolerance, bisect_many, rungs_held
+from haploop.tools.sweep.table import Row
 
-Result = dict[str, Any]
-Holds = Callable[[Result], bool | None]
+Holds = Callable[[Row], bool | None]
 # A candidate: the row, and the value on the axis.
 Candidate = tuple[int, float]
-Run = Callable[[Sequence[Candidate]], Iterable[tuple[int, Result]]]
+Run = Callable[[Sequence[Candidate]], Iterable[tuple[int, Row]]]
 
 
 @dataclass(frozen=True)

@@ -6,10 +6,10 @@ import time
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Self
 
-from haploop.tools.sweep.file.record import VERDICT
-from haploop.tools.sweep.table import ENDED, WHY
+from haploop.tools.sweep.record import VERDICT
+from haploop.tools.sweep.table import ENDED, WHY, Row
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -69,7 +69,7 @@ class SweepProgress:
         self._total += cells
         self._bars.update(self._task, total=self._total)
 
-    def add_rows(self, rows: Sequence[Mapping[str, Any]], stored: bool = False) -> None:
+    def add_rows(self, rows: Sequence[Row], stored: bool = False) -> None:
         """Takes cells that are done; ``stored`` are those of an earlier call."""
         self.counts.update(outcome(row) for row in rows)
         if not stored:
@@ -91,7 +91,7 @@ class SweepProgress:
         return asked
 
 
-def outcome(row: Mapping[str, Any]) -> str:
+def outcome(row: Row) -> str:
     """Returns a row in one word."""
     return row.get(VERDICT) or row[ENDED]
 

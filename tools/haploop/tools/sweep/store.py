@@ -7,13 +7,13 @@ import fcntl
 import io
 import os
 import shutil
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
 from haploop.launch.output import OutputError
-from haploop.tools.sweep.table import BOUNDARY, CELL, PARTS, TABLE, make_table, pyarrow
+from haploop.tools.sweep.table import BOUNDARY, CELL, PARTS, TABLE, Row, make_table, pyarrow
 
 LOCK = ".lock"
 # Rows that are merged into a group of the table, which a reader can read by itself.
@@ -63,7 +63,7 @@ class Store:
         """Tells whether the table is there."""
         return (self.directory / TABLE).exists()
 
-    def done(self, columns: Sequence[str] = (CELL,)) -> list[dict[str, Any]]:
+    def done(self, columns: Sequence[str] = (CELL,)) -> list[Row]:
         """Returns some columns of all rows that are stored; a part that cannot be read is given up, to be run again."""
         arrow, rows = pyarrow(), []
         for file in self._files():
@@ -74,7 +74,7 @@ class Store:
         self.rows = len(rows)
         return rows
 
-    def add(self, rows: Sequence[Mapping[str, Any]]) -> None:
+    def add(self, rows: Sequence[Row]) -> None:
         """Keeps the rows of a part that is done.
 
         Raises:

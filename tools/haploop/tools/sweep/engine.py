@@ -11,13 +11,11 @@ from haploop.tools.executor.parts import Group
 from haploop.tools.executor.pool import Pool
 from haploop.tools.executor.work import Work
 from haploop.tools.search.bisect import Tolerance
-from haploop.tools.sweep.file.cells import Axis, Bisect, Extra, Item, Sweep
-from haploop.tools.sweep.file.record import VERDICT, wants_energy, wants_trajectories
-from haploop.tools.sweep.run.boundary import Boundary, Candidate, find_boundaries, verdict_is
-from haploop.tools.sweep.run.store import Store
-from haploop.tools.sweep.table import CELL, ENDED, NUMBER, SEED, TEXT, WHOLE, WHY, Column, make_schema, make_table
-
-Row = dict[str, Any]
+from haploop.tools.sweep.boundary import Boundary, Candidate, find_boundaries, verdict_is
+from haploop.tools.sweep.cells import Axis, Bisect, Extra, Item, Sweep
+from haploop.tools.sweep.record import VERDICT, wants_energy, wants_trajectories
+from haploop.tools.sweep.store import Store
+from haploop.tools.sweep.table import CELL, ENDED, NUMBER, SEED, TEXT, WHOLE, WHY, Column, Row, make_schema, make_table
 
 
 class Watcher(Protocol):

@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from haploop.launch.runs.in_process import run_in_process
 from haploop.launch.runs.result import unit_of
 from haploop.launch.scene.mistakes import nearest
 from haploop.launch.spec import RunFailed
-from haploop.logger.summary import OF_THE_MACHINE
+from haploop.logger.summary import OF_THE_MACHINE, Summary
+from haploop.protocol.scene.scene import Scene
 from haploop.tools.sweep.table import ENDED, NUMBER, TEXT, TRUTH, WHY, Column
 
 if TYPE_CHECKING:
     from haploop.controller.dissipation import Element
-    from haploop.tools.sweep.file.cells import Sweep
+    from haploop.tools.sweep.cells import Sweep
 
 VERDICT = "verdict"
 # Without the books, which take most of the time of a run.
@@ -34,7 +36,7 @@ class RecordError(ValueError):
         self.wrong = list(wrong)
 
 
-def make_columns(names: Sequence[str], sweep: Sweep, kinds: dict[str, type[Element]]) -> list[Column]:
+def make_columns(names: Sequence[str], sweep: Sweep, kinds: Mapping[str, type[Element]]) -> list[Column]:
     """Makes a column for each key; the verdict is always among them.
 
     Args:
@@ -45,7 +47,7 @@ def make_columns(names: Sequence[str], sweep: Sweep, kinds: dict[str, type[Eleme
     Raises:
         RecordError: some keys are those of no number, word or truth value.
     """
-    known: dict[str, Any] = {}
+    known: Summary = {}
     for cell in _samples(sweep):
         known |= _leaves(_short_run(cell, kinds))
     wrong = []
@@ -73,32 +75,31 @@ def wants_trajectories(columns: Sequence[Column]) -> bool:
     return any(column.name == "trajectory_sha256" for column in columns)
 
 
-def _samples(sweep: Sweep) -> Iterator[dict[str, Any]]:
+def _samples(sweep: Sweep) -> list[Scene]:
     """Returns the scenes of the corners of the grid; the base where none of them can be run."""
-    found = []
+    found: list[Scene] = []
     for cell in (0, sweep.count - 1):
         try:
             found.append(sweep.scene(cell))
         except Exception:  # it will be a row with its reason
             continue
-    return iter(found or [sweep.base])
+    return found or [sweep.base]
 
 
-def _short_run(scene: dict[str, Any], kinds: dict[str, type[Element]]) -> dict[str, Any]:
-    short = {**scene, "duration": TICKS / scene["clock"]["control_rate"]}
+def _short_run(scene: Scene, kinds: Mapping[str, type[Element]]) -> Summary:
     try:
-        summary = run_in_process(short, kinds)
+        summary = run_in_process(replace(scene, duration=TICKS / scene.clock.control_rate), dict(kinds))
     except RunFailed:
         return {}
     return {key: value for key, value in summary.items() if key not in OF_THE_MACHINE}
 
 
-def _leaves(value: Any, key: str = "") -> dict[str, Any]:
+def _leaves(value: Any, key: str = "") -> Summary:
     """Returns the values that are no tables, by dotted key."""
     inner = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else None
     if inner is None:
         return {key: value}
-    found: dict[str, Any] = {}
+    found: Summary = {}
     for name, entry in inner:
         found |= _leaves(entry, f"{key}.{name}".lstrip("."))
     return found

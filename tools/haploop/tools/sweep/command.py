@@ -17,16 +17,16 @@ from haploop.tools.cli.exit_codes import FAILED, WRONG_USE, leave, plain_errors,
 from haploop.tools.executor.executors import ExecutorError
 from haploop.tools.executor.pool import Pool, read_sources
 from haploop.tools.machine import machine, versions
-from haploop.tools.sweep.file.record import wants_trajectories
-from haploop.tools.sweep.file.sweep_file import load
-from haploop.tools.sweep.run.engine import Engine, Stopped
-from haploop.tools.sweep.run.progress import SweepProgress, describe_counts
-from haploop.tools.sweep.run.store import Store, StoreError
+from haploop.tools.sweep.engine import Engine, Stopped
+from haploop.tools.sweep.progress import SweepProgress, describe_counts
+from haploop.tools.sweep.record import wants_trajectories
+from haploop.tools.sweep.store import Store, StoreError
+from haploop.tools.sweep.sweep_file import load
 from haploop.tools.sweep.table import SWEEP, NeedsPyarrow, make_schema, pyarrow
 
 if TYPE_CHECKING:
-    from haploop.tools.sweep.file.cells import Sweep
-    from haploop.tools.sweep.run.boundary import Boundary
+    from haploop.tools.sweep.boundary import Boundary
+    from haploop.tools.sweep.cells import Sweep
 
 SUMMARY = "summary.json"
 

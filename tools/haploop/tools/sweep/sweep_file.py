@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from copy import deepcopy
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import Field, ValidationError
 from pydantic_core import PydanticCustomError
@@ -19,13 +19,17 @@ from haploop.launch.scene.mistakes import COMMAND_LINE, Mistake, SceneError, nea
 from haploop.launch.scene.models import Model
 from haploop.launch.scene.number import Number, si
 from haploop.launch.scene.overrides import key_path, lay_overrides
-from haploop.launch.scene.schema import TomlSchema
+from haploop.launch.scene.schema import Schema, TomlSchema
 from haploop.protocol.quantity import Quantity
+from haploop.protocol.scene.scene import Scene
 from haploop.tools.executor.work import Sources, load_kinds
-from haploop.tools.sweep.file.cells import Axis, Bisect, Refused, Sweep, resolved
-from haploop.tools.sweep.file.keys import NoSuchKey, number_at
-from haploop.tools.sweep.file.points import PointsError, Span, listed, make_points
-from haploop.tools.sweep.file.record import USUAL, RecordError, make_columns
+from haploop.tools.sweep.cells import Axis, Bisect, Refused, Sweep, Values, resolved
+from haploop.tools.sweep.points import NoSuchKey, PointsError, Span, listed, make_points, number_at
+from haploop.tools.sweep.record import USUAL, RecordError, make_columns
+from haploop.tools.sweep.table import Column
+
+if TYPE_CHECKING:
+    from haploop.controller.dissipation import Element
 
 MOST_AXES = 3
 Verdict = Literal["steady", "limit-cycle", "diverged", "no-contact"]
@@ -45,11 +49,11 @@ class SweepFile(Model):
 
     title: str | None = None
     scene: str | None = None
-    base: dict[str, Any] | None = None
+    base: Values | None = None
     repeat: Annotated[int, si("", "seeds of every combination", whole=True, at_least=1, at_most=1_000_000)] = 1
     record: list[str] | None = None
-    set: dict[str, Any] = Field(default_factory=dict)
-    axes: dict[str, Any]
+    set: Values = Field(default_factory=dict)
+    axes: Values
     bisect: BisectTable | None = None
 
 
@@ -65,18 +69,19 @@ def load(path: Path, overrides: Sequence[str] = (), sources: Sources = ()) -> Sw
         SceneError: the sweep cannot be run; it holds every mistake.
         PluginError: a plugin does not load.
     """
-    data = parse(path, "sweep", "a scene and [axes]")
-    return _Reader(path, data, load_kinds(sources), sources).sweep(overrides)
+    return _Reader(path, load_kinds(sources), sources).sweep(overrides)
 
 
 class _Reader:
     """Collects the parts of a sweep, and all that is wrong with them."""
 
-    def __init__(self, path: Path, data: dict[str, Any], kinds: dict[str, Any], sources: Sources) -> None:
+    def __init__(self, path: Path, kinds: Mapping[str, type[Element]], sources: Sources) -> None:
         self._kinds, self._sources = kinds, sources
         self._layers = Layers(path)
-        self._layers.lay(data, str(path))
-        self._data = data
+        self._layers.lay(parse(path, "sweep", "a scene and [axes]"), str(path))
+        self._data = self._layers.data
+        given = self._data.get("set")
+        self._changes: Values = given if isinstance(given, dict) else {}
 
     def sweep(self, overrides: Sequence[str]) -> Sweep:
         """Makes the sweep."""
@@ -106,63 +111,56 @@ class _Reader:
             self._layers.complain(("scene",), expected, given)
         return table
 
-    def _base(self, overrides: Sequence[str]) -> dict[str, Any] | None:
+    def _base(self, overrides: Sequence[str]) -> Scene | None:
         """Returns the scene that is varied; its mistakes are added."""
-        changes = self._data.get("set")
-        changes = changes if isinstance(changes, dict) else {}
         try:
-            laid = [*texts(changes), *overrides]
+            laid = [*texts(self._changes), *overrides]
             if isinstance(name := self._data.get("scene"), str):
                 return scene_file.load(self._layers.path.parent / name, laid, self._kinds)
             if isinstance(table := self._data.get("base"), dict):
                 layers = Layers(self._layers.path, table)
                 lay_overrides(layers, laid)
                 layers.data.setdefault("title", layers.path.stem)
-                scene = resolve(layers, self._kinds)
-                scene.get("event", []).sort(key=lambda event: event["at"])
-                return scene
+                return resolve(layers, self._kinds).in_order()
         except SceneError as error:
-            self._layers.mistakes += [self._placed(mistake, changes) for mistake in error.mistakes]
+            self._layers.mistakes += [self._placed(mistake) for mistake in error.mistakes]
         except TypeError as error:  # a value that no scene holds, such as a date
             self._layers.complain(("set",), str(error), "cannot be used")
         return None
 
-    def _unchanged(self) -> dict[str, Any] | None:
+    def _unchanged(self) -> Scene | None:
         """Returns the scene without what is laid over it, where that is all that is wrong with it."""
         try:
             return scene_file.load(self._layers.path.parent / self._data["scene"], (), self._kinds)
         except (SceneError, LookupError, TypeError):
             return None
 
-    def _placed(self, mistake: Mistake, changes: Mapping[str, Any]) -> Mistake:
+    def _placed(self, mistake: Mistake) -> Mistake:
         """Returns a mistake of the scene as one of this file where ``[set]`` made it."""
-        if mistake.file == COMMAND_LINE and mistake.key in changes:
+        if mistake.file == COMMAND_LINE and mistake.key in self._changes:
             return replace(mistake, file=shown(self._layers.path), key=f"set.{mistake.key}")
         return mistake
 
-    def _axes(self, base: dict[str, Any] | None) -> list[Axis]:
+    def _axes(self, base: Scene | None) -> list[Axis]:
         """Returns the axes that can be used; of the others the mistakes are added."""
         given = self._data.get("axes")
         if not isinstance(given, dict):
             return []
         if not 1 <= len(given) <= MOST_AXES:
             self._layers.complain(("axes",), f"A sweep has one to {MOST_AXES} axes.", f"has {len(given)}")
-        whole = base and self._with_first_names(base, given)
+        whole = base and self._with_first_names(base)
         return [axis for key, values in given.items() if whole and (axis := self._axis(key, values, whole))]
 
-    def _with_first_names(self, base: dict[str, Any], given: Mapping[str, Any]) -> dict[str, Any]:
+    def _with_first_names(self, base: Scene) -> Layers:
         """Returns the base with the first name or table of each such axis, which may bring the keys of another axis."""
-        firsts = {key: values[0] for key, values in given.items() if isinstance(values, list) and values}
+        firsts = {key: values[0] for key, values in self._data["axes"].items() if isinstance(values, list) and values}
         names = {key: value for key, value in firsts.items() if not isinstance(value, int | float) and key_path(key)}
-        layers = Layers(self._layers.path)
-        layers.data = deepcopy(base)
-        try:
+        layers = Layers(self._layers.path, base.as_dict())
+        with suppress(TypeError):  # a value that no scene holds, which is a mistake of its axis
             lay_overrides(layers, texts(names))
-        except TypeError:
-            return base
-        return layers.data
+        return layers
 
-    def _axis(self, key: str, values: Any, scene: dict[str, Any]) -> Axis | None:
+    def _axis(self, key: str, values: Any, scene: Layers) -> Axis | None:
         at: KeyPath = ("axes", key)
         path = key_path(key)
         if isinstance(values, dict) and not {"from", "to", "step", "count", "scale"} & values.keys():
@@ -173,7 +171,7 @@ class _Reader:
             return None
         try:
             if not path:
-                raise NoSuchKey("cannot be read", "It must be a dotted key, such as wall.stiffness.")
+                raise NoSuchKey("It must be a dotted key, such as wall.stiffness.", "cannot be read")
             number = number_at(path, scene, self._kinds)
             points = self._points(at, values, number)
         except NoSuchKey as error:
@@ -205,7 +203,7 @@ class _Reader:
             return None
         return make_points(span, number)
 
-    def _complain_of_span(self, at: KeyPath, what: str, message: str, key: KeyPath, schema: dict[str, Any]) -> None:
+    def _complain_of_span(self, at: KeyPath, what: str, message: str, key: KeyPath, schema: Schema) -> None:
         """Adds a mistake in a span, with its keys as those of the file."""
         layers = Layers(self._layers.path, self._layers.value(at))
         complain(layers, what, message, key, schema)
@@ -217,7 +215,7 @@ class _Reader:
             for mistake in layers.mistakes
         ]
 
-    def _names_fit(self, at: KeyPath, key: str, values: Sequence[Any], scene: dict[str, Any]) -> bool:
+    def _names_fit(self, at: KeyPath, key: str, values: Sequence[Any], scene: Layers) -> bool:
         """Tells whether the key takes each value; what the rest of a scene says to it is known cell by cell."""
         count = len(self._layers.mistakes)
         for place, value in enumerate(values):
@@ -231,7 +229,7 @@ class _Reader:
                 self._layers.complain((*at, place), "A scene holds text, numbers, true or false, lists and tables.")
         return len(self._layers.mistakes) == count
 
-    def _record(self, base: dict[str, Any] | None, axes: Sequence[Axis]) -> list[Any]:
+    def _record(self, base: Scene | None, axes: Sequence[Axis]) -> list[Column]:
         given = self._data.get("record")
         names = given if isinstance(given, list) and all(isinstance(name, str) for name in given) else list(USUAL)
         if base is None:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from copy import deepcopy
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from haploop.launch.batch.stacking import is_batchable
 from haploop.launch.scene.check import resolve
@@ -17,11 +17,18 @@ from haploop.launch.scene.layers import Layers
 from haploop.launch.scene.mistakes import Mistake, SceneError
 from haploop.launch.scene.overrides import key_path, lay_value
 from haploop.launch.scene.toml_writer import Lines, inline, lines_of, to_toml
+from haploop.logger.summary import Summary
 from haploop.protocol.scene.paths import value_at
+from haploop.protocol.scene.scene import Scene
 from haploop.tools.executor.parts import Group
 from haploop.tools.executor.work import Sources, load_kinds
-from haploop.tools.sweep.table import CELL, ENDED, NUMBER, SCENE, SEED, TEXT, WHOLE, WHY, Column
+from haploop.tools.sweep.table import CELL, ENDED, NUMBER, SCENE, SEED, TEXT, WHOLE, WHY, Column, Row
 
+if TYPE_CHECKING:
+    from haploop.controller.dissipation import Element
+
+# By dotted key of a scene, what may stand there: numbers in SI units, names, tables.
+Values = dict[str, Any]
 # Scenes that differ in these tables are run in different arrays.
 _APART = ("clock", "duration", "event")
 
@@ -89,7 +96,7 @@ class Sweep:
     """
 
     title: str
-    base: dict[str, Any]
+    base: Scene
     axes: tuple[Axis, ...]
     repeat: int = 1
     record: tuple[Column, ...] = ()
@@ -126,7 +133,7 @@ class Sweep:
             cell = cell * len(axis.values) + places[axis.key]
         return cell * self.repeat + repeat
 
-    def values(self, item: Item) -> tuple[dict[str, Any], int]:
+    def values(self, item: Item) -> tuple[Values, int]:
         """Returns the value of each axis, by key, and the seed."""
         cell, repeat = divmod(item.beside if isinstance(item, Extra) else item, self.repeat)
         found = {}
@@ -135,40 +142,58 @@ class Sweep:
             found[axis.key] = axis.values[place]
         if isinstance(item, Extra) and self.bisect:
             found[self.bisect.axis] = item.value
-        return {axis.key: found[axis.key] for axis in self.axes}, self.base["seed"] + repeat
+        return {axis.key: found[axis.key] for axis in self.axes}, self.base.seed + repeat
 
-    def scene(self, item: Item) -> dict[str, Any]:
-        """Returns the resolved scene of a cell.
+    def scene(self, item: Item) -> Scene:
+        """Returns the resolved scene of a cell; tables that its values leave alone are those of the base.
 
         Raises:
             ValueError: its values make no scene that can be run; the message says why.
             ElementError: an element's own code refuses its parameters.
         """
         values, seed = self.values(item)
+        values = {SEED: seed, **values}
         kinds = load_kinds(self.sources)
-        scene = resolved({"seed": seed, **values}, self.base, kinds)
+        scene = resolved(values, self._tables, kinds)
         try_out(elements_of(scene), kinds)
-        return scene
+        others = vars(self.base).keys() - {key_path(key)[0] for key in values}
+        kept = {name: getattr(self.base, name) for name in others}
+        return replace(scene, **{name: table for name, table in kept.items() if getattr(scene, name) == table})
 
-    def row(self, item: Item, scene: dict[str, Any] | None, result: dict[str, Any]) -> dict[str, Any]:
+    def row(self, item: Item, scene: Scene | None, result: Summary) -> Row:
         """Makes the row of a cell in the table."""
         values, seed = self.values(item)
-        recorded = {column.name: _entry(result, column) for column in self.record}
-        ended = result["ended"]
         return {
             CELL: item.cell if isinstance(item, Extra) else item,
             **{axis.key: axis.entry(values[axis.key]) for axis in self.axes},
-            **recorded,
+            **{column.name: _entry(result, column) for column in self.record},
             SEED: values.get(SEED, seed),
-            ENDED: ended,
+            ENDED: result["ended"],
             WHY: result.get("why", ""),
-            SCENE: None if scene is None else to_toml(scene, self._lines),
+            SCENE: None if scene is None else self._toml(scene),
         }
+
+    def _toml(self, scene: Scene) -> str:
+        """Returns a cell's scene as TOML; tables that it shares with the base have been written once."""
+        base, tables = self._tables.data, scene.as_dict()
+        for name, table in vars(scene).items():
+            if name in base and table is getattr(self.base, name):
+                tables[name] = base[name]
+        return to_toml(tables, self._lines)
+
+    @cached_property
+    def _tables(self) -> Layers:
+        """The base scene as its file would have it; not to be changed."""
+        return Layers(Path(), self.base.as_dict())
 
     @cached_property
     def _lines(self) -> Lines:
-        """Lines of TOML that cells share with the base scene."""
-        return lines_of(self.base)
+        """Lines of TOML of the base's tables, by their identity."""
+        return lines_of(self._tables.data)
+
+    def __getstate__(self) -> dict[str, object]:
+        """Leaves out what is cached: identities mean nothing in another process."""
+        return {field.name: getattr(self, field.name) for field in fields(self)}
 
     def columns(self) -> list[Column]:
         """Returns the columns of the table."""
@@ -190,34 +215,39 @@ class Sweep:
 
     def toml(self) -> str:
         """Returns the sweep as a file that runs by itself."""
-        table: dict[str, Any] = {"title": self.title, "repeat": self.repeat}
-        table["record"] = [column.name for column in self.record]
-        table["axes"] = {axis.key: list(axis.values) for axis in self.axes}
-        if bisect := self.bisect:
-            tolerances = {"tolerance": bisect.tolerance, "relative": bisect.relative}
+        bisect = {}
+        if self.bisect:
+            tolerances = {"tolerance": self.bisect.tolerance, "relative": self.bisect.relative}
             given = {name: value for name, value in tolerances.items() if value}
-            table["bisect"] = {"axis": bisect.axis, **given, "holds": bisect.holds}
-        return to_toml({**table, "base": self.base})
+            bisect = {"bisect": {"axis": self.bisect.axis, **given, "holds": self.bisect.holds}}
+        return to_toml(
+            {
+                "title": self.title,
+                "repeat": self.repeat,
+                "record": [column.name for column in self.record],
+                "axes": {axis.key: list(axis.values) for axis in self.axes},
+                **bisect,
+                "base": self.base.as_dict(),
+            }
+        )
 
 
-def resolved(values: dict[str, Any], base: dict[str, Any], kinds: dict[str, Any]) -> dict[str, Any]:
-    """Resolves a scene with other values at some dotted keys; it shares with the base what they leave alone.
+def resolved(values: Values, base: Layers, kinds: Mapping[str, type[Element]]) -> Scene:
+    """Resolves a scene with other values at some dotted keys.
 
     Raises:
         SceneError: there is no such scene; its mistakes name no file.
     """
-    others = {path[0] for path in map(key_path, values)}
-    layers = Layers(Path(), base | {key: deepcopy(base[key]) for key in others & base.keys()})
+    changed = {key_path(key)[0] for key in values}
+    tables = {name: deepcopy(table) if name in changed else table for name, table in base.data.items()}
+    layers = Layers(Path(), tables)
     for key, value in values.items():
         if complaint := lay_value(layers, key_path(key), deepcopy(value)):
             layers.mistakes.append(Mistake("", key, "cannot be set", complaint))
     try:
-        scene = resolve(layers, kinds)
+        return resolve(layers, kinds).in_order()
     except SceneError as error:
         raise Refused(error.mistakes) from error
-    scene.get("event", []).sort(key=lambda event: event["at"])
-    left = {key: base[key] for key in scene.keys() - others & base.keys()}
-    return {key: left[key] if left.get(key) == entry else entry for key, entry in scene.items()}
 
 
 class Refused(SceneError):
@@ -227,7 +257,7 @@ class Refused(SceneError):
         return " ".join(str(mistake).partition(": ")[2] for mistake in self.mistakes)
 
 
-def _entry(result: dict[str, Any], column: Column) -> Any:
+def _entry(result: Summary, column: Column) -> Any:
     """Returns the value of a result at a dotted key; None where there is none."""
     value = value_at(result, column.name)
     return value if value is None or column.kind != NUMBER else float(value)

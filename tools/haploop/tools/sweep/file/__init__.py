@@ -1,1 +1,0 @@
-"""The sweep file: axes, cells and what is recorded, resolved and checked."""

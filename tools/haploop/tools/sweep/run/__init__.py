@@ -1,1 +1,0 @@
-"""Running a sweep: cells, boundaries, store and table."""
