@@ -38,7 +38,7 @@ class ControllerNode:
         self._block = BlockLength(scene.run.block_ticks)
         self._reported = 0
         self._secret = welcome["context"]["secret"]
-        self._loop = ControllerEnd(context, welcome["endpoints"]["plant"]["loop"], self._await_plant)
+        self._loop = ControllerEnd(context, welcome["endpoints"]["plant"]["loop"], lambda: self._wait("plant"))
 
     def _state(self) -> tuple[int, Message]:
         return self._controller.tick, {"history": self._controller.recorder.history}
@@ -90,9 +90,6 @@ class ControllerNode:
         refused, recorder.refused = recorder.refused, []
         self._client.progress(self._reported, refusals_as_status(refused))
         self._block.next()
-
-    def _await_plant(self) -> None:
-        self._wait("plant")
 
     def _wait(self, on: str) -> None:
         """Nothing came for a while: say so, and serve whoever subscribes to a loop that stands still."""

@@ -11,11 +11,6 @@ from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
 
 
-def integrator_name(scene: Scene) -> str:
-    """Returns the name of the integrator that moves the bodies of a resolved scene."""
-    return scene.clock.integrator
-
-
 def needs_chain(scene: Scene) -> bool:
     """Tells whether there is more than one mass under held forces that change at the same steps of every interval.
 
@@ -35,12 +30,9 @@ def needs_chain(scene: Scene) -> bool:
 
 
 def make_motion(scene: Scene, time: Timebase, members: int | None = None) -> Any:
-    """Makes the least motion that moves a scene; nothing else is even imported.
+    """Makes the least motion that moves a scene, or a batch of so many members, whose integrator is exact.
 
-    Args:
-        scene: a resolved scene; in a batch a stacked one, whose numbers are floats, or arrays of shape (members,).
-        time: the integers of the run.
-        members: of the batch, whose integrator is exact; None for one run.
+    Nothing else is even imported.
     """
     if not needs_chain(scene):
         return OneMassMotion(scene, time, members)

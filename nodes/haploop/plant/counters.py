@@ -40,11 +40,7 @@ class Counter:
         self._before, self._steps = state[0], list(state[1])
 
     def column(self, first: int, end: int) -> np.ndarray:
-        """Returns the number of events before each of the steps first ... end; forgets those before ``end``.
-
-        Returns:
-            Shape (end - first + 1,), float64.
-        """
+        """Returns the number of events before each of the steps first ... end; forgets those before ``end``."""
         steps = np.sort(np.array(self._steps, np.int64))
         counts = self._before + np.searchsorted(steps, np.arange(first, end + 1))
         self._before = int(counts[-1])
@@ -52,7 +48,7 @@ class Counter:
         return counts.astype(float)
 
     def select(self, kept: np.ndarray) -> None:
-        """A counter of one run has no members to drop."""
+        """Drops the members that are not kept, shape (members,); one run has none."""
 
 
 class BatchCounter(Counter):
@@ -74,11 +70,9 @@ class BatchCounter(Counter):
         return self._count
 
     def restore(self, state: Any) -> None:
-        """Goes on from a state."""
         self._count = state
 
     def select(self, kept: np.ndarray) -> None:
-        """Drops the members that are not kept, shape (members,)."""
         self._count = self._count[kept]
 
 

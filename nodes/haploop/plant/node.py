@@ -26,7 +26,7 @@ class PlantNode:
 
     def __init__(self, client: ClockClient, context: zmq.Context[zmq.Socket[bytes]], directory: Path) -> None:
         self._client = client
-        self._loop = PlantEnd(context, self._await_controller)
+        self._loop = PlantEnd(context, lambda: self._wait("controller"))
         self._publisher = Publisher(context, ROLE, self._state)
         names = PROCESSES[ROLE].binds
         sockets = {"loop": self._loop.socket, "telemetry": self._publisher.socket}
@@ -78,9 +78,6 @@ class PlantNode:
         self._publisher.serve()
         self._client.progress(self._plant.reached)
         self._block.next()
-
-    def _await_controller(self) -> None:
-        self._wait("controller")
 
     def _wait(self, on: str) -> None:
         self._client.waiting(self._plant.tick, on)

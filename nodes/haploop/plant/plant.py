@@ -24,13 +24,11 @@ class Checkpoint(NamedTuple):
     A tree of numbers, strings and arrays of NumPy, of which msgpack makes bytes with ``default=np.ndarray.tolist``.
 
     Attributes:
-        tick: the next tick to be sampled.
-        interval_due: whether the interval before it has yet to be stepped.
+        interval_due: whether the interval before ``tick`` has yet to be stepped.
         unusable: whether a command has come that is no finite number.
-        stop_reason: why the plant has ended by itself, or None.
         delays: changes of the delay to come, (first command, plant steps).
         delay_steps: the delay that a change has brought, or None.
-        motion, line, position, accelerometer: the states of the parts; None without an accelerometer.
+        motion, line, position, accelerometer: the states of the parts.
         last: hold in effect last.
     """
 
@@ -146,25 +144,17 @@ class Plant:
         """Steps through interval ``tick - 1``; False when the run has to end where the plant now is."""
         tick = self.tick - 1
         holds = self._line.holds(tick)
-        if self._unusable and self._refuse(tick, holds):
-            return False
+        if self._unusable:
+            for _, force, command in holds:
+                if not math.isfinite(force):
+                    self.stop_reason = f"command {command} was {force}, which no device can apply, at tick {tick}"
+                    return False
         self._x = x = self._motion.advance(tick, holds)
         self._interval_due, limit_m = False, self._limit_m
         if not -limit_m <= x <= limit_m:
-            self._stop(tick + 1, beyond(x, limit_m))
+            self.stop_reason = f"{beyond(x, limit_m)}, at tick {tick + 1}"
             return False
         return True
-
-    def _refuse(self, tick: int, holds: list[Hold]) -> bool:
-        """Ends the run before interval ``tick`` if a force in it is no finite number."""
-        for _, force, command in holds:
-            if not math.isfinite(force):
-                self._stop(tick, f"command {command} was {force}, which no device can apply")
-                return True
-        return False
-
-    def _stop(self, tick: int, what: str) -> None:
-        self.stop_reason = f"{what}, at tick {tick}"
 
     def state(self) -> dict[str, float]:
         """Returns where the plant is now: tick reached, x, v, force and command last in effect."""

@@ -21,11 +21,7 @@ _ROWS = 128
 
 
 def make_normal(seed: Any, name: str, first: int = 0) -> Draw:
-    """Returns the standard normal numbers of a named stream from draw ``first`` on.
-
-    Args:
-        seed: a whole number, or an array of shape (members,) with the seed of every member of a batch.
-    """
+    """Returns the standard normal numbers of a named stream from draw ``first`` on; of each where there are seeds."""
     if getattr(seed, "shape", ()):
         return NormalRows(np.asarray(seed), name, first)
     return RandomStream(int(seed), name).normal(first)
@@ -74,11 +70,6 @@ class NormalRows:
     """Standard normal numbers of a named stream for every seed of a batch, a row of shape (members,) a draw.
 
     Every member draws what it would draw alone.
-
-    Args:
-        seeds: shape (members,), whole numbers.
-        name: what is random.
-        first: the draw to begin with.
     """
 
     def __init__(self, seeds: np.ndarray, name: str, first: int = 0) -> None:

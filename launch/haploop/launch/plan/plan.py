@@ -10,7 +10,7 @@ from haploop.controller.recorder import MOTION_COLUMNS
 from haploop.launch.plan.effect import Effect, Stage
 from haploop.launch.plan.effects import all_effects, effects_of
 from haploop.plant.chain.chain import Chain
-from haploop.plant.choose import integrator_name, needs_chain
+from haploop.plant.choose import needs_chain
 from haploop.plant.integrators.registry import find_integrator
 from haploop.protocol.scene.paths import value_at
 from haploop.protocol.scene.scene import Scene
@@ -93,7 +93,7 @@ def multiplications(scene: Scene) -> int:
     """
     time, size = Timebase.from_scene(scene), len(Chain.from_scene(scene).states)
     if needs_chain(scene):
-        method = find_integrator(integrator_name(scene))
+        method = find_integrator(scene.clock.integrator)
         moves = method.evaluations * (1 if method.chooses_steps else time.steps_per_tick)
         return moves * size * (size + 2)
     return (time.steps_per_tick + (2 if time.delay_steps % time.steps_per_tick else 1)) * size * (size + 1)
@@ -107,7 +107,7 @@ def _memory(scene: Scene, named: tuple[Effect, ...]) -> dict[str, int]:
 
 def _plant_step(chain: Chain, named: tuple[Effect, ...], scene: Scene) -> tuple[Step, ...]:
     bodies = " - ".join(chain.bodies)
-    method = "exact flow" if integrator_name(scene) == "exact" else integrator_name(scene)
+    method = "exact flow" if scene.clock.integrator == "exact" else scene.clock.integrator
     what = f"{method} of {len(chain.states)} states ({bodies}), the command held, the force of the hand linear"
     return Step("plant", what), *_stage("motion", named, scene)
 

@@ -16,13 +16,7 @@ _wide = np.longdouble
 
 @dataclass(frozen=True)
 class Link:
-    """A spring and a damper side by side, between two neighbouring bodies.
-
-    Attributes:
-        name: "cable" or "grip".
-        stiffness: N/m.
-        damping: N s/m.
-    """
+    """A spring (N/m) and a damper (N s/m) side by side, between two neighbouring bodies: "cable" or "grip"."""
 
     name: str
     stiffness: float
@@ -80,16 +74,12 @@ class Chain:
             grounded["hand"] = (len(bodies) - 1, hand.damping)
             spring = hand.stiffness, hand.rest
         bandwidth = scene.actuator.bandwidth if scene.actuator else None
-        return cls(
-            bodies=tuple(bodies),
-            masses_kg=tuple(masses),
-            grounded=grounded,
-            links=tuple(links),
-            spring=spring,
-            actuator_rate=None if bandwidth is None else 2.0 * np.pi * bandwidth,
-            sensor=_sensor(scene),
-            start=(device.position, device.velocity),
-        )
+        actuator_rate = None if bandwidth is None else 2.0 * np.pi * bandwidth
+        table, sensor = scene.accelerometer, None
+        if table and table.bandwidth is not None and accelerometer_is_used(scene):
+            sensor = sensor_body(scene), 2.0 * np.pi * table.bandwidth
+        start = device.position, device.velocity
+        return cls(tuple(bodies), tuple(masses), grounded, tuple(links), spring, actuator_rate, sensor, start)
 
     @property
     def count(self) -> int:
@@ -183,13 +173,6 @@ class Chain:
         if self.sensor:
             scales[size - 1] = h
         return scales
-
-
-def _sensor(scene: Scene) -> tuple[int, float] | None:
-    table = scene.accelerometer
-    if table is None or table.bandwidth is None or not accelerometer_is_used(scene):
-        return None
-    return sensor_body(scene), 2.0 * np.pi * table.bandwidth
 
 
 def sensor_body(scene: Scene) -> int:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterable
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -17,10 +17,17 @@ from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
 from haploop.protocol.trees import tree_select
 
-if TYPE_CHECKING:
-    from haploop.plant.friction.stick_slip import StickSlipState
-
 HELD = ("force", "command")
+
+
+class StickSlipState(NamedTuple):
+    """Mode of the first body: stuck, or slipping in the direction +1.0 or -1.0 (stuck: the last one).
+
+    In a batch both are arrays of shape (members,).
+    """
+
+    is_stuck: Any
+    direction: Any
 
 
 class ChainState(NamedTuple):
@@ -59,10 +66,7 @@ class Interval(NamedTuple):
 class ChainHistory(ABC):
     """State and record of a chain; what moves it is written in the classes that build on this.
 
-    Args:
-        scene: a resolved scene; in a batch a stacked one, whose numbers are floats, or arrays of shape (members,).
-        time: the integers of the run; in a batch those all members share, whose delay does not change.
-        members: of a batch; None for one run.
+    It is made of what ``OneMassMotion`` is made of, and has its properties and methods.
 
     Attributes:
         chain: the bodies.
@@ -93,12 +97,12 @@ class ChainHistory(ABC):
 
     @property
     def x(self) -> Any:
-        """Position of body 0 at the end of the last interval, m."""
+        """Position of body 0, m."""
         return first_row(self.state.z)
 
     @property
     def v(self) -> Any:
-        """Velocity of body 0 at the end of the last interval, m/s."""
+        """Velocity of body 0, m/s."""
         return first_row(self.state.z[self._v :])
 
     @property
@@ -110,11 +114,7 @@ class ChainHistory(ABC):
         """Goes on from a state, whose arrays may be lists."""
         z, z_comp, held, sensed, mode = state
         arrays = np.array(z), np.array(z_comp), np.array(held)
-        self.state = ChainState(*arrays, tuple(sensed), self._mode_of(mode))
-
-    def _mode_of(self, _mode: Any) -> StickSlipState | None:
-        """Returns the mode of friction of a packed state."""
-        return None
+        self.state = ChainState(*arrays, tuple(sensed), StickSlipState(*mode) if mode else None)
 
     def loads(self, first: int, last: int) -> np.ndarray:
         """Returns the load on the last body at the steps first ... last - 1, N."""
@@ -151,17 +151,9 @@ class ChainHistory(ABC):
         return self.state.sensed[0] if self.state.sensed else 0.0
 
     def take_record(self, tick: int, *, positions_only: bool = False) -> dict[str, np.ndarray]:
-        """Returns the record from interval ``tick`` on, and starts a new one: every plant step and the present state.
+        """Returns the record as ``OneMassMotion`` does, of every state (but x with ``positions_only``).
 
-        Its columns are every state, what rounding left of each length (``*_low``), and what was held, by name.
-
-        Args:
-            tick: the first interval of the record.
-            positions_only: leave out all states but x.
-
-        Returns:
-            Shape (steps + 1,) each; in a batch (steps + 1, members), but for ``command``, which all members share,
-            and beside them ``held_N``, the force of every hold, shape (holds, members).
+        Its columns are the states, what rounding left of each length (``*_low``), and what was held, by name.
         """
         done, self._done = self._done, []
         chain, (z, z_comp, held, *_) = self.chain, self.state

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from haploop.plant.chain.history import ChainHistory, Interval
-from haploop.plant.chain.transition import ChainResponse, make_chain_tables
+from haploop.plant.chain.transition import ChainResponse
 from haploop.plant.line import Hold
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
@@ -26,17 +26,15 @@ class ChainMotion(ChainHistory):
         self._free = self._response(stuck=False)
 
     def _response(self, *, stuck: bool) -> ChainResponse:
-        tables = make_chain_tables(self.chain, self._step_s, self._n, stuck=stuck, members=self._members)
-        return ChainResponse(tables, self.loads, self._n)
+        has_members = self._members is not None
+        return ChainResponse(self.chain, self._step_s, self._n, self.loads, stuck=stuck, has_members=has_members)
 
     def advance(self, tick: int, holds: list[Hold]) -> Any:
-        """Moves through interval ``tick`` under the forces held in it; returns x at its end, m."""
         interval = self._begin(holds)
         follow(self._free, interval, 0, holds, tick, 0.0)
         return self._accept(tick, interval)
 
     def select(self, kept: np.ndarray) -> None:
-        """Drops the members of a batch that are not kept, shape (members,); the record must have been taken."""
         super().select(kept)
         self._free.select(kept)
 
@@ -48,15 +46,10 @@ def follow(
 
     Two motions under the same load differ by a motion without any: y = z - D at any step.
 
-    Args:
-        response: transitions and forced response.
-        interval: its states are known at step ``begin``.
-        begin: plant step.
-        holds: forces held in interval ``tick``.
-        friction: N.
+    The states of the interval ``tick``, in which ``holds`` are held, are known at step ``begin``; friction in N.
     """
     states, comps = interval.states, interval.comps
-    forced, held = response.of_interval(tick), response.tables.held
+    forced, held = response.of_interval(tick), response.held
     acting = np.empty((states.shape[1] + 2, *states.shape[2:]))
     y, comp = states[begin], comps[begin]
     if begin:

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
 from haploop.plant.chain.chain import Chain, sensor_body
-from haploop.plant.chain.transition import make_tables
+from haploop.plant.chain.transition import Loads, make_tables
 from haploop.plant.sensing.encoder import accelerometer_is_used
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
@@ -21,21 +20,11 @@ class SensedAcceleration:
     At a step the sensor senses the acceleration under the forces held over the step that ends there; 0 at the start,
     and while friction holds its body. A bandwidth makes it a state of the chain; a delay reads an older step.
 
-    Args:
-        scene: a resolved scene, or the stacked scene of a batch.
-        chain: of the scene.
-        time: the integers of the run.
-        loads: load in N at the steps first ... last - 1.
-        members: of the batch; None for one run.
-
     Attributes:
         none: what is kept before the first step; empty where no sample carries an acceleration.
     """
 
-    def __init__(
-        self, scene: Scene, chain: Chain, time: Timebase, loads: Callable[[int, int], np.ndarray],
-        members: int | None = None,
-    ) -> None:  # fmt: skip
+    def __init__(self, scene: Scene, chain: Chain, time: Timebase, loads: Loads, members: int | None) -> None:
         is_used, delay_s = accelerometer_is_used(scene), scene.accelerometer.delay if scene.accelerometer else 0.0
         self.none = (0.0,) * (round(delay_s * time.plant_rate) + 1) if is_used else ()
         self._loads, self._state = loads, chain.states.index("accelerometer") if chain.sensor else None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import NamedTuple
+from functools import lru_cache
 
 import numpy as np
 
@@ -13,6 +13,8 @@ from haploop.plant.motion.transition import gramian, transition_minus_identity
 from haploop.protocol.arrays import each
 from haploop.protocol.trees import tree_leaves, tree_select, tree_unflatten
 
+# Returns the load in N at the steps first ... last - 1.
+Loads = Callable[[int, int], np.ndarray]
 _wide = np.longdouble
 # Responses to the load are made for this many intervals at a time, on a fixed grid; in a batch for fewer.
 _PIECE_TICKS, _PIECE_TICKS_OF_A_BATCH = 64, 8
@@ -74,54 +76,32 @@ def scaled_rates(chain: Chain, step_s: float, stuck: bool) -> Matrix:
     return scales[:, None] * rates / scales
 
 
-class ChainTables(NamedTuple):
-    """Transitions over one plant step and over 1 ... steps of them; see ``ChainTransition``.
-
-    In a batch both have a last axis for the members, of length 1 where all share them.
-    """
-
-    step: np.ndarray
-    held: np.ndarray
-
-
-def make_chain_tables(
-    chain: Chain, step_s: float, steps: int, *, stuck: bool, members: int | None = None
-) -> ChainTables:
-    """Makes the transitions of a chain, or of the chains of a batch of so many members."""
-
-    def made(chain: Chain) -> tuple[np.ndarray, ...]:
-        transition = ChainTransition(chain, step_s, steps, stuck)
-        return transition.step, transition.held
-
-    return ChainTables(*make_tables(made, chain, has_members=members is not None))
-
-
 class ChainResponse:
-    """Transitions, and the forced (zero-state) response to the load alone within each interval: a cache, no state.
-
-    Args:
-        tables: of one chain or of a batch.
-        loads: load in N at the steps first ... last - 1.
-        steps: plant steps an interval has.
+    """Transitions, and the forced (zero-state) response to the load alone within intervals of so many steps: a cache.
 
     Attributes:
-        tables: as given.
+        step, held: see ``ChainTransition`` and ``make_tables``.
     """
 
-    def __init__(self, tables: ChainTables, loads: Callable[[int, int], np.ndarray], steps: int) -> None:
-        self.tables, self._loads, self._n = tables, loads, steps
-        self._piece_ticks = _PIECE_TICKS if tables.step.ndim == 2 else _PIECE_TICKS_OF_A_BATCH
-        self._pieces: dict[int, np.ndarray] = {}
+    def __init__(
+        self, chain: Chain, step_s: float, steps: int, loads: Loads, *, stuck: bool, has_members: bool
+    ) -> None:
+        def made(chain: Chain) -> tuple[np.ndarray, ...]:
+            transition = ChainTransition(chain, step_s, steps, stuck)
+            return transition.step, transition.held
+
+        self.step, self.held = make_tables(made, chain, has_members=has_members)
+        self._loads, self._n = loads, steps
+        self._piece_ticks = _PIECE_TICKS_OF_A_BATCH if has_members else _PIECE_TICKS
+        self._piece = lru_cache(maxsize=1)(self._made)
 
     def of_interval(self, tick: int) -> np.ndarray:
         """Returns the response at the steps of interval ``tick`` and at its end, shape (n + 1, states)."""
         piece, at = divmod(tick, self._piece_ticks)
-        if piece not in self._pieces:
-            self._pieces = {piece: self._made(piece)}
-        return self._pieces[piece][at]
+        return self._piece(piece)[at]
 
     def _made(self, piece: int) -> np.ndarray:
-        n, table = self._n, self.tables.step
+        n, table = self._n, self.step
         size = table.shape[1]
         ticks, loads = self._piece_ticks, self._loads
         first = piece * ticks * n
@@ -137,7 +117,8 @@ class ChainResponse:
 
     def select(self, kept: np.ndarray) -> None:
         """Drops the members of a batch that are not kept, shape (members,)."""
-        self.tables, self._pieces = tree_select((self.tables, self._pieces), kept)
+        self.step, self.held = tree_select((self.step, self.held), kept)
+        self._piece.cache_clear()
 
 
 class ChainIntegrals:
@@ -182,9 +163,8 @@ def make_tables(
 
     Args:
         make: from a chain of floats to tables; it may not look at the start and the rest.
-        chain: of a scene, or of a stacked one, whose numbers may be arrays of shape (members,).
-        has_members: whether it is of a batch: the tables then have a last axis for the members, of length 1 where all
-            share them.
+        chain: of a scene, or of a batch.
+        has_members: whether it is of a batch: a last axis is then for the members, of length 1 where all share it.
     """
 
     # What is made does not depend on the start and the rest: chains that differ in these alone share it.

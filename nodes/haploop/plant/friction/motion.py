@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from haploop.plant.chain.history import HELD, ChainState, Interval
+from haploop.plant.chain.history import ChainState, Interval, StickSlipState
 from haploop.plant.chain.motion import ChainMotion, follow
 from haploop.plant.chain.transition import ChainTransition
-from haploop.plant.friction.stick_slip import Friction, StickSlip, StickSlipState
+from haploop.plant.friction.stick_slip import RubbingHistory, StickSlip
 from haploop.plant.friction.substeps import SubstepSolver, pieces_record
 from haploop.plant.line import Hold
 from haploop.protocol.scene.scene import Scene
@@ -17,7 +17,7 @@ from haploop.protocol.ticks import Timebase
 from haploop.protocol.trees import tree_member, tree_take
 
 
-class FrictionMotion(ChainMotion):
+class FrictionMotion(RubbingHistory, ChainMotion):
     """Exact transition between the instants at which friction switches, and these instants by halving the step.
 
     Body 0 slips in a direction +-1 under friction -direction F, or is stuck: then it is clamped, v is exactly 0.0 and
@@ -27,28 +27,14 @@ class FrictionMotion(ChainMotion):
     other, and every one of a scene too stiff or with too curved a law for that, is solved step by step.
     """
 
-    held_names = (*HELD, "friction", "stuck")
-
-    def __init__(self, scene: Scene, time: Timebase, members: int | None = None) -> None:
-        assert scene.friction
-        self.friction = Friction(scene.friction)
-        super().__init__(scene, time, members)
+    def __init__(self, scene: Scene, time: Timebase) -> None:
+        super().__init__(scene, time)
         self._clamped = self._response(stuck=True)
         self._pieces: list[list[float]] = []
         free, clamped = (ChainTransition(self.chain, self._step_s, self._n, stuck) for stuck in (False, True))
         self._solver = SubstepSolver(self.chain, self._stick_slip, free, clamped, self._step_s)
 
-    def _begun(self, z: np.ndarray) -> tuple[np.ndarray, StickSlipState | None]:
-        self._stick_slip = StickSlip(self.chain, self.friction, self._step_s)
-        mode = self._stick_slip.begin(z, float(self.loads(0, 1)[0]))
-        friction = self._stick_slip.friction_at(mode, z[self._v])
-        return np.array([0.0, -1.0, friction, float(mode.is_stuck)]), mode
-
-    def _mode_of(self, mode: Any) -> StickSlipState:
-        return StickSlipState(*mode)
-
     def advance(self, tick: int, holds: list[Hold]) -> Any:
-        """Moves through interval ``tick`` under the forces held in it; returns x at its end, m."""
         interval, mode = self._begin(holds), self.state.mode
         loads = self.loads(tick * self._n, (tick + 1) * self._n + 1)
         step = 0
@@ -98,12 +84,11 @@ class FrictionMotion(ChainMotion):
         return mode
 
     def take_record(self, tick: int, *, positions_only: bool = False) -> dict[str, np.ndarray]:
-        """Returns the record as without friction; the pieces of the steps within which friction switched, ``pieces.*``,
-        come beside."""
+        """Returns the record as without friction, and beside it ``take_pieces``."""
         return super().take_record(tick, positions_only=positions_only) | self.take_pieces()
 
     def take_pieces(self) -> dict[str, np.ndarray]:
-        """Returns the pieces of steps since the last call; see ``pieces_record``."""
+        """Returns the pieces of the steps within which friction switched; see ``pieces_record``."""
         pieces, self._pieces = self._pieces, []
         return pieces_record(self.chain, pieces)
 
@@ -112,20 +97,18 @@ class FrictionMotion(ChainMotion):
         return self._done.pop()
 
 
-class BatchFrictionMotion(ChainMotion):
+class BatchFrictionMotion(RubbingHistory, ChainMotion):
     """``FrictionMotion`` of the members of a batch with the same chain and the same friction.
 
     In an interval all members go as far as they would if nothing switched, those that stick and those that slip apart.
     Most do. For each of the others the interval is solved anew by the motion of one run.
     """
 
-    held_names = (*HELD, "friction", "stuck")
-
     def __init__(self, scene: Scene, time: Timebase, members: int) -> None:
         self._one = FrictionMotion(tree_member(scene, 0), time)
         self._pieces: list[tuple[int, dict[str, np.ndarray]]] = []
         super().__init__(scene, time, members)
-        self._stick_slip = StickSlip(self.chain, self._one.friction, self._step_s)
+        self._stick_slip = StickSlip(self.chain, self.friction, self._step_s)
         self._clamped = self._response(stuck=True)
 
     def _begun(self, z: np.ndarray) -> tuple[np.ndarray, StickSlipState | None]:
@@ -134,7 +117,6 @@ class BatchFrictionMotion(ChainMotion):
         return held, StickSlipState(*(np.full(z.shape[1:], part) for part in mode))
 
     def advance(self, tick: int, holds: list[Hold]) -> Any:
-        """Moves through interval ``tick`` under the forces held in it; returns x at its end, m."""
         interval, loads = self._begin(holds), self.loads(tick * self._n, (tick + 1) * self._n + 1)
         is_stuck, direction = self._decided(interval, loads)
         holds_through = np.empty(is_stuck.shape, bool)
@@ -187,8 +169,7 @@ class BatchFrictionMotion(ChainMotion):
         return one.state.mode
 
     def take_record(self, tick: int, *, positions_only: bool = False) -> dict[str, Any]:
-        """Returns the record as without friction; ``pieces``: (member, its pieces) wherever friction switched within an
-        interval."""
+        """Returns the record as without friction, and beside it ``pieces``: (member, its pieces) of intervals."""
         pieces, self._pieces = self._pieces, []
         record = super().take_record(tick, positions_only=positions_only)
         return record if positions_only else record | {"pieces": pieces}

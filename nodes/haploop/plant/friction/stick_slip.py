@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from haploop.plant.chain.chain import Chain
+from haploop.plant.chain.history import HELD, ChainHistory, StickSlipState
 from haploop.protocol.scene import effects
+from haploop.protocol.scene.scene import Scene
+from haploop.protocol.ticks import Timebase
 
 # Sticking ends beyond the breakaway force by this much, relative: what rounding does to a sum of forces is far less.
 _MARGIN = 1e-12
@@ -19,9 +22,6 @@ class Friction:
 
     Without a Stribeck velocity F is ``kinetic`` at every speed; without a breakaway force that is ``kinetic``, too
     (Armstrong-Helouvry, Dupont and Canudas de Wit 1994).
-
-    Args:
-        table: the resolved ``[friction]`` table.
 
     Attributes:
         kinetic_N: F at high speed.
@@ -45,16 +45,6 @@ class Friction:
     def holds(self, force):
         """Tells whether a body at rest stays there under this force (N; a float or an array)."""
         return abs(force) <= self.holds_N
-
-
-class StickSlipState(NamedTuple):
-    """Mode of the first body: stuck, or slipping in the direction +1.0 or -1.0 (stuck: the last one).
-
-    In a batch both are arrays of shape (members,).
-    """
-
-    is_stuck: Any
-    direction: Any
 
 
 class StickSlip:
@@ -112,12 +102,7 @@ class StickSlip:
     ) -> Any:  # fmt: skip
         """Tells whether the mode may cease and be back between two states in which it holds.
 
-        Args:
-            mode: all of many stick or all slip.
-            begin, end: the states, ``part`` of a plant step apart.
-            command: held between them.
-            load, end_load: in the two states.
-            friction: friction force between them.
+        They are ``part`` of a plant step apart, with command and friction force held; all of many stick or all slip.
         """
         force, end_force = self._force.on(begin, command, load), self._force.on(end, command, end_load)
         if not mode.is_stuck:
@@ -152,3 +137,24 @@ def _tangents_meet_below(g: Any, slope: Any, end_g: Any, end_slope: Any) -> Any:
     """Tells whether g falls at the start and rises at the end of a length of 1, and the tangents meet at 0 or below."""
     turns = (slope < 0.0) & (end_slope > 0.0)
     return turns & (g * (end_slope - slope) <= slope * (end_g - g - end_slope))
+
+
+class RubbingHistory(ChainHistory):
+    """State and record of a chain whose first body sticks and slips; goes before the motion without friction.
+
+    Attributes:
+        friction: the law.
+    """
+
+    held_names = (*HELD, "friction", "stuck")
+
+    def __init__(self, scene: Scene, time: Timebase, *members: int | None) -> None:
+        assert scene.friction
+        self.friction = Friction(scene.friction)
+        super().__init__(scene, time, *members)
+
+    def _begun(self, z: np.ndarray) -> tuple[np.ndarray, StickSlipState | None]:
+        self._stick_slip = StickSlip(self.chain, self.friction, self._step_s)
+        mode = self._stick_slip.begin(z, float(self.loads(0, 1)[0]))
+        friction = self._stick_slip.friction_at(mode, z[self._v])
+        return np.array([0.0, -1.0, friction, float(mode.is_stuck)]), mode

@@ -8,8 +8,9 @@ from typing import NamedTuple
 import numpy as np
 
 from haploop.plant.chain.chain import Chain
+from haploop.plant.chain.history import StickSlipState
 from haploop.plant.chain.transition import ChainTransition
-from haploop.plant.friction.stick_slip import Friction, StickSlip, StickSlipState
+from haploop.plant.friction.stick_slip import Friction, StickSlip
 from haploop.protocol.scene.scene import Scene
 
 # A piece is halved this often to find when friction switches: to 2e-14 s at 10 kHz.
@@ -25,8 +26,7 @@ class Step(NamedTuple):
     """Course of a plant step in which body 0 may stick and slip.
 
     Attributes:
-        mode: at the end.
-        z, z_comp: states and what rounding left of them at the end.
+        mode, z, z_comp: at the end; what rounding left of the states z.
         friction, is_stuck: friction in N, and whether body 0 was stuck, at the start.
         pieces: rows of ``pieces_record``, none where the step is one piece.
     """
@@ -48,8 +48,6 @@ class SubstepSolver:
     With a Stribeck velocity every piece has the friction of the speed foreseen for its middle: second order in h.
 
     Args:
-        chain: the bodies.
-        stick_slip: friction on body 0.
         free, clamped: transitions of the chain, and with body 0 held.
         step_s: h, s.
 
@@ -72,14 +70,7 @@ class SubstepSolver:
         self, mode: StickSlipState, step: int, z: np.ndarray, z_comp: np.ndarray, command: float, load: float,
         rise: float,
     ) -> Step:  # fmt: skip
-        """Solves plant step ``step``.
-
-        Args:
-            mode: at its start.
-            step: its number.
-            z, z_comp: states and what rounding left of them at its start.
-            command: held over it, N.
-            load, rise: at its start, and how much it rises over it, N.
+        """Solves plant step number ``step`` from its start, under a command and a load with its rise over it, N.
 
         Raises:
             ArithmeticError: friction switched so often that it took a million pieces.

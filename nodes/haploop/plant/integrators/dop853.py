@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from haploop.plant.chain.chain import Chain
-from haploop.plant.chain.history import ChainHistory, Interval
+from haploop.plant.chain.history import ChainHistory, Interval, StickSlipState
 from haploop.plant.integrators.registry import Integrator
 from haploop.plant.line import Hold
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
-
-if TYPE_CHECKING:
-    from haploop.plant.friction.stick_slip import StickSlipState
 
 Rates = Callable[[float, np.ndarray], np.ndarray]
 # Relative tolerance of a step, and the speed that is none to it, m/s.
@@ -36,7 +33,6 @@ class Dop853Motion(ChainHistory):
         self._absolute = (_TOLERANCE * _STILL_M_S / self.chain.scales(self._step_s)[: len(self.state.z)]).astype(float)
 
     def advance(self, tick: int, holds: list[Hold]) -> float:
-        """Moves through interval ``tick`` under the forces held in it; returns x at its end, m."""
         interval = self._begin(holds)
         interval.comps[:] = 0.0
         loads = self.loads(tick * self._n, (tick + 1) * self._n + 1)

@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from haploop.plant.chain.history import HELD, Interval
-from haploop.plant.friction.stick_slip import Friction, StickSlip, StickSlipState
+from haploop.plant.chain.history import Interval, StickSlipState
+from haploop.plant.friction.stick_slip import RubbingHistory
 from haploop.plant.integrators.dop853 import Dop853Motion, Rates, System
 from haploop.plant.line import Hold
 from haploop.protocol.scene.scene import Scene
@@ -31,7 +31,7 @@ class _Forces(NamedTuple):
         return self.load + self.slope * (t - self.start)
 
 
-class Dop853FrictionMotion(Dop853Motion):
+class Dop853FrictionMotion(RubbingHistory, Dop853Motion):
     """As without friction, and started anew where friction switches: events, found on the dense output.
 
     Slipping ends where v changes its sign; there body 0 sticks, clamped with v = 0.0, if the other forces on it are
@@ -39,25 +39,12 @@ class Dop853FrictionMotion(Dop853Motion):
     of the part in which the body slips, so that the residual shows the steps within which friction switched.
     """
 
-    held_names = (*HELD, "friction", "stuck")
-
     def __init__(self, scene: Scene, time: Timebase) -> None:
-        assert scene.friction
-        self._friction = Friction(scene.friction)
         super().__init__(scene, time)
         self._clamped = System(self.chain, stuck=True)
         self._pull = (self.chain.accelerations()[0] * self.chain.masses_kg[0]).astype(float)
 
-    def _begun(self, z: np.ndarray) -> tuple[np.ndarray, StickSlipState | None]:
-        self._stick_slip = StickSlip(self.chain, self._friction, self._step_s)
-        mode = self._stick_slip.begin(z, float(self.loads(0, 1)[0]))
-        return np.array([0.0, -1.0, self._stick_slip.friction_at(mode, z[self._v]), float(mode.is_stuck)]), mode
-
-    def _mode_of(self, mode: Any) -> StickSlipState:
-        return StickSlipState(*mode)
-
     def advance(self, tick: int, holds: list[Hold]) -> float:
-        """Moves through interval ``tick`` under the forces held in it; returns x at its end, m."""
         assert self.state.mode
         self._mode = self.state.mode
         return super().advance(tick, holds)
@@ -122,17 +109,17 @@ class Dop853FrictionMotion(Dop853Motion):
         """Notes friction in the steps in which the body slips, as at their beginning; ``v`` at that of the first."""
         speeds = [v, *interval.states[first + 1 : last, self._v].tolist()]
         for step, speed in zip(range(first, last), speeds, strict=False):
-            interval.held[step, 2:] = -self._mode.direction * self._friction.at(speed), 0.0
+            interval.held[step, 2:] = -self._mode.direction * self.friction.at(speed), 0.0
 
     def _slipping(self, forces: _Forces) -> tuple[Rates, Callable[[float, np.ndarray], float]]:
         """Returns z' while body 0 slips, and what falls below 0 when it no longer does: the speed in its direction."""
-        law, v, direction = self._friction, self._v, self._mode.direction
+        law, v, direction = self.friction, self._v, self._mode.direction
         smooth, unit = self._free.under(*forces), -direction * self._free.of_friction
         return (lambda t, z: smooth(t, z) + law.at(z[v]) * unit), _Event(lambda _t, z: direction * z[v])
 
     def _sticking(self, forces: _Forces) -> tuple[Rates, Callable[[float, np.ndarray], float]]:
         """Returns z' while body 0 is held, and what falls below 0 when it no longer is: what more could be held."""
-        most = self._friction.holds_N
+        most = self.friction.holds_N
         return self._clamped.under(*forces), _Event(lambda t, z: most - abs(self._other_forces(t, z, forces)))
 
     def _other_forces(self, t: float, z: np.ndarray, forces: _Forces) -> float:

@@ -74,11 +74,7 @@ def integrator_names() -> tuple[str, ...]:
 
 
 def integrator_module(name: str) -> str:
-    """Returns the module an integrator is written in.
-
-    Raises:
-        KeyError: there is none of this name.
-    """
+    """Returns the module an integrator is written in; raises as ``find_integrator`` does."""
     return _place(name).partition(":")[0]
 
 

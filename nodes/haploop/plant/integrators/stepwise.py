@@ -33,7 +33,6 @@ class StepwiseMotion(ChainHistory):
         self._step = method(self._rates, self._step_s).step
 
     def advance(self, tick: int, holds: list[Hold]) -> float:
-        """Moves through interval ``tick`` under the forces held in it; returns x at its end, m."""
         interval = self._begin(holds)
         self._fill_in(interval, self.loads(tick * self._n, (tick + 1) * self._n + 1))
         return self._accept(tick, interval)

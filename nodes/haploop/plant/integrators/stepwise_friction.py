@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from haploop.plant.chain.history import HELD, Interval
-from haploop.plant.friction.stick_slip import Friction, StickSlip, StickSlipState
+from haploop.plant.chain.history import Interval
+from haploop.plant.friction.stick_slip import Friction, RubbingHistory
 from haploop.plant.integrators.linear_rates import LinearRates, OneStep, Rows, moved, response_to
 from haploop.plant.integrators.stepwise import StepwiseMotion
 from haploop.protocol.scene.scene import Scene
@@ -62,25 +62,16 @@ class FrictionProjection:
         return rows
 
 
-class StepwiseFrictionMotion(StepwiseMotion):
+class StepwiseFrictionMotion(RubbingHistory, StepwiseMotion):
     """One-step motion, every step projected onto what friction allows; see ``FrictionProjection``."""
 
-    held_names = (*HELD, "friction", "stuck")
-
     def __init__(self, scene: Scene, time: Timebase) -> None:
-        assert scene.friction
-        self._friction = Friction(scene.friction)
         super().__init__(scene, time)
         free, clamped = (
             self._method(rates, self._step_s) for rates in (self._rates, LinearRates(self.chain, stuck=True))
         )
-        self._projection = FrictionProjection(self._friction, free, clamped, self._rates)
+        self._projection = FrictionProjection(self.friction, free, clamped, self._rates)
         self._step = self._projection.step
-
-    def _begun(self, z: np.ndarray) -> tuple[np.ndarray, StickSlipState | None]:
-        stick_slip = StickSlip(self.chain, self._friction, self._step_s)
-        mode = stick_slip.begin(z, float(self.loads(0, 1)[0]))
-        return np.array([0.0, -1.0, stick_slip.friction_at(mode, z[self._v]), float(mode.is_stuck)]), None
 
     def _fill_in(self, interval: Interval, loads: np.ndarray) -> None:
         super()._fill_in(interval, loads)

@@ -21,15 +21,14 @@ class Line(Protocol):
 
     Attributes:
         counters: of what may befall a command, by the name of its column.
+        state: a tree of numbers and forces, enough to go on from.
     """
 
     @property
     def counters(self) -> dict[str, Counter]: ...
 
     @property
-    def state(self) -> Any:
-        """A tree of numbers and forces, enough to go on from."""
-        ...
+    def state(self) -> Any: ...
 
     def restore(self, state: Any, /) -> None:
         """Goes on from a state."""
@@ -38,12 +37,14 @@ class Line(Protocol):
         """Takes the next commands, in order of their ticks."""
 
     def holds(self, tick: int, /) -> list[Hold]:
-        """Returns the forces held in interval ``tick``, in order: all its steps, no hold of none."""
+        """Returns the forces held in interval ``tick``, in order: all its steps, no hold of none.
+
+        It is to be called for every interval, once, from 0 on; commands up to tick - L must have been received.
+        """
         ...
 
     def retimed(self, delay_steps: int, tick: int, /) -> Line:
-        """Returns a line on which the commands from ``tick`` on have another delay, in plant steps; the others are on
-        it."""
+        """Returns a line with another delay of the commands from ``tick`` on, in plant steps; the others are on it."""
         ...
 
     def select(self, kept: np.ndarray, /) -> None:

@@ -40,18 +40,11 @@ class Actuator(NamedTuple):
 
 
 class ActuatedLine:
-    """Line with an actuator at its end, which sees the commands that arrive.
-
-    Args:
-        line: brings the commands.
-        table: the resolved ``[actuator]`` table; its bandwidth is the motion's.
-        time: the integers of the run.
-        members: of a batch; None for one run.
+    """Line with an actuator at its end, which sees the commands that another line brings.
 
     Attributes:
-        line: as given.
-        actuator: its parameters.
-        receive: takes the next commands, a list in order of their ticks.
+        line: that line.
+        actuator: its parameters; the bandwidth is the motion's.
         state: (of the line, tick of the command in effect last, its force in N, saturated commands).
         counters: those of the line and, where there is a saturation, the commands it clipped, each at its first step.
     """
@@ -73,18 +66,15 @@ class ActuatedLine:
         return self.line.state, self._command, self._force, self._saturated.state
 
     def restore(self, state: tuple[Any, int, Any, Any]) -> None:
-        """Goes on from a state."""
         line, self._command, self._force, saturated = state
         self.line.restore(line)
         self._saturated.restore(saturated)
 
     def retimed(self, delay_steps: int, tick: int) -> ActuatedLine:
-        """Returns the line with another delay of the commands from ``tick`` on."""
         self._take(self.line.retimed(delay_steps, tick))
         return self
 
     def holds(self, tick: int) -> list[Hold]:
-        """Returns the forces the device feels in interval ``tick``, in order."""
         step = tick * self._steps
         holds: list[Hold] = []
         for count, force, command in self.line.holds(tick):
@@ -97,7 +87,6 @@ class ActuatedLine:
         return holds
 
     def select(self, kept: np.ndarray) -> None:
-        """Drops the members of a batch that are not kept, shape (members,)."""
         self.line.select(kept)
         self.actuator, self._force = tree_select((self.actuator, self._force), kept)
         self._saturated.select(kept)

@@ -41,11 +41,10 @@ class DelayLine:
         return self._first, tuple(self._forces)
 
     def restore(self, state: Any) -> None:
-        """Goes on from a state."""
         self._first, self._forces[:] = state
 
     def holds(self, tick: int) -> list[Hold]:
-        """Returns the forces held in interval ``tick``, in order; forgets all older commands.
+        """Returns the forces as ``Line`` does; forgets all older commands.
 
         Raises:
             IndexError: command tick - L has not been received.
@@ -76,7 +75,6 @@ class DelayLine:
         return LossyLine(self._time).taking_over(delay_steps, self._forces[acting - self._first], acting, coming, tick)
 
     def select(self, kept: np.ndarray) -> None:
-        """Drops the members of a batch that are not kept, shape (members,)."""
         self._forces[:] = tree_select(self._forces, kept)
 
 

@@ -25,12 +25,6 @@ class LossyLine:
 
     Since j_k >= 0, interval k still needs no command later than k - L.
 
-    Args:
-        time: the integers of the run.
-        jitter: the resolved ``[jitter]`` table, or None.
-        loss: the resolved ``[loss]`` table, or None.
-        seed: the scene's.
-
     Attributes:
         delay_steps: of the commands still to come.
         additional_steps: returns j of the next command, whole plant steps, >= 0.
@@ -61,7 +55,6 @@ class LossyLine:
         return self._received, self.delay_steps, tuple(self._coming), *self._acting, *counts
 
     def restore(self, state: tuple[Any, ...]) -> None:
-        """Goes on from a state."""
         self._received, self.delay_steps, coming, force, command, dropped, lost = state
         self._coming, self._acting = deque(tuple(one) for one in coming), (force, command)
         self._dropped.restore(dropped)
@@ -69,19 +62,16 @@ class LossyLine:
         self._draw_from(self._received)
 
     def taking_over(self, delay_steps: int, force: float, command: int, coming: Any, received: int) -> LossyLine:
-        """Returns this line at the place of another one: its force and command in effect, those on their way and how
-        many have come; further commands have the delay given."""
+        """Returns this line in another's place: its force and command in effect, those on their way, how many came."""
         nothing = 0, ()
         self.restore((received, delay_steps, coming, force, command, nothing, nothing))
         return self
 
     def retimed(self, delay_steps: int, _tick: int) -> LossyLine:
-        """Returns the line with another delay of the commands still to come."""
         self.delay_steps = delay_steps
         return self
 
     def receive(self, forces: list[float]) -> None:
-        """Takes the next commands, in order of their ticks."""
         for command, force in enumerate(forces, self._received):
             effect = command * self._steps + self.delay_steps + self.additional_steps()
             if self.is_lost():
@@ -96,10 +86,6 @@ class LossyLine:
             self._dropped.note(self._coming.pop()[0])
 
     def holds(self, tick: int) -> list[Hold]:
-        """Returns the forces held in interval ``tick``, in order; to be called for every interval, once, from 0 on.
-
-        Commands up to tick - L must have been received.
-        """
         step, end = tick * self._steps, (tick + 1) * self._steps
         coming, (force, command) = self._coming, self._acting
         holds: list[Hold] = []
@@ -114,24 +100,14 @@ class LossyLine:
         return holds
 
     def select(self, kept: np.ndarray) -> None:
-        """Refuses: such a line runs alone.
-
-        Raises:
-            TypeError: always.
-        """
         raise TypeError("A line with jitter, loss or a changed delay is not run in batches.")
 
 
 def make_jitter(table: Jitter | None, seed: int, plant_rate: int, first: int = 0) -> Draw:
     """Makes the additional delays of the commands from ``first`` on, in whole plant steps, j_k >= 0.
 
-        uniform   0, 1, ... most, equally likely
-        gamma     shape (mean / deviation)^2, scale deviation^2 / mean, rounded to the nearest step
-
-    Args:
-        table: the ``[jitter]`` table, times in s; None for no jitter.
-        seed: the scene's.
-        plant_rate: plant steps per second.
+    uniform   0, 1, ... most, equally likely
+    gamma     shape (mean / deviation)^2, scale deviation^2 / mean, rounded to the nearest step
     """
     if table is None:
         return repeat(0).__next__
@@ -144,12 +120,7 @@ def make_jitter(table: Jitter | None, seed: int, plant_rate: int, first: int = 0
 
 
 def make_loss(table: Loss | None, seed: int, first: int = 0) -> Draw:
-    """Makes the losses of the commands from ``first`` on, each by itself with the same probability.
-
-    Args:
-        table: the ``[loss]`` table; None for no loss.
-        seed: the scene's.
-    """
+    """Makes the losses of the commands from ``first`` on, each by itself with the same probability."""
     if table is None:
         return repeat(False).__next__
     uniform, probability = RandomStream(seed, "loss").uniform(first), table.probability

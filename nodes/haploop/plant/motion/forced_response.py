@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -37,18 +38,14 @@ def forced_response(transition: FohTransition, start: Any, rise: Any) -> Iterato
 
 
 class ForcedResponse:
-    """Response to tau and the spring's rest, from zero at the start of every interval: a cache, no state.
+    """Response to tau and the spring's rest, from zero at the start of every interval of n steps: a cache, no state.
 
     It does not depend on the controller, and is made piece by piece of the run.
 
-    Args:
+    Attributes:
         transition: over a plant step.
         tau: force of the hand.
         rest_N: force of the spring with the device at the origin, k x_rest.
-        steps: n, plant steps an interval has.
-
-    Attributes:
-        transition, tau, rest_N: as given.
         is_shared: whether all members of a batch have the same response.
     """
 
@@ -57,7 +54,7 @@ class ForcedResponse:
         load = tau.at_steps(0, 1)[0] + rest_N
         self.is_shared = not np.shape(transition.x_x) and (np.shape(load) or (1,))[-1] == 1
         self._piece_ticks = _PIECE_TICKS if self.is_shared else _PIECE_TICKS_OF_EACH
-        self._pieces: dict[int, np.ndarray] = {}
+        self._piece = lru_cache(maxsize=9)(self._made)
 
     def loads(self, first: int, last: int) -> np.ndarray:
         """Returns tau + k x_rest at the steps first ... last - 1, N."""
@@ -78,13 +75,6 @@ class ForcedResponse:
         start = tick - first * size
         return joined[:, :, start : start + ticks]
 
-    def _piece(self, piece: int) -> np.ndarray:
-        if piece not in self._pieces:
-            if len(self._pieces) > 8:
-                self._pieces.clear()
-            self._pieces[piece] = self._made(piece)
-        return self._pieces[piece]
-
     def _made(self, piece: int) -> np.ndarray:
         n, ticks = self._steps, self._piece_ticks
         first = piece * ticks * n
@@ -97,8 +87,7 @@ class ForcedResponse:
         return response
 
     def select(self, kept: np.ndarray) -> None:
-        """Drops the members of a batch that are not kept, shape (members,)."""
         self.transition, self.rest_N = tree_select((self.transition, self.rest_N), kept)
         self.tau.select(kept)
         if not self.is_shared:
-            self._pieces = {piece: np.compress(kept, made, axis=-1) for piece, made in self._pieces.items()}
+            self._piece.cache_clear()

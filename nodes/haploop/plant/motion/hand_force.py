@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import lru_cache
 from importlib.metadata import entry_points
 
 import numpy as np
@@ -23,29 +24,20 @@ Profile = Callable[[np.ndarray], np.ndarray]
 
 
 class HandForce:
-    """The hand force of a scene at plant steps, in N.
+    """The hand force of a scene at plant steps, in N; step s is at ``s / plant_rate``.
 
     In a batch it has a last axis for the members, of length 1 where all have the same force.
-
-    Args:
-        table: the resolved ``[hand.force]`` table, or None for no force; a stacked one in a batch.
-        plant_rate: plant steps per second; step s is at ``s / plant_rate``.
-        members: of a batch; None for one run.
 
     Attributes:
         is_shared: whether all members have the same force.
     """
 
     def __init__(self, table: tables.HandForce | None, plant_rate: int, members: int | None = None) -> None:
-        self._table, self._plant_rate = table, plant_rate
+        self._table, self._profile, self._plant_rate = table, _profile(table), plant_rate
         self._has_members = members is not None
         self.is_shared = not any(getattr(number, "shape", ()) for number in tree_leaves(table))
         self._piece_steps = _PIECE_STEPS if self.is_shared else _PIECE_STEPS_OF_EACH
-        self._prepare()
-
-    def _prepare(self) -> None:
-        self._profile = _profile(self._table)
-        self._pieces: dict[int, np.ndarray] = {}
+        self._piece = lru_cache(maxsize=3)(self._made)
 
     def add(self, constant_N: float) -> None:
         """Adds a constant force; for one run."""
@@ -60,19 +52,16 @@ class HandForce:
         start = first - pieces.start * size
         return joined[start : start + last - first]
 
-    def _piece(self, index: int) -> np.ndarray:
-        if index not in self._pieces:
-            if len(self._pieces) > 2:
-                self._pieces.clear()
-            times = np.arange(index * self._piece_steps, (index + 1) * self._piece_steps) / self._plant_rate
-            self._pieces[index] = self._profile(times[:, None] if self._has_members else times)
-        return self._pieces[index]
+    def _made(self, piece: int) -> np.ndarray:
+        times = np.arange(piece * self._piece_steps, (piece + 1) * self._piece_steps) / self._plant_rate
+        return self._profile(times[:, None] if self._has_members else times)
 
     def select(self, kept: np.ndarray) -> None:
         """Drops the members of a batch that are not kept, shape (members,)."""
         if not self.is_shared:
             self._table = tree_select(self._table, kept)
-            self._prepare()
+            self._profile = _profile(self._table)
+            self._piece.cache_clear()
 
 
 def make_hand_force(scene: Scene, plant_rate: int, members: int | None = None) -> HandForce:

@@ -31,20 +31,17 @@ class OneMassState(NamedTuple):
 
 
 def advance(over: Any, state: tuple[Any, ...], holds: Sequence[Hold], drive: Any, noted: list[Any]) -> tuple[Any, ...]:
-    """Moves one mass through an interval.
+    """Moves one mass through an interval: returns the entries of ``OneMassState`` at its end.
 
     Over a hold of i steps y+ = y + (e^{A i h} - I) y + (integral of e^{A s} ds) f / m, for floats, arrays of NumPy or
     of jax.
 
     Args:
         over: coefficients of ``make_zoh_transitions``, indexed by the number of steps.
-        state: the entries of ``OneMassState`` at the start of the interval.
+        state: the entries at the start.
         holds: forces held in the interval.
         drive: what the forced response adds to (x, v) by the end of the interval.
         noted: takes seven entries for every hold: steps, x, v, x_comp and v_comp at its beginning, force, command.
-
-    Returns:
-        The entries of ``OneMassState`` at the end.
     """
     x, v, x_comp, v_comp = state
     last = holds[-1]
@@ -78,9 +75,7 @@ class OneMassMotion:
         members: of a batch; None for one run.
 
     Attributes:
-        mechanics: masses, dampers and spring.
         held: coefficients of ``make_zoh_transitions``; in a batch with a last axis, of length 1 where all share them.
-        response: forced response.
         state: at the end of the last interval.
         last: hold in effect last.
     """
@@ -116,12 +111,12 @@ class OneMassMotion:
 
     @property
     def x(self) -> Any:
-        """Position at the end of the last interval, m."""
+        """Position, m."""
         return self._state[0]
 
     @property
     def v(self) -> Any:
-        """Velocity at the end of the last interval, m/s."""
+        """Velocity, m/s."""
         return self._state[1]
 
     def restore(self, state: Sequence[Any], last: Sequence[Any]) -> None:
@@ -148,14 +143,8 @@ class OneMassMotion:
     def take_record(self, tick: int, *, positions_only: bool = False) -> dict[str, np.ndarray]:
         """Returns the record from interval ``tick`` on, and starts a new one: every plant step and the present state.
 
-        Its columns are x, v, x_low (x_comp), force and command.
-
-        Args:
-            tick: the first interval of the record.
-            positions_only: leave v, x_low and force out.
-
         Returns:
-            Shape (steps + 1,) each; in a batch (steps + 1, members), but for ``command``, which all members share,
+            x, v, x_low (x_comp), force and command; of these x and command with ``positions_only``. Shape (steps + 1,); in a batch (steps + 1, members), but for ``command``, which all members share,
             and beside them ``held_N``, the force of every hold, shape (holds, members).
         """
         noted, self._noted = self._noted, []

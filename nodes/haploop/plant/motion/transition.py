@@ -27,9 +27,6 @@ def transition_minus_identity(rates: Matrix, duration: Real) -> Matrix:
     Args:
         rates: A, shape (n, n), 1/s.
         duration: t, s.
-
-    Returns:
-        Shape (n, n).
     """
     scaled, doublings = _short_step(rates, duration)
     term = increment = scaled.copy()
@@ -51,11 +48,8 @@ def gramian(rates: Matrix, weight: Matrix, duration: Real) -> Matrix:
 
     Args:
         rates: A, shape (n, n), 1/s.
-        weight: Q, symmetric, shape (n, n).
+        weight: Q, symmetric, shape (n, n); so is W.
         duration: t, s.
-
-    Returns:
-        Shape (n, n), symmetric.
     """
     scaled, doublings = _short_step(rates, duration)
     step = duration / _wide(2) ** doublings
@@ -111,12 +105,6 @@ def make_zoh_transitions(mass: Any, damping: Any, stiffness: Any, step_s: float,
     """Makes the zero-order-hold transitions over 0, 1, 2 ... ``steps`` plant steps under a force that is held.
 
     E(i + 1) = E(i) + E(1) + E(1) E(i) for E = e^{A i h} - I, which never subtracts the identity.
-
-    Args:
-        mass: kg, > 0.
-        damping: N s/m.
-        stiffness: N/m.
-        step_s: h, s.
 
     Returns:
         Shape (steps + 1, 6), row i for i steps, columns x_x, x_v, x_force, v_x, v_v, v_force; of a batch of members

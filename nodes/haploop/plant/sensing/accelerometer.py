@@ -36,12 +36,7 @@ class Reading(NamedTuple):
     last_count: Any
 
     def of(self, acceleration: Any, noise: Any) -> tuple[Any, Any]:
-        """Returns (reading in m/s^2, whether the range clipped it).
-
-        Args:
-            acceleration: what the sensor feels, m/s^2.
-            noise: of this tick, m/s^2; not read where there is none.
-        """
+        """Returns (reading in m/s^2, whether the range clipped it) of an acceleration and the noise of this tick."""
         bias, has_noise, most, resolution, last_count = self
         value = acceleration if bias is None else acceleration + bias
         if has_noise is not None:
@@ -66,12 +61,6 @@ class Accelerometer:
     D sqrt(pi / 2 B), and it is correlated from tick to tick; without a bandwidth the sensor passes what the tick rate
     can tell, D sqrt(rate / 2), and it is white.
 
-    Args:
-        table: the resolved ``[accelerometer]`` table, or a stacked one of a batch.
-        seed: the scene's, or an array of shape (members,).
-        time: the integers of the run.
-        members: of a batch; None for one run.
-
     Attributes:
         parameters: of the reading.
         draw: returns the next standard normal number of the noise, or a row of them; None without noise.
@@ -84,10 +73,9 @@ class Accelerometer:
         self._read, self._noise = 0, None
         noise = _noise(table, time) if np.any(table.noise_density) else None
         self.draw = make_normal(seed, "accelerometer") if noise else None
-        most, resolution = table.range, table.resolution
-        last_count = (
-            each(_last_count, resolution, math.inf if most is None else most) if resolution is not None else None
-        )
+        most, resolution, last_count = table.range, table.resolution, None
+        if resolution is not None:
+            last_count = each(_last_count, resolution, math.inf if most is None else most)
         bias = table.bias if np.any(table.bias) else None
         self.parameters = Reading(bias, noise, most, resolution, last_count)
         self._clipped = make_counter(members)

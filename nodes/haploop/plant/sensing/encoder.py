@@ -15,11 +15,7 @@ ROUNDINGS = {"nearest": rint, "floor": floor}
 
 
 def make_encoder(table: Encoder | None) -> Callable[[Any], Any]:
-    """Makes the function from true to measured position: q rint(x / q) or q floor(x / q); without a table x itself.
-
-    Args:
-        table: the resolved ``[encoder]`` table: resolution q in m, rounding; in a batch q may be of shape (members,).
-    """
+    """Makes the function from true to measured position: q rint(x / q) or q floor(x / q); without a table x itself."""
     if table is None:
         return lambda x: x
     resolution, whole = table.resolution, ROUNDINGS[table.rounding]
@@ -30,7 +26,7 @@ class PositionSensor:
     """Measured position of the device, as the encoder rounds it.
 
     Attributes:
-        encoder: the resolved ``[encoder]`` table, or None.
+        encoder: the ``[encoder]`` table, or None.
         reading: returns the measured position of x in m at the next tick; to be called at every tick from tick 0 on.
         state: none, for a sensor without noise.
     """

@@ -35,12 +35,7 @@ class Noise(NamedTuple):
     fresh: Any = None
 
     def after(self, before: Any, draw: Any) -> Any:
-        """Returns the noise at a tick, in the unit of ``deviation``.
-
-        Args:
-            before: the noise at the tick before; None at tick 0.
-            draw: a standard normal number xi, or an array of shape (members,).
-        """
+        """Returns the noise at a tick after that of the tick before (None at tick 0), from a standard normal number."""
         if before is None or self.keep is None:
             return self.deviation * draw
         return self.keep * before + self.fresh * draw
@@ -55,12 +50,6 @@ def make_noise(deviation: Any, cutoff_Hz: Any, period_s: float) -> Noise:
 
 class NoisyPositionSensor(PositionSensor):
     """Measured position of the device plus band-limited noise, as the encoder rounds it; stationary from tick 0 on.
-
-    Args:
-        encoder: the resolved ``[encoder]`` table, or None.
-        table: the resolved ``[noise]`` table: deviation in m, cutoff in Hz.
-        seed: the scene's; in a batch a number for all members or an array of shape (members,).
-        period_s: one tick.
 
     Attributes:
         noise: its parameters.
@@ -92,12 +81,10 @@ class NoisyPositionSensor(PositionSensor):
         self._measured, self._last = measured, noise
 
     def restore(self, state: Any) -> None:
-        """Goes on from a state."""
         self._measured, self._last = state
         self.draw = make_normal(self._seed, "noise", self._measured)
 
     def select(self, kept: np.ndarray) -> None:
-        """Drops the members of a batch that are not kept, shape (members,)."""
         self.encoder, self.noise, self._last, self._seed = tree_select(
             (self.encoder, self.noise, self._last, self._seed), kept
         )
