@@ -144,8 +144,9 @@ class OneMassMotion:
         """Returns the record from interval ``tick`` on, and starts a new one: every plant step and the present state.
 
         Returns:
-            x, v, x_low (x_comp), force and command; of these x and command with ``positions_only``. Shape (steps + 1,); in a batch (steps + 1, members), but for ``command``, which all members share,
-            and beside them ``held_N``, the force of every hold, shape (holds, members).
+            x, v, x_low (x_comp), force and command, of these x and command with ``positions_only``; shape (steps + 1,)
+            each. In a batch (steps + 1, members), but for ``command``, which all members share, and beside them
+            ``held_N``, the force of every hold, shape (holds, members).
         """
         noted, self._noted = self._noted, []
         held, response, tail = self.held, self.response, np.shape(self._state[0])
