@@ -22,7 +22,7 @@ def element(kind, **parameters):
     return ElementTable(name=kind, parameters=parameters)
 
 
-def made_up(ticks=100, elements=(), wall=WALL, books=None):
+def made_up(ticks=100, elements=(), wall: Wall | None = WALL, books=None):
     """A history of some ticks of made-up numbers."""
     history = History(TIME, 0)
     row, steps = np.arange(float(ticks)), np.arange(ticks * 10 + 1.0)
@@ -103,14 +103,14 @@ def test_a_swap_and_a_set_change_what_is_at_work_from_their_tick_on_and_a_refuse
         (6, {"pause": True}),
         (8, {"swap": {"kind": "none"}, "element": 0}),
     ]
-    found = [(span.from_tick, *AtWork.of_scene(span.scene)) for span in spans(scene, changes_of(events))]
-    assert [(tick, [one.name for one in elements], wall.stiffness) for tick, elements, wall in found] == [
+    found = [(span.from_tick, AtWork.of_scene(span.scene)) for span in spans(scene, changes_of(events))]
+    assert [(tick, [one.name for one in now.elements], now.wall and now.wall.stiffness) for tick, now in found] == [
         (0, ["damping"], 5.0),
         (3, ["damping"], 7.0),
         (5, ["damping", "inertia"], 7.0),
         (8, ["inertia"], 7.0),
     ]
-    assert found[1][1][0] == ElementTable(name="damping", acts="always", parameters={"damping": 2.0})
+    assert found[1][1].elements[0] == ElementTable(name="damping", acts="always", parameters={"damping": 2.0})
 
 
 def test_what_telemetry_says_is_at_work_is_what_its_scene_says():

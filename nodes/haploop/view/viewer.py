@@ -7,11 +7,9 @@ import time as wall_clock
 
 from haploop.logger.log import LogError
 from haploop.protocol.clock_client import Aborted, Refused
-from haploop.protocol.wire import Message
-from haploop.view.draw.messages import WAITING, event_lines, state
 from haploop.view.receive.ingest import Backfill
 from haploop.view.receive.run_session import RunSession
-from haploop.view.receive.runs import CommandFailed, Run, Runs
+from haploop.view.receive.runs import Run, Runs
 
 # Updates a second: telemetry is received and shown so often.
 UPDATE_HZ = 31.5
@@ -24,7 +22,7 @@ _LOGGED_S = 0.6
 
 
 class Viewer:
-    """Follows one run after another, and makes the messages that all pages get.
+    """Follows one run after another.
 
     Args:
         runs: where runs are found and asked.
@@ -107,19 +105,10 @@ class Viewer:
             if now >= gone_due:
                 gone_due = now + 1.0
                 if not self._is_live(session.run):
-                    self._end_vanished(session)
+                    session.end_without_launcher()
             due = max(due + 1.0 / UPDATE_HZ, now)
             await asyncio.sleep(due - now)
         self._notify_pages()
-
-    @staticmethod
-    def _end_vanished(session: RunSession) -> None:
-        """Ends the session of a launcher that has gone: in order, its last messages perhaps lost, or killed."""
-        session.poll()
-        if not session.outcome:
-            session.end("ended", "")
-            if session.summary is None:
-                session.end("failed", f"The launcher of run {session.run.id} has ended without a word.")
 
     async def _complete(self, session: RunSession) -> None:
         """Reads what is there only when a run is over: its summary, and from its log whatever was not received."""
@@ -147,41 +136,3 @@ class Viewer:
             if over or backfill.reaches(session.history):
                 session.prepend(backfill.history)
                 return
-
-    async def command(self, verb: str, arguments: Message) -> str:
-        """Sends a command to the run on show; returns its answer, a sentence.
-
-        Raises:
-            CommandFailed: the run refused it, is over, or there is none.
-        """
-        if self.session is None:
-            raise CommandFailed("No run is live; start one with haploop run SCENE.")
-        if self.session.outcome:
-            raise CommandFailed(f"Run {self.session.run.id} is over; nothing about it can change any more.")
-        return await self.session.clock.command(verb, arguments)
-
-    def state(self) -> Message:
-        """Returns the state message for pages."""
-        return state(self.session) if self.session else WAITING
-
-    def events(self) -> Message:
-        """Returns the events message for pages."""
-        session = self.session
-        lines = event_lines(session.events, session.time.control_rate, session.clock.options) if session else []
-        return {"type": "events", "events": lines}
-
-    @property
-    def state_version(self) -> tuple[object, ...]:
-        """Returns a tuple that differs whenever the state has changed."""
-        if (session := self.session) is None:
-            return (None,)
-        status, at_work = session.clock.status, session.history.at_work
-        of_clock = status.get("paused"), status.get("pace")
-        return (session, session.outcome, session.summary is None, of_clock, at_work, session.delay_s)
-
-    @property
-    def events_version(self) -> tuple[object, ...]:
-        """Returns a tuple that differs whenever there are new events."""
-        if (session := self.session) is None:
-            return (None,)
-        return (session, len(session.events), session.clock.options is None)

@@ -18,11 +18,7 @@ from haploop.view.receive.run_session import RunSession
 _MOST_EVENTS = 1000
 WAITING = {"type": "state", "phase": "waiting", "why": "", "run": None, "options": None, "summary": None, "nodes": []}
 # Entries of the summary, of its window and of its energy; the logger's status has them side by side.
-_JUDGED = (
-    ("verdict", "verdict_rule"),
-    ("oscillation_m", "displayed_stiffness_N_m"),
-    ("residual_J", "moved_J"),
-)
+_JUDGED = ("verdict", "verdict_rule"), ("oscillation_m", "displayed_stiffness_N_m"), ("residual_J", "moved_J")
 
 
 class Column(NamedTuple):

@@ -32,7 +32,11 @@ def ingest(history: History, frames: Sequence[tuple[str, Frame]]) -> Message:
     status: Message = {}
     for role, frame in frames:
         if frame.name == "STATE":
-            status = _note_state(history, role, *frame.fields) or status
+            tick, now = frame.fields
+            {"plant": history.steps, "controller": history.ticks, "logger": history.energy}[role].begin(tick)
+            if role == "controller" and now["history"]:  # all there is of a run that stands still
+                history.at_work = AtWork.of_block(now["history"][-1])
+            status = now if role == "logger" and now else status
         elif frame.name.endswith("_BLOCK"):
             blocks.setdefault(frame.name, []).append(block := frame.as_dict())
             status = block.get("status") or status
@@ -43,15 +47,6 @@ def ingest(history: History, frames: Sequence[tuple[str, Frame]]) -> Message:
         if (role, frame.name) == ("plant", "END"):
             history.end(frame.fields[0])
     return status
-
-
-def _note_state(history: History, role: str, tick: int, state: Message) -> Message:
-    """Notes where a stream begins and what is at work, all there is of a run that stands still; returns the status."""
-    series = {"plant": history.steps, "controller": history.ticks, "logger": history.energy}[role]
-    series.begin(tick)
-    if role == "controller" and state["history"]:
-        history.at_work = AtWork.of_block(state["history"][-1])
-    return state if role == "logger" else {}
 
 
 def _contiguous(blocks: Iterable[Block]) -> list[list[Block]]:

@@ -40,7 +40,6 @@ class RunSession:
         delay_s: the round-trip delay at present.
         outcome: "" while the run goes on, then "ended" or "failed"; ``why`` is a sentence, if there is one.
         summary: of the run, once it is there.
-        skipped_ticks: how many never came.
 
     Raises:
         Refused, Aborted: the run did not let this viewer in.
@@ -66,7 +65,6 @@ class RunSession:
         self.delay_s = self.scene.clock.round_trip_delay
         self.outcome = self.why = ""
         self.summary: Summary | None = None
-        self.skipped_ticks = 0
         self._seen: deque[tuple[float, int]] = deque()
 
     def poll(self) -> None:
@@ -82,24 +80,24 @@ class RunSession:
         self._note_events()
         if self.history.at_work == AtWork():
             self.history.at_work = AtWork.of_scene(at_work(self.scene, changes_of(self.events)))
-        self.skipped_ticks = sum(self._observer.skipped.values())
-        self._count_time()
-        if "logger" in self._observer.ended:
-            self.end("ended", "")
-
-    def _count_time(self) -> None:
-        """Notes wall time and tick, for the real-time factor."""
         now = wall_clock.monotonic()
         if self.history.first_tick is not None:
             self._seen.append((now, self.history.end_tick))
         while self._seen and now - self._seen[0][0] > _FACTOR_S:
             self._seen.popleft()
+        if "logger" in self._observer.ended:
+            self.end("ended", "")
 
     def _note_events(self) -> None:
         events = self._observer.take_events()
         self.events += events
         for _, event in events:
             self.delay_s = event.get("set", {}).get(DELAY, self.delay_s)
+
+    @property
+    def skipped_ticks(self) -> int:
+        """Returns how many never came."""
+        return sum(self._observer.skipped.values())
 
     @property
     def real_time_factor(self) -> float | None:
@@ -116,6 +114,14 @@ class RunSession:
         self.outcome, self.why = how, why
         self.read_summary()
 
+    def end_without_launcher(self) -> None:
+        """Ends the session where the launcher has gone: in order, its last messages perhaps lost, or killed."""
+        self.poll()
+        if not self.outcome:
+            self.end("ended", "")
+            if self.summary is None:
+                self.end("failed", f"The launcher of run {self.run.id} has ended without a word.")
+
     def close(self) -> None:
         """Leaves the run, which may go on, and closes its sockets."""
         with contextlib.suppress(zmq.ZMQError):  # closed already, where the clock did not let this viewer in again
@@ -128,6 +134,12 @@ class RunSession:
             self.summary = summary = json.loads((self.out / "summary.json").read_text(encoding="utf-8"))
             self.outcome = "failed" if summary.get("ended") == "failed" else self.outcome
             self.why = self.why or summary.get("why", "")
+
+    @property
+    def version(self) -> tuple[object, ...]:
+        """Returns a tuple that differs whenever something but the tick has changed."""
+        status, at_work = self.clock.status, self.history.at_work
+        return self.outcome, self.summary is None, status.get("paused"), status.get("pace"), at_work, self.delay_s
 
     @property
     def is_complete(self) -> bool:

@@ -7,12 +7,7 @@ from pathlib import Path
 
 _OWN = Path(__file__).with_name("static")
 _OF_UPLOT = ("uPlot.iife.js", "uPlot.min.css")
-TYPES = {
-    ".html": "text/html",
-    ".css": "text/css",
-    ".js": "text/javascript",
-    ".svg": "image/svg+xml",
-}
+TYPES = {".html": "text/html", ".css": "text/css", ".js": "text/javascript", ".svg": "image/svg+xml"}
 
 
 class MissingExtra(RuntimeError):

@@ -19,27 +19,18 @@ class Guard:
 
     Attributes:
         token: what every command must carry.
+        address: of the page.
+        link: the address with the token in its fragment, which no browser sends to any server.
+        one_time_link: one that leads to ``link`` once: all users can see the command line that starts a browser.
     """
 
     def __init__(self, port: int) -> None:
         self._hosts = [f"{name}:{port}" for name in _NAMES]
         self.token = secrets.token_urlsafe(24)
         self._key: str | None = secrets.token_urlsafe(24)
-
-    @property
-    def address(self) -> str:
-        """Returns the address of the page."""
-        return f"http://{self._hosts[0]}/"
-
-    @property
-    def link(self) -> str:
-        """Returns the address with the token in its fragment, which no browser sends to any server."""
-        return f"{self.address}#token={self.token}"
-
-    @property
-    def one_time_link(self) -> str:
-        """Returns a link that leads to ``link`` once: all users can see the command line that starts a browser."""
-        return f"{self.address}enter/{self._key}"
+        self.address = f"http://{self._hosts[0]}/"
+        self.link = f"{self.address}#token={self.token}"
+        self.one_time_link = f"{self.address}enter/{self._key}"
 
     def redeem(self, key: str) -> bool:
         """Tells whether this is the key of the one-time link, and uses it up."""

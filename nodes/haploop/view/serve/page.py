@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from aiohttp import WSCloseCode, WSMsgType, web
 
 from haploop.protocol.wire import Message
+from haploop.view.draw.messages import WAITING, event_lines, state
 from haploop.view.draw.snapshot import Viewport, snapshot
 from haploop.view.receive.runs import CommandFailed
 from haploop.view.serve.guard import Guard
@@ -34,7 +35,9 @@ class Page:
         self._socket, self._viewer, self._guard = socket, viewer, guard
         self._viewport = Viewport()
         self._state_due = 0.0
-        self._sent_state = self._sent_events = self._sent_snapshot = ()
+        self._sent_state: tuple[object, ...] | None = ()
+        self._sent_events: tuple[object, ...] | None = ()
+        self._sent_snapshot: tuple[object, ...] = ()
 
     async def run(self) -> None:
         """Serves the page until it closes, or sends an invalid message."""
@@ -69,7 +72,12 @@ class Page:
             raise CommandFailed("This page only watches: open the link that haploop view printed to steer.")
         if command.verb not in _VERBS:
             raise CommandFailed(f"{command.verb[:40]!r} is no command; these are: {', '.join(_VERBS)}.")
-        return await self._viewer.command(command.verb, command.arguments)
+        session = self._viewer.session
+        if session is None:
+            raise CommandFailed("No run is live; start one with haploop run SCENE.")
+        if session.outcome:
+            raise CommandFailed(f"Run {session.run.id} is over; nothing about it can change any more.")
+        return await session.clock.command(command.verb, command.arguments)
 
     async def _send_updates(self) -> None:
         """Sends what is new after every update; a page that does not read blocks this task alone."""
@@ -85,13 +93,16 @@ class Page:
 
     async def _send_news(self) -> None:
         """Sends state and events when they have changed, the state anyway every 0.4 s."""
-        now, viewer = wall_clock.monotonic(), self._viewer
-        if (version := viewer.events_version) != self._sent_events:
-            self._sent_events = version
-            await self._send(viewer.events())
-        if (version := viewer.state_version) != self._sent_state or now >= self._state_due:
+        now, session = wall_clock.monotonic(), self._viewer.session
+        known = session and (session, len(session.events), session.clock.options is None)
+        if known != self._sent_events:
+            self._sent_events = known
+            lines = event_lines(session.events, session.time.control_rate, session.clock.options) if session else []
+            await self._send({"type": "events", "events": lines})
+        version = session and (session, session.version)
+        if version != self._sent_state or now >= self._state_due:
             self._sent_state, self._state_due = version, now + _STATE_S
-            await self._send(viewer.state())
+            await self._send(state(session) if session else WAITING)
 
     async def _send_snapshot(self) -> None:
         if (session := self._viewer.session) is None:

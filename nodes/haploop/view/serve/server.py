@@ -10,7 +10,7 @@ import weakref
 from collections.abc import Callable
 
 from aiohttp import WSCloseCode, hdrs, web
-from aiohttp.typedefs import Handler, Middleware
+from aiohttp.typedefs import Handler
 
 from haploop.view.receive.runs import Runs
 from haploop.view.serve.assets import TYPES, assets
@@ -24,7 +24,7 @@ _LARGEST_MESSAGE = 64 * 1024
 _HEARTBEAT_S = 20.0
 # How long pages that have been told to close, and requests under way, are waited for at the end.
 _GOODBYE_S = 1.0
-# So much may wait in the system for a page that is slow; then it gets fewer pictures.
+# So much may wait in the system for a page that is slow; then it gets fewer pictures, but none that are old.
 _WAITING_BYTES = 256 * 1024
 
 
@@ -59,10 +59,17 @@ def make_app(viewer: Viewer, guard: Guard) -> web.Application:
             writer_limit=1,  # every picture waits until there is room for it
         )
         await page.prepare(request)
-        _shrink_send_buffer(page)
+        if connection := page.get_extra_info("socket"):
+            connection.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _WAITING_BYTES)
         pages.add(page)
         await Page(page, viewer, guard).run()
         return page
+
+    @web.middleware
+    async def only_by_name(request: web.Request, handler: Handler) -> web.StreamResponse:
+        if not guard.is_own_host(request.headers.get(hdrs.HOST)):
+            raise web.HTTPForbidden(text=f"This server answers at {guard.address} alone.")
+        return await handler(request)
 
     async def protect(_: web.Request, response: web.StreamResponse) -> None:
         response.headers.update(guard.headers)
@@ -72,7 +79,7 @@ def make_app(viewer: Viewer, guard: Guard) -> web.Application:
         with contextlib.suppress(TimeoutError):
             await asyncio.wait_for(asyncio.gather(*leaving, return_exceptions=True), _GOODBYE_S)
 
-    app = web.Application(middlewares=[_only_by_name(guard)])
+    app = web.Application(middlewares=[only_by_name])
     app.router.add_get("/", file)
     app.router.add_get("/static/{name}", file)
     app.router.add_get("/enter/{key}", enter)
@@ -80,23 +87,6 @@ def make_app(viewer: Viewer, guard: Guard) -> web.Application:
     app.on_response_prepare.append(protect)
     app.on_shutdown.append(close)
     return app
-
-
-def _only_by_name(guard: Guard) -> Middleware:
-    @web.middleware
-    async def check(request: web.Request, handler: Handler) -> web.StreamResponse:
-        if not guard.is_own_host(request.headers.get(hdrs.HOST)):
-            raise web.HTTPForbidden(text=f"This server answers at {guard.address} alone.")
-        return await handler(request)
-
-    return check
-
-
-def _shrink_send_buffer(page: web.WebSocketResponse) -> None:
-    """Shrinks the send buffer of a page: snapshots that wait in it are old when they arrive."""
-    connection = page.get_extra_info("socket")
-    if connection is not None:
-        connection.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _WAITING_BYTES)
 
 
 class PortTaken(OSError):
@@ -126,24 +116,22 @@ async def serve(
     runs: Runs,
     listening: socket.socket,
     *,
+    on_serving: Callable[[Guard], object],
+    end: asyncio.Event,
     first: str | None = None,
     from_start: bool = True,
-    on_serving: Callable[[Guard], object] = lambda guard: None,
-    end: asyncio.Event | None = None,
 ) -> None:
     """Serves the page until SIGINT, SIGTERM or ``end``.
 
     Args:
         runs: where runs are found and asked.
         listening: from :func:`listen`.
-        first: id of the run to follow first; the newest when None.
-        from_start: whether the page shows what was logged before this viewer joined.
         on_serving: called once the page can be opened.
         end: set from outside to end.
+        first, from_start: of the viewer.
     """
     guard = Guard(listening.getsockname()[1])
     viewer = Viewer(runs, first, from_start)
-    end = end or asyncio.Event()
     loop = asyncio.get_running_loop()
     for number in (signal.SIGINT, signal.SIGTERM):
         with contextlib.suppress(NotImplementedError, RuntimeError, ValueError):  # not in the main thread

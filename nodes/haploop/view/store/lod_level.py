@@ -35,22 +35,20 @@ class Ring:
     There is room for twice as many: when it is full, the newest half moves to the front, so that what is asked for is
     always one piece of memory and a value is moved once at most, on average.
 
-    Args:
-        capacity: values of each column that are surely held.
-        columns: how many columns there are at first.
-
     Attributes:
+        capacity: values of each column that are surely held.
         start, end: numbers of the first value held and of the one after the last; the first ever appended has number 0.
+        nbytes: memory of the buffer.
     """
 
     def __init__(self, capacity: int, columns: int) -> None:
+        """Makes an empty one with so many columns at first."""
         self._values = np.full((columns, 2 * capacity), np.nan)
         self.capacity = capacity
         self.start = self.end = 0
 
     @property
     def nbytes(self) -> int:
-        """Returns the memory of the buffer in bytes."""
         return self._values.nbytes
 
     def append(self, values: np.ndarray) -> None:
@@ -79,11 +77,10 @@ class Ring:
 
 @dataclass
 class LodLevel:
-    """A ring buffer with its scale: ``values`` values of each column per ``ticks`` ticks.
+    """A ring buffer with its scale: ``values`` values of each column per ``ticks`` ticks, from the series' origin on.
 
     Attributes:
-        ring: the values.
-        ticks, values: ticks of a bucket, counted from the origin of the series, and values of each column for them.
+        start, end: the first tick that is held in whole, and the one after the last.
     """
 
     ring: Ring
@@ -92,12 +89,10 @@ class LodLevel:
 
     @property
     def start(self) -> int:
-        """Returns the first tick that is held in whole."""
         return -(-self.ring.start // self.values) * self.ticks
 
     @property
     def end(self) -> int:
-        """Returns the tick after the last one that is held in whole."""
         return self.ring.end // self.values * self.ticks
 
     def between(self, from_tick: int, to_tick: int) -> np.ndarray:

@@ -23,18 +23,17 @@ MOST_COLUMNS = 48
 class LodSeries:
     """Keeps rows of named columns, a whole number of them a tick, from tick ``origin`` on.
 
-    Level 0 holds the newest rows. Every other level holds the least and the greatest of buckets of some ticks, twice as
-    many as on the level before it; before a level would forget its oldest buckets there is a next one, so that some
-    level always reaches back to the origin.
-    Memory grows with the logarithm of the run's length alone.
-
-    Args:
-        rows_per_tick: rows of one tick.
-        recent_ticks: ticks that are held in full, at least.
-        origin: the first tick.
+    Level 0 holds the newest rows, of ``recent_ticks`` at least. Every other level holds the least and the greatest of
+    buckets of some ticks, twice as many as on the level before it; before a level would forget its oldest buckets there
+    is a next one, so that some level always reaches back to the origin. So memory grows with the logarithm of the run's
+    length alone.
 
     Attributes:
         first_tick: first tick that is known; None before anything is.
+        end_tick: the tick before which every tick is known, or never will be.
+        full_from_tick: the tick from which on rows are held in full.
+        names: the columns, in the order of their first rows.
+        nbytes: memory of all levels.
     """
 
     def __init__(self, rows_per_tick: int, recent_ticks: int, origin: int) -> None:
@@ -48,22 +47,18 @@ class LodSeries:
 
     @property
     def names(self) -> list[str]:
-        """Returns the columns, in the order of their first rows."""
         return list(self._columns)
 
     @property
     def nbytes(self) -> int:
-        """Returns the memory of all levels in bytes."""
         return sum(level.ring.nbytes for level in self._levels)
 
     @property
     def end_tick(self) -> int:
-        """Returns the tick before which every tick is known, or never will be."""
         return self.origin + self._levels[0].end
 
     @property
     def full_from_tick(self) -> int:
-        """Returns the tick from which on rows are held in full."""
         return self.origin + self._levels[0].start
 
     def _add_level(self) -> None:
@@ -77,33 +72,25 @@ class LodSeries:
             self.first_tick = max(tick, self.origin)
 
     def append(self, tick: int, columns: Mapping[str, np.ndarray]) -> None:
-        """Appends the rows of some ticks from ``tick`` on.
+        """Appends the rows of some ticks from ``tick`` on, name -> array of shape (ticks * rows_per_tick,).
 
         Ticks that are known already are passed over; ticks missing in between, and columns without rows here, are NaN.
-
-        Args:
-            tick: first of the ticks.
-            columns: name -> array of shape (ticks * rows_per_tick,).
         """
         rows = len(next(iter(columns.values())))
-        known = max(0, self.end_tick - tick) * self.rows_per_tick
+        known = (self.end_tick - tick) * self.rows_per_tick
         if known >= rows:
             return
         self.begin(tick)
-        self._skip_to(tick)
+        for missing in range(-known, 0, -self._at_once):
+            self._take(np.full((len(self._columns), min(missing, self._at_once)), np.nan))
         for name in columns:
             if name not in self._columns:
                 self._open(name, columns.keys())
+        known = max(0, known)
         values = np.full((len(self._columns), rows - known), np.nan)
         for name in self._columns.keys() & columns.keys():
             values[self._columns[name]] = columns[name][known:]
         self._take(values)
-
-    def _skip_to(self, tick: int) -> None:
-        missing = (tick - self.end_tick) * self.rows_per_tick
-        while missing > 0:
-            self._take(np.full((len(self._columns), min(missing, self._at_once)), np.nan))
-            missing -= self._at_once
 
     def _open(self, name: str, present: Collection[str]) -> None:
         """Adds a column; where there are too many, in place of the oldest that is not present any more."""
@@ -161,13 +148,10 @@ class LodSeries:
 
     def bucket_from(self, from_tick: int, bucket_ticks: int) -> int:
         """Returns the ticks of a bucket for :meth:`envelope`: ``bucket_ticks``, or more where the past is coarser."""
-        while not self._reaches_back(self.aligned(from_tick, bucket_ticks), bucket_ticks):
-            bucket_ticks *= 2
-        return bucket_ticks
-
-    def _reaches_back(self, tick: int, bucket_ticks: int) -> bool:
-        at = tick - self.origin
-        return any(level.ticks <= bucket_ticks and level.start <= at for level in self._levels)
+        fine = (level for level in self._levels if level.ticks <= bucket_ticks)
+        if any(level.start <= self.aligned(from_tick, bucket_ticks) - self.origin for level in fine):
+            return bucket_ticks
+        return self.bucket_from(from_tick, 2 * bucket_ticks)
 
     def aligned(self, tick: int, bucket_ticks: int) -> int:
         """Returns the first tick of the bucket that holds a tick."""
@@ -199,9 +183,8 @@ class LodSeries:
         rest = []
         for level in levels:
             until = min(level.end, end // level.ticks * level.ticks)
-            if until > at:
-                rest.append(level.between(at, until))
-                at = until
+            rest += [level.between(at, until)] if until > at else []
+            at = max(at, until)
         if rest:
             values = np.concatenate(rest, axis=1)
             self._pick(values, names, found[:, filled : filled + 2], values.shape[1])
