@@ -141,13 +141,15 @@ def test_one_scene_or_an_unknown_method_draws_too(cost: Cost, tmp_path: Path) ->
     assert target.read_bytes().startswith(b"\x89PNG")
 
 
-def test_what_cannot_be_drawn_says_why(cost: Cost, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_cannot_be_drawn_says_why(
+    figure: Any, cost: Cost, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     points = [dataclasses.replace(point, us_per_tick=None) for point in cost.scenes[0].points]
     untimed = dataclasses.replace(cost, scenes=[dataclasses.replace(cost.scenes[0], points=points)])
     with pytest.raises(FigureError, match="nothing to draw"):
         figure_of(untimed)
     with pytest.raises(FigureError, match="cannot be written"):
-        write_figure(figure_of(cost), tmp_path / "cost.nonsense")
+        write_figure(figure, tmp_path / "cost.nonsense")
     monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
     with pytest.raises(FigureError, match=r"pip install 'haploop\[plot\]'"):
         figure_of(cost)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import random
 from collections.abc import Callable
+from functools import cached_property
 from pathlib import Path
 from typing import Self
 
@@ -88,8 +89,9 @@ class Measurement:
 
     def other_prices(self, stage: Stage) -> None:
         """Measures the prices of books, log, effects, processes, delay and control rate."""
-        self._prices().measure(stage)
+        self._prices.measure(stage)
 
+    @cached_property
     def _prices(self) -> Prices:
         return Prices(scenes_folder(), self._store, self._repeats)
 
@@ -124,7 +126,7 @@ class Measurement:
             tolerance_m=tolerance_m,
             load=busiest,
             scenes=[made for grid in self._grids if (made := self._scene_cost(grid, tolerance_m))],
-            prices=self._prices().groups(),
+            prices=self._prices.groups(),
         )
 
     def _scene_cost(self, grid: Grid, tolerance_m: float) -> SceneCost | None:
