@@ -22,7 +22,7 @@ _FLUSH_S = 0.4
 class LogSession:
     """Keeps a logger's log flushed and closes everything in order."""
 
-    def __init__(self, logger: Logger, log: Log | MemoryLog | None, out: Path | None) -> None:
+    def __init__(self, logger: Logger, log: Log | None, out: Path | None) -> None:
         self.logger = logger
         self._log, self._out = log, out
         self._flush_due = wall_clock.monotonic() + _FLUSH_S
@@ -73,9 +73,10 @@ def open_session(
         LogError: the log cannot be made.
     """
     detail = scene.run.log
-    log = None if detail == "none" else Log(out / LOG) if out else memory
-    if log is None:
+    file = Log(out / LOG) if out and detail != "none" else None
+    log = file or memory
+    if log is None or detail == "none":
         return LogSession(Logger(scene, time, None), None, out)
     for name, text in attachments.items():
         log.attach(name, "text/plain", text.encode())
-    return LogSession(Logger(scene, time, Channels(log, time, every_step=detail == "steps")), log, out)
+    return LogSession(Logger(scene, time, Channels(log, time, every_step=detail == "steps")), file, out)

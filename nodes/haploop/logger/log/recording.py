@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from haploop.logger.log.table import Floats, pack
+from haploop.protocol.changes import Event
 
 if TYPE_CHECKING:
     import pandas
@@ -57,8 +58,12 @@ class Table(dict[str, Floats]):
         return frame
 
 
+# Rows of a topic: of its columns, or the maps of a topic without columns (``/events``).
+Rows = Table | list[Event]
+
+
 class Recording(dict[str, Any]):
-    """The content of a log by topic: a :class:`Table`, or a list of maps for a topic without columns (``/events``).
+    """The content of a log, rows by topic.
 
     Attributes:
         truncated: whether the file ends before its closing summary, as that of a killed run or of one still going.
@@ -66,7 +71,7 @@ class Recording(dict[str, Any]):
         attachments: content of each attached file by name.
     """
 
-    def __init__(self, topics: dict[str, Any], cut: str, attachments: dict[str, bytes]) -> None:
+    def __init__(self, topics: Mapping[str, Rows], cut: str, attachments: dict[str, bytes]) -> None:
         super().__init__(topics)
         self.truncated = bool(cut)
         self.cut = cut
@@ -76,10 +81,9 @@ class Recording(dict[str, Any]):
         raise KeyError(f"There is no channel {topic} in this log; its channels are {', '.join(self) or 'none'}.")
 
 
-Rows = Table | list[Any]
-
-
-def join(pieces: Sequence[tuple[NDArray[np.uint64], Rows]], units: Mapping[str, str] | None = None) -> tuple[Any, Any]:
+def join(
+    pieces: Sequence[tuple[NDArray[np.uint64], Rows]], units: Mapping[str, str] | None = None
+) -> tuple[NDArray[np.uint64], Rows]:
     """Joins pieces of one topic, rows in the order of log time and, at the same time, of the pieces.
 
     The tables are used up on the way, so that hardly more than one column is held twice.
@@ -96,24 +100,20 @@ def join(pieces: Sequence[tuple[NDArray[np.uint64], Rows]], units: Mapping[str, 
     times_in_order = times if order is None else times[order]
     tables = [rows for _, rows in pieces if isinstance(rows, Table)]
     if not tables and not units:
-        maps = [one for _, rows in pieces for one in rows]
+        maps = [one for _, rows in pieces if isinstance(rows, list) for one in rows]
         return times_in_order, maps if order is None else [maps[row] for row in order]
     if units is None:
         units = reduce(merge_columns, [table.units for table in tables])
-    columns = _joined_columns(tables, [len(times) for times, _ in pieces], units, order)
-    return times_in_order, Table(columns, units)
 
-
-def _joined_columns(
-    tables: Sequence[Table], rows: Sequence[int], units: Mapping[str, str], order: NDArray[Any] | None
-) -> Iterable[tuple[str, Floats]]:
-    for name in units:
+    def column(name: str) -> Floats:
         parts = [
-            table.pop(name) if name in table else np.full(count, np.nan)
-            for table, count in zip(tables, rows, strict=True)
+            table.pop(name) if name in table else np.full(len(times), np.nan)
+            for table, (times, _) in zip(tables, pieces, strict=True)
         ]
-        column = parts[0] if len(parts) == 1 else np.concatenate([*parts, np.empty(0)])
-        yield name, column if order is None else column[order]
+        whole = parts[0] if len(parts) == 1 else np.concatenate([*parts, np.empty(0)])
+        return whole if order is None else whole[order]
+
+    return times_in_order, Table(((name, column(name)) for name in units), units)
 
 
 def merge_columns(known: Mapping[str, str], new: Mapping[str, str]) -> dict[str, str]:
@@ -157,7 +157,7 @@ class MemoryLog:
         columns = ((name, np.ascontiguousarray(rows[:, number])) for number, name in enumerate(units))
         self._pieces[topic].append((times, Table(columns, units)))
 
-    def message(self, channel: int, log_time_ns: int, obj: dict[str, Any]) -> None:
+    def message(self, channel: int, log_time_ns: int, obj: Event) -> None:
         """Adds one map, as it would come back from a file."""
         topic, _ = self._channels[channel]
         self._pieces[topic].append((np.array([log_time_ns], np.uint64), [msgpack.unpackb(pack(obj))]))
@@ -165,12 +165,6 @@ class MemoryLog:
     def attach(self, name: str, media_type: str, data: bytes) -> None:
         """Keeps a whole file, of any ``media_type``."""
         self._attachments[name] = data
-
-    def flush(self) -> None:
-        """Does nothing: everything can be read already."""
-
-    def close(self) -> None:
-        """Does nothing: there is no file."""
 
     def recording(self) -> Recording:
         """Returns all that was written, once: the log is empty afterwards."""

@@ -11,7 +11,7 @@ import struct
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from io import BytesIO
-from typing import IO, Any
+from typing import IO
 
 import msgpack
 import numpy as np
@@ -22,8 +22,8 @@ from mcap.stream_reader import get_chunk_data_stream
 from numpy.typing import NDArray
 
 from haploop.logger.log import LogError
-from haploop.logger.log.recording import Table
-from haploop.logger.log.table import Floats, TableLayout, rows_of
+from haploop.logger.log.recording import Rows, Table
+from haploop.logger.log.table import TableLayout
 
 _PREFIX = struct.Struct("<BQ")
 _MESSAGE = struct.Struct("<HIQQ")
@@ -111,36 +111,25 @@ class LogChannel:
     topic: str
     layout: TableLayout
 
-    def decode(
-        self, runs: Sequence[MessageRun], names: Collection[str] | None
-    ) -> tuple[NDArray[np.uint64], Table | list[Any]]:
+    def decode(self, runs: Sequence[MessageRun], names: Collection[str] | None) -> tuple[NDArray[np.uint64], Rows]:
         """Returns log time of every row in ns, shape (rows,), and the rows: columns ``names`` (None: all), or the maps.
 
         Raises:
             LogError: the messages are not what the schema of the channel says.
         """
-        try:
-            return self._decode(runs, names)
-        except (ValueError, TypeError, AttributeError) as error:
-            raise LogError(f"A message on {self.topic} is no msgpack map of its schema's numbers: {error}.") from error
-
-    def _decode(
-        self, runs: Sequence[MessageRun], names: Collection[str] | None
-    ) -> tuple[NDArray[np.uint64], Table | list[Any]]:
         log_times_ns = np.concatenate([run.log_times_ns for run in runs])
         units = self.layout.columns
-        if not units:
-            return log_times_ns, [msgpack.unpackb(payload) for run in runs for payload in run]
-        rows_each, columns = self._columns(runs)
+        try:
+            if not units:
+                return log_times_ns, [msgpack.unpackb(payload) for run in runs for payload in run]
+            rows_each, columns = self.layout.samples or 1, self.layout.read(b"".join([run.payloads for run in runs]))
+            if columns is None:  # other programs may order or encode the same numbers otherwise
+                messages = [msgpack.unpackb(payload) for run in runs for payload in run]
+                maps = [message if isinstance(message, list) else [message] for message in messages]
+                rows = [[float(one.get(name, "nan")) for name in units] for of_message in maps for one in of_message]
+                rows_each = [len(of_message) for of_message in maps]
+                columns = list(np.array(rows, np.float64).reshape(-1, len(units)).T)
+        except (ValueError, TypeError, AttributeError) as error:
+            raise LogError(f"A message on {self.topic} is no msgpack map of its schema's numbers: {error}.") from error
         kept = ((name, column) for name, column in zip(units, columns, strict=True) if names is None or name in names)
         return np.repeat(log_times_ns, rows_each), Table(kept, units)
-
-    def _columns(self, runs: Sequence[MessageRun]) -> tuple[int | list[int], Sequence[Floats]]:
-        """Returns the rows in each message, and all columns."""
-        columns = self.layout.read(b"".join([run.payloads for run in runs]))
-        if columns is not None:
-            return self.layout.samples or 1, columns
-        # Other programs may order or encode the same numbers otherwise.
-        rows = [rows_of(msgpack.unpackb(payload), self.layout.columns) for run in runs for payload in run]
-        flat = np.array([row for of_message in rows for row in of_message], np.float64)
-        return [len(of_message) for of_message in rows], list(flat.reshape(-1, len(self.layout.columns)).T)

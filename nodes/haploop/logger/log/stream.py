@@ -6,7 +6,7 @@ import struct
 from collections.abc import Collection, Iterator
 from io import BytesIO
 from pathlib import Path
-from typing import IO, Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from mcap.data_stream import ReadDataStream
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from haploop.logger.log import LogError
 from haploop.logger.log.mcap_file import MAGIC
-from haploop.logger.log.recording import Recording, Table, join, merge_columns
+from haploop.logger.log.recording import Recording, Rows, join, merge_columns
 from haploop.logger.log.records import LogChannel, MessageRun, chunk_body, lone_message, parts, records
 from haploop.logger.log.table import TableLayout
 
@@ -35,7 +35,7 @@ class Batch(NamedTuple):
 
     topic: str
     log_times_ns: NDArray[np.uint64]
-    rows: Table | list[Any]
+    rows: Rows
 
 
 class LogStream:
@@ -119,19 +119,14 @@ class LogStream:
                     if self.until is not None and file.tell() > self.until:
                         return
                     batches = self._take(opcode, content)
-                    if opcode == Opcode.FOOTER and not self._close(file):
-                        return
+                    if opcode == Opcode.FOOTER:
+                        if file.read(len(MAGIC)) != MAGIC:
+                            return
+                        self._open_end = ""
                     self.read_bytes = file.tell()
                     yield from batches
             except _DAMAGE as damage:
                 self._open_end = f"what follows is damaged: {damage or type(damage).__name__}"
-
-    def _close(self, file: IO[bytes]) -> bool:
-        """Tells whether the file ends as it should after its footer."""
-        if file.read(len(MAGIC)) != MAGIC:
-            return False
-        self._open_end = ""
-        return True
 
     def _take(self, opcode: int, content: bytes) -> list[Batch]:
         """Returns the batches in one record of the file; indexes and the summary are passed over."""
@@ -156,11 +151,10 @@ class LogStream:
                 raise ValueError(f"a message of channel {part.channel} came before the channel")
             elif self.chosen(topic := self._channels[part.channel].topic):
                 found.setdefault(topic, {}).setdefault(part.channel, []).append(part)
-        return [self._batch(topic, runs) for topic, runs in found.items()]
-
-    def _batch(self, topic: str, runs: dict[int, list[MessageRun]]) -> Batch:
-        pieces = [self._channels[number].decode(of_channel, self._columns) for number, of_channel in runs.items()]
-        return Batch(topic, *join(pieces))
+        return [
+            Batch(topic, *join([self._channels[number].decode(some, self._columns) for number, some in runs.items()]))
+            for topic, runs in found.items()
+        ]
 
     def _register(self, opcode: int, content: bytes) -> None:
         if opcode == Opcode.SCHEMA:

@@ -8,7 +8,7 @@ message serves as the template, and the numbers are written into (and read from)
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from typing import Any, cast
 
 import msgpack
@@ -99,12 +99,10 @@ class TableLayout:
     def json_schema(self, title: str) -> bytes:
         """Returns the JSON Schema of a message: each column a number with its ``unit``, or any map without columns."""
         numbers = {name: {"type": "number", "unit": unit} for name, unit in self.columns.items()}
-        schema: dict[str, Any] = {"type": "object"}
-        if numbers:
-            schema |= {"properties": numbers, "required": list(numbers)}
-        if self.samples is not None:
-            schema = {"type": "array", "items": schema, "minItems": self.samples, "maxItems": self.samples}
-        return json.dumps({"title": title, **schema}, ensure_ascii=False).encode()
+        one_map = {"type": "object", **({"properties": numbers, "required": list(numbers)} if numbers else {})}
+        maps = {"type": "array", "items": one_map, "minItems": self.samples, "maxItems": self.samples}
+        schema = {"title": title, **(one_map if self.samples is None else maps)}
+        return json.dumps(schema, ensure_ascii=False).encode()
 
     @classmethod
     def from_json_schema(cls, schema: bytes) -> TableLayout:
@@ -116,10 +114,3 @@ class TableLayout:
             return cls({name: str(kind.get("unit", "")) for name, kind in numbers.items()}, samples)
         except (ValueError, TypeError, AttributeError, KeyError):
             return cls({})
-
-
-def rows_of(message: Any, columns: Iterable[str]) -> list[list[float]]:
-    """Returns the numbers of a message (a map, or an array of maps), a row a map; NaN where a column is absent."""
-    names = list(columns)
-    maps = message if isinstance(message, list) else [message]
-    return [[float(one.get(name, "nan")) for name in names] for one in maps]

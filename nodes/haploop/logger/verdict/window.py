@@ -51,13 +51,6 @@ class WindowState(NamedTuple):
 class Window:
     """Keeps what the last ``WINDOW_S`` seconds (or the second half of a shorter run) need to be judged.
 
-    Args:
-        time: the integers of the run, or those all members of a batch share.
-        resolution_m: encoder step, 0 without one; swings within one step either way do not count. A number, or shape
-            (members,).
-        members: of the batch; 1 for one run.
-        spare_ticks: ticks to be kept beyond the window.
-
     Attributes:
         kept_ticks: the most ticks that a window takes.
         swing_m: what does not count as a swing, shape (members,).
@@ -67,6 +60,10 @@ class Window:
     def __init__(
         self, time: Timebase, resolution_m: float | np.ndarray, members: int = 1, *, spare_ticks: int = 0
     ) -> None:
+        """Makes the window of one run or of the members of a batch, with room for some ticks beyond it.
+
+        Swings within an encoder step ``resolution_m`` (a number or shape (members,), 0 without) do not count.
+        """
         self._time, n = time, time.steps_per_tick
         self.kept_ticks = min(keep_steps(time.plant_rate) // n + 2, time.ticks + 1)
         kept_ticks = self.kept_ticks + spare_ticks
