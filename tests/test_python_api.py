@@ -12,8 +12,8 @@ import pytest
 
 from haploop.controller.dissipation import Element, ElementError, Motion, PluginError, Quantity, where
 from haploop.launch import Scene, load, run
-from haploop.launch.output import OutputError
 from haploop.launch.scene.mistakes import SceneError
+from haploop.launch.spec import OutputError
 from haploop.logger import read
 from haploop.logger.log.recording import Recording
 

@@ -6,7 +6,7 @@ import pytest
 
 from haploop.launch.clock.clock import ClockError
 from haploop.launch.clock.commands import capabilities
-from haploop.launch.processes.control import CommandRefused
+from haploop.launch.processes.run_directory import CommandRefused
 from haploop.launch.runs.replay import replay
 from haploop.logger import read
 from haploop.protocol.scene.scene import Wall

@@ -9,7 +9,7 @@ import pytest
 import zmq
 
 from haploop.launch.processes import run_directory
-from haploop.launch.processes.control import ask
+from haploop.launch.processes.run_directory import ask
 from haploop.launch.runs.start import prepare, run
 from haploop.protocol.sockets import open_socket
 from haploop.protocol.transport import SecureContext, Transport, TransportError

@@ -7,7 +7,7 @@ import signal
 import pytest
 
 from haploop.controller.dissipation import registry
-from haploop.launch.processes import control
+from haploop.launch.processes import run_directory
 from haploop.launch.runs.in_process import run_in_process
 from haploop.launch.runs.replay import replay
 from haploop.launch.scene.file import load
@@ -106,7 +106,7 @@ def test_what_cannot_be_done_is_refused_with_the_reason_and_leaves_the_run_as_it
     run = running()
     run.reaches(200)
     for verb, arguments, reason in REFUSED:
-        with pytest.raises(control.CommandRefused, match=reason):
+        with pytest.raises(run_directory.CommandRefused, match=reason):
             run.ask(verb, **arguments)
     done = run.reaches(run.ask("status")["granted"])
     run.ask("stop")

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import haploop.logger
-from haploop.launch.processes import control
+from haploop.launch.processes import run_directory
 from haploop.launch.runs.replay import replay
 from helpers.live.launched import ROLES, SCENES, command, first_and_slowly, wait_for
 
@@ -194,7 +194,7 @@ def test_a_reload_that_fails_says_why_and_leaves_the_old_element_at_work_until_o
     swap = {"swap": {"kind": "brake", "damping": 0.05, "acts": "always"}, "reload": True}
     for reason, source in BROKEN.items():
         brake(source)
-        with pytest.raises(control.CommandRefused, match=reason):
+        with pytest.raises(run_directory.CommandRefused, match=reason):
             run.ask("swap", **swap)
     swapped = run.stands(at=run.ask("step", ticks=100)["tick"])
     assert swapped == paused + 100

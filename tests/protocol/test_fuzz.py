@@ -159,7 +159,8 @@ def test_the_clock_grants_after_a_turns_worth_of_messages_however_many_wait(
     time = Timebase.from_scene(resolved)
     with tempfile.TemporaryDirectory(prefix="hl", dir="/tmp") as sockets:
         clock = Clock(resolved, time, KINDS)
-        server = ClockServer(context, Path(sockets), "", clock, {}, lambda *_: (True, "", {}), lambda _: False)
+        nobody = "", {}, {}, {}
+        server = ClockServer(context, Path(sockets), "", clock, nobody, lambda *_: (True, "", {}), lambda _: False)
         with attacks.Stranger(context, Path(sockets) / "clock.sock") as stranger:
             for _ in range(900):
                 stranger.socket.send(b"junk")

@@ -10,7 +10,7 @@ From Python::
     result["/plant"]["x"], result["/plant"].units["x"]     # an array, and its unit
     run(scene.swap("damping", at="1.5 s", damping=0.8), out="runs/swapped")
 
-See :func:`haploop.launch.runs.loaded_scene.load`, :class:`haploop.launch.runs.loaded_scene.Scene` and
+See :func:`haploop.launch.runs.loaded_scene.load`, :class:`haploop.launch.runs.loaded_scene.LoadedScene` and
 :func:`haploop.launch.runs.result.run`, which are imported when first used.
 """
 
@@ -20,15 +20,22 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from haploop.launch.runs.loaded_scene import Scene, load
+    from haploop.launch.runs.loaded_scene import LoadedScene as Scene
+    from haploop.launch.runs.loaded_scene import load
     from haploop.launch.runs.result import Result, run
 
 __all__ = ["Result", "Scene", "load", "run"]
 
-_HOMES = {"Scene": "loaded_scene", "load": "loaded_scene", "Result": "result", "run": "result"}
+_HOMES = {
+    "Scene": "loaded_scene.LoadedScene",
+    "load": "loaded_scene.load",
+    "Result": "result.Result",
+    "run": "result.run",
+}
 
 
 def __getattr__(name: str) -> Any:
     if name not in _HOMES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(f"{__name__}.runs.{_HOMES[name]}"), name)
+    module, _, attribute = _HOMES[name].partition(".")
+    return getattr(import_module(f"{__name__}.runs.{module}"), attribute)

@@ -43,7 +43,7 @@ class Change:
     refused: str | None = None
 
     @classmethod
-    def from_dict(cls, tick: int, event: Mapping[str, Any]) -> Change:
+    def from_dict(cls, tick: int, event: Event) -> Change:
         """Reads an event that is a change."""
         return cls(
             tick,
@@ -117,7 +117,7 @@ class Span:
     scene: Scene
 
 
-def is_change(event: Mapping[str, Any]) -> bool:
+def is_change(event: Event) -> bool:
     """Returns whether an event changes what is simulated."""
     return "swap" in event or "set" in event
 
@@ -134,7 +134,7 @@ def refusals_as_status(refused: Iterable[Change]) -> Event | None:
     return {key: [event[name] for event in events] for key, name in named.items()} if events else None
 
 
-def refusals_of(status: Mapping[str, Any]) -> list[Event]:
+def refusals_of(status: Event) -> list[Event]:
     """Returns the events that put on record what a PROGRESS reported, which need not tell the changes themselves."""
     changes = status.get("refused_changes", [])
     return [
@@ -143,7 +143,7 @@ def refusals_of(status: Mapping[str, Any]) -> list[Event]:
     ]
 
 
-def changes_of(events: Iterable[tuple[int, Mapping[str, Any]]]) -> list[Change]:
+def changes_of(events: Iterable[tuple[int, Event]]) -> list[Change]:
     """Returns the changes among (tick, event) in order, with ``refused`` where a later event refuses one."""
     events = list(events)
     refusals = [event for _, event in events if "refused" in event]
@@ -165,7 +165,7 @@ def at_work(scene: Scene, changes: Iterable[Change]) -> Scene:
     return reduce(lambda now, change: change.apply(now), changes, scene)
 
 
-def describe(event: Mapping[str, Any], units: Mapping[str, str] = _NO_UNITS) -> str:
+def describe(event: Event, units: Mapping[str, str] = _NO_UNITS) -> str:
     """Returns any event in a few words; ``units`` as in :meth:`Change.describe`."""
     if is_change(event):
         return Change.from_dict(0, event).describe(units)
@@ -185,12 +185,12 @@ def _amount(value: Any, unit: str | None) -> str:
     return f"{value:g} {unit or ''}".rstrip() if is_number else str(value)
 
 
-def _with_refusal(change: Change, refusals: list[Mapping[str, Any]]) -> Change:
+def _with_refusal(change: Change, refusals: list[Event]) -> Change:
     sentence = next((event["refused"] for event in refusals if _refuses(event, change)), None)
     return change if sentence is None else replace(change, refused=sentence)
 
 
-def _refuses(event: Mapping[str, Any], change: Change) -> bool:
+def _refuses(event: Event, change: Change) -> bool:
     """Compares by the change that the refusal holds; logs of before that field only tell of it in their sentence."""
     if "change" in event:
         other = Change.from_dict(event["change"]["tick"], event["change"])

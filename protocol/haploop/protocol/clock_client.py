@@ -7,8 +7,9 @@ from typing import Any
 
 import zmq
 
+from haploop.protocol.changes import Event
 from haploop.protocol.sockets import has_message, open_socket
-from haploop.protocol.wire import Frame, WireError, decode, encode
+from haploop.protocol.wire import Frame, Message, WireError, decode, encode
 
 # A node that waits says so this often, so that the clock can tell who is being waited for.
 REPORT_MS = 200
@@ -41,7 +42,7 @@ class ClockClient:
         self._socket.connect(address)
         self.until = 0
         self.last = False
-        self.events: list[tuple[int, dict[str, Any]]] = []
+        self.events: list[tuple[int, Event]] = []
         self.malformed = 0
         self.refused = ""
 
@@ -50,7 +51,7 @@ class ClockClient:
         """Returns the DEALER socket, for pollers."""
         return self._socket
 
-    def join(self, endpoints: dict[str, str], lossless: bool = True) -> dict[str, Any]:
+    def join(self, endpoints: dict[str, str], lossless: bool = True) -> Message:
         """Asks to take part, waits for the WELCOME and returns its fields by name.
 
         Raises:
@@ -98,7 +99,7 @@ class ClockClient:
             self.refused = frame.fields[0]
         return frame
 
-    def take_events(self) -> list[tuple[int, dict[str, Any]]]:
+    def take_events(self) -> list[tuple[int, Event]]:
         """Returns the events granted since the last call, (tick, event) in order."""
         events, self.events = self.events, []
         return events
@@ -107,7 +108,7 @@ class ClockClient:
         """Reports that all connections stand and that work starts at ``tick``."""
         self._socket.send(encode("READY", tick))
 
-    def progress(self, tick: int, status: dict[str, Any] | None = None) -> None:
+    def progress(self, tick: int, status: Message | None = None) -> None:
         """Reports that every tick before ``tick`` is done."""
         self._socket.send(encode("PROGRESS", tick, status or {}))
 

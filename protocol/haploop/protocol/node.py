@@ -9,16 +9,16 @@ import sys
 import threading
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import zmq
 
 from haploop.protocol.clock_client import Aborted, ClockClient, Refused
 from haploop.protocol.loop import LoopError
 from haploop.protocol.transport import SecureContext, Transport
+from haploop.protocol.wire import Message
 
 # work(client, context, directory of sockets) -> (tick reached, result for the clock)
-Work = Callable[[ClockClient, "zmq.Context[zmq.Socket[bytes]]", Path], tuple[int, dict[str, Any]]]
+Work = Callable[[ClockClient, "zmq.Context[zmq.Socket[bytes]]", Path], tuple[int, Message]]
 
 
 class NodeError(Exception):

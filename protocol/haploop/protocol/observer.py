@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from typing import Any
 
 import zmq
 
+from haploop.protocol.changes import Event
 from haploop.protocol.clock_client import ClockClient
 from haploop.protocol.telemetry import Subscriber
 from haploop.protocol.wire import Frame
@@ -40,7 +40,7 @@ class Observer:
     def __init__(self, context: zmq.Context[zmq.Socket[bytes]], role: str, clock: str, listens: Sequence[str]) -> None:
         self._context, self._role, self._clock = context, role, clock
         self._taken = 0
-        self._events: list[tuple[int, dict[str, Any]]] = []
+        self._events: list[tuple[int, Event]] = []
         self.client = self._join()
         addresses = {name: self.welcome["endpoints"][name]["telemetry"] for name in listens}
         self._streams = Subscriber(context, addresses)
@@ -96,7 +96,7 @@ class Observer:
         self._taken += len(events) - passed
         self._events += events[passed:]
 
-    def take_events(self) -> list[tuple[int, dict[str, Any]]]:
+    def take_events(self) -> list[tuple[int, Event]]:
         """Returns the events since the last call, (tick, event) in order; at first all since the start of the run."""
         events, self._events = self._events, []
         return events

@@ -29,7 +29,7 @@ class Publisher:
     """
 
     def __init__(
-        self, context: zmq.Context[zmq.Socket[bytes]], role: str, state: Callable[[], tuple[int, dict[str, Any]]]
+        self, context: zmq.Context[zmq.Socket[bytes]], role: str, state: Callable[[], tuple[int, Message]]
     ) -> None:
         self.socket = open_socket(context, zmq.XPUB)
         self._topic = role.encode()

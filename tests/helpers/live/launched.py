@@ -15,7 +15,7 @@ from typing import Any
 
 import pytest
 
-from haploop.launch.processes import control, run_directory
+from haploop.launch.processes import run_directory
 from haploop.logger import read
 from haploop.logger.log.recording import Recording
 from haploop.protocol.processes import PROCESSES
@@ -201,7 +201,7 @@ class Run(Launched):
 
     def ask(self, verb: str, **arguments: Any) -> dict[str, Any]:
         """A command as from another terminal; returns the data of its answer."""
-        return control.ask(self.live, verb, **arguments)[1]
+        return run_directory.ask(self.live, verb, **arguments)[1]
 
     def reaches(self, tick: int) -> int:
         """Wait until all nodes have done the ticks before ``tick``; returns how far they are."""

@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from haploop.launch.processes import control, run_directory
+from haploop.launch.processes import run_directory
 from haploop.launch.processes.run_directory import LiveRun
 from haploop.launch.runs.in_process import run_in_process
 from haploop.launch.runs.start import prepare, run
@@ -61,7 +61,7 @@ class Going:
 
     def ask(self, verb: str, **arguments: Any) -> tuple[str, dict[str, Any]]:
         """A command as from another terminal."""
-        return control.ask(self.live, verb, **arguments)
+        return run_directory.ask(self.live, verb, **arguments)
 
     def stands_at(self, tick: int, paused: bool = True) -> None:
         """Wait until the run stands still at ``tick``, every tick before it logged, on request or because it must."""
@@ -84,7 +84,7 @@ class Going:
     def end(self) -> None:
         """Leave nothing behind, however the test went."""
         if self._thread.is_alive():
-            with suppress(control.CommandRefused, control.RunNotFound):
+            with suppress(run_directory.CommandRefused, run_directory.RunNotFound):
                 self.ask("stop")
             self._thread.join(30)
 

@@ -12,18 +12,20 @@ from typing import TYPE_CHECKING, Any
 from haploop.controller.dissipation import ElementError, PluginError, load_plugin
 from haploop.launch.clock.clock import Clock, ClockError
 from haploop.launch.clock.roster import Roster
-from haploop.launch.output import OutputError, keep_plugin
 from haploop.launch.scene.events import settable_keys
 from haploop.launch.scene.mistakes import SceneError
+from haploop.launch.spec import OutputError, keep_plugin
 from haploop.protocol.quantity import Quantity
 from haploop.protocol.scene.paths import value_at
 from haploop.protocol.scene.scene import Scene
+from haploop.protocol.scene.table import Tables
+from haploop.protocol.wire import Message
 
 if TYPE_CHECKING:
     from haploop.controller.dissipation import Element
     from haploop.launch.spec import RunSpec
 
-Answer = tuple[bool, str, dict[str, Any]]
+Answer = tuple[bool, str, Message]
 
 
 def in_words(pace: float) -> float | str:
@@ -52,7 +54,7 @@ class Commands:
             "set": self._set,
         }
 
-    def __call__(self, verb: str, arguments: dict[str, Any]) -> Answer:
+    def __call__(self, verb: str, arguments: Message) -> Answer:
         """Carries out one command."""
         act = self._verbs.get(verb)
         if act is None:
@@ -68,7 +70,7 @@ class Commands:
     def _at(self, tick: int) -> str:
         return f"tick {tick} ({tick / self._rate:g} s)"
 
-    def _status(self) -> tuple[str, dict[str, Any]]:
+    def _status(self) -> tuple[str, Message]:
         clock, roster = self._clock, self._roster()
         logger = roster.own("logger")
         data = {
@@ -87,29 +89,29 @@ class Commands:
         state = "paused" if clock.paused else "running"
         return f"{state} at {self._at(data['tick'])} of {clock.end}", data
 
-    def _options(self) -> tuple[str, dict[str, Any]]:
+    def _options(self) -> tuple[str, Message]:
         """Answers what can be set and swapped in now, with units, bounds and present values."""
         data = capabilities(self._clock.present(), self._spec.kinds)
         return f"{len(data['settable'])} keys can be set, {len(data['kinds'])} kinds swapped in", data
 
-    def _pause(self) -> tuple[str, dict[str, Any]]:
+    def _pause(self) -> tuple[str, Message]:
         tick = self._clock.pause()
         self._clock.note({"pause": True})
         return f"paused at {self._at(tick)}", {"tick": tick}
 
-    def _resume(self) -> tuple[str, dict[str, Any]]:
+    def _resume(self) -> tuple[str, Message]:
         tick = self._clock.resume(time.monotonic())
         self._clock.note({"resume": True})
         return f"resumed at {self._at(tick)}", {"tick": tick}
 
-    def _step(self, ticks: int = 1) -> tuple[str, dict[str, Any]]:
+    def _step(self, ticks: int = 1) -> tuple[str, Message]:
         if not isinstance(ticks, int) or ticks < 1:
             raise ClockError(f"A step goes on for at least one tick, but {ticks} was asked for.")
         self._clock.note({"step": ticks})
         tick = self._clock.step(ticks, time.monotonic())
         return f"stepping to {self._at(tick)}", {"tick": tick}
 
-    def _pace(self, pace: float | str) -> tuple[str, dict[str, Any]]:
+    def _pace(self, pace: float | str) -> tuple[str, Message]:
         rate = math.inf if pace == "free" else pace
         if isinstance(rate, bool) or not isinstance(rate, int | float):
             raise ClockError(f"A pace is a number above 0, or free, but {pace!r} was asked for.")
@@ -117,14 +119,14 @@ class Commands:
         self._clock.note({"pace": in_words(rate)})
         return f"pace {in_words(rate)} from {self._at(tick)} on", {"tick": tick}
 
-    def _stop(self) -> tuple[str, dict[str, Any]]:
+    def _stop(self) -> tuple[str, Message]:
         tick = self._clock.stop()
         self._clock.note({"stop": True})
         return f"stopping at {self._at(tick)}", {"tick": tick}
 
     def _swap(
-        self, swap: dict[str, Any], element: int = 0, at: float | None = None, reload: bool = False
-    ) -> tuple[str, dict[str, Any]]:
+        self, swap: Tables, element: int = 0, at: float | None = None, reload: bool = False
+    ) -> tuple[str, Message]:
         kinds = dict(self._spec.kinds)
         extra = self._reload(str(swap.get("kind"))) if reload else {}
         try:
@@ -134,12 +136,12 @@ class Commands:
             raise
         return f"element {element} becomes {swap['kind']} at {self._at(tick)}", {"tick": tick}
 
-    def _set(self, set: dict[str, Any], at: float | None = None) -> tuple[str, dict[str, Any]]:
+    def _set(self, set: dict[str, float], at: float | None = None) -> tuple[str, Message]:
         tick = self._clock.change({"set": set}, at)
         what = ", ".join(f"{key} = {value}" for key, value in set.items())
         return f"{what} from {self._at(tick)} on", {"tick": tick}
 
-    def _reload(self, kind: str) -> dict[str, Any]:
+    def _reload(self, kind: str) -> Message:
         """Loads the edited file of a kind named at launch; a file that does not load changes nothing."""
         source: Path | None = self._spec.plugin_sources.get(kind)
         if source is None:
@@ -153,7 +155,7 @@ class Commands:
         return {"plugin": str(kept.resolve())}
 
 
-def capabilities(scene: Scene, kinds: Mapping[str, type[Element]]) -> dict[str, Any]:
+def capabilities(scene: Scene, kinds: Mapping[str, type[Element]]) -> Message:
     """Returns the keys that can be set and the kinds that can be swapped in, as plain values.
 
     Args:
@@ -178,7 +180,7 @@ def _about(element: type[Element]) -> str:
     return (element.__doc__ or "").strip().partition("\n")[0]
 
 
-def _parameters(element: type[Element]) -> dict[str, dict[str, Any]]:
+def _parameters(element: type[Element]) -> dict[str, Message]:
     declared: dict[str, tuple[Quantity, Any]] = element.parameters()
     return {
         name: {**quantity.as_dict(), "default": None if default is dataclasses.MISSING else default}

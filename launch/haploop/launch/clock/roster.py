@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any
 
 from haploop.protocol.processes import PROCESSES
+from haploop.protocol.wire import Message
 
 
 @dataclass
@@ -31,7 +31,7 @@ class Node:
     ready: bool = False
     done: bool = False
     waits_for: str = ""
-    status: dict[str, Any] = field(default_factory=dict)
+    status: Message = field(default_factory=dict)
 
     @property
     def is_own(self) -> bool:
@@ -83,7 +83,7 @@ class Roster:
         for node in self.nodes.values():
             node.heard += seconds
 
-    def table(self) -> list[dict[str, Any]]:
+    def table(self) -> list[Message]:
         """Returns role, pid, tick, lag behind the first, whom it waits for and skipped ticks of every node."""
         first = max((node.tick for node in self.nodes.values()), default=0)
         return [

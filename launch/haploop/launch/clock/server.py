@@ -15,9 +15,9 @@ from haploop.launch.spec import RunFailed
 from haploop.protocol.changes import refusals_of
 from haploop.protocol.processes import PROCESSES
 from haploop.protocol.sockets import bind, has_message, open_socket
-from haploop.protocol.wire import Frame, WireError, decode, encode
+from haploop.protocol.wire import Frame, Message, WireError, decode, encode
 
-Command = Callable[[str, dict[str, Any]], tuple[bool, str, dict[str, Any]]]
+Command = Callable[[str, Message], tuple[bool, str, Message]]
 
 # Messages taken before grants go out, so that nobody who floods the clock can hold time up.
 _AT_ONCE = 200
@@ -29,7 +29,7 @@ class ClockServer:
 
     Args:
         clock: decides how far and when.
-        welcome: fields of WELCOME but for endpoints and granted: run, scene, timebase, context.
+        welcome: of the fields of WELCOME run, scene, timebase and context.
         command: carries out a command from a client.
         start_gate: given the pids of all that are ready, returns whether the first tick may be worked on.
 
@@ -46,7 +46,7 @@ class ClockServer:
         sockets: Path,
         secret: str,
         clock: Clock,
-        welcome: dict[str, Any],
+        welcome: tuple[str, Message, Message, Message],
         command: Command,
         start_gate: Callable[[set[int]], bool],
     ) -> None:
@@ -54,7 +54,7 @@ class ClockServer:
         self.address = bind(self._socket, sockets, "clock")
         self._secret, self._clock, self._welcome, self._command = secret, clock, welcome, command
         self.roster = Roster()
-        self.results: dict[str, dict[str, Any]] = {}
+        self.results: dict[str, Message] = {}
         self.unknown_peers = 0
         self._greeted, self._start_gate = False, start_gate
         self._granted = -1
@@ -148,7 +148,7 @@ class ClockServer:
             return
         handler(node, *frame.fields)
 
-    def _join(self, sender: bytes, request: dict[str, Any]) -> None:
+    def _join(self, sender: bytes, request: Message) -> None:
         role = request["role"]
         known = role in PROCESSES
         reason = ""
@@ -175,17 +175,10 @@ class ClockServer:
             self._greet(node)
 
     def _greet(self, node: Node) -> None:
-        context = self._welcome["context"]
-        if not node.is_own:
-            context = {key: value for key, value in context.items() if key != "secret"}
-        fields = {
-            **self._welcome,
-            "endpoints": self.roster.endpoints(),
-            "granted": self._clock.until,
-            "context": context,
-        }
-        order = ("run", "scene", "timebase", "endpoints", "granted", "context")
-        self._send(node.identity, "WELCOME", *(fields[name] for name in order))
+        run, scene, timebase, context = self._welcome
+        secret = {"secret": self._secret} if node.is_own else {}
+        endpoints = self.roster.endpoints()
+        self._send(node.identity, "WELCOME", run, scene, timebase, endpoints, self._clock.until, secret | context)
 
     # What nodes say
 
@@ -194,7 +187,7 @@ class ClockServer:
         if not node.is_own:
             self._send(node.identity, "GRANT", self._clock.until, self._clock.is_last, self._clock.events_from(tick))
 
-    def _on_progress(self, node: Node, tick: int, status: dict[str, Any]) -> None:
+    def _on_progress(self, node: Node, tick: int, status: Message) -> None:
         node.tick = max(node.tick, tick)
         node.status = status or node.status
         if node.role == "controller":
@@ -208,7 +201,7 @@ class ClockServer:
         if node.role == "plant":
             self._clock.end_at(tick)
 
-    def _on_done(self, node: Node, tick: int, result: dict[str, Any]) -> None:
+    def _on_done(self, node: Node, tick: int, result: Message) -> None:
         node.done, node.tick = True, tick
         if node.is_own:
             self.results[node.role] = result

@@ -9,7 +9,7 @@ from typing import Any, Literal, TypeVar
 from haploop.plant.integrators.registry import find_integrator
 from haploop.protocol.scene.paths import value_at, without
 from haploop.protocol.scene.scene import Scene
-from haploop.protocol.scene.table import Table
+from haploop.protocol.scene.table import Table, Tables
 
 TableType = TypeVar("TableType", bound=Table)
 Stage = Literal["motion", "measurement", "estimate", "line", "actuation"]
@@ -52,7 +52,7 @@ class Draft:
             what was found.
     """
 
-    data: dict[str, Any]
+    data: Tables
     scene: Scene | None
     valid: Callable[[type[Any], Any], Any]
     complain: Callable[..., None]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import json
 import os
 import signal
 import subprocess
@@ -22,7 +21,7 @@ class Child:
     tells the launcher, without polling, that the process has ended.
     """
 
-    def __init__(self, role: str, sockets: Path, start: dict[str, Any], cores: set[int] | None) -> None:
+    def __init__(self, role: str, sockets: Path, start: bytes, cores: set[int] | None) -> None:
         self.role = role
         command = [sys.executable, "-m", PROCESSES[role].module, str(sockets)]
         self._process = subprocess.Popen(
@@ -39,7 +38,7 @@ class Child:
             with contextlib.suppress(OSError):
                 os.sched_setaffinity(self._process.pid, cores)
         with contextlib.suppress(BrokenPipeError):
-            self._process.stdin.write(json.dumps(start).encode() + b"\n")
+            self._process.stdin.write(start + b"\n")
             self._process.stdin.flush()
         self.died = self._process.stdout.fileno()
 
@@ -81,7 +80,7 @@ class Child:
                     pipe.close()
 
 
-def start_children(sockets: Path, start: dict[str, Any], pin: bool, run_number: int) -> dict[str, Child]:
+def start_children(sockets: Path, start: bytes, pin: bool, run_number: int) -> dict[str, Child]:
     """Starts every process of the table.
 
     Plant and controller wait for each other at every tick and gain nothing from two cores, but lose the wake-up from

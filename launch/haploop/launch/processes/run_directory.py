@@ -1,4 +1,4 @@
-"""The directories of live runs: a private one of sockets each, in which other terminals find the run."""
+"""The live runs: the private directory of each, in which other terminals find it, and the commands they send it."""
 
 from __future__ import annotations
 
@@ -10,17 +10,28 @@ import tempfile
 import time
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
+import zmq
+
+from haploop.protocol.sockets import open_socket
 from haploop.protocol.transport import SecureContext, Transport
+from haploop.protocol.wire import Message, WireError, decode, encode
 
 # A socket's path must stay below the kernel's 107 bytes; this leaves room for the run and the socket's name.
 _LONGEST_BASE = 70
 # A directory that is older and tells of no run belonged to a launcher that was killed as it started.
 _ANNOUNCED_WITHIN_S = 60.0
+_ANSWER_MS = 5000
+_LOOK_MS = 250
 
 
 class RunNotFound(Exception):
     """No run, or not one run, to talk to; the message lists those there are."""
+
+
+class CommandRefused(Exception):
+    """The run did not do what was asked; the message says why."""
 
 
 def base_directory() -> Path:
@@ -119,6 +130,41 @@ def find(run_id: str | None) -> LiveRun:
     if not fitting:
         raise RunNotFound(f"No live run has the id {run_id}; these are live:\n{listing}")
     raise RunNotFound(f"{len(fitting)} runs are live; name one with --run ID:\n{listing}")
+
+
+def ask(run: LiveRun, verb: str, **arguments: Any) -> tuple[str, Message]:
+    """Sends a command to a live run; returns its answer, a sentence and data.
+
+    Raises:
+        CommandRefused: it was refused; nothing has changed.
+        RunNotFound: the run does not answer, or has ended.
+    """
+    context = run.make_context()
+    socket = open_socket(context, zmq.DEALER)
+    try:
+        socket.connect(run.clock)
+        socket.send(encode("COMMAND", verb, arguments))
+        _await_answer(socket, run)
+        frame = decode(socket.recv())
+    except WireError as error:
+        raise RunNotFound(f"Run {run.id} answered with something else: {error}") from error
+    finally:
+        context.destroy(linger=0)
+    if frame.name == "REFUSED":
+        raise CommandRefused(frame.fields[0])
+    ok, text, data = frame.fields
+    if not ok:
+        raise CommandRefused(text)
+    return text, data
+
+
+def _await_answer(socket: zmq.Socket[bytes], run: LiveRun) -> None:
+    for _ in range(_ANSWER_MS // _LOOK_MS):
+        if socket.poll(_LOOK_MS):
+            return
+        if not is_live(run):
+            raise RunNotFound(f"Run {run.id} ({run.title}) has ended.")
+    raise RunNotFound(f"Run {run.id} ({run.title}) has not answered for {_ANSWER_MS // 1000} s.")
 
 
 def _made(path: Path) -> float:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import secrets
 import time
 from pathlib import Path
-from typing import Any
 
 import zmq
 
@@ -15,6 +15,7 @@ from haploop.launch.clock.server import ClockServer
 from haploop.launch.processes import run_directory
 from haploop.launch.processes.children import Child, interrupts, start_children
 from haploop.launch.spec import RunFailed, RunSpec
+from haploop.logger.summary import Summary
 from haploop.protocol.ticks import Timebase
 from haploop.protocol.transport import SecureContext
 
@@ -31,7 +32,7 @@ _PROBE_S = 0.2
 _HELD_UP_S = 1.0
 
 
-def run_processes(spec: RunSpec) -> dict[str, Any]:
+def run_processes(spec: RunSpec) -> Summary:
     """Runs to the end and returns the summary.
 
     The first SIGINT or SIGTERM ends the run in order, with a summary of what ran; the second at once.
@@ -59,29 +60,24 @@ class Supervisor:
         self._deadline_s = scene.run.deadline
         self._context = SecureContext.from_transport(spec.transport)
         secret = secrets.token_hex(16)
-        welcome = {
-            "run": sockets.name,
-            "scene": scene.as_dict(),
-            "timebase": timebase.as_dict(),
-            "context": {
-                "secret": secret,
-                "out": str(spec.out.resolve()),
-                "plugins": [str(path.resolve()) for path in spec.plugins],
-                "attachments": spec.attachments,
-            },
+        context = {
+            "out": str(spec.out.resolve()),
+            "plugins": [str(path.resolve()) for path in spec.plugins],
+            "attachments": spec.attachments,
         }
+        welcome = sockets.name, scene.as_dict(), timebase.as_dict(), context
         commands = Commands(self._clock, spec, lambda: self._server.roster)
         self._server = ClockServer(self._context, sockets, secret, self._clock, welcome, commands, spec.start_gate)
         keys = spec.transport.as_dict()["keys"]
         run_directory.announce(sockets, self._server.address, scene.title, str(spec.out), keys)
         run_number = len(run_directory.live_runs()) - 1
         start = {"address": self._server.address, "secret": secret, "transport": spec.transport.as_dict()}
-        self._children = start_children(sockets, start, scene.run.pin, run_number)
+        self._children = start_children(sockets, json.dumps(start).encode(), scene.run.pin, run_number)
         self._started = self._looked = time.monotonic()
         self._probe_due = 0.0
         self._stopping = False
 
-    def run(self) -> dict[str, Any]:
+    def run(self) -> Summary:
         """Leads the run to its end; returns its summary."""
         try:
             address = f" at {self._server.address}" if self._spec.transport.host else ""

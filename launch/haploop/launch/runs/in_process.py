@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import TYPE_CHECKING, NoReturn
 
 from haploop.controller.controller import Controller
 from haploop.controller.dissipation import ElementError
 from haploop.launch.spec import RunFailed
 from haploop.logger.session import LogSession, open_session
+from haploop.logger.summary import Summary
 from haploop.plant.plant import Plant
 from haploop.protocol.block_length import BlockLength
 from haploop.protocol.changes import Event, is_change, refusal
@@ -19,8 +20,7 @@ from haploop.protocol.ticks import Timebase
 if TYPE_CHECKING:
     from haploop.controller.dissipation import Element
     from haploop.logger.log.recording import MemoryLog
-
-Progress = Callable[[dict[str, Any]], None]
+    from haploop.protocol.wire import Message
 
 
 def run_in_process(
@@ -30,10 +30,10 @@ def run_in_process(
     out: Path | None = None,
     attachments: dict[str, str] | None = None,
     events: list[tuple[int, Event]] | None = None,
-    on_progress: Progress | None = None,
+    on_progress: Callable[[Message], None] | None = None,
     memory: MemoryLog | None = None,
     stop: Callable[[], bool] = lambda: False,
-) -> dict[str, Any]:
+) -> Summary:
     """Runs a resolved scene to its end and returns the summary.
 
     Args:
@@ -123,9 +123,9 @@ class Loop:
         self._close(reason)
         raise RunFailed(reason)
 
-    def finish(self) -> dict[str, Any]:
+    def finish(self) -> Summary:
         """Closes the books and returns the summary."""
         return self._close("")
 
-    def _close(self, failed: str) -> dict[str, Any]:
+    def _close(self, failed: str) -> Summary:
         return self._session.close(failed, self._plant.stop_reason, self._controller.recorder.trouble, 0)

@@ -12,29 +12,29 @@ from haploop.controller.dissipation.registry import checked
 from haploop.launch.scene import file as scene_file
 from haploop.launch.scene.check import resolve
 from haploop.launch.scene.events import elements_of, try_out
-from haploop.launch.scene.layers import Layers
-from haploop.launch.scene.overrides import lay_overrides
+from haploop.launch.scene.layers import Layers, lay_overrides
 from haploop.launch.scene.toml_writer import inline, to_toml
-from haploop.protocol.scene.scene import Scene as Tables
+from haploop.protocol.scene.scene import Scene
+from haploop.protocol.scene.table import Tables
 
 Values = Mapping[str, Any] | Iterable[str]
 
 
 @dataclass(frozen=True, eq=False)
-class Scene:
+class LoadedScene:
     """A scene that can be run; every change gives a new one, which can be run too, and leaves this one as it is.
 
     A value is a number in SI units, text with its unit (``"0.2 N/mm"``) or a quantity of pint. ``scene["wall"]`` is a
     table of it in SI units; ``print(scene)`` shows all of them.
 
     Attributes:
-        scene: its tables, typed.
+        scene: what it holds, typed.
         path: the file it was read from.
         kinds: the elements at hand, by kind.
         plugin_files: the file of each kind that came from one.
     """
 
-    scene: Tables
+    scene: Scene
     path: Path
     kinds: Mapping[str, type[Element]] = field(default_factory=dict)
     plugin_files: Mapping[str, Path] = field(default_factory=dict)
@@ -43,7 +43,7 @@ class Scene:
         try_out(elements_of(self.scene), self.kinds)
 
     @property
-    def tables(self) -> dict[str, Any]:
+    def tables(self) -> Tables:
         """All tables, copied: plain dicts, all numbers SI, defaults filled in, absent tables absent."""
         return self.scene.as_dict()
 
@@ -61,7 +61,7 @@ class Scene:
     def __repr__(self) -> str:
         return f"<Scene {self['title']!r}, {self['duration']:g} s, from {self.path}>"
 
-    def set(self, values: Values, at: Any = None) -> Scene:
+    def set(self, values: Values, at: Any = None) -> LoadedScene:
         """Returns the scene with other values, from its start or from a moment on.
 
         Args:
@@ -82,7 +82,7 @@ class Scene:
             raise TypeError('What is set in mid-run must be given by key, such as {"wall.stiffness": 200}.')
         return self._with_event({"at": plain(at), "set": plain(values)}, "set")
 
-    def swap(self, kind: str | type[Element], *, at: Any, element: int = 0, **parameters: Any) -> Scene:
+    def swap(self, kind: str | type[Element], *, at: Any, element: int = 0, **parameters: Any) -> LoadedScene:
         """Returns the scene with an element that is swapped in in mid-run.
 
         Args:
@@ -103,7 +103,7 @@ class Scene:
         table = {"kind": name, **plain(parameters)}
         return scene._with_event({"at": plain(at), "swap": table, "element": element}, "swap")
 
-    def _with_event(self, event: dict[str, Any], by: str) -> Scene:
+    def _with_event(self, event: Tables, by: str) -> LoadedScene:
         """Returns the scene with one event more; its mistakes are those of the method ``by``, not of the file."""
         layers = Layers(self.path, self.tables)
         events = layers.data.setdefault("event", [])
@@ -111,7 +111,7 @@ class Scene:
         events.append(event)
         return self._resolved(layers)
 
-    def _resolved(self, layers: Layers) -> Scene:
+    def _resolved(self, layers: Layers) -> LoadedScene:
         return replace(self, scene=resolve(layers, self.kinds).in_order())
 
 
@@ -121,12 +121,12 @@ def load(
     *,
     elements: Iterable[type[Element]] = (),
     plugins: Iterable[str | Path] = (),
-) -> Scene:
+) -> LoadedScene:
     """Reads a scene file.
 
     Args:
         path: the scene file (TOML).
-        values: laid over what it says, as in :meth:`Scene.set`.
+        values: laid over what it says, as in :meth:`LoadedScene.set`.
         elements: element classes that may be named by their kind, in this scene and in those made of it.
         plugins: files that define elements.
 
@@ -142,7 +142,7 @@ def load(
         files |= dict.fromkeys(found, plugin)
     kinds |= (given := {checked(element, element.__name__).kind: element for element in elements})
     files = {kind: file for kind, file in files.items() if kind not in given}
-    return Scene(scene_file.load(path, texts(values), kinds), Path(path), kinds, files)
+    return LoadedScene(scene_file.load(path, texts(values), kinds), Path(path), kinds, files)
 
 
 def texts(values: Values) -> list[str]:

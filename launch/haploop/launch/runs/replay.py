@@ -6,19 +6,18 @@ import dataclasses
 import json
 import tempfile
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 import haploop.logger
 from haploop.controller.dissipation import load_plugin, registry
-from haploop.launch.output import PLUGINS, SCENE
 from haploop.launch.runs.in_process import run_in_process
 from haploop.launch.scene.file import load
-from haploop.launch.spec import RunFailed
+from haploop.launch.spec import PLUGINS, SCENE, RunFailed
 from haploop.logger.log.recording import Recording
 from haploop.logger.session import SUMMARY
-from haploop.logger.summary import finite
+from haploop.logger.summary import Summary, finite
+from haploop.protocol.changes import Event
 
 
 class ReplayError(Exception):
@@ -34,7 +33,7 @@ class Replay:
         differences: where recorded and repeated run disagree, as sentences; empty when every bit agreed.
     """
 
-    summary: dict[str, Any]
+    summary: Summary
     differences: list[str]
 
 
@@ -80,7 +79,7 @@ def _recorded(directory: Path) -> Recording:
     return recorded
 
 
-def _summary(directory: Path) -> dict[str, Any] | None:
+def _summary(directory: Path) -> Summary | None:
     file = directory / SUMMARY
     return json.loads(file.read_text(encoding="utf-8")) if file.is_file() else None
 
@@ -96,7 +95,7 @@ def _launch_plugins(directory: Path, recorded: Recording) -> list[str]:
     return names
 
 
-def _event(event: dict[str, Any], directory: Path) -> tuple[int, dict[str, Any]]:
+def _event(event: Event, directory: Path) -> tuple[int, Event]:
     """Returns tick and event of a logged event, its plugin looked for in the run's directory."""
     del event["timestamp"]
     tick = event.pop("tick")
@@ -129,7 +128,7 @@ def _compare(recorded: Recording, repeated: Recording, failed: bool) -> list[str
     return differences
 
 
-def _compare_summaries(before: dict[str, Any], after: dict[str, Any]) -> list[str]:
+def _compare_summaries(before: Summary, after: Summary) -> list[str]:
     """Differences between the summary of a run that ended in order and the repeated one's."""
     keys = ("ticks", "verdict", "trajectory_sha256", "final", "extremes", "window", "energy", "lost")
     of_effects = ("actuator", "accelerometer")

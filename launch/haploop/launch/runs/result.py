@@ -12,13 +12,14 @@ from typing import TYPE_CHECKING, Any
 
 import haploop.logger
 from haploop.controller.dissipation import PluginError, registry
-from haploop.launch.output import SCENE, make_output
 from haploop.launch.runs import start
 from haploop.launch.runs.in_process import run_in_process
-from haploop.launch.runs.loaded_scene import Scene, load
+from haploop.launch.runs.loaded_scene import LoadedScene, load
 from haploop.launch.scene.events import elements_of
+from haploop.launch.spec import SCENE, make_output
 from haploop.logger.log.recording import MemoryLog, Recording, Table
 from haploop.logger.session import LOG
+from haploop.logger.summary import Summary
 
 if TYPE_CHECKING:
     import pint
@@ -46,8 +47,8 @@ class Result:
         directory: where the run left its files, None when it left none.
     """
 
-    scene: Scene
-    summary: dict[str, Any]
+    scene: LoadedScene
+    summary: Summary
     directory: Path | None
     _kept: Recording | None = None
 
@@ -86,7 +87,7 @@ class Result:
 
 
 def run(
-    scene: Scene | str | Path,
+    scene: LoadedScene | str | Path,
     out: str | Path | None = None,
     *,
     processes: bool = False,
@@ -108,7 +109,7 @@ def run(
         RunFailed: a process was killed, hung or could not go on, or an element raised.
         LogError: the log could not be written.
     """
-    scene = scene if isinstance(scene, Scene) else load(scene)
+    scene = scene if isinstance(scene, LoadedScene) else load(scene)
     if math.isfinite(pace) and not processes:
         raise ValueError(f"A pace of {pace:g} needs the clock of a run as processes; give processes=True too.")
     if out is None and not processes:
@@ -124,7 +125,7 @@ def run(
     return Result(scene, summary, None if out is None else target, kept)
 
 
-def _in_memory(scene: Scene) -> Result:
+def _in_memory(scene: LoadedScene) -> Result:
     memory = MemoryLog()
     summary = run_in_process(scene.scene, dict(scene.kinds), attachments={SCENE: str(scene)}, memory=memory)
     return Result(scene, summary, None, memory.recording())
@@ -140,7 +141,7 @@ def _read(directory: Path) -> Recording:
     return haploop.logger.read(directory) if (directory / LOG).exists() else Recording({}, "", {})
 
 
-def _check_files(scene: Scene) -> None:
+def _check_files(scene: LoadedScene) -> None:
     """Processes load their elements themselves: every one must be installed, or have a file."""
     installed = registry()
     for element in elements_of(scene.scene):

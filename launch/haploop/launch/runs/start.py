@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import Any
 
 from haploop.controller.dissipation import Element, load_plugin, registry
-from haploop.launch.output import keep_plugin, make_output, write_scene
 from haploop.launch.scene.events import elements_of, try_out
 from haploop.launch.scene.file import load
-from haploop.launch.spec import RunSpec
+from haploop.launch.spec import RunSpec, keep_plugin, make_output, write_scene
+from haploop.logger.summary import Summary
 from haploop.protocol.scene.scene import Scene
 
 
@@ -54,7 +54,7 @@ def lay_out(
     return RunSpec(scene, kinds, directory, attachments, kept, sources or {})
 
 
-def run(spec: RunSpec, *, in_process: bool = False, **options: Any) -> dict[str, Any]:
+def run(spec: RunSpec, *, in_process: bool = False, **options: Any) -> Summary:
     """Runs a scene and returns its summary.
 
     The first SIGINT or SIGTERM ends the run in order, with a summary of what ran; the second at once.

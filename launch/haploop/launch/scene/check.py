@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from pydantic import ValidationError
 from pydantic_core import PydanticCustomError
@@ -20,6 +20,7 @@ from haploop.launch.scene.models import number_of, read_table, scene_model
 from haploop.launch.scene.schema import Schema, alternatives, schema_at, whole_schema
 from haploop.launch.scene.toml_writer import inline
 from haploop.protocol.scene.scene import Clock, EventTable, Scene
+from haploop.protocol.scene.table import Tables
 from haploop.protocol.ticks import Timebase, TimebaseError
 
 if TYPE_CHECKING:
@@ -68,7 +69,7 @@ def resolve(layers: Layers, kinds: Mapping[str, type[Element]]) -> Scene:
     return replace(scene, event=tuple(events))
 
 
-def resolve_event(event: dict[str, Any], scene: Scene, kinds: Mapping[str, type[Element]]) -> EventTable:
+def resolve_event(event: Tables, scene: Scene, kinds: Mapping[str, type[Element]]) -> EventTable:
     """Returns an event that comes in during a run, resolved, after the events of the resolved ``scene``.
 
     Raises:

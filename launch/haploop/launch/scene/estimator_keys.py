@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from pydantic_core import PydanticCustomError
 
 from haploop.controller.estimators.choose import estimators_for
@@ -12,7 +10,7 @@ from haploop.launch.scene.models import number_of
 from haploop.protocol.scene.effects import Noise
 from haploop.protocol.scene.estimators import Acceleration, Velocity
 from haploop.protocol.scene.scene import Scene
-from haploop.protocol.scene.table import Table
+from haploop.protocol.scene.table import Table, Tables
 
 _TABLES: dict[str, type[Table]] = {"velocity": Velocity, "acceleration": Acceleration}
 
@@ -42,7 +40,7 @@ def check_filter(layers: Layers, scene: Scene) -> None:
         layers.complain(("velocity", "jerk_density"), expected)
 
 
-def _keys(layers: Layers, name: str, table: dict[str, Any]) -> None:
+def _keys(layers: Layers, name: str, table: Tables) -> None:
     """Compares the keys of a table with those that the estimators declare that may stand in it."""
     kinds, estimator = estimators_for(name), table.get("estimator", "difference")
     if not isinstance(estimator, str) or (kind := kinds.get(estimator)) is None:
@@ -77,7 +75,7 @@ def _gives(layers: Layers, source: str) -> bool:
         return True
 
 
-def _acceleration(layers: Layers, acceleration: dict[str, Any], velocity: dict[str, Any]) -> None:
+def _acceleration(layers: Layers, acceleration: Tables, velocity: Tables) -> None:
     source, estimator = acceleration.get("source", "encoder"), acceleration.get("estimator")
     if source != "encoder" and estimator is not None:
         layers.complain(("acceleration", "estimator"), 'It goes with source = "encoder" alone.')
@@ -90,6 +88,6 @@ def _missing(layers: Layers, name: str, key: str, why: str) -> None:
     layers.complain((name, key), f"{why} {number_of(_TABLES[name], key).form}.", "is missing")
 
 
-def _table(layers: Layers, name: str) -> dict[str, Any]:
+def _table(layers: Layers, name: str) -> Tables:
     table = layers.data.get(name)
     return table if isinstance(table, dict) else {}

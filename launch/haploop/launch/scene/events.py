@@ -13,6 +13,7 @@ from haploop.launch.scene.mistakes import counted, nearest
 from haploop.launch.scene.models import number_of
 from haploop.launch.scene.number import Number
 from haploop.protocol.scene.scene import NO_ELEMENT, Clock, ElementTable, EventTable, Scene, Wall
+from haploop.protocol.scene.table import Tables
 from haploop.protocol.ticks import DELAY, Timebase, whole_count
 
 if TYPE_CHECKING:
@@ -51,7 +52,7 @@ def check_events(
     return settings
 
 
-def _check_shape(layers: Layers, key: KeyPath, event: dict[str, Any], time: Timebase | None) -> None:
+def _check_shape(layers: Layers, key: KeyPath, event: Tables, time: Timebase | None) -> None:
     verbs = [verb for verb in VERBS if event.get(verb) is not None]
     if len(verbs) != 1:
         given = f"has {' and '.join(verbs)}" if verbs else "changes nothing"
@@ -64,7 +65,7 @@ def _check_shape(layers: Layers, key: KeyPath, event: dict[str, Any], time: Time
         layers.complain((*key, "at"), f"It must be at most {last:g} s, when the last tick of the run is.")
 
 
-def _swap(layers: Layers, key: KeyPath, event: dict[str, Any], slots: list[Any]) -> None:
+def _swap(layers: Layers, key: KeyPath, event: Tables, slots: list[Any]) -> None:
     """Puts the new kind into its slot."""
     element = _read(event, "element")
     kind = event["swap"].get("kind")
@@ -122,7 +123,7 @@ def _nearest_key(name: str, settable: dict[str, Number]) -> str | None:
     return names.get(nearest(last, names) or "") if names else nearest(name, settable)
 
 
-def _read(event: dict[str, Any], key: str) -> Any:
+def _read(event: Tables, key: str) -> Any:
     """Returns a number of an event; 0 where it is missing, or wrong, which is a mistake reported elsewhere."""
     try:
         return number_of(EventTable, key).read(event.get(key))

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
+import csv
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from haploop.launch.scene.check import resolve
-from haploop.launch.scene.force_csv import TraceError, read_trace
-from haploop.launch.scene.layers import Layers, read_layers
+from haploop.launch.scene.layers import Layers, lay_overrides, read_layers
 from haploop.launch.scene.mistakes import COMMAND_LINE
-from haploop.launch.scene.overrides import lay_overrides
+from haploop.launch.scene.models import fault
 from haploop.protocol.scene.scene import Scene
 
 if TYPE_CHECKING:
@@ -68,3 +68,46 @@ def _read_recording(layers: Layers) -> None:
             layers.complain(key, str(error))
     del force["file"]
     force |= {"time": times, "force": forces}
+
+
+class TraceError(ValueError):
+    """A recording that cannot be used; the message is a full sentence."""
+
+
+def read_trace(path: Path) -> tuple[list[float], list[float]]:
+    """Times in s and forces in N from a CSV of two columns; a header line and empty lines may be there.
+
+    Raises:
+        TraceError: no such file, not text, or a line that is no pair of numbers, with its line number.
+    """
+    try:
+        lines = path.read_text(encoding="utf-8-sig").splitlines()
+    except UnicodeDecodeError as error:
+        raise TraceError(f"The recording must be UTF-8 text, but byte {error.start} is not.") from error
+    except OSError as error:
+        raise TraceError(f"The recording cannot be read: {error.strerror}.") from error
+    numbers, times, forces = [], [], []
+    for number, cells in enumerate(csv.reader(lines), start=1):
+        if not any(cell.strip() for cell in cells):
+            continue
+        try:
+            time, force = map(float, cells)
+        except ValueError as error:
+            if not times and len(cells) == 2 and not any(_is_number(cell) for cell in cells):
+                continue  # the header
+            line = ",".join(cells)
+            raise TraceError(f"Line {number} must be a time in s and a force in N, but is {line!r}.") from error
+        numbers.append(number)
+        times.append(time)
+        forces.append(force)
+    if found := fault(times, forces):
+        raise TraceError(f"Line {numbers[found[0]]}: {found[1]}" if numbers else found[1])
+    return times, forces
+
+
+def _is_number(cell: str) -> bool:
+    try:
+        float(cell)
+    except ValueError:
+        return False
+    return True

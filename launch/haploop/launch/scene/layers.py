@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import tomllib
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from haploop.launch.scene.mistakes import COMMAND_LINE, Mistake, SceneError, shown
+from haploop.launch.scene.mistakes import COMMAND_LINE, Mistake, SceneError, counted, shown
 from haploop.launch.scene.toml_writer import inline
+from haploop.protocol.scene.table import Tables
 
 KeyPath = tuple[str | int, ...]
 # Keys that say what else is in their table, each with the keys that are there whatever it says.
@@ -27,7 +30,7 @@ class Layers:
     """
 
     path: Path
-    data: dict[str, Any] = field(default_factory=dict)
+    data: Tables = field(default_factory=dict)
     origins: dict[KeyPath, str] = field(default_factory=dict)
     mistakes: list[Mistake] = field(default_factory=list)
 
@@ -52,7 +55,7 @@ class Layers:
             value = value[part]
         return value
 
-    def lay(self, over: dict[str, Any], origin: str, key: KeyPath = ()) -> None:
+    def lay(self, over: Tables, origin: str, key: KeyPath = ()) -> None:
         """Lays a table over the one at ``key``: tables merge key by key, all else is replaced.
 
         The keys of a ramp mean nothing to a sine: a table that names another kind drops what lay below it.
@@ -121,7 +124,7 @@ def _read(layers: Layers, path: Path, chain: tuple[Path, ...]) -> None:
     layers.lay(table, str(path))
 
 
-def parse(path: Path, what: str = "scene", needs: str = "a duration and a [device]") -> dict[str, Any]:
+def parse(path: Path, what: str = "scene", needs: str = "a duration and a [device]") -> Tables:
     """Returns the tables of one TOML file, which is a ``what`` and needs some keys at least.
 
     Raises:
@@ -144,6 +147,77 @@ def parse(path: Path, what: str = "scene", needs: str = "a duration and a [devic
     except RecursionError:
         problem = "The tables are nested too deeply."
     raise SceneError([Mistake(shown(path), "", "", problem)])
+
+
+def lay_overrides(layers: Layers, overrides: Iterable[str]) -> None:
+    """Lays each ``dotted.key=value`` on; what is wrong is added to the mistakes of ``layers``.
+
+    A part of the key that is a number counts the elements of a list from 0, and one past its end adds one. Tables and
+    lists that are absent are made.
+    """
+    for text in overrides:
+        name, value = split_assignment(text) or ("", None)
+        path = key_path(name)
+        if not path:
+            expected = "It must read KEY=VALUE with a dotted key, such as dissipation.0.mass=0.02."
+            layers.mistakes.append(Mistake(COMMAND_LINE, text, "cannot be read", expected))
+        elif complaint := lay_value(layers, path, value):
+            layers.mistakes.append(Mistake(COMMAND_LINE, name, "cannot be set", complaint))
+
+
+def lay_value(layers: Layers, path: Sequence[str], value: Any) -> str | None:
+    """Makes the way to the last part and lays the value there; returns a sentence where there is no such way."""
+    key: tuple[str | int, ...] = ()
+    node: Any = layers.data
+    for part, after in zip(path, [*path[1:], None], strict=True):
+        if isinstance(node, list):
+            if not part.isdecimal() or int(part) > len(node):
+                count = counted(len(node), "element")
+                return f"{'.'.join(map(str, key))} has {count}, counted from 0, so {part} is none of them."
+            step: Any = int(part)
+            if step == len(node):
+                node.append({})
+        elif isinstance(node, dict):
+            step = part
+        else:
+            return f"{'.'.join(map(str, key))} holds a value, not a table."
+        if after is None:
+            break
+        if isinstance(node, dict) and step not in node:
+            layers.lay({part: [] if after.isdecimal() else {}}, COMMAND_LINE, key)
+        node, key = node[step], (*key, step)
+    if isinstance(node, list):
+        node[int(path[-1])] = value
+        layers.origins[(*key, int(path[-1]))] = COMMAND_LINE
+    else:
+        layers.lay({path[-1]: value}, COMMAND_LINE, key)
+    return None
+
+
+@lru_cache(maxsize=256)
+def key_path(name: str) -> tuple[str, ...]:
+    """Returns the parts of a dotted key, read as TOML reads it, so that a part may be quoted; () for no key."""
+    try:
+        node: Any = tomllib.loads(f"{name} = 0") if "\n" not in name else {}
+    except ValueError:
+        return ()
+    path = []
+    while isinstance(node, dict) and node:
+        [(part, node)] = node.items()
+        path.append(part)
+    return tuple(path)
+
+
+def split_assignment(text: str) -> tuple[str, Any] | None:
+    """Splits ``KEY=VALUE``; the value is TOML where the text is, and the text itself otherwise. None without a key."""
+    name, equals, value = text.partition("=")
+    if not equals or not name.strip():
+        return None
+    try:
+        table = tomllib.loads(f"value = {value}")
+    except ValueError:
+        return name.strip(), value.strip()
+    return name.strip(), table["value"] if len(table) == 1 else value.strip()
 
 
 def _quoted(value: Any) -> str:

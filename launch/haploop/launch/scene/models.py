@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from functools import cache, reduce
 from operator import or_
 from types import UnionType
@@ -14,7 +14,6 @@ from pydantic_core import PydanticCustomError
 
 from haploop.controller.estimators.choose import estimators_for
 from haploop.launch.plan.effects import all_effects
-from haploop.launch.scene.force_csv import fault
 from haploop.launch.scene.number import Number
 from haploop.plant.integrators.registry import integrator_names
 from haploop.protocol.quantity import Quantity
@@ -165,3 +164,17 @@ def _model(name: str, about: str | None, keys: Keys, base: type[Model] = Model) 
 def _one_of(models: list[Any]) -> Any:
     """Returns the type of a table of one of these kinds."""
     return Annotated[reduce(or_, models), Field(discriminator="kind")] if len(models) > 1 else models[0]
+
+
+def fault(times: Sequence[float], forces: Sequence[float]) -> tuple[int, str] | None:
+    """Returns the first sample at which these are no function of time, and why; None when they are one."""
+    if not times:
+        return 0, "There must be at least one sample."
+    if len(times) != len(forces):
+        return min(len(times), len(forces)), f"There are {len(times)} times but {len(forces)} forces."
+    for i, (time, force) in enumerate(zip(times, forces, strict=True)):
+        if not abs(time) < float("inf") or not abs(force) < float("inf"):
+            return i, "Time and force must be finite numbers."
+        if i and time <= times[i - 1]:
+            return i, f"The times must increase, but {time:g} s follows {times[i - 1]:g} s."
+    return None

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from pydantic.json_schema import GenerateJsonSchema
+from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
 from pydantic_core import core_schema
 
 from haploop.launch.scene.models import scene_model
@@ -13,7 +13,7 @@ from haploop.launch.scene.models import scene_model
 if TYPE_CHECKING:
     from haploop.controller.dissipation import Element
 
-Schema = dict[str, Any]
+Schema = JsonSchemaValue
 
 
 class TomlSchema(GenerateJsonSchema):

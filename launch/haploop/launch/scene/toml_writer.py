@@ -6,6 +6,8 @@ import math
 import re
 from typing import Any
 
+from haploop.protocol.scene.table import Tables
+
 _BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
 _ESCAPES = {ord('"'): '\\"', ord("\\"): "\\\\", **{c: f"\\u{c:04x}" for c in [*range(0x20), 0x7F]}}
 
@@ -14,7 +16,7 @@ _ESCAPES = {ord('"'): '\\"', ord("\\"): "\\\\", **{c: f"\\u{c:04x}" for c in [*r
 Lines = dict[int, tuple[Any, list[str]]]
 
 
-def to_toml(scene: dict[str, Any], known: Lines | None = None) -> str:
+def to_toml(scene: Tables, known: Lines | None = None) -> str:
     """Returns the TOML text of a dict of str, bool, int, finite float, lists and dicts.
 
     Args:
@@ -26,7 +28,7 @@ def to_toml(scene: dict[str, Any], known: Lines | None = None) -> str:
     return "\n".join(_table(scene, (), known or {})).lstrip("\n") + "\n"
 
 
-def lines_of(scene: dict[str, Any]) -> Lines:
+def lines_of(scene: Tables) -> Lines:
     """Returns the lines of each table of a scene, for ``to_toml`` of scenes that share some; they must not change."""
     return {id(entry): (entry, _tables(entry, (key,))) for key, entry in scene.items() if _has_header(entry)}
 
@@ -46,7 +48,7 @@ def inline(value: Any) -> str:
     raise TypeError(f"A scene holds text, numbers, true or false, lists and tables, but not {value!r}.")
 
 
-def _table(table: dict[str, Any], path: tuple[str, ...], known: Lines) -> list[str]:
+def _table(table: Tables, path: tuple[str, ...], known: Lines) -> list[str]:
     """Lines of a table: its plain keys first, since they belong to the header above them, then its sub-tables."""
     headed = [(key, value) for key, value in table.items() if _has_header(value)]
     keys = {key for key, _ in headed}

@@ -6,7 +6,7 @@ import dataclasses
 from typing import Any, TypeVar
 
 from haploop.protocol.scene.scene import ElementTable
-from haploop.protocol.scene.table import OpenTable, Table
+from haploop.protocol.scene.table import OpenTable, Table, Tables
 
 TableType = TypeVar("TableType", bound=Table)
 
@@ -61,7 +61,7 @@ def _declares(table: Table, name: str) -> bool:
     return any(field.name == name for field in table.fields())
 
 
-def _undeclared(table: Table) -> dict[str, Any]:
+def _undeclared(table: Table) -> Tables:
     if isinstance(table, ElementTable):
         return {"kind": table.name, **table.parameters}
     kind = {"kind": table.kind} if table.kind else {}

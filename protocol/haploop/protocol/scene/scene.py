@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import field, replace
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from haploop.protocol.quantity import si
 from haploop.protocol.scene.effects import (
@@ -19,7 +18,7 @@ from haploop.protocol.scene.effects import (
 )
 from haploop.protocol.scene.estimators import Acceleration, Velocity
 from haploop.protocol.scene.hand_force import HandForce
-from haploop.protocol.scene.table import OpenTable, Table
+from haploop.protocol.scene.table import OpenTable, Table, Tables
 
 
 class Clock(Table):
@@ -91,14 +90,14 @@ class ElementTable(Table):
     parameters: dict[str, float] = field(default_factory=dict)
 
     @classmethod
-    def from_dict(cls, data: Mapping[str, Any]) -> ElementTable:
+    def from_dict(cls, data: Tables) -> ElementTable:
         """Makes it from ``{"kind": ..., "acts": ..., parameter: value, ...}``."""
         if isinstance(data, cls):
             return data
         parameters = {key: value for key, value in data.items() if key not in ("kind", "acts")}
         return cls(name=data["kind"], acts=data.get("acts", "in-contact"), parameters=parameters)
 
-    def as_dict(self) -> dict[str, Any]:
+    def as_dict(self) -> Tables:
         """Returns what ``from_dict`` takes."""
         if self.name == NO_ELEMENT:
             return {"kind": self.name}
@@ -150,6 +149,6 @@ class Scene(OpenTable):
         """Returns the scene with its events in order of time."""
         return replace(self, event=tuple(sorted(self.event, key=lambda event: event.at)))
 
-    def as_dict(self) -> dict[str, Any]:
+    def as_dict(self) -> Tables:
         """Returns the scene as nested dicts and lists, absent tables and empty lists left out."""
         return {key: value for key, value in super().as_dict().items() if value != []}

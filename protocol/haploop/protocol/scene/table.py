@@ -8,6 +8,9 @@ from functools import cache
 from types import UnionType
 from typing import Annotated, Any, ClassVar, Self, Union, dataclass_transform, get_args, get_origin, get_type_hints
 
+# Tables as plain dicts, as TOML and the wire hold them.
+Tables = dict[str, Any]
+
 
 @dataclass_transform(kw_only_default=True, frozen_default=True)
 @dataclasses.dataclass(kw_only=True, frozen=True)
@@ -85,7 +88,7 @@ class Table:
             given.pop("kind", None)
         return cls(**given)
 
-    def as_dict(self) -> dict[str, Any]:
+    def as_dict(self) -> Tables:
         """Returns the table as nested dicts and lists, absent keys left out, in the order of declaration."""
         written = {"kind": self.kind} if self.kind else {}
         for field in self.fields():
@@ -113,7 +116,7 @@ class OpenTable(Table):
         made = super().from_dict({key: value for key, value in data.items() if key not in others})
         return dataclasses.replace(made, others=others) if others else made
 
-    def as_dict(self) -> dict[str, Any]:
+    def as_dict(self) -> Tables:
         """Returns the table as ``Table.as_dict`` does, the keys of others last."""
         written = super().as_dict()
         return written | written.pop("others")

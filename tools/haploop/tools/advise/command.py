@@ -45,8 +45,8 @@ class Request:
 
 def advise(request: Request, as_json: bool) -> None:
     """Searches, writes the results into the directory and prints them."""
-    from haploop.launch.output import make_output
     from haploop.launch.scene.events import elements_of, try_out
+    from haploop.launch.spec import make_output
     from haploop.tools.advise.advice import advice
     from haploop.tools.advise.judge import Judge
     from haploop.tools.advise.subject import InvalidRequest, make_subject

@@ -6,10 +6,10 @@ import signal
 import sys
 from pathlib import Path
 
-from haploop.launch.output import make_output, write_scene
 from haploop.launch.processes import run_directory
 from haploop.launch.processes.children import interrupts
 from haploop.launch.processes.run_directory import LiveRun
+from haploop.launch.spec import make_output, write_scene
 from haploop.logger.books.buffers import TelemetryGap
 from haploop.logger.node import LoggerNode
 from haploop.logger.summary import Summary

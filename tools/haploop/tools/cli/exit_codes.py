@@ -28,10 +28,9 @@ def print_json(data: Any) -> None:
 def plain_errors() -> Iterator[None]:
     """Turns the errors of the packages below into messages: 2 for wrong use, 1 for a run that failed."""
     from haploop.controller.dissipation import ElementError, PluginError
-    from haploop.launch.output import OutputError
-    from haploop.launch.processes.control import CommandRefused
-    from haploop.launch.processes.run_directory import RunNotFound
+    from haploop.launch.processes.run_directory import CommandRefused, RunNotFound
     from haploop.launch.scene.mistakes import SceneError
+    from haploop.launch.spec import OutputError
     from haploop.logger.log import LogError
 
     try:

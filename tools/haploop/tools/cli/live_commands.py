@@ -15,7 +15,7 @@ from haploop.tools.cli.options import At, Json, Run, parse_assignments, parse_pa
 def status(run: Run = None, json: Json = False) -> None:
     """Show the live runs: every node, its tick, its lag, whom it waits for, what it skipped."""
     from haploop.launch.processes import run_directory
-    from haploop.launch.processes.control import ask
+    from haploop.launch.processes.run_directory import ask
 
     answers = {}
     with plain_errors():
@@ -39,7 +39,7 @@ def status(run: Run = None, json: Json = False) -> None:
 def _ask(run_id: str | None, as_json: bool, verb: str, **arguments: Any) -> None:
     """Has a live run do something and prints its answer."""
     from haploop.launch.processes import run_directory
-    from haploop.launch.processes.control import ask
+    from haploop.launch.processes.run_directory import ask
 
     with plain_errors():
         text, data = ask(run_directory.find(run_id), verb, **arguments)

@@ -39,8 +39,7 @@ class LiveRuns:
 
     def ask(self, run: LiveRun, verb: str, arguments: Message) -> tuple[str, Message]:
         """Has a run carry out a command."""
-        from haploop.launch.processes.control import CommandRefused, ask
-        from haploop.launch.processes.run_directory import RunNotFound
+        from haploop.launch.processes.run_directory import CommandRefused, RunNotFound, ask
         from haploop.view.receive.runs import CommandFailed
 
         try:

@@ -9,8 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from haploop.launch.scene.file import resolved
-from haploop.launch.scene.layers import Layers
-from haploop.launch.scene.overrides import key_path
+from haploop.launch.scene.layers import Layers, key_path
 from haploop.plant.sensing.encoder import accelerometer_is_used
 from haploop.protocol.scene.scene import Clock, Device, Scene
 from haploop.tools.cli.options import parse_assignments

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import IO
 from urllib.parse import quote
 
-from haploop.launch.output import OutputError
+from haploop.launch.spec import OutputError
 from haploop.logger.log.stream import LogStream, survey
 from haploop.tools.cli.exit_codes import FAILED, WRONG_USE, leave, plain_errors
 from haploop.tools.export.archives import JsonMcapWriter, NpzWriter

@@ -13,9 +13,8 @@ from typing import TYPE_CHECKING, Any
 from haploop.launch.batch.stacking import is_batchable
 from haploop.launch.scene.check import resolve
 from haploop.launch.scene.events import elements_of, try_out
-from haploop.launch.scene.layers import Layers
+from haploop.launch.scene.layers import Layers, key_path, lay_value
 from haploop.launch.scene.mistakes import Mistake, SceneError
-from haploop.launch.scene.overrides import key_path, lay_value
 from haploop.launch.scene.toml_writer import Lines, inline, lines_of, to_toml
 from haploop.logger.summary import Summary
 from haploop.protocol.scene.paths import value_at

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from haploop.launch.output import PLUGINS, OutputError, keep_plugin, kept_name, make_output
 from haploop.launch.processes.children import interrupts
+from haploop.launch.spec import PLUGINS, OutputError, keep_plugin, kept_name, make_output
 from haploop.logger.summary import write
 from haploop.tools.cli.exit_codes import FAILED, WRONG_USE, leave, plain_errors, print_json
 from haploop.tools.executor.executors import ExecutorError

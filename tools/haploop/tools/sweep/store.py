@@ -12,7 +12,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
-from haploop.launch.output import OutputError
+from haploop.launch.spec import OutputError
 from haploop.tools.sweep.table import BOUNDARY, CELL, PARTS, TABLE, Row, make_table, pyarrow
 
 LOCK = ".lock"

@@ -14,11 +14,10 @@ from pydantic_core import PydanticCustomError
 from haploop.launch.runs.loaded_scene import texts
 from haploop.launch.scene import file as scene_file
 from haploop.launch.scene.check import complain, resolve
-from haploop.launch.scene.layers import KeyPath, Layers, parse
+from haploop.launch.scene.layers import KeyPath, Layers, key_path, lay_overrides, parse
 from haploop.launch.scene.mistakes import COMMAND_LINE, Mistake, SceneError, nearest, shown
 from haploop.launch.scene.models import Model
 from haploop.launch.scene.number import Number, si
-from haploop.launch.scene.overrides import key_path, lay_overrides
 from haploop.launch.scene.schema import Schema, TomlSchema
 from haploop.protocol.quantity import Quantity
 from haploop.protocol.scene.scene import Scene
