@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple, TypedDict
 
 Verdict = Literal["holds", "holds under a stated assumption", "does not hold here"]
 HOLDS, ASSUMING, FAILS = "holds", "holds under a stated assumption", "does not hold here"
@@ -23,6 +23,7 @@ class Claim:
         quote: its words, shortened; what was left out or put in is in brackets or dots.
         name: by which its figure tests it.
         numbers, assumption: of a finding, with names in braces for what is computed.
+        tested: name by which the search of Fig. 7 tests it; "" where it does not.
     """
 
     place: str
@@ -30,6 +31,7 @@ class Claim:
     name: str = field(default="", compare=False)
     numbers: str = field(default="", compare=False, repr=False)
     assumption: str = field(default="", compare=False, repr=False)
+    tested: str = field(default="", compare=False, repr=False)
 
     def holds(self, numbers: str) -> Finding:
         """Finds that it holds, without any assumption beyond the paper's own words."""
@@ -43,12 +45,21 @@ class Claim:
         """Finds that it does not hold."""
         return Finding(self, FAILS, numbers)
 
-    def holds_if(self, is_so: bool, under_it: bool = False, **computed: Any) -> Finding:
+    def holds_if(self, is_so: bool, under_it: bool = False, /, **computed: Any) -> Finding:
         """Finds that it holds if ``is_so``, else that it holds under its assumption if ``under_it``, else neither."""
         numbers = self.numbers.format(**computed)
         if is_so:
             return self.holds(numbers)
         return self.assuming(self.assumption.format(**computed), numbers) if under_it else self.fails(numbers)
+
+
+class KeptFinding(TypedDict):
+    """A finding as it is kept beside its figure: with the name of the claim, whose words stay in their table."""
+
+    claim: str
+    verdict: Verdict
+    assumption: str
+    numbers: str
 
 
 @dataclass(frozen=True)
@@ -74,32 +85,52 @@ class Finding:
         if bool(self.assumption) != (self.verdict == ASSUMING):
             raise ValueError(f"An assumption belongs to the verdict {ASSUMING!r} and to no other.")
 
-    def as_dict(self) -> dict[str, Any]:
-        """Returns it as it is kept beside the figure: with the name of the claim, whose words stay in their table."""
-        kept = {"verdict": self.verdict, "assumption": self.assumption, "numbers": self.numbers}
-        return {"claim": self.claim.name, **kept}
+    def as_dict(self) -> KeptFinding:
+        """Returns it as it is kept."""
+        return {
+            "claim": self.claim.name,
+            "verdict": self.verdict,
+            "assumption": self.assumption,
+            "numbers": self.numbers,
+        }
 
     @classmethod
-    def from_dict(cls, kept: dict[str, Any], claims: Mapping[str, Claim]) -> Finding:
+    def from_dict(cls, kept: KeptFinding, claims: Mapping[str, Claim]) -> Finding:
         """Reads back what ``as_dict`` returned, given the claims by name."""
         return cls(claims[kept["claim"]], kept["verdict"], kept["numbers"], kept["assumption"])
 
 
+class _Part(NamedTuple):
+    """A figure, or the page, in ``figures.toml``."""
+
+    texts: dict[str, str]
+    claims: dict[str, Claim]
+    sections: dict[str, str]
+
+
+@cache
+def _parts() -> dict[str, _Part]:
+    read = tomllib.loads(Path(__file__).with_name("figures.toml").read_text(encoding="utf-8"))
+    return {
+        name: _Part(
+            {key: text for key, text in part.items() if isinstance(text, str)},
+            {key: Claim(name=key, **claim) for key, claim in part.get("claims", {}).items()},
+            part.get("sections", {}),
+        )
+        for name, part in read.items()
+    }
+
+
 def claims_of(figure: int) -> dict[str, Claim]:
     """Returns the claims that a figure tests, by name."""
-    return {name: Claim(name=name, **claim) for name, claim in _figures()[str(figure)]["claims"].items()}
+    return _parts()[str(figure)].claims
 
 
 def texts_of(part: int | Literal["page"]) -> dict[str, str]:
     """Returns title, caption and the other texts of a figure, with names in braces for what is computed."""
-    return {name: text for name, text in _figures()[str(part)].items() if isinstance(text, str)}
+    return _parts()[str(part)].texts
 
 
 def sections() -> dict[str, str]:
     """Returns the titles of the paper's sections, in its order."""
-    return _figures()["page"]["sections"]
-
-
-@cache
-def _figures() -> dict[str, Any]:
-    return tomllib.loads(Path(__file__).with_name("figures.toml").read_text(encoding="utf-8"))
+    return _parts()["page"].sections

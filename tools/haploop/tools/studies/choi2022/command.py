@@ -6,9 +6,8 @@ import json
 import shutil
 import sys
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 from haploop.tools.cli.exit_codes import WRONG_USE, leave, plain_errors
 from haploop.tools.figure.data import FigureError
@@ -16,7 +15,7 @@ from haploop.tools.render.progress import Stage, bars, silent
 from haploop.tools.render.terminal import markdown_table
 from haploop.tools.studies.choi2022.claims import ASSUMING, VERDICTS, Finding, claims_of, sections, texts_of
 from haploop.tools.studies.choi2022.figures import figure, numbers
-from haploop.tools.studies.choi2022.work import Work
+from haploop.tools.studies.choi2022.work import Kept, Work
 
 PAGE = "paper.md"
 
@@ -66,13 +65,13 @@ def write_page(directory: Path, target: Path | None = None, pictures: str = "") 
     return target
 
 
-def made(directory: Path) -> dict[int, dict[str, Any]]:
+def made(directory: Path) -> dict[int, Kept]:
     """Returns what the directory holds, by the number of the figure."""
     files = ((number, directory / f"figure_{number}.json") for number in numbers())
     return {number: json.loads(file.read_text(encoding="utf-8")) for number, file in files if file.exists()}
 
 
-def page(kept: dict[int, dict[str, Any]], pictures: str = "") -> str:
+def page(kept: Mapping[int, Kept], pictures: str = "") -> str:
     """Returns the page in Markdown: answers, the finding of every claim, then the figures."""
     claims = {number: claims_of(number) for number in kept}
     rows = [(number, Finding.from_dict(one, claims[number])) for number in kept for one in kept[number]["findings"]]
@@ -117,13 +116,13 @@ def _table(rows: list[tuple[int, Finding]]) -> str:
     return markdown_table(["the paper says", "here", "numbers", "figure"], cells)
 
 
-def _missing(kept: dict[int, dict[str, Any]]) -> list[str]:
+def _missing(kept: Mapping[int, Kept]) -> list[str]:
     """Names the figures that were not made, and how many claims they would test."""
     missing = [f"{number} ({len(figure(number).CLAIMS)} claims)" for number in numbers() if number not in kept]
     return [f"Not made here: figure {', '.join(missing)}."] if missing else []
 
 
-def _figure(number: int, one: dict[str, Any], pictures: str) -> list[str]:
+def _figure(number: int, one: Kept, pictures: str) -> list[str]:
     """Returns heading, pictures with what is seen on them, notes, and which files hold data and scenes."""
     shown = [name for name in one["files"] if name.endswith(".png")]
     others = ", ".join(f"`{name}`" for name in one["files"] if name not in shown)

@@ -1,18 +1,46 @@
-"""Drawings of several figures: a colour for each kind of element, momentum over velocity, and a press on a wall."""
+"""Drawings and tables of several figures: colours of elements, momentum over velocity, and what a search found."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, NamedTuple
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, TypedDict
 
 import numpy as np
 
-from haploop.tools.figure.style import ELEMENTS, FAINT, INK, TEXT, WALL, dress, legend
+from haploop.tools.figure.style import ELEMENTS, FAINT, INK, SMALL, TEXT, WALL, dress, empty_figure
+from haploop.tools.render.terminal import markdown_table
+from haploop.tools.search.random import Row
+from haploop.tools.studies.choi2022.interpretations import (
+    InterpretationSpace,
+    Option,
+    decider,
+    never_together,
+    percent,
+    share,
+    yes,
+)
 from haploop.tools.studies.choi2022.sampled import steps_J
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+
+class Inside(TypedDict):
+    """Keywords of a legend within the axes, on a ground that hides what is behind it."""
+
+    framealpha: float
+    edgecolor: str
+
+
+class UpperLeft(TypedDict):
+    """Keywords of a legend in the upper left corner."""
+
+    loc: str
+    bbox_to_anchor: tuple[float, float]
+    ncols: int
+
 
 COLOURS = {
     "nothing": FAINT,
@@ -29,9 +57,8 @@ SHORT = {
     "unidirectional-inertia": "unidirectional",
     "both": "damping and unidirectional",
 }
-# A legend within the axes, on a ground that hides what is behind it.
-INSIDE: dict[str, Any] = {"framealpha": 0.8, "edgecolor": "none"}
-UPPER_LEFT: dict[str, Any] = {"loc": "upper left", "bbox_to_anchor": (0.0, 1.0), "ncols": 1}
+INSIDE: Inside = {"framealpha": 0.8, "edgecolor": "none"}
+UPPER_LEFT: UpperLeft = {"loc": "upper left", "bbox_to_anchor": (0.0, 1.0), "ncols": 1}
 _TAKEN, _GIVEN = "#9FD3B0", "#E8A0A0"
 # Steps shorter than this share of all have no arrow.
 _ARROW = 0.04
@@ -67,46 +94,83 @@ def draw_momentum(ax: Axes, v_m_s: np.ndarray, mass_kg: float, title: str) -> No
     dress(ax, title, "velocity v[k−1] (mm/s)", "momentum m v[k] (g mm/s)")
 
 
-class Press(NamedTuple):
-    """The signals of a run that presses on a wall.
+def claims_table(
+    claims: Mapping[str, str],
+    alone: Mapping[str, Row],
+    shares: Mapping[str, Sequence[Row]],
+    found: Sequence[Option],
+    decided: str,
+) -> str:
+    """Returns a table with a row a claim: where it holds, how often, and what decides it.
 
-    Attributes:
-        t_s: of the ticks.
-        origin_N, element_N, output_N: force of the wall's spring, of all elements, and their sum.
-        displayed_N_m: output over penetration, NaN outside the wall (Choi et al. 2022, V.B.2).
+    Args:
+        claims: what is tested, by name.
+        alone: interpretations with a column of yes or no, by heading.
+        shares: sets of interpretations with a column of shares, by heading.
+        found: options that may decide.
+        decided: heading of the column of options.
     """
-
-    t_s: np.ndarray
-    origin_N: np.ndarray
-    element_N: np.ndarray
-    output_N: np.ndarray
-    displayed_N_m: np.ndarray
-
-    @classmethod
-    def from_log(cls, scene: dict[str, Any], log: Any) -> Press:
-        """Takes it from a run's scene and log."""
-        ticks = log["/controller"]
-        depth = scene["wall"]["position"] - np.asarray(ticks["x"])
-        wall, total = np.asarray(ticks["wall"]), np.asarray(ticks["total"])
-        inside = np.asarray(ticks["in_contact"]) > 0
-        displayed = np.full(len(depth), np.nan)
-        displayed[inside] = total[inside] / depth[inside]
-        return cls(np.arange(len(depth)) / scene["clock"]["control_rate"], wall, total - wall, total, displayed)
-
-    def columns(self, prefix: str) -> dict[str, np.ndarray]:
-        """Returns the data beside the figure; outside the wall the displayed stiffness is 0."""
-        named = self._asdict() | {"displayed_N_m": np.nan_to_num(self.displayed_N_m)}
-        return {f"{prefix}_{name}": column for name, column in named.items()}
+    rows = []
+    for name, about in claims.items():
+        decides = decider(found, name)
+        rows.append(
+            [
+                f"*{name}*",
+                about,
+                *(yes(row, name) for row in alone.values()),
+                *(percent(share(some, name)) for some in shares.values()),
+                decides.describe(name) if decides else "",
+            ]
+        )
+    return markdown_table(
+        ["claim", "as tested", *alone, *shares, decided],
+        rows,
+        numbers=range(2 + len(alone), 2 + len(alone) + len(shares)),
+    )
 
 
-def draw_press(forces: Axes, stiffness: Axes, press: Press, heading: str, wanted_N_m: float) -> None:
-    """Draws forces and displayed stiffness as in the paper's Figs. 9 and 12, one above the other."""
-    forces.plot(press.t_s, press.output_N, color=INK, linewidth=0.9, label="output")
-    forces.plot(press.t_s, press.origin_N, color=WALL, linewidth=0.9, label="wall spring")
-    forces.plot(press.t_s, press.element_N, color=ELEMENTS[0], linewidth=0.9, label="elements")
-    dress(forces, heading, "", "force (N)")
-    stiffness.plot(press.t_s, press.displayed_N_m / 1e3, ".", color=INK, markersize=2.0)
-    stiffness.axhline(wanted_N_m / 1e3, color=WALL, linewidth=1.0, label="asked for")
-    dress(stiffness, "", "time (s)", "displayed stiffness (N/mm)")
-    stiffness.set_ylim(-0.5 * wanted_N_m / 1e3, 2.5 * wanted_N_m / 1e3)
-    legend(stiffness)
+def by_number_of_claims(rows: Sequence[Row], claims: int) -> str:
+    """Returns how many interpretations have how many of the claims: ``"3 of 13: 20, 2 of 13: 7"``."""
+    holding = Counter(row["holding"] for row in rows)
+    return ", ".join(f"{count} of {claims}: {holding[count]}" for count in sorted(holding, reverse=True))
+
+
+def pairs_never_together(rows: Sequence[Row], claims: Sequence[str]) -> str:
+    """Returns ``never_together`` in words; empty if there are none."""
+    return "; ".join(f"*{first}* and *{second}*" for first, second in never_together(rows, claims))
+
+
+def list_of_choices(space: InterpretationSpace) -> str:
+    """Returns a list item for each choice with its options."""
+    return "\n".join(
+        f"- {space.label(key)}: {', '.join(space.value(key, option) for option in some)}"
+        for key, some in space.choices.items()
+    )
+
+
+def share_map(found: Sequence[Option], claims: Sequence[str], count: int) -> Figure:
+    """Draws a row an option, a column a claim, the share of interpretations as colour and number."""
+    shares = np.array([[option.share(claim) for claim in claims] for option in found])
+    starts = [i == 0 or option.dimension != found[i - 1].dimension for i, option in enumerate(found)]
+    figure = empty_figure(11.5, 2.0 + 0.2 * len(found))
+    ax = figure.subplots()
+    ax.pcolormesh(shares, cmap="YlGnBu", vmin=0.0, vmax=1.0, edgecolors="white", linewidth=0.5)
+    for (row, column), value in np.ndenumerate(shares):
+        text = percent(float(value)).removesuffix(" %")
+        colour = "white" if value > 0.55 else INK
+        ax.text(column + 0.5, row + 0.5, text, ha="center", va="center", fontsize=SMALL - 1, color=colour)
+    ax.set_xticks(np.arange(len(claims)) + 0.5, claims, rotation=40, ha="left", fontsize=SMALL)
+    ax.xaxis.tick_top()
+    names = [
+        f"{option.dimension}: {option.name}" if start else option.name
+        for option, start in zip(found, starts, strict=True)
+    ]
+    ax.set_yticks(np.arange(len(found)) + 0.5, names, fontsize=SMALL)
+    ax.invert_yaxis()
+    for i in np.flatnonzero(starts)[1:]:
+        ax.axhline(i, color=INK, linewidth=0.7)
+    ax.tick_params(length=0)
+    for spine in ax.spines.values():
+        spine.set_visible(False)
+    ax.set_xlabel(f"% of {count} random interpretations under which the claim holds", fontsize=TEXT, color=INK)
+    return figure

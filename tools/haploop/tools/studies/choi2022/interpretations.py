@@ -1,13 +1,13 @@
 """Interpretations of a paper: one choice for everything that it leaves open, and for which of them its claims hold.
 
 A table of interpretations has a row each: its choices and numbers by key, and by name of each claim how far it falls
-short of it, 0.0 where the claim holds.
+short of it, 0.0 where the claim holds; ``all``, ``holding`` and ``distance`` sum that up (``summed_up``).
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any, Generic, TypeVar
@@ -15,12 +15,16 @@ from typing import Any, Generic, TypeVar
 import numpy as np
 
 from haploop.tools.render.units import amount
-from haploop.tools.search.random import Space
+from haploop.tools.search import random
+from haploop.tools.search.random import Effort, Evaluate, Group, Row, Space, random_search
+from haploop.tools.studies.choi2022.work import Work
 
-Row = Mapping[str, Any]
 Nearest = TypeVar("Nearest")
+SEED = 2022
 # An option with fewer interpretations says nothing.
 _FEWEST = 20
+# What falls short of a claim counts for no more than this: a factor of 20.
+MOST = 3.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -62,12 +66,47 @@ class Found(Generic[Nearest]):
         nearest: the interpretation nearest to the paper.
     """
 
-    rows: list[dict[str, Any]]
+    rows: list[Row]
     nearest: Nearest
 
-    def of(self, stage: str) -> list[dict[str, Any]]:
+    def of(self, stage: str) -> list[Row]:
         """Returns the rows of a stage."""
         return [row for row in self.rows if row["stage"] == stage]
+
+
+def searched(
+    work: Work,
+    space: Space,
+    evaluate: Evaluate,
+    effort: Effort,
+    tie: Callable[[Row], float] = lambda _: 0.0,
+) -> random.Found:
+    """Searches for the interpretation nearest to the paper with the fixed seed.
+
+    The same effort gives the same rows, whatever the number of workers.
+    """
+
+    def distance(row: Row) -> float:
+        return row["distance"]
+
+    def evaluate_all(stage: str, evaluate: Evaluate, groups: Sequence[Group]) -> list[list[Row]]:
+        return work.map_parallel(f"{stage} interpretations, in groups", evaluate, groups)
+
+    return random_search(space, evaluate, effort, seed=SEED, distance=distance, tie=tie, evaluate_all=evaluate_all)
+
+
+def summed_up(shortfalls: Mapping[str, float], claims: Iterable[str], apart: float = 0.0) -> Row:
+    """Returns the last columns of a row: whether a claim fails, how many hold, and the distance from the paper.
+
+    Args:
+        shortfalls: by name of the claim.
+        claims: those that count.
+        apart: distance beyond the shortfalls.
+    """
+    counted = [shortfalls[name] for name in claims]
+    holding = sum(short == 0.0 for short in counted)
+    distance = apart + sum(min(MOST, short) for short in counted)
+    return {"all": float(holding < len(counted)), "holding": holding, "distance": distance}
 
 
 def holds(row: Row, claim: str) -> bool:
@@ -158,8 +197,8 @@ def decider(found: Iterable[Option], claim: str) -> Decider | None:
 
 def never_together(rows: Sequence[Row], claims: Sequence[str]) -> list[tuple[str, str]]:
     """Returns the pairs of claims that each hold somewhere, and nowhere both."""
-    table = np.array([[holds(row, name) for name in claims] for row in rows], bool)
-    both = table.T.astype(int) @ table.astype(int)
+    table = np.array([[holds(row, name) for name in claims] for row in rows], int)
+    both = table.T @ table
     return [
         (first, second)
         for i, first in enumerate(claims)

@@ -1,27 +1,50 @@
-"""A figure in the making, and the files it leaves: pictures, data, scenes and findings."""
+"""A figure in the making: the runs of the program behind it, and the files it leaves."""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping, Sequence
+from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, NamedTuple, TypedDict, TypeVar
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from haploop.controller.dissipation import registry
+from haploop.launch.runs.in_process import run_in_process
+from haploop.launch.scene.file import load
 from haploop.launch.scene.toml_writer import to_toml
+from haploop.logger.log.recording import MemoryLog, Recording
+from haploop.logger.summary import Summary
+from haploop.protocol.scene.scene import Hand, Scene, Wall
+from haploop.tools.cost.grid import scenes_folder
 from haploop.tools.executor.executors import make_executor, map_parallel
 from haploop.tools.executor.pool import Pool
 from haploop.tools.figure.style import write_figure
 from haploop.tools.render.progress import Stage, silent
-from haploop.tools.studies.choi2022.claims import Finding, texts_of
+from haploop.tools.studies.choi2022.claims import Finding, KeptFinding, texts_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 Item = TypeVar("Item")
 Answer = TypeVar("Answer")
+_LAST_S = 0.5
+
+
+class Kept(TypedDict):
+    """What the page needs of a figure, as figure_N.json holds it."""
+
+    number: int
+    title: str
+    answer: str
+    caption: str
+    seen: dict[str, str]
+    small: bool
+    files: list[str]
+    findings: list[KeptFinding]
+    notes: list[str]
 
 
 class Work:
@@ -58,10 +81,10 @@ class Work:
         with make_executor(self.workers) as executor:
             return map_parallel(executor, call, items, self.stage(name, len(items)))
 
-    def run_all(self, name: str, scenes: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
+    def run_all(self, name: str, scenes: Sequence[Scene]) -> list[Summary]:
         """Returns the results of scenes without their energy books, in their order."""
         advance = self.stage(name, len(scenes))
-        found: dict[int, dict[str, Any]] = {}
+        found: dict[int, Summary] = {}
         with Pool(self.workers) as pool:
             for index, result in pool.results(scenes, energy=False):
                 found[index] = result
@@ -74,7 +97,7 @@ class Work:
             self._files.append(name)
         return self.out / name
 
-    def tell(self, name: str, **computed: Any) -> str:
+    def tell(self, name: str, /, **computed: Any) -> str:
         """Returns one of the texts with what was computed in the place of names in braces."""
         return self.texts[name].format(**computed)
 
@@ -87,18 +110,18 @@ class Work:
         write_figure(figure, self.path(f"{name}.png"))
         self._seen[f"{name}.png"] = seen
 
-    def data(self, name: str, columns: Mapping[str, Any]) -> None:
+    def data(self, name: str, columns: Mapping[str, ArrayLike]) -> None:
         """Writes arrays by name; the unit stands at the end of each name."""
-        arrays: dict[str, Any] = {key: np.asarray(value) for key, value in columns.items()}
-        np.savez_compressed(self.path(f"{name}.npz"), **arrays)
+        arrays = {key: np.asarray(value) for key, value in columns.items()}
+        np.savez_compressed(self.path(f"{name}.npz"), allow_pickle=True, **arrays)
 
-    def scene(self, name: str, scene: dict[str, Any]) -> None:
+    def scene(self, name: str, scene: Scene) -> None:
         """Writes a resolved scene that runs by itself."""
-        self.text(f"{name}.toml", to_toml(scene))
+        self.text(f"{name}.toml", to_toml(scene.as_dict()))
 
     def keep(self, findings: Sequence[Finding]) -> None:
         """Writes what the page needs: figure_N.json."""
-        kept = {
+        kept: Kept = {
             "number": self.number,
             "title": self.texts["title"],
             "answer": self.answer,
@@ -111,3 +134,64 @@ class Work:
         }
         text = json.dumps(kept, indent=2, ensure_ascii=False) + "\n"
         (self.out / f"figure_{self.number}.json").write_text(text, encoding="utf-8")
+
+
+@cache
+def shipped(name: str) -> Scene:
+    """Returns a scene that comes with haploop, by the name of its file."""
+    return load(scenes_folder() / name)
+
+
+def fig6(panel: str) -> Scene:
+    """Returns the scene of a panel of Fig. 6, "a", "b" or "c", in our interpretation."""
+    return shipped(f"fig6{panel}.toml")
+
+
+def wall_of(scene: Scene) -> Wall:
+    """Returns the wall of a scene that is known to have one."""
+    assert scene.wall
+    return scene.wall
+
+
+def hand_of(scene: Scene) -> Hand:
+    """Returns the hand of a scene that is known to have one."""
+    assert scene.hand
+    return scene.hand
+
+
+class Run(NamedTuple):
+    """A run in this process: its resolved scene, its summary, and its log by channel."""
+
+    scene: Scene
+    summary: Summary
+    log: Recording
+
+
+def run(scene: Scene) -> Run:
+    """Runs a resolved scene in this process."""
+    memory = MemoryLog()
+    summary = run_in_process(scene, registry(), memory=memory)
+    return Run(scene, summary, memory.recording())
+
+
+def spectrum(log: Recording) -> tuple[np.ndarray, np.ndarray]:
+    """Returns frequencies in Hz and amplitudes in m of the position in the last half second, its trend taken out."""
+    t, x = log["/plant"]["t"], log["/plant"]["x"]
+    last = t >= t[-1] - _LAST_S
+    t, x = t[last], x[last]
+    x = x - np.polyval(np.polyfit(t - t[0], x, 1), t - t[0])
+    window = np.hanning(len(x))
+    amplitudes = np.abs(np.fft.rfft(x * window)) / window.sum() * 2.0 * np.sqrt(2.0 / 3.0)
+    return np.fft.rfftfreq(len(x), t[1] - t[0]), amplitudes
+
+
+def strongest_Hz(log: Recording) -> float:
+    """Returns the frequency of the largest swing."""
+    frequencies, amplitudes = spectrum(log)
+    return float(frequencies[np.argmax(amplitudes[1:]) + 1])
+
+
+def faster_m(log: Recording, frequency_Hz: float) -> float:
+    """Returns the root mean square of what of the position is faster than a frequency."""
+    frequencies, amplitudes = spectrum(log)
+    return float(np.sqrt((amplitudes[frequencies > frequency_Hz] ** 2).sum() / 2.0))

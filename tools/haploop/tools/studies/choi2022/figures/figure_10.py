@@ -2,27 +2,26 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from haploop.tools.figure.style import FAINT, GREY, dress, empty_figure, legend, plain_numbers
+from haploop.logger.summary import Summary
+from haploop.tools.figure.style import ELEMENTS, FAINT, GREY, dress, empty_figure, legend, plain_numbers
 from haploop.tools.render.units import amount
 from haploop.tools.studies.choi2022.claims import Finding, claims_of
-from haploop.tools.studies.choi2022.drawing import COLOURS, INSIDE, SHORT, UPPER_LEFT
-from haploop.tools.studies.choi2022.experiment.limits import swings_at_Hz
-from haploop.tools.studies.choi2022.experiment.measure import LOW_KG
-from haploop.tools.studies.choi2022.experiment.setup import KINDS, Setup, elements_of
-from haploop.tools.studies.choi2022.experiment.tuning import FELT_M, STIFFNESSES, Range, ranges
-from haploop.tools.studies.choi2022.experiment.verdicts import nearest, verdict_under_assumptions
-from haploop.tools.studies.choi2022.gate import (
+from haploop.tools.studies.choi2022.device import KINDS, Setup, elements_of
+from haploop.tools.studies.choi2022.drawing import COLOURS, INSIDE, SHORT, UPPER_LEFT, legend_of_colours
+from haploop.tools.studies.choi2022.experiment import findings, nearest
+from haploop.tools.studies.choi2022.experiment_measure import DAMPINGS, LOW_KG, MASSES, is_steady, largest
+from haploop.tools.studies.choi2022.theory import (
     DELAYS_S,
     FREQUENCIES_HZ,
     OLD_S,
     always_open_Hz,
     damps,
     felt_with,
-    gate_figure,
+    swings_at_Hz,
 )
 from haploop.tools.studies.choi2022.work import Work
 
@@ -31,25 +30,68 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 CLAIMS = claims_of(10)
+# From 2.5 N/mm in steps of 0.5 (Choi et al. 2022, V.B.3), to where nothing is steady any more.
+STIFFNESSES = np.arange(2500.0, 8001.0, 500.0)
+# Felt by a hand at 100 Hz, between 8.5 um at 20 Hz and 0.06 um at 320 Hz in logarithms (Israr, Choi and Tan 2006).
+FELT_M = 0.5e-6
+_DAMPS = {
+    "both drive": "#F0F0F0",
+    "bidirectional damps, unidirectional drives": COLOURS["bidirectional-inertia"],
+    "unidirectional damps, bidirectional drives": COLOURS["unidirectional-inertia"],
+    "both damp": "#DDEBF5",
+}
 
 
 def make(work: Work) -> list[Finding]:
     """Draws the ranges, and the gate of eq. 9."""
     setup = nearest(work)
     stiffnesses = STIFFNESSES[::4] if work.small else STIFFNESSES
-    found = ranges(work, setup, stiffnesses)
+    found = _ranges(work, setup, stiffnesses)
     work.figure(_draw(found, stiffnesses), "figure_10", work.tell("seen"))
-    work.figure(gate_figure(setup), "figure_10_gate", work.tell("seen_gate"))
+    work.figure(_gate(setup), "figure_10_gate", work.tell("seen_gate"))
     columns = {"stiffness_N_m": stiffnesses}
     for kind, one in found.items():
         columns |= {f"{kind}_size_N_s_m_or_kg": one.sizes, f"{kind}_steady": one.steady}
     work.data("figure_10", columns)
     work.scene("figure_10", setup.scene(4500.0, elements_of(KINDS[3], 0.009)))
     work.notes = [_why(work, setup), _felt(work, found)]
-    most = {kind: one.largest(stiffnesses) for kind, one in found.items()}
-    largest = ", ".join(f"{SHORT[kind]} {stiffness / 1e3:.1f}" for kind, stiffness in most.items())
-    work.answer = work.tell("answer", sizes=len(found[KINDS[1]].sizes), largest=largest)
-    return _findings(work, found, stiffnesses, most, largest)
+    most = {kind: largest(one.steady, stiffnesses) for kind, one in found.items()}
+    reached = ", ".join(f"{SHORT[kind]} {stiffness / 1e3:.1f}" for kind, stiffness in most.items())
+    work.answer = work.tell("answer", sizes=len(found[KINDS[1]].sizes), largest=reached)
+    return _findings(work, found, stiffnesses, most, reached)
+
+
+class Range(NamedTuple):
+    """The range of one element.
+
+    Attributes:
+        sizes: N s/m or kg, shape (sizes,).
+        steady: shape (stiffnesses, sizes).
+        swings_m: peak to peak of the position over the last half second; infinite where the run broke off.
+    """
+
+    sizes: np.ndarray
+    steady: np.ndarray
+    swings_m: np.ndarray
+
+
+def _ranges(work: Work, setup: Setup, stiffnesses: np.ndarray) -> dict[str, Range]:
+    """Returns the ranges of nothing and of the three elements, one at a time."""
+    step = 6 if work.small else 1
+    sizes = {KINDS[0]: np.zeros(1), KINDS[1]: DAMPINGS[::step], KINDS[2]: MASSES[::step], KINDS[3]: MASSES[::step]}
+    cells = [(kind, k, float(size)) for kind in KINDS for k in stiffnesses for size in sizes[kind]]
+    results = work.run_all("stable ranges", [setup.scene(k, elements_of(kind, size)) for kind, k, size in cells])
+    found = {}
+    for kind, of_kind in sizes.items():
+        here = [result for cell, result in zip(cells, results, strict=True) if cell[0] == kind]
+        shape = len(stiffnesses), len(of_kind)
+        steady, swings_m = (np.reshape([of(result) for result in here], shape) for of in (is_steady, _swing_m))
+        found[kind] = Range(of_kind, steady, swings_m)
+    return found
+
+
+def _swing_m(result: Summary) -> float:
+    return result["window"]["oscillation_m"] if "window" in result else np.inf
 
 
 def _draw(found: dict[str, Range], stiffnesses: np.ndarray) -> Figure:
@@ -75,7 +117,7 @@ def _cells(ax: Axes, one: Range, stiffnesses: np.ndarray, kind: str) -> None:
     unit, label = (1.0, "damping (N s/m)") if kind == "damping" else (1e3, "inertia (g)")
     ax.plot(*_points(unit * one.sizes, stiffnesses, ~one.steady), ".", color=FAINT, markersize=2.5)
     _marks(ax, unit * one.sizes, stiffnesses, one.steady, COLOURS[kind], "")
-    most = one.largest(stiffnesses)
+    most = largest(one.steady, stiffnesses)
     _dress(
         ax, f"{SHORT[kind]}: up to {most / 1e3:.1f} N/mm", label, "wall stiffness (N/mm)" if kind == KINDS[1] else ""
     )
@@ -138,7 +180,7 @@ def _bands(codes: np.ndarray, code: int) -> str:
 
 
 def _findings(
-    work: Work, found: dict[str, Range], stiffnesses: np.ndarray, most: dict[str, float], largest: str
+    work: Work, found: dict[str, Range], stiffnesses: np.ndarray, most: dict[str, float], reached: str
 ) -> list[Finding]:
     damping, two, one = (found[kind].steady for kind in KINDS[1:])
     sizes = damping.sum(axis=1)
@@ -147,23 +189,52 @@ def _findings(
     cells = np.array([two & ~one, one & ~two, two & one])
     low = cells[:, :, found[KINDS[2]].sizes <= LOW_KG].sum(axis=(1, 2))
     wider = one.sum() > two.sum() and most[KINDS[3]] > most[KINDS[2]]
-    computed: dict[str, Any] = {
+    computed = {
         "sizes": damping.shape[1],
         "widths": widths or "none",
-        "largest": largest,
+        "largest": reached,
         "one": one.sum(),
         "two": two.sum(),
         "all": "{}, {}, {} runs".format(*cells.sum(axis=(1, 2))),
         "low_g": 1e3 * LOW_KG,
         "low": "{}, {}, {}".format(*low),
     }
-    return [
-        verdict_under_assumptions(work, CLAIMS[name], bool(is_so), tested, **computed)
-        for name, is_so, tested in (
-            ("wide", shrinks, "10 narrows"),
-            ("damping", abs(most[KINDS[1]] - 4500.0) <= 500.0, "10 damping 4.5"),
-            ("similar", abs(most[KINDS[2]] - 4500.0) <= 500.0, "10 bidirectional 4.5"),
-            ("larger", wider, "10 larger"),
-            ("exclusive", (low[:2] > 0).all() and low[2] == 0, "10 exclusive"),
-        )
-    ]
+    near = {kind: abs(most[kind] - 4500.0) <= 500.0 for kind in KINDS[1:3]}
+    holding = {
+        "wide": shrinks,
+        "damping": near[KINDS[1]],
+        "similar": near[KINDS[2]],
+        "larger": bool(wider),
+        "exclusive": bool((low[:2] > 0).all() and low[2] == 0),
+    }
+    return findings(work, CLAIMS, holding, **computed)
+
+
+def _gate(setup: Setup) -> Figure:
+    """Draws felt damping and mass over frequency with a setup, and who damps over frequency and delay."""
+    figure = empty_figure(13.0, 7.0)
+    axes = figure.subplots(2, 2)
+    two, one = felt_with(setup, FREQUENCIES_HZ)
+    damping, mass = axes[0]
+    for ax, name, label in ((damping, "damping", "felt damping / (m w)"), (mass, "mass", "felt mass / m")):
+        ax.plot(FREQUENCIES_HZ, getattr(two, name), color=COLOURS["bidirectional-inertia"], label="bidirectional")
+        ax.plot(FREQUENCIES_HZ, getattr(one, name), color=COLOURS["unidirectional-inertia"], label="unidirectional")
+        ax.axhline(0.0, color=GREY, linewidth=0.6)
+        dress(ax, f"felt {name}", "frequency (Hz)", label)
+    mass.plot(FREQUENCIES_HZ, one.duty, ":", color=ELEMENTS[3], linewidth=0.9, label="gate open, share")
+    legend(damping)
+    legend(mass)
+    _who(axes[1, 0], 0.0, "who damps: an ideal accelerometer")
+    _who(axes[1, 1], OLD_S, f"who damps: a reading {1e3 * OLD_S:.2f} ms old")
+    legend_of_colours(figure, _DAMPS)
+    return figure
+
+
+def _who(ax: Axes, reading_s: float, heading: str) -> None:
+    from matplotlib.colors import ListedColormap
+
+    reach = (FREQUENCIES_HZ[0], FREQUENCIES_HZ[-1], 0.0, 1e3 * DELAYS_S[-1])
+    colours = {"cmap": ListedColormap(list(_DAMPS.values())), "vmin": -0.5, "vmax": 3.5, "interpolation": "nearest"}
+    ax.imshow(damps(reading_s), origin="lower", aspect="auto", extent=reach, **colours)
+    dress(ax, heading, "frequency (Hz)", "extra delay (ms)")
+    ax.grid(visible=False)

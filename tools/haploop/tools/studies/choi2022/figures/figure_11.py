@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from haploop.tools.figure.style import INK, SMALL, dress, empty_figure
 from haploop.tools.studies.choi2022.claims import Finding, claims_of
-from haploop.tools.studies.choi2022.experiment.measure import is_steady
-from haploop.tools.studies.choi2022.experiment.setup import both
-from haploop.tools.studies.choi2022.experiment.verdicts import nearest, verdict_under_assumptions
+from haploop.tools.studies.choi2022.device import both
+from haploop.tools.studies.choi2022.experiment import findings, nearest
+from haploop.tools.studies.choi2022.experiment_measure import is_steady
 from haploop.tools.studies.choi2022.work import Work
 
 CLAIMS = claims_of(11)
@@ -52,7 +50,7 @@ def make(work: Work) -> list[Finding]:
     most, alone, damped = float(largest[i, j]), float(largest[0].max()), float(largest[:, 0].max())
     bears = np.flatnonzero(largest[0, 1:]) + 1
     helped = int((largest[1:, bears].max(axis=0) >= largest[0, bears] + 500.0).sum())
-    computed: dict[str, Any] = {
+    computed = {
         "most": most / 1e3,
         "damping": dampings[i],
         "mass_g": 1e3 * masses[j],
@@ -67,14 +65,8 @@ def make(work: Work) -> list[Finding]:
         and 0.5 <= masses[j] / PAPER_MASS_KG <= 2.0
     )
     work.answer = work.tell("answer", **computed)
-    return [
-        verdict_under_assumptions(work, CLAIMS[name], is_so, tested, **computed)
-        for name, is_so, tested in (
-            ("most", near, "11 up to 6.3"),
-            ("more", most > max(alone, damped), "11 more"),
-            ("step", helped == len(bears), ""),
-        )
-    ]
+    holding = {"most": near, "more": most > max(alone, damped), "step": helped == len(bears)}
+    return findings(work, CLAIMS, holding, **computed)
 
 
 def largest_steady(steady: np.ndarray, stiffnesses: np.ndarray) -> np.ndarray:

@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from typing import Any
+from dataclasses import replace
 
 import numpy as np
 
+from haploop.protocol.scene.hand_force import Constant, Trace
 from haploop.tools.figure.style import SMALL, WALL_FILL, dress, empty_figure
 from haploop.tools.render.units import amount
 from haploop.tools.studies.choi2022.claims import Finding, claims_of
+from haploop.tools.studies.choi2022.device import KINDS
 from haploop.tools.studies.choi2022.drawing import COLOURS
-from haploop.tools.studies.choi2022.experiment.setup import KINDS
-from haploop.tools.studies.choi2022.experiment.verdicts import verdict_under_assumptions
+from haploop.tools.studies.choi2022.experiment import findings
 from haploop.tools.studies.choi2022.figures.figure_12 import best_pair
-from haploop.tools.studies.choi2022.scenes import run
-from haploop.tools.studies.choi2022.work import Work
+from haploop.tools.studies.choi2022.work import Work, hand_of, run
 
 CLAIMS = claims_of(13)
 # The person lets go at this time, so that the contact has an end.
@@ -24,14 +24,14 @@ _EDGE_S = 0.06
 
 def make(work: Work) -> list[Finding]:
     """Runs a press of half a second with the best pair, after which the hand pulls back."""
-    scene, _ = best_pair(work)
-    push = scene["hand"]["force"]["value"]
-    times = [0.0, _RELEASED_S, _RELEASED_S + 0.05]
-    scene["hand"]["force"] = {"kind": "trace", "time": times, "force": [push, push, _PULL_N]}
-    _, log = run(scene)
-    energy = log["/energy"]
-    t = np.asarray(log["/controller"]["timestamp"])
-    inside = np.asarray(log["/controller"]["in_contact"]) > 0
+    pressed = best_pair(work).scene
+    hand = hand_of(pressed)
+    assert isinstance(hand.force, Constant)
+    push = hand.force.value
+    force = Trace(time=(0.0, _RELEASED_S, _RELEASED_S + 0.05), force=(push, push, _PULL_N))
+    scene = replace(pressed, hand=replace(hand, force=force))
+    log = run(scene).log
+    energy, t, inside = log["/energy"], log["/controller"]["timestamp"], log["/controller"]["in_contact"] > 0
     books = {
         kind: np.asarray([energy[f"{name}.{kind}"] for name in ("damping", KINDS[3])]) for kind in ("sampled", "true")
     }
@@ -60,15 +60,19 @@ def _findings(work: Work, sampled: np.ndarray, true: np.ndarray, t: np.ndarray, 
     shares = flows[:, edge].sum(axis=1) / np.where(took == 0.0, 1.0, took)
     middle = flows[:, ~edge].sum(axis=1)
     both = {"damping": took[0], "inertia": took[1], "true_damping": left[0], "true_inertia": left[1]}
-    computed: dict[str, Any] = {name: amount(float(energy), "J") for name, energy in both.items()} | {
-        "edge_ms": 1e3 * _EDGE_S,
-        "shares": f"damping {100 * shares[0]:.0f} %, inertia {100 * shares[1]:.0f} %",
-        "between": f"damping {amount(float(middle[0]), 'J')}, inertia {amount(float(middle[1]), 'J')}",
+    computed = {name: amount(float(energy), "J") for name, energy in both.items()}
+    holding = {
+        "larger": bool(took[1] > took[0] or left[1] > left[0]),
+        "ends": bool(shares[0] > 0.8),
+        "middle": bool(middle[1] > abs(middle[0])),
     }
-    more = "" if took[1] > took[0] else "; by the true books, not by the sampled ones that the paper has"
-    larger = bool(took[1] > took[0] or left[1] > left[0])
-    return [
-        verdict_under_assumptions(work, CLAIMS["larger"], larger, "13 more", more, **computed),
-        verdict_under_assumptions(work, CLAIMS["ends"], bool(shares[0] > 0.8), **computed),
-        verdict_under_assumptions(work, CLAIMS["middle"], bool(middle[1] > abs(middle[0])), **computed),
-    ]
+    return findings(
+        work,
+        CLAIMS,
+        holding,
+        books="" if took[1] > took[0] else "; by the true books, not by the sampled ones that the paper has",
+        edge_ms=1e3 * _EDGE_S,
+        shares=f"damping {100 * shares[0]:.0f} %, inertia {100 * shares[1]:.0f} %",
+        between=f"damping {amount(float(middle[0]), 'J')}, inertia {amount(float(middle[1]), 'J')}",
+        **computed,
+    )

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import product
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, TypedDict
 
 import numpy as np
 
 from haploop.tools.figure.style import INK, SMALL, dress, empty_figure
 from haploop.tools.render.terminal import markdown_table
 from haploop.tools.studies.choi2022.claims import Finding, claims_of
+from haploop.tools.studies.choi2022.device import KINDS, Setup, elements_of
 from haploop.tools.studies.choi2022.drawing import COLOURS, SHORT, legend_of_colours
-from haploop.tools.studies.choi2022.experiment.limits import Best, limits
-from haploop.tools.studies.choi2022.experiment.setup import KINDS, Setup, elements_of
+from haploop.tools.studies.choi2022.theory import Best, limits
 from haploop.tools.studies.choi2022.work import Work
 
 if TYPE_CHECKING:
@@ -30,26 +31,34 @@ _BASE = Setup(
 )  # fmt: skip
 # By less than this nobody wins: the gated map's limits are known to some 2 %.
 DRAW = 1.05
-Drive = tuple[str, dict[str, Any]]
-# Beside mode and delay these decide: where the masses sit, and how old the reading is.
-DRIVES: tuple[Drive, ...] = (
-    ("rotor against the rest, ideal unit", {"near_share": 0.055, "unit": "ideal", "mount": "motor"}),
-    ("near mass 0.3, ideal unit", {"near_share": 0.3, "unit": "ideal", "mount": "motor"}),
-    ("near mass 0.3, unit of 420 Hz and 1 ms", {"near_share": 0.3, "unit": "420 Hz", "mount": "motor"}),
-    ("halves, unit on the far one, 420 Hz and 1 ms", {"near_share": 0.45, "unit": "420 Hz", "mount": "tip"}),
-)
+
+
+class Drive(TypedDict):
+    """What tells a drive from ``_BASE``, beside mode and delay: where the masses sit, and how old the reading is."""
+
+    near_share: float
+    unit: str
+    mount: str
+
+
+DRIVES: dict[str, Drive] = {
+    "rotor against the rest, ideal unit": {"near_share": 0.055, "unit": "ideal", "mount": "motor"},
+    "near mass 0.3, ideal unit": {"near_share": 0.3, "unit": "ideal", "mount": "motor"},
+    "near mass 0.3, unit of 420 Hz and 1 ms": {"near_share": 0.3, "unit": "420 Hz", "mount": "motor"},
+    "halves, unit on the far one, 420 Hz and 1 ms": {"near_share": 0.45, "unit": "420 Hz", "mount": "tip"},
+}
 
 
 def make(work: Work) -> list[Finding]:
     """Computes the limits of every cell, without a run."""
     modes, delays = (_MODES_HZ[2:7:2], _DELAYS_S[1:2]) if work.small else (_MODES_HZ, _DELAYS_S)
-    drives = DRIVES[1:2] if work.small else DRIVES
-    cells = product((choice for _, choice in drives), delays, modes)
+    names = [*DRIVES][1:2] if work.small else [*DRIVES]
+    cells = product((DRIVES[name] for name in names), delays, modes)
     setups = [replace(_BASE, **choice, mode_Hz=mode, delay_s=delay) for choice, delay, mode in cells]
     found = work.map_parallel("which element wins", limits, setups)
     best = np.array([[cell[kind] for kind in KINDS] for cell in found])
-    stiffness, sizes = np.moveaxis(best.reshape(len(drives), len(delays), len(modes), len(KINDS), 2), -1, 0)
-    work.figure(_draw(stiffness, modes, delays, [name for name, _ in drives]), "figure_14")
+    stiffness, sizes = np.moveaxis(best.reshape(len(names), len(delays), len(modes), len(KINDS), 2), -1, 0)
+    work.figure(_draw(stiffness, modes, delays, names), "figure_14")
     grid = {"mode_Hz": modes, "delay_s": delays}
     work.data("figure_14", grid | {"stiffness_N_m": stiffness, "size_N_s_m_or_kg": sizes})
     work.scene("figure_14", setups[len(setups) // 2].scene(2000.0, elements_of(KINDS[3], 0.009)))
@@ -66,7 +75,7 @@ def winner(stiffness: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return stiffness.argmax(axis=-1), order[..., -1] / np.maximum(order[..., -2], 1.0)
 
 
-def _draw(stiffness: np.ndarray, modes: Any, delays: Any, names: list[str]) -> Figure:
+def _draw(stiffness: np.ndarray, modes: Sequence[float], delays: Sequence[float], names: list[str]) -> Figure:
     columns = min(len(names), 2)
     figure = empty_figure(7.6 * columns, 0.6 + 3.6 * -(-len(names) // columns))
     axes = np.atleast_1d(figure.subplots(-(-len(names) // columns), columns)).ravel()
@@ -76,7 +85,7 @@ def _draw(stiffness: np.ndarray, modes: Any, delays: Any, names: list[str]) -> F
     return figure
 
 
-def _panel(ax: Axes, name: str, stiffness: np.ndarray, modes: Any, delays: Any) -> None:
+def _panel(ax: Axes, name: str, stiffness: np.ndarray, modes: Sequence[float], delays: Sequence[float]) -> None:
     from matplotlib.colors import to_rgb
 
     best, by = winner(stiffness)
@@ -115,7 +124,7 @@ def _higher(stiffness: np.ndarray) -> tuple[Finding, str]:
     return finding, winners
 
 
-def _drives(work: Work) -> tuple[dict[str, Any], str]:
+def _drives(work: Work) -> tuple[dict[str, float | str], str]:
     """Returns how the softness of a drive decides: what the texts name, and a note with a table."""
     modes = (125.0, 450.0) if work.small else (100.0, 125.0, 170.0, 225.0, 300.0, 450.0, 600.0)
     found = work.map_parallel("soft and stiff drives", limits, [replace(_BASE, mode_Hz=mode) for mode in modes])

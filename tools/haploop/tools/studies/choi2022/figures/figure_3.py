@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from haploop.logger.summary import Summary
+from haploop.protocol.scene.effects import Accelerometer
+from haploop.protocol.scene.estimators import Acceleration
+from haploop.protocol.scene.scene import Device, ElementTable, Encoder, Scene
 from haploop.tools.figure.style import INK, PRESSING, RELEASING, SMALL, dress, empty_figure, legend
 from haploop.tools.render.units import amount
 from haploop.tools.studies.choi2022.claims import Finding, claims_of
 from haploop.tools.studies.choi2022.drawing import INSIDE, UPPER_LEFT
 from haploop.tools.studies.choi2022.sampled import PERIOD_S, SPRING, STIFFNESS_N_M, forces, taken_J
-from haploop.tools.studies.choi2022.scenes import run, single_contact
-from haploop.tools.studies.choi2022.work import Work
+from haploop.tools.studies.choi2022.work import Run, Work, fig6, hand_of, run, wall_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -21,40 +26,75 @@ CLAIMS = claims_of(3)
 
 # Coarse enough to be seen.
 _RESOLUTION_M = 1e-4
+_SPEED_M_S = 0.1
 _FILL = "#E8A0A0"
+
+
+class Curve(NamedTuple):
+    """Penetration in m, negative outside, and force out of the wall in N at every plant step."""
+
+    depth_m: np.ndarray
+    force_N: np.ndarray
+
+    @classmethod
+    def from_run(cls, ran: Run) -> Curve:
+        """Takes it from a run."""
+        plant = ran.log["/plant"]
+        return cls(wall_of(ran.scene).position - plant["x"], plant["force"])
 
 
 def make(work: Work) -> list[Finding]:
     """Runs three contacts: sampled and held, with an encoder's steps too, with 2 ms of delay too."""
-    encoder = {"encoder": {"resolution": _RESOLUTION_M, "rounding": "nearest"}}
+    encoder = Encoder(resolution=_RESOLUTION_M)
+    late = "One contact, sampled, held, quantised and delayed"
     scenes = {
         "sampled and held": single_contact("One contact, sampled and held"),
-        "and 0.1 mm encoder steps": single_contact("One contact, sampled, held and quantised", **encoder),
-        "and 2 ms of delay": single_contact(
-            "One contact, sampled, held, quantised and delayed", delay_s=0.002, **encoder
-        ),
+        "and 0.1 mm encoder steps": single_contact("One contact, sampled, held and quantised", encoder=encoder),
+        "and 2 ms of delay": single_contact(late, delay_s=0.002, encoder=encoder),
     }
     curves, walls, columns = {}, {}, {}
     for number, (name, scene) in enumerate(scenes.items()):
-        summary, log = run(scene)
-        curves[name] = force_curve(scene, log["/plant"])
-        walls[name] = summary["energy"]["wall"]
-        columns |= {f"penetration_{number}_m": curves[name][0], f"force_{number}_N": curves[name][1]}
+        ran = run(scene)
+        curves[name], walls[name] = Curve.from_run(ran), ran.summary["energy"]["wall"]
+        columns |= {f"penetration_{number}_m": curves[name].depth_m, f"force_{number}_N": curves[name].force_N}
         work.scene(f"figure_3_{number}", scene)
     figure = empty_figure(13.0, 4.4)
     axes = figure.subplots(1, 3, sharey=True, sharex=True)
-    for ax, (name, (depth, force)) in zip(axes, curves.items(), strict=True):
-        _draw(ax, name, depth, force, walls[name])
+    for ax, (name, curve) in zip(axes, curves.items(), strict=True):
+        _draw(ax, name, *curve, walls[name])
     work.figure(figure, "figure_3")
     work.data("figure_3", columns)
-    sampled, quantised, delayed = (amount(-wall["true_J"], "J") for wall in walls.values())
+    sampled, quantised, delayed = (_J(-wall["true_J"]) for wall in walls.values())
     work.answer = work.tell("answer", sampled=sampled, quantised=quantised, delayed=delayed)
     return _findings(curves, walls)
 
 
-def force_curve(scene: dict[str, Any], plant: Any) -> tuple[np.ndarray, np.ndarray]:
-    """Returns penetration (m, negative outside) and force out of the wall (N) at every plant step."""
-    return scene["wall"]["position"] - plant["x"], np.asarray(plant["force"])
+def single_contact(
+    title: str,
+    *elements: ElementTable,
+    delay_s: float = 0.0,
+    encoder: Encoder | None = None,
+    accelerometer: Accelerometer | None = None,
+    acceleration: Acceleration | None = None,
+) -> Scene:
+    """Returns a scene in which the device, hand attached but slack, coasts at 0.1 m/s into 0.15 N/mm and out again."""
+    scene = fig6("b")
+    return replace(
+        scene,
+        title=title,
+        duration=0.1,
+        clock=replace(scene.clock, round_trip_delay=delay_s),
+        device=Device(
+            mass=scene.device.mass, damping=0.0, position=wall_of(scene).position + 0.0004, velocity=-_SPEED_M_S
+        ),
+        hand=replace(hand_of(scene), stiffness=0.0, damping=0.0, force=None),
+        encoder=encoder,
+        noise=None,
+        accelerometer=accelerometer,
+        velocity=None,
+        acceleration=acceleration,
+        dissipation=elements,
+    )
 
 
 def area_J(depth_m: np.ndarray, force_N: np.ndarray) -> float:
@@ -65,7 +105,7 @@ def area_J(depth_m: np.ndarray, force_N: np.ndarray) -> float:
     return float(-np.sum(force_N[:-1] * np.diff(depth_m)))
 
 
-def _draw(ax: Axes, name: str, depth: np.ndarray, force: np.ndarray, wall: dict[str, Any]) -> None:
+def _draw(ax: Axes, name: str, depth: np.ndarray, force: np.ndarray, wall: Summary) -> None:
     mm = 1e3 * depth
     deepest = int(np.argmax(mm))
     ax.fill(mm, force, color=_FILL, linewidth=0, alpha=0.7)
@@ -94,7 +134,7 @@ def _taken_and_given_J(depth: np.ndarray, force: np.ndarray) -> tuple[float, flo
     return float(np.maximum(work, 0.0).sum()), float(np.maximum(-work, 0.0).sum())
 
 
-def _findings(curves: dict[str, Any], walls: dict[str, Any]) -> list[Finding]:
+def _findings(curves: Mapping[str, Curve], walls: Mapping[str, Summary]) -> list[Finding]:
     energies = {name: _taken_and_given_J(*one) for name, one in curves.items()}
     areas, leaks = [area_J(*one) for one in curves.values()], [-wall["true_J"] for wall in walls.values()]
     apart = max(abs(area / leak - 1.0) for area, leak in zip(areas, leaks, strict=True))

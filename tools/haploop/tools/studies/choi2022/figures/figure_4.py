@@ -2,29 +2,29 @@
 
 from __future__ import annotations
 
-import copy
 import math
-from typing import Any
+from dataclasses import replace
 
 import numpy as np
 
+from haploop.protocol.scene.effects import Accelerometer
+from haploop.protocol.scene.estimators import Acceleration
+from haploop.protocol.scene.hand_force import Trace
+from haploop.protocol.scene.scene import ElementTable, Encoder, Scene
 from haploop.tools.figure.style import INK, SMALL, empty_figure
 from haploop.tools.linear.one_tick import OneTickMap
 from haploop.tools.render.units import amount, fixed
 from haploop.tools.search.bisect import Tolerance, bisect
 from haploop.tools.studies.choi2022.claims import Finding, claims_of
 from haploop.tools.studies.choi2022.drawing import draw_momentum
+from haploop.tools.studies.choi2022.figures.figure_3 import single_contact
 from haploop.tools.studies.choi2022.sampled import MASS_KG, PERIOD_S, closed_form, mean_taken, steps_J
-from haploop.tools.studies.choi2022.scenes import fig6, pushed_and_braked, run, single_contact
-from haploop.tools.studies.choi2022.work import Work
+from haploop.tools.studies.choi2022.work import Run, Work, fig6, hand_of, run
 
 CLAIMS = claims_of(4)
 CUTOFFS_HZ = (None, 100.0, 30.0, 10.0)
 # An IMU of the class of the paper's: 300 ug/Hz^0.5, 16 bit over 8 g, 420 Hz (MPU-9250's data sheet).
-IMU = {
-    "noise_density": 2.9e-3, "range": 78.5, "resolution": 2.4e-3, "bandwidth": 420.0, "delay": 0.0014, "bias": 0.0,
-    "mount": "tip",
-}  # fmt: skip
+IMU = Accelerometer(noise_density=2.9e-3, range=78.5, resolution=2.4e-3, bandwidth=420.0, delay=0.0014)
 # PHANToM Premium 1.5, one count.
 COUNT_M = 28.7e-6
 # An encoder so fine that its step does not matter.
@@ -34,10 +34,9 @@ _FINE_M = 1e-7
 def make(work: Work) -> list[Finding]:
     """Draws the motion of the schematic and a run, and tests filters over the acceleration."""
     pulse = 0.1 * np.sin(np.pi * np.arange(-1, 15) / 12.0).clip(0.0)
-    inertia = [{"kind": "bidirectional-inertia", "acts": "always", "mass": MASS_KG}]
-    pushed = pushed_and_braked(dissipation=inertia)
-    v = np.asarray(run(pushed)[1]["/controller"]["v"])
-    contact = single_contact("In and out of the wall, with inertia", dissipation=[inertia[0] | {"acts": "in-contact"}])
+    pushed = run(_pushed_and_braked(_inertia(MASS_KG)))
+    v = pushed.log["/controller"]["v"]
+    contact = run(single_contact("In and out of the wall, with inertia", replace(_inertia(MASS_KG), acts="in-contact")))
     figure = empty_figure(11.0, 4.6)
     left, right = figure.subplots(1, 2)
     draw_momentum(left, pulse, MASS_KG, "Prescribed: faster, then slower")
@@ -47,8 +46,8 @@ def make(work: Work) -> list[Finding]:
         ax.text(0.03, 0.95, f"net taken {net}", transform=ax.transAxes, va="top", fontsize=SMALL, color=INK)
     work.figure(figure, "figure_4")
     work.data("figure_4", {"prescribed_v_m_s": pulse, "run_v_m_s": v})
-    work.scene("figure_4_pushed", pushed)
-    work.scene("figure_4_contact", contact)
+    work.scene("figure_4_pushed", pushed.scene)
+    work.scene("figure_4_contact", contact.scene)
     masses_g = {cutoff: 1e3 * largest_mass_kg(cutoff, 0.0) for cutoff in CUTOFFS_HZ}
     masses = [f"{mass:.0f} g {'at ' * bool(cutoff)}{named(cutoff)}" for cutoff, mass in masses_g.items()]
     work.answer = work.tell("answer", masses=", ".join(masses))
@@ -58,10 +57,20 @@ def make(work: Work) -> list[Finding]:
     ]
 
 
-def _on_energy(
-    pulse: np.ndarray, v: np.ndarray, pushed: dict[str, Any], contact: dict[str, Any], frequencies: int
-) -> list[Finding]:
-    energy, free = run(contact)[0]["energy"], run(pushed)[0]["energy"]
+def _pushed_and_braked(element: ElementTable) -> Scene:
+    """Returns a scene of device and hand in the open, pushed for 24 ms and braked for as long, without any damping."""
+    scene = single_contact("Pushed, then braked", element)
+    force = Trace(time=(0.0, 0.012, 0.024, 0.036, 0.048), force=(0.0, 0.25, 0.0, -0.25, 0.0))
+    device = replace(scene.device, position=0.0, velocity=0.0)
+    return replace(scene, duration=0.06, device=device, wall=None, hand=replace(hand_of(scene), force=force))
+
+
+def _inertia(mass_kg: float) -> ElementTable:
+    return ElementTable(name="bidirectional-inertia", acts="always", parameters={"mass": mass_kg})
+
+
+def _on_energy(pulse: np.ndarray, v: np.ndarray, pushed: Run, contact: Run, frequencies: int) -> list[Finding]:
+    energy, free = contact.summary["energy"], pushed.summary["energy"]
     sampled_J, wall_J = energy["elements"][0]["sampled_J"], energy["wall"]["sampled_J"]
     apart = abs(float(steps_J(v, MASS_KG).sum()) / free["elements"][0]["sampled_J"] - 1.0)
     closed = float(steps_J(pulse, MASS_KG).sum())
@@ -135,10 +144,8 @@ def largest_stiffness_N_m(cutoff_Hz: float | None, mass_kg: float) -> float:
 
 
 def _one_tick(mass_kg: float, cutoff_Hz: float | None) -> OneTickMap:
-    scene = copy.deepcopy(fig6("c"))
-    scene.pop("encoder")
-    scene["acceleration"] = {"source": "encoder"} | ({"cutoff": cutoff_Hz} if cutoff_Hz else {})
-    scene["dissipation"] = [{"kind": "bidirectional-inertia", "acts": "always", "mass": mass_kg}]
+    estimate = Acceleration(cutoff=cutoff_Hz)
+    scene = replace(fig6("c"), encoder=None, acceleration=estimate, dissipation=(_inertia(mass_kg),))
     return OneTickMap.from_scene(scene)
 
 
@@ -147,20 +154,17 @@ def errors_m_s2(count_m: float = COUNT_M) -> dict[str, float]:
 
     The contact is with the wall alone, so that the motion is the same whatever is made of it.
     """
-    encoder = {"encoder": {"resolution": count_m, "rounding": "nearest"}}
-    true = _accelerations(single_contact("true", acceleration={"source": "accelerometer"}, **encoder))
-    found = {}
-    for cutoff in CUTOFFS_HZ:
-        table = {"source": "encoder"} | ({"cutoff": cutoff} if cutoff else {})
-        scene = single_contact("differenced", acceleration=table, **encoder)
-        found[f"encoder, {named(cutoff)}"] = _accelerations(scene)
-    scene = single_contact("measured", acceleration={"source": "accelerometer"}, accelerometer=IMU, **encoder)
-    found["accelerometer"] = _accelerations(scene)
+
+    def accelerations(estimate: Acceleration, accelerometer: Accelerometer | None = None) -> np.ndarray:
+        encoder = Encoder(resolution=count_m)
+        scene = single_contact("a contact", encoder=encoder, accelerometer=accelerometer, acceleration=estimate)
+        return run(scene).log["/controller"]["a"]
+
+    measured = Acceleration(source="accelerometer")
+    true = accelerations(measured)
+    found = {f"encoder, {named(cutoff)}": accelerations(Acceleration(cutoff=cutoff)) for cutoff in CUTOFFS_HZ}
+    found["accelerometer"] = accelerations(measured, IMU)
     return {name: float(np.sqrt(np.mean((a - true) ** 2))) for name, a in found.items()}
-
-
-def _accelerations(scene: dict[str, Any]) -> np.ndarray:
-    return np.asarray(run(scene)[1]["/controller"]["a"])
 
 
 def _listed(values: dict[str, float], unit: str) -> str:

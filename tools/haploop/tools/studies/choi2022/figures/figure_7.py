@@ -2,20 +2,26 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
 
 from haploop.tools.figure.style import GREY, INK, SMALL, dress, empty_figure
+from haploop.tools.render.terminal import markdown_table
 from haploop.tools.studies.choi2022.claims import Finding, claims_of
-from haploop.tools.studies.choi2022.drawing import SHORT
-from haploop.tools.studies.choi2022.experiment.measure import CLAIMS as TESTED
-from haploop.tools.studies.choi2022.experiment.measure import NAMES, PAPER, largest, stiffness_ladder
-from haploop.tools.studies.choi2022.experiment.scene_file import file_text
-from haploop.tools.studies.choi2022.experiment.search import SPACE, columns, notes, search
-from haploop.tools.studies.choi2022.experiment.setup import FRICTION_N, KINDS, SCENE_FILE, Setup
-from haploop.tools.studies.choi2022.experiment.verdicts import NEAREST, SCENE, keep_shares
-from haploop.tools.studies.choi2022.interpretations import Found, options, percent, share
-from haploop.tools.studies.choi2022.search_report import share_map
+from haploop.tools.studies.choi2022.device import FRICTION_N, KINDS, SCENE_FILE, Setup, file_text
+from haploop.tools.studies.choi2022.drawing import (
+    SHORT,
+    by_number_of_claims,
+    claims_table,
+    list_of_choices,
+    pairs_never_together,
+    share_map,
+)
+from haploop.tools.studies.choi2022.experiment import NEAREST, SCENE, SPACE, WHOLE, describe, keep_shares, search
+from haploop.tools.studies.choi2022.experiment_measure import CLAIMS as TESTED
+from haploop.tools.studies.choi2022.experiment_measure import NAMES, PAPER, largest, stiffness_ladder
+from haploop.tools.studies.choi2022.interpretations import SEED, Found, Option, holds, options, percent, share
 from haploop.tools.studies.choi2022.work import Work
 
 if TYPE_CHECKING:
@@ -25,8 +31,12 @@ CLAIMS = claims_of(7)
 # Largest steady stiffness in N/m by element, and by key of a setup at a lower and an upper value of it.
 Largest = dict[str, float]
 Influences = dict[str, tuple[Largest, Largest]]
+# Two values of a number, or two options of a choice.
+Pair = tuple[float, float] | tuple[str, str]
 _FACTOR, _DELAY_S = 1.4, 5e-4
 _LOWER, _UPPER = "#56B4E9", "#E69F00"
+# Claims that hold less often than this are in no pair of those that never hold together.
+_OFTEN = 0.05
 
 
 def make(work: Work) -> list[Finding]:
@@ -44,26 +54,32 @@ def make(work: Work) -> list[Finding]:
         "figure_7_influence",
         work.tell("seen_influence", factor=_FACTOR),
     )
-    work.data("figure_7_readings", columns(found))
-    work.scene(SCENE.removesuffix(".toml"), found.nearest.scene(5000.0, []))
+    work.data("figure_7_interpretations", _columns(found))
+    work.scene(SCENE.removesuffix(".toml"), found.nearest.scene(5000.0))
     work.text(SCENE_FILE, file_text(found.nearest))
-    work.notes = notes(work, found, there)
+    work.notes = _notes(work, found, there)
     work.answer = _answer(work, found)
     return [_on_the_unit(found, *influences["acceleration"])]
 
 
-def _varied(setup: Setup, small: bool) -> dict[str, tuple[Any, Any]]:
+def _columns(found: Found[Setup]) -> dict[str, list[float | str]]:
+    """Returns the rows as columns; that of the nearest is among them once."""
+    rows = [row for row in found.rows if row["stage"] != "nearest"]
+    return {key.replace(" ", "_"): [row[key] for row in rows] for key in rows[0]}
+
+
+def _varied(setup: Setup, small: bool) -> dict[str, Pair]:
     """Returns for each value of a setup a lower and an upper one, or two other choices."""
-    numbers = {
+    pairs: dict[str, Pair] = {
         key: (float(f"{getattr(setup, key) / _FACTOR:.3g}"), float(f"{getattr(setup, key) * _FACTOR:.3g}"))
         for key in SPACE.bounds
     }
-    numbers["near_share"] = (numbers["near_share"][0], min(numbers["near_share"][1], 0.9))
+    lower, upper = pairs["near_share"]
+    pairs["near_share"] = (float(lower), min(float(upper), 0.9))
     delays = (round(max(setup.delay_s - _DELAY_S, 0.0), 4), round(setup.delay_s + _DELAY_S, 4))
     units = [unit for unit in SPACE.choices["unit"] if unit != setup.unit]
     velocities = [one for one in SPACE.choices["velocity"] if one != setup.velocity]
-    pairs = {
-        **numbers,
+    pairs |= {
         "delay_s": delays,
         "unit": (units[0], units[-1]),
         "mount": ("motor", "tip"),
@@ -73,9 +89,9 @@ def _varied(setup: Setup, small: bool) -> dict[str, tuple[Any, Any]]:
     return {key: pairs[key] for key in ("delay_s", "acceleration")} if small else pairs
 
 
-def _influences(work: Work, found: Found[Setup], varied: dict[str, tuple[Any, Any]]) -> tuple[Largest, Influences]:
+def _influences(work: Work, found: Found[Setup], varied: Mapping[str, Pair]) -> tuple[Largest, Influences]:
     """Returns the largest stiffnesses of the nearest interpretation, and those at both values of each key."""
-    ends = [replace(found.nearest, **{key: value}) for key, pair in varied.items() for value in pair]
+    ends = [Setup.from_row(found.nearest.as_dict() | {key: value}) for key, pair in varied.items() for value in pair]
     base, *rest = _largest(work, [found.nearest, *ends])
     influences = {key: (rest[2 * i], rest[2 * i + 1]) for i, key in enumerate(varied)}
     [rough] = found.of("friction")
@@ -84,7 +100,7 @@ def _influences(work: Work, found: Found[Setup], varied: dict[str, tuple[Any, An
 
 def _largest(work: Work, setups: list[Setup]) -> list[Largest]:
     """Returns the largest stiffnesses of each setup; those of one structure run together."""
-    alike: dict[Any, list[int]] = {}
+    alike: dict[tuple[float | str, ...], list[int]] = {}
     for i, setup in enumerate(setups):
         structure = (*(getattr(setup, key) for key in SPACE.choices), setup.acceleration)
         alike.setdefault(structure, []).append(i)
@@ -98,7 +114,7 @@ def _largest(work: Work, setups: list[Setup]) -> list[Largest]:
     return [found[i] for i in range(len(setups))]
 
 
-def _draw(base: Largest, influences: Influences, varied: dict[str, tuple[Any, Any]]) -> Figure:
+def _draw(base: Largest, influences: Influences, varied: Mapping[str, Pair]) -> Figure:
     figure = empty_figure(13.0, 1.2 + 0.46 * len(varied))
     axes = figure.subplots(1, len(NAMES) - 1, sharey=True, sharex=True)
     for ax, name in zip(axes, NAMES[1:], strict=True):
@@ -114,6 +130,61 @@ def _draw(base: Largest, influences: Influences, varied: dict[str, tuple[Any, An
     axes[0].set_yticks(range(len(varied)), [SPACE.label(key) for key in varied])
     axes[0].invert_yaxis()
     return figure
+
+
+def _notes(work: Work, found: Found[Setup], there: Sequence[Option]) -> list[str]:
+    """Returns the sections below the figure."""
+    rows, [row], [with_friction] = found.of("random"), found.of("nearest"), found.of("friction")
+    described = describe(found.nearest)
+    measured = {"nearest interpretation": row, "with friction of 48 mN": with_friction}
+    bears = [["the paper", "", *(f"{stiffness / 1e3:.1f}" for stiffness in PAPER.values())]]
+    bears += [[name, *(f"{one[f'{kind}_N_m'] / 1e3:.1f}" for kind in NAMES)] for name, one in measured.items()]
+    kinds = ["nothing", "damping", "bidirectional", "unidirectional", "damping with unidirectional"]
+    never = pairs_never_together(rows, [name for name in TESTED if share(rows, name) >= _OFTEN])
+    bounds = [
+        f"- {SPACE.label(key)}: {SPACE.value(key, low)} to {SPACE.value(key, high)}"
+        for key, (low, high) in SPACE.bounds.items()
+    ]
+    return [
+        "#### The nearest interpretation",
+        work.tell(
+            "nearest",
+            described=f"{described[:1].upper()}{described[1:]}",
+            file=SCENE_FILE,
+            holding=row["holding"],
+            claims=len(TESTED),
+            lacks=", ".join(f"*{name}*" for name in TESTED if not holds(row, name)),
+        ),
+        markdown_table(["", *kinds], bears, numbers=range(1, 6)),
+        work.tell("friction"),
+        "#### Each claim alone",
+        work.tell("alone", count=len(rows), bears=sum(max(row[f"{name}_N_m"] for name in PAPER) > 0.0 for row in rows)),
+        claims_table(
+            TESTED,
+            {"nearest": row},
+            {"its neighbours": found.of("neighbour"), "random interpretations": rows},
+            there,
+            "likeliest with, and least with",
+        ),
+        "#### All claims together",
+        work.tell(
+            "together",
+            most=max(row["holding"] for row in found.rows),
+            counts=by_number_of_claims(rows, len(TESTED)),
+            never=work.tell("never", often=percent(_OFTEN), pairs=never) if never else "",
+        ),
+        "#### How was searched",
+        work.tell(
+            "method",
+            seed=SEED,
+            far=WHOLE.far,
+            close=WHOLE.close,
+            papers=", ".join(f"{name.replace('-', ' ')} {stiffness / 1e3:.1f}" for name, stiffness in PAPER.items()),
+            **Counter(row["stage"] for row in found.rows),
+        ),
+        "\n".join([list_of_choices(SPACE), *bounds]),
+        work.tell("unit"),
+    ]
 
 
 def _answer(work: Work, found: Found[Setup]) -> str:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
@@ -13,14 +12,12 @@ from haploop.tools.dissipate.samples import Samples
 from haploop.tools.figure.style import GREY, dress, empty_figure, legend
 from haploop.tools.render.units import amount
 from haploop.tools.studies.choi2022.claims import Finding, claims_of
+from haploop.tools.studies.choi2022.device import FRICTION_N, KINDS, Setup, elements_of
 from haploop.tools.studies.choi2022.drawing import COLOURS, INSIDE, UPPER_LEFT
-from haploop.tools.studies.choi2022.experiment.measure import BOOKED_AT_N_M, BOOKED_DAMPING, BOOKED_KG
-from haploop.tools.studies.choi2022.experiment.search import describe
-from haploop.tools.studies.choi2022.experiment.setup import FRICTION_N, KINDS, Setup, elements_of
-from haploop.tools.studies.choi2022.experiment.verdicts import nearest, nearest_with, verdict_under_assumptions
+from haploop.tools.studies.choi2022.experiment import describe, findings, nearest, nearest_with
+from haploop.tools.studies.choi2022.experiment_measure import BOOKED_AT_N_M, BOOKED_DAMPING, BOOKED_KG
 from haploop.tools.studies.choi2022.sampled import bidirectional_J, damper_J, unidirectional_J
-from haploop.tools.studies.choi2022.scenes import run, strongest_Hz
-from haploop.tools.studies.choi2022.work import Work
+from haploop.tools.studies.choi2022.work import Run, Work, run, strongest_Hz
 
 CLAIMS = claims_of(8)
 
@@ -37,8 +34,7 @@ class Contact:
     """A run with the paper's damping, all three elements booked on it in the order of ``LABELS``, and how it swings."""
 
     stiffness_N_m: float
-    scene: dict[str, Any]
-    summary: dict[str, Any]
+    ran: Run
     booked: Booked
     swings_Hz: float
 
@@ -68,25 +64,21 @@ def contacts(setup: Setup, work: Work) -> list[Contact]:
     """Runs a contact with the paper's damping at both of its stiffnesses."""
     found = []
     for stiffness in BOOKED_AT_N_M:
-        scene = setup.scene(stiffness, elements_of("damping", BOOKED_DAMPING))
-        summary, log = run(scene)
-        found.append(Contact(stiffness, scene, summary, booked_on(scene, log, work), strongest_Hz(log)))
+        ran = run(setup.scene(stiffness, elements_of("damping", BOOKED_DAMPING)))
+        found.append(Contact(stiffness, ran, _booked_on(ran, work), strongest_Hz(ran.log)))
     return found
 
 
-def booked_on(scene: dict[str, Any], log: Any, work: Work) -> Booked:
+def _booked_on(ran: Run, work: Work) -> Booked:
     """Books damping and both inertias on the motion of a run, in the order of ``LABELS``."""
-    time = Timebase.from_scene(scene)
+    scene, time = ran.scene, Timebase.from_scene(ran.scene)
     n, late = time.steps_per_tick, time.delay_steps % time.steps_per_tick
-    elements = [
-        *elements_of("damping", BOOKED_DAMPING),
-        *elements_of("bidirectional-inertia", BOOKED_KG),
-        *elements_of("unidirectional-inertia", BOOKED_KG),
-    ]
+    sizes = zip(KINDS[1:], (BOOKED_DAMPING, BOOKED_KG, BOOKED_KG), strict=True)
+    elements = tuple(element for kind, size in sizes for element in elements_of(kind, size))
     recorded = frozenset({"velocity", "acceleration"})
-    delay_s = scene["clock"]["round_trip_delay"]
-    booking = Booking({**scene, "dissipation": elements}, time.period_s, delay_s, work.kinds, recorded)
-    ticks, x = log["/controller"], np.asarray(log["/plant"]["x"])
+    delay_s = scene.clock.round_trip_delay
+    booking = Booking(replace(scene, dissipation=elements), time.period_s, delay_s, work.kinds, recorded)
+    ticks, x = ran.log["/controller"], ran.log["/plant"]["x"]
     count = len(ticks["x"])
     true, between = x[: count * n : n], x[late : late + count * n : n]
     t_s = (np.arange(count) * time.period_s).astype(np.float64)
@@ -96,16 +88,16 @@ def booked_on(scene: dict[str, Any], log: Any, work: Work) -> Booked:
 def _picture(work: Work, contacts: list[Contact], name: str, seen: str) -> None:
     figure = empty_figure(12.0, 3.8)
     axes = figure.subplots(1, len(contacts))
-    columns: dict[str, Any] = {}
+    columns: dict[str, np.ndarray] = {}
     for ax, contact, key in zip(axes, contacts, ("lower", "higher"), strict=True):
-        booked, verdict = contact.booked, contact.summary["verdict"]
+        booked, verdict = contact.booked, contact.ran.summary["verdict"]
         for i, label in enumerate(LABELS):
             colour = COLOURS[KINDS[i + 1]]
             ax.plot(booked.t_s, 1e3 * booked.sampled_J[i], color=colour, linewidth=1.3, label=label)
             ax.plot(booked.t_s, 1e3 * booked.true_J[i], color=colour, linewidth=0.9, linestyle="--")
         dress(ax, f"{contact.stiffness_N_m / 1e3:.1f} N/mm: {verdict}", "time (s)", "energy taken (mJ)")
         columns |= {f"{key}_t_s": booked.t_s, f"{key}_sampled_J": booked.sampled_J, f"{key}_true_J": booked.true_J}
-        work.scene(f"{name}_{key}", contact.scene)
+        work.scene(f"{name}_{key}", contact.ran.scene)
     legend(axes[0], **UPPER_LEFT, **INSIDE)
     work.data(name, columns)
     work.figure(figure, name, f"{seen} {work.tell('seen_books')}")
@@ -149,8 +141,8 @@ def _findings(contacts: list[Contact], work: Work) -> list[Finding]:
     back = [contact.back_J for contact in contacts]
     all_more = all((end[1:] > end[0]).all() and end[0] > 0.0 for end in ends)
     pure = max(float(of[2] / end[2]) for of, end in zip(back, ends, strict=True))
-    late = 1.0 + contacts[0].scene["clock"]["round_trip_delay"] * 1e3
-    computed: dict[str, Any] = {
+    late = 1.0 + contacts[0].ran.scene.clock.round_trip_delay * 1e3
+    computed = {
         "labels": ", ".join(LABELS),
         "ends": _by_wall(contacts, ends),
         "first": first_ahead_Hz(bidirectional_J(_FREQUENCIES_HZ, None)),
@@ -159,17 +151,13 @@ def _findings(contacts: list[Contact], work: Work) -> list[Finding]:
         "limit": 250.0 / late,
         "share": 100 * pure,
     }
-    holds = {
+    holding = {
         "more": all_more,
         "oscillates": all(of[1] > of[2] > 0.0 for of in back),
         "also_generates": all(of[0] > _ROUNDING for of in back),
         "pure": all_more and pure < 0.01,
     }
-    tested = {"more": "8 more"}
-    return [
-        verdict_under_assumptions(work, CLAIMS[name], is_so, tested.get(name, ""), **computed)
-        for name, is_so in holds.items()
-    ]
+    return findings(work, CLAIMS, holding, **computed)
 
 
 def _by_wall(contacts: list[Contact], values: list[np.ndarray]) -> str:

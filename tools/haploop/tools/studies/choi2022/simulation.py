@@ -1,15 +1,21 @@
-"""Interpretations of the paper's simulation (Choi et al. 2022, section V.A) and their scenes."""
+"""Interpretations of the paper's simulation (Choi et al. 2022, section V.A), and their scenes."""
 
 from __future__ import annotations
 
-import copy
 import math
+from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 from haploop.launch.scene.toml_writer import inline
-from haploop.tools.search.random import Point
+from haploop.protocol.scene.effects import Noise
+from haploop.protocol.scene.estimators import Acceleration, Velocity
+from haploop.protocol.scene.hand_force import Constant, HandForce, MinimumJerk, Ramp, Sine, Step
+from haploop.protocol.scene.scene import Encoder, Scene
+from haploop.protocol.scene.table import Table
+from haploop.tools.search.random import Point, Row
 from haploop.tools.studies.choi2022.interpretations import InterpretationSpace
-from haploop.tools.studies.choi2022.scenes import fig6
+from haploop.tools.studies.choi2022.work import fig6, hand_of, wall_of
 
 # The paper's statements are never touched: masses, damping and spring of device and hand, walls, elements, 1 kHz, 2 ms.
 # Choices that it leaves open, none of them a matter of degree. The operator "firmly grasps" the device
@@ -61,8 +67,6 @@ SPACE = InterpretationSpace(
 OURS, NEAREST = "our interpretation", "[the nearest interpretation](#figure-6)"
 _REACH_N = -0.6  # holds the hand's spring of 10 N/m at the wall, 60 mm away
 _STEP_AT_S = 0.1
-
-
 # That of our scene files fig6a.toml to fig6c.toml.
 BASE = Point(
     {
@@ -77,19 +81,18 @@ BASE = Point(
 )  # fmt: skip
 
 
-def used_numbers(chosen: dict[str, Any]) -> list[str]:
+def used_numbers(chosen: Mapping[str, Any]) -> list[str]:
     """Returns the keys of the numbers that matter under some choices."""
     keys = ["push_N", "resolution_m"]
-    keys += {"ramp": ["rise_s"], "minimum-jerk": ["rise_s"], "sine": ["swing_Hz", "swing_share"]}.get(
-        chosen["force"], []
-    )
+    of_force = {"ramp": ["rise_s"], "minimum-jerk": ["rise_s"], "sine": ["swing_Hz", "swing_share"]}
+    keys += of_force.get(chosen["force"], [])
     keys += ["noise_m", "noise_Hz"] if chosen["noise"] == "low-passed" else []
     keys += ["velocity_Hz"] if chosen["velocity"] == "low-passed" else []
     keys += ["acceleration_Hz"] if chosen["acceleration"].startswith("low-passed") else []
     return keys
 
 
-def as_row(interpretation: Point) -> dict[str, Any]:
+def as_row(interpretation: Point) -> Row:
     """Returns choices, numbers and seed in one flat map; numbers that do not matter under the choices are NaN."""
     used = used_numbers(interpretation.choices)
     numbers = {key: value if key in used else math.nan for key, value in interpretation.numbers.items()}
@@ -102,41 +105,42 @@ def describe(interpretation: Point) -> str:
     return SPACE.describe(chosen | interpretation.numbers, [*chosen, *used_numbers(chosen)])
 
 
-def scene_of(interpretation: Point, panel: str) -> dict[str, Any]:
+def scene_of(interpretation: Point, panel: str) -> Scene:
     """Returns the resolved scene of a panel of Fig. 6, "a", "b" or "c", under an interpretation."""
     base = fig6(panel)
     chosen, number = interpretation.choices, interpretation.numbers
-    scene = copy.deepcopy(base) | {"duration": chosen["duration"], "seed": interpretation.seed}
-    for table in ("noise", "velocity", "acceleration"):
-        scene.pop(table, None)
-    at_wall = chosen["rest"] == "wall"
-    scene["hand"]["rest"] = base["wall"]["position"] if at_wall else 0.0
-    scene["hand"]["force"] = _force(chosen["force"], 0.0 if at_wall else _REACH_N, number)
-    scene["encoder"] = {"resolution": number["resolution_m"], "rounding": chosen["rounding"]}
-    if chosen["noise"] == "low-passed":
-        scene["noise"] = {"deviation": number["noise_m"], "cutoff": number["noise_Hz"]}
-    if chosen["velocity"] == "low-passed":
-        scene["velocity"] = {"cutoff": number["velocity_Hz"]}
-    source = "accelerometer" if "accelerometer" in chosen["acceleration"] else "encoder"
+    rest, reach_N = (wall_of(base).position, 0.0) if chosen["rest"] == "wall" else (0.0, _REACH_N)
+    force = _force(chosen["force"], reach_N - number["push_N"], number)
     is_filtered = chosen["acceleration"].startswith("low-passed")
-    scene["acceleration"] = {"source": source} | ({"cutoff": number["acceleration_Hz"]} if is_filtered else {})
-    for element in scene.get("dissipation", []):
-        element["acts"] = chosen["acts"]
-    return scene
+    return replace(
+        base,
+        duration=chosen["duration"],
+        seed=interpretation.seed,
+        hand=replace(hand_of(base), rest=rest, force=force),
+        encoder=Encoder(resolution=number["resolution_m"], rounding=chosen["rounding"]),
+        noise=Noise(deviation=number["noise_m"], cutoff=number["noise_Hz"]) if chosen["noise"] != "none" else None,
+        velocity=Velocity(cutoff=number["velocity_Hz"]) if chosen["velocity"] == "low-passed" else None,
+        acceleration=Acceleration(
+            source="accelerometer" if "accelerometer" in chosen["acceleration"] else "encoder",
+            cutoff=number["acceleration_Hz"] if is_filtered else None,
+        ),
+        dissipation=tuple(replace(element, acts=chosen["acts"]) for element in base.dissipation),
+    )
 
 
-def _force(kind: str, reach_N: float, number: dict[str, float]) -> dict[str, Any]:
-    value = reach_N - number["push_N"]
+def _force(kind: str, value: float, number: Mapping[str, float]) -> HandForce:
     match kind:
-        case "ramp" | "minimum-jerk":
-            return {"kind": kind, "value": value, "rise_time": number["rise_s"]}
+        case "ramp":
+            return Ramp(value=value, rise_time=number["rise_s"])
+        case "minimum-jerk":
+            return MinimumJerk(value=value, rise_time=number["rise_s"])
         case "step":
-            return {"kind": kind, "value": value, "at": _STEP_AT_S}
+            return Step(value=value, at=_STEP_AT_S)
         case "constant":
-            return {"kind": kind, "value": value}
+            return Constant(value=value)
         case _:
-            swing = {"amplitude": number["swing_share"] * number["push_N"], "frequency": number["swing_Hz"]}
-            return {"kind": "sine", **swing, "offset": value, "phase": 0.0}
+            swing_N = number["swing_share"] * number["push_N"]
+            return Sine(amplitude=swing_N, frequency=number["swing_Hz"], offset=value)
 
 
 _TITLES = {
@@ -150,30 +154,35 @@ _ABOUT = """\
 # open that were tried, the one under which its Fig. 6 comes out best (docs/paper.md). Masses, damping, springs, wall,
 # element, 1 kHz and 2 ms are the paper's; each table here is an ASSUMPTION.
 """
-# Tables that a scene may hold beyond the paper's numbers.
-_TABLES = ("encoder", "noise", "velocity", "acceleration")
 
 
 def scene_text(interpretation: Point, panel: str) -> str:
     """Returns the scene file of an interpretation, which extends the paper's scene of the panel."""
     scene = scene_of(interpretation, panel)
+    hand = hand_of(scene)
+    tables = {
+        "hand.force": hand.force,
+        "encoder": scene.encoder,
+        "noise": scene.noise,
+        "velocity": scene.velocity,
+        "acceleration": scene.acceleration,
+    }
     lines = [
         _ABOUT.format(title=_TITLES[panel]).rstrip(),
         f"title = {inline(_TITLES[panel])}",
         f'extends = "../fig6{panel}.toml"',
-        f"duration = {inline(scene['duration'])}",
-        f"seed = {inline(scene['seed'])}",
+        f"duration = {inline(scene.duration)}",
+        f"seed = {inline(scene.seed)}",
         "",
         "[hand]",
-        f"rest = {inline(scene['hand']['rest'])}",
-        *_table("hand.force", scene["hand"]["force"]),
+        f"rest = {inline(hand.rest)}",
     ]
-    for name in _TABLES:
-        lines += _table(name, scene[name]) if name in scene else []
-    for element in scene.get("dissipation", []):
-        lines += ["", "[[dissipation]]", *(f"{key} = {inline(value)}" for key, value in element.items())]
+    for name, table in tables.items():
+        lines += ["", f"[{name}]", *_lines(table)] if table else []
+    for element in scene.dissipation:
+        lines += ["", "[[dissipation]]", *_lines(element)]
     return "\n".join(lines) + "\n"
 
 
-def _table(name: str, table: dict[str, Any]) -> list[str]:
-    return ["", f"[{name}]", *(f"{key} = {inline(value)}" for key, value in table.items())]
+def _lines(table: Table) -> list[str]:
+    return [f"{key} = {inline(value)}" for key, value in table.as_dict().items()]

@@ -1,23 +1,31 @@
-"""The largest stiffness that a loop in contact bears with each element and its best size, without a single run.
+"""What theory says of a virtual inertia with the gate of eq. 9, and of linear elements, without a single run.
 
-Linear elements: where the one-tick map of the loop has the spectral radius 1. Unidirectional inertia: where the same
-map, switched by the gate of eq. 9, begins to grow.
+At one frequency: the mass and the damping that the device feels of an inertia. In a contact: the largest stiffness that
+the loop bears with each element and its best size. Linear elements: where the one-tick map of the loop has the spectral
+radius 1. Unidirectional inertia: where the same map, switched by the gate, begins to grow.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from haploop.plant.chain.chain import Chain
+from haploop.protocol.scene.estimators import Acceleration
+from haploop.protocol.scene.scene import ElementTable, Scene
 from haploop.tools.linear.one_tick import OneTickMap
 from haploop.tools.search.bisect import bisect_many
-from haploop.tools.studies.choi2022.experiment.setup import KINDS, Setup, elements_of
+from haploop.tools.studies.choi2022.device import KINDS, UNITS, VELOCITIES, Setup, elements_of
 
+FREQUENCIES_HZ = np.linspace(2.0, 498.0, 249)
+# Age of a reading of an MPU-9250 at its setting of 420 Hz.
+OLD_S = 1.38e-3
+DELAYS_S = np.linspace(0.0, 3e-3, 121)
 # Sizes tried for every element: from next to nothing to beyond what any loop here bears. N s/m, and kg.
 DAMPINGS = np.geomspace(0.1, 40.0, 10)
 MASSES = np.geomspace(3e-4, 0.08, 10)
@@ -26,6 +34,95 @@ _REFINED = 3
 # A mass that adds nothing but keeps its place in the map, and one to take the map's slope from; kg.
 _NO_MASS, _SOME_MASS = 1e-15, 1e-3
 _STARTS, _TICKS, _SETTLED, _RESCALED_EVERY = 3, 1200, 400, 50
+
+
+class Felt(NamedTuple):
+    """The fundamental of the force of a virtual inertia m on a device that swings at w, over what a mass m would take.
+
+    Attributes:
+        duty: share of the ticks at which the gate is open.
+        mass: felt mass over m.
+        damping: felt damping over m w; the element takes energy out where it is positive.
+    """
+
+    duty: np.ndarray
+    mass: np.ndarray
+    damping: np.ndarray
+
+
+def bidirectional(
+    frequency_Hz: np.ndarray, *, reading_s: float, delay_s: float | np.ndarray, period_s: float = 1e-3
+) -> Felt:
+    """Returns what f = -m a comes to, late by the age of the reading, the extra delay and half a period of the hold.
+
+    By psi = w (reading + delay + T / 2) it lags, so that the device feels m cos(psi) and the damping m w sin(psi): late
+    inertia damps, most at a quarter of a period, and drives from half a period on.
+    """
+    w = 2.0 * np.pi * np.asarray(frequency_Hz, float)
+    return _felt(np.ones_like(w), np.ones_like(w, complex), w * (reading_s + delay_s + period_s / 2.0))
+
+
+def unidirectional(
+    frequency_Hz: np.ndarray,
+    *,
+    reading_s: float,
+    delay_s: float | np.ndarray,
+    velocity_s: float | np.ndarray = 5e-4,
+    period_s: float = 1e-3,
+) -> Felt:
+    """Returns the describing function of f = -m a[k] while v[k] a[k-1] >= 0 (Choi et al. 2022, eq. 9).
+
+    Against the reading a[k], the velocity (a difference, T / 2 old) lags by p = pi/2 + w (velocity - reading), a[k-1]
+    by q = w T. With d = p - q folded into [0, pi] the gate is open around (p + q) / 2 for the share 1 - d / pi, and
+        N = (2 h + e^(-j (p + q)) sin 2 h) / pi,    2 h = pi - d,
+    is what is left of the reading's fundamental, which then lags as that of a bidirectional inertia. Without any lag
+    d = pi/2 and N = 1/2 - j/pi: half the mass, and a damping of m w / pi. Where w (T/2 + reading) nears pi/2, v and
+    a[k-1] swing together and the gate never closes: there it is a bidirectional inertia. Beyond, it opens while
+    the motion slows. The phase of the ticks is averaged over: no frequency is locked to the rate.
+
+    Args:
+        reading_s: age of the acceleration's reading.
+        delay_s: extra delay of the loop.
+        velocity_s: age of the velocity; of one that is low-passed by frequency, ``low_passed_s``.
+    """
+    w = 2.0 * np.pi * np.asarray(frequency_Hz, float)
+    p, q = np.pi / 2.0 + w * (velocity_s - reading_s), w * period_s
+    open_rad = np.pi - np.arccos(np.cos(p - q))
+    left = (open_rad + np.exp(-1j * (p + q)) * np.sin(open_rad)) / np.pi
+    return _felt(open_rad / np.pi, left, w * (reading_s + delay_s + period_s / 2.0))
+
+
+def _felt(duty: np.ndarray, left: np.ndarray, lag: np.ndarray) -> Felt:
+    arrives = left * np.exp(-1j * lag)
+    return Felt(duty, np.real(arrives), -np.imag(arrives))
+
+
+def low_passed_s(frequency_Hz: np.ndarray, cutoff_Hz: float | None, age_s: float) -> np.ndarray:
+    """Returns the age of a signal behind a first-order low-pass, atan(f / cutoff) / w more than before."""
+    f = np.asarray(frequency_Hz, float)
+    return age_s + (np.arctan(f / cutoff_Hz) / (2.0 * np.pi * f) if cutoff_Hz else np.zeros_like(f))
+
+
+def always_open_Hz(*, reading_s: float, velocity_s: float = 5e-4, period_s: float = 1e-3) -> float:
+    """Returns the lowest frequency at which the gate never closes, Hz: w (T + reading - velocity) = pi / 2."""
+    return 0.25 / (period_s + reading_s - velocity_s)
+
+
+def damps(reading_s: float) -> np.ndarray:
+    """Returns which inertia damps, an index from 0 to 3 to the colours, shape (delays, frequencies)."""
+    delay, frequency = np.meshgrid(DELAYS_S, FREQUENCIES_HZ, indexing="ij")
+    two = bidirectional(frequency, reading_s=reading_s, delay_s=delay).damping > 0.0
+    one = unidirectional(frequency, reading_s=reading_s, delay_s=delay).damping > 0.0
+    return two + 2 * one
+
+
+def felt_with(setup: Setup, frequency_Hz: np.ndarray) -> tuple[Felt, Felt]:
+    """Returns what bi- and unidirectional inertia come to with a setup's delay, unit and low-pass of the velocity."""
+    bandwidth, late = UNITS[setup.unit]
+    reading_s = late + (1.0 / (2.0 * np.pi * bandwidth) if bandwidth else 0.0)
+    velocity_s = low_passed_s(frequency_Hz, VELOCITIES[setup.velocity], 5e-4)
+    two = bidirectional(frequency_Hz, reading_s=reading_s, delay_s=setup.delay_s)
+    return two, unidirectional(frequency_Hz, reading_s=reading_s, delay_s=setup.delay_s, velocity_s=velocity_s)
 
 
 class Best(NamedTuple):
@@ -45,7 +142,7 @@ def limits(setup: Setup) -> dict[str, Best]:
         KINDS[0]: Best(first_end(setup, KINDS[0], 0.0), 0.0),
         KINDS[1]: _best(partial(exact, KINDS[1]), DAMPINGS),
         KINDS[2]: _best(partial(exact, KINDS[2]), MASSES),
-        KINDS[3]: _best(partial(gated_ends, GatedMap.from_scene(setup.linear_scene([]))), MASSES),
+        KINDS[3]: _best(partial(gated_ends, GatedMap.from_scene(setup.linear_scene())), MASSES),
     }
 
 
@@ -57,9 +154,9 @@ def first_end(setup: Setup, kind: str, size: float) -> float:
 
 def swings_at_Hz(setup: Setup, stiffness: float) -> float:
     """Returns the frequency of what grows fastest, or decays slowest, without an element at a stiffness in N/m."""
-    scene = setup.linear_scene([])
+    scene = setup.linear_scene()
     values = np.linalg.eigvals(OneTickMap.from_scene(scene).matrix(stiffness))
-    return float(abs(np.angle(values[np.abs(values).argmax()])) / (2.0 * np.pi) * scene["clock"]["control_rate"])
+    return float(abs(np.angle(values[np.abs(values).argmax()])) / (2.0 * np.pi) * scene.clock.control_rate)
 
 
 def gated_ends(gated: GatedMap, masses: np.ndarray) -> np.ndarray:
@@ -109,25 +206,25 @@ class GatedMap:
     states: int
 
     @classmethod
-    def from_scene(cls, scene: dict[str, Any]) -> GatedMap:
+    def from_scene(cls, scene: Scene) -> GatedMap:
         """Makes the map of a resolved scene without elements.
 
         Raises:
             ValueError: velocity or acceleration are not read as the map has it.
             NotLinear: the rest of the loop is no linear map.
         """
-        if scene.get("velocity") or scene.get("acceleration", {}) != {"source": "accelerometer"}:
+        if scene.velocity or scene.acceleration != Acceleration(source="accelerometer"):
             raise ValueError("The gate's map is that of a plain difference of positions and a raw accelerometer.")
 
         def map_with(mass: float) -> OneTickMap:
-            inertia = {"kind": "bidirectional-inertia", "acts": "always", "mass": mass}
-            return OneTickMap.from_scene({**scene, "dissipation": [inertia]})
+            inertia = ElementTable(name="bidirectional-inertia", acts="always", parameters={"mass": mass})
+            return OneTickMap.from_scene(replace(scene, dissipation=(inertia,)))
 
         least, more = map_with(_NO_MASS), map_with(_SOME_MASS)
         per_kg = (more.without_wall - least.without_wall) / (_SOME_MASS - _NO_MASS)
         return cls(least.without_wall, per_kg, least.pushed, len(Chain.from_scene(scene).states))
 
-    def growth(self, stiffness: Any, mass: Any, *, seed: int = 1, ticks: int = _TICKS) -> np.ndarray:
+    def growth(self, stiffness: ArrayLike, mass: ArrayLike, *, seed: int = 1, ticks: int = _TICKS) -> np.ndarray:
         """Returns ln of the factor per tick by which the fastest of some random starts grows in the end, peak to peak.
 
         Args:
