@@ -14,29 +14,23 @@ import pytest
 from haploop.controller.dissipation import registry
 from haploop.launch.runs.in_process import run_in_process
 from haploop.launch.scene.file import load
+from haploop.protocol.scene.estimators import Velocity
 from haploop.tools.cost.grid import scenes_folder
 from haploop.tools.linear.one_tick import OneTickMap
 from haploop.tools.linear.stiffness_limit import smooth
 from haploop.tools.search.random import Point
 from haploop.tools.studies.choi2022.claims import Claim, Finding
 from haploop.tools.studies.choi2022.command import make_figure
-from haploop.tools.studies.choi2022.experiment.limits import GatedMap, first_end, gated_ends
-from haploop.tools.studies.choi2022.experiment.measure import CLAIMS, NAMES, SIZES, largest, measure, stiffness_ladder
-from haploop.tools.studies.choi2022.experiment.scene_file import file_text
-from haploop.tools.studies.choi2022.experiment.search import SPACE, setup_of
-from haploop.tools.studies.choi2022.experiment.setup import KINDS, SCENE_FILE, Setup, elements_of, nearest
-from haploop.tools.studies.choi2022.experiment.verdicts import (
-    NEAREST,
-    keep_shares,
-    nearest_with,
-    verdict_under_assumptions,
-)
-from haploop.tools.studies.choi2022.experiment.verdicts import nearest as nearest_in
+from haploop.tools.studies.choi2022.device import KINDS, SCENE_FILE, Setup, elements_of, file_text, nearest
+from haploop.tools.studies.choi2022.experiment import NEAREST, SPACE, finding, keep_shares, nearest_with, setup_of
+from haploop.tools.studies.choi2022.experiment import nearest as nearest_in
+from haploop.tools.studies.choi2022.experiment_measure import CLAIMS, NAMES, SIZES, largest, measure, stiffness_ladder
 from haploop.tools.studies.choi2022.figures import figure
 from haploop.tools.studies.choi2022.figures.figure_8 import contacts as figure_8_contacts
 from haploop.tools.studies.choi2022.figures.figure_11 import largest_steady
 from haploop.tools.studies.choi2022.interpretations import options
-from haploop.tools.studies.choi2022.work import Work
+from haploop.tools.studies.choi2022.theory import GatedMap, first_end, gated_ends
+from haploop.tools.studies.choi2022.work import Work, wall_of
 
 # A drive, a hand and a unit with all that a loop may have but friction.
 SETUP = Setup(
@@ -59,17 +53,23 @@ def test_a_setup_as_a_scene_file_reads_back(setup: Setup, tmp_path: Path) -> Non
     file.write_text(file_text(setup), encoding="utf-8")
     scene = load(file)
     assert Setup.from_scene(scene) == setup
-    made = setup.scene(5000.0, [])
+    made = setup.scene(5000.0)
+    assert scene.accelerometer
+    assert made.accelerometer
+    assert scene.accelerometer == replace(made.accelerometer, range=scene.accelerometer.range)
+    assert scene.accelerometer.range == pytest.approx(8.0 * 9.80665, rel=1e-5)
     for table in ("clock", "device", "transmission", "encoder", "actuator"):
-        numbers = {key: value for key, value in made[table].items() if not isinstance(value, str)}
-        assert scene[table] == made[table] | {key: pytest.approx(value, rel=1e-5) for key, value in numbers.items()}
-    assert scene["accelerometer"] == made["accelerometer"] | {"range": pytest.approx(8.0 * 9.80665, rel=1e-5)}
+        read, written = getattr(scene, table).as_dict(), getattr(made, table).as_dict()
+        assert read == {
+            key: value if isinstance(value, str) else pytest.approx(value, rel=1e-5) for key, value in written.items()
+        }
 
 
 def test_the_drive_rings_where_the_setup_says() -> None:
     setup = replace(SETUP, mode_Hz=180.0, near_share=0.2)
-    scene = setup.scene(1.0, [])
-    near, far, k = scene["transmission"]["motor_mass"], scene["device"]["mass"], scene["transmission"]["stiffness"]
+    scene = setup.scene(1.0)
+    assert scene.transmission
+    near, far, k = scene.transmission.motor_mass, scene.device.mass, scene.transmission.stiffness
     assert math.sqrt(k * (near + far) / (near * far)) / (2.0 * math.pi) == pytest.approx(180.0)
     assert near + far == pytest.approx(0.0525)
 
@@ -78,13 +78,13 @@ def test_a_gate_without_inertia_leaves_the_exact_limit() -> None:
     """The gated map's first growth is rho(M) = 1 where the gate switches nothing."""
     setup = SETUP
     exact = first_end(setup, "nothing", 0.0)
-    gated = GatedMap.from_scene(setup.linear_scene([]))
+    gated = GatedMap.from_scene(setup.linear_scene())
     assert gated_ends(gated, np.array([0.0]))[0] == pytest.approx(exact, rel=0.02)
 
 
 def test_the_gated_maps_growth_without_a_gate_is_that_of_the_eigenvalues() -> None:
     setup = SETUP
-    gated, exact = GatedMap.from_scene(setup.linear_scene([])), OneTickMap.from_scene(setup.linear_scene([]))
+    gated, exact = GatedMap.from_scene(setup.linear_scene()), OneTickMap.from_scene(setup.linear_scene())
     for stiffness in (1900.0, 2500.0):
         assert gated.growth(stiffness, 0.0) == pytest.approx(math.log(exact.growth(stiffness)), abs=1e-4)
 
@@ -93,15 +93,14 @@ def test_the_gated_maps_growth_without_a_gate_is_that_of_the_eigenvalues() -> No
 def test_runs_of_the_program_grow_and_decay_as_the_gated_map_says(share: float, grows: bool) -> None:
     """Without encoder, noise and friction; deep enough that the contact is never left while it matters."""
     setup, mass = SETUP, 0.02
-    limit = gated_ends(GatedMap.from_scene(setup.linear_scene([])), np.array([mass]))[0]
+    limit = gated_ends(GatedMap.from_scene(setup.linear_scene()), np.array([mass]))[0]
     scene = smooth(setup.scene(share * limit, elements_of(KINDS[3], mass)))
-    scene["device"] |= {"velocity": -0.01}
-    result = run_in_process(scene, registry())
+    result = run_in_process(replace(scene, device=replace(scene.device, velocity=-0.01)), registry())
     assert (result["verdict"] != "steady") == grows
 
 
 def test_the_gated_map_refuses_estimates_that_it_does_not_have() -> None:
-    scene = SETUP.linear_scene([]) | {"velocity": {"cutoff": 100.0}}
+    scene = replace(SETUP.linear_scene(), velocity=Velocity(cutoff=100.0))
     with pytest.raises(ValueError, match="plain difference"):
         GatedMap.from_scene(scene)
 
@@ -158,17 +157,17 @@ def test_inertias_that_are_booked_unfelt_are_booked_as_recorded() -> None:
 
 
 def test_a_claim_that_the_nearest_interpretation_breaks_may_hold_in_another(tmp_path: Path) -> None:
-    work, claim = Work(tmp_path, 8), Claim("V.B", "it does", "does", "{energy}")
-    assert verdict_under_assumptions(work, claim, False, "8 more", energy="1 J").verdict == "does not hold here"
+    work, claim = Work(tmp_path, 8), Claim("V.B", "it does", "does", "{energy}", tested="8 more")
+    assert finding(work, claim, False, energy="1 J").verdict == "does not hold here"
     assert nearest_with(work, "8 more") is None
     broken, held = ({name: float(not is_so) for name in CLAIMS} | {"distance": 3.0} for is_so in (False, True))
     table = [SETUP.as_dict() | broken] * 30 + [replace(SETUP, mount="motor").as_dict() | held] * 30
     keep_shares(work, list(CLAIMS), table, options(table, SPACE))
-    work.scene("figure_7", replace(SETUP, mode_Hz=300.0).scene(5000.0, []))
-    found = verdict_under_assumptions(work, claim, False, "8 more", energy="1 J")
+    work.scene("figure_7", replace(SETUP, mode_Hz=300.0).scene(5000.0))
+    found = finding(work, claim, False, energy="1 J")
     assert "mount of the unit: motor" in found.assumption
     assert found.numbers == "1 J. In 50 % of 60 random interpretations"
-    assert verdict_under_assumptions(work, claim, True, "8 more", energy="1 J").assumption == NEAREST
+    assert finding(work, claim, True, energy="1 J").assumption == NEAREST
     assert nearest_with(work, "8 more") == replace(SETUP, mount="motor")
     assert nearest_in(work).mode_Hz == 300.0
     assert nearest_in(Work(tmp_path, 8, small=True)) == nearest()
@@ -183,7 +182,7 @@ def test_a_small_figure_has_its_files_and_a_finding_for_every_claim(number: int,
     for name in kept["files"]:
         assert (tmp_path / name).stat().st_size > 0
         if name.endswith(".toml") and name != SCENE_FILE:  # that one extends what lies elsewhere
-            assert load(tmp_path / name)["wall"]["stiffness"] > 0.0
+            assert wall_of(load(tmp_path / name)).stiffness > 0.0
 
 
 @pytest.mark.slow

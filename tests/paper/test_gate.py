@@ -9,7 +9,7 @@ import pytest
 
 from haploop.controller.dissipation import Motion
 from haploop.controller.dissipation.unidirectional_inertia import UnidirectionalInertia
-from haploop.tools.studies.choi2022.gate import always_open_Hz, bidirectional, low_passed_s, unidirectional
+from haploop.tools.studies.choi2022.theory import always_open_Hz, bidirectional, low_passed_s, unidirectional
 
 PERIOD_S, TICKS, MASS_KG = 1e-3, 40_000, 0.01
 

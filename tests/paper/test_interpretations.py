@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import copy
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,10 +14,12 @@ from haploop.launch.runs.in_process import run_in_process
 from haploop.launch.scene.check import resolve
 from haploop.launch.scene.file import load
 from haploop.launch.scene.layers import Layers
+from haploop.protocol.scene.estimators import Acceleration
+from haploop.protocol.scene.paths import without
+from haploop.protocol.scene.scene import Scene
 from haploop.tools.search.random import Point
-from haploop.tools.studies.choi2022.interpretations import decider, never_together, options, share
-from haploop.tools.studies.choi2022.scenes import fig6
-from haploop.tools.studies.choi2022.simulation.interpretation import (
+from haploop.tools.studies.choi2022.interpretations import MOST, decider, never_together, options, share
+from haploop.tools.studies.choi2022.simulation import (
     BASE,
     BOUNDS,
     CHOICES,
@@ -26,33 +28,21 @@ from haploop.tools.studies.choi2022.simulation.interpretation import (
     scene_of,
     scene_text,
 )
-from haploop.tools.studies.choi2022.simulation.measure import CLAIMS, MOST, SMALL_M, extent, over, shortfalls
-from haploop.tools.studies.choi2022.simulation.search import write_table
+from haploop.tools.studies.choi2022.simulation_measure import CLAIMS, SMALL_M, Extent, measure, over
+from haploop.tools.studies.choi2022.work import Work, fig6
 from helpers.scenes.least import KINDS
 
 SCENES = Path(__file__).parents[2] / "launch/scenes"
-# What the paper states (section V.A), by table; nothing else of these tables is left but what is listed.
-OPEN = {
-    "hand": {"rest", "force"},
-    "encoder": {"resolution", "rounding"},
-    "noise": {"deviation", "cutoff"},
-    "velocity": {"cutoff"},
-    "acceleration": {"source", "cutoff"},
-}
-OPEN_AT_TOP = {"title", "duration", "seed"}
+# What the paper leaves open (section V.A), beside title, duration, the encoder's step and where the elements act.
+OPEN = ("seed", "noise", "velocity", "acceleration", "hand.rest", "hand.force", "encoder.rounding")
 
 
-def stated(scene: dict[str, Any]) -> dict[str, Any]:
-    """What is left of a scene without what the paper leaves open."""
-    kept = copy.deepcopy(scene)
-    for key in OPEN_AT_TOP:
-        kept.pop(key)
-    for table, keys in OPEN.items():
-        left = {key: value for key, value in kept.pop(table, {}).items() if key not in keys}
-        kept |= {table: left} if left else {}
-    for element in kept.get("dissipation", []):
-        element.pop("acts")
-    return kept
+def stated(scene: Scene) -> Scene:
+    """The scene with all that the paper leaves open at one value."""
+    assert scene.encoder
+    encoder = replace(scene.encoder, resolution=1e-5)
+    elements = tuple(replace(element, acts="always") for element in scene.dissipation)
+    return without(replace(scene, title="", duration=3.0, encoder=encoder, dissipation=elements), *OPEN)
 
 
 def drawn(seed: int = 1, structures: int = 30, each: int = 1) -> list[Point]:
@@ -62,11 +52,7 @@ def drawn(seed: int = 1, structures: int = 30, each: int = 1) -> list[Point]:
 
 def test_our_own_interpretation_is_what_the_scene_files_say() -> None:
     for panel in "abc":
-        scene = scene_of(BASE, panel)
-        if panel != "a":
-            assert scene["dissipation"] == fig6(panel)["dissipation"]
-        assert scene.pop("acceleration") == {"source": "encoder"}
-        assert scene == fig6(panel)
+        assert scene_of(BASE, panel) == replace(fig6(panel), acceleration=Acceleration())
 
 
 @pytest.mark.parametrize("panel", ["a", "b", "c"])
@@ -74,7 +60,7 @@ def test_no_interpretation_touches_what_the_paper_states_and_every_one_can_be_ru
     for interpretation in drawn():
         scene = scene_of(interpretation, panel)
         assert stated(scene) == stated(fig6(panel))
-        assert resolve(Layers(Path("scene.toml"), copy.deepcopy(scene)), KINDS) == scene
+        assert resolve(Layers(Path("scene.toml"), scene.as_dict()), KINDS) == scene
 
 
 def test_interpretations_are_drawn_within_their_bounds_with_every_option_as_often_and_again_the_same() -> None:
@@ -103,8 +89,7 @@ def test_a_scene_file_of_an_interpretation_reads_back_to_its_scene(tmp_path: Pat
         for panel in "abc":
             file = tmp_path / "paper/scene.toml"
             file.write_text(scene_text(interpretation, panel), encoding="utf-8")
-            read, made = load(file), scene_of(interpretation, panel)
-            assert {**read, "title": ""} == {**made, "title": ""}
+            assert replace(load(file), title="") == replace(scene_of(interpretation, panel), title="")
 
 
 def test_a_shortfall_is_the_logarithm_of_the_missing_factor() -> None:
@@ -114,12 +99,12 @@ def test_a_shortfall_is_the_logarithm_of_the_missing_factor() -> None:
 
 
 def test_a_book_is_measured_by_its_end_its_least_and_its_greatest_fall() -> None:
-    assert extent(np.array([0.0, 3.0, 1.0, 5.0, -1.0, 4.0])) == (4.0, -1.0, 6.0)
+    assert Extent.from_book(np.array([0.0, 3.0, 1.0, 5.0, -1.0, 4.0])) == (4.0, -1.0, 6.0)
 
 
 def test_the_measure_finds_of_our_own_interpretation_what_its_runs_are_known_to_do() -> None:
     """(a) cycles 4.7 mm wide, (b) is steady, (c) cycles beyond the wall: as README.md tells."""
-    [row] = shortfalls([BASE])
+    [row] = measure([BASE])
     held = {claim for claim in CLAIMS if row[claim] == 0.0}
     assert {"a cycles", "a bounded", "a small", "wall unstable", "b bounded", "b helps"} <= held
     assert not {"b large", "b leaves", "c steadied", "c smaller"} & held
@@ -131,7 +116,7 @@ def test_the_measure_finds_of_our_own_interpretation_what_its_runs_are_known_to_
 
 def test_interpretations_together_come_to_what_each_comes_to_alone() -> None:
     group = SPACE.draw(np.random.default_rng(7), 1, 3)[0]
-    assert shortfalls(group) == [shortfalls([one])[0] for one in group]
+    assert measure(group) == [measure([one])[0] for one in group]
 
 
 def row(**found: Any) -> dict[str, Any]:
@@ -156,8 +141,8 @@ def test_claims_that_never_hold_together_are_found() -> None:
 def test_the_table_of_interpretations_reads_back(tmp_path: Path) -> None:
     parquet = pytest.importorskip("pyarrow.parquet")
     rows = [{**row(), "stage": name} for name in ("random", "base")]
-    assert write_table(rows, tmp_path / "readings.parquet")
-    read = parquet.read_table(tmp_path / "readings.parquet").to_pylist()
+    Work(tmp_path, 6).table("interpretations", rows)
+    read = parquet.read_table(tmp_path / "interpretations.parquet").to_pylist()
     assert [one["stage"] for one in read] == ["random", "base"]
     assert read[0]["push_N"] == 0.05
 

@@ -23,6 +23,7 @@ from haploop.tools.executor.executors import make_executor, map_parallel
 from haploop.tools.executor.pool import Pool
 from haploop.tools.figure.style import write_figure
 from haploop.tools.render.progress import Stage, silent
+from haploop.tools.search.random import Row
 from haploop.tools.studies.choi2022.claims import Finding, KeptFinding, texts_of
 
 if TYPE_CHECKING:
@@ -114,6 +115,15 @@ class Work:
         """Writes arrays by name; the unit stands at the end of each name."""
         arrays = {key: np.asarray(value) for key, value in columns.items()}
         np.savez_compressed(self.path(f"{name}.npz"), allow_pickle=True, **arrays)
+
+    def table(self, name: str, rows: Sequence[Row]) -> None:
+        """Writes rows as Parquet, NaN for what a row does not use; nothing where pyarrow is missing."""
+        try:
+            import pyarrow
+            import pyarrow.parquet
+        except ImportError:
+            return
+        pyarrow.parquet.write_table(pyarrow.Table.from_pylist(list(rows)), self.path(f"{name}.parquet"))
 
     def scene(self, name: str, scene: Scene) -> None:
         """Writes a resolved scene that runs by itself."""

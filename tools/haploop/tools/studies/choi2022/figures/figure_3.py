@@ -61,7 +61,7 @@ def make(work: Work) -> list[Finding]:
     figure = empty_figure(13.0, 4.4)
     axes = figure.subplots(1, 3, sharey=True, sharex=True)
     for ax, (name, curve) in zip(axes, curves.items(), strict=True):
-        _draw(ax, name, *curve, walls[name])
+        _draw(ax, name, curve, walls[name])
     work.figure(figure, "figure_3")
     work.data("figure_3", columns)
     sampled, quantised, delayed = (_J(-wall["true_J"]) for wall in walls.values())
@@ -105,7 +105,8 @@ def area_J(depth_m: np.ndarray, force_N: np.ndarray) -> float:
     return float(-np.sum(force_N[:-1] * np.diff(depth_m)))
 
 
-def _draw(ax: Axes, name: str, depth: np.ndarray, force: np.ndarray, wall: Summary) -> None:
+def _draw(ax: Axes, name: str, curve: Curve, wall: Summary) -> None:
+    depth, force = curve
     mm = 1e3 * depth
     deepest = int(np.argmax(mm))
     ax.fill(mm, force, color=_FILL, linewidth=0, alpha=0.7)

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -65,7 +64,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-TABLE = "figure_6_interpretations.parquet"
 CLAIMS = claims_of(6)
 # The claims that the search tests under every interpretation, in its words.
 TESTED = {name: (COUNTED | ASIDE)[name] for name in CLAIMS if name in COUNTED | ASIDE}
@@ -96,8 +94,7 @@ def make(work: Work) -> list[Finding]:
     rows = found.of("random")
     if there := options(rows, SPACE):
         work.figure(share_map(there, [*COUNTED, "all"], len(rows)), "figure_6_search", work.tell("seen_search"))
-    if write_table(found.rows, work.out / TABLE):
-        work.path(TABLE)
+    work.table("figure_6_interpretations", found.rows)
     work.notes = _notes(work, found)
     decides = decider(there, "c beats bidirectional")
     work.answer = work.tell(
@@ -166,20 +163,6 @@ def _together(found: Found[Point]) -> Finding:
         nearest=found.of("nearest")[0]["holding"],
         ours=found.of("base")[0]["holding"],
     )
-
-
-def write_table(rows: Sequence[Row], path: Path) -> bool:
-    """Writes all interpretations as Parquet, one row each; returns False where pyarrow is missing.
-
-    Numbers that an interpretation does not use are NaN; swings of runs that diverged are infinite.
-    """
-    try:
-        import pyarrow
-        import pyarrow.parquet
-    except ImportError:
-        return False
-    pyarrow.parquet.write_table(pyarrow.Table.from_pylist(list(rows)), path)
-    return True
 
 
 def _notes(work: Work, found: Found[Point]) -> list[str]:

@@ -109,7 +109,7 @@ def presses(work: Work, name: str, cases: Mapping[str, tuple[str, Scene]]) -> li
     for column, (key, (heading, scene)) in zip(axes.T, cases.items(), strict=True):
         runs.append(run(scene))
         press = Press.from_run(runs[-1])
-        _draw(*column, press, f"{heading}: {runs[-1].summary['verdict']}", wall_of(scene).stiffness)
+        _draw(column[0], column[1], press, f"{heading}: {runs[-1].summary['verdict']}", wall_of(scene).stiffness)
         columns |= press.columns(key)
         work.scene(f"{name}_{key}", scene)
     legend(axes[0, 0], loc="upper right", ncols=3, **INSIDE)
