@@ -26,7 +26,6 @@ class ActiveElement:
     A book covers one element with one set of parameters: a swap and a changed parameter both open a new one.
 
     Attributes:
-        element: with its parameters.
         acts: "always", or "in-contact": the force is 0 out of contact.
         book: number of the book, in order of opening within the run.
         from_tick: the tick at which it was opened.
@@ -39,12 +38,8 @@ class ActiveElement:
 
     def describe(self) -> Description:
         """Returns the description of the element and its book."""
-        return {
-            "book": self.book,
-            "kind": self.element.kind,
-            "parameters": {**self.element.values(), "acts": self.acts},
-            "from_tick": self.from_tick,
-        }
+        parameters = {**self.element.values(), "acts": self.acts}
+        return {"book": self.book, "kind": self.element.kind, "parameters": parameters, "from_tick": self.from_tick}
 
 
 def make_element(table: ElementTable, kinds: Mapping[str, type[Element]]) -> tuple[Element, str]:
@@ -57,9 +52,8 @@ def make_element(table: ElementTable, kinds: Mapping[str, type[Element]]) -> tup
         return kinds[table.name](**table.parameters), table.acts
     except Exception as error:
         given = ", ".join(f"{name} = {value}" for name, value in table.parameters.items()) or "no parameters"
-        raise ElementError(
-            f"The element {table.name} cannot be made with {given}: {type(error).__name__}: {error}"
-        ) from error
+        what = f"{type(error).__name__}: {error}"
+        raise ElementError(f"The element {table.name} cannot be made with {given}: {what}") from error
 
 
 def keeps_attributes(element: Element) -> bool:
@@ -91,7 +85,7 @@ class Unchanged:
             raise ElementError(f"The element {element.kind} keeps attributes of its own.")
 
     def check(self) -> None:
-        """Look again, after a tick."""
+        """Looks again, after a tick."""
         for element, known in zip(self._elements, self._known, strict=True):
             now = vars(element).values()
             if len(now) != len(known) or any(new is not old for new, old in zip(now, known, strict=True)):

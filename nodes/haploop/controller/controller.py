@@ -22,7 +22,6 @@ from haploop.protocol.trees import tree_select
 if TYPE_CHECKING:
     import numpy as np
 
-
 Kinds = dict[str, type[Element]]
 
 
@@ -45,7 +44,7 @@ def apply_change(
 def _swapped(
     params: ControllerParams, state: ControllerState, change: Change, table: ElementTable, kinds: Kinds
 ) -> tuple[ControllerParams, ControllerState]:
-    """Both with a new element in its place, one more past the end, or one less; a new one's memory is fresh."""
+    """Returns both with a new element in its place, one more past the end, or one less; a new one's memory is fresh."""
     place, elements, memories, books = change.element, list(params.elements), list(state.elements), params.books
     if table.name == NO_ELEMENT:
         del elements[place]
@@ -77,24 +76,17 @@ def _set(params: ControllerParams, tick: int, path: list[str], value: float) -> 
 _NEVER = 2**62
 
 
-def make_params(scene: Scene, period_s: float, kinds: dict[str, type[Element]]) -> ControllerParams:
+def make_params(scene: Scene, period_s: float, kinds: Kinds) -> ControllerParams:
     """Makes the parameters of the controller of a resolved scene, or of a batch in a stacked one."""
-    elements = tuple(
-        ActiveElement(*make_element(table, kinds), book, 0) for book, table in enumerate(scene.dissipation)
-    )
+    made = [make_element(table, kinds) for table in scene.dissipation]
+    elements = tuple(ActiveElement(element, acts, book, 0) for book, (element, acts) in enumerate(made))
     wall = Wall.from_scene(scene)
     motion = Motion(period_s, wall.inward)
     return ControllerParams(*make_estimators(scene, period_s), wall, elements, len(elements), motion)
 
 
 class Controller:
-    """Parameters and state of the controller of one loop or of a batch; knows nothing of sockets.
-
-    Args:
-        scene: resolved, of one loop, or stacked of a batch.
-        time: of the scene.
-        kinds: element kinds at hand.
-        recorder: of a batch; one for a single loop when None.
+    """Parameters and state of the controller of one loop, or of a batch with its recorder; knows nothing of sockets.
 
     Attributes:
         params, state: what ``tick`` is given, both replaced between ticks; the state is None before the first sample.
@@ -102,13 +94,7 @@ class Controller:
         recorder: what happened at every tick, in blocks.
     """
 
-    def __init__(
-        self,
-        scene: Scene,
-        time: Timebase,
-        kinds: dict[str, type[Element]],
-        recorder: Recorder | None = None,
-    ) -> None:
+    def __init__(self, scene: Scene, time: Timebase, kinds: Kinds, recorder: Recorder | None = None) -> None:
         self._kinds, self._control_rate = dict(kinds), time.control_rate
         self.params = make_params(scene, time.period_s, self._kinds)
         self.state: StateTuple | None = None
@@ -119,13 +105,13 @@ class Controller:
         self.recorder.open(self.params)
 
     def select(self, kept: np.ndarray) -> None:
-        """Keep these members of a batch, whose rows have been taken; ``kept`` is their mask, shape (members,)."""
+        """Keeps these members of a batch, whose rows have been taken; ``kept`` is their mask, shape (members,)."""
         self.params, self.state = tree_select(self.params, kept), tree_select(self.state, kept)
         self._changes = tree_select(self._changes, kept)
         self.recorder.open(self.params)
 
     def schedule(self, tick: int, event: Event) -> None:
-        """Have a checked swap or set take effect at ``tick``, before that tick's force."""
+        """Has a checked swap or set take effect at ``tick``, before that tick's force."""
         change = Change.from_dict(tick, event)
         if DELAY in change.set:
             self.recorder.cover(math.ceil(change.set[DELAY] * self._control_rate) + 2)
@@ -155,7 +141,7 @@ class Controller:
         return forces
 
     def _change(self, state: ControllerState) -> ControllerState:
-        """Carry out what is due; later ticks are written to a new block, since its columns may differ."""
+        """Carries out what is due; later ticks are written to a new block, since its columns may differ."""
         self.recorder.cut()
         while self._changes and self._changes[0].tick <= self.tick:
             change = self._changes.pop(0)

@@ -44,20 +44,21 @@ class ControllerNode:
         return self._controller.tick, {"history": self._controller.recorder.history}
 
     def connect(self) -> None:
-        """Greet the plant and wait for the logger."""
+        """Greets the plant and waits for the logger."""
         self._loop.greet(self._secret)
         self._publisher.await_subscriber(lambda: self._wait("logger"))
         self._client.ready(0)
 
     def run(self) -> tuple[int, Message]:
-        """Answer until the plant ends the run; returns the number of ticks answered."""
+        """Answers until the plant ends the run; returns the number of ticks answered."""
         controller, client, loop = self._controller, self._client, self._loop
         while (samples := loop.samples(controller.tick)) is not None:
             end = controller.tick + len(samples)
             while client.until < end:
                 client.wait(controller.tick)
-            if client.events:
-                self._schedule()
+            for tick, event in client.take_events() if client.events else ():
+                if is_change(event):
+                    controller.schedule(tick, event)
             try:
                 loop.answer(controller.tick, controller.answer(samples))
             except ElementError:
@@ -66,21 +67,13 @@ class ControllerNode:
             if end - self._reported >= self._block.ticks or end >= client.until:
                 self._flush()
                 client.poll()
-        return self._end()
-
-    def _schedule(self) -> None:
-        for tick, event in self._client.take_events():
-            if is_change(event):
-                self._controller.schedule(tick, event)
-
-    def _end(self) -> tuple[int, Message]:
         self._flush()
-        tick, trouble = self._controller.tick, self._controller.recorder.trouble
+        tick, trouble = controller.tick, controller.recorder.trouble
         self._publisher.publish("END", tick, "", trouble)
         return tick, {"strangers": self._publisher.unknown_peers, "trouble": trouble}
 
     def _flush(self) -> None:
-        """Publish what was answered, answer new subscribers, report."""
+        """Publishes what was answered, answers new subscribers, reports."""
         recorder = self._controller.recorder
         for block in recorder.take():
             fields = (block[name] for name in ("from_tick", "ticks", "columns", "elements", "wall"))
@@ -92,7 +85,7 @@ class ControllerNode:
         self._block.next()
 
     def _wait(self, on: str) -> None:
-        """Nothing came for a while: say so, and serve whoever subscribes to a loop that stands still."""
+        """Says that nothing came for a while, and serves whoever subscribes to a loop that stands still."""
         self._client.waiting(self._controller.tick, on)
         self._client.poll()
         if self._controller.recorder.is_empty:
@@ -100,7 +93,7 @@ class ControllerNode:
 
 
 def work(client: ClockClient, context: zmq.Context[zmq.Socket[bytes]], directory: Path) -> tuple[int, Message]:
-    """Run the controller as a node of a run."""
+    """Runs the controller as a node of a run."""
     try:
         node = ControllerNode(client, context, directory)
         node.connect()

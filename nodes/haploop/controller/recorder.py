@@ -19,7 +19,7 @@ MOTION_COLUMNS = ("x", "v", "a", "wall")
 class Recorder:
     """Rows of a controller, tick by tick.
 
-    A block is a dict of ``from_tick``, ``ticks``, ``columns`` (name -> little-endian float64 bytes), ``elements`` (one
+    A block has ``from_tick``, ``ticks``, ``columns`` (name -> little-endian float64 bytes), ``elements`` (one
     description per dissipation column) and ``wall`` (position, stiffness, into_wall) as they stood in its ticks.
 
     Attributes:
@@ -39,7 +39,7 @@ class Recorder:
         self._next_tick = 0
 
     def open(self, params: ControllerParams) -> None:
-        """Start a block with the columns of these elements, in which wall and elements are as they are now."""
+        """Starts a block with the columns of these elements, in which wall and elements are as they are now."""
         wall = params.wall
         self._begin()
         self.elements = [active.describe() for active in params.elements]
@@ -57,11 +57,11 @@ class Recorder:
         return not self._rows and not self._cut
 
     def cover(self, ticks: int) -> None:
-        """Keep a history of at least so many ticks from now on."""
+        """Keeps a history of at least so many ticks from now on."""
         self._history_ticks = max(self._history_ticks, ticks)
 
     def cut(self) -> None:
-        """End the present block."""
+        """Ends the present block."""
         width = len(self._names)
         ticks = len(self._rows) // width
         if not ticks:
@@ -70,15 +70,8 @@ class Recorder:
         columns = {name: rows[i::width] for i, name in enumerate(self._names)}
         if self.trouble is None and not math.isfinite(sum(rows)):
             self._find_trouble(columns)
-        self._cut.append(
-            {
-                "from_tick": self._next_tick,
-                "ticks": ticks,
-                "columns": {name: column.tobytes() for name, column in columns.items()},
-                "elements": self.elements,
-                "wall": self._wall,
-            }
-        )
+        block: Block = {"from_tick": self._next_tick, "ticks": ticks, "elements": self.elements, "wall": self._wall}
+        self._cut.append(block | {"columns": {name: column.tobytes() for name, column in columns.items()}})
         self._next_tick += ticks
 
     def take(self) -> list[Block]:
@@ -125,14 +118,14 @@ class BatchRecorder(Recorder):
         self._taken: list[Row] = []
 
     def open(self, params: ControllerParams) -> None:
-        """From now on rows have the columns of these elements and this wall."""
+        """Gives the rows to come the columns of these elements and this wall."""
         super().open(params)
         self._shared = {"wall_position": params.wall.position, "wall_stiffness": params.wall.stiffness}
         self._books = [active.book for active in params.elements]
         self.add = self._add
 
     def cut(self) -> None:
-        """Nothing: every row knows its columns."""
+        """Does nothing: every row knows its columns."""
 
     def _add(self, row: list[Any]) -> None:
         motion, forces = row[: len(MOTION_COLUMNS)], row[len(MOTION_COLUMNS) : -2]

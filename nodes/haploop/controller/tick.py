@@ -17,8 +17,7 @@ class Wall:
     """f_wall = k_w (x_w - x_m) while x_m is strictly inside, else 0 (Choi et al. 2022, eq. 12).
 
     Attributes:
-        position: of its surface x_w, m.
-        stiffness: k_w, N/m.
+        position, stiffness: x_w of its surface, m; k_w, N/m.
         inward: direction that leads into it, +1.0 or -1.0; 0.0 where there is no wall, so that nothing is inside.
     """
 
@@ -45,10 +44,8 @@ class ControllerParams:
     """Everything that a tick depends on but state and sample; another one takes its place where something changes.
 
     Attributes:
-        velocity: from x_m[k] to v[k].
-        acceleration: from its input to a[k].
+        velocity, acceleration: from x_m[k] to v[k], and from an input to a[k].
         input: that input: "encoder": v[k]; "accelerometer": the reading; "kalman": what the velocity's filter found.
-        wall: the virtual wall.
         elements: the active elements, in the order in which their forces are added.
         books: how many books of elements have been opened so far.
         motion: what elements are given; written anew at every tick.
@@ -115,9 +112,6 @@ def tick(params: ControllerParams, state: StateTuple, sample: Sample) -> tuple[S
     """Returns the next state, and the row of this tick: x, v, a, the wall's force, every element's, total, contact.
 
     f_d[k] = f_wall[k] + sum of the elements' forces[k], in the order of the scene's list. The state is not changed.
-
-    Args:
-        sample: (x_m,) or (x_m, acceleration); floats, or arrays of shape (members,).
 
     Raises:
         NoForce: an element raised, or gave something that is no number.

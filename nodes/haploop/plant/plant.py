@@ -14,7 +14,7 @@ from haploop.protocol.changes import Event
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import DELAY, Timebase
 
-# From the first tick and its samples to the commands that answer them.
+# From the first tick of at most L + 1 samples and these to the forces in N that answer them.
 Exchange = Callable[[int, list[tuple[float, ...]]], list[float]]
 
 
@@ -88,10 +88,7 @@ class Plant:
             self._delays.append((tick, round(values[DELAY] * self._steps * self._control_rate)))
 
     def run_until(self, end: int, exchange: Exchange) -> None:
-        """Works up to tick ``end``, or to where the plant stops by itself; delays change on the way.
-
-        ``exchange`` is given the first tick of at most L + 1 samples and returns the forces in N that answer them.
-        """
+        """Works up to tick ``end``, or to where the plant stops by itself; delays change on the way."""
         while self._delays and self._delays[0][0] < end:
             tick, delay_steps = self._delays.pop(0)
             self._work_until(tick, exchange)
@@ -196,9 +193,8 @@ class Plant:
     def take_block(self) -> tuple[int, int, dict[str, bytes]]:
         """Returns (first tick, ticks, columns) of what was stepped since the last block; empties it.
 
-        Columns x, v, x_low (what rounding to a float left of x), force and command are little-endian float64 with
-        ``ticks * n + 1`` rows: every step of the block and its end state, whose force and command are the last
-        held ones. What a scene's effects count follows, each the number of times before a step.
+        Columns are little-endian float64 with ``ticks * n + 1`` rows: every step of the block and its end state, whose
+        force and command are the last held ones. What effects count follows, the number of times before a step.
         """
         first, reached = self._block_first, self.reached
         record = self._motion.take_record(first)

@@ -19,7 +19,7 @@ class PluginError(Exception):
 
 
 def registry(plugin_files: list[Path] | None = None) -> dict[str, type[Element]]:
-    """Every kind by name: the installed ones, then those of ``plugin_files``, which win.
+    """Returns every kind by name: the installed ones, then those of ``plugin_files``, which win.
 
     Raises:
         PluginError: an entry point or a file does not load, or holds no element.
@@ -36,7 +36,7 @@ def registry(plugin_files: list[Path] | None = None) -> dict[str, type[Element]]
 
 
 def load_plugin(path: Path) -> dict[str, type[Element]]:
-    """The elements a Python file defines, by kind. The file is executed: only files named by the user come here.
+    """Returns the elements a Python file defines, by kind. The file is executed: only a file the user named comes here.
 
     Raises:
         PluginError: the file cannot be read or run, or defines no usable element.
@@ -49,7 +49,7 @@ def load_plugin(path: Path) -> dict[str, type[Element]]:
 
 
 def load_source(source: str, origin: str) -> dict[str, type[Element]]:
-    """The elements that the text of a Python file defines, by kind; ``origin`` is the file.
+    """Returns the elements that the text of a Python file defines, by kind; ``origin`` is the file.
 
     Raises:
         PluginError: the text cannot be run, or defines no usable element.
@@ -70,7 +70,7 @@ def load_source(source: str, origin: str) -> dict[str, type[Element]]:
 
 
 def checked(element: object, origin: str) -> type[Element]:
-    """An element that has a kind, a force and well declared parameters.
+    """Returns an element that has a kind, a force and well declared parameters.
 
     Raises:
         PluginError: it is none; ``origin`` says where it came from.

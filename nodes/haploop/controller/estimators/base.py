@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from haploop.protocol.arrays import each
 from haploop.protocol.quantity import Quantity
 from haploop.protocol.scene.scene import Scene
 
@@ -77,15 +75,12 @@ class Difference(Estimator):
 
     @classmethod
     def from_scene(cls, scene: Scene, of: str, period_s: float) -> Difference:
-        """Makes it; no key of the scene is asked."""
         return cls(period_s)
 
     def start(self, u: Any, sample: Sample) -> Any:
-        """Returns the first input."""
         return u
 
     def step(self, memory: Any, u: Any, sample: Sample) -> tuple[Any, Any]:
-        """Returns u and the difference to the input before."""
         return u, (u - memory) / self.period_s
 
 
@@ -98,15 +93,12 @@ class Unchanged(Estimator):
 
     @classmethod
     def from_scene(cls, scene: Scene, of: str, period_s: float) -> Unchanged:
-        """Makes it; no key of the scene is asked."""
         return cls()
 
     def start(self, u: Any, sample: Sample) -> Any:
-        """Returns no memory."""
         return None
 
     def step(self, memory: Any, u: Any, sample: Sample) -> tuple[Any, Any]:
-        """Returns no memory and the input."""
         return None, u
 
 
@@ -125,26 +117,18 @@ class LowPass(Estimator):
 
     @classmethod
     def from_scene(cls, scene: Scene, of: str, period_s: float) -> LowPass:
-        """Raises TypeError: it is made of another by ``over``."""
+        """Raises TypeError: it is made of another."""
         raise TypeError("A low-pass is made over another estimator.")
 
-    @classmethod
-    def over(cls, raw: Estimator, cutoff_hz: Any, period_s: float) -> LowPass:
-        """Makes one of cutoff fc in Hz over another estimator."""
-        return cls(raw, 1.0 - each(math.exp, -2.0 * math.pi * cutoff_hz * period_s))
-
     def start(self, u: Any, sample: Sample) -> Any:
-        """Returns the memory of the other, and its first estimate."""
         memory = self.raw.start(u, sample)
         return memory, self.raw.step(memory, u, sample)[1]
 
     def step(self, memory: Any, u: Any, sample: Sample) -> tuple[Any, Any]:
-        """Returns both memories and y."""
         raw, y = memory
         raw, estimate = self.raw.step(raw, u, sample)
         y = y + self.gain * (estimate - y)
         return (raw, y), y
 
     def acceleration(self, memory: Any) -> Any:
-        """Returns what the other has found, as it is."""
         return self.raw.acceleration(memory[0])

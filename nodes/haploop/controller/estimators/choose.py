@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from importlib import import_module
+import math
 from importlib.metadata import entry_points
+from pkgutil import resolve_name
 from typing import Any
 
 from haploop.controller.estimators.base import Difference, Estimator, LowPass, Unchanged
+from haploop.protocol.arrays import each
 from haploop.protocol.scene.estimators import Acceleration
 from haploop.protocol.scene.scene import Scene
 
@@ -35,10 +37,7 @@ def estimator_class(name: str) -> type[Estimator]:
     if name not in ESTIMATORS:
         return {entry.name: entry for entry in entry_points(group=_GROUP)}[name].load()
     found = ESTIMATORS[name]
-    if isinstance(found, str):
-        module, _, attribute = found.partition(":")
-        return getattr(import_module(module), attribute)
-    return found
+    return resolve_name(found) if isinstance(found, str) else found
 
 
 def estimators_for(table: str) -> dict[str, type[Estimator]]:
@@ -65,4 +64,4 @@ def _make(scene: Scene, of: str, period_s: float) -> Estimator:
 
 
 def _filtered(raw: Estimator, cutoff_hz: Any, period_s: float) -> Estimator:
-    return raw if cutoff_hz is None else LowPass.over(raw, cutoff_hz, period_s)
+    return raw if cutoff_hz is None else LowPass(raw, 1.0 - each(math.exp, -2.0 * math.pi * cutoff_hz * period_s))

@@ -74,11 +74,9 @@ class Kalman(Estimator):
         )
 
     def start(self, u: Any, sample: Sample) -> Memory:
-        """Returns the first position, at rest."""
         return u, 0.0 * u, 0.0 * u
 
     def step(self, memory: Memory, u: Any, sample: Sample) -> tuple[Memory, Any]:
-        """Returns what is predicted of the next tick, and v[k]."""
         (g_x,), (g_v,), (g_a,) = self.gain
         x, v, a = memory
         surprise = u - x
@@ -86,7 +84,6 @@ class Kalman(Estimator):
         return (x + g_x * surprise + self.period_s * v + self.half_s2 * a, v + self.period_s * a, a), v
 
     def acceleration(self, memory: Memory) -> Any:
-        """Returns a[k]; the model holds it until the next tick."""
         return memory[2]
 
 
@@ -99,11 +96,9 @@ class FusedKalman(Kalman):
     """
 
     def start(self, u: Any, sample: Sample) -> Memory:
-        """Returns the first position, at rest under the first reading."""
         return u, 0.0 * u, sample[1]
 
     def step(self, memory: Memory, u: Any, sample: Sample) -> tuple[Memory, Any]:
-        """Returns what is predicted of the next tick, and v[k]."""
         (g_x, h_x), (g_v, h_v), (g_a, h_a) = self.gain
         x, v, a = memory
         surprise, surprise_a = u - x, sample[1] - a
@@ -113,7 +108,7 @@ class FusedKalman(Kalman):
 
 
 def assumed_noises(scene: Scene, period_s: float) -> dict[str, float]:
-    """The standard deviations that the filter of a scene counts on, by their keys in ``[velocity]``."""
+    """Returns the standard deviations that the filter of a scene counts on, by their keys in ``[velocity]``."""
     noises = {"measurement_noise": position_noise_m(scene)}
     if scene.velocity and scene.velocity.accelerometer:
         given = scene.velocity.accelerometer_noise
@@ -122,13 +117,13 @@ def assumed_noises(scene: Scene, period_s: float) -> dict[str, float]:
 
 
 def jerk_density_limits(noise_m: float, period_s: float) -> tuple[float, float]:
-    """Least and greatest ``jerk_density`` that the gain can be computed for: w0 T from 1e-5 to 1e4."""
+    """Returns the least and greatest ``jerk_density`` that the gain can be computed for: w0 T from 1e-5 to 1e4."""
     unit = noise_m * period_s**-2.5
     return 1e-15 * unit, 1e12 * unit
 
 
 def steady_state(jerk_density: float, noises: list[float], period_s: float) -> tuple[Array, Array]:
-    """Gain, shape (3, m), and covariance of the estimate's error, shape (3, 3), both SI.
+    """Returns the gain, shape (3, m), and the covariance of the estimate's error, shape (3, 3), both SI.
 
     P = A (P - P H' (H P H' + R)^-1 H P) A' + Q, gain = P H' (H P H' + R)^-1, solved with sigma as the unit of length
     and 1 / w0 or T, whichever is longer, as that of time: then no number is far from 1, however slow the filter.
@@ -136,7 +131,6 @@ def steady_state(jerk_density: float, noises: list[float], period_s: float) -> t
     Args:
         jerk_density: root of the jerk's density S, m/s^3/Hz^0.5, within ``jerk_density_limits``.
         noises: standard deviation of the position, m, above 0, and where it is measured of the acceleration, m/s^2.
-        period_s: the control period T.
     """
     from scipy.linalg import solve_discrete_are
 
@@ -156,14 +150,14 @@ def steady_state(jerk_density: float, noises: list[float], period_s: float) -> t
 
 
 def _model(T: float, S: float) -> tuple[Array, Array]:
-    """A and Q of x''' = w over the time T."""
+    """Returns A and Q of x''' = w over the time T."""
     step = np.array([[1.0, T, T**2 / 2], [0.0, 1.0, T], [0.0, 0.0, 1.0]])
     noise = [[T**5 / 20, T**4 / 8, T**3 / 6], [T**4 / 8, T**3 / 3, T**2 / 2], [T**3 / 6, T**2 / 2, T]]
     return step, S * np.array(noise)
 
 
 def position_noise_m(scene: Scene) -> float:
-    """Standard deviation sigma: what ``[velocity]`` says, or that of rounding (q / sqrt(12)) and noise together."""
+    """Returns sigma: what ``[velocity]`` says, or that of rounding (q / sqrt(12)) and noise together."""
     if scene.velocity and scene.velocity.measurement_noise is not None:
         return scene.velocity.measurement_noise
     rounding = (scene.encoder.resolution if scene.encoder else 0.0) / math.sqrt(12.0)
@@ -171,7 +165,7 @@ def position_noise_m(scene: Scene) -> float:
 
 
 def _accelerometer_noise_m_s2(scene: Scene, period_s: float) -> float:
-    """Standard deviation of the accelerometer's white noise through its first-order bandwidth, and of its rounding.
+    """Returns the deviation of the accelerometer's white noise through its first-order bandwidth, and of its rounding.
 
     The noise of density n is n sqrt(pi B / 2) behind a corner at B Hz, n sqrt(1 / (2 T)) when sampled as it is.
     """

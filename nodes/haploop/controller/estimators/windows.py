@@ -32,15 +32,12 @@ class WindowDifference(Estimator):
 
     @classmethod
     def from_scene(cls, scene: Scene, of: str, period_s: float) -> WindowDifference:
-        """Makes the one of ``ticks`` in the scene's table."""
         return cls(scene.estimate(of).ticks or 1, period_s)
 
     def start(self, u: Any, sample: Sample) -> tuple[tuple[Any, ...], int]:
-        """Returns a memory full of the first input."""
         return (u,) * self.ticks, 0
 
     def step(self, memory: tuple[tuple[Any, ...], Any], u: Any, sample: Sample) -> tuple[Any, Any]:
-        """Returns the memory with u, and the rate from the oldest to u."""
         recent, age = memory
         rate = (u - recent[-1]) / ((age + (age < 1)) * self.period_s)
         recent = (u,) + recent[:-1]  # noqa: RUF005 - in two thirds of the time
@@ -84,14 +81,12 @@ class EndFit(Estimator):
         table = scene.estimate(of)
         count = scene.encoder.resolution if scene.encoder and of == "velocity" else 0.0
         bound = count if table.bound is None else table.bound
-        return _FITS[table.fit or "end"](table.ticks, bound, period_s)
+        return (BestFit if table.fit == "best" else EndFit)(table.ticks or 1, bound, period_s)
 
     def start(self, u: Any, sample: Sample) -> tuple[Any, ...]:
-        """Returns a memory without a number."""
         return (u * math.nan,) * self.ticks
 
     def step(self, memory: tuple[Any, ...], u: Any, sample: Sample) -> tuple[tuple[Any, ...], Any]:
-        """Returns the memory with u, and the rate over the longest window that fits."""
         recent = (u,) + memory[:-1]  # noqa: RUF005 - in two thirds of the time
         return recent, self.rate(u, memory)
 
@@ -113,7 +108,6 @@ class BestFit(EndFit):
     """
 
     def rate(self, u: Any, recent: tuple[Any, ...]) -> Any:
-        """Returns the slope of least squares over the longest window that fits."""
         rate = total = moment = u - u
         for i, rise, fits in _windows(u, recent, self.bound):
             total = total + rise
@@ -121,9 +115,6 @@ class BestFit(EndFit):
             slope = 6.0 * (2.0 * moment - i * total) / (i * (i + 1) * (i + 2) * self.period_s)
             rate = where(fits, slope, rate)
         return rate
-
-
-_FITS = {"end": EndFit, "best": BestFit}
 
 
 def _windows(u: Any, recent: tuple[Any, ...], bound: Any) -> Iterator[tuple[int, Any, Any]]:

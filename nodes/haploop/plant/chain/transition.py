@@ -26,10 +26,6 @@ class ChainTransition:
     The augmented state is (z, command, friction, load, rise), load' = rise / h: one exponential gives the response to
     all inputs. All tables are transposed, (what acts, what is moved), so that sums over the first axis run in order.
 
-    Args:
-        stuck: body 0 is held where it is.
-        steps: the longest hold, in plant steps.
-
     Attributes:
         step: over one plant step; shape (states + 4, states).
         held: over 1 ... steps plant steps, from (z, command, friction) alone; shape (states + 2, steps, states).
@@ -49,10 +45,7 @@ class ChainTransition:
         self.held = np.stack(held, axis=1)
 
     def halves(self, levels: int) -> list[Matrix]:
-        """Returns the transitions over h, h/2, ... h/2^levels, each of shape (states + 4, states).
-
-        The rise is that of a whole step.
-        """
+        """Returns the transitions over h, h/2, ... h/2^levels, shape (states + 4, states); rise is of a whole step."""
         increment = transition_minus_identity(self._rates, self._step_s / _wide(2) ** levels)
         table = [self._unscaled(increment)]
         for _ in range(levels):

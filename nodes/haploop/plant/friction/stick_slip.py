@@ -66,10 +66,6 @@ class StickSlip:
         self._change = _Row(pull[: self._size] @ chain.rates(stuck=True) * step_s, self._size)
         self._speed_up = step_s / chain.masses_kg[0]
 
-    def begin(self, z: np.ndarray, load: float) -> StickSlipState:
-        """Returns the mode in which a run begins."""
-        return self.decide_at_rest(StickSlipState(False, math.copysign(1.0, z[self._v])), z, 0.0, load)
-
     def decide_at_rest(self, mode: StickSlipState, z: np.ndarray, command: float, load: float) -> StickSlipState:
         """Returns the mode from a state on: where v is exactly 0, sticking, or slipping where the other forces pull."""
         if z[self._v] != 0.0:
@@ -155,6 +151,7 @@ class RubbingHistory(ChainHistory):
 
     def _begun(self, z: np.ndarray) -> tuple[np.ndarray, StickSlipState | None]:
         self._stick_slip = StickSlip(self.chain, self.friction, self._step_s)
-        mode = self._stick_slip.begin(z, float(self.loads(0, 1)[0]))
+        slipping = StickSlipState(False, math.copysign(1.0, z[self._v]))
+        mode = self._stick_slip.decide_at_rest(slipping, z, 0.0, float(self.loads(0, 1)[0]))
         friction = self._stick_slip.friction_at(mode, z[self._v])
         return np.array([0.0, -1.0, friction, float(mode.is_stuck)]), mode

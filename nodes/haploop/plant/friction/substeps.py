@@ -47,10 +47,6 @@ class SubstepSolver:
     exactly 0.0. The kinetic energy which that throws away, of the order of 1e-20 of what moves, is heat of friction.
     With a Stribeck velocity every piece has the friction of the speed foreseen for its middle: second order in h.
 
-    Args:
-        free, clamped: transitions of the chain, and with body 0 held.
-        step_s: h, s.
-
     Attributes:
         whole_steps: whether a step in which nothing switches is one piece, with the same friction at every speed.
     """
@@ -165,11 +161,6 @@ def goes_by_whole_steps(scene: Scene) -> bool:
 
 def parts_of_a_step(chain: Chain, step_s: float) -> int:
     """Returns into how many pieces, a power of two, a plant step is cut so that none is longer than half a radian."""
-    fastest = max(_fastest_mode(chain, stuck) for stuck in (False, True))
+    rates = [chain.rates(stuck)[:, : len(chain.states)].astype(float) for stuck in (False, True)]
+    fastest = max(float(np.abs(np.linalg.eigvals(matrix).imag).max()) for matrix in rates)
     return 1 << max(0, math.ceil(math.log2(max(fastest * step_s / _RADIANS, 1.0))))
-
-
-def _fastest_mode(chain: Chain, stuck: bool) -> float:
-    """Returns the highest frequency with which the chain can swing, rad/s."""
-    rates = chain.rates(stuck)[:, : len(chain.states)].astype(float)
-    return float(np.abs(np.linalg.eigvals(rates).imag).max())

@@ -8,13 +8,14 @@ from typing import Any
 import numpy as np
 
 from haploop.plant.chain.chain import Chain
-from haploop.plant.chain.history import ChainHistory, Interval, StickSlipState
+from haploop.plant.chain.history import ChainHistory, Interval
 from haploop.plant.integrators.registry import Integrator
 from haploop.plant.line import Hold
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
 
 Rates = Callable[[float, np.ndarray], np.ndarray]
+Event = Callable[[float, np.ndarray], float]
 # Relative tolerance of a step, and the speed that is none to it, m/s.
 _TOLERANCE, _STILL_M_S = 1e-10, 1e-3
 
@@ -26,6 +27,8 @@ class Dop853Motion(ChainHistory):
     anew where a force or its slope changes; plant steps are read off its dense output. The error is that of the
     tolerance, whatever ``clock.plant_rate``. Digits below the rounding of a float are not kept.
     """
+
+    _mode: Any = None  # of friction
 
     def __init__(self, scene: Scene, time: Timebase) -> None:
         super().__init__(scene, time)
@@ -41,11 +44,7 @@ class Dop853Motion(ChainHistory):
         for first, last in zip([0, *cuts.tolist()], [*cuts.tolist(), self._n], strict=True):
             slope = float(loads[last] - loads[first]) / ((last - first) * self._step_s)
             self._through(interval, first, last, float(loads[first]), slope)
-        return self._accept(tick, interval, self._mode_after())
-
-    def _mode_after(self) -> StickSlipState | None:
-        """Returns the mode of friction after the interval gone through."""
-        return None
+        return self._accept(tick, interval, self._mode)
 
     def _through(self, interval: Interval, first: int, last: int, load: float, slope: float) -> None:
         """Goes through steps ``first`` ... ``last`` under one command, the load (N) rising by ``slope`` N/s."""
@@ -55,12 +54,7 @@ class Dop853Motion(ChainHistory):
         interval.states[first + 1 : last + 1] = found.y.T
 
     def _solved(
-        self,
-        rates: Rates,
-        span: tuple[float, float],
-        z: np.ndarray,
-        ends: np.ndarray,
-        events: Sequence[Callable[[float, np.ndarray], float]] = (),
+        self, rates: Rates, span: tuple[float, float], z: np.ndarray, ends: np.ndarray, events: Sequence[Event] = ()
     ) -> Any:
         """Returns the motion over a span of time in s; states at ``ends``.
 

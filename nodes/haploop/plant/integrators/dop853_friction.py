@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -11,7 +10,7 @@ import numpy as np
 
 from haploop.plant.chain.history import Interval, StickSlipState
 from haploop.plant.friction.stick_slip import RubbingHistory
-from haploop.plant.integrators.dop853 import Dop853Motion, Rates, System
+from haploop.plant.integrators.dop853 import Dop853Motion, Event, Rates, System
 from haploop.plant.line import Hold
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
@@ -45,12 +44,8 @@ class Dop853FrictionMotion(RubbingHistory, Dop853Motion):
         self._pull = (self.chain.accelerations()[0] * self.chain.masses_kg[0]).astype(float)
 
     def advance(self, tick: int, holds: list[Hold]) -> float:
-        assert self.state.mode
         self._mode = self.state.mode
         return super().advance(tick, holds)
-
-    def _mode_after(self) -> StickSlipState | None:
-        return self._mode
 
     def _through(self, interval: Interval, first: int, last: int, load: float, slope: float) -> None:
         """Goes through steps ``first`` ... ``last``, from one switch of friction to the next.
@@ -111,13 +106,13 @@ class Dop853FrictionMotion(RubbingHistory, Dop853Motion):
         for step, speed in zip(range(first, last), speeds, strict=False):
             interval.held[step, 2:] = -self._mode.direction * self.friction.at(speed), 0.0
 
-    def _slipping(self, forces: _Forces) -> tuple[Rates, Callable[[float, np.ndarray], float]]:
+    def _slipping(self, forces: _Forces) -> tuple[Rates, Event]:
         """Returns z' while body 0 slips, and what falls below 0 when it no longer does: the speed in its direction."""
         law, v, direction = self.friction, self._v, self._mode.direction
         smooth, unit = self._free.under(*forces), -direction * self._free.of_friction
         return (lambda t, z: smooth(t, z) + law.at(z[v]) * unit), _Event(lambda _t, z: direction * z[v])
 
-    def _sticking(self, forces: _Forces) -> tuple[Rates, Callable[[float, np.ndarray], float]]:
+    def _sticking(self, forces: _Forces) -> tuple[Rates, Event]:
         """Returns z' while body 0 is held, and what falls below 0 when it no longer is: what more could be held."""
         most = self.friction.holds_N
         return self._clamped.under(*forces), _Event(lambda t, z: most - abs(self._other_forces(t, z, forces)))
@@ -132,7 +127,7 @@ class Dop853FrictionMotion(RubbingHistory, Dop853Motion):
 class _Event:
     """An event of ``solve_ivp`` that ends the motion where the function falls below 0."""
 
-    function: Callable[[float, np.ndarray], float]
+    function: Event
     terminal: bool = True
     direction: float = -1.0
 

@@ -56,12 +56,6 @@ def moved(z: Rows, h: float, rates: Rows) -> Rows:
     return [a + h * rate for a, rate in zip(z, rates, strict=True)]
 
 
-def one_step_matrix(method: OneStep, size: int) -> np.ndarray:
-    """Returns M of z+ = M z without inputs, shape (states, states)."""
-    still = [0.0] * size
-    return np.stack(method.step(list(np.eye(size)), still, still, still))
-
-
 def response_to(push: Rows, method: OneStep) -> Rows:
     """Returns z at the end of a plant step that began with none, under a push held over it."""
     return method.step([0.0] * len(push), push, push, push)

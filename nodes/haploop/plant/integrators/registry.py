@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from importlib import import_module
 from importlib.metadata import entry_points
+from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Any
 
 from haploop.protocol.scene.scene import Scene
@@ -57,15 +57,11 @@ class Integrator:
 
     def make_motion(self, scene: Scene, *args: Any) -> Any:
         """Makes the motion of a resolved scene; nothing else is imported."""
-        return _load(self.motions[scene.friction is not None])(scene, *args)
+        return resolve_name(self.motions[scene.friction is not None])(scene, *args)
 
 
-EXACT = Integrator(
-    "exact",
-    "exact",
-    order=None,
-    motions=("haploop.plant.chain.motion:ChainMotion", "haploop.plant.friction.motion:FrictionMotion"),
-)
+_EXACT_MOTIONS = "haploop.plant.chain.motion:ChainMotion", "haploop.plant.friction.motion:FrictionMotion"
+EXACT = Integrator("exact", "exact", order=None, motions=_EXACT_MOTIONS)
 
 
 def integrator_names() -> tuple[str, ...]:
@@ -84,15 +80,10 @@ def find_integrator(name: str) -> Integrator:
     Raises:
         KeyError: there is none of this name.
     """
-    return _load(_place(name))
+    return resolve_name(_place(name))
 
 
 def _place(name: str) -> str:
     if name not in INTEGRATORS:
         return {entry.name: entry.value for entry in entry_points(group=_GROUP)}[name]
     return INTEGRATORS[name]
-
-
-def _load(place: str) -> Any:
-    module, _, name = place.partition(":")
-    return getattr(import_module(module), name)

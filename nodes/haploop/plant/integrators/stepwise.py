@@ -6,7 +6,7 @@ import numpy as np
 
 from haploop.plant.chain.chain import Chain
 from haploop.plant.chain.history import ChainHistory, Interval
-from haploop.plant.integrators.linear_rates import LinearRates, OneStep, one_step_matrix, response_to
+from haploop.plant.integrators.linear_rates import LinearRates, OneStep, response_to
 from haploop.plant.integrators.registry import find_integrator
 from haploop.plant.line import Hold
 from haploop.protocol.scene.scene import Scene
@@ -58,9 +58,9 @@ def growth(scene: Scene) -> float:
     one-step method.
     """
     rates, method, step_s = _method_of(scene)
-    size = len(rates.matrix)
+    size, still = len(rates.matrix), [0.0] * len(rates.matrix)
     scales = Chain.from_scene(scene).scales(step_s)[:size].astype(float)
-    matrix = scales[:, None] * one_step_matrix(method, size) / scales
+    matrix = scales[:, None] * np.stack(method.step(list(np.eye(size)), still, still, still)) / scales
     return float(np.abs(np.linalg.eigvals(matrix)).max())
 
 

@@ -20,10 +20,6 @@ class FrictionProjection:
     breakaway force at rest. Where f is enough, v is 0.0 exactly; a body that was at rest stays, its x to the bit, and
     the rest of the chain follows the rates of the clamped system. Stops and starts fall on plant steps, which leaves
     every method, whatever its order, an error of order h in their times.
-
-    Args:
-        free, clamped: the method for the rates of the free system, and with body 0 held.
-        rates: of the free system.
     """
 
     def __init__(self, friction: Friction, free: OneStep, clamped: OneStep, rates: LinearRates) -> None:

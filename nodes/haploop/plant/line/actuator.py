@@ -17,11 +17,8 @@ from haploop.protocol.trees import tree_select
 class Actuator(NamedTuple):
     """Force = q rint(command / q), clipped to +-saturation.
 
-    A command that is no finite number passes unchanged; it ends the run.
-
-    Attributes:
-        resolution: q in N, or None; in a batch a number for all members or an array of shape (members,).
-        saturation: N, or None; as q.
+    A command that is no finite number passes unchanged; it ends the run. Either (N) may be None; in a batch a number
+    for all members or an array of shape (members,).
     """
 
     resolution: Any

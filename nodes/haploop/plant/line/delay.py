@@ -72,7 +72,9 @@ class DelayLine:
         n, d = self._time.steps_per_tick, self._time.delay_steps
         acting = max((tick * n - 1 - d) // n, -1)
         coming = tuple((k * n + d, self._forces[k - self._first], k) for k in range(acting + 1, tick))
-        return LossyLine(self._time).taking_over(delay_steps, self._forces[acting - self._first], acting, coming, tick)
+        line, none = LossyLine(self._time), (0, ())
+        line.restore((tick, delay_steps, coming, self._forces[acting - self._first], acting, none, none))
+        return line
 
     def select(self, kept: np.ndarray) -> None:
         self._forces[:] = tree_select(self._forces, kept)

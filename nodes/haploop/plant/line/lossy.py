@@ -61,12 +61,6 @@ class LossyLine:
         self._lost.restore(lost)
         self._draw_from(self._received)
 
-    def taking_over(self, delay_steps: int, force: float, command: int, coming: Any, received: int) -> LossyLine:
-        """Returns this line in another's place: its force and command in effect, those on their way, how many came."""
-        nothing = 0, ()
-        self.restore((received, delay_steps, coming, force, command, nothing, nothing))
-        return self
-
     def retimed(self, delay_steps: int, _tick: int) -> LossyLine:
         self.delay_steps = delay_steps
         return self

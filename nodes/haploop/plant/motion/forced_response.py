@@ -19,15 +19,10 @@ _PIECE_TICKS_OF_EACH = 8
 
 
 def forced_response(transition: FohTransition, start: Any, rise: Any) -> Iterator[tuple[Any, Any]]:
-    """Yields the forced (zero-state) response at every step of intervals but their start.
+    """Yields the forced (zero-state) response of x (m) and v (m/s) at every step of intervals but their start.
 
-    Args:
-        transition: over a plant step.
-        start, rise: load at the start of each step and its rise over it, N, shape (n, intervals); both and what is
-            yielded may have a last axis for the members of a batch.
-
-    Yields:
-        What is added to x in m and v in m/s, shape (intervals,) each.
+    ``start`` and ``rise``: load at the start of each step and its rise over it, N, shape (n, intervals). What is
+    yielded is of shape (intervals,) each; all may have a last axis for the members of a batch.
     """
     s = transition
     push_x, push_v = s.x_force * start + s.x_slope * rise, s.v_force * start + s.v_slope * rise

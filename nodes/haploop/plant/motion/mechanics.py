@@ -12,10 +12,8 @@ class Mechanics:
     """The device with the hand rigidly attached (Choi et al. 2022, eq. 10 and 11 added), or the device alone.
 
     Attributes:
-        mass_kg: m_d + m_h.
         dampers: physical dampers by name, N s/m; their sum is b.
-        stiffness: k_h, N/m.
-        rest_m: x_rest.
+        stiffness, rest_m: k_h, N/m; x_rest.
         start: initial position in m and velocity in m/s.
     """
 

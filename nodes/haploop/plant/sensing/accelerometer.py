@@ -21,11 +21,10 @@ from haploop.protocol.trees import tree_select
 class Reading(NamedTuple):
     """Parameters of a reading: (a + bias + noise), clipped to +-range, rounded to the nearest count within the range.
 
+    What is None does not act. In a batch numbers may be arrays of shape (members,).
+
     Attributes:
-        bias: m/s^2, or None; in a batch a number for all members or an array of shape (members,), as the others.
-        noise: or None.
-        range: m/s^2, or None.
-        resolution: m/s^2, or None.
+        bias, range, resolution: m/s^2.
         last_count: the last whole count within the range, m/s^2.
     """
 
@@ -97,7 +96,6 @@ class Accelerometer:
         return self._read, self._noise, self._clipped.state
 
     def restore(self, state: tuple[int, Any, Any]) -> None:
-        """Goes on from a state."""
         self._read, self._noise, clipped = state
         self._clipped.restore(clipped)
         if self.draw:
