@@ -102,6 +102,27 @@ def test_the_wall_is_shaded_on_the_side_of_its_material(into_wall, solid, stand_
     assert filled == ([False, True] if solid == "below" else [True, False])
 
 
+def test_the_numbers_of_an_axis_leave_its_label_alone_however_large_they_are(stand_in, page):
+    """The label's strip of pixels is the same beside −8 mJ, −8000 mJ, −80 000 mJ and 10⁵ times that."""
+
+    def label(energy_J):
+        values = [energy_J * i / (ROWS - 1) for i in range(ROWS)]
+        stand_in.show(snapshot(0.0, 2.0, table("energy", 0.0, 2.0 / (ROWS - 1), ("wall", "J", "wall", values))))
+        settled(page, "energy", f"{-1000 * energy_J:.3f}")
+        return page.evaluate(
+            """() => {
+                const canvas = document.querySelector("#energy canvas");
+                const ratio = canvas.width / canvas.clientWidth;
+                const strip = [0, 0, 18 * ratio, canvas.height].map(Math.round);
+                return canvas.getContext("2d").getImageData(...strip).data.join();
+            }"""
+        )
+
+    alone = label(-0.008)
+    assert len(set(alone.split(","))) > 2, "there is a label"
+    assert {label(energy_J) == alone for energy_J in (-8.0, -80.0, -900.0, -8e6)} == {True}
+
+
 def test_every_part_has_its_line_its_name_and_its_number(stand_in, page):
     stand_in.show(contact())
     settled(page, "force", "0: damping")

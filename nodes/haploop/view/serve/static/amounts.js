@@ -2,6 +2,7 @@
 
 const PREFIXES = [[1e3, "k"], [1, ""], [1e-3, "m"], [1e-6, "µ"], [1e-9, "n"]];
 const MOST_DECIMALS = 4;
+const MOST_WHOLE = 999_999;
 export const NONE = "–";
 
 const minus = (text) => text.replaceAll("-", "−");
@@ -37,10 +38,14 @@ export const plain = (value) => String(Number(value.toPrecision(12)));
 
 const isWhole = (value) => value >= 0.5 && Math.abs(value - Math.round(value)) < 1e-6 * value;
 
-/** The numbers along an axis, all with the decimals their step needs; powers of ten where that would be many. */
+const magnitude = (value) => Math.floor(Math.log10(value));
+
+/** The numbers along an axis, all with the decimals their step needs; powers of ten where digits would be many. */
 export function axisNumbers(splits, step) {
+  const largest = Math.max(...splits.map(Math.abs));
   let decimals = 0;
   while (decimals <= MOST_DECIMALS && !isWhole(step * 10 ** decimals)) decimals += 1;
-  if (decimals <= MOST_DECIMALS) return splits.map((value) => steady(value, decimals));
-  return splits.map((value) => (value === 0 ? "0" : power(value, 2)));
+  if (decimals <= MOST_DECIMALS && largest <= MOST_WHOLE) return splits.map((value) => steady(value, decimals));
+  const digits = Math.max(2, 1 + magnitude(largest) - magnitude(step));
+  return splits.map((value) => (value === 0 ? "0" : power(value, digits).replace("e+", "e")));
 }

@@ -4,8 +4,9 @@ import { axisNumbers } from "./amounts.js";
 import { colour } from "./palette.js";
 
 export const FONT = 'system-ui, -apple-system, "Segoe UI", Roboto, "Helvetica Neue", Arial, sans-serif';
-// Axes keep their size whatever stands on them: the charts stay below each other, and nothing jumps.
-const LEFT_PX = 52;
+// Axes keep their size whatever stands on them: the charts stay below each other, and nothing jumps. To the left there
+// is room for "−60.0005" and "−100000".
+const LEFT_PX = 66;
 const BOTTOM_PX = 20;
 const BARE_PX = 5;
 const LABEL_PX = 17;

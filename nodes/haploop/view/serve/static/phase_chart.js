@@ -84,7 +84,7 @@ export class PhaseChart {
   }
 
   size() {
-    return { width: Math.max(80, this.plot.clientWidth), height: Math.max(80, this.plot.clientHeight) };
+    return { width: Math.max(120, this.plot.clientWidth), height: Math.max(80, this.plot.clientHeight) };
   }
 
   resize() {

@@ -142,7 +142,7 @@ export class TimeChart {
   }
 
   size() {
-    return { width: Math.max(80, this.plot.clientWidth), height: Math.max(60, this.plot.clientHeight) };
+    return { width: Math.max(120, this.plot.clientWidth), height: Math.max(60, this.plot.clientHeight) };
   }
 
   resize() {
