@@ -21,8 +21,6 @@ from haploop.tools.search.random import Point
 from haploop.tools.studies.choi2022.interpretations import MOST, decider, never_together, options, share
 from haploop.tools.studies.choi2022.simulation import (
     BASE,
-    BOUNDS,
-    CHOICES,
     SPACE,
     as_row,
     scene_of,
@@ -66,12 +64,12 @@ def test_no_interpretation_touches_what_the_paper_states_and_every_one_can_be_ru
 def test_interpretations_are_drawn_within_their_bounds_with_every_option_as_often_and_again_the_same() -> None:
     points = drawn(structures=60, each=2)
     assert points == drawn(structures=60, each=2) != drawn(seed=2, structures=60, each=2)
-    for key, names in CHOICES.items():
+    for key, names in SPACE.choices.items():
         counts = [sum(point.choices[key] == name for point in points) for name in names]
         assert set(counts) == {len(points) // len(names)}
     near = [one for point in points for one in SPACE.neighbours(np.random.default_rng(3), point, 2.0, 1)]
     for point in [*points, *near]:
-        assert all(low <= point.numbers[key] <= high for key, (low, high) in BOUNDS.items())
+        assert all(low <= point.numbers[key] <= high for key, (low, high) in SPACE.bounds.items())
 
 
 def test_numbers_that_an_interpretation_does_not_use_are_no_numbers_in_its_row() -> None:

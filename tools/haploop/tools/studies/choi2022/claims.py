@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
-from typing import Any, Literal, NamedTuple, TypedDict
+from typing import Any, Literal, cast
 
 Verdict = Literal["holds", "holds under a stated assumption", "does not hold here"]
 HOLDS, ASSUMING, FAILS = "holds", "holds under a stated assumption", "does not hold here"
@@ -53,15 +53,6 @@ class Claim:
         return self.assuming(self.assumption.format(**computed), numbers) if under_it else self.fails(numbers)
 
 
-class KeptFinding(TypedDict):
-    """A finding as it is kept beside its figure: with the name of the claim, whose words stay in their table."""
-
-    claim: str
-    verdict: Verdict
-    assumption: str
-    numbers: str
-
-
 @dataclass(frozen=True)
 class Finding:
     """The outcome of a test of a claim.
@@ -85,52 +76,32 @@ class Finding:
         if bool(self.assumption) != (self.verdict == ASSUMING):
             raise ValueError(f"An assumption belongs to the verdict {ASSUMING!r} and to no other.")
 
-    def as_dict(self) -> KeptFinding:
-        """Returns it as it is kept."""
-        return {
-            "claim": self.claim.name,
-            "verdict": self.verdict,
-            "assumption": self.assumption,
-            "numbers": self.numbers,
-        }
+    def as_dict(self) -> dict[str, str]:
+        """Returns it as it is kept beside the figure: with the name of the claim, whose words stay in their table."""
+        kept = {"verdict": self.verdict, "assumption": self.assumption, "numbers": self.numbers}
+        return {"claim": self.claim.name, **kept}
 
     @classmethod
-    def from_dict(cls, kept: KeptFinding, claims: Mapping[str, Claim]) -> Finding:
+    def from_dict(cls, kept: Mapping[str, str], claims: Mapping[str, Claim]) -> Finding:
         """Reads back what ``as_dict`` returned, given the claims by name."""
-        return cls(claims[kept["claim"]], kept["verdict"], kept["numbers"], kept["assumption"])
-
-
-class _Part(NamedTuple):
-    """A figure, or the page, in ``figures.toml``."""
-
-    texts: dict[str, str]
-    claims: dict[str, Claim]
-    sections: dict[str, str]
+        return cls(claims[kept["claim"]], cast(Verdict, kept["verdict"]), kept["numbers"], kept["assumption"])
 
 
 @cache
-def _parts() -> dict[str, _Part]:
-    read = tomllib.loads(Path(__file__).with_name("figures.toml").read_text(encoding="utf-8"))
-    return {
-        name: _Part(
-            {key: text for key, text in part.items() if isinstance(text, str)},
-            {key: Claim(name=key, **claim) for key, claim in part.get("claims", {}).items()},
-            part.get("sections", {}),
-        )
-        for name, part in read.items()
-    }
+def _figures() -> dict[str, Any]:
+    return tomllib.loads(Path(__file__).with_name("figures.toml").read_text(encoding="utf-8"))
 
 
 def claims_of(figure: int) -> dict[str, Claim]:
     """Returns the claims that a figure tests, by name."""
-    return _parts()[str(figure)].claims
+    return {name: Claim(name=name, **claim) for name, claim in words_of(figure, "claims").items()}
 
 
 def texts_of(part: int | Literal["page"]) -> dict[str, str]:
     """Returns title, caption and the other texts of a figure, with names in braces for what is computed."""
-    return _parts()[str(part)].texts
+    return {name: text for name, text in _figures()[str(part)].items() if isinstance(text, str)}
 
 
-def sections() -> dict[str, str]:
-    """Returns the titles of the paper's sections, in its order."""
-    return _parts()["page"].sections
+def words_of(part: int | Literal["page"], table: str) -> dict[str, Any]:
+    """Returns a table of a figure, or of the page, such as ``tested``: what its search tests, by name of the claim."""
+    return _figures()[str(part)][table]

@@ -13,7 +13,7 @@ from haploop.tools.cli.exit_codes import WRONG_USE, leave, plain_errors
 from haploop.tools.figure.data import FigureError
 from haploop.tools.render.progress import Stage, bars, silent
 from haploop.tools.render.terminal import markdown_table
-from haploop.tools.studies.choi2022.claims import ASSUMING, VERDICTS, Finding, claims_of, sections, texts_of
+from haploop.tools.studies.choi2022.claims import ASSUMING, VERDICTS, Finding, claims_of, texts_of, words_of
 from haploop.tools.studies.choi2022.figures import figure, numbers
 from haploop.tools.studies.choi2022.work import Kept, Work
 
@@ -95,7 +95,7 @@ def _count(rows: list[tuple[int, Finding]]) -> str:
 def _tables(rows: list[tuple[int, Finding]]) -> list[str]:
     """Returns a table for each section of the paper, in its order; within it by figure."""
     parts = []
-    for section, title in sections().items():
+    for section, title in words_of("page", "sections").items():
         if there := [row for row in rows if _section(row[1].claim.place) == section]:
             parts += [f"### {section}. {title}", _table(there)]
     return parts

@@ -12,7 +12,7 @@ from typing import Any, TypedDict
 from haploop.launch.scene.file import load
 from haploop.tools.search.random import Effort, Point, Row, Scale
 from haploop.tools.studies.choi2022.claims import Claim, Finding
-from haploop.tools.studies.choi2022.device import FRICTION_N, UNITS, VELOCITIES, Setup
+from haploop.tools.studies.choi2022.device import FRICTION_N, Setup
 from haploop.tools.studies.choi2022.device import nearest as nearest_of_scene_file
 from haploop.tools.studies.choi2022.experiment_measure import gap_N_m, measure
 from haploop.tools.studies.choi2022.interpretations import (
@@ -30,43 +30,13 @@ from haploop.tools.studies.choi2022.work import Work
 NEAREST = "[the nearest interpretation of the device](#figure-7)"
 SHARES, SCENE = "figure_7_shares.json", "figure_7.toml"
 
-SPACE = InterpretationSpace(
-    # Extra delay in s: from nothing to what a slow input and output card adds.
-    choices={
-        "delay_s": (0.0, 0.0003, 0.0006, 0.001, 0.0015, 0.002),
-        "unit": tuple(UNITS),
-        "mount": ("motor", "tip"),
-        "velocity": tuple(VELOCITIES),
-    },
-    # The mode's frequency from below what was reported (near 200 Hz) to where it hardly matters; the near mass from the
-    # rotor alone (0.0029 kg of 0.0525) to most of it; ratios of damping of metal drives; a press and a tap as a hand
-    # makes them; a hand half to twice as heavy, damped and stiff as the published mean.
-    bounds={
-        "mode_Hz": (80.0, 500.0),
-        "near_share": (0.055, 0.8),
-        "mode_damping": (0.005, 0.06),
-        "push_N": (1.5, 4.0),
-        "entry_m_s": (0.1, 0.24),
-        "hand": (0.5, 2.0),
-    },
+SPACE = InterpretationSpace.from_words(
+    7,
     # Delays are whole plant steps.
     scales={"delay_s": Scale(1e-4, 0.0, 2e-3)},
     # As a scene file has them: what is steady may hang on the fourth digit.
     digits=3,
-    labels={
-        "delay_s": "extra delay (s)",
-        "unit": "inertial unit",
-        "mount": "mount of the unit",
-        "velocity": "low-pass of the velocity",
-        "friction_N": "dry friction (N)",
-        "acceleration": "acceleration of",
-        "mode_Hz": "mode of the drive (Hz)",
-        "near_share": "near mass, share",
-        "mode_damping": "mode's damping ratio",
-        "push_N": "push (N)",
-        "entry_m_s": "entry speed (m/s)",
-        "hand": "hand, times the published",
-    },
+    labels={"friction_N": "dry friction (N)", "acceleration": "acceleration of"},
 )
 WHOLE = Effort(structures=24, each=24, rounds=2, best=3, groups=3, children=8, neighbours=24, far=0.15, close=0.05)
 SMALL = Effort(structures=1, each=2, rounds=1, best=1, children=1, neighbours=1, far=0.15)

@@ -14,6 +14,7 @@ from haploop.logger.summary import Summary
 from haploop.protocol.scene.scene import Scene
 from haploop.tools.search.bisect import climb, rungs_held
 from haploop.tools.search.random import Row
+from haploop.tools.studies.choi2022.claims import words_of
 from haploop.tools.studies.choi2022.device import KINDS, Elements, Setup, both, elements_of
 from haploop.tools.studies.choi2022.interpretations import summed_up
 
@@ -49,24 +50,7 @@ LOW_KG = 0.009
 # So small a part of an inertia is booked beside a damper without being felt.
 _UNFELT = 1e-6
 
-CLAIMS: dict[str, str] = {
-    "8 more": (
-        "on the motion with 2.7 N s/m at 4.5 and at 5.0 N/mm the damping takes energy, and each inertia of 1.8 g would "
-        "have taken more (sampled books)"
-    ),
-    "9 damping ends": "no damping steadies more than 5.0 N/mm",
-    "9 inertia": "some unidirectional inertia steadies 5.5 N/mm, and all softer walls",
-    "10 narrows": "fewer sizes of damping steady the stiffest wall that one does than 2.5 N/mm",
-    "10 damping 4.5": "damping steadies up to 4.5 N/mm, 0.5 more or less",
-    "10 bidirectional 4.5": "bidirectional inertia steadies up to 4.5 N/mm, 0.5 more or less",
-    "10 larger": "unidirectional inertia steadies a stiffer wall than damping and than bidirectional inertia",
-    "10 wider": "and has more steady pairs of size and stiffness than bidirectional inertia",
-    "10 exclusive": "up to 9 g each inertia steadies walls that the other of the same size does not, and none together",
-    "11 more": "damping with unidirectional inertia steadies a stiffer wall than either alone",
-    "11 up to 6.3": "together they steady up to 6.3 N/mm, 0.5 more or less",
-    "12 pair": "2.15 N s/m with 9 g are steady at 6.3 N/mm",
-    "13 more": "at the stiffest wall that some pair steadies its inertia takes more than its damping (sampled)",
-}
+CLAIMS: dict[str, str] = words_of(7, "tested")
 
 
 def is_steady(result: Summary) -> bool:

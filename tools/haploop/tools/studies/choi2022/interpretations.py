@@ -10,13 +10,15 @@ import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any, Generic, TypeVar
+from types import MappingProxyType
+from typing import Any, Generic, Self, TypeVar
 
 import numpy as np
 
 from haploop.tools.render.units import amount
 from haploop.tools.search import random
-from haploop.tools.search.random import Effort, Evaluate, Group, Row, Space, random_search
+from haploop.tools.search.random import Effort, Evaluate, Group, Point, Row, Space, random_search
+from haploop.tools.studies.choi2022.claims import words_of
 from haploop.tools.studies.choi2022.work import Work
 
 Nearest = TypeVar("Nearest")
@@ -33,9 +35,31 @@ class InterpretationSpace(Space):
 
     Attributes:
         labels: by key; the unit, where there is one, in brackets at the end.
+        ours: our own interpretation, where there is one.
+        whys: why the bounds of a number are as they are.
     """
 
     labels: Mapping[str, str]
+    ours: Point
+    whys: Mapping[str, str]
+
+    @classmethod
+    def from_words(cls, figure: int, labels: Mapping[str, str] = MappingProxyType({}), **options: Any) -> Self:
+        """Makes the space of a figure of its tables ``choices`` and ``numbers``.
+
+        Args:
+            labels: of values besides.
+            options: as of ``Space``.
+        """
+        choices, numbers = words_of(figure, "choices"), words_of(figure, "numbers")
+        return cls(
+            choices={key: tuple(one["options"]) for key, one in choices.items()},
+            bounds={key: (one["from"], one["to"]) for key, one in numbers.items()},
+            labels={key: one["label"] for key, one in (choices | numbers).items()} | dict(labels),
+            ours=Point(*({key: one.get("ours") for key, one in of.items()} for of in (choices, numbers)), seed=1),
+            whys={key: one.get("why", "") for key, one in numbers.items()},
+            **options,
+        )
 
     def label(self, key: str) -> str:
         """Returns what a key is called, without its unit."""

@@ -17,7 +17,7 @@ from haploop.logger.summary import Summary
 from haploop.protocol.scene.scene import Scene
 from haploop.tools.render.units import amount
 from haploop.tools.search.random import Effort, Point, Row, evaluated
-from haploop.tools.studies.choi2022.claims import Claim, Finding
+from haploop.tools.studies.choi2022.claims import Claim, Finding, words_of
 from haploop.tools.studies.choi2022.interpretations import MOST, Found, searched, summed_up
 from haploop.tools.studies.choi2022.simulation import BASE, NEAREST, OURS, SPACE, as_row, scene_of
 from haploop.tools.studies.choi2022.work import Run, Work, faster_m, run, strongest_Hz
@@ -41,29 +41,8 @@ _NAMES = {"base": OURS, "nearest": "the nearest"}
 # is a matter of a factor, 1 where it is one of yes or no, MOST where the run diverged. The sum of them is the distance
 # of an interpretation from the paper. Every claim of V.A is here, and what the paper says only by its figures
 # ("monotone").
-CLAIMS: dict[str, str] = {
-    "a cycles": "(a) is a limit cycle",
-    "a bounded": (
-        "(a) does not diverge, and does not go on growing: three times as long, its swing is at most 1.5 times"
-    ),
-    "a small": "(a) swings by no more than 6 mm peak to peak",
-    "wall unstable": "0.15 N/mm alone is no steady contact",
-    "b bounded": "(b) does not diverge",
-    "b large": "(b) is a limit cycle at least twice as wide as (a)",
-    "b leaves": "(b) leaves the wall",
-    "b helps": "(b) swings less than 0.15 N/mm alone",
-    "b best": "(b) swings no more than with 1/2, 3/4, 4/3 and 2 times the damping",
-    "c steadied": "(c) does not leave the wall",
-    "c smaller": "(c) swings at most half as wide as (b)",
-    "c passive": "(c): the sampled book of the inertia ends above 0 and is never below by more than 5 % of its end",
-    "c monotone": "(c): the sampled book never falls by more than 5 % of its end",
-}
-# Beside them, and in no sum.
-ASIDE: dict[str, str] = {
-    "c steady": "(c) comes to the verdict steady",
-    "c truly passive": "(c): the same of the true book, which counts the force that acts, 2 ms late",
-    "c beats bidirectional": "(c) swings no more than with bidirectional inertia of the same mass",
-}
+CLAIMS: dict[str, str] = words_of(6, "tested")
+ASIDE: dict[str, str] = words_of(6, "aside")
 
 
 def search(work: Work) -> Found[Point]:

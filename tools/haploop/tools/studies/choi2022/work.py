@@ -24,7 +24,7 @@ from haploop.tools.executor.pool import Pool
 from haploop.tools.figure.style import write_figure
 from haploop.tools.render.progress import Stage, silent
 from haploop.tools.search.random import Row
-from haploop.tools.studies.choi2022.claims import Finding, KeptFinding, texts_of
+from haploop.tools.studies.choi2022.claims import Finding, texts_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -44,7 +44,7 @@ class Kept(TypedDict):
     seen: dict[str, str]
     small: bool
     files: list[str]
-    findings: list[KeptFinding]
+    findings: list[dict[str, str]]
     notes: list[str]
 
 

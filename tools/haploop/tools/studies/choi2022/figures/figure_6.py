@@ -47,9 +47,7 @@ from haploop.tools.studies.choi2022.interpretations import (
     yes,
 )
 from haploop.tools.studies.choi2022.simulation import (
-    ABOUT,
     BASE,
-    BOUNDS,
     NEAREST,
     SPACE,
     describe,
@@ -174,8 +172,8 @@ def _notes(work: Work, found: Found[Point]) -> list[str]:
     missed = ", ".join(f"*{name}* by {nearest[name]:.2g}" for name in COUNTED if nearest[name] > 0.0)
     swings = {key.removeprefix("swing ").removesuffix("_m"): nearest[key] for key in nearest if key[:6] == "swing "}
     numbers = [
-        [SPACE.label(key), SPACE.value(key, low), SPACE.value(key, high), ABOUT[key][1]]
-        for key, (low, high) in BOUNDS.items()
+        [SPACE.label(key), SPACE.value(key, low), SPACE.value(key, high), SPACE.whys[key]]
+        for key, (low, high) in SPACE.bounds.items()
     ]
     count = Counter(row["stage"] for row in found.rows)
     return [
@@ -198,7 +196,7 @@ def _notes(work: Work, found: Found[Point]) -> list[str]:
             options(rows, SPACE),
             "decided most by",
         ),
-        work.tell("aside", names=", ".join(f"*{name}*" for name in ASIDE)),
+        work.tell("not_counted", names=", ".join(f"*{name}*" for name in ASIDE)),
         "#### The nearest interpretation",
         work.tell(
             "nearest",
