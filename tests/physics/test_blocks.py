@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -33,6 +34,8 @@ def test_blocks_and_windows_of_any_size_give_the_same_summary_of_drawn_scenes(se
 @pytest.mark.parametrize("delay", [13, *(pytest.param(d, marks=pytest.mark.slow) for d in (0, 3, 10, 20, 50))])
 def test_blocks_of_any_size_give_the_same_summary_of_every_shipped_scene(path, delay):
     scene = load(path, [f"clock.round_trip_delay={delay / 10_000}"])
+    if delay == 13:  # at 1.8 s all are in contact, and the swap is 0.3 s past
+        scene = replace(scene, duration=min(scene.duration, 1.8))
     usual = in_blocks(scene, 100)
     for block_ticks in (1, 7, 1000):
         assert in_blocks(scene, block_ticks) == usual

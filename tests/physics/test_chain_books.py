@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from functools import cache
 from itertools import pairwise
 from typing import Any
@@ -186,7 +187,7 @@ def test_friction_never_gives_heat_back_in_any_step(name):
 @pytest.mark.parametrize("name", ["everything", "late and lost", "cable"])
 def test_a_logger_that_joins_begins_where_it_knows_every_command_and_its_books_close(name):
     """Where nine of ten commands are lost, the one in effect is often older than what the controller hands over."""
-    resolved = resolved_of(name)
+    resolved = replace(resolved_of(name), duration=0.2)
     time = Timebase.from_scene(resolved)
     plant, controller = Plant(resolved, time), Controller(resolved, time, KINDS)
     joining: list[Logger] = []
