@@ -10,7 +10,7 @@ import pytest
 from rich.console import Console
 
 from haploop.protocol.changes import describe
-from haploop.protocol.wire import Frame
+from haploop.protocol.transport.wire import Frame
 from haploop.tools.attach.live_status import LiveStatus
 from haploop.tools.attach.live_table import LinePrinter, end_sentence, live_line, live_table
 

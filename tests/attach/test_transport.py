@@ -11,9 +11,8 @@ import zmq
 from haploop.launch.processes import run_directory
 from haploop.launch.processes.run_directory import ask
 from haploop.launch.runs.start import prepare, run
-from haploop.protocol.sockets import open_socket
-from haploop.protocol.transport import SecureContext, Transport, TransportError
-from haploop.protocol.wire import encode
+from haploop.protocol.transport.sockets import SecureContext, Transport, TransportError, open_socket
+from haploop.protocol.transport.wire import encode
 
 SCENE = Path(__file__).parents[2] / "launch" / "scenes" / "fig6c.toml"
 

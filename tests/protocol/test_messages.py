@@ -6,8 +6,7 @@ from pathlib import Path
 import pytest
 
 from haploop.protocol import document
-from haploop.protocol.messages import BY_CODE, CHANNELS, MESSAGES, VERSION, complaint
-from haploop.protocol.processes import PROCESSES
+from haploop.protocol.transport.messages import BY_CODE, CHANNELS, MESSAGES, PROCESSES, VERSION, complaint
 
 README = Path(__file__).parents[2] / "protocol" / "README.md"
 KINDS = {"int", "number", "text", "bool", "bytes", "map", "list", "text?"}

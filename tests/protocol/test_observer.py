@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from haploop.logger import read
-from haploop.protocol.clock_client import ClockClient
-from haploop.protocol.observer import Observer
+from haploop.protocol.transport.clock_client import ClockClient
+from haploop.protocol.transport.observer import Observer
 from helpers.live.live_run import going, undisturbed
 
 ALL = ("plant", "controller", "logger")

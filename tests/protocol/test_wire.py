@@ -9,9 +9,9 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from haploop.protocol import wire
-from haploop.protocol.messages import MESSAGES, VERSION
-from haploop.protocol.wire import Frame, WireError, decode, encode
+from haploop.protocol.transport import wire
+from haploop.protocol.transport.messages import MESSAGES, VERSION
+from haploop.protocol.transport.wire import Frame, WireError, decode, encode
 
 WHOLE = st.integers(-(2**63), 2**64 - 1)
 TEXT = st.text(st.characters(exclude_categories=["Cs"]))

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 
 from haploop.launch.scene.toml_writer import to_toml
 from haploop.protocol.scene.scene import Scene
-from haploop.protocol.transport import Transport
-from haploop.protocol.wire import Message
+from haploop.protocol.transport.sockets import Transport
+from haploop.protocol.transport.wire import Message
 
 if TYPE_CHECKING:
     from haploop.controller.dissipation import Element

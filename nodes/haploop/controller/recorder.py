@@ -11,7 +11,7 @@ import numpy as np
 from haploop.controller.active_elements import Description
 from haploop.controller.tick import ControllerParams
 from haploop.protocol.changes import Change
-from haploop.protocol.telemetry import Block
+from haploop.protocol.transport.telemetry import Block
 
 MOTION_COLUMNS = ("x", "v", "a", "wall")
 

@@ -19,9 +19,9 @@ from haploop.logger.verdict.window import CONTROLLER_COLUMNS, Window
 from haploop.plant.counters import COUNTERS
 from haploop.protocol.changes import Event
 from haploop.protocol.scene.scene import Scene
-from haploop.protocol.telemetry import Block
 from haploop.protocol.ticks import Timebase
-from haploop.protocol.wire import Message
+from haploop.protocol.transport.telemetry import Block
+from haploop.protocol.transport.wire import Message
 
 
 class Logger:

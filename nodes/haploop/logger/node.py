@@ -14,14 +14,14 @@ from haploop.logger.books.buffers import TelemetryGap
 from haploop.logger.log import LogError
 from haploop.logger.session import open_session
 from haploop.logger.summary import Summary
-from haploop.protocol.clock_client import REPORT_MS, Aborted, ClockClient
-from haploop.protocol.node import NodeError, run_node
-from haploop.protocol.processes import PROCESSES
 from haploop.protocol.scene.scene import Scene
-from haploop.protocol.sockets import bind
-from haploop.protocol.telemetry import Publisher, Subscriber
 from haploop.protocol.ticks import Timebase
-from haploop.protocol.wire import Frame, Message
+from haploop.protocol.transport.clock_client import REPORT_MS, Aborted, ClockClient
+from haploop.protocol.transport.messages import PROCESSES
+from haploop.protocol.transport.node import NodeError, run_node
+from haploop.protocol.transport.sockets import bind
+from haploop.protocol.transport.telemetry import Publisher, Subscriber
+from haploop.protocol.transport.wire import Frame, Message
 
 ROLE = "logger"
 _LISTENS = ("plant", "controller")

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 from haploop.logger.books.books import BooksState, moved_J, residual_J, stored_J, total_J
 from haploop.logger.verdict.measures import RunMeasures
 from haploop.protocol.scene.scene import Scene
-from haploop.protocol.telemetry import Block
+from haploop.protocol.transport.telemetry import Block
 
 # A summary as summary.json holds it, or an entry of it.
 Summary = dict[str, Any]

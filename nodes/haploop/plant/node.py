@@ -8,15 +8,15 @@ import zmq
 
 from haploop.plant.plant import Plant
 from haploop.protocol.block_length import BlockLength
-from haploop.protocol.clock_client import ClockClient
-from haploop.protocol.loop import PlantEnd
-from haploop.protocol.node import NodeError, run_node
-from haploop.protocol.processes import PROCESSES
 from haploop.protocol.scene.scene import Scene
-from haploop.protocol.sockets import bind
-from haploop.protocol.telemetry import Publisher
 from haploop.protocol.ticks import Timebase
-from haploop.protocol.wire import Message
+from haploop.protocol.transport.clock_client import ClockClient
+from haploop.protocol.transport.loop import PlantEnd
+from haploop.protocol.transport.messages import PROCESSES
+from haploop.protocol.transport.node import NodeError, run_node
+from haploop.protocol.transport.sockets import bind
+from haploop.protocol.transport.telemetry import Publisher
+from haploop.protocol.transport.wire import Message
 
 ROLE = "plant"
 

@@ -6,7 +6,7 @@ import asyncio
 import time as wall_clock
 
 from haploop.logger.log import LogError
-from haploop.protocol.clock_client import Aborted, Refused
+from haploop.protocol.transport.clock_client import Aborted, Refused
 from haploop.view.receive.ingest import Backfill
 from haploop.view.receive.run_session import RunSession
 from haploop.view.receive.runs import Run, Runs

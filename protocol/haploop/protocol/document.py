@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from pathlib import Path
 
-from haploop.protocol.messages import CHANNELS, MESSAGES
-from haploop.protocol.processes import PROCESSES
+from haploop.protocol.transport.messages import CHANNELS, MESSAGES, PROCESSES
 
 COMMAND = "python -m haploop.protocol.document"
 BEGIN = f"<!-- begin: written by {COMMAND} -->"

@@ -18,7 +18,7 @@ import pytest
 from haploop.launch.processes import run_directory
 from haploop.logger import read
 from haploop.logger.log.recording import Recording
-from haploop.protocol.processes import PROCESSES
+from haploop.protocol.transport.messages import PROCESSES
 
 SCENES = Path(__file__).parents[3] / "launch/scenes"
 SCENE = SCENES / "fig6c.toml"

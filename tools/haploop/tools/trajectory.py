@@ -12,8 +12,8 @@ from haploop.logger.logger import Logger
 from haploop.logger.session import LogSession
 from haploop.logger.summary import Summary
 from haploop.protocol.scene.scene import Scene
-from haploop.protocol.telemetry import Block
 from haploop.protocol.ticks import Timebase
+from haploop.protocol.transport.telemetry import Block
 
 
 @dataclass(frozen=True)

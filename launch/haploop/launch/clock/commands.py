@@ -19,7 +19,7 @@ from haploop.protocol.quantity import Quantity
 from haploop.protocol.scene.paths import value_at
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.scene.table import Tables
-from haploop.protocol.wire import Message
+from haploop.protocol.transport.wire import Message
 
 if TYPE_CHECKING:
     from haploop.controller.dissipation import Element

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from haploop.protocol.processes import PROCESSES
-from haploop.protocol.wire import Message
+from haploop.protocol.transport.messages import PROCESSES
+from haploop.protocol.transport.wire import Message
 
 
 @dataclass

@@ -13,9 +13,9 @@ from haploop.launch.clock.clock import Clock
 from haploop.launch.clock.roster import Node, Roster
 from haploop.launch.spec import RunFailed
 from haploop.protocol.changes import refusals_of
-from haploop.protocol.processes import PROCESSES
-from haploop.protocol.sockets import bind, has_message, open_socket
-from haploop.protocol.wire import Frame, Message, WireError, decode, encode
+from haploop.protocol.transport.messages import PROCESSES
+from haploop.protocol.transport.sockets import bind, has_message, open_socket
+from haploop.protocol.transport.wire import Frame, Message, WireError, decode, encode
 
 Command = Callable[[str, Message], tuple[bool, str, Message]]
 

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from haploop.protocol.processes import PROCESSES
+from haploop.protocol.transport.messages import PROCESSES
 
 
 class Child:

@@ -14,9 +14,8 @@ from typing import Any
 
 import zmq
 
-from haploop.protocol.sockets import open_socket
-from haploop.protocol.transport import SecureContext, Transport
-from haploop.protocol.wire import Message, WireError, decode, encode
+from haploop.protocol.transport.sockets import SecureContext, Transport, open_socket
+from haploop.protocol.transport.wire import Message, WireError, decode, encode
 
 # A socket's path must stay below the kernel's 107 bytes; this leaves room for the run and the socket's name.
 _LONGEST_BASE = 70

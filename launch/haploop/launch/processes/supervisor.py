@@ -17,7 +17,7 @@ from haploop.launch.processes.children import Child, interrupts, start_children
 from haploop.launch.spec import RunFailed, RunSpec
 from haploop.logger.summary import Summary
 from haploop.protocol.ticks import Timebase
-from haploop.protocol.transport import SecureContext
+from haploop.protocol.transport.sockets import SecureContext
 
 _START_DEADLINE_S = 20.0
 # What the logger is given to save its files after another node has failed.

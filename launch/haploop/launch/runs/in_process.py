@@ -20,7 +20,7 @@ from haploop.protocol.ticks import Timebase
 if TYPE_CHECKING:
     from haploop.controller.dissipation import Element
     from haploop.logger.log.recording import MemoryLog
-    from haploop.protocol.wire import Message
+    from haploop.protocol.transport.wire import Message
 
 
 def run_in_process(

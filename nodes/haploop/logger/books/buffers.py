@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from haploop.protocol.telemetry import Block
+from haploop.protocol.transport.telemetry import Block
 
 # Columns of pieces of steps have a row for each piece, in order; ``pieces.step`` says of which step it is.
 PIECES = "pieces."

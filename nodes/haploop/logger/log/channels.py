@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from haploop.logger.books.buffers import as_float64
 from haploop.logger.log.table import Floats
 from haploop.protocol.changes import Event
-from haploop.protocol.telemetry import Block
 from haploop.protocol.ticks import Timebase
+from haploop.protocol.transport.telemetry import Block
 
 UNITS = {
     "x": "m",

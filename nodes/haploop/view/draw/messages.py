@@ -11,7 +11,7 @@ import numpy as np
 
 from haploop.logger.summary import finite
 from haploop.protocol.changes import KINDS, Event, describe
-from haploop.protocol.wire import Message
+from haploop.protocol.transport.wire import Message
 from haploop.view.receive.run_session import RunSession
 
 # A page lists no more events than these, the newest.

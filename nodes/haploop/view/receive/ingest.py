@@ -11,9 +11,9 @@ from haploop.logger.log.recording import Table
 from haploop.logger.log.stream import Batch, LogStream
 from haploop.protocol.changes import Event, Span, changes_of, spans
 from haploop.protocol.scene.scene import Scene
-from haploop.protocol.telemetry import Block
 from haploop.protocol.ticks import Timebase
-from haploop.protocol.wire import Frame, Message
+from haploop.protocol.transport.telemetry import Block
+from haploop.protocol.transport.wire import Frame, Message
 from haploop.view.store.history import TRUE, AtWork, History
 
 # Columns from which positions and forces of the plant are made, and those of the controller that are shown.

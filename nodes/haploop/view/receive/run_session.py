@@ -12,11 +12,11 @@ import zmq
 
 from haploop.logger.summary import Summary
 from haploop.protocol.changes import Event, at_work, changes_of
-from haploop.protocol.clock_client import Aborted, Refused
-from haploop.protocol.observer import Observer
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import DELAY, Timebase
-from haploop.protocol.wire import Message
+from haploop.protocol.transport.clock_client import Aborted, Refused
+from haploop.protocol.transport.observer import Observer
+from haploop.protocol.transport.wire import Message
 from haploop.view.receive.ingest import ingest
 from haploop.view.receive.runs import ClockAnswers, Run, Runs
 from haploop.view.store.history import AtWork, History

@@ -8,8 +8,8 @@ from collections.abc import Sequence
 from typing import Any, Protocol
 
 from haploop.protocol.changes import Event
-from haploop.protocol.transport import SecureContext
-from haploop.protocol.wire import Message
+from haploop.protocol.transport.sockets import SecureContext
+from haploop.protocol.transport.wire import Message
 
 # How often the clock is asked for its status.
 _ASK_S = 0.5

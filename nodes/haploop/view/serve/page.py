@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from aiohttp import WSCloseCode, WSMsgType, web
 
-from haploop.protocol.wire import Message
+from haploop.protocol.transport.wire import Message
 from haploop.view.draw.messages import WAITING, event_lines, state
 from haploop.view.draw.snapshot import Viewport, snapshot
 from haploop.view.receive.runs import CommandFailed

@@ -9,8 +9,8 @@ import numpy as np
 
 from haploop.logger.log.channels import motion_columns
 from haploop.protocol.scene.scene import ElementTable, Scene, Wall
-from haploop.protocol.telemetry import Block
 from haploop.protocol.ticks import Timebase
+from haploop.protocol.transport.telemetry import Block
 from haploop.view.store.lod_series import LodSeries
 
 Columns = Mapping[str, np.ndarray]

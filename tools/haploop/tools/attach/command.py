@@ -13,10 +13,10 @@ from haploop.launch.spec import make_output, write_scene
 from haploop.logger.books.buffers import TelemetryGap
 from haploop.logger.node import LoggerNode
 from haploop.logger.summary import Summary
-from haploop.protocol.clock_client import Aborted, ClockClient, Refused
-from haploop.protocol.processes import OBSERVER
 from haploop.protocol.scene.scene import Scene
-from haploop.protocol.transport import SecureContext
+from haploop.protocol.transport.clock_client import Aborted, ClockClient, Refused
+from haploop.protocol.transport.messages import OBSERVER
+from haploop.protocol.transport.sockets import SecureContext
 from haploop.tools.attach.live_table import attach_print
 from haploop.tools.attach.plotjuggler import PORT, attach_plotjuggler
 from haploop.tools.cli.exit_codes import FAILED, WRONG_USE, leave, plain_errors

@@ -9,9 +9,9 @@ import numpy as np
 
 from haploop.logger.summary import Summary
 from haploop.protocol.changes import Event
-from haploop.protocol.telemetry import Block
 from haploop.protocol.ticks import Timebase
-from haploop.protocol.wire import Frame, Message
+from haploop.protocol.transport.telemetry import Block
+from haploop.protocol.transport.wire import Frame, Message
 
 # Wall time over which the real-time factor is taken.
 _FACTOR_OVER_S = 2.0

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from haploop.launch.processes import run_directory
 from haploop.launch.processes.run_directory import LiveRun
 from haploop.protocol.changes import describe
-from haploop.protocol.clock_client import Refused
+from haploop.protocol.transport.clock_client import Refused
 from haploop.tools.attach.live_status import LiveStatus
 from haploop.tools.attach.observed_run import ObservedRun, read_summary
 from haploop.tools.cli.exit_codes import FAILED, WRONG_USE, leave

@@ -11,10 +11,10 @@ from typing import Self
 from haploop.launch.processes import run_directory
 from haploop.launch.processes.run_directory import LiveRun, RunNotFound
 from haploop.logger.summary import Summary
-from haploop.protocol.clock_client import Aborted, Refused
-from haploop.protocol.observer import Observer
-from haploop.protocol.processes import PROCESSES
-from haploop.protocol.wire import Frame, Message
+from haploop.protocol.transport.clock_client import Aborted, Refused
+from haploop.protocol.transport.messages import PROCESSES
+from haploop.protocol.transport.observer import Observer
+from haploop.protocol.transport.wire import Frame, Message
 
 # Intervals at which to look for a run that starts, and to ask again to join one that is about to begin.
 _LOOK_S, _ASK_AGAIN_S = 0.05, 0.02

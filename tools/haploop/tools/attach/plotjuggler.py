@@ -26,10 +26,10 @@ from haploop.logger.books.buffers import as_float64
 from haploop.logger.log.channels import Channels, motion_columns
 from haploop.logger.log.table import Floats, TableLayout
 from haploop.protocol.changes import Event
-from haploop.protocol.clock_client import Refused
-from haploop.protocol.sockets import has_message, open_socket
 from haploop.protocol.ticks import Timebase
-from haploop.protocol.wire import Frame
+from haploop.protocol.transport.clock_client import Refused
+from haploop.protocol.transport.sockets import has_message, open_socket
+from haploop.protocol.transport.wire import Frame
 from haploop.tools.attach.observed_run import ObservedRun, iterate_runs
 from haploop.tools.cli.exit_codes import WRONG_USE, leave
 

@@ -36,7 +36,7 @@ def run(
     """Run a scene to its end; other terminals can steer and watch it meanwhile."""
     from haploop.launch.runs import start
     from haploop.launch.spec import RunFailed
-    from haploop.protocol.transport import Transport, TransportError
+    from haploop.protocol.transport.sockets import Transport, TransportError
     from haploop.tools.cli.view import viewing
     from haploop.tools.render.progress import ProgressLine
     from haploop.tools.render.report import print_summary

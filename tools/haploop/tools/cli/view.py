@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     import asyncio
 
     from haploop.launch.processes.run_directory import LiveRun
-    from haploop.protocol.wire import Message
+    from haploop.protocol.transport.wire import Message
     from haploop.view.serve.guard import Guard
 
 SINCE = ("start", "now")

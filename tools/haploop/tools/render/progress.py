@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from rich.live import Live
     from rich.text import Text
 
-    from haploop.protocol.wire import Message
+    from haploop.protocol.transport.wire import Message
 
 # Names a stage of so many parts; what it returns is called after each of them.
 Stage = Callable[[str, int], Callable[[], None]]

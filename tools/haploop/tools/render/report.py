@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from haploop.controller.dissipation import Element
     from haploop.logger.summary import Summary
     from haploop.protocol.quantity import Quantity
-    from haploop.protocol.wire import Message
+    from haploop.protocol.transport.wire import Message
 
 # Entry of the summary, the count in it, and its words.
 _COUNTS = (

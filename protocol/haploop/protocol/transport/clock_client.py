@@ -8,8 +8,8 @@ from typing import Any
 import zmq
 
 from haploop.protocol.changes import Event
-from haploop.protocol.sockets import has_message, open_socket
-from haploop.protocol.wire import Frame, Message, WireError, decode, encode
+from haploop.protocol.transport.sockets import has_message, open_socket
+from haploop.protocol.transport.wire import Frame, Message, WireError, decode, encode
 
 # A node that waits says so this often, so that the clock can tell who is being waited for.
 REPORT_MS = 200

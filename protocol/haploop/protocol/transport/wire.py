@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import msgpack
 
-from haploop.protocol.messages import BY_CODE, MESSAGES, VERSION, complaint
+from haploop.protocol.transport.messages import BY_CODE, MESSAGES, VERSION, complaint
 
 # A frame larger than this is refused by the socket itself.
 MAX_FRAME_BYTES = 64 * 1024 * 1024

@@ -12,10 +12,10 @@ from pathlib import Path
 
 import zmq
 
-from haploop.protocol.clock_client import Aborted, ClockClient, Refused
-from haploop.protocol.loop import LoopError
-from haploop.protocol.transport import SecureContext, Transport
-from haploop.protocol.wire import Message
+from haploop.protocol.transport.clock_client import Aborted, ClockClient, Refused
+from haploop.protocol.transport.loop import LoopError
+from haploop.protocol.transport.sockets import SecureContext, Transport
+from haploop.protocol.transport.wire import Message
 
 # work(client, context, directory of sockets) -> (tick reached, result for the clock)
 Work = Callable[[ClockClient, "zmq.Context[zmq.Socket[bytes]]", Path], tuple[int, Message]]

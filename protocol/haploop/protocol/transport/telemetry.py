@@ -7,8 +7,8 @@ from typing import Any
 
 import zmq
 
-from haploop.protocol.sockets import has_message, open_socket
-from haploop.protocol.wire import Frame, Message, WireError, decode, encode
+from haploop.protocol.transport.sockets import has_message, open_socket
+from haploop.protocol.transport.wire import Frame, Message, WireError, decode, encode
 
 # A block of telemetry: from_tick, ticks, columns and what its sender adds (messages.py).
 Block = Message

@@ -8,9 +8,9 @@ from collections.abc import Sequence
 import zmq
 
 from haploop.protocol.changes import Event
-from haploop.protocol.clock_client import ClockClient
-from haploop.protocol.telemetry import Subscriber
-from haploop.protocol.wire import Frame
+from haploop.protocol.transport.clock_client import ClockClient
+from haploop.protocol.transport.telemetry import Subscriber
+from haploop.protocol.transport.wire import Frame
 
 # How often the clock is told how far the observer is, and what it skipped.
 _REPORT_S = 0.2

@@ -1,6 +1,6 @@
-"""The one table of messages: what travels between processes, under which code, with which fields.
+"""The two tables of a run: its processes, and the messages that travel between them, each with its code and fields.
 
-Every frame is a msgpack array ``[VERSION, code, field, field, ...]``; the table below is the whole grammar. Encoding,
+Every frame is a msgpack array ``[VERSION, code, field, field, ...]``; the table of messages is the whole grammar. Encoding,
 checking and the documentation in ``protocol/README.md`` derive from it.
 """
 
@@ -24,8 +24,38 @@ _TYPES: dict[str, tuple[type, ...]] = {
 
 
 @dataclass(frozen=True)
+class Process:
+    """One row of its table.
+
+    Attributes:
+        role: its name in messages, logs and errors.
+        module: started as ``python -m module``.
+        binds: channel -> file name of the socket it binds, ``.sock`` in the run's directory of sockets.
+        on_loop_core: whether it ping-pongs at every tick, and so shares one core with its partner.
+    """
+
+    role: str
+    module: str
+    binds: dict[str, str]
+    on_loop_core: bool
+
+
+PROCESSES: dict[str, Process] = {
+    process.role: process
+    for process in (
+        Process("plant", "haploop.plant.node", {"loop": "loop", "telemetry": "plant"}, on_loop_core=True),
+        Process("controller", "haploop.controller.node", {"telemetry": "controller"}, on_loop_core=True),
+        Process("logger", "haploop.logger.node", {"telemetry": "logger"}, on_loop_core=False),
+    )
+}
+
+# Attached nodes join under this role, or any other that is not in the table.
+OBSERVER = "observer"
+
+
+@dataclass(frozen=True)
 class Message:
-    """One row of the table.
+    """One row of its table.
 
     Attributes:
         code: the number on the wire.

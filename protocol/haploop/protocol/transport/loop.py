@@ -8,10 +8,10 @@ from typing import Any
 import msgpack
 import zmq
 
-from haploop.protocol.clock_client import REPORT_MS
-from haploop.protocol.messages import MESSAGES, VERSION
-from haploop.protocol.sockets import bare_send, open_socket
-from haploop.protocol.wire import Frame, WireError, decode, encode
+from haploop.protocol.transport.clock_client import REPORT_MS
+from haploop.protocol.transport.messages import MESSAGES, VERSION
+from haploop.protocol.transport.sockets import bare_send, open_socket
+from haploop.protocol.transport.wire import Frame, WireError, decode, encode
 
 _COMMANDS = MESSAGES["COMMANDS"].code
 _SAMPLES = MESSAGES["SAMPLES"].code

@@ -1,0 +1,6 @@
+"""How processes talk: messages, wire format, sockets, the loop, telemetry, and what each kind of node does with them.
+
+``messages`` holds the tables of processes and messages, ``wire`` their encoding, ``sockets`` what they travel on. A
+node is a ``node.run_node`` call with a ``ClockClient``; plant and controller talk through ``loop``, everyone else
+listens to ``telemetry``, an attached node as an ``Observer``.
+"""
