@@ -5,8 +5,9 @@ BIN := .venv/bin
 PIP := $(PYTHON) -m pip --python $(BIN)/python -qq --disable-pip-version-check --no-input
 READY := .venv/.installed
 
-QUICK := tests/scene tests/log tests/estimators tests/clock $(patsubst %,tests/physics/test_%.py,\
-  step stability leak energy_per_sample timing_rules random_stream event_timing)
+QUICK := tests/scene tests/log tests/estimators tests/clock $(patsubst %,tests/physics/%.py,\
+  motion/test_step motion/test_stability motion/test_timing_rules motion/test_event_timing \
+  energy/test_leak energy/test_energy_per_sample sensing/test_random_stream)
 
 .DEFAULT_GOAL := help
 .PHONY: help demo quick test slow check bench accuracy paper notebook lock clean

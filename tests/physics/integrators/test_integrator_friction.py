@@ -19,7 +19,7 @@ from helpers.scenes.effect_tables import EFFECTS, tap
 from helpers.scenes.every_effect import EVERYTHING, METHODS
 from helpers.scenes.least import mistakes, scene
 
-SCENES = Path(__file__).parents[2] / "launch/scenes"
+SCENES = Path(__file__).parents[3] / "launch/scenes"
 ONE_STEP = METHODS[:-1]
 MASS, KINETIC = 0.05, 0.0487
 

@@ -14,7 +14,7 @@ from haploop.launch.scene.file import load
 from haploop.plant.plant import Plant
 from haploop.protocol.ticks import Timebase
 
-SCENES = Path(__file__).parents[2] / "launch/scenes"
+SCENES = Path(__file__).parents[3] / "launch/scenes"
 
 
 @pytest.mark.slow

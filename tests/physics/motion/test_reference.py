@@ -26,7 +26,7 @@ SEEDS = range(30)
 KNOWN = ("encoder", "velocity.cutoff", "acceleration.source", "acceleration.cutoff")
 SCENES = [
     path
-    for path in sorted((Path(__file__).parents[2] / "launch/scenes").glob("*.toml"))
+    for path in sorted((Path(__file__).parents[3] / "launch/scenes").glob("*.toml"))
     if {effect.key for effect in effects_of(load(path))} <= {*KNOWN}
 ]
 

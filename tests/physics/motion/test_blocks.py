@@ -13,7 +13,7 @@ from haploop.launch.scene.file import load
 from helpers.runs.captured import in_blocks, of_the_scene
 from helpers.scenes.random_scenes import drawn
 
-SCENES = sorted((Path(__file__).parents[2] / "launch/scenes").glob("*.toml"))
+SCENES = sorted((Path(__file__).parents[3] / "launch/scenes").glob("*.toml"))
 
 
 @pytest.mark.parametrize("seed", [6, 11, 24, 25, 29])
