@@ -70,7 +70,7 @@ class LoggerNode:
         self.session = open_session(scene, time, out, attachments)
         self.session.logger.booked = self._publish_energy
         states: dict[str, Message] = {}
-        early = []
+        early: list[tuple[str, Frame]] = []
         while len(states) < len(_LISTENS):
             received = self._streams.receive(REPORT_MS)
             for role, frame in received:

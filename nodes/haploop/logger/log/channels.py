@@ -14,17 +14,8 @@ from haploop.protocol.changes import Event
 from haploop.protocol.ticks import Timebase
 from haploop.protocol.transport.telemetry import Block
 
-UNITS = {
-    "x": "m",
-    "v": "m/s",
-    "force": "N",
-    "tip_x": "m",
-    "tip_v": "m/s",
-    "hand_x": "m",
-    "hand_v": "m/s",
-    "actuator": "N",
-    "friction": "N",
-}
+_MOTION = {f"{body}{name}": unit for body in ("", "tip_", "hand_") for name, unit in (("x", "m"), ("v", "m/s"))}
+UNITS = _MOTION | dict.fromkeys(("force", "actuator", "friction"), "N")
 # Each link of telemetry leads on to the body that the log names.
 _FAR_END = {"cable": "tip", "grip": "hand"}
 CONTROLLER_UNITS = {"x": "m", "v": "m/s", "a": "m/s^2", "wall": "N", "total": "N", "in_contact": ""}
@@ -95,9 +86,8 @@ class Channels:
 
     def event(self, tick: int, event: Event) -> None:
         """Writes one message: the tick, its time in s, and the event as it was given."""
-        self._log.message(
-            self._events, self._time.tick_ns(tick), {"timestamp": tick / self._time.control_rate, "tick": tick, **event}
-        )
+        entry = {"timestamp": tick / self._time.control_rate, "tick": tick, **event}
+        self._log.message(self._events, self._time.tick_ns(tick), entry)
 
 
 def motion_columns(plant: dict[str, np.ndarray]) -> dict[str, np.ndarray]:

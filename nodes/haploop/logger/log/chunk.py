@@ -24,16 +24,9 @@ Compression = Literal["", "lz4"]
 # Negative levels give up size for speed. On a log of random motions -3 takes three quarters of the time of level 0 and
 # gives 3 % more bytes, still half of what goes in; -5 gives 14 % more and wins hardly any time.
 _LZ4_LEVEL = -3
-# What stands before the data of a message; ``length`` counts all that comes after it.
-_HEAD = {
-    "opcode": "u1",
-    "length": "<u8",
-    "channel": "<u2",
-    "sequence": "<u4",
-    "log_time": "<u8",
-    "publish_time": "<u8",
-}
-_FIXED_BYTES = 2 + 4 + 8 + 8
+# What stands before the data of a message record; its length counts what comes after it.
+_PREFIX = [("opcode", "u1"), ("length", "<u8")]
+_HEAD = [("channel", "<u2"), ("sequence", "<u4"), ("log_time", "<u8"), ("publish_time", "<u8")]
 
 
 class TableRows:
@@ -49,7 +42,7 @@ class TableRows:
         self.channel = channel
         self.count = 0
         self._layout = layout
-        self._record = np.dtype([*_HEAD.items(), ("message", layout.dtype)])
+        self._record = np.dtype([*_PREFIX, *_HEAD, ("message", layout.dtype)])
         self._records = np.empty(0, self._record)
         self._views: list[Floats] = []
 
@@ -61,20 +54,14 @@ class TableRows:
         held = self._records[: self.count]
         self._records = np.empty(capacity, self._record)
         self._records["opcode"] = Opcode.MESSAGE
-        self._records["length"] = _FIXED_BYTES + self._layout.dtype.itemsize
+        self._records["length"] = np.dtype([*_HEAD, ("message", self._layout.dtype)]).itemsize
         self._records["channel"] = self.channel
         self._layout.stamp(self._records["message"])
         self._records[: self.count] = held
         self._views = self._layout.views(self._records["message"])
 
     def append(self, sequence: int, log_times_ns: NDArray[np.int64], values: Floats) -> None:
-        """Adds messages.
-
-        Args:
-            sequence: number of the first message on its channel.
-            log_times_ns: shape (messages,).
-            values: shape (messages, columns), or (messages, samples, columns) where the layout has samples.
-        """
+        """Adds messages, the first of which is number ``sequence`` on its channel; shapes as of ``Log.write``."""
         start, end = self.count, self.count + len(log_times_ns)
         if end > len(self._records):
             self._reserve(max(end, 2 * len(self._records)))
@@ -141,15 +128,12 @@ class FreeRows:
 
 
 def chunk(rows: Sequence[TableRows | FreeRows], start: int, compression: Compression) -> tuple[bytes, ChunkIndex]:
-    """Composes a chunk and the message indexes that follow it.
+    """Returns a chunk and the message indexes that follow it, as bytes, and the chunk's index for the file's summary.
 
     Args:
         rows: the messages, at least one channel's and at least one message each.
         start: byte of the file at which the chunk is to stand.
         compression: its name in the file.
-
-    Returns:
-        The bytes for the file, and the index of the chunk for the file's summary.
     """
     body = b"".join([some.body() for some in rows])
     packed = body

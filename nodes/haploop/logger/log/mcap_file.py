@@ -11,20 +11,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NoReturn
 
+from mcap import records as mcap
 from mcap.data_stream import RecordBuilder
 from mcap.opcode import Opcode
-from mcap.records import (
-    AttachmentIndex,
-    Channel,
-    ChunkIndex,
-    DataEnd,
-    Footer,
-    Header,
-    McapRecord,
-    Schema,
-    Statistics,
-    SummaryOffset,
-)
 
 from haploop.logger.log import LogError
 
@@ -42,17 +31,13 @@ class McapFile:
     """
 
     def __init__(self, path: str | Path) -> None:
-        """Makes the file and begins it.
-
-        Raises:
-            LogError: the operating system refuses.
-        """
+        """Makes the file and begins it; raises LogError where the operating system refuses."""
         self.path = Path(path)
         self.size = 0
-        self.schemas: list[Schema] = []
-        self.channels: list[Channel] = []
-        self.chunks: list[ChunkIndex] = []
-        self.attachments: list[AttachmentIndex] = []
+        self.schemas: list[mcap.Schema] = []
+        self.channels: list[mcap.Channel] = []
+        self.chunks: list[mcap.ChunkIndex] = []
+        self.attachments: list[mcap.AttachmentIndex] = []
         self.message_counts: dict[int, int] = {}
         self._failure: LogError | None = None
         try:
@@ -62,14 +47,13 @@ class McapFile:
             raise LogError(
                 f"The log {self.path} cannot be made ({error.strerror}); name a directory that exists and is writable."
             ) from error
-        self.append(MAGIC + bytes_of(Header(profile="", library="haploop")))
+        self.append(MAGIC + bytes_of(mcap.Header(profile="", library="haploop")))
 
     def append(self, piece: bytes) -> None:
         """Hands a piece to the operating system.
 
         Raises:
-            LogError: the operating system refuses, now or at an earlier piece; the file is cut back to the whole
-                pieces before it and stays so.
+            LogError: it refuses, now or at an earlier piece; the file is cut back to the whole pieces before and stays.
         """
         if self._failure:
             raise self._failure
@@ -105,14 +89,10 @@ class McapFile:
         self._file.close()
 
     def append_summary(self) -> None:
-        """Ends the file, from the DataEnd record on.
-
-        Raises:
-            LogError: as of ``append``.
-        """
-        data_end = bytes_of(DataEnd(data_section_crc=0))
+        """Ends the file, from the DataEnd record on; raises LogError as ``append`` does."""
+        data_end = bytes_of(mcap.DataEnd(data_section_crc=0))
         start = self.size + len(data_end)
-        statistics = Statistics(
+        statistics = mcap.Statistics(
             attachment_count=len(self.attachments),
             channel_count=len(self.channels),
             channel_message_counts=self.message_counts,
@@ -123,26 +103,25 @@ class McapFile:
             metadata_count=0,
             schema_count=len(self.schemas),
         )
-        groups: list[tuple[Opcode, Sequence[McapRecord]]] = [
-            (Opcode.SCHEMA, self.schemas),
-            (Opcode.CHANNEL, self.channels),
-            (Opcode.STATISTICS, [statistics]),
-            (Opcode.CHUNK_INDEX, self.chunks),
-            (Opcode.ATTACHMENT_INDEX, self.attachments),
-        ]
+        groups: dict[Opcode, Sequence[mcap.McapRecord]] = {
+            Opcode.SCHEMA: self.schemas,
+            Opcode.CHANNEL: self.channels,
+            Opcode.STATISTICS: [statistics],
+            Opcode.CHUNK_INDEX: self.chunks,
+            Opcode.ATTACHMENT_INDEX: self.attachments,
+        }
         covered, offsets = b"", []
-        for opcode, records in groups:
-            group = bytes_of(*records)
-            if group:
-                offsets.append(SummaryOffset(opcode, start + len(covered), len(group)))
+        for opcode, records in groups.items():
+            if group := bytes_of(*records):
+                offsets.append(mcap.SummaryOffset(opcode, start + len(covered), len(group)))
             covered += group
         # The checksum covers the footer as well, up to the checksum itself.
-        footer = bytes_of(Footer(start, start + len(covered), summary_crc=0))[:-_CRC_BYTES]
+        footer = bytes_of(mcap.Footer(start, start + len(covered), summary_crc=0))[:-_CRC_BYTES]
         covered += bytes_of(*offsets) + footer
         self.append(data_end + covered + zlib.crc32(covered).to_bytes(_CRC_BYTES, "little") + MAGIC)
 
 
-def bytes_of(*records: McapRecord) -> bytes:
+def bytes_of(*records: mcap.McapRecord) -> bytes:
     """Returns records end to end."""
     builder = RecordBuilder()
     for record in records:

@@ -97,14 +97,17 @@ class LogStream:
         where = f"it was read up to byte {self.read_bytes} ({self._open_end})"
         return f"The log {self.path} was cut off or is still being written; {where}."
 
-    def chosen(self, topic: str) -> bool:
-        """Tells whether a topic is one of those asked for."""
+    def _is_chosen(self, topic: str) -> bool:
         return self._topics is None or topic in self._topics
 
-    def chosen_units(self, topic: str) -> dict[str, str]:
-        """Returns unit by column of a topic, of the columns asked for."""
-        units = self.units[topic]
-        return {name: units[name] for name in units if self._columns is None or name in self._columns}
+    def chosen_units(self) -> dict[str, dict[str, str]]:
+        """Returns unit by column of the columns asked for, by topic; those met so far that have any, or none at all."""
+        chosen = {
+            topic: {name: unit for name, unit in units.items() if self._columns is None or name in self._columns}
+            for topic, units in self.units.items()
+            if self._is_chosen(topic)
+        }
+        return {topic: units for topic, units in chosen.items() if units or not self.units[topic]}
 
     def __iter__(self) -> Iterator[Batch]:
         """Yields all batches that have not come yet.
@@ -149,7 +152,7 @@ class LogStream:
                 self._register(*part)
             elif part.channel not in self._channels:
                 raise ValueError(f"a message of channel {part.channel} came before the channel")
-            elif self.chosen(topic := self._channels[part.channel].topic):
+            elif self._is_chosen(topic := self._channels[part.channel].topic):
                 found.setdefault(topic, {}).setdefault(part.channel, []).append(part)
         return [
             Batch(topic, *join([self._channels[number].decode(some, self._columns) for number, some in runs.items()]))
@@ -174,21 +177,10 @@ class LogStream:
 
 
 def read(path: str | Path, topics: Collection[str] | None = None, columns: Collection[str] | None = None) -> Recording:
-    """Reads the log of a run.
+    """Returns the log of a run: arrays by topic and column, ``read(run)["/plant"]["x"]``.
 
-    Args:
-        path: a run's directory, or an MCAP file of msgpack maps.
-        topics: only these topics; all when None.
-        columns: only these columns, of every topic that has them; all when None. A topic that has none of them is left
-            out, one without columns at all (``/events``) is not.
-
-    Returns:
-        Arrays by topic and column, ``read(run)["/plant"]["x"]``; of a log that was cut off, everything up to the last
-        whole chunk, with ``truncated`` set.
-
-    Raises:
-        FileNotFoundError: there is no such directory or file, or the directory holds no log.
-        LogError: the file is empty, is no MCAP file, or holds messages other than msgpack maps.
+    Arguments and errors are those of :class:`LogStream`. A topic that has columns, but none of those asked for, is left
+    out. Of a log that was cut off there is everything up to the last whole chunk, and ``truncated`` is set.
     """
     log = LogStream(path, topics, columns)
     batches: dict[str, list[Batch]] = {}
@@ -196,8 +188,7 @@ def read(path: str | Path, topics: Collection[str] | None = None, columns: Colle
         batches.setdefault(batch.topic, []).append(batch)
     rows = {
         topic: join([batch[1:] for batch in batches.pop(topic, [])], units)[1]
-        for topic in log.units
-        if log.chosen(topic) and ((units := log.chosen_units(topic)) or not log.units[topic])
+        for topic, units in log.chosen_units().items()
     }
     return Recording(rows, log.cut, log.attachments)
 
@@ -206,9 +197,6 @@ def survey(path: str | Path) -> LogStream:
     """Returns a stream that has gone through a whole log without unpacking a message.
 
     Its ``units`` are those of every channel there is, and its ``read_bytes`` is where the log ended.
-
-    Raises:
-        FileNotFoundError, LogError: as for :class:`LogStream`.
     """
     log = LogStream(path, topics=())
     for _ in log:

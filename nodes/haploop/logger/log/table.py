@@ -28,16 +28,11 @@ class TableLayout:
 
     Attributes:
         columns: unit by column name, in the order of the map; "" for a pure number.
-        samples: maps in a message's top-level array, or None when the message is one plain map.
+        samples: maps in a message's top-level array, 1 at least, or None when the message is one plain map.
         dtype: NumPy dtype of one message, as long as the msgpack message in bytes.
     """
 
     def __init__(self, columns: Mapping[str, str], samples: int | None = None) -> None:
-        """Lays out the message.
-
-        Raises:
-            ValueError: ``samples`` is less than 1.
-        """
         if samples is not None and samples < 1:
             raise ValueError(f"A message must hold at least one sample, but samples_per_message is {samples}.")
         self.columns = dict(columns)
@@ -67,24 +62,18 @@ class TableLayout:
         messages.view(as_bytes)[:] = self._template.view(as_bytes)
 
     def views(self, messages: NDArray[Any]) -> list[Floats]:
-        """Returns the numbers inside an array of messages, as writable views in column order.
+        """Returns the numbers inside an array of messages of this dtype, shape (messages,), in column order.
 
-        Args:
-            messages: shape (messages,), of this dtype.
-
-        Returns:
-            One big-endian float64 view a column, of shape (messages,) or, with samples, (messages, samples).
+        They are writable views, big-endian float64, of shape (messages,) or, with samples, (messages, samples).
         """
         maps = messages["maps"]
         return [maps[str(number)] for number in range(len(self.columns))]
 
     def read(self, payload: bytes) -> list[Floats] | None:
-        """Takes messages standing end to end apart.
+        """Takes messages standing end to end apart: a native float64 array a column, flat over messages and samples.
 
-        Returns:
-            One native float64 array a column, flat over messages and samples; None when the bytes are not of this
-            layout through and through. That is told by putting the numbers back into the template: the bytes must be
-            those that were read.
+        Returns None when the bytes are not of this layout through and through. That is told by putting the numbers back
+        into the template: the bytes must be those that were read.
         """
         if len(payload) % self.dtype.itemsize:
             return None

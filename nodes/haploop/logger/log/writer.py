@@ -43,22 +43,16 @@ class Log:
     def channel(
         self, topic: str, columns: Mapping[str, str], *, samples_per_message: int | None = None, title: str
     ) -> int:
-        """Registers a channel; for what is registered already, the number it has.
+        """Registers a channel and returns its number; for what is registered already, the number it has.
 
-        The same topic may be registered again with other columns: it then has several channels, which
-        :func:`haploop.logger.read` joins.
+        The same topic may be registered again with other columns: :func:`haploop.logger.read` joins its channels.
 
         Args:
             topic: such as ``/plant``.
             columns: unit by column name ("" for a pure number); empty for free maps, see :meth:`message`.
-            samples_per_message: None for messages that are one map; else a message is an array of so many maps.
+            samples_per_message: None for messages that are one map; else a message is an array of so many maps, 1 at
+                least (ValueError).
             title: what the channel holds, for people; also the name of its schema.
-
-        Returns:
-            The channel's number, for :meth:`write` and :meth:`message`.
-
-        Raises:
-            ValueError: ``samples_per_message`` is less than 1.
         """
         key = (topic, tuple(columns.items()), samples_per_message, title)
         if key in self._known:
@@ -80,7 +74,7 @@ class Log:
         """Adds messages to a channel with columns.
 
         Args:
-            channel: the channel's number.
+            channel: its number.
             log_times_ns: simulated time in ns, from 0 up, shape (messages,).
             values: shape (messages, columns), or (messages, samples, columns) where the channel has samples.
 
@@ -97,22 +91,16 @@ class Log:
             return
         if log_times_ns.min() < 0:
             raise ValueError(f"A log time must be 0 or later, but {log_times_ns.min()} ns came on channel {channel}.")
-        rows = self._rows.get(channel)
-        if not isinstance(rows, TableRows):
+        if not isinstance(rows := self._rows.get(channel), TableRows):
             rows = self._rows[channel] = TableRows(channel, layout)
         rows.append(self._file.message_counts[channel] + rows.count, log_times_ns, values)
         self._close_full_chunk()
 
     def message(self, channel: int, log_time_ns: int, obj: Event) -> None:
-        """Adds one map to a channel without columns; ``obj`` holds what msgpack can carry.
-
-        Raises:
-            ValueError: the channel has columns.
-        """
+        """Adds one map to a channel without columns (ValueError for another); ``obj`` holds what msgpack can carry."""
         if channel in self._tables:
             raise ValueError(f"Channel {channel} has columns: its messages come through write().")
-        rows = self._rows.get(channel)
-        if not isinstance(rows, FreeRows):
+        if not isinstance(rows := self._rows.get(channel), FreeRows):
             rows = self._rows[channel] = FreeRows(channel)
         rows.append(self._file.message_counts[channel] + rows.count, log_time_ns, pack(obj))
         self._close_full_chunk()

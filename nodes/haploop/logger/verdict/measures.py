@@ -131,8 +131,7 @@ def measure_window(
     Args:
         x: positions at the last plant steps at least, shape (runs, steps), m.
         rows: ``CONTROLLER_COLUMNS`` at the last ticks at least, shape (runs, ticks).
-        span: of the windows.
-        rate: plant steps a second.
+        span, rate: of the windows, and plant steps a second.
         swing_m: what does not count as a swing, shape (runs,).
     """
     x = x[:, -span.steps - 1 :]
