@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, TypedDict
+from collections.abc import Collection, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, TypedDict
 
 import numpy as np
 
 from haploop.tools.figure.style import ELEMENTS, FAINT, INK, SMALL, TEXT, WALL, dress, empty_figure
 from haploop.tools.render.terminal import markdown_table
-from haploop.tools.search.random import Row
+from haploop.tools.search.random import Effort, Row
 from haploop.tools.studies.choi2022.interpretations import (
+    SEED,
+    Found,
     InterpretationSpace,
     Option,
     decider,
-    never_together,
     percent,
     share,
     yes,
@@ -129,23 +130,26 @@ def claims_table(
     )
 
 
-def by_number_of_claims(rows: Sequence[Row], claims: int) -> str:
-    """Returns how many interpretations have how many of the claims: ``"3 of 13: 20, 2 of 13: 7"``."""
-    holding = Counter(row["holding"] for row in rows)
-    return ", ".join(f"{count} of {claims}: {holding[count]}" for count in sorted(holding, reverse=True))
-
-
-def pairs_never_together(rows: Sequence[Row], claims: Sequence[str]) -> str:
-    """Returns ``never_together`` in words; empty if there are none."""
-    return "; ".join(f"*{first}* and *{second}*" for first, second in never_together(rows, claims))
-
-
-def list_of_choices(space: InterpretationSpace) -> str:
-    """Returns a list item for each choice with its options."""
-    return "\n".join(
+def search_words(
+    space: InterpretationSpace, effort: Effort, found: Found[Any], claims: Collection[str]
+) -> dict[str, str | float]:
+    """Returns what the words on any search name: its seed and effort, the interpretations of each stage, ``claims``,
+    the choices as a list, and ``counts``: how many random interpretations have how many of the claims.
+    """
+    holding = Counter(row["holding"] for row in found.of("random"))
+    choices = (
         f"- {space.label(key)}: {', '.join(space.value(key, option) for option in some)}"
         for key, some in space.choices.items()
     )
+    return {
+        **Counter(row["stage"] for row in found.rows),
+        "seed": SEED,
+        "far": effort.far,
+        "close": effort.close,
+        "claims": len(claims),
+        "choices": "\n".join(choices),
+        "counts": ", ".join(f"{n} of {len(claims)}: {holding[n]}" for n in sorted(holding, reverse=True)),
+    }
 
 
 def share_map(found: Sequence[Option], claims: Sequence[str], count: int) -> Figure:

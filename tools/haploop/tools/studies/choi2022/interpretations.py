@@ -219,13 +219,9 @@ def decider(found: Iterable[Option], claim: str) -> Decider | None:
     return most if most and most.gap(claim) > 0.0 else None
 
 
-def never_together(rows: Sequence[Row], claims: Sequence[str]) -> list[tuple[str, str]]:
-    """Returns the pairs of claims that each hold somewhere, and nowhere both."""
+def never_together(rows: Sequence[Row], claims: Sequence[str]) -> str:
+    """Returns the pairs of claims that each hold somewhere, and nowhere both; empty if there are none."""
     table = np.array([[holds(row, name) for name in claims] for row in rows], int)
     both = table.T @ table
-    return [
-        (first, second)
-        for i, first in enumerate(claims)
-        for j, second in enumerate(claims[:i])
-        if not both[i, j] and both[i, i] and both[j, j]
-    ]
+    pairs = ((i, j) for i in range(len(claims)) for j in range(i) if not both[i, j] and both[i, i] and both[j, j])
+    return "; ".join(f"*{claims[i]}* and *{claims[j]}*" for i, j in pairs)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
@@ -10,18 +9,11 @@ from haploop.tools.figure.style import GREY, INK, SMALL, dress, empty_figure
 from haploop.tools.render.terminal import markdown_table
 from haploop.tools.studies.choi2022.claims import Finding, claims_of
 from haploop.tools.studies.choi2022.device import FRICTION_N, KINDS, SCENE_FILE, Setup, file_text
-from haploop.tools.studies.choi2022.drawing import (
-    SHORT,
-    by_number_of_claims,
-    claims_table,
-    list_of_choices,
-    pairs_never_together,
-    share_map,
-)
+from haploop.tools.studies.choi2022.drawing import SHORT, claims_table, search_words, share_map
 from haploop.tools.studies.choi2022.experiment import NEAREST, SCENE, SPACE, WHOLE, describe, keep_shares, search
 from haploop.tools.studies.choi2022.experiment_measure import CLAIMS as TESTED
 from haploop.tools.studies.choi2022.experiment_measure import NAMES, PAPER, largest, stiffness_ladder
-from haploop.tools.studies.choi2022.interpretations import SEED, Found, Option, holds, options, percent, share
+from haploop.tools.studies.choi2022.interpretations import Found, Option, holds, never_together, options, percent, share
 from haploop.tools.studies.choi2022.work import Work
 
 if TYPE_CHECKING:
@@ -57,7 +49,7 @@ def make(work: Work) -> list[Finding]:
     work.data("figure_7_interpretations", _columns(found))
     work.scene(SCENE.removesuffix(".toml"), found.nearest.scene(5000.0))
     work.text(SCENE_FILE, file_text(found.nearest))
-    work.notes = _notes(work, found, there)
+    work.notes = [_notes(work, found, there)]
     work.answer = _answer(work, found)
     return [_on_the_unit(found, *influences["acceleration"])]
 
@@ -132,59 +124,41 @@ def _draw(base: Largest, influences: Influences, varied: Mapping[str, Pair]) -> 
     return figure
 
 
-def _notes(work: Work, found: Found[Setup], there: Sequence[Option]) -> list[str]:
-    """Returns the sections below the figure."""
+def _notes(work: Work, found: Found[Setup], there: Sequence[Option]) -> str:
+    """Returns what is told below the figure."""
     rows, [row], [with_friction] = found.of("random"), found.of("nearest"), found.of("friction")
     described = describe(found.nearest)
     measured = {"nearest interpretation": row, "with friction of 48 mN": with_friction}
     bears = [["the paper", "", *(f"{stiffness / 1e3:.1f}" for stiffness in PAPER.values())]]
     bears += [[name, *(f"{one[f'{kind}_N_m'] / 1e3:.1f}" for kind in NAMES)] for name, one in measured.items()]
     kinds = ["nothing", "damping", "bidirectional", "unidirectional", "damping with unidirectional"]
-    never = pairs_never_together(rows, [name for name in TESTED if share(rows, name) >= _OFTEN])
-    bounds = [
+    never = never_together(rows, [name for name in TESTED if share(rows, name) >= _OFTEN])
+    alone = claims_table(
+        TESTED,
+        {"nearest": row},
+        {"its neighbours": found.of("neighbour"), "random interpretations": rows},
+        there,
+        "likeliest with, and least with",
+    )
+    bounds = (
         f"- {SPACE.label(key)}: {SPACE.value(key, low)} to {SPACE.value(key, high)}"
         for key, (low, high) in SPACE.bounds.items()
-    ]
-    return [
-        "#### The nearest interpretation",
-        work.tell(
-            "nearest",
-            described=f"{described[:1].upper()}{described[1:]}",
-            file=SCENE_FILE,
-            holding=row["holding"],
-            claims=len(TESTED),
-            lacks=", ".join(f"*{name}*" for name in TESTED if not holds(row, name)),
-        ),
-        markdown_table(["", *kinds], bears, numbers=range(1, 6)),
-        work.tell("friction"),
-        "#### Each claim alone",
-        work.tell("alone", count=len(rows), bears=sum(max(row[f"{name}_N_m"] for name in PAPER) > 0.0 for row in rows)),
-        claims_table(
-            TESTED,
-            {"nearest": row},
-            {"its neighbours": found.of("neighbour"), "random interpretations": rows},
-            there,
-            "likeliest with, and least with",
-        ),
-        "#### All claims together",
-        work.tell(
-            "together",
-            most=max(row["holding"] for row in found.rows),
-            counts=by_number_of_claims(rows, len(TESTED)),
-            never=work.tell("never", often=percent(_OFTEN), pairs=never) if never else "",
-        ),
-        "#### How was searched",
-        work.tell(
-            "method",
-            seed=SEED,
-            far=WHOLE.far,
-            close=WHOLE.close,
-            papers=", ".join(f"{name.replace('-', ' ')} {stiffness / 1e3:.1f}" for name, stiffness in PAPER.items()),
-            **Counter(row["stage"] for row in found.rows),
-        ),
-        "\n".join([list_of_choices(SPACE), *bounds]),
-        work.tell("unit"),
-    ]
+    )
+    return work.tell(
+        "notes",
+        **search_words(SPACE, WHOLE, found, TESTED),
+        described=f"{described[:1].upper()}{described[1:]}",
+        file=SCENE_FILE,
+        holding=row["holding"],
+        lacks=", ".join(f"*{name}*" for name in TESTED if not holds(row, name)),
+        stiffnesses=markdown_table(["", *kinds], bears, numbers=range(1, 6)),
+        bears=sum(max(row[f"{name}_N_m"] for name in PAPER) > 0.0 for row in rows),
+        alone=alone,
+        most=max(row["holding"] for row in found.rows),
+        never=work.tell("never", often=percent(_OFTEN), pairs=never) if never else "",
+        papers=", ".join(f"{name.replace('-', ' ')} {stiffness / 1e3:.1f}" for name, stiffness in PAPER.items()),
+        numbers="\n".join(bounds),
+    )
 
 
 def _answer(work: Work, found: Found[Setup]) -> str:
