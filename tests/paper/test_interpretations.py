@@ -133,7 +133,7 @@ def test_what_decides_is_the_dimension_whose_options_differ_most() -> None:
 
 def test_claims_that_never_hold_together_are_found() -> None:
     rows = [row(**{"a small": 1.0}), row(**{"c passive": 1.0})]
-    assert never_together(rows, list(CLAIMS)) == [("c passive", "a small")]
+    assert never_together(rows, list(CLAIMS)) == "*c passive* and *a small*"
 
 
 def test_the_table_of_interpretations_reads_back(tmp_path: Path) -> None:

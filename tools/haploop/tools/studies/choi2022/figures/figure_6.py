@@ -214,8 +214,10 @@ def _panels(runs: Mapping[str, Run]) -> Figure:
         room = max(3.0, 0.5 * (highest - deepest))
         for ax in axes[0]:
             ax.set_ylim(min(deepest, surface) - room, max(highest, surface) + 2.0 * room)
-    for ax in axes.ravel():
-        ax.label_outer()
+    for ax in axes[:, 1:].ravel():
+        ax.set_ylabel("")
+    for ax in axes[:2].ravel():
+        ax.set_xlabel("")
     return figure
 
 
@@ -245,11 +247,9 @@ def _energy(ax: Axes, log: Recording) -> None:
     t, energy = log["/energy"]["timestamp"], log["/energy"]
     for name in [key.removesuffix(".true") for key in energy if key.endswith(".true")]:
         label, colour = ("wall", WALL) if name == "wall" else ("element", element_colour(0))
-        look = {"color": colour, "linewidth": 1.5, "label": label}
-        _curve(ax, t, 1e3 * energy[f"{name}.true"], **look)
-        _curve(
-            ax, t, 1e3 * energy[f"{name}.sampled"], **look | {"linestyle": (0, (4, 2)), "linewidth": 1.0, "label": "_"}
-        )
+        true, sampled = 1e3 * energy[f"{name}.true"], 1e3 * energy[f"{name}.sampled"]
+        _curve(ax, t, true, color=colour, linestyle="-", linewidth=1.5, label=label)
+        _curve(ax, t, sampled, color=colour, linestyle=(0, (4, 2)), linewidth=1.0, label="_")
     heat = 1e3 * (energy["device_heat"] + energy["hand_heat"])
     ax.plot(t, heat, color=OF_THE_PLANT["hand"], linewidth=1.0, label="heat")
     ax.axhline(0.0, color=GREY, linewidth=0.8, zorder=0)
