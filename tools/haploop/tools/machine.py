@@ -16,20 +16,16 @@ _ROOTS = ("protocol", "nodes", "launch", "tools")
 
 def machine() -> str:
     """Returns processor, cores and operating system, for the record."""
-    cpu = next(
-        (line.partition(":")[2].strip() for line in _cpuinfo() if line.startswith("model name")), platform.processor()
-    )
+    path = Path("/proc/cpuinfo")
+    lines = path.read_text(encoding="utf-8").splitlines() if path.exists() else []
+    names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
+    cpu = next(iter(names), platform.processor())
     return f"{cpu or platform.machine()}, {cores()} cores, {platform.system()}"
 
 
 def cores() -> int:
     """Counts the cores this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
-def _cpuinfo() -> list[str]:
-    path = Path("/proc/cpuinfo")
-    return path.read_text(encoding="utf-8").splitlines() if path.exists() else []
 
 
 def versions() -> dict[str, str]:

@@ -8,7 +8,7 @@ from pathlib import Path
 from haploop.tools.cli.exit_codes import WRONG_USE, leave
 from haploop.tools.cost import figure, prices_figure
 from haploop.tools.cost.data import Cost, CostFileError, Point, Price, PriceGroup, SceneCost, load
-from haploop.tools.cost.findings import FindingTable, findings, length, rate, setting
+from haploop.tools.cost.findings import findings, length, rate, setting
 from haploop.tools.cost.report import made_with
 from haploop.tools.figure.data import FigureError
 from haploop.tools.figure.style import write_figure
@@ -47,7 +47,11 @@ def page(cost: Cost) -> str:
         "# What accuracy costs",
         _INTRO,
         "## Findings",
-        *(part for table in findings(cost) for part in _finding(table)),
+        *(
+            part
+            for table in findings(cost)
+            for part in (f"### {table.title}", markdown_table(table.heads, table.rows), *table.notes)
+        ),
         "## Error against time",
         f"![Error of each method against the time of a tick, scene by scene]({FIGURE})",
         *(part for scene in cost.scenes for part in _scene(scene)),
@@ -56,11 +60,6 @@ def page(cost: Cost) -> str:
         f"{made_with(cost)} {_quiet(cost)}".strip(),
     ]
     return "\n\n".join(parts) + "\n"
-
-
-def _finding(table: FindingTable) -> list[str]:
-    """Formats a table of findings with its title and sentences."""
-    return [f"### {table.title}", markdown_table(table.heads, table.rows), *table.notes]
 
 
 def _scene(scene: SceneCost) -> list[str]:

@@ -85,9 +85,11 @@ def price_jobs(scenes: Path, made_with: Sequence[Any]) -> Jobs:
         return Job(PROCESSES, "", "processes", scene, lambda: run_us(wall, overrides, ticks))
 
     with_books = in_process()
+    # Plant and controller alone: their telemetry is made and thrown away.
+    bare = Job(IN_PROCESS, "bare", "bare", with_books.scene, lambda: bare_us(with_books.scene))
     effects = load(scenes / "all_effects.toml", [f"duration={_EFFECTS_S}", _FREE, "run.log=none"])
     jobs = {
-        "books": {"without": _bare(with_books.scene), "with": with_books},
+        "books": {"without": bare, "with": with_books},
         "log": {log: as_processes(f"run.log={log}") for log in _LOGS},
         "effects": {name: _in_process(scene, name) for name, scene in ablations(effects).items()},
         "processes": {"one process": with_books, "three processes": as_processes("run.log=none")},
@@ -103,11 +105,6 @@ def price_jobs(scenes: Path, made_with: Sequence[Any]) -> Jobs:
 def _in_process(scene: Scene, name: str = "") -> Job:
     """Makes a job of plant, controller and books in one process; a name keeps equal jobs apart."""
     return Job(IN_PROCESS, f"books {name}", f"books {name}", scene, lambda: loop_us(scene))
-
-
-def _bare(scene: Scene) -> Job:
-    """Makes a job of plant and controller alone: their telemetry is made and thrown away."""
-    return Job(IN_PROCESS, "bare", "bare", scene, lambda: bare_us(scene))
 
 
 def bare_us(scene: Scene) -> float | None:
@@ -178,6 +175,7 @@ class Prices:
 
     def _group(self, name: str) -> PriceGroup:
         title, unit, way, how = _GROUPS[name]
+        buys = _BUYS | {effect.name: effect.does for effect in EFFECTS}
         prices: list[Price] = []
         for what, job in self._jobs[name].items():
             scale = job.scene.clock.control_rate / 1000.0 if name == "control rate" else 1.0
@@ -187,7 +185,7 @@ class Prices:
                 what,
                 [value * scale for value in self._times(job)],
                 prices[0].time if prices else None,
-                _BUYS.get(what) or (_steady_up_to(limit) if limit else _does(what)),
+                _steady_up_to(limit) if limit else buys[what],
                 is_left_out=name == "effects",
                 instructions_per_tick=self._store.get(_INSTRUCTIONS, job.key) if name in _COUNTED else None,
                 stiffness=limit,
@@ -202,8 +200,3 @@ def _steady_up_to(limit: StiffnessLimit) -> str:
         return f"a wall of up to {spring(limit.stiffness_N_m)} stays steady"
     ran = f"but runs at 0.97 and 1.03 of it were {limit.below} and {limit.above}"
     return f"in theory a wall of up to {spring(limit.stiffness_N_m)} stays steady, {ran}"
-
-
-def _does(effect: str) -> str:
-    """Returns what an effect does, as the table of effects says it."""
-    return next(found.does for found in EFFECTS if found.name == effect)

@@ -57,20 +57,13 @@ def summary_table(summary: Summary) -> RenderableType:
 
     word = summary["verdict"]
     head = Text.assemble((word, verdict_style(word)), "  ", (summary["title"], "bold"))
-    parts: list[RenderableType] = [head, Text(_rule_in_short(summary["verdict_rule"]), style="dim")]
+    # Of the rule the measures alone, without the limits they were held against.
+    seen = summary["verdict_rule"].partition("; ")[0].rstrip(".")
+    parts: list[RenderableType] = [head, Text(f"{seen[:1].upper()}{seen[1:]}.", style="dim")]
     if summary["ended"] not in ("done", "diverged"):
         parts.append(Text(f"ended early: {summary['ended']}", style="bold red"))
-    return Group(*parts, make_facts(_key_figures(summary)), _books(summary["energy"], _control_rate(summary)))
-
-
-def _rule_in_short(rule: str) -> str:
-    """Returns the first half of the rule: the measures, without the limits they were held against."""
-    seen = rule.partition("; ")[0].rstrip(".")
-    return f"{seen[:1].upper()}{seen[1:]}."
-
-
-def _control_rate(summary: Summary) -> float:
-    return summary["ticks"] / summary["duration_s"] if summary["duration_s"] else 1.0
+    control_rate = summary["ticks"] / summary["duration_s"] if summary["duration_s"] else 1.0
+    return Group(*parts, make_facts(_key_figures(summary)), _books(summary["energy"], control_rate))
 
 
 def _key_figures(summary: Summary) -> list[tuple[str, str]]:
