@@ -141,8 +141,5 @@ def test_bisected_from_runs_the_boundary_of_a_linear_loop_is_where_the_spectral_
 
 def test_a_verdict_holds_or_not_and_a_failed_run_has_none() -> None:
     holds = verdict_is("steady")
-    assert [holds({"verdict": "steady"}), holds({"verdict": "diverged"}), holds({"ended": "failed"})] == [
-        True,
-        False,
-        None,
-    ]
+    assert [holds({"verdict": word}) for word in ("steady", "diverged", None)] == [True, False, None]
+    assert holds({"ended": "failed"}) is None

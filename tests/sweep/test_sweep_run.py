@@ -198,6 +198,16 @@ def test_a_plugin_that_fails_in_one_cell_costs_no_other_its_row(tmp_path: Path) 
     assert json.loads((tmp_path / "out" / "summary.json").read_text())["counts"]["failed"] == 1
 
 
+def test_a_run_that_fails_is_no_far_side_of_a_boundary(tmp_path: Path) -> None:
+    (tmp_path / "raising.py").write_text(RAISING)
+    text = '[set]\ndissipation = [{ kind = "raising" }]\n[axes]\n"dissipation.0.force_N" = [0.1, 0.3]\n'
+    search = '[bisect]\naxis = "dissipation.0.force_N"\ntolerance = "0.01 N"\nholds = "steady"\n'
+    table = swept(tmp_path, text + search, plugins=[tmp_path / "raising.py"])
+    assert table["verdict"].tolist() == ["steady", None]
+    assert "the run at 0.3 failed: " in table.boundary["why"][0]
+    assert np.isnan(table.boundary["boundary"][0])
+
+
 def test_other_plugin_files_are_refused_for_a_sweep_that_goes_on(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -109,5 +109,5 @@ def find_boundaries(
 
 
 def verdict_is(word: str = "steady") -> Holds:
-    """Makes the test of a result for this verdict; it gives None for a run that failed."""
-    return lambda result: result["verdict"] == word if "verdict" in result else None
+    """Makes the test of a row for this verdict; it gives None for a run that failed."""
+    return lambda row: row["verdict"] == word if row.get("verdict") else None
