@@ -12,8 +12,7 @@ import haploop.logger
 from haploop.launch.runs.start import prepare, run
 from haploop.logger.log.channels import motion_columns
 from haploop.tools.figure.data import RunData
-from haploop.tools.figure.run_figure import make_figure
-from haploop.tools.figure.text_panels import book_rows
+from haploop.tools.figure.run_figure import book_rows, make_figure
 from haploop.tools.render.report import summary_table
 from haploop.tools.render.units import amount
 from helpers.shown import artists, row, shown

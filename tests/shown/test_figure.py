@@ -16,10 +16,9 @@ from hypothesis import strategies as st
 
 from haploop.launch.runs.start import prepare, run
 from haploop.logger import read
-from haploop.tools.figure.data import TOGETHER, History, RunData
+from haploop.tools.figure.data import TOGETHER, FigureError, History, RunData
 from haploop.tools.figure.loops import force_position_loop, momentum_loop
-from haploop.tools.figure.run_figure import FigureError, draw, make_figure
-from haploop.tools.figure.text_panels import event_lines, key_numbers
+from haploop.tools.figure.run_figure import draw, event_lines, key_numbers, make_figure
 from haploop.tools.figure.time import extremes
 from helpers.scenes.least import scene
 from helpers.shown import artists

@@ -27,7 +27,7 @@ from numpy.lib import format as npy
 
 from haploop.logger.log.recording import TIMESTAMP, Table
 from haploop.logger.log.stream import Batch
-from haploop.tools.export.writer import ExportWriter, Units, read_column, to_json
+from haploop.tools.export.tables import ExportWriter, Units, read_column, to_json
 
 # Properties that the schema of events has: without any it could not be read.
 _EVENT_UNITS = {TIMESTAMP: "s", "tick": ""}

@@ -13,8 +13,7 @@ from haploop.launch.spec import OutputError
 from haploop.logger.log.stream import LogStream, survey
 from haploop.tools.cli.exit_codes import FAILED, WRONG_USE, leave, plain_errors
 from haploop.tools.export.archives import JsonMcapWriter, NpzWriter
-from haploop.tools.export.tables import CsvWriter, ParquetWriter
-from haploop.tools.export.writer import ExportWriter
+from haploop.tools.export.tables import CsvWriter, ExportWriter, ParquetWriter
 from haploop.tools.render.terminal import console
 
 WRITERS: dict[str, type[ExportWriter]] = {

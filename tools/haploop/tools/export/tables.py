@@ -1,4 +1,4 @@
-"""CSV and Apache Parquet: a file for every topic, a column for every quantity.
+"""The base of every export format; CSV and Apache Parquet: a file for every topic, a column for every quantity.
 
 CSV: UTF-8, one header line, ``timestamp (s),x (m)``; a pure number has its name alone. Numbers have as many digits as
 it takes to read back the same float64, a NaN is an empty cell, an infinite number is ``inf`` or ``-inf``. So one call
@@ -13,22 +13,72 @@ from __future__ import annotations
 import contextlib
 import csv
 import io
+import json
+from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import chain
-from typing import IO, Any
+from typing import IO, Any, ClassVar, Self
 
 import numpy as np
 
-from haploop.logger.log.recording import TIMESTAMP
+from haploop.logger.log.recording import TIMESTAMP, Table
 from haploop.logger.log.stream import Batch
 from haploop.logger.log.table import Floats
-from haploop.tools.export.writer import ExportWriter, Units, read_column, to_json
+from haploop.logger.summary import finite
 
+Units = Mapping[str, Mapping[str, str]]
 # A topic of free maps becomes a table of these two columns: time, and the map as JSON.
 MESSAGE = "message"
 MAP_UNITS = {TIMESTAMP: "s", MESSAGE: ""}
 # Rows of a group of a Parquet file, which a reader can read by itself.
 _GROUP_ROWS = 1 << 16
+
+
+class ExportWriter(ABC):
+    """Writes the content of a log into files, in the memory of a few batches; a context manager.
+
+    Attributes:
+        suffix: of its files.
+        file_per_topic: whether every topic has a file of its own, or all have one.
+    """
+
+    suffix: ClassVar[str]
+    file_per_topic: ClassVar[bool] = False
+
+    @abstractmethod
+    def __init__(self, files: Sequence[IO[bytes]], units: Units, attachments: Mapping[str, bytes]) -> None:
+        """Begins the files.
+
+        Args:
+            files: one a topic in the order of ``units``, or one for all; closed by the caller.
+            units: by topic, unit by column of all that will come; empty for a topic of free maps.
+            attachments: content of each file attached to the log, by name.
+        """
+
+    @abstractmethod
+    def add(self, batch: Batch) -> None:
+        """Takes the next rows of a topic; a column that they do not have is NaN in them."""
+
+    @abstractmethod
+    def finish(self) -> None:
+        """Writes all that was held back; to be called once, when nothing has failed."""
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:  # noqa: B027 (most hold nothing beside their files)
+        """Releases whatever is held beside the files."""
+
+
+def read_column(batch: Batch, name: str) -> Floats:
+    """Returns a column of a batch, NaN throughout where it has none of the name."""
+    assert isinstance(batch.rows, Table)
+    return batch.rows[name] if name in batch.rows else np.full(len(batch.log_times_ns), np.nan)
+
+
+def to_json(value: Any) -> str:
+    """Returns compact JSON; null for numbers that are not finite, text for what JSON does not know."""
+    return json.dumps(finite(value), ensure_ascii=False, separators=(",", ":"), default=str)
 
 
 class CsvWriter(ExportWriter):

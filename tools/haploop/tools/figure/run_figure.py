@@ -3,46 +3,56 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
-from haploop.tools.figure.data import TOGETHER, FigureError, RunData
+from haploop.logger.summary import Summary
+from haploop.protocol.changes import describe
+from haploop.tools.figure.data import TOGETHER, Book, RunData
 from haploop.tools.figure.loops import draw_force_position, draw_momentum
 from haploop.tools.figure.style import (
     CLOSE,
+    GREY,
     INK,
+    LARGE,
     OF_THE_PLANT,
+    SMALL,
+    TEXT,
+    VERDICTS,
     WALL,
     element_colour,
     empty_figure,
     few_ticks,
+    fit_text,
     legend,
     write_figure,
 )
-from haploop.tools.figure.text_panels import draw_books, draw_events, draw_header, event_lines
 from haploop.tools.figure.time import energy_panel, force_panel, mark_events, position_panel
+from haploop.tools.render.report import LEAK_CAUSES, count_losses, plant_books
+from haploop.tools.render.units import amount, parameters, spring
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure, SubFigure
 
-__all__ = ["FigureError", "draw", "make_figure"]
+# What has room in the table and below the figure.
+_MOST_BOOKS, _MOST_LINES, _LINE_LETTERS = 7, 2, 225
+
+# Books of the plant that belong to a force which is drawn.
+_LINES = {"friction_heat_J": "friction", "actuator_J": "actuator"}
 
 
-def draw(run_directory: Path, target: Path | None = None) -> Path:
-    """Draws the figure of a run into a file.
+def draw(directory: Path, target: Path | None = None) -> Path:
+    """Draws the figure of a run, or of the log of one that was killed, into a file, and returns that.
 
     Args:
-        run_directory: what ``haploop run`` made; the log of a run that was killed serves as well.
+        directory: what ``haploop run`` made.
         target: file of the figure, in the format of its suffix; ``figure.png`` in the directory when None.
-
-    Returns:
-        The file.
 
     Raises:
         FigureError: matplotlib is missing, there is nothing to draw, or the file cannot be written.
         LogError: the log is no log.
     """
-    target = target or run_directory / "figure.png"
-    return write_figure(make_figure(RunData.from_directory(run_directory)), target)
+    return write_figure(make_figure(RunData.from_directory(directory)), target or directory / "figure.png")
 
 
 def make_figure(run: RunData) -> Figure:
@@ -68,15 +78,115 @@ def make_figure(run: RunData) -> Figure:
     colours |= {span.name: element_colour(number) for number, span in enumerate(run.history.elements)}
     energy_panel(energy, run, books, colours)
     mark_events([position, force, energy], run)
-    close_position, close_force = (body.add_subplot(grid[row, 1]) for row in range(2))
-    position_panel(close_position, run, close_s, "Position, close view")
-    force_panel(close_force, run, close_s, "Force by part, close view")
-    few_ticks(close_position)
-    few_ticks(close_force)
+    for row, (panel, title) in enumerate(((position_panel, "Position"), (force_panel, "Force by part"))):
+        ax = body.add_subplot(grid[row, 1])
+        panel(ax, run, close_s, f"{title}, close view")
+        few_ticks(ax)
     draw_force_position(body.add_subplot(grid[0, 2]), run, close_s)
     draw_momentum(body.add_subplot(grid[1, 2]), run, close_s)
-    draw_books(body.add_subplot(grid[2, 1:]), run, books, colours)
-    draw_header(header, run)
-    draw_events(footer, events)
+    _draw_books(body.add_subplot(grid[2, 1:]), run, books, colours)
+    _draw_header(header, run)
+    footer.text(0.012, 0.5, "\n".join(events), fontsize=SMALL + 0.5, color=GREY, va="center", gid="events")
     body.align_ylabels()
     return figure
+
+
+def _draw_header(figure: Figure | SubFigure, run: RunData) -> None:
+    """Writes the verdict as a coloured sign, the title, and the key numbers."""
+    word = run.summary.get("verdict", "no verdict")
+    sign = figure.text(
+        0.012, 0.66, word, fontsize=LARGE, fontweight="bold", color="white", va="center", gid="verdict",
+        bbox={"boxstyle": "round,pad=0.35", "facecolor": VERDICTS.get(word, GREY), "linewidth": 0},
+    )  # fmt: skip
+    right = sign.get_window_extent().x1 / figure.bbox.width
+    title = figure.text(right + 0.018, 0.66, run.scene.title, fontsize=LARGE, color=INK, va="center", gid="title")
+    fit_text(title, figure.bbox.width * (0.97 - right), smallest=1.0)
+    figure.text(0.006, 0.16, "   ·   ".join(key_numbers(run)), fontsize=TEXT + 1, color=INK, va="center", gid="numbers")
+
+
+def key_numbers(run: RunData) -> list[str]:
+    """Returns oscillation, stiffness, contact and residual; of a run without a summary, how far its log goes."""
+    first, last = run.span_s
+    if not run.summary:
+        return [f"{'log cut off' if run.cut else 'no summary'}: {last - first:g} s of {run.scene.duration:g} s"]
+    window, energy = run.summary["window"], run.summary["energy"]
+    words = [f"in the last {last - window['from_s']:.3g} s: oscillation {amount(window['oscillation_m'], 'm')}"]
+    if run.history.walls and run.summary["verdict"] != "no-contact":
+        words.append(f"outside the wall {100 * window['outside_fraction']:.0f} %")
+        displayed, wanted = window["displayed_stiffness_N_m"], run.history.walls[-1].wall.stiffness
+        words += [f"displayed stiffness {spring(displayed)} of {spring(wanted)}"] if displayed is not None else []
+    words.append(f"residual {amount(energy['residual_J'], 'J')} of {amount(energy['moved_J'], 'J')} moved")
+    return words
+
+
+def _draw_books(ax: Axes, run: RunData, books: list[Book], colours: dict[str, str]) -> None:
+    """Draws the table of the books at the end, in the colours of their lines."""
+    rows = [Row("Books at the end", "true", "sampled", "at work (s)"), *book_rows(run, books)]
+    height, size = 1.0 / max(len(rows), 12), TEXT * min(1.0, 13.0 / len(rows))
+    ax.set_axis_off()
+    ax.set(xlim=(0.0, 1.0), ylim=(1.0, 0.0))
+    for number, row in enumerate(rows):
+        y = (number + 0.5) * height
+        if row.book:
+            ax.plot([0.03, 0.06], [y, y], color=colours[row.book], linewidth=2.5, solid_capstyle="butt")
+        colour, weight = INK if row.book or not number else GREY, "normal" if number else "bold"
+        ax.text(0.075, y, row.name, ha="left", va="center", fontsize=size, color=colour, fontweight=weight)
+        for x, text in ((0.56, row.at_work), (0.72, row.true), (0.88, row.sampled)):
+            ax.text(x, y, text, ha="right", va="center", fontsize=size, color=colour, fontweight=weight)
+
+
+class Row(NamedTuple):
+    """A line of the table; ``book`` names the book or force whose colour it has, "" for none."""
+
+    name: str
+    true: str
+    sampled: str = ""
+    at_work: str = ""
+    book: str = ""
+
+
+def book_rows(run: RunData, books: list[Book]) -> list[Row]:
+    """Returns wall, its leak by cause, elements, then the books of the plant and the counts."""
+    spans = {span.name: span for span in run.history.elements}
+    energy = run.summary.get("energy", {})
+    rows = []
+    together = books[-1:] if len(books) > 1 else []
+    shown = books[: len(books) - len(together)]
+    for book in [*shown[:_MOST_BOOKS], *together]:
+        name, at_work = book.name, ""
+        if span := spans.get(book.name):
+            name = f"{book.name} ({parameters(span.element.as_dict())})"
+            end_s = min(span.to_tick / run.control_rate, run.span_s[1])
+            at_work = f"{span.from_tick / run.control_rate:g}–{end_s:g}"
+        true, sampled = (amount(value, "J") for value in book.ends_J)
+        rows.append(Row(name, true, sampled, at_work, book.name))
+        if book.name == "wall":
+            rows += _leak_rows(energy.get("wall", {}))
+    if len(shown) > _MOST_BOOKS:
+        rows.append(Row(f"and {len(shown) - _MOST_BOOKS} more elements in summary.json", ""))
+    for key, words in plant_books(energy).items():
+        rows.append(Row(words, amount(energy[key], "J"), book=_LINES.get(key, "")))
+    return rows + [Row(words, f"{count}") for words, count in count_losses(run.summary).items()]
+
+
+def _leak_rows(wall: Summary) -> list[Row]:
+    if "leak" not in wall:
+        return []
+    rows = [Row(f"    leak by {words}", amount(wall["leak"][key], "J")) for key, words in LEAK_CAUSES.items()]
+    ideal = wall["ideal_J"] or 0.0
+    held = abs(ideal) > 1e-9 * abs(wall["true_J"] or 0.0)
+    return rows + ([Row("    held by an ideal spring", amount(ideal, "J"))] if held else [])
+
+
+def event_lines(run: RunData) -> list[str]:
+    """Returns the numbered events as lines that fit below the figure."""
+    lines = [""]
+    for number, event in enumerate(run.events, start=1):
+        words = f"{number} at {event['timestamp']:g} s: {describe(event)}"
+        if lines[-1] and len(lines[-1]) + len(words) + 5 > _LINE_LETTERS:
+            if len(lines) == _MOST_LINES:
+                lines[-1] += f"     and {len(run.events) - number + 1} more"
+                break
+            lines.append("")
+        lines[-1] += ("     " if lines[-1] else "") + words[:_LINE_LETTERS]
+    return [line for line in lines if line]
