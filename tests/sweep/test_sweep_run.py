@@ -32,18 +32,19 @@ BISECT = '[bisect]\naxis = "wall.stiffness"\ntolerance = "8 N/m"\nholds = "no-co
 REACHING = '[axes]\n"wall.stiffness" = [100, 200]\n'
 
 
-class Quiet:
-    """Counts what it is told."""
+class Quiet(SweepProgress):
+    """Keeps what it is told."""
 
     def __init__(self) -> None:
-        self.expected, self.ran, self.stored = 0, [], 0
+        super().__init__("quiet")
+        self.expected, self.cells, self.stored = 0, [], 0
 
     def expect(self, cells: int) -> None:
         self.expected += cells
 
     def add_rows(self, rows: Any, stored: bool = False) -> None:
         self.stored += len(rows) if stored else 0
-        self.ran += [] if stored else [row["cell"] for row in rows]
+        self.cells += [] if stored else [row["cell"] for row in rows]
 
 
 def engine_run(made: Any, out: Path, stop_after: int | None = None, workers: int = 1) -> tuple[Quiet, list[Boundary]]:
@@ -52,7 +53,7 @@ def engine_run(made: Any, out: Path, stop_after: int | None = None, workers: int
     (out / "sweep.toml").write_text(made.toml())
     told = Quiet()
     with Store(out, make_schema(made.columns(), made.toml())) as store, Pool(workers) as pool:
-        stop = lambda: stop_after is not None and len(told.ran) >= stop_after  # noqa: E731
+        stop = lambda: stop_after is not None and len(told.cells) >= stop_after  # noqa: E731
         try:
             return told, Engine(made, store, pool, told, stop).run()
         except Stopped:
@@ -107,12 +108,12 @@ def test_a_sweep_that_was_stopped_goes_on_without_running_a_cell_twice(stop_afte
     made = loaded(tmp_path, RECORD + "repeat = 12\n" + GRID)
     whole, _ = engine_run(made, tmp_path / "whole")
     first, _ = engine_run(made, tmp_path / "cut", stop_after)
-    assert stop_after <= len(first.ran) < made.count
+    assert stop_after <= len(first.cells) < made.count
     assert not (tmp_path / "cut" / "table.parquet").exists()
-    assert len(read(tmp_path / "cut")) == len(first.ran)
+    assert len(read(tmp_path / "cut")) == len(first.cells)
     second, _ = engine_run(made, tmp_path / "cut")
-    assert second.stored == len(first.ran)
-    assert sorted(first.ran + second.ran) == sorted(whole.ran) == list(range(made.count))
+    assert second.stored == len(first.cells)
+    assert sorted(first.cells + second.cells) == sorted(whole.cells) == list(range(made.count))
     assert rows(tmp_path / "cut") == rows(tmp_path / "whole")
     assert not (tmp_path / "cut" / "parts").exists()
 
@@ -125,7 +126,7 @@ def test_a_part_that_was_half_written_is_run_again(tmp_path: Path) -> None:
     part.write_bytes(part.read_bytes()[:100])
     (tmp_path / "cut" / "parts" / "000000000064.parquet.part").write_bytes(b"PAR1")
     told, _ = engine_run(made, tmp_path / "cut")
-    assert sorted(told.ran) == list(range(200))
+    assert sorted(told.cells) == list(range(200))
     assert rows(tmp_path / "cut") == rows(tmp_path / "whole")
 
 
@@ -292,8 +293,8 @@ def test_a_bisection_that_was_stopped_goes_on_without_running_a_cell_twice(stop_
     whole, found = engine_run(made, tmp_path / "whole")
     first, _ = engine_run(made, tmp_path / "cut", stop_after)
     second, again = engine_run(made, tmp_path / "cut")
-    assert 0 < len(first.ran) < len(whole.ran)
-    assert sorted(first.ran + second.ran) == sorted(whole.ran)
+    assert 0 < len(first.cells) < len(whole.cells)
+    assert sorted(first.cells + second.cells) == sorted(whole.cells)
     assert repr(again) == repr(found)
     assert rows(tmp_path / "cut") == rows(tmp_path / "whole")
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from copy import deepcopy
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
@@ -194,23 +194,20 @@ class Sweep:
         """Leaves out what is cached: identities mean nothing in another process."""
         return {field.name: getattr(self, field.name) for field in fields(self)}
 
+    def bisected(self, bisect: Bisect) -> tuple[Axis, list[Axis]]:
+        """Returns the axis of a search, and the other axes."""
+        others = [axis for axis in self.axes if axis.key != bisect.axis]
+        return next(axis for axis in self.axes if axis not in others), others
+
     def columns(self) -> list[Column]:
         """Returns the columns of the table."""
-        return [
-            Column(CELL, WHOLE),
-            *self.axis_columns(),
-            *([] if SEED in {axis.key for axis in self.axes} else [Column(SEED, WHOLE)]),
-            *self.record,
-            *(Column(name, TEXT) for name in (ENDED, WHY, SCENE)),
-        ]
+        texts = [Column(name, TEXT) for name in (ENDED, WHY, SCENE)]
+        return [Column(CELL, WHOLE), *self.key_columns(self.axes), *self.record, *texts]
 
-    def axis_columns(self) -> list[Column]:
-        """Returns a column for each axis; the seed, where it is one, is a whole number."""
-        kinds = {True: TEXT, False: NUMBER}
-        return [
-            Column(axis.key, WHOLE if axis.key == SEED else kinds[axis.unit is None], axis.unit or "")
-            for axis in self.axes
-        ]
+    def key_columns(self, axes: Sequence[Axis]) -> list[Column]:
+        """Returns a column for each of some axes, and one for the seed where that is no axis."""
+        columns = {axis.key: Column(axis.key, TEXT if axis.unit is None else NUMBER, axis.unit or "") for axis in axes}
+        return list((columns | {SEED: Column(SEED, WHOLE)}).values())
 
     def toml(self) -> str:
         """Returns the sweep as a file that runs by itself."""

@@ -7,12 +7,13 @@ import sys
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from haploop.launch.processes.children import interrupts
 from haploop.launch.spec import PLUGINS, OutputError, keep_plugin, kept_name, make_output
-from haploop.logger.summary import write
+from haploop.logger.summary import Summary, write
 from haploop.tools.cli.exit_codes import FAILED, WRONG_USE, leave, plain_errors, print_json
 from haploop.tools.executor.executors import ExecutorError
 from haploop.tools.executor.pool import Pool, read_sources
@@ -25,7 +26,6 @@ from haploop.tools.sweep.sweep_file import load
 from haploop.tools.sweep.table import SWEEP, NeedsPyarrow, make_schema, pyarrow
 
 if TYPE_CHECKING:
-    from haploop.tools.sweep.boundary import Boundary
     from haploop.tools.sweep.cells import Sweep
 
 SUMMARY = "summary.json"
@@ -84,27 +84,31 @@ def sweep(request: Request, as_json: bool) -> None:
         leave(f"Stopped; to go on: haploop sweep {directory / SWEEP} --out {directory}", FAILED)
 
 
-def _run(request: Request, made: Sweep, directory: Path) -> dict[str, Any]:
+def _run(request: Request, made: Sweep, directory: Path) -> Summary:
     """Runs with progress; returns the summary, which is written too."""
-    began, before_s = time.monotonic(), _earlier_s(directory)
+    began, path = time.monotonic(), directory / SUMMARY
+    try:
+        before_s = float(json.loads(path.read_text(encoding="utf-8"))["wall_s"])
+    except (OSError, ValueError, LookupError):  # no earlier call ended in order
+        before_s = 0.0
     schema = make_schema(made.columns(), made.toml())
     with interrupts(usual_from=2) as received, Store(directory, schema) as store:
         if store.finished:
             print("Every cell of this sweep is there already; nothing was run.", file=sys.stderr)
-            return json.loads((directory / SUMMARY).read_text(encoding="utf-8"))
+            return json.loads(path.read_text(encoding="utf-8"))
         with SweepProgress(made.title) as progress:
-            ended, found = "done", None
+            ended, found = "done", []
             with Pool(request.workers, request.dask) as pool:
-                engine = Engine(
-                    made, store, pool, progress, lambda: progress.stopping(bool(received)), request.compiled
-                )
+                stop = partial(progress.stopping, received)
                 try:
-                    found = engine.run()
+                    found = Engine(made, store, pool, progress, stop, request.compiled).run()
                 except Stopped:
                     ended = "stopped"
+            missing = sum(bool(boundary.why) for boundary in found)
+            ran_s = time.monotonic() - began
             summary = {
                 "title": made.title,
-                "base": made.base["title"],
+                "base": made.base.title,
                 "axes": {
                     axis.key: [axis.entry(axis.values[0]), axis.entry(axis.values[-1]), len(axis.values)]
                     for axis in made.axes
@@ -114,17 +118,17 @@ def _run(request: Request, made: Sweep, directory: Path) -> dict[str, Any]:
                 "cells": sum(progress.counts.values()),
                 "counts": dict(progress.counts),
                 "first_reason": progress.reason,
-                **({"boundaries": _boundaries(found)} if found else {}),
-                "wall_s": before_s + time.monotonic() - began,
-                "rate_1_s": progress.ran / (time.monotonic() - began),
+                **({"boundaries": {"found": len(found) - missing, "missing": missing}} if found else {}),
+                "wall_s": before_s + ran_s,
+                "rate_1_s": progress.ran / ran_s,
                 "workers": pool.count,
                 "machine": machine(),
                 "versions": versions(),
             }
         try:
-            write(summary, directory / SUMMARY)
+            write(summary, path)
         except OSError as error:
-            raise StoreError(f"{directory / SUMMARY} could not be written: {error.strerror}.") from error
+            raise StoreError(f"{path} could not be written: {error.strerror}.") from error
     return summary
 
 
@@ -147,9 +151,10 @@ def _directory(request: Request, made: Sweep) -> Path:
     directory = make_output(out, request.path)
     for plugin in request.plugins:
         keep_plugin(plugin, directory)
+    part = directory / f"{SWEEP}.part"
     try:
-        (directory / f"{SWEEP}.part").write_text(text, encoding="utf-8")
-        (directory / f"{SWEEP}.part").replace(directory / SWEEP)
+        part.write_text(text, encoding="utf-8")
+        part.replace(directory / SWEEP)
     except OSError as error:
         raise OutputError(f"{directory / SWEEP} cannot be written: {error.strerror}.") from error
     return directory
@@ -162,20 +167,7 @@ def _first_difference(there: str, here: str) -> str:
     return "one of the two is longer"
 
 
-def _earlier_s(directory: Path) -> float:
-    """Returns the wall time of earlier calls that ended in order."""
-    try:
-        return float(json.loads((directory / SUMMARY).read_text(encoding="utf-8"))["wall_s"])
-    except (OSError, ValueError, LookupError):
-        return 0.0
-
-
-def _boundaries(found: Sequence[Boundary]) -> dict[str, int]:
-    known = sum(not boundary.why for boundary in found)
-    return {"found": known, "missing": len(found) - known}
-
-
-def _summary_sentences(summary: dict[str, Any]) -> str:
+def _summary_sentences(summary: Summary) -> str:
     """Returns the outcome in a line or two."""
     rate = summary["rate_1_s"]
     lines = [f"{summary['title']}: {summary['cells']} cells, {describe_counts(summary['counts'])}, {rate:.3g} cells/s"]
@@ -187,16 +179,11 @@ def _summary_sentences(summary: dict[str, Any]) -> str:
 
 
 def _demand_compiler(made: Sweep) -> None:
-    """Demands JAX before anything is started.
-
-    Raises:
-        ExecutorError: JAX is not there, or bits are asked for.
-    """
+    """Raises an ExecutorError before anything is started where JAX is not there, or bits are asked for."""
     if wants_trajectories(made.record):
         raise ExecutorError(
             "--jax keeps to a tolerance, so that trajectory_sha256 means nothing; leave it out of record."
         )
-
     try:
         import jax  # noqa: F401
     except ImportError as error:

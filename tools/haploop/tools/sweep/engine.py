@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import product
-from typing import Any, Protocol
+from typing import Any
 
 from haploop.tools.executor.parts import Group
 from haploop.tools.executor.pool import Pool
@@ -13,21 +13,10 @@ from haploop.tools.executor.work import Work
 from haploop.tools.search.bisect import Tolerance
 from haploop.tools.sweep.boundary import Boundary, Candidate, find_boundaries, verdict_is
 from haploop.tools.sweep.cells import Axis, Bisect, Extra, Item, Sweep
+from haploop.tools.sweep.progress import SweepProgress
 from haploop.tools.sweep.record import VERDICT, wants_energy, wants_trajectories
 from haploop.tools.sweep.store import Store
 from haploop.tools.sweep.table import CELL, ENDED, NUMBER, SEED, TEXT, WHOLE, WHY, Column, Row, make_schema, make_table
-
-
-class Watcher(Protocol):
-    """Observes the progress of a sweep."""
-
-    def expect(self, cells: int) -> None:
-        """Adds cells that are to be run."""
-        ...
-
-    def add_rows(self, rows: Sequence[Row], stored: bool = False) -> None:
-        """Takes cells that are done; ``stored`` are those of an earlier call."""
-        ...
 
 
 class Stopped(Exception):
@@ -41,15 +30,21 @@ class Engine:
         sweep: to run.
         store: where its rows go, and where those of an earlier call are.
         pool: of workers.
-        watcher: told of every part.
+        progress: told of every part.
         stop: asked between parts; True ends the sweep after those under way.
         compiled: whether to run compiled by JAX.
     """
 
     def __init__(
-        self, sweep: Sweep, store: Store, pool: Pool, watcher: Watcher, stop: Callable[[], bool], compiled: bool = False
+        self,
+        sweep: Sweep,
+        store: Store,
+        pool: Pool,
+        progress: SweepProgress,
+        stop: Callable[[], bool],
+        compiled: bool = False,
     ) -> None:
-        self._sweep, self._store, self._pool, self._watcher, self._stop = sweep, store, pool, watcher, stop
+        self._sweep, self._store, self._pool, self._progress, self._stop = sweep, store, pool, progress, stop
         self._work = Work(
             make=sweep.scene,
             keep=sweep.row,
@@ -70,9 +65,9 @@ class Engine:
         """
         if self._sweep.bisect is None:
             stored = self._store.done((CELL, ENDED, VERDICT))
-            self._watcher.add_rows(stored, stored=True)
+            self._progress.add_rows(stored, stored=True)
             done = {row[CELL] for row in stored}
-            self._watcher.expect(self._sweep.count - len(done))
+            self._progress.expect(self._sweep.count - len(done))
             for _ in self._rows(_without(self._sweep.groups(), done), self._sweep.count - len(done)):
                 pass
             self._store.finish()
@@ -87,7 +82,7 @@ class Engine:
         for part in self._pool.parts(self._work, groups, count, self._stop):
             rows = [row for _, row in part]
             self._store.add(rows)
-            self._watcher.add_rows(rows)
+            self._progress.add_rows(rows)
             done += len(rows)
             yield from part
         if done < count:
@@ -95,23 +90,26 @@ class Engine:
 
     def _bisected(self, bisect: Bisect) -> list[Boundary]:
         """Finds the boundary of every combination of the other axes and the seed, in that order."""
-        axis = next(axis for axis in self._sweep.axes if axis.key == bisect.axis)
+        axis, others = self._sweep.bisected(bisect)
         stored = {row[CELL]: row for row in self._store.done((CELL, ENDED, WHY, VERDICT))}
-        self._watcher.add_rows(list(stored.values()), stored=True)
-        rows, next_cell = list(_rows_of(self._sweep, axis)), 0
+        self._progress.add_rows(list(stored.values()), stored=True)
+        rows, next_cell = list(_rows_of(self._sweep, others)), 0
 
         def run(candidates: Sequence[Candidate]) -> Iterator[tuple[int, Row]]:
             """Runs a round: the grid at first, then one cell between its values in some of the rows."""
             nonlocal next_cell
             at_points = next_cell == 0
-            items = [
-                _item(self._sweep, axis, rows[row], value, at_points, next_cell + row) for row, value in candidates
-            ]
+            items: list[Item] = []
+            for row, value in candidates:
+                places, repeat = rows[row]
+                place = axis.values.index(value) if at_points else 0
+                cell = self._sweep.number({**places, axis.key: place}, repeat)
+                items.append(cell if at_points else Extra(next_cell + row, cell, value))
             next_cell += self._sweep.count if at_points else len(rows)
             places = {_cell(item): place for place, item in enumerate(items)}
             missing = sorted((item for item in items if _cell(item) not in stored), key=_cell)
             together = bool(missing) and self._sweep.together(missing[0])
-            self._watcher.expect(len(missing))
+            self._progress.expect(len(missing))
             for item in items:
                 if _cell(item) in stored:
                     yield places[_cell(item)], stored[_cell(item)]
@@ -141,18 +139,10 @@ def _without(groups: Iterable[Group], done: set[int]) -> Iterator[Group]:
             yield Group(range(first, group.items[-1] + 1), group.together)
 
 
-def _rows_of(sweep: Sweep, axis: Axis) -> Iterator[tuple[dict[str, int], int]]:
+def _rows_of(sweep: Sweep, others: Sequence[Axis]) -> Iterator[tuple[dict[str, int], int]]:
     """Yields a place on each other axis and a repeat for every row that is bisected."""
-    others = [other for other in sweep.axes if other is not axis]
     for *places, repeat in product(*(range(len(other.values)) for other in others), range(sweep.repeat)):
         yield {other.key: place for other, place in zip(others, places, strict=True)}, repeat
-
-
-def _item(sweep: Sweep, axis: Axis, row: tuple[dict[str, int], int], value: float, at_points: bool, cell: int) -> Item:
-    places, repeat = row
-    if at_points:
-        return sweep.number({**places, axis.key: axis.values.index(value)}, repeat)
-    return Extra(cell, sweep.number({**places, axis.key: 0}, repeat), value)
 
 
 def _cell(item: Item) -> int:
@@ -161,19 +151,15 @@ def _cell(item: Item) -> int:
 
 def _boundary_table(sweep: Sweep, bisect: Bisect, found: Sequence[Boundary]) -> Any:
     """Makes one row a combination: the other axes, the seed, and what is known of the boundary."""
-    axis = next(axis for axis in sweep.axes if axis.key == bisect.axis)
-    others = [column for column in sweep.axis_columns() if column.name != axis.key]
+    axis, others = sweep.bisected(bisect)
     numbers = [Column(name, NUMBER, axis.unit or "") for name in ("low", "high", "boundary")]
-    seeds = [Column(SEED, WHOLE)] if SEED not in {other.name for other in others} else []
-    columns = [*others, *seeds, *numbers, Column("changes", WHOLE), Column(WHY, TEXT)]
+    columns = [*sweep.key_columns(others), *numbers, Column("changes", WHOLE), Column(WHY, TEXT)]
     tolerance = Tolerance(bisect.tolerance, bisect.relative)
-    rows = []
-    for (places, repeat), one in zip(_rows_of(sweep, axis), found, strict=True):
-        by_key = {other.key: other for other in sweep.axes}
-        values = {key: by_key[key].entry(by_key[key].values[place]) for key, place in places.items()}
-        known = {} if math.isnan(one.near) else {
-            "low": one.low, "high": one.high, "boundary": tolerance.middle(one.near, one.far)
-        }  # fmt: skip
-        seed = {SEED: sweep.base["seed"] + repeat} if seeds else {}
-        rows.append({**values, **seed, **known, "changes": one.changes, WHY: one.why})
+    rows: list[Row] = []
+    for (places, repeat), one in zip(_rows_of(sweep, others), found, strict=True):
+        row = {SEED: sweep.base.seed + repeat, "changes": one.changes, WHY: one.why}
+        row |= {other.key: other.entry(other.values[places[other.key]]) for other in others}
+        if not math.isnan(one.near):
+            row |= {"low": one.low, "high": one.high, "boundary": tolerance.middle(one.near, one.far)}
+        rows.append(row)
     return make_table(rows, make_schema(columns, sweep.toml()))

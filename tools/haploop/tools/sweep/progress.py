@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping, Sequence, Sized
 from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
@@ -83,12 +83,12 @@ class SweepProgress:
             self._task, completed=sum(self.counts.values()), rate=rate, counts=describe_counts(self.counts)
         )
 
-    def stopping(self, asked: bool) -> bool:
-        """Tells whether the sweep has been asked to stop; says so once, on a terminal or not."""
-        if asked and not self._stopping:
+    def stopping(self, received: Sized) -> bool:
+        """Tells whether interrupts have been received; says so once, on a terminal or not."""
+        if received and not self._stopping:
             self._stopping = True
             self._bars.console.print("Stopping after the cells under way; once more ends at once.", highlight=False)
-        return asked
+        return bool(received)
 
 
 def outcome(row: Row) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
@@ -13,12 +13,12 @@ from pydantic_core import PydanticCustomError
 
 from haploop.launch.runs.loaded_scene import texts
 from haploop.launch.scene import file as scene_file
-from haploop.launch.scene.check import complain, resolve
+from haploop.launch.scene.check import complain
 from haploop.launch.scene.layers import KeyPath, Layers, key_path, lay_overrides, parse
-from haploop.launch.scene.mistakes import COMMAND_LINE, Mistake, SceneError, nearest, shown
+from haploop.launch.scene.mistakes import COMMAND_LINE, SceneError, nearest, shown
 from haploop.launch.scene.models import Model
 from haploop.launch.scene.number import Number, si
-from haploop.launch.scene.schema import Schema, TomlSchema
+from haploop.launch.scene.schema import TomlSchema
 from haploop.protocol.quantity import Quantity
 from haploop.protocol.scene.scene import Scene
 from haploop.tools.executor.work import Sources, load_kinds
@@ -28,7 +28,7 @@ from haploop.tools.sweep.record import USUAL, RecordError, make_columns
 from haploop.tools.sweep.table import Column
 
 if TYPE_CHECKING:
-    from haploop.controller.dissipation import Element
+    pass
 
 MOST_AXES = 3
 Verdict = Literal["steady", "limit-cycle", "diverged", "no-contact"]
@@ -68,14 +68,14 @@ def load(path: Path, overrides: Sequence[str] = (), sources: Sources = ()) -> Sw
         SceneError: the sweep cannot be run; it holds every mistake.
         PluginError: a plugin does not load.
     """
-    return _Reader(path, load_kinds(sources), sources).sweep(overrides)
+    return _Reader(path, sources).sweep(overrides)
 
 
 class _Reader:
     """Collects the parts of a sweep, and all that is wrong with them."""
 
-    def __init__(self, path: Path, kinds: Mapping[str, type[Element]], sources: Sources) -> None:
-        self._kinds, self._sources = kinds, sources
+    def __init__(self, path: Path, sources: Sources) -> None:
+        self._kinds, self._sources = load_kinds(sources), sources
         self._layers = Layers(path)
         self._layers.lay(parse(path, "sweep", "a scene and [axes]"), str(path))
         self._data = self._layers.data
@@ -84,15 +84,14 @@ class _Reader:
 
     def sweep(self, overrides: Sequence[str]) -> Sweep:
         """Makes the sweep."""
-        table = self._table()
-        base = self._base(overrides)
+        table, base = self._table(), self._base(overrides)
         shape = base or self._unchanged()
         axes = self._axes(shape)
         record = self._record(shape, axes)
-        bisect = self._bisect(table, axes)
+        bisect = self._bisect(table.bisect, axes) if table and table.bisect else None
         if self._layers.mistakes or table is None or base is None:
             raise SceneError(self._layers.mistakes)
-        title = table.title or f"{self._layers.path.stem}"
+        title = table.title or self._layers.path.stem
         return Sweep(title, base, tuple(axes), table.repeat, tuple(record), bisect, self._sources)
 
     def _table(self) -> SweepFile | None:
@@ -101,9 +100,7 @@ class _Reader:
         try:
             table = SweepFile.model_validate(self._data)
         except ValidationError as error:
-            schema = {**SweepFile.model_json_schema(schema_generator=TomlSchema), "title": "Sweep"}
-            for detail in error.errors(include_url=False):
-                complain(self._layers, detail["type"], detail["msg"], detail["loc"], schema)
+            _complain(self._layers, error, SweepFile, "Sweep")
         if ("scene" in self._data) == ("base" in self._data):
             given = "is given beside [base]" if "scene" in self._data else "is missing"
             expected = "A sweep has the path of a scene file, relative to its own, or the scene itself in [base]."
@@ -117,12 +114,12 @@ class _Reader:
             if isinstance(name := self._data.get("scene"), str):
                 return scene_file.load(self._layers.path.parent / name, laid, self._kinds)
             if isinstance(table := self._data.get("base"), dict):
-                layers = Layers(self._layers.path, table)
-                lay_overrides(layers, laid)
-                layers.data.setdefault("title", layers.path.stem)
-                return resolve(layers, self._kinds).in_order()
+                return scene_file.resolved(Layers(self._layers.path, table), laid, self._kinds)
         except SceneError as error:
-            self._layers.mistakes += [self._placed(mistake) for mistake in error.mistakes]
+            for mistake in error.mistakes:
+                if mistake.file == COMMAND_LINE and mistake.key in self._changes:
+                    mistake = replace(mistake, file=shown(self._layers.path), key=f"set.{mistake.key}")
+                self._layers.mistakes.append(mistake)
         except TypeError as error:  # a value that no scene holds, such as a date
             self._layers.complain(("set",), str(error), "cannot be used")
         return None
@@ -133,12 +130,6 @@ class _Reader:
             return scene_file.load(self._layers.path.parent / self._data["scene"], (), self._kinds)
         except (SceneError, LookupError, TypeError):
             return None
-
-    def _placed(self, mistake: Mistake) -> Mistake:
-        """Returns a mistake of the scene as one of this file where ``[set]`` made it."""
-        if mistake.file == COMMAND_LINE and mistake.key in self._changes:
-            return replace(mistake, file=shown(self._layers.path), key=f"set.{mistake.key}")
-        return mistake
 
     def _axes(self, base: Scene | None) -> list[Axis]:
         """Returns the axes that can be used; of the others the mistakes are added."""
@@ -194,25 +185,14 @@ class _Reader:
             self._layers.complain(at, "It must be a list, or a table with from, to, and step or count.")
             return None
         try:
-            span = Span.model_validate(values)
+            return make_points(Span.model_validate(values), number)
         except ValidationError as error:
-            schema = {**Span.model_json_schema(schema_generator=TomlSchema), "title": "span"}
-            for detail in error.errors(include_url=False):
-                self._complain_of_span(at, detail["type"], detail["msg"], detail["loc"], schema)
+            layers, name = Layers(self._layers.path, values), ".".join(map(str, at))
+            _complain(layers, error, Span, "span")
+            for mistake in layers.mistakes:
+                key, given = f"{name}.{mistake.key}".rstrip("."), mistake.given.replace("of a span", f"of {name}")
+                self._layers.mistakes.append(replace(mistake, key=key, given=given))
             return None
-        return make_points(span, number)
-
-    def _complain_of_span(self, at: KeyPath, what: str, message: str, key: KeyPath, schema: Schema) -> None:
-        """Adds a mistake in a span, with its keys as those of the file."""
-        layers = Layers(self._layers.path, self._layers.value(at))
-        complain(layers, what, message, key, schema)
-        name = ".".join(map(str, at))
-        self._layers.mistakes += [
-            replace(
-                mistake, key=f"{name}.{mistake.key}".rstrip("."), given=mistake.given.replace("of a span", f"of {name}")
-            )
-            for mistake in layers.mistakes
-        ]
 
     def _names_fit(self, at: KeyPath, key: str, values: Sequence[Any], scene: Layers) -> bool:
         """Tells whether the key takes each value; what the rest of a scene says to it is known cell by cell."""
@@ -241,11 +221,8 @@ class _Reader:
                 self._layers.complain(("record", place), sentence, None, hint)
         return []
 
-    def _bisect(self, table: SweepFile | None, axes: Sequence[Axis]) -> Bisect | None:
-        if table is None or table.bisect is None:
-            return None
-        given, by_key = table.bisect, {axis.key: axis for axis in axes}
-        axis = by_key.get(given.axis)
+    def _bisect(self, given: BisectTable, axes: Sequence[Axis]) -> Bisect | None:
+        axis = next((axis for axis in axes if axis.key == given.axis), None)
         if axis is None or axis.unit is None or axis.whole or len(axis.values) < 2:
             if given.axis not in (keys := list(self._data["axes"])):
                 sentence = f"It must be an axis: {', '.join(keys)}."
@@ -268,3 +245,9 @@ class _Reader:
             except PydanticCustomError as error:
                 self._layers.complain(("bisect", "tolerance"), error.message())
         return Bisect(axis.key, given.holds, tolerance, given.relative or 0.0)
+
+
+def _complain(layers: Layers, error: ValidationError, model: type[Model], title: str) -> None:
+    schema = {**model.model_json_schema(schema_generator=TomlSchema), "title": title}
+    for detail in error.errors(include_url=False):
+        complain(layers, detail["type"], detail["msg"], detail["loc"], schema)
