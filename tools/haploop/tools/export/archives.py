@@ -19,7 +19,7 @@ import zipfile
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from pathlib import Path
-from typing import IO, Any
+from typing import IO
 
 import numpy as np
 from mcap.writer import CompressionType, Writer
@@ -68,7 +68,7 @@ class NpzWriter(ExportWriter):
                 else:
                     file.write(b"]\n" if file.tell() else b"[]\n")
                     _move(file, archive, f"{topic.strip('/')}.json")
-            units = {_array(topic, name): unit for topic in self._units for name, unit in self._units[topic].items()}
+            units = {_array(topic, name): unit for topic, names in self._units.items() for name, unit in names.items()}
             archive.writestr("units.json", json.dumps(units, indent=1, ensure_ascii=False) + "\n")
             for name, content in self._attachments.items():
                 archive.writestr(name, content)
@@ -102,13 +102,12 @@ class JsonMcapWriter(ExportWriter):
         self._writer.start(library="haploop")
         for name, content in attachments.items():
             self._writer.add_attachment(0, 0, name, "text/plain", content)
-        self._channels = {topic: self._channel(topic, columns or _EVENT_UNITS) for topic, columns in units.items()}
         self._counts = dict.fromkeys(units, 0)
-
-    def _channel(self, topic: str, units: Mapping[str, str]) -> int:
-        name = f"haploop.{topic.strip('/')}"
-        schema = self._writer.register_schema(name, "jsonschema", json.dumps(_schema(name, units)).encode())
-        return self._writer.register_channel(topic, "json", schema)
+        self._channels: dict[str, int] = {}
+        for topic, columns in units.items():
+            name = f"haploop.{topic.strip('/')}"
+            schema = self._writer.register_schema(name, "jsonschema", _schema(name, columns or _EVENT_UNITS))
+            self._channels[topic] = self._writer.register_channel(topic, "json", schema)
 
     def add(self, batch: Batch) -> None:
         if isinstance(batch.rows, Table):
@@ -124,12 +123,12 @@ class JsonMcapWriter(ExportWriter):
         self._writer.finish()
 
 
-def _schema(title: str, units: Mapping[str, str]) -> dict[str, Any]:
+def _schema(title: str, units: Mapping[str, str]) -> bytes:
     columns = {
         name: {"type": "number", "title": f"{name} ({unit})" if unit else name, "unit": unit}
         for name, unit in units.items()
     }
-    return {"title": title, "type": "object", "properties": columns}
+    return json.dumps({"title": title, "type": "object", "properties": columns}).encode()
 
 
 def _row_times_ns(batch: Batch, rows: Table) -> list[int]:
@@ -142,12 +141,12 @@ def _row_times_ns(batch: Batch, rows: Table) -> list[int]:
 
 def _rows(rows: Table) -> list[str]:
     """Returns each row as a JSON object."""
-    keys = [f"{json.dumps(name)}:" for name in rows]
-    cells = [
-        [key + text for text in map(repr, column.tolist())] for key, column in zip(keys, rows.values(), strict=True)
-    ]
-    for column, texts in zip(rows.values(), cells, strict=True):
+    cells = []
+    for name, column in rows.items():
+        key = f"{json.dumps(name)}:"
+        texts = [key + text for text in map(repr, column.tolist())]
         for row in np.flatnonzero(~np.isfinite(column)).tolist():
             texts[row] = ""
+        cells.append(texts)
     absent = any("" in texts for texts in cells)
     return [f"{{{','.join(filter(None, row) if absent else row)}}}" for row in zip(*cells, strict=True)]

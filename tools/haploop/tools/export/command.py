@@ -32,12 +32,24 @@ class ExportFailed(Exception):
 def export_run(path: Path, to: str, out: Path | None, topics: str | None, force: bool) -> None:
     """Writes a run's log in another format and names the files."""
     with plain_errors():
+        if to not in WRITERS:
+            leave(f"--to must be one of {', '.join(FORMATS)}, but {to!r} was given.", WRONG_USE)
+        writer = WRITERS[to]
         try:
-            writer = _writer(to)
             contents = survey(path)
             units = _chosen(contents, topics)
             targets = _targets(contents.path, out, writer, list(units))
-            _export(contents, units, writer, targets, force)
+            # The log is read a second time, now that all its columns are known.
+            log = LogStream(contents.path, units.keys(), until=contents.read_bytes)
+            with (
+                new_files(targets, force) as files,
+                writer(files, units, contents.attachments) as exported,
+                _progress(contents.read_bytes) as show,
+            ):
+                for batch in log:
+                    exported.add(batch)
+                    show(log.read_bytes)
+                exported.finish()
         except (FileNotFoundError, ImportError) as error:
             leave(str(error), WRONG_USE)
         except ExportFailed as error:
@@ -45,12 +57,6 @@ def export_run(path: Path, to: str, out: Path | None, topics: str | None, force:
     if contents.cut:
         print(f"Note: {contents.cut} What it holds up to there was exported.", file=sys.stderr)
     print("\n".join(map(str, targets)))
-
-
-def _writer(to: str) -> type[ExportWriter]:
-    if to not in WRITERS:
-        leave(f"--to must be one of {', '.join(FORMATS)}, but {to!r} was given.", WRONG_USE)
-    return WRITERS[to]
 
 
 def _chosen(contents: LogStream, topics: str | None) -> dict[str, dict[str, str]]:
@@ -75,26 +81,6 @@ def _targets(log: Path, out: Path | None, writer: type[ExportWriter], topics: li
     if out and not out.is_dir():
         return [out]
     return [(out or log.parent) / f"{log.stem}{writer.suffix}"]
-
-
-def _export(
-    contents: LogStream,
-    units: dict[str, dict[str, str]],
-    make_writer: type[ExportWriter],
-    targets: list[Path],
-    force: bool,
-) -> None:
-    """Reads the log a second time, now that all its columns are known, and writes it."""
-    log = LogStream(contents.path, units.keys(), until=contents.read_bytes)
-    with (
-        new_files(targets, force) as files,
-        make_writer(files, units, contents.attachments) as writer,
-        _progress(contents.read_bytes) as show,
-    ):
-        for batch in log:
-            writer.add(batch)
-            show(log.read_bytes)
-        writer.finish()
 
 
 @contextlib.contextmanager
@@ -126,7 +112,12 @@ def new_files(targets: Sequence[Path], replace: bool) -> Iterator[list[IO[bytes]
     opened: list[IO[bytes]] = []
     try:
         for part in parts:
-            opened.append(_open(part))
+            try:
+                part.parent.mkdir(parents=True, exist_ok=True)
+                opened.append(part.open("wb"))
+            except OSError as error:
+                why = f"{part} cannot be made ({error.strerror}); name a place that is writable with --out."
+                raise OutputError(why) from error
         try:
             yield opened
             for file in opened:
@@ -143,13 +134,3 @@ def new_files(targets: Sequence[Path], replace: bool) -> Iterator[list[IO[bytes]
             with contextlib.suppress(OSError):
                 file.close()
             part.unlink(missing_ok=True)
-
-
-def _open(part: Path) -> IO[bytes]:
-    try:
-        part.parent.mkdir(parents=True, exist_ok=True)
-        return part.open("wb")
-    except OSError as error:
-        raise OutputError(
-            f"{part} cannot be made ({error.strerror}); name a place that is writable with --out."
-        ) from error

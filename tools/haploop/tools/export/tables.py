@@ -25,6 +25,7 @@ from haploop.logger.log.recording import TIMESTAMP, Table
 from haploop.logger.log.stream import Batch
 from haploop.logger.log.table import Floats
 from haploop.logger.summary import finite
+from haploop.protocol.changes import Event
 
 Units = Mapping[str, Mapping[str, str]]
 # A topic of free maps becomes a table of these two columns: time, and the map as JSON.
@@ -178,7 +179,7 @@ class ParquetWriter(ExportWriter):
 
 def map_rows(batch: Batch) -> tuple[list[float], list[str]]:
     """Returns time in s and JSON text of each of a batch's free maps."""
-    maps: list[dict[str, Any]] = list(batch.rows)  # type: ignore[arg-type]
+    maps: list[Event] = list(batch.rows)  # type: ignore[arg-type]
     nanoseconds = batch.log_times_ns.tolist()
     times = [float(one.get(TIMESTAMP, ns / 1e9)) for one, ns in zip(maps, nanoseconds, strict=True)]
     return times, [to_json(one) for one in maps]

@@ -5,7 +5,6 @@ from __future__ import annotations
 import time
 from collections import Counter
 from collections.abc import Mapping, Sequence, Sized
-from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
 from haploop.tools.sweep.record import VERDICT
@@ -38,16 +37,13 @@ class SweepProgress:
         self._total, self._stopping = 0, False
         self._began = time.monotonic()
         terminal = terminal or console(stderr=True)
-        columns = (
+        self._bars = progress.Progress(
             progress.TextColumn("{task.description}"),
             progress.BarColumn(bar_width=20),
             progress.MofNCompleteColumn(),
             progress.TextColumn("{task.fields[rate]}"),
             progress.TimeRemainingColumn(compact=True),
             progress.TextColumn("{task.fields[counts]}"),
-        )
-        self._bars = progress.Progress(
-            *columns,
             console=terminal,
             disable=not terminal.is_terminal,
             transient=True,
@@ -59,9 +55,7 @@ class SweepProgress:
         self._bars.start()
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._bars.stop()
 
     def expect(self, cells: int) -> None:
@@ -79,9 +73,8 @@ class SweepProgress:
             self._total += len(rows)
         elapsed_s = time.monotonic() - self._began
         rate = f"{self.ran / elapsed_s:.3g} cells/s" if self.ran else ""
-        self._bars.update(
-            self._task, completed=sum(self.counts.values()), rate=rate, counts=describe_counts(self.counts)
-        )
+        done, counts = sum(self.counts.values()), describe_counts(self.counts)
+        self._bars.update(self._task, completed=done, rate=rate, counts=counts)
 
     def stopping(self, received: Sized) -> bool:
         """Tells whether interrupts have been received; says so once, on a terminal or not."""

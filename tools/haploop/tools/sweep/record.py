@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -22,45 +23,32 @@ VERDICT = "verdict"
 # Without the books, which take most of the time of a run.
 USUAL = (VERDICT, "window.oscillation_m", "window.displayed_stiffness_N_m", "extremes.force_max_N")
 TICKS = 2
+Complain = Callable[[int, str, str | None], None]
 
 
-class RecordError(ValueError):
-    """Keys that no summary of these scenes has.
-
-    Attributes:
-        wrong: place in the list, what is wrong in a sentence, and the nearest key.
-    """
-
-    def __init__(self, wrong: Sequence[tuple[int, str, str | None]]) -> None:
-        super().__init__("; ".join(sentence for _, sentence, _ in wrong))
-        self.wrong = list(wrong)
-
-
-def make_columns(names: Sequence[str], sweep: Sweep, kinds: Mapping[str, type[Element]]) -> list[Column]:
+def make_columns(
+    names: Sequence[str], sweep: Sweep, kinds: Mapping[str, type[Element]], complain: Complain
+) -> list[Column]:
     """Makes a column for each key; the verdict is always among them.
 
     Args:
         names: dotted keys.
         sweep: what will be run; the first and the last of its cells that can be run are sampled.
         kinds: element kinds at hand.
-
-    Raises:
-        RecordError: some keys are those of no number, word or truth value.
+        complain: told the place of a key that is that of no number, word or truth value, a sentence about it, and
+            the nearest key.
     """
     known: Summary = {}
     for cell in _samples(sweep):
         known |= _leaves(_short_run(cell, kinds))
-    wrong = []
+    without_places = set(map(_without_places, known))
     for place, name in enumerate(names):
-        if _without_places(name) in {_without_places(key) for key in known} or not known:
+        if not known or _without_places(name) in without_places:
             continue
-        inner = [key for key in known if key.startswith(f"{name}.")]
-        if inner:
-            wrong.append((place, f"It is a table; name one of {', '.join(inner[:8])}.", None))
+        if inner := [key for key in known if key.startswith(f"{name}.")]:
+            complain(place, f"It is a table; name one of {', '.join(inner[:8])}.", None)
         else:
-            wrong.append((place, "It must be a dotted key of a run's summary.", nearest(name, known)))
-    if wrong:
-        raise RecordError(wrong)
+            complain(place, "It must be a dotted key of a run's summary.", nearest(name, known))
     wanted = dict.fromkeys([VERDICT, *names])
     return [Column(name, _kind(known.get(name)), unit_of(name)) for name in wanted if name not in (ENDED, WHY)]
 
@@ -79,10 +67,8 @@ def _samples(sweep: Sweep) -> list[Scene]:
     """Returns the scenes of the corners of the grid; the base where none of them can be run."""
     found: list[Scene] = []
     for cell in (0, sweep.count - 1):
-        try:
+        with suppress(Exception):  # it will be a row with its reason
             found.append(sweep.scene(cell))
-        except Exception:  # it will be a row with its reason
-            continue
     return found or [sweep.base]
 
 

@@ -9,7 +9,6 @@ import os
 import shutil
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from types import TracebackType
 from typing import Any, Self
 
 from haploop.launch.spec import OutputError
@@ -51,9 +50,7 @@ class Store:
             raise OutputError(f"The directory {self.directory} cannot be used: {error.strerror}.") from error
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         with contextlib.suppress(OSError):
             self._parts.rmdir()  # where nothing came of it
         os.close(self._lock)
@@ -104,8 +101,8 @@ class Store:
         """Yields all rows in groups in the order of their cells, with no more parts in memory than overlap."""
         arrow = pyarrow()
         held, last = [], -1
-        for first, file in sorted((self._first(file), file) for file in self._files()):
-            if first > last and sum(map(len, held)) >= _GROUP_ROWS:
+        for file in self._files():
+            if int(file.stem) > last and sum(map(len, held)) >= _GROUP_ROWS:
                 yield arrow.concat_tables(held).sort_by(CELL)
                 held = []
             # Threads and read-ahead would keep memory of their own for every file.
@@ -114,10 +111,8 @@ class Store:
         if held:
             yield arrow.concat_tables(held).sort_by(CELL)
 
-    def _first(self, file: Path) -> int:
-        return int(file.stem)
-
     def _files(self) -> list[Path]:
+        """Returns the parts, in the order of their first cells."""
         return sorted(self._parts.glob("*.parquet"))
 
     def _write(self, path: Path, write: Callable[[io.BytesIO], object]) -> None:

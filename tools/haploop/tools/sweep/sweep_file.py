@@ -24,7 +24,7 @@ from haploop.protocol.scene.scene import Scene
 from haploop.tools.executor.work import Sources, load_kinds
 from haploop.tools.sweep.cells import Axis, Bisect, Refused, Sweep, Values, resolved
 from haploop.tools.sweep.points import NoSuchKey, PointsError, Span, listed, make_points, number_at
-from haploop.tools.sweep.record import USUAL, RecordError, make_columns
+from haploop.tools.sweep.record import USUAL, make_columns
 from haploop.tools.sweep.table import Column
 
 if TYPE_CHECKING:
@@ -213,13 +213,11 @@ class _Reader:
         names = given if isinstance(given, list) and all(isinstance(name, str) for name in given) else list(USUAL)
         if base is None:
             return []  # what can be recorded depends on what runs
-        sample = Sweep("", base, tuple(axes), sources=self._sources)
-        try:
-            return make_columns(names, sample, self._kinds)
-        except RecordError as error:
-            for place, sentence, hint in error.wrong:
-                self._layers.complain(("record", place), sentence, None, hint)
-        return []
+
+        def complain(place: int, sentence: str, hint: str | None) -> None:
+            self._layers.complain(("record", place), sentence, None, hint)
+
+        return make_columns(names, Sweep("", base, tuple(axes), sources=self._sources), self._kinds, complain)
 
     def _bisect(self, given: BisectTable, axes: Sequence[Axis]) -> Bisect | None:
         axis = next((axis for axis in axes if axis.key == given.axis), None)

@@ -55,12 +55,10 @@ class Column:
 def make_schema(columns: Iterable[Column], sweep: str) -> Any:
     """Makes the schema; units stand in the metadata of the fields, the resolved sweep and the versions in its own."""
     arrow = pyarrow()
-    fields = [
-        arrow.field(
-            column.name, arrow.type_for_alias(column.kind), metadata={"unit": column.unit} if column.unit else None
-        )
-        for column in columns
-    ]
+    fields = []
+    for column in columns:
+        unit = {"unit": column.unit} if column.unit else None
+        fields.append(arrow.field(column.name, arrow.type_for_alias(column.kind), metadata=unit))
     return arrow.schema(fields, metadata={"sweep": sweep, "versions": json.dumps(versions())})
 
 
@@ -111,12 +109,8 @@ def is_sweep(directory: Path) -> bool:
     return (Path(directory) / SWEEP).is_file()
 
 
-def read(directory: str | Path, *, scenes: bool = True) -> SweepTable:
+def read(directory: str | Path) -> SweepTable:
     """Reads the table of a sweep, of a running or interrupted one as far as it is written.
-
-    Args:
-        directory: that the sweep writes to.
-        scenes: whether to read the column ``scene``, which is by far the largest.
 
     Raises:
         TableError: there is no sweep there, or its table cannot be read.
@@ -127,7 +121,7 @@ def read(directory: str | Path, *, scenes: bool = True) -> SweepTable:
         sweep = tomllib.loads((directory / SWEEP).read_text(encoding="utf-8"))
         finished = (directory / TABLE).exists()
         files = [directory / TABLE] if finished else sorted((directory / PARTS).glob("*.parquet"))
-        tables = [arrow.parquet.read_table(file, columns=_wanted(arrow, file, scenes)) for file in files]
+        tables = [arrow.parquet.read_table(file) for file in files]
         boundary = directory / BOUNDARY
         boundaries = _columns(arrow.parquet.read_table(boundary)) if finished and boundary.exists() else {}
     except (OSError, ValueError) as error:
@@ -135,14 +129,9 @@ def read(directory: str | Path, *, scenes: bool = True) -> SweepTable:
     if not tables:
         raise TableError(f"The sweep in {directory} has no finished cell yet.")
     whole = arrow.concat_tables(tables).sort_by(CELL)
-    units = {field.name: (field.metadata or {}).get(b"unit", b"").decode() for field in whole.schema}
-    return SweepTable(
-        _columns(whole), {name: unit for name, unit in units.items() if unit}, sweep, boundaries, finished
-    )
-
-
-def _wanted(arrow: Any, file: Path, scenes: bool) -> Sequence[str] | None:
-    return None if scenes else [name for name in arrow.parquet.read_schema(file).names if name != SCENE]
+    described = [field for field in whole.schema if b"unit" in (field.metadata or {})]
+    units = {field.name: field.metadata[b"unit"].decode() for field in described}
+    return SweepTable(_columns(whole), units, sweep, boundaries, finished)
 
 
 def _columns(table: Any) -> dict[str, np.ndarray]:

@@ -11,7 +11,7 @@ from haploop.tools.figure.labels import LabelRoom
 from haploop.tools.figure.style import ELEMENTS, FAINT, INK, WALL, fix_layout
 from haploop.tools.sweep.map.axis import Ruler
 from haploop.tools.sweep.map.data import Axis, MapData
-from haploop.tools.sweep.map.edges import ALL_HOLD, FOUND, NONE_HOLDS, UNKNOWN, Edges, find_edges
+from haploop.tools.sweep.map.edges import ALL_HOLD, FOUND, NONE_HOLDS, UNKNOWN, Edges, find_edges, furthest
 from haploop.tools.sweep.map.legend import LOOKS, Legend
 from haploop.tools.sweep.map.lines import (
     LineStyle,
@@ -22,7 +22,7 @@ from haploop.tools.sweep.map.lines import (
     line_styles,
     name_lines,
 )
-from haploop.tools.sweep.map.sentences import edge_description, edge_notes, furthest
+from haploop.tools.sweep.map.sentences import edge_description, edge_notes
 from haploop.tools.sweep.map.sheet import Sheet
 
 if TYPE_CHECKING:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import tomllib
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -60,10 +60,6 @@ class Axis:
         values = np.unique(np.asarray(given, dtype=float))
         return cls(key, unit, values, (), np.unique(np.asarray(planned, dtype=float)) if len(planned) else values)
 
-    def as_planned(self) -> Axis:
-        """Returns the axis without what a search ran in between."""
-        return replace(self, values=self.planned)
-
     def indices(self, column: Sequence[Any]) -> np.ndarray:
         """Returns the place of each entry of a column among the values."""
         if self.names:
@@ -73,7 +69,7 @@ class Axis:
     def word(self, index: int) -> str:
         """Returns one value with its unit."""
         if self.names:
-            return short_name(self.names[index])
+            return _short_name(self.names[index])
         factor, unit = with_prefix([self.values[index]], self.unit)
         return f"{short(self.values[index] / factor)} {unit}".strip()
 
@@ -174,21 +170,19 @@ def _name(value: Any) -> str:
     return inline(bool(value) if isinstance(value, np.bool_) else value)
 
 
-def short_name(name: str) -> str:
+def _short_name(name: str) -> str:
     """Returns a name as people read it: a list of elements without its punctuation, ``"damping 0.8 + brake 0.1"``."""
     if not name.startswith("["):
         return name
     try:
         elements = tomllib.loads(f"list = {name}")["list"]
-        words = [" ".join([table["kind"], *(f"{v:g}" for v in table.values() if is_number(v))]) for table in elements]
+        words = [
+            " ".join([table["kind"], *(f"{v:g}" for v in table.values() if isinstance(v, int | float))])
+            for table in elements
+        ]
     except (ValueError, TypeError, KeyError):
         return name
     return " + ".join(words) or "none"
-
-
-def is_number(value: Any) -> bool:
-    """Tells whether a value of a scene is a number."""
-    return isinstance(value, int | float) and not isinstance(value, bool)
 
 
 def verdict_number(word: str | None) -> int:
@@ -197,18 +191,9 @@ def verdict_number(word: str | None) -> int:
 
 
 def make_map_data(
-    columns: Columns,
-    units: Mapping[str, str],
-    sweep: ResolvedSweep,
-    boundary: Columns | None = None,
+    columns: Columns, units: Mapping[str, str], sweep: ResolvedSweep, boundary: Columns | None = None
 ) -> MapData:
-    """Makes the data of a map from a sweep's table.
-
-    Args:
-        columns: of the table, equally long; axes by their dotted keys.
-        units: of the axes.
-        sweep: the resolved sweep.
-        boundary: columns of the boundary's table.
+    """Makes the data of a map from a sweep's table, its units and the table of its boundaries.
 
     Raises:
         FigureError: there is no row, or no verdict was recorded.
@@ -218,17 +203,13 @@ def make_map_data(
     if not len(columns["verdict"]):
         raise FigureError("The sweep has no finished cell yet, so there is nothing to draw.")
     if "bisect" in sweep and not boundary and len(sweep["axes"]) > 1:
-        columns = _planned_alone(columns, sweep)
+        # Of a search that goes on; what it runs in between is no cell of a map.
+        key = sweep["bisect"]["axis"]
+        planned = np.flatnonzero(np.isin(np.asarray(columns[key], dtype=float), sweep["axes"][key])).tolist()
+        columns = {name: [column[row] for row in planned] for name, column in columns.items()}
     axes = tuple(
         Axis.from_column(key, units.get(key, ""), columns[key], given if isinstance(given, list) else [])
         for key, given in sweep["axes"].items()
     )
     base = sweep.get("base", {}).get("title", "untitled scene")
     return MapData(sweep.get("title", base), base, axes, columns, sweep, boundary or {})
-
-
-def _planned_alone(columns: Columns, sweep: ResolvedSweep) -> Columns:
-    """Returns the rows at the planned points of a search that goes on; those in between are no cells of a map."""
-    key = sweep["bisect"]["axis"]
-    rows = np.flatnonzero(np.isin(np.asarray(columns[key], dtype=float), sweep["axes"][key])).tolist()
-    return {name: [column[row] for row in rows] for name, column in columns.items()}

@@ -3,12 +3,24 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from haploop.tools.sweep.map.data import FAILED, NO_CONTACT, STEADY, STIFFNESS, Axis, Cells, MapData, verdict_number
+from haploop.tools.sweep.map.data import (
+    FAILED,
+    NO_CONTACT,
+    STEADY,
+    STIFFNESS,
+    Axis,
+    Cells,
+    Columns,
+    MapData,
+    short,
+    verdict_number,
+    with_prefix,
+)
 
 # What is known of a combination of the other axes' values.
 FOUND, ALL_HOLD, NONE_HOLDS, UNKNOWN = range(4)
@@ -39,26 +51,39 @@ class Edges:
     high: np.ndarray
     more: int
 
+    @property
+    def begin(self) -> str:
+        """The value from which the search goes, in words."""
+        return self.along.word(0 if self.rising else -1)
+
 
 def find_edges(data: MapData) -> Edges:
     """Finds the boundaries of a bisecting sweep that is finished."""
     key, holds = data.sweep["bisect"]["axis"], data.sweep["bisect"].get("holds", "steady")
-    along = next(axis for axis in data.axes if axis.key == key).as_planned()
+    along = next(axis for axis in data.axes if axis.key == key)
+    along = replace(along, values=along.planned)
     others = [axis for axis in data.axes if axis.key != key]
     others.sort(key=lambda axis: (bool(axis.names), -len(axis.values)))
-    planned = data.sweep["axes"][key]
-    rising = planned[-1] >= planned[0]
+    first, *_, last = data.sweep["axes"][key]
+    rising = last >= first
     shape = tuple(len(axis.values) for axis in others)
     # What holds least far: none, unknown, found, all.
     rank = np.full(shape, np.inf)
     state, nearest = np.full(shape, UNKNOWN), np.full(shape, math.nan)
     low, high = np.full(shape, math.nan), np.full(shape, math.nan)
-    table, starts = data.boundary, _starts(data, key, planned[0], others)
+    table, starts = data.boundary, _starts(data, key, first, others)
     places = zip(*(axis.indices(table[axis.key]) for axis in others), strict=True) if others else None
     for row in range(len(table["low"])):
         at = tuple(int(index) for index in next(places)) if places else ()
-        value = float(table["boundary"][row])
-        seen = _state(data, row, starts.get((*at, _seed(table, row))), holds)
+        value, started = float(table["boundary"][row]), starts.get((*at, _seed(table, row)))
+        if math.isfinite(float(table["low"][row])):
+            seen = FOUND
+        elif verdict_number(started) == FAILED:
+            seen = UNKNOWN
+        elif started != holds:
+            seen = NONE_HOLDS
+        else:
+            seen = ALL_HOLD if table["changes"][row] == 0 else UNKNOWN
         distance = {NONE_HOLDS: -math.inf, UNKNOWN: -1e300, FOUND: value if rising else -value, ALL_HOLD: 1e300}[seen]
         if distance < rank[at]:
             rank[at], state[at], nearest[at] = distance, seen, value if seen == FOUND else math.nan
@@ -69,16 +94,6 @@ def find_edges(data: MapData) -> Edges:
     return Edges(along, tuple(others), holds, rising, state, nearest, low, high, more)
 
 
-def _state(data: MapData, row: int, first: str | None, holds: str) -> int:
-    if math.isfinite(float(data.boundary["low"][row])):
-        return FOUND
-    if verdict_number(first) == FAILED:
-        return UNKNOWN
-    if first != holds:
-        return NONE_HOLDS
-    return ALL_HOLD if data.boundary["changes"][row] == 0 else UNKNOWN
-
-
 def _starts(data: MapData, key: str, first: float, others: list[Axis]) -> dict[tuple[int, ...], str | None]:
     """Returns the verdict where the search begins, by the indices of the other axes and the seed."""
     columns = data.columns
@@ -87,8 +102,34 @@ def _starts(data: MapData, key: str, first: float, others: list[Axis]) -> dict[t
     return {(*(int(index[row]) for index in indices), _seed(columns, row)): columns["verdict"][row] for row in begin}
 
 
-def _seed(table: Any, row: int) -> int:
+def _seed(table: Columns, row: int) -> int:
     return int(table["seed"][row]) if "seed" in table else 0
+
+
+@dataclass(frozen=True)
+class Furthest:
+    """The combination that holds furthest: its index, the boundary, and what to write beside it."""
+
+    index: tuple[int, ...]
+    value: float
+    words: str
+
+
+def furthest(edges: Edges) -> Furthest | None:
+    """Finds what holds furthest from where the search begins; None where no boundary was found and nothing holds."""
+    found = edges.state == FOUND
+    if (throughout := np.argwhere(edges.state == ALL_HOLD)).size:
+        end = -1 if edges.rising else 0
+        words = f"{edges.holds} up to {edges.along.word(end)} and perhaps beyond"
+        middle = tuple(int(i) for i in throughout[len(throughout) // 2])
+        return Furthest(middle, float(edges.along.values[end]), words)
+    if not found.any():
+        return None
+    far = np.where(found, edges.nearest if edges.rising else -edges.nearest, -np.inf)
+    index = tuple(int(i) for i in np.unravel_index(int(far.argmax()), far.shape))
+    value = float(edges.nearest[index])
+    factor, unit = with_prefix([value], edges.along.unit)
+    return Furthest(index, value, f"{edges.holds} up to {short(value / factor)} {unit}".strip())
 
 
 @dataclass(frozen=True)
@@ -96,15 +137,15 @@ class StiffestSteady:
     """A cell, as an index into the cells it was looked for in.
 
     Attributes:
-        index: of the cell.
         open_end: whether no stiffer wall was tried with its other values.
     """
 
     index: tuple[int, ...]
+    stiffness_N_m: float
     open_end: bool
 
 
-def stiffest_steady(axes: tuple[Axis, ...], cells: Cells) -> StiffestSteady | None:
+def stiffest_steady(axes: Sequence[Axis], cells: Cells) -> StiffestSteady | None:
     """Finds the stiffest steady wall below which every wall that was tried with the same other values is steady, too.
 
     Where several cells share it, the one in the middle of them is taken. None where the wall was not swept, or no
@@ -122,8 +163,8 @@ def stiffest_steady(axes: tuple[Axis, ...], cells: Cells) -> StiffestSteady | No
     if not held.any():
         return None
     reached = np.where(held, np.arange(held.shape[-1]), -1).max(axis=-1)
-    best = np.argwhere(reached == reached.max())
+    stiffest = int(reached.max())
+    best = np.argwhere(reached == stiffest)
     others = tuple(int(index) for index in best[len(best) // 2])
-    stiffness = int(reached.max())
-    index = (*others[:along], stiffness, *others[along:])
-    return StiffestSteady(index, stiffness == held.shape[-1] - 1)
+    index = (*others[:along], stiffest, *others[along:])
+    return StiffestSteady(index, float(axes[along].values[stiffest]), stiffest == held.shape[-1] - 1)

@@ -28,7 +28,6 @@ from haploop.tools.sweep.map.panels import (
     count_disagreement,
     draw_cells,
     draw_swings,
-    label_swings,
     mark_disagreement,
 )
 from haploop.tools.sweep.map.sentences import count_verdicts, description, map_notes, star_words
@@ -61,8 +60,7 @@ def make_figure(data: MapData) -> Figure:
     sheet = Sheet(len(panels), data.title, description(data, cells))
     for number, (ax, panel, over) in enumerate(zip(sheet.axes, panels, overs, strict=True)):
         if layout.y is None:
-            draw_swings(ax, rulers[0], panel.cells, swings)
-            label_swings(ax, sheet.is_left(number))
+            draw_swings(ax, rulers[0], panel.cells, swings, sheet.is_left(number))
         else:
             draw_cells(ax, rulers[0], rulers[1], panel.cells, scale)
         for ruler, which in zip(rulers, _SIDES, strict=False):
@@ -97,7 +95,7 @@ def _label(
 ) -> None:
     """Writes star and names, once the panel has its place."""
     room = LabelRoom(ax)
-    found = stiffest_steady(tuple(along), panel.cells)
+    found = stiffest_steady(along, panel.cells)
     room.avoid_texts(ax.texts)
     room.avoid_lines(line for lines in over.drawn.values() for line in lines)
     if len(rulers) == 1:
@@ -105,7 +103,7 @@ def _label(
     if found:
         x, *rest = (ruler.coordinates[index] for ruler, index in zip(rulers, found.index, strict=True))
         y = rest[0] if rest else float(swings.place(panel.cells.amplitude_m)[found.index])
-        draw_star(ax, room, x, y, star_words(along, found))
+        draw_star(ax, room, x, y, star_words(found))
     name_lines(room, over.drawn, styles)
 
 

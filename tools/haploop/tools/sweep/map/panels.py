@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,7 +9,7 @@ import numpy as np
 from haploop.tools.figure.style import FAINT, GREY, INK, SMALL, TEXT
 from haploop.tools.sweep.map.axis import Ruler
 from haploop.tools.sweep.map.data import LIMIT_CYCLE, NOT_RUN, STEADY, VERDICTS, Cells
-from haploop.tools.sweep.map.legend import LOOKS, amplitude_colours, metres_along
+from haploop.tools.sweep.map.legend import LOOKS, Look, amplitude_colours, metres_along
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -37,35 +36,24 @@ def draw_cells(ax: Axes, x: Ruler, y: Ruler, cells: Cells, scale: LogNorm | None
         ax.pcolormesh(*edges, shown, cmap=colours, norm=scale, zorder=1.1, rasterized=True, gid="amplitudes")
     for number, look in LOOKS.items():
         if look.hatch and (verdict == number).any():
-            _hatch(ax, edges, verdict == number, look.hatch, look.hatch_colour, VERDICTS[number])
+            _hatch(ax, edges, verdict == number, look, f"hatch {VERDICTS[number]}")
     _outline(ax, edges, verdict)
 
 
-def _hatch(
-    ax: Axes, edges: tuple[np.ndarray, np.ndarray], where: np.ndarray, hatch: str, colour: str, name: str
-) -> None:
-    """Draws one hatched patch of all cells of a verdict, row by row, so that the hatching runs through."""
+def _hatch(ax: Axes, edges: tuple[np.ndarray, np.ndarray], where: np.ndarray, look: Look, gid: str) -> None:
+    """Draws one hatched patch of all cells of a verdict, by unbroken runs in a row, so that the hatching runs on."""
     from matplotlib.patches import PathPatch
     from matplotlib.path import Path
 
-    boxes = [_box(edges, row, first, last) for row, first, last in _runs(where)]
-    path = Path.make_compound_path(*(Path(box, closed=True) for box in boxes))
-    ax.add_patch(
-        PathPatch(path, facecolor="none", edgecolor=colour, hatch=hatch, linewidth=0, zorder=1.2, gid=f"hatch {name}")
-    )
-
-
-def _runs(where: np.ndarray) -> Iterator[tuple[int, int, int]]:
-    """Yields row, first and one past the last cell of every unbroken run."""
+    boxes = []
     for row, marked in enumerate(where):
-        ends = np.flatnonzero(np.diff(np.concatenate([[0], marked.astype(int), [0]])))
-        for first, last in zip(ends[::2], ends[1::2], strict=True):
-            yield row, int(first), int(last)
-
-
-def _box(edges: tuple[np.ndarray, np.ndarray], row: int, first: int, last: int) -> np.ndarray:
-    x0, x1, y0, y1 = edges[0][first], edges[0][last], edges[1][row], edges[1][row + 1]
-    return np.array([(x0, y0), (x1, y0), (x1, y1), (x0, y1), (x0, y0)])
+        y0, y1 = edges[1][row : row + 2]
+        ends = edges[0][np.flatnonzero(np.diff(np.concatenate([[0], marked.astype(int), [0]])))]
+        for x0, x1 in zip(ends[::2], ends[1::2], strict=True):
+            boxes.append(Path([(x0, y0), (x1, y0), (x1, y1), (x0, y1), (x0, y0)], closed=True))
+    path = Path.make_compound_path(*boxes)
+    style = {"facecolor": "none", "edgecolor": look.hatch_colour, "hatch": look.hatch, "linewidth": 0}
+    ax.add_patch(PathPatch(path, zorder=1.2, gid=gid, **style))
 
 
 def _outline(ax: Axes, edges: tuple[np.ndarray, np.ndarray], verdict: np.ndarray) -> None:
@@ -136,11 +124,12 @@ class SwingScale:
         return np.where(np.isfinite(at), at, self.shelf)
 
 
-def draw_swings(ax: Axes, x: Ruler, cells: Cells, scale: SwingScale) -> None:
-    """Draws a panel; ``cells`` have the shape (values of x,)."""
+def draw_swings(ax: Axes, x: Ruler, cells: Cells, scale: SwingScale, label: bool) -> None:
+    """Draws a panel; ``cells`` have the shape (values of x,). The first panel of a row has the label along y."""
     ran = cells.verdict != NOT_RUN
-    at, places = x.coordinates, scale.place(cells.amplitude_m)
-    _shade(ax, x, cells.verdict)
+    at, places, edges = x.coordinates, scale.place(cells.amplitude_m), x.edges
+    for i in np.flatnonzero(cells.verdict == STEADY):
+        ax.axvspan(edges[i], edges[i + 1], color=LOOKS[STEADY].fill, linewidth=0, zorder=0.2, gid="steady")
     known = ran & np.isfinite(cells.amplitude_m)
     ax.plot(at, np.where(known, places, np.nan), color=FAINT, linewidth=1.2, zorder=2, gid="line")
     for i in np.flatnonzero(known & (cells.seeds > 1)):
@@ -158,21 +147,10 @@ def draw_swings(ax: Axes, x: Ruler, cells: Cells, scale: SwingScale) -> None:
     ax.set_ylim(scale.low, scale.high)
     metres_along(ax.yaxis, scale.high / scale.low)
     ax.tick_params(axis="y", labelsize=SMALL, colors=GREY, labelcolor=INK)
-    ax.grid(axis="y", color="#E6E6E6", linewidth=0.6, zorder=0.5)
-
-
-def label_swings(ax: Axes, label: bool) -> None:
-    """Writes the label along y, in the first panel of a row."""
     ax.tick_params(axis="y", which="both", labelleft=label)
     if label:
         ax.set_ylabel("oscillation, peak to peak", fontsize=TEXT, color=INK)
-
-
-def _shade(ax: Axes, x: Ruler, verdict: np.ndarray) -> None:
-    """Shades the ground of steady cells."""
-    edges = x.edges
-    for index in np.flatnonzero(verdict == STEADY):
-        ax.axvspan(edges[index], edges[index + 1], color=LOOKS[STEADY].fill, linewidth=0, zorder=0.2, gid="steady")
+    ax.grid(axis="y", color="#E6E6E6", linewidth=0.6, zorder=0.5)
 
 
 def count_disagreement(ax: Axes, x: Ruler, cells: Cells, scale: SwingScale) -> None:
