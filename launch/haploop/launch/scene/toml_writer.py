@@ -12,25 +12,13 @@ _BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
 _ESCAPES = {ord('"'): '\\"', ord("\\"): "\\\\", **{c: f"\\u{c:04x}" for c in [*range(0x20), 0x7F]}}
 
 
-# Lines of tables, by the identity of what they hold, which is kept with them.
-Lines = dict[int, tuple[Any, list[str]]]
-
-
-def to_toml(scene: Tables, known: Lines | None = None) -> str:
+def to_toml(scene: Tables) -> str:
     """Returns the TOML text of a dict of str, bool, int, finite float, lists and dicts.
-
-    Args:
-        known: lines of tables that this scene may share with another.
 
     Raises:
         TypeError: another type of value, None and infinite numbers included.
     """
-    return "\n".join(_table(scene, (), known or {})).lstrip("\n") + "\n"
-
-
-def lines_of(scene: Tables) -> Lines:
-    """Returns the lines of each table of a scene, for ``to_toml`` of scenes that share some; they must not change."""
-    return {id(entry): (entry, _tables(entry, (key,))) for key, entry in scene.items() if _has_header(entry)}
+    return "\n".join(_table(scene, ())).lstrip("\n") + "\n"
 
 
 def inline(value: Any) -> str:
@@ -48,13 +36,13 @@ def inline(value: Any) -> str:
     raise TypeError(f"A scene holds text, numbers, true or false, lists and tables, but not {value!r}.")
 
 
-def _table(table: Tables, path: tuple[str, ...], known: Lines) -> list[str]:
+def _table(table: Tables, path: tuple[str, ...]) -> list[str]:
     """Lines of a table: its plain keys first, since they belong to the header above them, then its sub-tables."""
     headed = [(key, value) for key, value in table.items() if _has_header(value)]
     keys = {key for key, _ in headed}
     lines = [f"{_key(key)} = {inline(value)}" for key, value in table.items() if key not in keys]
     for key, value in headed:
-        lines += known[id(value)][1] if id(value) in known else _tables(value, (*path, key))
+        lines += _tables(value, (*path, key))
     return lines
 
 
@@ -62,8 +50,8 @@ def _tables(value: Any, path: tuple[str, ...]) -> list[str]:
     """Lines of a table, or of an array of tables, under their headers."""
     name = ".".join(map(_key, path))
     if isinstance(value, dict):
-        return ["", f"[{name}]", *_table(value, path, {})]
-    return [line for item in value for line in ("", f"[[{name}]]", *_table(item, path, {}))]
+        return ["", f"[{name}]", *_table(value, path)]
+    return [line for item in value for line in ("", f"[[{name}]]", *_table(item, path))]
 
 
 def _has_header(value: Any) -> bool:

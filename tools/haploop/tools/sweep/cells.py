@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from copy import deepcopy
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,7 +15,7 @@ from haploop.launch.scene.check import resolve
 from haploop.launch.scene.events import elements_of, try_out
 from haploop.launch.scene.layers import Layers, key_path, lay_value
 from haploop.launch.scene.mistakes import Mistake, SceneError
-from haploop.launch.scene.toml_writer import Lines, inline, lines_of, to_toml
+from haploop.launch.scene.toml_writer import inline, to_toml
 from haploop.logger.summary import Summary
 from haploop.protocol.scene.paths import value_at
 from haploop.protocol.scene.scene import Scene
@@ -169,30 +169,13 @@ class Sweep:
             SEED: values.get(SEED, seed),
             ENDED: result["ended"],
             WHY: result.get("why", ""),
-            SCENE: None if scene is None else self._toml(scene),
+            SCENE: None if scene is None else to_toml(scene.as_dict()),
         }
-
-    def _toml(self, scene: Scene) -> str:
-        """Returns a cell's scene as TOML; tables that it shares with the base have been written once."""
-        base, tables = self._tables.data, scene.as_dict()
-        for name, table in vars(scene).items():
-            if name in base and table is getattr(self.base, name):
-                tables[name] = base[name]
-        return to_toml(tables, self._lines)
 
     @cached_property
     def _tables(self) -> Layers:
         """The base scene as its file would have it; not to be changed."""
         return Layers(Path(), self.base.as_dict())
-
-    @cached_property
-    def _lines(self) -> Lines:
-        """Lines of TOML of the base's tables, by their identity."""
-        return lines_of(self._tables.data)
-
-    def __getstate__(self) -> dict[str, object]:
-        """Leaves out what is cached: identities mean nothing in another process."""
-        return {field.name: getattr(self, field.name) for field in fields(self)}
 
     def bisected(self, bisect: Bisect) -> tuple[Axis, list[Axis]]:
         """Returns the axis of a search, and the other axes."""

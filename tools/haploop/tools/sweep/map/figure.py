@@ -50,7 +50,7 @@ def make_figure(data: MapData) -> Figure:
     cells, layout = data.cells(), Layout.from_axes(data.axes)
     along = [data.axes[layout.x]] + ([] if layout.y is None else [data.axes[layout.y]])
     rulers = [Ruler.from_axis(axis) for axis in along]
-    panels = list(layout.panels(data, cells))
+    panels = list(layout.panels(data.axes, cells))
     scenes = data.columns["scene"]
     overs = [find_lines((scenes[row] for row in panel.cells.row.flat if row >= 0), rulers) for panel in panels]
     words = {line.name: line.words for over in overs for line in over.lines if line.pieces}

@@ -42,12 +42,11 @@ LOOKS = {
 }
 # Of amplitudes that have colours of their own, the least over the greatest.
 _RANGE = 1e-5
-WORDS = {LIMIT_CYCLE: "limit cycle", NO_CONTACT: "no contact"}
 
 
 def verdict_words(verdict: int) -> str:
     """Returns a verdict in words."""
-    return WORDS.get(verdict, VERDICTS[verdict])
+    return VERDICTS[verdict].replace("-", " ")
 
 
 def amplitude_colours() -> Colormap:

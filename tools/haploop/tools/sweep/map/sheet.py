@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from haploop.tools.figure.style import GREY, INK, LARGE, SMALL, TEXT, empty_figure, fit_text
-from haploop.tools.sweep.map.data import STIFFNESS, Axis, Cells, MapData
+from haploop.tools.sweep.map.data import STIFFNESS, Axis, Cells
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -46,24 +46,19 @@ class Layout:
         """Counts the panels."""
         return prod(len(axes[number].values) for number in self.others)
 
-    def panels(self, data: MapData, cells: Cells) -> Iterator[Panel]:
+    def panels(self, axes: Sequence[Axis], cells: Cells) -> Iterator[Panel]:
         """Yields the first panels, as many as are drawn."""
-        lengths = [range(len(data.axes[number].values)) for number in self.others]
-        for fixed in islice(product(*lengths), MOST_PANELS):
-            where: list[int | slice] = [slice(None)] * len(data.axes)
-            for number, index in zip(self.others, fixed, strict=True):
-                where[number] = index
-            pairs = [(data.axes[n].key, data.axes[n].word(i)) for n, i in zip(self.others, fixed, strict=True)]
-            full = ", ".join(f"{key} = {word}" for key, word in pairs)
-            short = ", ".join(f"{key.rpartition('.')[2]} = {word}" for key, word in pairs)
-            titles = full, short, ", ".join(word for _, word in pairs)
-            yield Panel(titles, self._taken(cells, tuple(where)))
-
-    def _taken(self, cells: Cells, where: tuple[int | slice, ...]) -> Cells:
-        """Returns the cells of a panel, x first."""
         turned = self.y is not None and self.y < self.x
-        taken = [array[where] for array in vars(cells).values()]
-        return Cells(*(np.ascontiguousarray(array.T) if turned else array for array in taken))
+        lengths = [range(len(axes[number].values)) for number in self.others]
+        for fixed in islice(product(*lengths), MOST_PANELS):
+            at = dict(zip(self.others, fixed, strict=True))
+            where = tuple(at.get(number, slice(None)) for number in range(len(axes)))
+            taken = [array[where] for array in vars(cells).values()]
+            words = {axes[number].key: axes[number].word(index) for number, index in at.items()}
+            full = ", ".join(f"{key} = {word}" for key, word in words.items())
+            short = ", ".join(f"{key.rpartition('.')[2]} = {word}" for key, word in words.items())
+            titles = full, short, ", ".join(words.values())
+            yield Panel(titles, Cells(*(np.ascontiguousarray(array.T) if turned else array for array in taken)))
 
 
 @dataclass(frozen=True)
