@@ -1,17 +1,23 @@
 """What a snapshot of a history holds, and the form in which it travels."""
 
+import asyncio
 import math
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
+from haploop.logger.log.writer import Log
 from haploop.protocol.changes import changes_of, spans
 from haploop.protocol.scene.scene import ElementTable, Wall
 from haploop.protocol.ticks import Timebase
+from haploop.tools.cli.view import LiveRuns
+from haploop.view import viewer
 from haploop.view.draw.messages import event_lines
 from haploop.view.draw.snapshot import Viewport, snapshot
 from haploop.view.store.history import AtWork, History
-from helpers.live.browsing import decode
+from helpers.live.browsing import decode, to_its_end
 from helpers.scenes.least import typed
 
 TIME = Timebase(10_000, 1_000, 0, 100_000)
@@ -36,6 +42,42 @@ def made_up(ticks=100, elements=(), wall: Wall | None = WALL, books=None):
 
 def drawn(history, **watch):
     return decode(snapshot(history, Viewport(**watch)))
+
+
+def log_ticks(path, ticks):
+    """A log of so many ticks, in which x counts the steps."""
+    at, steps = np.arange(float(ticks)), np.arange(ticks * 10.0).reshape(ticks, 10)
+    rows = {
+        "/plant": ({"timestamp": steps / 1e4, "t": steps / 1e4, "x": steps, "v": steps, "force": -steps}, 10),
+        "/controller": ({"timestamp": at / 1e3, "x": at, "v": at, "a": at, "wall": at, "total": at}, None),
+        "/energy": ({"timestamp": at / 1e3, "wall.true": at, "residual": at}, None),
+    }
+    with Log(path / "log.mcap") as log:
+        for topic, (columns, samples) in rows.items():
+            channel = log.channel(topic, dict.fromkeys(columns, ""), samples_per_message=samples, title=topic)
+            log.write(channel, np.arange(ticks) * 1_000_000, np.stack([*columns.values()], axis=-1))
+
+
+def test_a_log_that_is_not_there_yet_is_looked_for_again(tmp_path, monkeypatch):
+    """A viewer that is welcomed together with the logger may be the quicker of the two."""
+    monkeypatch.setattr(viewer, "_LOGGED_S", 0.01)
+    live, prepended = History(TIME, 0), []
+    for series in live.all_series:
+        series.begin(300)
+    session: Any = SimpleNamespace(
+        out=tmp_path, scene=typed(), time=TIME, events=[], outcome="", history=live, prepend=prepended.append
+    )
+
+    async def play():
+        filling = asyncio.create_task(viewer.Viewer(LiveRuns(), None, from_start=True)._backfill(session))
+        await asyncio.sleep(0.1)
+        assert not filling.done()
+        log_ticks(tmp_path, 300)
+        await asyncio.wait_for(filling, 20.0)
+
+    to_its_end(play())
+    x = prepended[0].steps.rows(["x"], 0, 300)[0]
+    np.testing.assert_array_equal(x, np.arange(3000.0))
 
 
 def test_no_telemetry_gives_an_empty_snapshot():

@@ -122,6 +122,8 @@ class Viewer:
 
     async def _backfill(self, session: RunSession) -> None:
         """Puts what was logged before joining in front of what was received."""
+        if session.scene.run.log == "none":
+            return
         backfill = Backfill(session.out, session.scene, session.time, session.events)
         while True:
             over = bool(session.outcome)
@@ -131,8 +133,8 @@ class Viewer:
                 await asyncio.to_thread(backfill.read)
             except (OSError, LogError):
                 if over:
-                    return  # no log, or none that this process may read: what is received is all there is
-                continue  # the logger may be about to make it
+                    return  # none that this process may read: what is received is all there is
+                continue  # the logger, welcomed at the same time, may be about to make it
             if over or backfill.reaches(session.history):
                 session.prepend(backfill.history)
                 return

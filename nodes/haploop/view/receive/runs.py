@@ -27,13 +27,16 @@ class Run(Protocol):
     @property
     def id(self) -> str:
         """Identifier among live runs."""
+        ...
 
     @property
     def clock(self) -> str:
         """Address of the clock."""
+        ...
 
     def make_context(self) -> SecureContext:
         """Makes a context whose sockets may connect to the run."""
+        ...
 
 
 class Runs(Protocol):
@@ -41,6 +44,7 @@ class Runs(Protocol):
 
     def live(self) -> Sequence[Run]:
         """Returns the runs that live now, the oldest first."""
+        ...
 
     def ask(self, run: Any, verb: str, arguments: Message) -> tuple[str, Message]:
         """Sends a command to a run; returns its answer, a sentence and data.
@@ -48,6 +52,7 @@ class Runs(Protocol):
         Raises:
             CommandFailed: the run refused, or does not answer.
         """
+        ...
 
 
 class ClockAnswers:
