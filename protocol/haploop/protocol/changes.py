@@ -96,10 +96,9 @@ class Change:
         kind = self.swap.name
         if kind == NO_ELEMENT:
             return f"element {self.element} is removed"
-        words = [
-            f"{name} {_amount(value, units.get(f'{kind}.{name}'))}" for name, value in self.swap.parameters.items()
-        ]
-        words += ["always"] if self.swap.acts == "always" else []
+        values = self.swap.parameters.items()
+        words = [f"{name} {_amount(value, units.get(f'{kind}.{name}'))}" for name, value in values]
+        words += ["always"] * (self.swap.acts == "always")
         return f"element {self.element} becomes {kind}" + (f" ({', '.join(words)})" if words else "")
 
     def refuse(self, error: Exception) -> Change:
@@ -147,7 +146,9 @@ def changes_of(events: Iterable[tuple[int, Event]]) -> list[Change]:
     """Returns the changes among (tick, event) in order, with ``refused`` where a later event refuses one."""
     events = list(events)
     refusals = [event for _, event in events if "refused" in event]
-    return [_with_refusal(Change.from_dict(tick, event), refusals) for tick, event in events if is_change(event)]
+    changes = [Change.from_dict(tick, event) for tick, event in events if is_change(event)]
+    sentences = [next((event["refused"] for event in refusals if _refuses(event, change)), None) for change in changes]
+    return [replace(change, refused=why or change.refused) for change, why in zip(changes, sentences, strict=True)]
 
 
 def spans(scene: Scene, changes: Iterable[Change]) -> list[Span]:
@@ -185,21 +186,11 @@ def _amount(value: Any, unit: str | None) -> str:
     return f"{value:g} {unit or ''}".rstrip() if is_number else str(value)
 
 
-def _with_refusal(change: Change, refusals: list[Event]) -> Change:
-    sentence = next((event["refused"] for event in refusals if _refuses(event, change)), None)
-    return change if sentence is None else replace(change, refused=sentence)
-
-
 def _refuses(event: Event, change: Change) -> bool:
     """Compares by the change that the refusal holds; logs of before that field only tell of it in their sentence."""
     if "change" in event:
         other = Change.from_dict(event["change"]["tick"], event["change"])
-        return (other.tick, other.swap, other.element, other.set) == (
-            change.tick,
-            change.swap,
-            change.element,
-            change.set,
-        )
+        return replace(other, plugin=None, refused=None) == replace(change, plugin=None, refused=None)
     if change.swap is None:
         words = "set " + ", ".join(f"{key} = {value}" for key, value in change.set.items())
     else:

@@ -45,10 +45,6 @@ class Roster:
     def __init__(self) -> None:
         self.nodes: dict[bytes, Node] = {}
 
-    def add(self, node: Node) -> None:
-        """Adds a node."""
-        self.nodes[node.identity] = node
-
     def own(self, role: str) -> Node | None:
         """Returns the run's own process of this role, None before it has joined."""
         return next((node for node in self.nodes.values() if node.role == role), None)

@@ -34,6 +34,7 @@ class ClockServer:
         start_gate: given the pids of all that are ready, returns whether the first tick may be worked on.
 
     Attributes:
+        socket: the ROUTER, for pollers.
         address: where the clock listens.
         roster: who takes part.
         results: role -> result of each own process that is done.
@@ -50,8 +51,8 @@ class ClockServer:
         command: Command,
         start_gate: Callable[[set[int]], bool],
     ) -> None:
-        self._socket = open_socket(context, zmq.ROUTER)
-        self.address = bind(self._socket, sockets, "clock")
+        self.socket = open_socket(context, zmq.ROUTER)
+        self.address = bind(self.socket, sockets, "clock")
         self._secret, self._clock, self._welcome, self._command = secret, clock, welcome, command
         self.roster = Roster()
         self.results: dict[str, Message] = {}
@@ -60,14 +61,9 @@ class ClockServer:
         self._granted = -1
         self._last_sent = False
 
-    @property
-    def socket(self) -> zmq.Socket[bytes]:
-        """The socket, for pollers."""
-        return self._socket
-
     def close(self) -> None:
         """Stops listening; what was sent still goes out."""
-        self._socket.close(linger=200)
+        self.socket.close(linger=200)
 
     def serve(self) -> None:
         """Takes the messages that are there, up to a limit, then grants what can be granted.
@@ -76,24 +72,21 @@ class ClockServer:
             RunFailed: one of the run's own processes said that it cannot go on.
         """
         for _ in range(_AT_ONCE):
-            if not has_message(self._socket):
+            if not has_message(self.socket):
                 break
-            sender, *frames = self._socket.recv_multipart()
+            sender, *frames = self.socket.recv_multipart()
             try:
                 self._take(sender, decode(frames[-1] if frames else b""))
             except WireError as error:
-                self.unknown_peers += 1
-                self._send(sender, "REFUSED", str(error))
+                self._refuse(sender, str(error))
         if not self._greeted and self.roster.joined():
             self._greeted = True
             for node in list(self.roster.nodes.values()):
                 self._greet(node)
-        if self.roster.all_own("ready") and self._may_start():
-            self.grant()
-
-    def _may_start(self) -> bool:
-        has_begun = self._granted >= 0 or self._clock.is_last
-        return has_begun or self._start_gate({node.pid for node in self.roster.nodes.values() if node.ready})
+        if self.roster.all_own("ready"):
+            has_begun = self._granted >= 0 or self._clock.is_last
+            if has_begun or self._start_gate({node.pid for node in self.roster.nodes.values() if node.ready}):
+                self.grant()
 
     def grant(self) -> None:
         """Sends every node how far it may go and what changes on the way, if that is news."""
@@ -115,7 +108,7 @@ class ClockServer:
 
     def _send(self, identity: bytes, name: str, *fields: Any) -> None:
         try:
-            self._socket.send_multipart([identity, encode(name, *fields)], flags=zmq.DONTWAIT)
+            self.socket.send_multipart([identity, encode(name, *fields)], flags=zmq.DONTWAIT)
         except zmq.ZMQError:  # gone, or so far behind that its queue is full
             node = self.roster.nodes.get(identity)
             if node and not node.is_own:
@@ -130,23 +123,22 @@ class ClockServer:
             return
         node = self.roster.nodes.get(sender)
         if node is None:
-            self.unknown_peers += 1
-            self._send(sender, "REFUSED", f"{frame.name} came from somebody who has not joined; send JOIN first.")
+            self._refuse(sender, f"{frame.name} came from somebody who has not joined; send JOIN first.")
             return
         if frame.name in ("READY", "PROGRESS") and not 0 <= frame.fields[0] <= self._clock.until:
-            self.unknown_peers += 1
-            self._send(
-                sender, "REFUSED", f"{frame.name} must name a tick from 0 to {self._clock.until}, which is granted."
-            )
+            self._refuse(sender, f"{frame.name} must name a tick from 0 to {self._clock.until}, which is granted.")
             return
         node.heard = time.monotonic()
         node.waits_for = ""
         handler = getattr(self, f"_on_{frame.name.lower()}", None)
         if handler is None:
-            self.unknown_peers += 1
-            self._send(sender, "REFUSED", f"{frame.name} is not for the clock.")
-            return
-        handler(node, *frame.fields)
+            self._refuse(sender, f"{frame.name} is not for the clock.")
+        else:
+            handler(node, *frame.fields)
+
+    def _refuse(self, sender: bytes, reason: str) -> None:
+        self.unknown_peers += 1
+        self._send(sender, "REFUSED", reason)
 
     def _join(self, sender: bytes, request: Message) -> None:
         role = request["role"]
@@ -170,7 +162,7 @@ class ClockServer:
         lossless = request["lossless"] and role not in ("plant", "controller")
         node = Node(sender, role, request["pid"], lossless, request["endpoints"], time.monotonic())
         node.tick = 0 if known else self._clock.until
-        self.roster.add(node)
+        self.roster.nodes[sender] = node
         if not known:
             self._greet(node)
 

@@ -18,26 +18,13 @@ Stage = Literal["motion", "measurement", "estimate", "line", "actuation"]
 HISTORY = tuple(f"haploop.plant.chain.{name}" for name in ("history", "chain", "sensed_acceleration", "transition"))
 _EXACT = ("haploop.plant.chain.motion",)
 CHAIN = (*_EXACT, *HISTORY)
-_EXACT_RUBBING = tuple(f"haploop.plant.friction.{name}" for name in ("motion", "substeps"))
-RUBBING = _EXACT_RUBBING
+RUBBING = tuple(f"haploop.plant.friction.{name}" for name in ("motion", "substeps"))
 # Shared by the one-step methods.
 LINEAR_RATES = ("haploop.plant.integrators.linear_rates",)
 DRAWN = ("haploop.plant.streams",)
 NOISY = ("haploop.plant.sensing.noise", *DRAWN)
 COUNTED = ("haploop.plant.counters",)
 LINE = ("haploop.plant.line.lossy", *DRAWN, *COUNTED, *CHAIN)
-
-
-def moved_by(integrator: str, modules: tuple[str, ...], rubs: bool) -> tuple[str, ...]:
-    """Returns the modules under an integrator, which has its own in place of those that move bodies exactly.
-
-    Args:
-        rubs: whether they are those of friction.
-    """
-    if integrator == "exact":
-        return modules
-    kept = tuple(module for module in modules if module not in (*_EXACT, *_EXACT_RUBBING))
-    return (*kept, find_integrator(integrator).motions[1].partition(":")[0]) if rubs else kept
 
 
 @dataclass(frozen=True)
@@ -138,7 +125,11 @@ class Effect:
 
     def modules_in(self, scene: Scene) -> tuple[str, ...]:
         """Returns what it imports in a scene: another integrator has its own in place of what moves bodies exactly."""
-        return moved_by(value_at(scene, "clock.integrator") or "exact", self.modules, self.key == "friction")
+        if scene.clock.integrator == "exact":
+            return self.modules
+        kept = tuple(module for module in self.modules if module not in (*_EXACT, *RUBBING))
+        motion = find_integrator(scene.clock.integrator).motions[1].partition(":")[0]
+        return (*kept, motion) if self.key == "friction" else kept
 
     def is_named(self, scene: Scene) -> bool:
         """Returns whether a resolved scene names it; a number that is 0 names nothing."""

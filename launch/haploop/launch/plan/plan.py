@@ -65,10 +65,13 @@ def plan(scene: Scene) -> Plan:
     """Returns the plan of a resolved scene."""
     named = effects_of(scene)
     chain = Chain.from_scene(scene)
+    # The states of effects in the motion are integrated instead.
+    remembered = {effect.name: effect.states_in(scene) for effect in named if effect.stage != "motion"}
+    elements = (f"dissipation.{index}" for index in range(len(scene.dissipation)))
     return Plan(
         bodies=dict(zip(chain.bodies, chain.masses_kg, strict=True)),
         states=chain.states,
-        memory=_memory(scene, named),
+        memory={name: count for name, count in remembered.items() if count},
         plant_step=_plant_step(chain, named, scene),
         tick=_tick(scene, chain, named),
         modules={
@@ -77,7 +80,7 @@ def plan(scene: Scene) -> Plan:
         },
         columns={
             "/plant": ("x", "v", "force", *_once(column for effect in named for column in effect.columns)),
-            "/controller": (*MOTION_COLUMNS, *_element_columns(scene), "total", "in_contact"),
+            "/controller": (*MOTION_COLUMNS, *elements, "total", "in_contact"),
         },
         counts=_once(count for effect in named for count in effect.counts),
         named=named,
@@ -97,12 +100,6 @@ def multiplications(scene: Scene) -> int:
         moves = method.evaluations * (1 if method.chooses_steps else time.steps_per_tick)
         return moves * size * (size + 2)
     return (time.steps_per_tick + (2 if time.delay_steps % time.steps_per_tick else 1)) * size * (size + 1)
-
-
-def _memory(scene: Scene, named: tuple[Effect, ...]) -> dict[str, int]:
-    """Counts what effects remember; the states of those in the motion are integrated instead."""
-    counts = {effect.name: effect.states_in(scene) for effect in named if effect.stage != "motion"}
-    return {name: count for name, count in counts.items() if count}
 
 
 def _plant_step(chain: Chain, named: tuple[Effect, ...], scene: Scene) -> tuple[Step, ...]:
@@ -162,7 +159,3 @@ def _values(found: Any, key: str = "") -> str:
 
 def _once(entries: Iterable[str]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(entries))
-
-
-def _element_columns(scene: Scene) -> tuple[str, ...]:
-    return tuple(f"dissipation.{index}" for index in range(len(scene.dissipation)))

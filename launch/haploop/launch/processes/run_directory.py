@@ -143,7 +143,13 @@ def ask(run: LiveRun, verb: str, **arguments: Any) -> tuple[str, Message]:
     try:
         socket.connect(run.clock)
         socket.send(encode("COMMAND", verb, arguments))
-        _await_answer(socket, run)
+        for _ in range(_ANSWER_MS // _LOOK_MS):
+            if socket.poll(_LOOK_MS):
+                break
+            if not is_live(run):
+                raise RunNotFound(f"Run {run.id} ({run.title}) has ended.")
+        else:
+            raise RunNotFound(f"Run {run.id} ({run.title}) has not answered for {_ANSWER_MS // 1000} s.")
         frame = decode(socket.recv())
     except WireError as error:
         raise RunNotFound(f"Run {run.id} answered with something else: {error}") from error
@@ -155,15 +161,6 @@ def ask(run: LiveRun, verb: str, **arguments: Any) -> tuple[str, Message]:
     if not ok:
         raise CommandRefused(text)
     return text, data
-
-
-def _await_answer(socket: zmq.Socket[bytes], run: LiveRun) -> None:
-    for _ in range(_ANSWER_MS // _LOOK_MS):
-        if socket.poll(_LOOK_MS):
-            return
-        if not is_live(run):
-            raise RunNotFound(f"Run {run.id} ({run.title}) has ended.")
-    raise RunNotFound(f"Run {run.id} ({run.title}) has not answered for {_ANSWER_MS // 1000} s.")
 
 
 def _made(path: Path) -> float:

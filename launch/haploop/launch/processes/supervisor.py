@@ -108,8 +108,7 @@ class Supervisor:
                     self._look_at(child)
                     poller.unregister(child.died)
             self._check_deadlines()
-            logger = self._server.roster.own("logger")
-            if logger:
+            if logger := self._server.roster.own("logger"):
                 self._spec.on_progress(logger.status)
         for child in self._children.values():
             child.wait(2.0)
@@ -119,45 +118,35 @@ class Supervisor:
         ended = child.exit_description()
         given_up = time.monotonic() + (_LAST_WORDS_S if child.exited() else 0.0)
         self._server.serve()
-        while not self._is_done(child.role):
+        while not ((node := self._server.roster.own(child.role)) and node.done):
             if time.monotonic() > given_up:
                 raise RunFailed(f"The {child.role} {ended}; {self._where()}")
             self._server.socket.poll(20)
             self._server.serve()
 
-    def _is_done(self, role: str) -> bool:
-        node = self._server.roster.own(role)
-        return node is not None and node.done
-
-    def _discount_silence(self, now: float) -> None:
-        """Leaves the time in which the launcher itself did not listen out of every node's silence."""
-        held_up_s = now - self._looked
-        self._looked = now
+    def _check_deadlines(self) -> None:
+        now, roster = time.monotonic(), self._server.roster
+        held_up_s, self._looked = now - self._looked, now
         if held_up_s > _HELD_UP_S:
             self._started += held_up_s
-            self._server.roster.discount_silence(held_up_s)
-
-    def _check_deadlines(self) -> None:
-        now = time.monotonic()
-        self._discount_silence(now)
-        if not self._server.roster.joined():
+            roster.discount_silence(held_up_s)
+        if not roster.joined():
             if now - self._started > _START_DEADLINE_S:
-                missing = [role for role in self._children if not self._server.roster.own(role)]
+                missing = [role for role in self._children if not roster.own(role)]
                 raise RunFailed(f"The {' and the '.join(missing)} did not join within {_START_DEADLINE_S:g} s.")
             return
-        for node in self._server.roster.silent(now, self._deadline_s):
+        for node in roster.silent(now, self._deadline_s):
             if node.is_own:
                 raise RunFailed(
                     f"The {node.role} has not answered for {self._deadline_s:g} s and was ended; {self._where()} "
                     "A longer wait can be set with run.deadline."
                 )
-            if node.lossless and node.tick <= self._server.roster.slowest():
-                self._server.drop(
-                    node, f"Nothing was heard of you for {self._deadline_s:g} s; the run goes on without you."
-                )
+            if node.lossless and node.tick <= roster.slowest():
+                reason = f"Nothing was heard of you for {self._deadline_s:g} s; the run goes on without you."
+                self._server.drop(node, reason)
         if now >= self._probe_due:
             self._probe_due = now + _PROBE_S
-            self._server.probe(self._server.roster.silent(now, _PROBE_S))
+            self._server.probe(roster.silent(now, _PROBE_S))
 
     def _where(self) -> str:
         tick = self._server.roster.common_tick()

@@ -120,12 +120,9 @@ class Loop:
     def fail(self, reason: str) -> NoReturn:
         """Saves what there is and raises RunFailed."""
         self._hand_over()
-        self._close(reason)
+        self.finish(reason)
         raise RunFailed(reason)
 
-    def finish(self) -> Summary:
-        """Closes the books and returns the summary."""
-        return self._close("")
-
-    def _close(self, failed: str) -> Summary:
+    def finish(self, failed: str = "") -> Summary:
+        """Closes the books and returns the summary; ``failed`` says why the run could not go on."""
         return self._session.close(failed, self._plant.stop_reason, self._controller.recorder.trouble, 0)

@@ -116,11 +116,7 @@ class LoadedScene:
 
 
 def load(
-    path: str | Path,
-    values: Values = (),
-    *,
-    elements: Iterable[type[Element]] = (),
-    plugins: Iterable[str | Path] = (),
+    path: str | Path, values: Values = (), *, elements: Iterable[type[Element]] = (), plugins: Iterable[str | Path] = ()
 ) -> LoadedScene:
     """Reads a scene file.
 

@@ -87,11 +87,7 @@ class Result:
 
 
 def run(
-    scene: LoadedScene | str | Path,
-    out: str | Path | None = None,
-    *,
-    processes: bool = False,
-    pace: float = math.inf,
+    scene: LoadedScene | str | Path, out: str | Path | None = None, *, processes: bool = False, pace: float = math.inf
 ) -> Result:
     """Runs a scene to its end.
 

@@ -107,11 +107,11 @@ def _setting(
         except PydanticCustomError as error:
             layers.complain(key, error.message())
             return None
+        complaints: list[str] = []
         if name == DELAY and time:
-            complaints: list[str] = []
             whole_count(value, time.plant_rate, "It", "plant steps", complaints)
-            for sentence in complaints:
-                layers.complain(key, sentence)
+        for sentence in complaints:
+            layers.complain(key, sentence)
         return value
     return None
 

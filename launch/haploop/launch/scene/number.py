@@ -29,11 +29,6 @@ class Number:
 
     quantity: Quantity
 
-    @property
-    def whole(self) -> bool:
-        """True where only whole numbers are taken, read as int."""
-        return self.quantity.whole
-
     def read(self, value: Any) -> float:
         """Returns the number in SI units.
 
@@ -52,7 +47,7 @@ class Number:
             _refuse(str(error))
         if complaint:
             _refuse(f"It {complaint}.")
-        if not self.whole:
+        if not self.quantity.whole:
             return float(number)
         if number != int(number):
             _refuse(f"It must be {self.form}.")
@@ -66,7 +61,7 @@ class Number:
         words = " and ".join(f"{word} {bound:g}" for word, bound in bounds.items() if bound is not None)
         unit = f" in {q.unit}" if q.unit else ""
         text = f', or text with its unit such as "1 {q.unit}"' if q.unit else ""
-        return ("a whole number" if self.whole else "a number") + unit + (words and f", {words}") + text
+        return ("a whole number" if self.quantity.whole else "a number") + unit + (words and f", {words}") + text
 
     def __get_pydantic_core_schema__(self, _source: Any, _handler: Any) -> CoreSchema:
         return core_schema.no_info_plain_validator_function(self.read)
@@ -75,7 +70,7 @@ class Number:
         q = self.quantity
         bounds = {"minimum": q.at_least, "exclusiveMinimum": q.above, "maximum": q.at_most, "exclusiveMaximum": q.below}
         return {
-            "type": ["integer" if self.whole else "number", "string"],
+            "type": ["integer" if self.quantity.whole else "number", "string"],
             "description": ": ".join(filter(None, [q.about, self.form])),
             **{name: bound for name, bound in bounds.items() if bound is not None},
         }

@@ -6,16 +6,7 @@ from dataclasses import field, replace
 from typing import Annotated, Literal
 
 from haploop.protocol.quantity import si
-from haploop.protocol.scene.effects import (
-    Accelerometer,
-    Actuator,
-    Friction,
-    Grip,
-    Jitter,
-    Loss,
-    Noise,
-    Transmission,
-)
+from haploop.protocol.scene.effects import Accelerometer, Actuator, Friction, Grip, Jitter, Loss, Noise, Transmission
 from haploop.protocol.scene.estimators import Acceleration, Velocity
 from haploop.protocol.scene.hand_force import HandForce
 from haploop.protocol.scene.table import OpenTable, Table, Tables

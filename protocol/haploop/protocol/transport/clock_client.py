@@ -28,6 +28,7 @@ class ClockClient:
     """Speaks to the clock for one node.
 
     Attributes:
+        socket: the DEALER, for pollers.
         until: ticks before this one may be worked on.
         last: whether no further ticks will be granted.
         events: granted events not yet taken, (tick, event), in order.
@@ -38,18 +39,13 @@ class ClockClient:
 
     def __init__(self, context: zmq.Context[zmq.Socket[bytes]], role: str, address: str, secret: str) -> None:
         self.role, self._secret = role, secret
-        self._socket = open_socket(context, zmq.DEALER)
-        self._socket.connect(address)
+        self.socket = open_socket(context, zmq.DEALER)
+        self.socket.connect(address)
         self.until = 0
         self.last = False
         self.events: list[tuple[int, Event]] = []
         self.malformed = 0
         self.refused = ""
-
-    @property
-    def socket(self) -> zmq.Socket[bytes]:
-        """Returns the DEALER socket, for pollers."""
-        return self._socket
 
     def join(self, endpoints: dict[str, str], lossless: bool = True) -> Message:
         """Asks to take part, waits for the WELCOME and returns its fields by name.
@@ -58,8 +54,8 @@ class ClockClient:
             Refused: the clock said no, or said nothing for 20 s.
             Aborted: the run failed before it began.
         """
-        self._socket.send(encode("JOIN", self.role, self._secret, os.getpid(), endpoints, lossless))
-        while self._socket.poll(_JOIN_MS):
+        self.socket.send(encode("JOIN", self.role, self._secret, os.getpid(), endpoints, lossless))
+        while self.socket.poll(_JOIN_MS):
             frame = self._receive()
             if frame and frame.name == "WELCOME":
                 welcome = frame.as_dict()
@@ -71,12 +67,12 @@ class ClockClient:
 
     def poll(self) -> None:
         """Takes what the clock has sent, without waiting."""
-        while has_message(self._socket):
+        while has_message(self.socket):
             self._receive()
 
     def wait(self, tick: int) -> bool:
         """Waits for a message of the clock; after 0.2 s without one, reports WAITING and returns False."""
-        if self._socket.poll(REPORT_MS):
+        if self.socket.poll(REPORT_MS):
             self._receive()
             self.poll()
             return True
@@ -85,7 +81,7 @@ class ClockClient:
 
     def _receive(self) -> Frame | None:
         try:
-            frame = decode(self._socket.recv())
+            frame = decode(self.socket.recv())
         except WireError:
             self.malformed += 1
             return None
@@ -106,25 +102,25 @@ class ClockClient:
 
     def ready(self, tick: int) -> None:
         """Reports that all connections stand and that work starts at ``tick``."""
-        self._socket.send(encode("READY", tick))
+        self.socket.send(encode("READY", tick))
 
     def progress(self, tick: int, status: Message | None = None) -> None:
         """Reports that every tick before ``tick`` is done."""
-        self._socket.send(encode("PROGRESS", tick, status or {}))
+        self.socket.send(encode("PROGRESS", tick, status or {}))
 
     def waiting(self, tick: int, on: str) -> None:
         """Reports that this node is alive and waits for the process ``on``."""
-        self._socket.send(encode("WAITING", tick, on))
+        self.socket.send(encode("WAITING", tick, on))
 
     def ended(self, tick: int, reason: str) -> None:
         """Reports that the plant ended the run by itself."""
-        self._socket.send(encode("ENDED", tick, reason))
+        self.socket.send(encode("ENDED", tick, reason))
 
     def leave(self, name: str, *fields: Any) -> None:
         """Sends DONE, FAILED or LEAVE, allows it 1 s to go out, and closes."""
-        self._socket.send(encode(name, *fields))
-        self._socket.close(linger=1000)
+        self.socket.send(encode(name, *fields))
+        self.socket.close(linger=1000)
 
     def close(self) -> None:
         """Closes without a message."""
-        self._socket.close(linger=0)
+        self.socket.close(linger=0)
