@@ -21,6 +21,11 @@ class TelemetryGap(RuntimeError):
     """A block that does not follow the one before it."""
 
 
+def _check(block: Block, role: str, end: int) -> None:
+    if block["from_tick"] != end:
+        raise TelemetryGap(f"A {role} block from tick {end} was expected, but one from {block['from_tick']} came.")
+
+
 class PlantBuffer:
     """Plant states at every step from ``tick`` on; the last state is the start of what comes next.
 
@@ -39,10 +44,7 @@ class PlantBuffer:
         Raises:
             TelemetryGap: it does not start where the last one ended.
         """
-        if block["from_tick"] != self.end:
-            raise TelemetryGap(
-                f"A plant block from tick {self.end} was expected, but one from {block['from_tick']} came."
-            )
+        _check(block, "plant", self.end)
         keep = max(0, (self.end - self.tick) * self._steps)
         for name, data in block["columns"].items():
             new = as_float64(data)
@@ -107,10 +109,7 @@ class ControllerBuffer:
         Raises:
             TelemetryGap: it does not start where the last one ended.
         """
-        if block["from_tick"] != self.end:
-            raise TelemetryGap(
-                f"A controller block from tick {self.end} was expected, but one from {block['from_tick']} came."
-            )
+        _check(block, "controller", self.end)
         new = {name: as_float64(data) for name, data in block["columns"].items()}
         books = {e["book"]: new.pop(f"dissipation.{i}") for i, e in enumerate(block["elements"])}
         ticks, kept = block["ticks"], self.end - self.first

@@ -11,9 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from haploop.logger.books.chain_integrals import ChainForms
 from haploop.logger.books.one_mass import beyond_limits
-from haploop.logger.books.segments import BatchColumns, Columns, Segments, end_to_end
+from haploop.logger.books.segments import BatchColumns, ChainForms, Columns, Segments, end_to_end
 from haploop.logger.books.sums import sum_rows, sum_steps
 from haploop.logger.books.work import Displacement, by_interval
 from haploop.plant.chain.chain import Chain
@@ -60,10 +59,7 @@ class ChainBooks:
     def increments(
         self, first_step: int, columns: BatchColumns, moved: Displacement, commanded: Iterable[np.ndarray]
     ) -> Iterator[np.ndarray]:
-        """Yields the energy each interval adds to each book, J; see ``OneMassBooks.increments``.
-
-        ``columns`` of a batch with friction have ``pieces``: the pieces of every member that has any, by its place.
-        """
+        """Yields the energy each interval adds to each book, J; see ``OneMassBooks.increments``."""
         dx = moved.by_step.reshape(-1, *moved.by_step.shape[2:])
         for book in self.by_step(first_step, columns, dx, commanded):
             yield sum_steps(by_interval(book, self._n))

@@ -179,16 +179,15 @@ class OneMassBooks:
     Attributes:
         names: the books, in the order in which ``increments`` yields them; heats end in ``_heat``.
         params: their numbers.
-        is_limited: whether an actuator has limits.
     """
 
     def __init__(self, scene: Scene, time: Timebase, members: int | None = None) -> None:
         self.params = one_mass_params(scene, time, members)
         self._n, self._tau = time.steps_per_tick, make_hand_force(scene, time.plant_rate, members)
-        self.is_limited = scene.actuator is not None
+        self._is_limited = scene.actuator is not None
         dampers = self.params.mechanics.dampers
         self.names = ["hand_work", *(f"{name}_heat" for name in dampers), "kinetic", "spring"]
-        self.names += ["actuator"] * self.is_limited + [f"{name}_work" for name in constant_forces(scene)]
+        self.names += ["actuator"] * self._is_limited + [f"{name}_work" for name in constant_forces(scene)]
 
     def increments(
         self, first_step: int, columns: dict[str, np.ndarray], moved: Displacement, commanded: Iterable[np.ndarray]
@@ -211,7 +210,7 @@ class OneMassBooks:
         starts = (by_interval(column[:-1], n) for column in (x, v, columns["force"], tau))
         steps = Steps(*starts, rise=by_interval(rise, n) if rise.any() else None, dx=moved.by_step)
         ticks = Ticks(x[::n], v[::n], moved.by_tick)
-        limited = (by_interval(force, n) for force in commanded) if self.is_limited else None
+        limited = (by_interval(force, n) for force in commanded) if self._is_limited else None
         return increments(self.params, steps, ticks, limited, sum_steps)
 
     def select(self, kept: np.ndarray) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Hashable, Iterable, Sequence
+from collections.abc import Hashable, Sequence
 from typing import TYPE_CHECKING, Any
 
 import jax
@@ -13,9 +13,8 @@ from haploop.controller.recorder import Row
 from haploop.controller.tick import NoForce
 from haploop.launch.batch.batch import Batch
 from haploop.launch.batch.jax.block import RINGS, Block, BlockInputs, Carry, Rings, constants_of, numbers_of
-from haploop.launch.batch.jax.books import Forces
 from haploop.launch.batch.jax.programs import Call, Programs
-from haploop.launch.batch.jax.tick import BatchParams, BatchState, NotCompilable, TickInputs
+from haploop.launch.batch.jax.tick import BatchParams, BatchState, Forces, NotCompilable, TickInputs
 from haploop.launch.batch.jax.window import CompiledWindow
 from haploop.launch.batch.stacking import structure
 from haploop.logger.books.one_mass import OneMassBooks
@@ -40,9 +39,7 @@ class CompiledBatch(Batch):
     """``Batch`` that goes by itself only at its start and where a change comes, until all that is in effect is known.
 
     Args:
-        scenes: resolved scenes of one structure, with which a batch can be run.
-        kinds: element kinds at hand.
-        energy: whether to keep energy books.
+        scenes, kinds, energy: as for ``Batch``.
         size: of the arrays; places beyond the scenes are computed, unheeded.
         programs: where compiled blocks are kept.
 
@@ -107,14 +104,17 @@ class CompiledBatch(Batch):
 
     def _by_program(self, first: int, until: int) -> None:
         params, state = self._params(), self._state()
-        carry, rings, inputs = self._carry(first, state), self._rings(), self._inputs(params, first, first)
+        x = self._window.state.x.reshape(-1, self._time.steps_per_tick, len(self._ended))
+        rings = Rings(x, {name: self._window.state.rows[name] for name in RINGS})
+        carry, inputs = self._carry(first, state), self._inputs(params, first, first)
         call = self._call(params, state, (carry, rings, inputs))
         rings, done = self._programs.begun(rings, first), first
         before = deque[tuple[Carry, BlockInputs]](maxlen=-(-self._window.kept_ticks // BLOCK_TICKS) + 1)
         while done < until and not self._ended.all():
             end = min(done + BLOCK_TICKS, until)
             if done - first < len(self._window.state.rows["wall_position"]):  # beyond, what would be written is there
-                self._note_wall_position(done, end)
+                ring = self._window.state.rows["wall_position"]
+                ring[np.arange(done, end) % len(ring)] = self._controller.params.wall.position
             inputs = self._inputs(params, done, end)
             before.append((carry, inputs))
             carry, rings = call(carry, rings, inputs)
@@ -129,13 +129,12 @@ class CompiledBatch(Batch):
         self._controller.tick += done - first
         self._resume(carry, done)
 
-    def _again(self, call: Call, before: Iterable[tuple[Carry, BlockInputs]], rings: Rings) -> tuple[Carry, Rings]:
+    def _again(self, call: Call, before: Sequence[tuple[Carry, BlockInputs]], rings: Rings) -> tuple[Carry, Rings]:
         """Go through the last blocks once more, for the windows of members that ended; from now on all is kept."""
         self._keep_from = 0
-        carry = None
-        for start, inputs in before:
-            carry, rings = call(carry or start, rings, inputs._replace(keep_from=np.int64(0)))
-        assert carry
+        carry, _ = next(iter(before))
+        for _, inputs in before:
+            carry, rings = call(carry, rings, inputs._replace(keep_from=np.int64(0)))
         return carry, rings
 
     def _call(self, params: BatchParams, state: BatchState, args: tuple[Carry, Rings, BlockInputs]) -> Call:
@@ -249,20 +248,11 @@ class CompiledBatch(Batch):
             past[name][np.arange(tick - len(column), tick) % (len(column) + 1)] = rows_of(column, members)
         return past
 
-    def _rings(self) -> Rings:
-        """Returns the rings, read by windows, with which a program begins."""
-        x = self._window.state.x.reshape(-1, self._time.steps_per_tick, len(self._ended))
-        return Rings(x, {name: self._window.state.rows[name] for name in RINGS})
-
     def _last(self, carry: Carry, tick: int) -> list[dict[str, np.ndarray]]:
         """The forces of the ticks before ``tick`` of which a command has yet to act, or is the last to have acted."""
         past = {name: np.asarray(ring) for name, ring in carry.past.items()}
         size = len(past["command"])
         return [{name: ring[k % size].copy() for name, ring in past.items()} for k in range(tick - size + 1, tick)]
-
-    def _note_wall_position(self, first: int, end: int) -> None:
-        ring = self._window.state.rows["wall_position"]
-        ring[np.arange(first, end) % len(ring)] = self._controller.params.wall.position
 
     def _fetch(self, carry: Carry, rings: Rings, *, writable: bool) -> None:
         """Let the logger have what the program has kept."""

@@ -10,9 +10,17 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from haploop.launch.batch.jax.books import Forces, added_in_tick
 from haploop.launch.batch.jax.rows import Rows
-from haploop.launch.batch.jax.tick import BatchParams, BatchState, NotCompilable, TickInputs, TickOutputs, batch_tick
+from haploop.launch.batch.jax.tick import (
+    BatchParams,
+    BatchState,
+    Forces,
+    NotCompilable,
+    TickInputs,
+    TickOutputs,
+    added_in_tick,
+    batch_tick,
+)
 from haploop.protocol.trees import tree_leaves, tree_map, tree_unflatten
 
 # Rings of the window that are written at every tick, beside that of x.
@@ -161,17 +169,13 @@ class Block:
         if not self._book_names:
             return {}, command
         apart, now = partial(_apart, go), told.forces
+        wall = params.controller.wall if self._has_wall else None
         acting = [before[0], before[1] if params.lookahead else now]
 
         def added() -> Forces:
-            return added_in_tick(
-                params.books, self._book_names, told, acting, before[2], x_m_before, self._wall(params), apart
-            )
+            return added_in_tick(params.books, self._book_names, told, acting, before[2], x_m_before, wall, apart)
 
         return apart(added), now | command
-
-    def _wall(self, params: BatchParams) -> Any:
-        return params.controller.wall if self._has_wall else None
 
 
 def _as_before(before: list[Any], after: BatchState) -> list[Any]:
