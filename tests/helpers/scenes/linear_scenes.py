@@ -6,13 +6,14 @@ from typing import Any
 
 import numpy as np
 
+from haploop.protocol.scene.scene import Scene
 from helpers.scenes.least import scene
 
 DELAYS = (0, 3, 10, 13, 20, 37)
 RATES = ((10_000, 1_000), (10_000, 2_000), (8_000, 500), (5_000, 5_000), (12_000, 1_500))
 
 
-def linear_scene(seed: int) -> dict[str, Any]:
+def linear_scene(seed: int) -> Scene:
     """A scene whose loop in contact is a linear map, with all that such a map can have."""
     rng = np.random.default_rng(seed)
     return scene(**_plant(rng), **_estimators(rng), dissipation=_elements(rng))
