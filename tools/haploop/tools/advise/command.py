@@ -22,16 +22,7 @@ _STAGES = 9
 
 @dataclass(frozen=True)
 class Request:
-    """The arguments of ``haploop advise``.
-
-    Attributes:
-        device: name of a preset, or a scene file.
-        hand, delay, estimator: in place of the scene's own; None leaves them.
-        overrides: ``KEY=VALUE``.
-        plugins: files with elements.
-        workers: processes; as many as there are cores when None.
-        out: directory to write to; a new one below runs/ when None.
-    """
+    """The arguments of ``haploop advise``; what is None is left as it is, or made by default."""
 
     device: str
     hand: str | None

@@ -66,7 +66,7 @@ class Grid:
 
     Attributes:
         damping, mass: count and factor of a single element's parameter.
-        both: count and factor of each parameter of two elements, around what is best alone.
+        both: those of each parameter of two elements, around what is best alone.
         refined: how often points beside the best are tried.
         finalists: choices of each family that are compared by what they allow when the loop is not as it was taken for.
     """
@@ -140,9 +140,7 @@ class Gains:
     """The limits of one family.
 
     Attributes:
-        family: the element, or elements.
-        values: the parameters with the largest steady stiffness.
-        limit: that stiffness.
+        values, limit: the parameters with the largest steady stiffness, and that stiffness.
         tried: the limit of every choice of parameters.
         safe_values: the parameters that allow most when all else is a fifth more or less, in the worst way.
         alone: limit with one quantity a fifth more or less, with the best parameters.
@@ -166,13 +164,7 @@ class Gains:
 
 
 class Search:
-    """The search of all families by one set of tasks.
-
-    Args:
-        tasks: that judge a loop.
-        judge: runs them.
-        stage: called with the name of each stage of the search.
-    """
+    """The search of all families by one set of tasks; ``stage`` is called with the name of each stage."""
 
     def __init__(self, tasks: Tasks, judge: Judge, stage: Callable[[str], object] = lambda name: None) -> None:
         self.tasks, self.judge, self.stage = tasks, judge, stage

@@ -19,13 +19,12 @@ _NEAR = 1.2
 
 @dataclass(frozen=True)
 class Pace:
-    """The number of stiffnesses that a search tries in a round, and its tolerance.
+    """The stiffnesses that a search tries in a round, and its tolerance.
 
     Attributes:
         ladder: factors of the start in the first round.
         beyond: factors up or down from there, where the limit lies beyond.
-        between: stiffnesses between one that is steady and one that is not, in every later round.
-        tolerance: relative, between the last two of these.
+        between: how many between a steady one and one that is not in every later round, down to the tolerance.
         below: shares of the largest that must hold, too.
     """
 
@@ -36,9 +35,10 @@ class Pace:
     below: tuple[float, ...] = (0.75, 0.5, 0.25)
 
 
+_UP = tuple(2.0 ** (i / 2) for i in range(1, 11))
 # The pace of a search that starts from a guess.
 WIDE = {
-    "arrays": Pace(tuple(2.0 ** (i / 2) for i in range(-8, 9)), tuple(2.0 ** (i / 2) for i in range(1, 11)), 17, 0.02),
+    "arrays": Pace(tuple(2.0 ** (i / 2) for i in range(-8, 9)), _UP, 17, 0.02),
     "friction": Pace((1 / 8, 1 / 4, 1 / 2, 1.0, 2.0), (2.0,), 2, 0.05),
     "alone": Pace((1.0,), (2.0,), 1, 0.05),
 }
@@ -47,7 +47,7 @@ BEYOND = {way: replace(pace, ladder=(0.5, 1.0)) for way, pace in WIDE.items()} |
 # The pace near a limit that is known about, as is what lies below it. With friction, bodies that differ share
 # no array, and what swings for long before it rests costs as much in one as alone: few runs, one after the other.
 NEAR = {
-    "arrays": Pace(tuple(1.1 * 0.92**i for i in range(16)), tuple(2.0 ** (i / 2) for i in range(1, 11)), 17, 0.02, ()),
+    "arrays": Pace(tuple(1.1 * 0.92**i for i in range(16)), _UP, 17, 0.02, ()),
     "friction": Pace((0.85,), (1.3,), 1, 0.1, ()),
     "alone": Pace((0.85,), (1.3,), 1, 0.1, ()),
 }
@@ -106,11 +106,9 @@ def largest_steady(
 
     Args:
         cells: by any name.
-        judge: from scenes and whether each is run to the end of its swings to judgements.
-        pace: how much in a round, and how near.
+        judged: from scenes and whether each is run to the end of its swings to judgements.
         rivals: of a cell's name, of which cells only one counts: the one with the largest limit, or the smallest where
             ``softest``. The others are narrowed no further than it takes to tell.
-        softest: see ``rivals``.
         reached: of a set of rivals what another of them is known to bear, N/m.
     """
     searches = {name: _Search(loops, pace) for name, loops in cells.items()}
@@ -129,13 +127,10 @@ def largest_steady(
             for k in search.wanted
             for scene in cells[name].make(k, search.thorough)
         ]
-        patient = [asking[name].thorough for name, _, _ in runs]
-        fails, presumed = set[tuple[Any, float]](), set[tuple[Any, float]]()
-        for (name, k, _), judgement in zip(runs, judged([scene for *_, scene in runs], patient), strict=True):
-            if not judgement.steady:
-                fails.add((name, k))
-            if judgement.presumed:
-                presumed.add((name, k))
+        judgements = judged([scene for *_, scene in runs], [asking[name].thorough for name, _, _ in runs])
+        looked = [(name, k, judgement) for (name, k, _), judgement in zip(runs, judgements, strict=True)]
+        fails = {(name, k) for name, k, judgement in looked if not judgement.steady}
+        presumed = {(name, k) for name, k, judgement in looked if judgement.presumed}
         for name, search in asking.items():
             is_sure = search.thorough or cells[name].is_one_run
             holds = [(name, k) not in fails for k in search.wanted]
@@ -154,12 +149,7 @@ def _best_ends(
 
 
 class _Search:
-    """The search for one limit.
-
-    Attributes:
-        wanted: the stiffnesses to try next, N/m; none when the search is over.
-        thorough: whether by all that must be steady.
-    """
+    """The search for one limit: the stiffnesses to try next (none when it is over), and whether thoroughly."""
 
     def __init__(self, loops: StiffnessQuery, pace: Pace) -> None:
         self._pace, self._most = pace, loops.most_N_m

@@ -6,8 +6,10 @@ import itertools
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial, reduce
+from typing import Any
 
-from haploop.protocol.scene.scene import Scene
+from haploop.protocol.scene.scene import ElementTable, Scene
 from haploop.tools.advise.gains import Gains, Search, Values
 from haploop.tools.advise.judge import execution_mode
 from haploop.tools.advise.largest import LEAST_N_M, NEAR, WIDE, Limit, StiffnessQuery, largest_steady
@@ -29,14 +31,12 @@ class Recommendation:
         stiffness_N_m: steady in every corner that was tried; 0 where none is.
         corners: how many loops it was tried in.
         nearest: the smallest change beyond a fifth at which it is no longer steady; None where none of those tried.
-        farthest: the largest change tried.
     """
 
     gains: Gains
     stiffness_N_m: float
     corners: int
     nearest: Change | None
-    farthest: Change | None
 
 
 class MarginSearch:
@@ -76,7 +76,8 @@ class MarginSearch:
         ranked = sorted(gains.tried, key=lambda values: (-gains.tried[values].stiffness_N_m, values))
         chosen = ranked[:1]
         while len(chosen) < self._search.grid.finalists:
-            gentler = [values for values in ranked if _is_gentler(values, chosen[-1])]
+            # The last parameter, the inertia where there is one, is a quarter smaller at least.
+            gentler = [values for values in ranked if values and values[-1] <= 0.75 * chosen[-1][-1]]
             if not gentler or not gains.tried[gentler[0]].stiffness_N_m:
                 break
             chosen.append(gentler[0])
@@ -110,24 +111,22 @@ class MarginSearch:
         comes out above, that is tried, too.
         """
         self._search.stage("every corner")
-        every = [_same, *(lambda scene, c=corner: scale_quantities(scene, c) for corner in corners(self._tasks.first))]
+        every = [_same, *(partial(scale_quantities, factors=factors) for factors in corners(self._tasks.first))]
         proved: dict[int, float] = {}
+
+        def bears(gains: Gains) -> float:
+            """Returns what a family is known, or likely, to bear in its worst corner."""
+            return proved.get(id(gains), gains.safe.stiffness_N_m)
+
         while True:
-            best = found[0]
-            for gains in found[1:]:
-                if _allows(gains, proved) > _WORTH * _allows(best, proved):
-                    best = gains
+            best = reduce(lambda best, gains: gains if bears(gains) > _WORTH * bears(best) else best, found)
             if id(best) in proved:
                 break
             self._known_well(best)
             proved[id(best)] = holds = self._everywhere(best, every)
             if holds < rounded_down(best.safe.stiffness_N_m):
                 best.safe = Limit(holds, best.safe.stiffness_N_m)
-        changes = larger_changes(self._tasks.first) if proved[id(best)] else []
-        nearest = self._nearest(best, proved[id(best)], changes)
-        return Recommendation(
-            best, proved[id(best)], len(every), nearest, max(changes, key=lambda c: c.size, default=None)
-        )
+        return Recommendation(best, proved[id(best)], len(every), self._nearest(best, proved[id(best)]))
 
     def _everywhere(self, gains: Gains, every: list[Vary]) -> float:
         """Returns the largest stiffness of two digits that was seen to hold in every corner; 0 for none.
@@ -148,17 +147,9 @@ class MarginSearch:
 
     def _failing(self, gains: Gains, stiffness: float, changes: list[Vary]) -> list[Vary]:
         """Returns the changes under which a wall, or where that costs little a softer one, is not steady."""
-        elements = gains.family.elements(gains.safe_values)
         walls = [stiffness, *(max(LEAST_N_M, stiffness * share) for share in self._below)]
-        runs = [
-            (i, run)
-            for i, change in enumerate(changes)
-            for k in walls
-            for run in self._tasks.make_runs(k, elements, change)
-        ]
-        judged = self._search.judge.judge([run for _, run in runs])
-        failed = {i for (i, _), judgement in zip(runs, judged, strict=True) if not judgement.steady}
-        return [change for i, change in enumerate(changes) if i in failed]
+        looks = [(change, k) for change in changes for k in walls]
+        return list(dict.fromkeys(self._unsteady(looks, gains.family.elements(gains.safe_values))))
 
     def _known_well(self, gains: Gains) -> None:
         """Finds the limit of the choice that is safe, which may have been left off as not the best."""
@@ -167,19 +158,25 @@ class MarginSearch:
             known = self._search.limits([(gains.family, values)], max(LEAST_N_M, gains.tried[values].stiffness_N_m))
             gains.tried[values] = known[gains.family, values]
 
-    def _nearest(self, gains: Gains, stiffness: float, changes: list[Change]) -> Change | None:
-        """Returns the smallest change at which a stiffness is no longer steady."""
+    def _nearest(self, gains: Gains, stiffness: float) -> Change | None:
+        """Returns the smallest change at which a stiffness, unless it is 0, is no longer steady."""
         self._search.stage("the nearest instability")
         elements = gains.family.elements(gains.safe_values)
+        changes = larger_changes(self._tasks.first) if stiffness else []
         for _, alike in itertools.groupby(sorted(changes, key=_size), key=_size):
-            runs = [
-                (change, run) for change in alike for run in self._tasks.make_runs(stiffness, elements, change.apply)
-            ]
-            judged = self._search.judge.judge([run for _, run in runs])
-            failed = [change for (change, _), judgement in zip(runs, judged, strict=True) if not judgement.steady]
-            if failed:
+            if failed := self._unsteady([(change, stiffness) for change in alike], elements):
                 return failed[0]
         return None
+
+    def _unsteady(self, looks: Sequence[tuple[Any, float]], elements: Sequence[ElementTable]) -> list[Any]:
+        """Returns the changes, or variations, of (change, stiffness) for which some run is not steady, in order."""
+        runs = [
+            (change, run)
+            for change, k in looks
+            for run in self._tasks.make_runs(k, elements, change.apply if isinstance(change, Change) else change)
+        ]
+        judged = self._search.judge.judge([run for _, run in runs])
+        return [change for (change, _), judgement in zip(runs, judged, strict=True) if not judgement.steady]
 
 
 def _same(scene: Scene) -> Scene:
@@ -190,21 +187,8 @@ def _likely_worst(gains: Gains) -> list[Vary]:
     """Returns the worst change, and the worst signs of all together, with every mass also the other way."""
     corner = _corner(gains.alone)
     flipped = {name: 2.0 - factor if name.endswith("mass") else factor for name, factor in corner.items()}
-    together: list[Vary] = [
-        lambda scene: scale_quantities(scene, corner),
-        lambda scene: scale_quantities(scene, flipped),
-    ]
-    return together + ([gains.worst.apply] if gains.worst else [])
-
-
-def _is_gentler(values: Values, than: Values) -> bool:
-    """Tells whether the last parameter, the inertia where there is one, is a quarter smaller at least."""
-    return bool(values) and values[-1] <= 0.75 * than[-1]
-
-
-def _allows(gains: Gains, proved: dict[int, float]) -> float:
-    """Returns the stiffness that a family is known, or likely, to bear in its worst corner."""
-    return proved.get(id(gains), gains.safe.stiffness_N_m)
+    together = [partial(scale_quantities, factors=factors) for factors in (corner, flipped)]
+    return [*together, *([gains.worst.apply] if gains.worst else [])]
 
 
 def rounded_down(value: float) -> float:
@@ -223,7 +207,6 @@ def _corner(alone: dict[Change, Limit]) -> dict[str, float]:
     """Returns of every quantity the factor that allows less by itself."""
     worst: dict[str, Change] = {}
     for change, limit in alone.items():
-        before = worst.get(change.quantity)
-        if before is None or limit.stiffness_N_m < alone[before].stiffness_N_m:
+        if limit.stiffness_N_m < alone[worst.setdefault(change.quantity, change)].stiffness_N_m:
             worst[change.quantity] = change
     return {name: change.factor for name, change in worst.items()}

@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from haploop.tools.advise.buzz import Ablation, Buzz
     from haploop.tools.advise.gains import Gains
     from haploop.tools.advise.largest import Limit
-    from haploop.tools.linear.bounds import Bound
 
 _LONGEST_WORD = len("unidirectional")
 _READING = (
@@ -118,21 +117,14 @@ def bounds_table(found: Advice) -> Table:
     for index in columns:
         gains = found.gains[index]
         table.add_column(f"{gains.family.name}\n{gains.family.words(gains.values)}", justify="right")
-    exact = [found.exact_N_m[index] for index in columns]
-    if any(value is not None for value in exact):
-        table.add_row(
-            "exact map, ρ(M) = 1", "stability", *("–" if value is None else format_stiffness(value) for value in exact)
-        )
-    for row in zip(*(found.bounds[index] for index in columns), strict=True):
-        if any(bound.applies for bound in row):
-            table.add_row(row[0].name, row[0].kind, *map(_bound, row))
+    rows = [("exact map, ρ(M) = 1", "stability", [found.exact_N_m[index] for index in columns])]
+    for bounds in zip(*(found.bounds[index] for index in columns), strict=True):
+        rows.append((bounds[0].name, bounds[0].kind, [bound.stiffness_N_m for bound in bounds]))
+    for name, kind, stiffnesses in rows:
+        if any(value is not None for value in stiffnesses):
+            cells = ["–" if value is None else format_stiffness(value) if value else "none" for value in stiffnesses]
+            table.add_row(name, kind, *cells)
     return table
-
-
-def _bound(bound: Bound) -> str:
-    return (
-        "–" if bound.stiffness_N_m is None else format_stiffness(bound.stiffness_N_m) if bound.stiffness_N_m else "none"
-    )
 
 
 def why_table(buzz: Buzz) -> RenderableType:
@@ -144,28 +136,20 @@ def why_table(buzz: Buzz) -> RenderableType:
     for name in ("swing", "largest\nsteady"):
         table.add_column(name, justify="right", no_wrap=True)
     table.add_column("its part\nof the leak", justify="right")
-    table.add_row(
-        "as it is", "", _verdict(buzz.steady, buzz.verdict), _swing(buzz.oscillation_m), format_limit(buzz.largest), ""
-    )
+    table.add_row("as it is", "", *_ran(buzz), "")
     table.add_section()
-    every = [*buzz.alone, *buzz.together, *([buzz.without_all] if buzz.without_all else [])]
-    for without in every:
-        limit = format_limit(without.largest) if without.largest else "–"
-        swing = _swing(without.oscillation_m)
-        words = without.instead if len(without.without) == 1 else ""
-        verdict = _verdict(without.steady, without.verdict)
-        table.add_row(" and ".join(without.without), words, verdict, swing, limit, _format_share(without))
+    for one in [*buzz.alone, *buzz.together, *([buzz.without_all] if buzz.without_all else [])]:
+        words = one.instead if len(one.without) == 1 else ""
+        table.add_row(" and ".join(one.without), words, *_ran(one), _format_share(one))
     return Group(Text(), Text(head, style="bold"), table)
 
 
-def _verdict(steady: bool, verdict: str) -> Text:
-    word = "dies away" if steady and verdict != "steady" else verdict
-    return Text(word, style=verdict_style("steady" if steady else verdict))
-
-
-def _swing(oscillation_m: float) -> str:
-    """Formats a swing, peak to peak; 0 where it is less than an atom."""
-    return amount(oscillation_m if oscillation_m >= 1e-10 else 0.0, "m")
+def _ran(run: Buzz | Ablation) -> tuple[Text, str, str]:
+    """Returns verdict, swing peak to peak (0 where it is less than an atom) and largest steady stiffness of a row."""
+    word = "dies away" if run.steady and run.verdict != "steady" else run.verdict
+    verdict = Text(word, style=verdict_style("steady" if run.steady else run.verdict))
+    swing = amount(run.oscillation_m if run.oscillation_m >= 1e-10 else 0.0, "m")
+    return verdict, swing, format_limit(run.largest) if run.largest else "–"
 
 
 def _table(*names: str) -> Table:

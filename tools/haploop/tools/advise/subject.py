@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -58,7 +59,7 @@ class Subject:
 def make_subject(
     device: str,
     hand: str | None,
-    delay: str | None,
+    delay: str | float | None,
     estimator: str | None,
     overrides: Sequence[str],
     kinds: Mapping[str, type[Element]],
@@ -82,7 +83,9 @@ def make_subject(
         task = {"title": path.stem, "duration": 1.0, "wall": {"position": 0.0, "stiffness": 1000.0}}
         layers.lay(task, str(path))
     if delay is not None:
-        layers.lay({"clock": {"round_trip_delay": _number_or_text(delay)}}, "--delay")
+        with contextlib.suppress(ValueError):
+            delay = float(delay)
+        layers.lay({"clock": {"round_trip_delay": delay}}, "--delay")
     scene = resolved(layers, overrides, kinds)
     if (delay_s := scene.clock.round_trip_delay) > MOST_DELAY_S:
         raise InvalidRequest(_TOO_LATE.format(delay_s, MOST_DELAY_S))
@@ -143,13 +146,6 @@ def _lay_estimator(layers: Layers, name: str) -> None:
         if name != "accelerometer" or table == "acceleration":
             layers.data.pop(table, None)
     layers.lay(ESTIMATORS[name], "--estimator")
-
-
-def _number_or_text(given: str) -> float | str:
-    try:
-        return float(given)
-    except ValueError:
-        return given
 
 
 def _unknown(what: str, name: str, allowed: list[str], other: str) -> str:

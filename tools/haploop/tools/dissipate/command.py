@@ -29,10 +29,7 @@ class Request:
 
     Attributes:
         path: a text file, a run's directory or its log.
-        selection: elements, wall and estimates.
-        layout: columns of a text file.
         delay_s: delay of the forces; None for none, or for that of the run.
-        plugins: Python files with elements.
         out: file of the figure; beside the recording when None.
     """
 

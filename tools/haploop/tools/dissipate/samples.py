@@ -64,7 +64,8 @@ class Notes:
 
     def gap(self, from_s: float, to_s: float) -> None:
         """Counts a gap between two times."""
-        self.gaps, self.missing_s = self.gaps + 1, self.missing_s + to_s - from_s
+        self.gaps += 1
+        self.missing_s += to_s - from_s
         if len(self.gaps_s) < 100:
             self.gaps_s.append((from_s, to_s))
 
@@ -73,7 +74,6 @@ class Recording(Protocol):
     """A recording that can be read once.
 
     Attributes:
-        name: of the recording.
         period_s: the control period T.
         delay_s: delay after which a force acts on the device.
         between: what the motion between samples is taken from: "plant steps" or "straight lines".
@@ -88,6 +88,4 @@ class Recording(Protocol):
     recorded: frozenset[str]
     notes: Notes
 
-    def samples(self) -> Iterator[Samples]:
-        """Yields all samples, in pieces of any length."""
-        ...
+    def samples(self) -> Iterator[Samples]: ...  # in pieces of any length

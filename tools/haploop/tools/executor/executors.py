@@ -6,7 +6,6 @@ import contextlib
 import os
 import signal
 import threading
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator
 from concurrent import futures
 from concurrent.futures import BrokenExecutor, Future, ProcessPoolExecutor
@@ -26,7 +25,7 @@ class ExecutorError(Exception):
     """No worker can be had; the message says why and what to do."""
 
 
-class Executor(ABC):
+class Executor:
     """Runs calls; a context manager, at whose end the calls in flight are waited for, or dropped after an error.
 
     Attributes:
@@ -39,17 +38,15 @@ class Executor(ABC):
     room: int
     worker_died: tuple[type[BaseException], ...]
 
-    @abstractmethod
     def submit(self, call: Callable[..., Any], *arguments: Any) -> Future[Any]:
         """Has a call run; starts the workers when there are none."""
+        raise NotImplementedError
 
-    @abstractmethod
     def renew(self) -> None:
-        """Replaces workers that died."""
+        """Replaces workers that died, where nobody else does."""
 
-    @abstractmethod
     def close(self, at_once: bool) -> None:
-        """Ends the workers: after the calls in flight, or now."""
+        """Ends the workers, if there are any: after the calls in flight, or now."""
 
     def __enter__(self) -> Self:
         return self
@@ -80,13 +77,9 @@ def map_parallel(
     items: Iterable[Item],
     advance: Callable[[], object] = lambda: None,
 ) -> list[Answer]:
-    """Calls a function on each item and returns the answers in the order of the items.
+    """Calls an importable function on each item, all under way at once; returns the answers in order.
 
-    Args:
-        executor: runs the calls.
-        call: a function that can be imported.
-        items: one a call; all are under way at once.
-        advance: called after each answer, in any thread.
+    ``advance`` is called after each answer, in any thread.
     """
     submitted: list[Future[Answer]] = []
     for item in items:
@@ -111,18 +104,11 @@ class InlineExecutor(Executor):
             future.set_exception(error)
         return future
 
-    def renew(self) -> None:
-        """Does nothing: no worker dies without this process."""
-
-    def close(self, at_once: bool) -> None:
-        """Does nothing: no call is in flight."""
-
 
 class ProcessExecutor(Executor):
     """Processes of this machine, started anew (spawned), one thread each.
 
-    They hold one end of a pipe; when the other is closed, by this object or by the end of this process, however it
-    ended, they end at once.
+    They hold one end of a pipe and end at once when the other is closed, by this object or the end of this process.
     """
 
     worker_died: tuple[type[BaseException], ...] = (BrokenExecutor,)
@@ -130,8 +116,7 @@ class ProcessExecutor(Executor):
     def __init__(self, count: int) -> None:
         self.count, self.room = count, 2 * count
         self._executor: futures.Executor | None = None
-        # Workers hold the first end, this process alone the second.
-        self._pipe: tuple[Connection, Connection] | None = None
+        self._pipe: tuple[Connection, Connection] | None = None  # the workers' end, and ours
 
     def submit(self, call: Callable[..., Any], *arguments: Any) -> Future[Any]:
         with _one_thread_each():  # processes may be started at any submit
@@ -193,9 +178,6 @@ class DaskExecutor(Executor):
     def submit(self, call: Callable[..., Any], *arguments: Any) -> Future[Any]:
         return self._executor.submit(call, *arguments)
 
-    def renew(self) -> None:
-        """Leaves it to the scheduler."""
-
     def close(self, at_once: bool) -> None:
         self._executor.shutdown(wait=not at_once)
         self._client.close()
@@ -203,14 +185,14 @@ class DaskExecutor(Executor):
 
 def _begin(held: Connection) -> None:
     """Makes this process a worker: Ctrl-C is for the one that started it, and without that one it ends."""
+
+    def end_with() -> None:
+        with contextlib.suppress(EOFError, OSError):
+            held.recv()
+        os._exit(1)
+
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    threading.Thread(target=_end_with, args=(held,), daemon=True).start()
-
-
-def _end_with(held: Connection) -> None:
-    with contextlib.suppress(EOFError, OSError):
-        held.recv()
-    os._exit(1)
+    threading.Thread(target=end_with, daemon=True).start()
 
 
 @contextlib.contextmanager

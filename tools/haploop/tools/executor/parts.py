@@ -38,12 +38,11 @@ class _Pace:
 
 
 class Sizes:
-    """Finds the number of items the next part should have.
+    """Finds the number of items the next part should have, of ``most``, which memory is proportional to.
 
     Args:
         workers: that share the parts.
         count: of all items, so that no worker has to wait long for another in the end; None where it is not known.
-        most: items in a part, which memory is proportional to.
     """
 
     def __init__(self, workers: int, count: int | None = None, most: int = MOST) -> None:

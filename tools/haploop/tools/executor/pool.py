@@ -47,12 +47,11 @@ class Pool:
     def results(
         self, scenes: Iterable[Scene], plugins: Sequence[Path] = (), *, energy: bool = True, trajectories: bool = False
     ) -> Iterator[tuple[int, Summary]]:
-        """Yields the index of each scene and its result, in the order in which they come in.
+        """Yields the index of each resolved scene and its result, in the order in which they come in.
 
-        A scene that fails, or kills its worker, has a result with its reason.
+        Scenes are taken a few thousand at a time; one that fails, or kills its worker, has a result with its reason.
 
         Args:
-            scenes: resolved; taken a few thousand at a time.
             plugins: files that define elements.
             energy, trajectories: as of ``haploop.launch.batch.run.batch_results``.
 
@@ -77,7 +76,6 @@ class Pool:
         itself, and one that kills its worker again is halved until the culprit stands alone.
 
         Args:
-            work: to do.
             groups: of items that belong together; taken when there is room for them.
             count: of all items, where it is known.
             stop: asked before each part; True ends the work after those under way.

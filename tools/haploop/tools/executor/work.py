@@ -28,7 +28,7 @@ def _whole_result(_item: Any, _scene: Scene | None, result: Summary) -> Summary:
 
 @dataclass(frozen=True)
 class Work:
-    """A job that is sent to workers with every part: nothing but values and functions that can be imported.
+    """A job that is sent to workers with every part: nothing but values and importable functions.
 
     Attributes:
         make: from an item to its resolved scene, which it is by default; an error that it raises is the reason why the

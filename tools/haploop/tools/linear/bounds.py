@@ -27,7 +27,6 @@ class Bound:
 
     Attributes:
         name: authors and year, short enough for a label.
-        source: where it is published.
         formula: in the field's letters: K, B virtual and b physical; T the period, td the delay.
         domain: for what it was derived.
         kind: passive with whatever passive hand, or stable with the scene's own.

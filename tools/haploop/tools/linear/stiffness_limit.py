@@ -28,12 +28,7 @@ _DEPTH_OF_MORE_STATES_M = 6e-5
 
 @dataclass(frozen=True)
 class StiffnessLimit:
-    """A limit and what runs beside it came to.
-
-    Attributes:
-        stiffness_N_m: rho(M) = 1.
-        below, above: the verdicts at 0.97 and 1.03 of it.
-    """
+    """A limit, rho(M) = 1, and the verdicts of the runs at 0.97 and 1.03 of it."""
 
     stiffness_N_m: float
     below: str

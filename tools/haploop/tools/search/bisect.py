@@ -17,10 +17,7 @@ Bracket = tuple[float, float]
 
 @dataclass(frozen=True)
 class Tolerance:
-    """The width down to which a bracket is halved: absolute, or relative to its greater end.
-
-    With neither, a bracket is halved down to neighbouring floats.
-    """
+    """The width down to which a bracket is halved: absolute, or relative to its greater end; 0 for floats."""
 
     absolute: float = 0.0
     relative: float = 0.0
@@ -49,10 +46,8 @@ def bisect_many(
     """Halves the brackets of all members in common rounds, one value of each member a round.
 
     Args:
-        brackets: by member.
         holds: from values by member to whether the property holds there; None, or no answer, ends the search of that
             member with the bracket it has.
-        tolerance: of every bracket.
         most_rounds: halvings at most; as many as the tolerance takes when None.
     """
     narrowed = dict(brackets)

@@ -1,8 +1,8 @@
-"""Random search of a space of choices and numbers: draw, refine around the best, and look at the neighbours of those.
+"""Random search of the least distance: draw points, refine around the best, and look at the neighbours of those.
 
-A search minimises a distance. Points of one structure (one option of every choice) are drawn and evaluated in groups,
-so that an evaluation can treat them together. The same space, effort and seed give the same points, however the groups
-are spread over processes, since all points of a stage are drawn before any of them is evaluated.
+Points of one structure (one option of every choice) are drawn and evaluated in groups, so that an evaluation can treat
+them together. All points of a stage are drawn before any is evaluated: they are the same however groups are spread over
+processes.
 """
 
 from __future__ import annotations
@@ -19,13 +19,7 @@ Row = dict[str, Any]
 
 @dataclass(frozen=True)
 class Point:
-    """A point of a space.
-
-    Attributes:
-        choices: an option by the key of each choice.
-        numbers: a value by the key of each number.
-        seed: for what is random in the evaluation; 0 in a space that is not ``seeded``.
-    """
+    """A point of a space: options and numbers by key, and a seed where the space is ``seeded``."""
 
     choices: dict[str, Any]
     numbers: dict[str, float]
@@ -69,11 +63,7 @@ class Space:
     seeded: bool = False
 
     def draw(self, rng: np.random.Generator, structures: int, each: int) -> list[list[Point]]:
-        """Draws structures, and a group of ``each`` points for every one of them.
-
-        Every option of a choice comes up equally often, but for the remainder, since the column of its options is
-        shuffled. So what depends on one choice is not the doing of a few structures alone.
-        """
+        """Draws structures, and a group of ``each`` points for every one; every option comes up equally often."""
         columns = {key: [options[i % len(options)] for i in range(structures)] for key, options in self.choices.items()}
         for column in columns.values():
             rng.shuffle(column)
@@ -83,12 +73,9 @@ class Space:
     def neighbours(
         self, rng: np.random.Generator, point: Point, spread: float, count: int, *, shifted: bool = True
     ) -> list[Point]:
-        """Draws a group of points near one.
+        """Draws a group of points near one: each number times e^(spread xi), xi normal, kept within its bounds.
 
-        Each number is multiplied by e^(spread xi), xi normal, and kept within its bounds.
-
-        Args:
-            shifted: whether choices with a scale are shifted by 10 spread xi steps, the same for the whole group.
+        If ``shifted``, choices with a scale are shifted by 10 spread xi steps, the same for the whole group.
         """
         choices = dict(point.choices)
         for key, scale in self.scales.items() if shifted else ():
@@ -99,13 +86,13 @@ class Space:
     def _numbers(self, rng: np.random.Generator) -> dict[str, float]:
         return {key: math.exp(rng.uniform(math.log(low), math.log(high))) for key, (low, high) in self.bounds.items()}
 
-    def _near(self, rng: np.random.Generator, numbers: Mapping[str, float], spread: float) -> dict[str, float]:
+    def _near(self, rng: np.random.Generator, numbers: dict[str, float], spread: float) -> dict[str, float]:
         moved = {key: value * math.exp(spread * rng.standard_normal()) for key, value in numbers.items()}
         return {key: float(np.clip(value, *self.bounds[key])) for key, value in moved.items()}
 
     def _point(self, rng: np.random.Generator, choices: dict[str, Any], numbers: dict[str, float]) -> Point:
-        point = Point(choices, numbers).rounded(self.digits) if self.digits else Point(choices, numbers)
-        return replace(point, seed=int(rng.integers(2**31))) if self.seeded else point
+        point = Point(choices, numbers, int(rng.integers(2**31)) if self.seeded else 0)
+        return point.rounded(self.digits) if self.digits else point
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -141,13 +128,7 @@ class Trial(NamedTuple):
 
 
 class Found(NamedTuple):
-    """The outcome of a search.
-
-    Attributes:
-        trials: of the stages "random" and "refined", in the order in which they were drawn.
-        best: the finalist whose distance, with the mean of its neighbours' added, is the least.
-        neighbours: of the best, of the stage "neighbour".
-    """
+    """The trials as they were drawn, the finalist that is best with the mean of its neighbours added, and those."""
 
     trials: list[Trial]
     best: Trial
@@ -172,13 +153,13 @@ def random_search(
     """Searches a space for the point with the least distance.
 
     Of one structure no more than a third of the best are refined, so that one good structure does not hide others. A
-    point that is good only just there is worth less than one whose neighbours are good, too: ``Found.best``.
+    point that is good only just there is worth less than one whose neighbours are good, too.
 
     Args:
         evaluate: returns a row for each point of a group; must be importable where processes evaluate.
         distance: of a row, to be minimised.
         tie: decides between finalists at the same distance.
-        evaluate_all: evaluates many groups, in parallel perhaps; its first argument is the stage.
+        evaluate_all: evaluates many groups, in parallel perhaps; one after another by default.
     """
     rng = np.random.default_rng(seed)
 
@@ -202,10 +183,7 @@ def random_search(
 
 
 def evaluated(
-    stage: str,
-    evaluate: Evaluate,
-    groups: Sequence[Group],
-    evaluate_all: EvaluateAll = evaluate_in_turn,
+    stage: str, evaluate: Evaluate, groups: Sequence[Group], evaluate_all: EvaluateAll = evaluate_in_turn
 ) -> list[Trial]:
     """Evaluates groups of points and returns a trial for each point, in order."""
     rows = evaluate_all(stage, evaluate, groups)
