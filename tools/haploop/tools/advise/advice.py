@@ -5,23 +5,21 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from haploop.controller.dissipation import Element
+from haploop.protocol.scene.scene import Scene
 from haploop.tools.advise.buzz import STEPS_BEYOND, Buzz, explain_buzz
 from haploop.tools.advise.gains import Gains, Search
+from haploop.tools.advise.judge import Judge
+from haploop.tools.advise.largest import Limit
 from haploop.tools.advise.margins import MarginSearch, Recommendation
+from haploop.tools.advise.subject import Subject
 from haploop.tools.advise.tasks import Tasks, make_tasks, with_wall
 from haploop.tools.advise.variations import DELAY, SHARE, delay_s, uncertain_quantities
 from haploop.tools.linear.bounds import Bound, bounds_of
 from haploop.tools.linear.linearity import is_linear
 from haploop.tools.linear.one_tick import NeverStable, OneTickMap
-
-if TYPE_CHECKING:
-    from haploop.controller.dissipation import Element
-    from haploop.protocol.scene.scene import Scene
-    from haploop.tools.advise.judge import Judge
-    from haploop.tools.advise.largest import Limit
-    from haploop.tools.advise.subject import Subject
 
 # An advice as one JSON object.
 AdviceData = dict[str, Any]

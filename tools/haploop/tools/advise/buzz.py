@@ -6,17 +6,13 @@ import itertools
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
+from haploop.logger.summary import Summary
 from haploop.protocol.scene.paths import value_at, with_value
-from haploop.tools.advise.judge import Judgement, execution_mode
+from haploop.protocol.scene.scene import Scene
+from haploop.tools.advise.judge import Judge, Judgement, execution_mode
 from haploop.tools.advise.largest import LEAST_N_M, WIDE, Limit, StiffnessQuery, largest_steady
 from haploop.tools.advise.variations import Cause, causes, without_causes
-
-if TYPE_CHECKING:
-    from haploop.logger.summary import Summary
-    from haploop.protocol.scene.scene import Scene
-    from haploop.tools.advise.judge import Judge
 
 Causes = tuple[Cause, ...]
 # A wall beyond the largest that is steady buzzes, or the next one does where this one stands on an island.

@@ -8,13 +8,22 @@ import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
+from rich import progress
+
+from haploop.launch.spec import make_output
+from haploop.launch.scene.events import elements_of, try_out
+from haploop.launch.scene.toml_writer import to_toml
+from haploop.logger.summary import finite
+from haploop.tools.advise.advice import Advice, AdviceData, advice, as_data
+from haploop.tools.advise.figure import draw
+from haploop.tools.advise.judge import Judge
+from haploop.tools.advise.report import buzz_sentences, gain_sentences, report
+from haploop.tools.advise.subject import InvalidRequest, make_subject
 from haploop.tools.cli.exit_codes import FAILED, WRONG_USE, leave, plain_errors, print_json
 from haploop.tools.cli.scenes import kinds_with, print_notes
-
-if TYPE_CHECKING:
-    from haploop.tools.advise.advice import Advice, AdviceData
+from haploop.tools.figure.data import FigureError
+from haploop.tools.render.terminal import console
 
 ADVICE, SCENE, FIGURE = "advice.json", "advice.toml", "figure.png"
 _STAGES = 9
@@ -36,12 +45,6 @@ class Request:
 
 def advise(request: Request, as_json: bool) -> None:
     """Searches, writes the results into the directory and prints them."""
-    from haploop.launch.scene.events import elements_of, try_out
-    from haploop.launch.spec import make_output
-    from haploop.tools.advise.advice import advice
-    from haploop.tools.advise.judge import Judge
-    from haploop.tools.advise.subject import InvalidRequest, make_subject
-
     if request.workers is not None and request.workers < 1:
         leave(f"--workers must be at least 1, but {request.workers} was given.", WRONG_USE)
     with plain_errors():
@@ -69,9 +72,6 @@ def advise(request: Request, as_json: bool) -> None:
     if as_json:
         print_json(data)
     else:
-        from haploop.tools.advise.report import report
-        from haploop.tools.render.terminal import console
-
         console().print(report(found))
     for path in data["files"].values():
         print(path, file=sys.stderr)
@@ -79,13 +79,6 @@ def advise(request: Request, as_json: bool) -> None:
 
 def _write(found: Advice, out: Path) -> AdviceData:
     """Writes scene, figure and data; returns the data with the files in it."""
-    from haploop.launch.scene.toml_writer import to_toml
-    from haploop.logger.summary import finite
-    from haploop.tools.advise.advice import as_data
-    from haploop.tools.advise.figure import draw
-    from haploop.tools.advise.report import buzz_sentences, gain_sentences
-    from haploop.tools.figure.data import FigureError
-
     files = {}
     because = " ".join(buzz_sentences(found.buzz)) if found.buzz else ""
     data = as_data(found, " ".join(gain_sentences(found)), because)
@@ -106,10 +99,6 @@ def _write(found: Advice, out: Path) -> AdviceData:
 @contextlib.contextmanager
 def _progress() -> Iterator[tuple[Callable[[str], None], Callable[[int], None]]]:
     """Shows a bar of the stages on a terminal, with the runs so far; a line a stage elsewhere."""
-    from rich import progress
-
-    from haploop.tools.render.terminal import console
-
     screen = console(stderr=True)
     columns = (
         "{task.description}",

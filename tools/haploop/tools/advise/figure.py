@@ -6,6 +6,8 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from haploop.tools.advise.advice import Advice
+from haploop.tools.advise.buzz import Ablation, Buzz
 from haploop.tools.advise.report import buzz_sentences, format_limit, format_stiffness, gain_sentences
 from haploop.tools.figure.style import (
     GREY,
@@ -24,9 +26,6 @@ from haploop.tools.figure.style import (
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-    from haploop.tools.advise.advice import Advice
-    from haploop.tools.advise.buzz import Ablation, Buzz
 
 _WIDTH_IN, _ROW_IN, _BESIDE_IN = 12.5, 0.44, 1.6
 _BAR = 0.62

@@ -6,17 +6,13 @@ import itertools
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import partial
-from typing import TYPE_CHECKING
 
 from haploop.protocol.scene.scene import ElementTable, Hand, Scene
-from haploop.tools.advise.judge import execution_mode
+from haploop.tools.advise.judge import Judge, execution_mode
 from haploop.tools.advise.largest import BEYOND, LEAST_N_M, WIDE, Limit, StiffnessQuery, largest_steady
 from haploop.tools.advise.tasks import Tasks
 from haploop.tools.advise.variations import Change
 from haploop.tools.render.units import amount
-
-if TYPE_CHECKING:
-    from haploop.tools.advise.judge import Judge
 
 Values = tuple[float, ...]
 

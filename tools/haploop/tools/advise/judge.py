@@ -11,8 +11,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self
+from typing import Any, Self
 
+from haploop.controller.dissipation import Element
 from haploop.launch.batch.run import batch_results, groups
 from haploop.launch.batch.stacking import is_batchable
 from haploop.logger.summary import Summary
@@ -24,9 +25,6 @@ from haploop.tools.executor.pool import Pool, read_sources
 from haploop.tools.executor.work import Results, Work, load_kinds
 from haploop.tools.linear.linearity import is_linear
 from haploop.tools.linear.one_tick import OneTickMap
-
-if TYPE_CHECKING:
-    from haploop.controller.dissipation import Element
 
 # A run whose swings would die away within so many times its duration is run again, so long; alone the first only.
 LONGER = 2, 4, 8

@@ -3,23 +3,18 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
-from rich.console import Group
+from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from haploop.tools.advise.advice import Advice
+from haploop.tools.advise.buzz import Ablation, Buzz
+from haploop.tools.advise.gains import Gains
+from haploop.tools.advise.largest import Limit
 from haploop.tools.advise.variations import SAMPLING
 from haploop.tools.render.terminal import make_table, verdict_style
 from haploop.tools.render.units import amount, fixed
-
-if TYPE_CHECKING:
-    from rich.console import RenderableType
-
-    from haploop.tools.advise.advice import Advice
-    from haploop.tools.advise.buzz import Ablation, Buzz
-    from haploop.tools.advise.gains import Gains
-    from haploop.tools.advise.largest import Limit
 
 _LONGEST_WORD = len("unidirectional")
 _READING = (

@@ -6,8 +6,9 @@ import contextlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from haploop.controller.dissipation import Element
 from haploop.launch.scene.file import resolved
 from haploop.launch.scene.layers import Layers, read_layers
 from haploop.launch.scene.mistakes import nearest
@@ -15,9 +16,6 @@ from haploop.protocol.changes import Change, at_work
 from haploop.protocol.scene.scene import Scene
 from haploop.tools.advise.tasks import MOST_DELAY_S
 from haploop.tools.cost.grid import scenes_folder
-
-if TYPE_CHECKING:
-    from haploop.controller.dissipation import Element
 
 # The only measured hand there is, along the axis of Choi et al. 2022.
 DEFAULT_HAND = "fu_cavusoglu_y"

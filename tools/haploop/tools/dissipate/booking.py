@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from haploop.controller.controller import Controller
-from haploop.controller.dissipation import ElementError
+from haploop.controller.dissipation import Element, ElementError
 from haploop.controller.estimators.base import Sample, Unchanged
 from haploop.logger.books.buffers import as_float64
 from haploop.logger.books.sums import add_columns, no_sums
@@ -18,9 +18,6 @@ from haploop.protocol.changes import Event
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
 from haploop.tools.dissipate.samples import Floats, Samples
-
-if TYPE_CHECKING:
-    from haploop.controller.dissipation import Element
 
 
 class Booked(NamedTuple):

@@ -7,18 +7,22 @@ import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
 
+from haploop.controller.dissipation import Element
+from haploop.protocol.scene.scene import Scene
 from haploop.tools.cli.exit_codes import FAILED, WRONG_USE, leave, plain_errors, print_json
 from haploop.tools.cli.scenes import kinds_with
-
-if TYPE_CHECKING:
-    from haploop.controller.dissipation import Element
-    from haploop.protocol.scene.scene import Scene
-    from haploop.tools.dissipate.controller_scene import Selection
-    from haploop.tools.dissipate.outcome import Outcome
-    from haploop.tools.dissipate.samples import Recording
-    from haploop.tools.dissipate.text_recording import Layout
+from haploop.tools.dissipate.booking import Booking
+from haploop.tools.dissipate.controller_scene import Selection, make_scene_for_log, make_scene_for_text
+from haploop.tools.dissipate.figure import make_figure
+from haploop.tools.dissipate.log_recording import LogRecording, read_scene
+from haploop.tools.dissipate.outcome import Outcome, Trace, make_outcome
+from haploop.tools.dissipate.report import make_report
+from haploop.tools.dissipate.samples import Recording, RecordingError
+from haploop.tools.dissipate.text_recording import Layout, TextRecording
+from haploop.tools.figure.data import FigureError
+from haploop.tools.figure.style import write_figure
+from haploop.tools.render.terminal import console
 
 _LONGEST_DELAY_S = 60.0
 
@@ -43,8 +47,6 @@ class Request:
 
 def dissipate(request: Request, as_json: bool) -> None:
     """Books, prints the table, draws the figure and names its file."""
-    from haploop.tools.dissipate.samples import RecordingError
-
     with plain_errors():
         try:
             outcome = compute_outcome(request, kinds_with(request.plugins))
@@ -54,8 +56,6 @@ def dissipate(request: Request, as_json: bool) -> None:
     if as_json:
         print_json(outcome.as_data() | {"figure": str(figure) if figure else None})
         return
-    from haploop.tools.dissipate.report import make_report
-    from haploop.tools.render.terminal import console
 
     console(stderr=True).print(make_report(outcome))
     if figure:
@@ -69,8 +69,6 @@ def compute_outcome(request: Request, kinds: dict[str, type[Element]]) -> Outcom
         RecordingError, FileNotFoundError, LogError: the recording cannot be used.
         SceneError, ElementError: the selection is wrong.
     """
-    from haploop.tools.dissipate.booking import Booking
-    from haploop.tools.dissipate.outcome import Trace, make_outcome
 
     recording, scene = _open(request, kinds)
     booking = Booking(scene, recording.period_s, recording.delay_s, kinds, recording.recorded)
@@ -88,17 +86,12 @@ def compute_outcome(request: Request, kinds: dict[str, type[Element]]) -> Outcom
 
 def _open(request: Request, kinds: dict[str, type[Element]]) -> tuple[Recording, Scene]:
     """Returns the recording and the scene of the controller."""
-    from haploop.tools.dissipate.controller_scene import make_scene_for_log, make_scene_for_text
-    from haploop.tools.dissipate.samples import RecordingError
-    from haploop.tools.dissipate.text_recording import Layout, TextRecording
-
     if request.delay_s is not None and not 0.0 <= request.delay_s <= _LONGEST_DELAY_S:
         raise RecordingError(f"The delay must be from 0 to {_LONGEST_DELAY_S:g} s, but is {request.delay_s:g} s.")
     path, selection = request.path, request.selection
     if path.is_dir() or path.suffix == ".mcap":
         if request.layout != Layout():
             raise RecordingError("A log has its own columns, times and units; columns are named for text files alone.")
-        from haploop.tools.dissipate.log_recording import LogRecording, read_scene
 
         scene = read_scene(path)
         recording = LogRecording(path, scene, request.delay_s, selection.estimated_anew())
@@ -111,8 +104,6 @@ def _open(request: Request, kinds: dict[str, type[Element]]) -> tuple[Recording,
 @contextlib.contextmanager
 def _shown(name: str) -> Iterator[Callable[[float], None]]:
     """Shows a line on a terminal with the time to which the recording is booked, fed with that time in s."""
-    from haploop.tools.render.terminal import console
-
     shown = console(stderr=True)
     if not shown.is_terminal:
         yield lambda _to_s: None
@@ -123,10 +114,6 @@ def _shown(name: str) -> Iterator[Callable[[float], None]]:
 
 def _draw(outcome: Outcome, request: Request) -> Path | None:
     """Draws the figure and returns its file; None, and a note on stderr, where there is no matplotlib."""
-    from haploop.tools.dissipate.figure import make_figure
-    from haploop.tools.figure.data import FigureError
-    from haploop.tools.figure.style import write_figure
-
     path = request.path
     beside = path / "dissipate.png" if path.is_dir() else path.with_name(f"{path.stem}-dissipate.png")
     try:

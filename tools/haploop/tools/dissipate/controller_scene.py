@@ -6,8 +6,9 @@ import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from haploop.controller.dissipation import Element
 from haploop.launch.scene.file import resolved
 from haploop.launch.scene.layers import Layers, key_path
 from haploop.plant.sensing.encoder import accelerometer_is_used
@@ -15,9 +16,6 @@ from haploop.protocol.scene.scene import Clock, Device, Scene
 from haploop.tools.cli.options import parse_assignments
 from haploop.tools.dissipate.log_recording import holds_readings
 from haploop.tools.dissipate.samples import RecordingError
-
-if TYPE_CHECKING:
-    from haploop.controller.dissipation import Element
 
 Kinds = Mapping[str, "type[Element]"]
 # Tables that can be overridden; [encoder] tells the estimators to what the positions were rounded.

@@ -25,13 +25,7 @@ _UNIT = re.compile(r"(.*?)\s*[(\[]([^)\]]*)[)\]]\s*")
 
 @dataclass(frozen=True)
 class Column:
-    """One column of a file.
-
-    Attributes:
-        index: from 0.
-        name: as in the header, without the unit; its number where there is no header.
-        unit: from the header's brackets, "" without.
-    """
+    """One column of a file, counted from 0, its name or number from 1, and its unit from the header's brackets."""
 
     index: int
     name: str
@@ -63,12 +57,10 @@ class DelimitedFile:
             raise RecordingError(f"{path} is empty: a line for every sample was expected.")
         self._delimiter = next((mark for mark in "\t;," if mark in rows[0]), None)
         cells = self._cells(rows[:1])[0]
-        self.has_header = not any(_is_number(self._number_text(cell)) for cell in cells if cell.strip())
-        if not self.has_header and first[0].startswith("#"):
-            named = self._cells([first[0].lstrip("# ")])[0]
+        self.has_header = not any(is_number(self._number_text(cell)) for cell in cells if cell.strip())
+        if not self.has_header:
+            named = self._cells([first[0].lstrip("# ")])[0] if first[0].startswith("#") else []
             cells = named if len(named) == len(cells) else [str(i + 1) for i in range(len(cells))]
-        elif not self.has_header:
-            cells = [str(i + 1) for i in range(len(cells))]
         self.columns = [_column(index, cell) for index, cell in enumerate(cells)]
 
     def column(self, given: str, what: str) -> Column:
@@ -86,11 +78,10 @@ class DelimitedFile:
                 f"{self.path} has {len(found)} columns {given!r}; give the {what} by its number from 1."
             )
         if not found:
-            names = ", ".join(c.name for c in self.columns)
-            hint = nearest(given, [c.name for c in self.columns])
-            mean = f" Did you mean {hint}?" if hint else ""
+            names = [c.name for c in self.columns]
+            mean = f" Did you mean {hint}?" if (hint := nearest(given, names)) else ""
             raise RecordingError(
-                f"There is no column {given!r} in {self.path} for the {what}.{mean} There are: {names}."
+                f"There is no column {given!r} in {self.path} for the {what}.{mean} There are: {', '.join(names)}."
             )
         return found[0]
 
@@ -117,24 +108,22 @@ class DelimitedFile:
                 if len(rows) != len(chunk):
                     line = next((n for n, line in chunk if line.count('"') % 2), chunk[0][0])
                     raise RecordingError(f"Line {line} of {self.path}: a quotation mark is not closed.")
-                table = np.array([self._row(cells, wanted, n) for cells, (n, _) in zip(rows, chunk, strict=True)])
+                cells = zip(rows, (n for n, _ in chunk), strict=True)
+                table = np.array([[self._number(row, index, n) for index in wanted] for row, n in cells])
                 table[~np.isfinite(table)] = np.nan
                 yield table, np.array([float(n) for n, _ in chunk])
-
-    def _row(self, cells: Sequence[str], wanted: Sequence[int], line: int) -> list[float]:
-        try:
-            return [float(cells[index]) for index in wanted]
-        except (ValueError, IndexError):
-            return [self._number(cells, index, line) for index in wanted]
 
     def _number(self, cells: Sequence[str], index: int, line: int) -> float:
         text = self._number_text(cells[index]) if index < len(cells) else ""
         if not text:
             return np.nan
-        if not _is_number(text):
+        try:
+            return float(text)
+        except ValueError:
             name = self.columns[index].name
-            raise RecordingError(f"Line {line} of {self.path}: a number was expected in column {name}, not {text!r}.")
-        return float(text)
+            raise RecordingError(
+                f"Line {line} of {self.path}: a number was expected in column {name}, not {text!r}."
+            ) from None
 
     def _number_text(self, cell: str) -> str:
         text = cell.strip()
@@ -167,7 +156,8 @@ def _column(index: int, cell: str) -> Column:
     return Column(index, match[1].strip(), match[2].strip()) if match else Column(index, cell.strip(), "")
 
 
-def _is_number(text: str) -> bool:
+def is_number(text: str) -> bool:
+    """Tells whether a text is a number, nan and inf among them."""
     try:
         float(text)
     except ValueError:

@@ -50,8 +50,7 @@ class LogRecording:
     The force of tick k would have acted from step k n + d on, n steps a tick, d the scene's delay or another one.
 
     Args:
-        path: a run's directory or its log.
-        scene: the scene in it.
+        path: a run's directory or its log, with this scene in it.
         delay_s: delay of the forces; that of the scene when None.
         estimated: which of "velocity" and "acceleration" are to be estimated again, not taken from the run.
     """
@@ -107,8 +106,7 @@ class _Waiting:
     """Holds rows of both channels until those of the other have come.
 
     Args:
-        n: plant steps a tick.
-        late: step within a tick at which a delayed force changes.
+        n, late: plant steps a tick, and the one of them at which a delayed force changes.
         of_steps: whether the plant's steps were logged.
     """
 

@@ -4,18 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from haploop.controller.dissipation import Element, Quantity
 from haploop.protocol.scene.scene import ElementTable, Scene
 from haploop.tools.dissipate.booking import Booked, Booking
 from haploop.tools.dissipate.samples import Floats, Recording
 from haploop.tools.render.units import amount
 from haploop.view.store.lod_level import extremes
-
-if TYPE_CHECKING:
-    from haploop.controller.dissipation import Element, Quantity
 
 # Points above which the trace is decimated.
 _MOST = 8192
@@ -29,8 +27,7 @@ class Trace:
     """Keeps the books of a recording of any length in bounded memory, decimated with their extremes kept.
 
     Attributes:
-        close: in full, the interval in which most energy was given back, rows like those of ``lines``; None before
-            anything is given back.
+        close: in full, the interval in which most was given back, rows like those of ``lines``; None before any was.
     """
 
     def __init__(self, period_s: float) -> None:
@@ -44,7 +41,7 @@ class Trace:
         """Takes the books at more samples."""
         rows = np.vstack([booked.t_s, booked.x_m, booked.sampled_J, booked.true_J])
         self._keep(rows)
-        self._look_closely(rows, -np.minimum(booked.added_J, 0.0).sum(axis=0))
+        self._look_closely(np.vstack([rows, -np.minimum(booked.added_J, 0.0).sum(axis=0)]))
 
     def lines(self) -> Floats:
         """Returns t, x, and the sampled and the true books of every element, shape (rows, points)."""
@@ -63,14 +60,12 @@ class Trace:
             self._points = np.hstack([thinned, self._points[:, usable:]])
             self._group = max(4, 2 * self._group)
 
-    def _look_closely(self, rows: Floats, given_J: Floats) -> None:
-        """Compares intervals of equal length that overlap by half."""
-        tagged = np.vstack([rows, given_J])
+    def _look_closely(self, tagged: Floats) -> None:
+        """Compares intervals of equal length that overlap by half, by what was given back, in the last row."""
         waiting = np.hstack([self._open, tagged]) if self._open.size else tagged
-        half = self._span // 2
         while waiting.shape[1] >= self._span:
             self._consider(waiting[:, : self._span])
-            waiting = waiting[:, half:]
+            waiting = waiting[:, self._span // 2 :]
         self._open = waiting
         if self.close is None and waiting.shape[1]:
             self._consider(waiting)
@@ -105,14 +100,7 @@ class ElementOutcome:
 
 @dataclass(frozen=True)
 class Outcome:
-    """The outcome of all elements on one recording.
-
-    Attributes:
-        recording: that was read.
-        elements: in the order in which they were selected.
-        trace: for the figure.
-        scene: the resolved scene of the controller.
-    """
+    """The outcome of the elements, in the order of their selection, on a recording, with the controller's scene."""
 
     recording: Recording
     elements: list[ElementOutcome]

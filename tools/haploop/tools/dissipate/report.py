@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from rich.console import Group, RenderableType
+from rich.text import Text
 
 from haploop.protocol.scene.estimators import Acceleration
 from haploop.protocol.scene.scene import Scene
@@ -10,15 +11,9 @@ from haploop.tools.dissipate.outcome import ElementOutcome, Outcome
 from haploop.tools.render.terminal import make_table
 from haploop.tools.render.units import amount, fixed
 
-if TYPE_CHECKING:
-    from rich.console import RenderableType
-
 
 def make_report(outcome: Outcome) -> RenderableType:
     """Makes the report: conclusion, table and notes."""
-    from rich.console import Group
-    from rich.text import Text
-
     numbers = ("true", "sampled", "took", "gave back", "largest force")
     table = make_table("would have taken out of the device", *numbers, numbers=numbers)
     for element in outcome.elements:

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from haploop.launch.scene.number import from_text
-from haploop.tools.dissipate.delimited import Column, DelimitedFile
+from haploop.tools.dissipate.delimited import Column, DelimitedFile, is_number
 from haploop.tools.dissipate.samples import Floats, Notes, RecordingError, Samples
 
 # Names of columns that are looked for where none is given.
@@ -25,13 +25,11 @@ _PERIODS_S = 1e-7, 1e3
 
 @dataclass(frozen=True)
 class Layout:
-    """The columns to read and their units; None for what is to be looked for, or is not there.
+    """The columns to read, by names or numbers from 1, and their units; None for what is looked for, or is not there.
 
     Attributes:
-        position, time, velocity, acceleration: names, or numbers from 1.
         rate_Hz: samples a second, where there is no time.
         length: unit of the position, such as "mm", or metres a count.
-        time_unit, velocity_unit, acceleration_unit: units of the others.
     """
 
     position: str | None = None
@@ -69,31 +67,30 @@ class TextRecording:
 
     def _choose(self, file: DelimitedFile, layout: Layout) -> tuple[dict[str, Column], dict[str, float]]:
         """Returns column and scale to SI of every quantity that is read."""
-        given = {
-            "time": layout.time,
-            "position": layout.position,
-            "velocity": layout.velocity,
-            "acceleration": layout.acceleration,
+        asked = {
+            "time": (layout.time, layout.time_unit, "s"),
+            "position": (layout.position, layout.length, "m"),
+            "velocity": (layout.velocity, layout.velocity_unit, "m/s"),
+            "acceleration": (layout.acceleration, layout.acceleration_unit, "m/s^2"),
         }
-        columns = {what: file.column(name, what) for what, name in given.items() if name is not None}
+        columns = {what: file.column(name, what) for what, (name, *_) in asked.items() if name is not None}
         if "position" not in columns:
             columns["position"] = self._guessed(file, _POSITIONS, "position")
         if layout.rate_Hz is None and "time" not in columns:
             columns["time"] = self._guessed(file, _TIMES, "time")
         if layout.rate_Hz is not None and "time" in columns:
             raise RecordingError("Give either the column of the time or the rate, not both.")
-        units = {
-            "time": (layout.time_unit, "s"),
-            "position": (layout.length, "m"),
-            "velocity": (layout.velocity_unit, "m/s"),
-            "acceleration": (layout.acceleration_unit, "m/s^2"),
-        }
-        if layout.length:
-            for what in ("velocity", "acceleration"):
-                _refuse_unknown_unit(what, columns.get(what), units[what])
-        return columns, {
-            what: _scale(units[what][0] or column.unit, units[what][1]) for what, column in columns.items()
-        }
+        scales = {}
+        for what, column in columns.items():
+            _, unit, si = asked[what]
+            # The unit of such a column is not that of the position: an inertial sensor has its own.
+            if layout.length and what in ("velocity", "acceleration") and not unit and not column.unit:
+                raise RecordingError(
+                    f"In which unit is the {what} in column {column.name}? --unit is that of the position alone; "
+                    f"give --{what}-unit, such as {si}."
+                )
+            scales[what] = _scale(unit or column.unit, si)
+        return columns, scales
 
     @staticmethod
     def _guessed(file: DelimitedFile, names: tuple[str, ...], what: str) -> Column:
@@ -130,18 +127,19 @@ class TextRecording:
             self._refuse_disorder(t, steps, lines, last_s)
             is_gap = steps > _GAP * self.period_s
             is_gap[0] |= last_s is None
-            self._note(t, steps, is_gap, last_s)
+            self.notes.uneven += int((np.abs(steps[~is_gap] / self.period_s - 1.0) > _UNEVEN).sum())
+            for at in np.flatnonzero(is_gap):
+                before = t[at - 1] if at else last_s
+                if before is not None:
+                    self.notes.gap(float(before), float(t[at]))
             starts = [0, *np.flatnonzero(is_gap[1:]) + 1, len(t)]
             for first, end in pairwise(starts):
-                yield self._piece(columns, first, end, bool(is_gap[first]))
+                part = {name: column[first:end] for name, column in columns.items()}
+                x, v, a = part["position"], part.get("velocity"), part.get("acceleration")
+                yield Samples(part["time"], x, v, a, x, None, begins=bool(is_gap[first]))
             last_s = float(t[-1])
         if self.notes.rows < 2:
             raise RecordingError(f"{self._file.path} holds fewer than two samples.")
-
-    def _piece(self, columns: dict[str, Floats], first: int, end: int, begins: bool) -> Samples:
-        part = {name: column[first:end] for name, column in columns.items()}
-        x = part["position"]
-        return Samples(part["time"], x, part.get("velocity"), part.get("acceleration"), x, None, begins)
 
     def _rows(self) -> Iterator[tuple[dict[str, Floats], Floats]]:
         """Yields SI columns by quantity, of all usable rows, and the rows' lines (time from the rate if given)."""
@@ -169,42 +167,17 @@ class TextRecording:
                 f"{before:.9g} s; sort the rows, or give the rate with --rate if they are in order."
             )
 
-    def _note(self, t: Floats, steps: Floats, is_gap: np.ndarray, last_s: float | None) -> None:
-        known = ~is_gap
-        self.notes.uneven += int((np.abs(steps[known] / self.period_s - 1.0) > _UNEVEN).sum())
-        for at in np.flatnonzero(is_gap):
-            before = t[at - 1] if at else last_s
-            if before is not None:
-                self.notes.gap(float(before), float(t[at]))
-
-
-def _refuse_unknown_unit(what: str, column: Column | None, unit: tuple[str | None, str]) -> None:
-    """Refuses to guess the unit of a column where that of the position was given: an inertial sensor has its own."""
-    given, si = unit
-    if column and not given and not column.unit:
-        raise RecordingError(
-            f"In which unit is the {what} in column {column.name}? --unit is that of the position alone; "
-            f"give --{what}-unit, such as {si}."
-        )
-
 
 def _scale(unit: str, si: str) -> float:
     """Returns the factor from a unit to SI."""
-    number = _as_number(unit)
-    if number is not None:
-        if not (math.isfinite(number) and number):
-            raise RecordingError(f"A unit cannot be {unit} {si}.")
-        return number
     if not unit:
         return 1.0
     try:
+        if is_number(unit):
+            number = float(unit)
+            if not (math.isfinite(number) and number):
+                raise RecordingError(f"A unit cannot be {unit} {si}.")
+            return number
         return float(from_text(f"1 {unit}", si))
     except ValueError as error:
         raise RecordingError(f"{unit!r} is no unit for numbers in {si}: {error}") from error
-
-
-def _as_number(text: str) -> float | None:
-    try:
-        return float(text)
-    except ValueError:
-        return None

@@ -6,13 +6,11 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache, partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from haploop.controller.dissipation import Element
 from haploop.logger.summary import Summary
 from haploop.protocol.scene.scene import Scene
-
-if TYPE_CHECKING:
-    from haploop.controller.dissipation import Element
 
 Sources = tuple[tuple[str, str], ...]
 Results = Callable[[list[Scene]], Iterator[tuple[int, Summary]]]

@@ -12,6 +12,7 @@ import numpy as np
 from haploop.plant.chain.chain import Chain
 from haploop.plant.motion.mechanics import Mechanics
 from haploop.plant.sensing.encoder import accelerometer_is_used
+from haploop.protocol.scene.paths import value_at
 from haploop.protocol.scene.scene import Scene
 from haploop.tools.linear.linearity import Kinds, LinearController, installed_kinds, why_not_linear
 
@@ -59,7 +60,7 @@ def bounds_of(scene: Scene, kinds: Kinds | None = None) -> list[Bound]:
         kinds: element kinds at hand; the installed ones when None.
     """
     kinds = installed_kinds() if kinds is None else kinds
-    return [_bound(about, stiffness, scene, kinds) for about, stiffness in _KNOWN]
+    return [_bound(about, stiffness, scene, kinds) for stiffness, about in _KNOWN.items()]
 
 
 def _bound(about: Bound, stiffness: Callable[[Scene, Kinds], float], scene: Scene, kinds: Kinds) -> Bound:
@@ -69,11 +70,19 @@ def _bound(about: Bound, stiffness: Callable[[Scene, Kinds], float], scene: Scen
         return replace(about, why_not=str(error))
 
 
+def _refuse(scene: Scene, kinds: Kinds, *outside: str, friction: bool = False) -> None:
+    """Raises where the loop is not linear, unless by friction where that is allowed, or some of ``_OUTSIDE`` holds."""
+    curved = [what for what in why_not_linear(scene, kinds) if not (friction and what == "[friction]")]
+    if curved:
+        raise _DoesNotApply(f"The scene has {', '.join(curved)}.")
+    for what in outside:
+        holds, sentence = _OUTSIDE[what]
+        if holds(scene):
+            raise _DoesNotApply(sentence)
+
+
 def _passive(scene: Scene, kinds: Kinds) -> float:
-    _refuse_nonlinear(scene, kinds, allowed=("[friction]",))
-    _refuse_lagging_force(scene)
-    if accelerometer_is_used(scene):
-        raise _DoesNotApply("The controller also reads an accelerometer, not the position alone.")
+    _refuse(scene, kinds, "lag", "accelerometer", friction=True)
     delay_s = scene.clock.round_trip_delay
     ticks = delay_s * scene.clock.control_rate
     if abs(ticks - round(ticks)) > 1e-6:
@@ -119,9 +128,7 @@ def _force_over_motion(controller: LinearController, z: np.ndarray) -> np.ndarra
 
 
 def _soft(scene: Scene, kinds: Kinds) -> float:
-    _refuse_nonlinear(scene, kinds)
-    _refuse_lagging_force(scene)
-    _refuse_bodies_in_a_row(scene)
+    _refuse(scene, kinds, "lag", "bodies")
     if others := sorted({element.name for element in scene.dissipation} - {"damping"}):
         raise _DoesNotApply(f"It knows no element but damping; the scene has {', '.join(others)}.")
     virtual = sum(element.parameters["damping"] for element in scene.dissipation)
@@ -139,13 +146,8 @@ def _soft(scene: Scene, kinds: Kinds) -> float:
 
 
 def _at_once(scene: Scene, kinds: Kinds) -> float:
-    _refuse_nonlinear(scene, kinds)
-    _refuse_lagging_force(scene)
-    _refuse_bodies_in_a_row(scene)
-    _refuse_more_than_a_wall(scene)
+    _refuse(scene, kinds, "lag", "bodies", "elements", "delay", "spring")
     mechanics = Mechanics.from_scene(scene)
-    if mechanics.stiffness:
-        raise _DoesNotApply("The hand has a spring.")
     return _jury(mechanics.mass_kg, mechanics.damping, 2.0 * _half_period_s(scene))
 
 
@@ -163,15 +165,8 @@ def _jury(mass_kg: float, damping: float, period_s: float) -> float:
 
 
 def _over_an_encoder(scene: Scene, kinds: Kinds) -> float:
-    _refuse_nonlinear(scene, kinds, allowed=("[friction]",))
-    _refuse_lagging_force(scene)
-    _refuse_more_than_a_wall(scene)
-    if scene.transmission:
-        raise _DoesNotApply("The device is not rigid: it has a [transmission].")
-    if not scene.encoder:
-        raise _DoesNotApply("The scene has no [encoder].")
-    if scene.noise:
-        raise _DoesNotApply("The position is noisy, not only rounded.")
+    _refuse(scene, kinds, "lag", "elements", "delay", "transmission", "no encoder", "noise", friction=True)
+    assert scene.encoder
     friction_N = scene.friction.kinetic if scene.friction else 0.0
     return min(scene.device.damping / _half_period_s(scene), 2.0 * friction_N / scene.encoder.resolution)
 
@@ -180,71 +175,53 @@ def _half_period_s(scene: Scene) -> float:
     return 0.5 / scene.clock.control_rate
 
 
-def _refuse_nonlinear(scene: Scene, kinds: Kinds, allowed: tuple[str, ...] = ()) -> None:
-    if curved := [what for what in why_not_linear(scene, kinds) if what not in allowed]:
-        raise _DoesNotApply(f"The scene has {', '.join(curved)}.")
-
-
-def _refuse_lagging_force(scene: Scene) -> None:
-    if scene.actuator and scene.actuator.bandwidth is not None:
-        raise _DoesNotApply("The actuator lags: its bandwidth is limited.")
-
-
-def _refuse_bodies_in_a_row(scene: Scene) -> None:
-    if scene.transmission or (scene.hand and scene.hand.grip):
-        raise _DoesNotApply("Device and hand are no single rigid mass.")
-
-
-def _refuse_more_than_a_wall(scene: Scene) -> None:
-    if scene.dissipation:
-        raise _DoesNotApply("It is of a wall alone; the scene has dissipation elements.")
-    if scene.clock.round_trip_delay:
-        raise _DoesNotApply("It is of a loop without delay.")
-
-
-_KNOWN = (
-    (
-        Bound(
-            "Colgate & Schenkel 1997",
-            "J. E. Colgate, G. G. Schenkel: Passivity of a class of sampled-data systems: application to haptic "
-            "interfaces. J. Robotic Systems 14(1), 1997",
-            "b > (T/2) / (1 - cos wT) Re{(1 - e^-jwT) H(e^jwT)} at all w; b > K T/2 + |B| for a spring and a damper",
-            "a device with damping b, any passive hand, a linear H of the sampled position with whole ticks of delay",
-            "passivity",
-        ),
-        _passive,
+# What may take a scene out of the domain of a bound, and the sentence that says so.
+_OUTSIDE: dict[str, tuple[Callable[[Scene], object], str]] = {
+    "lag": (lambda scene: value_at(scene, "actuator.bandwidth"), "The actuator lags: its bandwidth is limited."),
+    "accelerometer": (accelerometer_is_used, "The controller also reads an accelerometer, not the position alone."),
+    "bodies": (
+        lambda scene: scene.transmission or value_at(scene, "hand.grip"),
+        "Device and hand are no single rigid mass.",
     ),
-    (
-        Bound(
-            "Gil et al. 2009",
-            "J. J. Gil, E. Sanchez, T. Hulin, C. Preusche, G. Hirzinger: Stability boundary for haptic rendering: "
-            "influence of damping and delay. J. Computing and Information Science in Engineering 9(1), 2009",
-            "K < (b + B) / (T/2 + td)",
-            "a rigid mass with damping b, virtual damping B of backward differences, and soft walls",
-            "stability",
-        ),
-        _soft,
+    "elements": (lambda scene: scene.dissipation, "It is of a wall alone; the scene has dissipation elements."),
+    "delay": (lambda scene: scene.clock.round_trip_delay, "It is of a loop without delay."),
+    "spring": (lambda scene: value_at(scene, "hand.stiffness"), "The hand has a spring."),
+    "transmission": (lambda scene: scene.transmission, "The device is not rigid: it has a [transmission]."),
+    "no encoder": (lambda scene: not scene.encoder, "The scene has no [encoder]."),
+    "noise": (lambda scene: scene.noise, "The position is noisy, not only rounded."),
+}
+
+_KNOWN: dict[Callable[[Scene, Kinds], float], Bound] = {
+    _passive: Bound(
+        "Colgate & Schenkel 1997",
+        "J. E. Colgate, G. G. Schenkel: Passivity of a class of sampled-data systems: application to haptic "
+        "interfaces. J. Robotic Systems 14(1), 1997",
+        "b > (T/2) / (1 - cos wT) Re{(1 - e^-jwT) H(e^jwT)} at all w; b > K T/2 + |B| for a spring and a damper",
+        "a device with damping b, any passive hand, a linear H of the sampled position with whole ticks of delay",
+        "passivity",
     ),
-    (
-        Bound(
-            "Exact, no delay",
-            "Jury's criterion on the exact flow of a mass under held forces",
-            "K < min((1 - E) / g0, 2 (1 + E) / (g1 - g0)), E = e^(-b T/m), g0 = ((m/b)(1 - E) - T E) / b, "
-            "g1 = (T - (m/b)(1 - E)) / b",
-            "a rigid mass with damping b, a wall alone, no delay, no spring in the hand",
-            "stability",
-        ),
-        _at_once,
+    _soft: Bound(
+        "Gil et al. 2009",
+        "J. J. Gil, E. Sanchez, T. Hulin, C. Preusche, G. Hirzinger: Stability boundary for haptic rendering: "
+        "influence of damping and delay. J. Computing and Information Science in Engineering 9(1), 2009",
+        "K < (b + B) / (T/2 + td)",
+        "a rigid mass with damping b, virtual damping B of backward differences, and soft walls",
+        "stability",
     ),
-    (
-        Bound(
-            "Abbott & Okamura 2005",
-            "J. J. Abbott, A. M. Okamura: Effects of position quantization and sampling rate on virtual-wall "
-            "passivity. IEEE Transactions on Robotics 21(5), 2005",
-            "K <= min(2 b / T, 2 fc / q)",
-            "a mass with damping b and Coulomb friction fc, an encoder of resolution q, a wall alone, no delay",
-            "passivity",
-        ),
-        _over_an_encoder,
+    _at_once: Bound(
+        "Exact, no delay",
+        "Jury's criterion on the exact flow of a mass under held forces",
+        "K < min((1 - E) / g0, 2 (1 + E) / (g1 - g0)), E = e^(-b T/m), g0 = ((m/b)(1 - E) - T E) / b, "
+        "g1 = (T - (m/b)(1 - E)) / b",
+        "a rigid mass with damping b, a wall alone, no delay, no spring in the hand",
+        "stability",
     ),
-)
+    _over_an_encoder: Bound(
+        "Abbott & Okamura 2005",
+        "J. J. Abbott, A. M. Okamura: Effects of position quantization and sampling rate on virtual-wall "
+        "passivity. IEEE Transactions on Robotics 21(5), 2005",
+        "K <= min(2 b / T, 2 fc / q)",
+        "a mass with damping b and Coulomb friction fc, an encoder of resolution q, a wall alone, no delay",
+        "passivity",
+    ),
+}

@@ -8,13 +8,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import cache
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from haploop.controller.active_elements import keeps_attributes, make_element
 from haploop.controller.controller import make_params
-from haploop.controller.dissipation import registry
+from haploop.controller.dissipation import Element, registry
 from haploop.controller.tick import ControllerParams, StateTuple, initial_state, tick
 from haploop.launch.plan.effect import as_written
 from haploop.launch.plan.effects import all_effects
@@ -22,9 +22,6 @@ from haploop.plant.sensing.encoder import accelerometer_is_used
 from haploop.protocol.scene.paths import value_at
 from haploop.protocol.scene.scene import Scene, Wall
 from haploop.protocol.trees import tree_leaves, tree_unflatten
-
-if TYPE_CHECKING:
-    from haploop.controller.dissipation import Element
 
 Kinds = Mapping[str, "type[Element]"]
 # A wall without stiffness that is never left: the elements act, and its own force is added where it is known.

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
+from haploop.controller.dissipation import Element
 from haploop.controller.estimators.kalman import assumed_noises
 from haploop.launch.plan.effects import all_effects
 from haploop.launch.runs.in_process import run_in_process
@@ -15,9 +15,6 @@ from haploop.protocol.scene.hand_force import Step
 from haploop.protocol.scene.paths import without
 from haploop.protocol.scene.scene import Hand, Scene, Wall
 from haploop.tools.linear.one_tick import OneTickMap
-
-if TYPE_CHECKING:
-    from haploop.controller.dissipation import Element
 
 BELOW, ABOVE = 0.97, 1.03
 # The surface is this far from where the loop rests inside the wall; its swings start with this and must change by this.
