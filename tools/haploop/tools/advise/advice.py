@@ -35,17 +35,14 @@ _STEADY_MEANS = (
 
 @dataclass(frozen=True)
 class Advice:
-    """The whole advice.
+    """The whole advice; gains, exact limits and bounds are of each family.
 
     Attributes:
-        name: of the device or scene.
         notes: what was assumed.
         tasks: by which every loop was judged.
         tolerance: relative, of the limits.
         uncertain: the quantities that were taken a fifth more or less.
-        gains: of each family.
-        exact_N_m: of each family the exact limit, rho(M) = 1, None where the loop is not linear.
-        bounds: of each family the analytic bounds.
+        exact_N_m: rho(M) = 1, None where the loop is not linear.
         safe: the gains to use.
         scene: that shows it, steady by its own verdict; None where nothing is safe.
         buzz: the causes of buzzing; None where nothing buzzes.

@@ -29,8 +29,7 @@ class Ablation:
         instead: words for what took their place.
         leak_J: their part of the wall's leak with them, negative where energy came out of it; None where not told.
         leak_share: that part of all that leaked that way, 0 to 1.
-        steady: whether it no longer buzzes.
-        verdict, oscillation_m: of its run.
+        steady, verdict, oscillation_m: of its run.
         largest: the largest steady stiffness; None where it was not looked for.
         is_element: whether it is a dissipation element.
     """
@@ -51,10 +50,8 @@ class Buzz:
     """The explanation why a scene buzzes, or how far it is from that.
 
     Attributes:
-        scene: that was looked into.
-        stiffness_N_m: its wall's.
-        steady: whether it does not buzz.
-        verdict, oscillation_m: of its run.
+        scene, stiffness_N_m: that was looked into, and its wall's.
+        steady, verdict, oscillation_m: of its run.
         largest: its own largest steady stiffness.
         elements_true_J: energy that each element took out of the device, negative where it fed it.
         alone: without each cause by itself.

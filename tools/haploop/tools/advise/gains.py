@@ -86,8 +86,12 @@ def first_choices(family: Family, scene: Scene, grid: Grid) -> list[Values]:
     if len(family.parts) != 1:
         return [()]
     [(_, key)] = family.parts
-    most = scale(scene, key)
-    count, factor = grid.damping if key == "damping" else grid.mass
+    hand = scene.hand or Hand()
+    most = scene.device.mass + (scene.transmission.motor_mass if scene.transmission else 0.0)
+    most += 0.0 if hand.grip else hand.mass
+    count, factor = grid.mass
+    if key == "damping":
+        most, (count, factor) = most / late_s(scene), grid.damping
     return [(_rounded(most / factor**i),) for i in range(count)]
 
 
@@ -111,14 +115,6 @@ def beside(family: Family, best: Values, tried: list[Values], grid: Grid, times:
             step = factor if best[index] == end and times == 0 else factor ** (0.5 ** (times + 1))
             found.append((*best[:index], _rounded(best[index] * step**sign), *best[index + 1 :]))
     return [choice for choice in dict.fromkeys(found) if choice not in tried]
-
-
-def scale(scene: Scene, key: str) -> float:
-    """Returns about the largest damping, or mass, that a loop can bear, in SI units."""
-    hand = scene.hand or Hand()
-    mass = scene.device.mass + (scene.transmission.motor_mass if scene.transmission else 0.0)
-    mass += 0.0 if hand.grip else hand.mass
-    return mass / late_s(scene) if key == "damping" else mass
 
 
 def late_s(scene: Scene) -> float:

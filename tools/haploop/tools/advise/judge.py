@@ -58,9 +58,7 @@ class Judgement:
 
     Attributes:
         steady: the verdict, or swings that die away too slowly for a run to end, in a loop whose exact map is stable.
-        verdict: of the longest run.
-        oscillation_m: peak to peak over its window.
-        summary: its summary.
+        verdict, oscillation_m, summary: of the longest run; the swing peak to peak over its window.
         presumed: whether its swings have still to die away.
     """
 
@@ -75,8 +73,7 @@ class Judge:
     """Runs loops, in arrays or on several cores, and judges them; a context manager.
 
     Args:
-        kinds: element kinds at hand.
-        plugins: the files they came from.
+        kinds, plugins: element kinds at hand, and the files they came from.
         workers: processes for heavy work; as many as there are cores when None.
         on_progress: called with the number of runs done so far.
 
@@ -130,7 +127,12 @@ class Judge:
 
     def _glanced(self, scenes: Sequence[Scene], hasty: set[int]) -> dict[int, Judgement]:
         """Judges those of the hasty ones that buzz already and will not cease, where friction makes runs dear."""
-        able = [i for i in sorted(hasty) if execution_mode(scenes[i]) == "friction" and _can_be_glanced_at(scenes[i])]
+        able = [
+            i for i in sorted(hasty)
+            if execution_mode(scenes[i]) == "friction"
+            and scenes[i].duration > 2.0 * GLANCE_S
+            and is_held_by(scenes[i], GLANCE_S / 2.0)
+        ]  # fmt: skip
         together = groups([scenes[index] for index in able])
         looked = [able[place] for group in together if len(group) >= _WORTH_A_GLANCE for place in group]
         results = self._results([replace(scenes[i], duration=GLANCE_S) for i in looked], energy=False)
@@ -226,10 +228,6 @@ def _seconds(scenes: Sequence[Scene], bundle: list[int]) -> float:
     first = scenes[bundle[0]]
     in_array_s = _IN_IT_S * (first.friction is not None) + _ARRAY_S / len(bundle)
     return first.duration * (_ALONE_S if len(bundle) < FEWEST else in_array_s) * len(bundle)
-
-
-def _can_be_glanced_at(scene: Scene) -> bool:
-    return scene.duration > 2.0 * GLANCE_S and is_held_by(scene, GLANCE_S / 2.0)
 
 
 def _goes_on(result: Summary) -> bool:

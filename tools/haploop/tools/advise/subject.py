@@ -42,7 +42,6 @@ class Subject:
     """A scene to advise on.
 
     Attributes:
-        name: of the preset or the scene file.
         scene: resolved; events that change it are taken as done from the start.
         has_task: whether it came with a task of its own; a preset has none.
         notes: what was assumed, one sentence each.

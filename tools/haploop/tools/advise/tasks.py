@@ -32,7 +32,7 @@ class Tasks:
     """The runs that judge a loop.
 
     Attributes:
-        scenes: one a task, without dissipation elements in place of which others may be laid.
+        scenes: one a task, the more demanding first; walls and elements are laid in place of theirs.
         seeds: of each task; one unless something is random.
         words: for what is done.
     """
@@ -63,7 +63,7 @@ class Tasks:
 
     @property
     def first(self) -> Scene:
-        """The scene of the first task, the more demanding one."""
+        """The scene of the first task."""
         return self.scenes[0]
 
 

@@ -45,8 +45,7 @@ class Booking:
 
     Args:
         scene: resolved: estimators, wall and elements of a controller.
-        period_s: T.
-        delay_s: d.
+        period_s, delay_s: T and d.
         kinds: element kinds at hand.
         recorded: which of "velocity" and "acceleration" come with the samples and are taken as they are.
 

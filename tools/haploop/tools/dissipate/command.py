@@ -16,9 +16,9 @@ from haploop.tools.dissipate.booking import Booking
 from haploop.tools.dissipate.controller_scene import Selection, make_scene_for_log, make_scene_for_text
 from haploop.tools.dissipate.figure import make_figure
 from haploop.tools.dissipate.log_recording import LogRecording, read_scene
-from haploop.tools.dissipate.outcome import Outcome, Trace, make_outcome
+from haploop.tools.dissipate.outcome import Outcome, Recording, Trace, make_outcome
 from haploop.tools.dissipate.report import make_report
-from haploop.tools.dissipate.samples import Recording, RecordingError
+from haploop.tools.dissipate.samples import RecordingError
 from haploop.tools.dissipate.text_recording import Layout, TextRecording
 from haploop.tools.figure.data import FigureError
 from haploop.tools.figure.style import write_figure

@@ -10,23 +10,7 @@ import numpy as np
 from haploop.tools.dissipate.outcome import Outcome
 from haploop.tools.dissipate.report import conclusion, make_row, note_sentences
 from haploop.tools.dissipate.samples import Floats
-from haploop.tools.figure.style import (
-    CLOSE,
-    ELEMENTS,
-    FAINT,
-    GREY,
-    INK,
-    LARGE,
-    SMALL,
-    TEXT,
-    WALL,
-    WALL_FILL,
-    dress,
-    element_colour,
-    empty_figure,
-    few_ticks,
-    legend,
-)
+from haploop.tools.figure import style
 from haploop.tools.render.units import prefix_for
 
 if TYPE_CHECKING:
@@ -36,7 +20,7 @@ if TYPE_CHECKING:
 _COLUMNS = ("", "true", "sampled", "took", "gave back", "largest force")
 _AT = (0.04, 0.46, 0.585, 0.71, 0.835, 1.0)
 # Elements that are drawn, at most: one per colour.
-_MOST = len(ELEMENTS)
+_MOST = len(style.ELEMENTS)
 # Letters of a line, at most.
 _LINE_LETTERS = 170
 
@@ -47,7 +31,7 @@ def make_figure(outcome: Outcome) -> Figure:
     Raises:
         FigureError: matplotlib is missing.
     """
-    figure = empty_figure(13.0, 7.8)
+    figure = style.empty_figure(13.0, 7.8)
     header, body = figure.subfigures(2, 1, squeeze=False, height_ratios=(0.085, 1.0))[:, 0]
     lines, close = outcome.trace.lines(), outcome.trace.close
     rows = 1 + min(len(outcome.elements), _MOST)
@@ -59,16 +43,16 @@ def make_figure(outcome: Outcome) -> Figure:
     if close is None:
         for ax in near:
             ax.set_axis_off()
-        near[0].text(0.5, 0.5, "No element gave anything back.", ha="center", fontsize=TEXT, color=GREY)
+        near[0].text(0.5, 0.5, "No element gave anything back.", ha="center", fontsize=style.TEXT, color=style.GREY)
     else:
         _motion(near[0], outcome, close, "Where most was given back", whole=False)
         since = close.copy()
         since[2:] -= close[2:, :1]
         _energies(near[1], outcome, since, "Energy there, since its beginning")
         for ax in (motion, energy):
-            ax.axvspan(close[0, 0], close[0, -1], color=CLOSE, alpha=0.5, zorder=0.5, linewidth=0, gid="close")
+            ax.axvspan(close[0, 0], close[0, -1], color=style.CLOSE, alpha=0.5, zorder=0.5, linewidth=0, gid="close")
         for ax in near:
-            few_ticks(ax)
+            style.few_ticks(ax)
     _table(body.add_subplot(grid[2, 0]), outcome, rows)
     _words(body.add_subplot(grid[2, 1]), outcome)
     _header(header, outcome)
@@ -88,12 +72,12 @@ def _motion(ax: Axes, outcome: Outcome, lines: Floats, title: str, whole: bool) 
     margin = 0.06 * (high - low) or 1.0
     if wall:
         far = min(low - margin, surface) if wall.occupies == "below" else max(high + margin, surface)
-        ax.axhspan(far, surface, color=WALL_FILL, zorder=0, linewidth=0, gid="wall")
-        ax.axhline(surface, color=WALL, linewidth=1.0, zorder=1)
-    ax.plot(t, x, color=INK, linewidth=1.0, gid="position")
+        ax.axhspan(far, surface, color=style.WALL_FILL, zorder=0, linewidth=0, gid="wall")
+        ax.axhline(surface, color=style.WALL, linewidth=1.0, zorder=1)
+    ax.plot(t, x, color=style.INK, linewidth=1.0, gid="position")
     ax.set_ylim(low - margin, high + margin)
     _common(ax, outcome, t)
-    dress(ax, title, "time (s)", f"position ({letter}m)")
+    style.dress(ax, title, "time (s)", f"position ({letter}m)")
 
 
 def _energies(ax: Axes, outcome: Outcome, lines: Floats, title: str) -> None:
@@ -101,25 +85,25 @@ def _energies(ax: Axes, outcome: Outcome, lines: Floats, title: str) -> None:
     books = lines[2:]
     factor, letter = prefix_for([float(np.abs(books).max())])
     for index, element in enumerate(outcome.elements[:_MOST]):
-        colour, name = element_colour(index), element.label
+        colour, name = style.element_colour(index), element.label
         ax.plot(lines[0], books[count + index] / factor, color=colour, linewidth=1.5, label=name, gid=f"{name}.true")
         if not agree:
             dashed = {"color": colour, "linewidth": 1.0, "dashes": (4, 2)}
             ax.plot(lines[0], books[index] / factor, **dashed, gid=f"{name}.sampled")
     if not agree:
-        for label, style in (("true", "-"), ("sampled", (0, (4, 2)))):
-            ax.plot([], [], color=GREY, linestyle=style, linewidth=1.3, label=label)
-        legend(ax, only=("true", "sampled"), loc="upper left", bbox_to_anchor=(0.0, 1.0), ncols=1)
-    ax.axhline(0.0, color=GREY, linewidth=0.8, zorder=0)
+        for label, dashes in (("true", "-"), ("sampled", (0, (4, 2)))):
+            ax.plot([], [], color=style.GREY, linestyle=dashes, linewidth=1.3, label=label)
+        style.legend(ax, only=("true", "sampled"), loc="upper left", bbox_to_anchor=(0.0, 1.0), ncols=1)
+    ax.axhline(0.0, color=style.GREY, linewidth=0.8, zorder=0)
     _common(ax, outcome, lines[0])
-    dress(ax, title, "time (s)", f"energy ({letter}J)")
+    style.dress(ax, title, "time (s)", f"energy ({letter}J)")
 
 
 def _common(ax: Axes, outcome: Outcome, t: Floats) -> None:
     """Sets the limits of time and marks the gaps."""
     for from_s, to_s in outcome.recording.notes.gaps_s:
         if from_s < t[-1] and to_s > t[0]:
-            ax.axvspan(from_s, to_s, color=FAINT, alpha=0.45, zorder=0.4, linewidth=0, gid="gap")
+            ax.axvspan(from_s, to_s, color=style.FAINT, alpha=0.45, zorder=0.4, linewidth=0, gid="gap")
     ax.set_xlim(float(t[0]), float(t[-1]))
 
 
@@ -131,11 +115,11 @@ def _table(ax: Axes, outcome: Outcome, rows: int) -> None:
     for number, cells in enumerate([_COLUMNS, *(make_row(element) for element in outcome.elements[: rows - 1])]):
         y = number + 0.5
         if number:
-            colour = element_colour(number - 1)
+            colour = style.element_colour(number - 1)
             ax.plot([0.0, 0.025], [y, y], color=colour, linewidth=2.5, solid_capstyle="butt")
         for x, cell, align in zip(_AT, cells, ("left", *["right"] * 5), strict=True):
             weight = "normal" if number else "bold"
-            ax.text(x, y, cell, ha=align, va="center", fontsize=TEXT, color=INK, fontweight=weight)
+            ax.text(x, y, cell, ha=align, va="center", fontsize=style.TEXT, color=style.INK, fontweight=weight)
 
 
 def _words(ax: Axes, outcome: Outcome) -> None:
@@ -144,14 +128,20 @@ def _words(ax: Axes, outcome: Outcome) -> None:
     more = len(outcome.elements) - _MOST
     notes = ([f"Left out here: {more} more element{'s' * (more > 1)}."] if more > 0 else []) + note_sentences(outcome)
     wrapped = [line for sentence in notes for line in textwrap.wrap(sentence, 84)]
-    ax.text(0.0, 1.0, "\n".join(wrapped[:9]), va="top", fontsize=SMALL, color=GREY, transform=ax.transAxes, gid="words")
+    ax.text(
+        0.0,
+        1.0,
+        "\n".join(wrapped[:9]),
+        va="top",
+        fontsize=style.SMALL,
+        color=style.GREY,
+        transform=ax.transAxes,
+        gid="words",
+    )
 
 
 def _header(figure: SubFigure, outcome: Outcome) -> None:
-    figure.text(0.008, 0.72, outcome.recording.name, fontsize=LARGE, color=INK, va="center", gid="title")
-    words = textwrap.shorten(_capital(conclusion(outcome)), _LINE_LETTERS, placeholder=" …")
-    figure.text(0.008, 0.2, words, fontsize=TEXT + 1, color=INK, va="center", gid="answer")
-
-
-def _capital(sentence: str) -> str:
-    return sentence[:1].upper() + sentence[1:]
+    figure.text(0.008, 0.72, outcome.recording.name, fontsize=style.LARGE, color=style.INK, va="center", gid="title")
+    sentence = conclusion(outcome)
+    words = textwrap.shorten(sentence[:1].upper() + sentence[1:], _LINE_LETTERS, placeholder=" …")
+    figure.text(0.008, 0.2, words, fontsize=style.TEXT + 1, color=style.INK, va="center", gid="answer")

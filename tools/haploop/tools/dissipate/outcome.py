@@ -11,10 +11,16 @@ import numpy as np
 from haploop.controller.dissipation import Element, Quantity
 from haploop.protocol.scene.scene import ElementTable, Scene
 from haploop.tools.dissipate.booking import Booked, Booking
-from haploop.tools.dissipate.samples import Floats, Recording
+from haploop.tools.dissipate.log_recording import LogRecording
+from haploop.tools.dissipate.samples import Floats
+from haploop.tools.dissipate.text_recording import TextRecording
 from haploop.tools.render.units import amount
 from haploop.view.store.lod_level import extremes
 
+# Both have a name, the control period and the delay of the forces in s, ``between``: what the motion between samples is
+# taken from, ``recorded``: which of "velocity" and "acceleration" are not estimated, and notes, complete once all
+# samples have been read.
+Recording = LogRecording | TextRecording
 # Points above which the trace is decimated.
 _MOST = 8192
 # Length of the detail, s.

@@ -1,10 +1,8 @@
-"""The interface of recordings: samples of a motion, piece by piece, and notes on what was found."""
+"""What recordings give: samples of a motion, piece by piece, and notes on what was found."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -68,24 +66,3 @@ class Notes:
         self.missing_s += to_s - from_s
         if len(self.gaps_s) < 100:
             self.gaps_s.append((from_s, to_s))
-
-
-class Recording(Protocol):
-    """A recording that can be read once.
-
-    Attributes:
-        period_s: the control period T.
-        delay_s: delay after which a force acts on the device.
-        between: what the motion between samples is taken from: "plant steps" or "straight lines".
-        recorded: which of "velocity" and "acceleration" are recorded, not estimated.
-        notes: complete once all samples have been read.
-    """
-
-    name: str
-    period_s: float
-    delay_s: float
-    between: str
-    recorded: frozenset[str]
-    notes: Notes
-
-    def samples(self) -> Iterator[Samples]: ...  # in pieces of any length

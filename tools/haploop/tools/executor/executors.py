@@ -56,11 +56,7 @@ class Executor:
 
 
 def make_executor(workers: int | None = None, dask: str | None = None) -> Executor:
-    """Makes the executor for a number of workers.
-
-    Args:
-        workers: processes; as many as there are cores when None; 1 runs in this process.
-        dask: address of a Dask scheduler, whose workers are used instead.
+    """Makes the executor of ``workers`` processes, one a core when None, this one when 1, or of a Dask scheduler's.
 
     Raises:
         ExecutorError: there is no such cluster.

@@ -20,15 +20,7 @@ DIED = "The process that ran it died: it was killed, ran out of memory or crashe
 
 
 class Pool:
-    """Workers that stay for several calls; a context manager.
-
-    Args:
-        workers: processes; as many as there are cores when None; 1 runs in this process.
-        dask: address of a Dask scheduler, whose workers are used instead.
-
-    Raises:
-        ExecutorError: there is no such cluster.
-    """
+    """Workers that stay for several calls, as of ``make_executor``; a context manager."""
 
     def __init__(self, workers: int | None = None, dask: str | None = None) -> None:
         self._executor = make_executor(workers, dask)
@@ -50,10 +42,7 @@ class Pool:
         """Yields the index of each resolved scene and its result, in the order in which they come in.
 
         Scenes are taken a few thousand at a time; one that fails, or kills its worker, has a result with its reason.
-
-        Args:
-            plugins: files that define elements.
-            energy, trajectories: as of ``haploop.launch.batch.run.batch_results``.
+        ``energy`` and ``trajectories`` are as of ``haploop.launch.batch.run.batch_results``.
 
         Raises:
             PluginError: a plugin cannot be used.

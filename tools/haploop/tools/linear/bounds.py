@@ -54,11 +54,7 @@ class _DoesNotApply(Exception):
 
 
 def bounds_of(scene: Scene, kinds: Kinds | None = None) -> list[Bound]:
-    """Returns all known bounds of a resolved scene's wall, those that do not apply among them.
-
-    Args:
-        kinds: element kinds at hand; the installed ones when None.
-    """
+    """Returns all known bounds of a resolved scene's wall, those that do not apply among them."""
     kinds = installed_kinds() if kinds is None else kinds
     return [_bound(about, stiffness, scene, kinds) for stiffness, about in _KNOWN.items()]
 

@@ -40,10 +40,9 @@ def is_linear(scene: Scene, kinds: Kinds | None = None) -> bool:
 
 
 def why_not_linear(scene: Scene, kinds: Kinds | None = None) -> list[str]:
-    """Returns the reasons why a scene's loop in contact is no linear map, a few words each; empty if it is one.
+    """Returns why a scene's loop in contact is no linear map, a few words each; empty if it is one.
 
-    Args:
-        kinds: element kinds at hand; the installed ones when None.
+    ``kinds`` are the element kinds at hand, here and below: the installed ones when None.
     """
     kinds = installed_kinds() if kinds is None else kinds
     curved = [effect.written for effect in all_effects() if not effect.linear and effect.is_named(scene)]

@@ -58,9 +58,6 @@ class OneTickMap:
     def from_scene(cls, scene: Scene, kinds: Kinds | None = None) -> OneTickMap:
         """Returns the map of a resolved scene in contact, with a wall or without; ``left_out`` says what it lacks.
 
-        Args:
-            kinds: element kinds at hand; the installed ones when None.
-
         Raises:
             NotLinear: the loop is no linear map, as ``why_not_linear`` tells.
         """
@@ -92,7 +89,6 @@ class OneTickMap:
         return list(self._ranges())
 
     def _ranges(self) -> Iterator[tuple[float, float]]:
-        """The stable ranges, one after the other."""
         inner = [k for k in _crossings(self.without_wall, self.pushed) if _LEAST_N_M < k < _MOST_N_M]
         edges = [_LEAST_N_M, *inner, _MOST_N_M]
         probes = [(low * high) ** 0.5 for low, high in pairwise(edges)]

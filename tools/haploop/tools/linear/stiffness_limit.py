@@ -53,8 +53,7 @@ def pressed_deep(scene: Scene, stiffness: float, kinds: dict[str, type[Element]]
 
     The push sets in with the first command, so that little else sets it swinging. It lasts until the swings are a
     hundred times as wide as at the start, or a hundredth: far above or below what the verdict takes for a swing, and
-    never out of the wall. Where there are links, or an actuator that lags, the depth is 60 um, and what
-    grows may leave the wall.
+    never out of the wall; with links, or an actuator that lags, the depth is 60 um, and what grows may leave it.
     """
     at, rate = scene.clock.round_trip_delay, scene.clock.control_rate
     depth_m = _DEPTH_M if len(Chain.from_scene(scene).states) == 2 else _DEPTH_OF_MORE_STATES_M

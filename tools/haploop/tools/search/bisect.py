@@ -77,11 +77,9 @@ def climb(
     ask: Callable[[Rung, Sequence[Member]], Iterable[Answer]],
     passes: Callable[[Answer], object] = bool,
 ) -> dict[Member, list[Answer]]:
-    """Asks all members at each rung; one that fails is not asked at later rungs.
+    """Asks all members at each rung, in order; one that fails is not asked at later rungs.
 
     Args:
-        members: distinct.
-        rungs: in the order in which they are tried.
         ask: from a rung and the members that have passed all rungs before to their answers, in their order.
         passes: from an answer to whether the member goes on.
 

@@ -52,7 +52,7 @@ class Space:
         choices: options by key; each is drawn equally often.
         bounds: least and greatest value by key, of numbers that are drawn evenly in their logarithm.
         scales: of those choices that neighbours may change.
-        digits: significant digits to which numbers are rounded; None leaves them as they were drawn.
+        digits: significant digits to which numbers are rounded; None for all.
         seeded: whether each point has a seed of its own.
     """
 
@@ -100,12 +100,10 @@ class Effort:
     """Effort of a search: number of draws, of refinements, and their spread.
 
     Attributes:
-        structures, each: points at random: so many structures, and points of each.
-        rounds, best, groups, children: of refinement: in each round, around so many of the best so far, so many groups
-            of so many points.
+        structures, each: so many structures at random, and points of each.
+        rounds, best, groups, children: of refinement: around so many of the best so far, groups of so many points.
         finalists, neighbours: so many of the best, and points around each of them.
-        far, close: standard deviation of the logarithm of a number in the first and the last round, geometrically
-            spaced in between; that of the neighbours is ``close``.
+        far, close: deviation of a number's logarithm in the first and the last round, and among the neighbours.
     """
 
     structures: int
@@ -157,8 +155,7 @@ def random_search(
 
     Args:
         evaluate: returns a row for each point of a group; must be importable where processes evaluate.
-        distance: of a row, to be minimised.
-        tie: decides between finalists at the same distance.
+        distance, tie: of a row, to be minimised; the tie decides between finalists at the same distance.
         evaluate_all: evaluates many groups, in parallel perhaps; one after another by default.
     """
     rng = np.random.default_rng(seed)
