@@ -85,18 +85,11 @@ def explain_buzz(scene: Scene, judge: Judge, stage: Callable[[str], object] = la
     leaks = _leaks(itself.summary)
 
     def ablation(some: Causes, judgement: Judgement, limit: Limit | None) -> Ablation:
-        leak_J, share = leaks.get(some[0].leak or "", (None, None)) if len(some) == 1 else (None, None)
-        return Ablation(
-            tuple(cause.name for cause in some),
-            ", ".join(cause.without for cause in some),
-            leak_J,
-            share,
-            judgement.steady,
-            judgement.verdict,
-            judgement.oscillation_m,
-            limit,
-            any(cause.is_element for cause in some),
-        )
+        leak = leaks.get(some[0].leak or "", (None, None)) if len(some) == 1 else (None, None)
+        ran = judgement.steady, judgement.verdict, judgement.oscillation_m
+        instead = ", ".join(cause.without for cause in some)
+        is_element = any(cause.is_element for cause in some)
+        return Ablation(tuple(cause.name for cause in some), instead, *leak, *ran, limit, is_element)
 
     alone = tuple(ablation(some, judged[some], limits[some]) for some in sets)
     together: tuple[Ablation, ...] = ()
@@ -107,18 +100,10 @@ def explain_buzz(scene: Scene, judge: Judge, stage: Callable[[str], object] = la
         if not together and parts:
             without_all = ablation(parts, judge.judge([without_causes(scene, parts)])[0], None)
     energies = itself.summary.get("energy", {}).get("elements", [])
-    return Buzz(
-        scene,
-        value_at(scene, "wall.stiffness"),
-        itself.steady,
-        itself.verdict,
-        itself.oscillation_m,
-        limits[()],
-        {entry["kind"]: entry["true_J"] for entry in energies},
-        alone,
-        together,
-        without_all,
-    )
+    ran = itself.steady, itself.verdict, itself.oscillation_m
+    elements_true_J = {entry["kind"]: entry["true_J"] for entry in energies}
+    stiffness = value_at(scene, "wall.stiffness")
+    return Buzz(scene, stiffness, *ran, limits[()], elements_true_J, alone, together, without_all)
 
 
 def _fewest(scene: Scene, parts: Causes, judge: Judge) -> list[tuple[Causes, Judgement, Limit]]:

@@ -61,8 +61,7 @@ class Grid:
     """The grid of parameters: first so many apart by a factor, then half way beside the best.
 
     Attributes:
-        damping, mass: count and factor of a single element's parameter.
-        both: those of each parameter of two elements, around what is best alone.
+        damping, mass, both: count and factor of a single element's parameter, and of each of two around their best.
         refined: how often points beside the best are tried.
         finalists: choices of each family that are compared by what they allow when the loop is not as it was taken for.
     """
@@ -184,14 +183,16 @@ class Search:
         most = max(limit.stiffness_N_m for limit in known.values())
         known |= self.limits([(BOTH, near) for near in around(BOTH, values, self.grid)], max(LEAST_N_M, most))
         known = self._refined([BOTH], known)
-        return [_gains(family, known) for family in FAMILIES]
+        return [
+            Gains(family, best := _best(known, family), known[family, best], _tried(known, family))
+            for family in FAMILIES
+        ]
 
     def _refined(self, families: list[Family], known: dict[Choice, Limit]) -> dict[Choice, Limit]:
         for times in range(self.grid.refined):
             choices, reached = [], {}
             for family in families:
-                tried = [values for other, values in known if other is family]
-                best = _best(known, family)
+                tried, best = list(_tried(known, family)), _best(known, family)
                 choices += [(family, values) for values in beside(family, best, tried, self.grid, times)]
                 reached[family] = known[family, best].stiffness_N_m
             known = known | self.limits(choices, LEAST_N_M, reached)
@@ -220,11 +221,9 @@ class Search:
 
 def _best(known: dict[Choice, Limit], family: Family) -> Values:
     """Returns the parameters that allow most; of equals the smallest."""
-    own = {values: limit.stiffness_N_m for (other, values), limit in known.items() if other is family}
-    return min(own, key=lambda values: (-own[values], values))
+    tried = _tried(known, family)
+    return min(tried, key=lambda values: (-tried[values].stiffness_N_m, values))
 
 
-def _gains(family: Family, known: dict[Choice, Limit]) -> Gains:
-    tried = {values: limit for (other, values), limit in known.items() if other is family}
-    values = _best(known, family)
-    return Gains(family, values, tried[values], tried)
+def _tried(known: dict[Choice, Limit], family: Family) -> dict[Values, Limit]:
+    return {values: limit for (other, values), limit in known.items() if other is family}

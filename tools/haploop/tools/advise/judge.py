@@ -139,7 +139,10 @@ class Judge:
         return {
             index: Judgement(False, result["verdict"], result["window"]["oscillation_m"], result)
             for index, result in zip(looked, results, strict=True)
-            if result["ended"] == "done" and _goes_on(result)
+            if result["ended"] == "done"
+            and result["verdict"] == "limit-cycle"
+            and (growth := result["window"]["growth_1_s"]) is not None
+            and growth > -_SURELY_DYING_1_S
         }
 
     def _judgement(self, scene: Scene, result: Summary, presumed: bool) -> Judgement:
@@ -228,12 +231,6 @@ def _seconds(scenes: Sequence[Scene], bundle: list[int]) -> float:
     first = scenes[bundle[0]]
     in_array_s = _IN_IT_S * (first.friction is not None) + _ARRAY_S / len(bundle)
     return first.duration * (_ALONE_S if len(bundle) < FEWEST else in_array_s) * len(bundle)
-
-
-def _goes_on(result: Summary) -> bool:
-    """Tells whether a short run swings without dying away."""
-    growth = result["window"]["growth_1_s"]
-    return result["verdict"] == "limit-cycle" and growth is not None and growth > -_SURELY_DYING_1_S
 
 
 def _dying_1_s(result: Summary) -> float:

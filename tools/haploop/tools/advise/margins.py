@@ -7,7 +7,6 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial, reduce
-from typing import Any
 
 from haploop.protocol.scene.scene import ElementTable, Scene
 from haploop.tools.advise.gains import Gains, Search, Values
@@ -102,7 +101,7 @@ class MarginSearch:
         known, worst = gains.tried[values], _likely_worst(gains)
         if known.is_within(self._search.tolerance):
             return self._changed(gains, values, worst, known.stiffness_N_m)
-        return self._changed(gains, values, [_same, *worst], known.not_steady_N_m)
+        return self._changed(gains, values, [partial(scale_quantities, factors={}), *worst], known.not_steady_N_m)
 
     def safe(self, found: list[Gains]) -> Recommendation:
         """Returns the family to use and a stiffness that holds in every corner, rounded down to two digits.
@@ -111,7 +110,7 @@ class MarginSearch:
         comes out above, that is tried, too.
         """
         self._search.stage("every corner")
-        every = [_same, *(partial(scale_quantities, factors=factors) for factors in corners(self._tasks.first))]
+        every = [partial(scale_quantities, factors=factors) for factors in ({}, *corners(self._tasks.first))]
         proved: dict[int, float] = {}
 
         def bears(gains: Gains) -> float:
@@ -148,8 +147,8 @@ class MarginSearch:
     def _failing(self, gains: Gains, stiffness: float, changes: list[Vary]) -> list[Vary]:
         """Returns the changes under which a wall, or where that costs little a softer one, is not steady."""
         walls = [stiffness, *(max(LEAST_N_M, stiffness * share) for share in self._below)]
-        looks = [(change, k) for change in changes for k in walls]
-        return list(dict.fromkeys(self._unsteady(looks, gains.family.elements(gains.safe_values))))
+        failed = self._unsteady(changes, walls, gains.family.elements(gains.safe_values))
+        return [changes[i] for i in failed]
 
     def _known_well(self, gains: Gains) -> None:
         """Finds the limit of the choice that is safe, which may have been left off as not the best."""
@@ -164,23 +163,21 @@ class MarginSearch:
         elements = gains.family.elements(gains.safe_values)
         changes = larger_changes(self._tasks.first) if stiffness else []
         for _, alike in itertools.groupby(sorted(changes, key=_size), key=_size):
-            if failed := self._unsteady([(change, stiffness) for change in alike], elements):
-                return failed[0]
+            same_size = list(alike)
+            if failed := self._unsteady([change.apply for change in same_size], [stiffness], elements):
+                return same_size[failed[0]]
         return None
 
-    def _unsteady(self, looks: Sequence[tuple[Any, float]], elements: Sequence[ElementTable]) -> list[Any]:
-        """Returns the changes, or variations, of (change, stiffness) for which some run is not steady, in order."""
+    def _unsteady(self, changes: Sequence[Vary], walls: Sequence[float], elements: Sequence[ElementTable]) -> list[int]:
+        """Returns the indices of the changes under which some run with some of the walls is not steady."""
         runs = [
-            (change, run)
-            for change, k in looks
-            for run in self._tasks.make_runs(k, elements, change.apply if isinstance(change, Change) else change)
+            (i, run)
+            for i, change in enumerate(changes)
+            for k in walls
+            for run in self._tasks.make_runs(k, elements, change)
         ]
         judged = self._search.judge.judge([run for _, run in runs])
-        return [change for (change, _), judgement in zip(runs, judged, strict=True) if not judgement.steady]
-
-
-def _same(scene: Scene) -> Scene:
-    return scene
+        return sorted({i for (i, _), judgement in zip(runs, judged, strict=True) if not judgement.steady})
 
 
 def _likely_worst(gains: Gains) -> list[Vary]:

@@ -128,16 +128,8 @@ def _words(ax: Axes, outcome: Outcome) -> None:
     more = len(outcome.elements) - _MOST
     notes = ([f"Left out here: {more} more element{'s' * (more > 1)}."] if more > 0 else []) + note_sentences(outcome)
     wrapped = [line for sentence in notes for line in textwrap.wrap(sentence, 84)]
-    ax.text(
-        0.0,
-        1.0,
-        "\n".join(wrapped[:9]),
-        va="top",
-        fontsize=style.SMALL,
-        color=style.GREY,
-        transform=ax.transAxes,
-        gid="words",
-    )
+    look = {"fontsize": style.SMALL, "color": style.GREY, "transform": ax.transAxes}
+    ax.text(0.0, 1.0, "\n".join(wrapped[:9]), va="top", gid="words", **look)
 
 
 def _header(figure: SubFigure, outcome: Outcome) -> None:

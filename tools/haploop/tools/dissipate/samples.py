@@ -19,10 +19,8 @@ class Samples:
     """Consecutive samples, one control period apart; arrays of shape (samples,).
 
     Attributes:
-        t_s: time of every sample.
-        x_m: position measured by the controller.
+        x_m, true_x_m: position measured by the controller, and that of the device.
         v_m_s, a_m_s2: velocity and acceleration as recorded; None where they are to be estimated.
-        true_x_m: position of the device.
         between_x_m: its position within the period after each sample, when a delayed force changes; None for a straight
             line from sample to sample.
         begins: whether a gap lies before it, or it is the first.
@@ -44,8 +42,7 @@ class Notes:
     """Counts of what was found in a recording.
 
     Attributes:
-        rows: samples that were used.
-        unusable_rows: rows left out, since a number in them is missing or not finite.
+        rows, unusable_rows: used, and left out, since a number in them is missing or not finite.
         gaps_s: begin and end of each gap, s; the first hundred.
         gaps, missing_s: number of gaps, and their length in all, s.
         uneven: periods that are more than a tenth off the others.

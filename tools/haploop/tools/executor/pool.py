@@ -45,8 +45,7 @@ class Pool:
         ``energy`` and ``trajectories`` are as of ``haploop.launch.batch.run.batch_results``.
 
         Raises:
-            PluginError: a plugin cannot be used.
-            ExecutorError: no worker can be started.
+            PluginError, ExecutorError: a plugin cannot be used, or no worker can be started.
         """
         work = Work(make=_second, sources=read_sources(plugins), energy=energy, trajectories=trajectories)
         count = len(scenes) if isinstance(scenes, Sequence) else None
@@ -73,8 +72,7 @@ class Pool:
             Each item of a part that is done with what is kept of it.
 
         Raises:
-            PluginError: a plugin does not load in a worker.
-            ExecutorError: no worker can be started.
+            PluginError, ExecutorError: a plugin does not load in a worker, or no worker can be started.
         """
         sizes = Sizes(self.count, count)
         source = cut(groups, sizes)
