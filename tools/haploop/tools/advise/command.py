@@ -11,9 +11,9 @@ from pathlib import Path
 
 from rich import progress
 
-from haploop.launch.spec import make_output
 from haploop.launch.scene.events import elements_of, try_out
 from haploop.launch.scene.toml_writer import to_toml
+from haploop.launch.spec import make_output
 from haploop.logger.summary import finite
 from haploop.tools.advise.advice import Advice, AdviceData, advice, as_data
 from haploop.tools.advise.figure import draw
