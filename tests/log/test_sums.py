@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from haploop.logger.books.sums import add_columns, add_ticks_of_batch, no_sums, sum_steps, with_rows
+from haploop.logger.books.work import add_columns, add_ticks_of_batch, no_sums, sum_steps, with_rows
 from haploop.protocol.trees import tree_select, tree_take
 
 amounts = st.floats(-1e6, 1e6, allow_subnormal=False)

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from haploop.logger.books.one_mass import OneMassBooks
-from haploop.logger.books.sums import sum_steps
-from haploop.logger.books.work import Displacement, by_interval
+from haploop.logger.books.work import Displacement, by_interval, sum_steps
 from haploop.plant.motion.mechanics import Mechanics
 from haploop.plant.motion.transition import make_foh_transition
 from haploop.protocol.ticks import Timebase

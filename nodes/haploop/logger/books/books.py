@@ -9,24 +9,22 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from haploop.logger.books.one_mass import OneMassBooks
-from haploop.logger.books.sums import (
-    Sums,
-    add_columns,
-    add_ticks_of_batch,
-    no_sums,
-    sum_rows,
-    sum_steps,
-    with_rows,
-)
 from haploop.logger.books.work import (
     CAUSES,
     Displacement,
+    Sums,
+    add_columns,
+    add_ticks_of_batch,
     by_interval,
     displacement,
     held_J,
     ideal_springs,
     in_effect,
+    no_sums,
     sampled_work,
+    sum_rows,
+    sum_steps,
+    with_rows,
 )
 from haploop.protocol.arrays import first_row
 from haploop.protocol.scene.scene import Scene

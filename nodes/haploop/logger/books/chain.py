@@ -13,8 +13,7 @@ import numpy as np
 
 from haploop.logger.books.one_mass import beyond_limits
 from haploop.logger.books.segments import BatchColumns, ChainForms, Columns, Segments, end_to_end
-from haploop.logger.books.sums import sum_rows, sum_steps
-from haploop.logger.books.work import Displacement, by_interval
+from haploop.logger.books.work import Displacement, by_interval, sum_rows, sum_steps
 from haploop.plant.chain.chain import Chain
 from haploop.plant.motion.hand_force import constant_forces, make_hand_force
 from haploop.protocol.arrays import first_row

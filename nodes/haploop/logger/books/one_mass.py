@@ -7,8 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from haploop.logger.books.sums import sum_rows, sum_steps
-from haploop.logger.books.work import Displacement, SumSteps, by_interval
+from haploop.logger.books.work import Displacement, SumSteps, by_interval, sum_rows, sum_steps
 from haploop.plant.motion.hand_force import constant_forces, make_hand_force
 from haploop.plant.motion.mechanics import Mechanics
 from haploop.plant.motion.transition import motion_integrals, natural_rate

@@ -12,8 +12,7 @@ from haploop.controller.controller import Controller
 from haploop.controller.dissipation import Element, ElementError
 from haploop.controller.estimators.base import Sample, Unchanged
 from haploop.logger.books.buffers import as_float64
-from haploop.logger.books.sums import add_columns, no_sums
-from haploop.logger.books.work import sampled_work
+from haploop.logger.books.work import add_columns, no_sums, sampled_work
 from haploop.protocol.changes import Event
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase

@@ -18,7 +18,7 @@ from haploop.launch.batch.jax.tick import BatchParams, BatchState, Forces, NotCo
 from haploop.launch.batch.jax.window import CompiledWindow
 from haploop.launch.batch.stacking import structure
 from haploop.logger.books.one_mass import OneMassBooks
-from haploop.logger.books.sums import Sums
+from haploop.logger.books.work import Sums
 from haploop.plant.line.actuator import ActuatedLine
 from haploop.plant.motion.one_mass import OneMassMotion
 from haploop.plant.plant import beyond

@@ -13,8 +13,7 @@ import jax
 from haploop.controller.tick import ControllerParams, StateTuple, Wall, tick
 from haploop.launch.batch.jax.rows import Rows
 from haploop.logger.books.one_mass import OneMassParams, Steps, Ticks, increments
-from haploop.logger.books.sums import sum_rows
-from haploop.logger.books.work import CAUSES, displacement, ideal_springs, sampled_work
+from haploop.logger.books.work import CAUSES, displacement, ideal_springs, sampled_work, sum_rows
 from haploop.plant.motion.forced_response import forced_response
 from haploop.plant.motion.one_mass import OneMassState, advance, sensed_acceleration
 from haploop.plant.motion.record import NOTED, change_over
