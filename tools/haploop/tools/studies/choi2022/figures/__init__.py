@@ -4,21 +4,10 @@ from __future__ import annotations
 
 import pkgutil
 import re
-from collections.abc import Callable, Mapping
 from importlib import import_module
-from typing import Protocol, cast
-
-from haploop.tools.studies.choi2022.claims import Claim, Finding
-from haploop.tools.studies.choi2022.work import Work
+from types import ModuleType
 
 _NAME = re.compile(r"figure_(\d+)")
-
-
-class PaperFigure(Protocol):
-    """A module ``figure_N``."""
-
-    CLAIMS: Mapping[str, Claim]
-    make: Callable[[Work], list[Finding]]
 
 
 def numbers() -> list[int]:
@@ -27,6 +16,6 @@ def numbers() -> list[int]:
     return sorted(int(found[1]) for name in names if (found := _NAME.fullmatch(name)))
 
 
-def figure(number: int) -> PaperFigure:
-    """Imports the module of a figure."""
-    return cast(PaperFigure, import_module(f"{__name__}.figure_{number}"))
+def figure(number: int) -> ModuleType:
+    """Imports the module of a figure: ``CLAIMS`` by name, and ``make`` from a ``Work`` to findings."""
+    return import_module(f"{__name__}.figure_{number}")

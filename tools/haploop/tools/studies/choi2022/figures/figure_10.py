@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from haploop.logger.summary import Summary
 from haploop.tools.figure.style import ELEMENTS, FAINT, GREY, dress, empty_figure, legend, plain_numbers
 from haploop.tools.render.units import amount
 from haploop.tools.studies.choi2022.claims import Finding, claims_of
@@ -78,64 +77,46 @@ class Range(NamedTuple):
 def _ranges(work: Work, setup: Setup, stiffnesses: np.ndarray) -> dict[str, Range]:
     """Returns the ranges of nothing and of the three elements, one at a time."""
     step = 6 if work.small else 1
-    sizes = {KINDS[0]: np.zeros(1), KINDS[1]: DAMPINGS[::step], KINDS[2]: MASSES[::step], KINDS[3]: MASSES[::step]}
-    cells = [(kind, k, float(size)) for kind in KINDS for k in stiffnesses for size in sizes[kind]]
-    results = work.run_all("stable ranges", [setup.scene(k, elements_of(kind, size)) for kind, k, size in cells])
+    of_kinds = dict(zip(KINDS, (np.zeros(1), DAMPINGS[::step], MASSES[::step], MASSES[::step]), strict=True))
+    cells = [(kind, k, float(size)) for kind in KINDS for k in stiffnesses for size in of_kinds[kind]]
+    results = iter(work.run_all("stable ranges", [setup.scene(k, elements_of(kind, size)) for kind, k, size in cells]))
     found = {}
-    for kind, of_kind in sizes.items():
-        here = [result for cell, result in zip(cells, results, strict=True) if cell[0] == kind]
-        shape = len(stiffnesses), len(of_kind)
-        steady, swings_m = (np.reshape([of(result) for result in here], shape) for of in (is_steady, _swing_m))
-        found[kind] = Range(of_kind, steady, swings_m)
+    for kind, sizes in of_kinds.items():
+        here = [[next(results) for _ in sizes] for _ in stiffnesses]
+        swings_m = [[one["window"]["oscillation_m"] if "window" in one else np.inf for one in row] for row in here]
+        found[kind] = Range(sizes, np.array([list(map(is_steady, row)) for row in here]), np.array(swings_m))
     return found
 
 
-def _swing_m(result: Summary) -> float:
-    return result["window"]["oscillation_m"] if "window" in result else np.inf
-
-
 def _draw(found: dict[str, Range], stiffnesses: np.ndarray) -> Figure:
+    """Draws full marks for what is steady, faint ones for what was tried besides; right, which inertia is."""
+
+    def marks(ax: Axes, sizes: np.ndarray, there: np.ndarray, colour: str, label: str = "") -> None:
+        rows, columns = np.nonzero(there)
+        style, size = (".", 2.5) if colour == FAINT else ("s", 4.5)
+        ax.plot(sizes[columns], stiffnesses[rows] / 1e3, style, color=colour, markersize=size, label=label)
+
     figure = empty_figure(13.0, 4.6)
     axes = figure.subplots(1, 4, sharey=True)
     for ax, kind in zip(axes, KINDS[1:], strict=False):
-        _cells(ax, found[kind], stiffnesses, kind)
+        unit, label = (1.0, "damping (N s/m)") if kind == "damping" else (1e3, "inertia (g)")
+        sizes, steady, _ = found[kind]
+        marks(ax, unit * sizes, ~steady, FAINT)
+        marks(ax, unit * sizes, steady, COLOURS[kind])
+        most = largest(steady, stiffnesses) / 1e3
+        dress(ax, f"{SHORT[kind]}: up to {most:.1f} N/mm", label, "wall stiffness (N/mm)" * (kind == KINDS[1]))
     two, one = (found[kind].steady for kind in KINDS[2:])
-    for there, colour, label in (
-        (two & one, GREY, "both"),
-        (two & ~one, COLOURS[KINDS[2]], "bidirectional only"),
-        (one & ~two, COLOURS[KINDS[3]], "unidirectional only"),
-    ):
-        _marks(axes[3], found[KINDS[2]].sizes * 1e3, stiffnesses, there, colour, label)
-    _dress(axes[3], "which inertia?", "inertia (g)", "")
+    sizes_g = found[KINDS[2]].sizes * 1e3
+    marks(axes[3], sizes_g, two & one, GREY, "both")
+    marks(axes[3], sizes_g, two & ~one, COLOURS[KINDS[2]], "bidirectional only")
+    marks(axes[3], sizes_g, one & ~two, COLOURS[KINDS[3]], "unidirectional only")
+    dress(axes[3], "which inertia?", "inertia (g)", "")
+    for ax in axes:
+        ax.set_xscale("log")
+        plain_numbers(ax.xaxis)
     legend(axes[3], **UPPER_LEFT, **INSIDE)
     axes[3].set_xlim(axes[2].get_xlim())
     return figure
-
-
-def _cells(ax: Axes, one: Range, stiffnesses: np.ndarray, kind: str) -> None:
-    """Draws full marks for what is steady, faint ones for what was tried besides."""
-    unit, label = (1.0, "damping (N s/m)") if kind == "damping" else (1e3, "inertia (g)")
-    ax.plot(*_points(unit * one.sizes, stiffnesses, ~one.steady), ".", color=FAINT, markersize=2.5)
-    _marks(ax, unit * one.sizes, stiffnesses, one.steady, COLOURS[kind], "")
-    most = largest(one.steady, stiffnesses)
-    _dress(
-        ax, f"{SHORT[kind]}: up to {most / 1e3:.1f} N/mm", label, "wall stiffness (N/mm)" if kind == KINDS[1] else ""
-    )
-
-
-def _marks(ax: Axes, sizes: np.ndarray, stiffnesses: np.ndarray, there: np.ndarray, colour: str, label: str) -> None:
-    ax.plot(*_points(sizes, stiffnesses, there), "s", color=colour, markersize=4.5, label=label)
-
-
-def _points(sizes: np.ndarray, stiffnesses: np.ndarray, there: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    rows, columns = np.nonzero(there)
-    return sizes[columns], stiffnesses[rows] / 1e3
-
-
-def _dress(ax: Axes, title: str, x_label: str, y_label: str) -> None:
-    dress(ax, title, x_label, y_label)
-    ax.set_xscale("log")
-    plain_numbers(ax.xaxis)
 
 
 def _felt(work: Work, found: dict[str, Range]) -> str:
@@ -152,15 +133,13 @@ def _why(work: Work, setup: Setup) -> str:
     soft_Hz, stiff_Hz = (swings_at_Hz(setup, stiffness) for stiffness in (2500.0, 7000.0))
     two, one = (float(of.damping) for of in felt_with(setup, np.array(np.mean([soft_Hz, stiff_Hz]))))
     row = int(np.argmin(abs(DELAYS_S - setup.delay_s)))
-    ideal, old = damps(0.0)[row], damps(OLD_S)[row]
+    codes = {"ideal": damps(0.0)[row], "old": damps(OLD_S)[row]}
     return work.tell(
         "why",
         delay_ms=1e3 * setup.delay_s,
-        ideal_two=_bands(ideal, 1),
-        ideal_one=_bands(ideal, 2),
+        **{f"{name}_two": _bands(of, 1) for name, of in codes.items()},
+        **{f"{name}_one": _bands(of, 2) for name, of in codes.items()},
         old_ms=1e3 * OLD_S,
-        old_two=_bands(old, 1),
-        old_one=_bands(old, 2),
         open_Hz=always_open_Hz(reading_s=OLD_S),
         soft_Hz=soft_Hz,
         stiff_Hz=stiff_Hz,
@@ -185,10 +164,8 @@ def _findings(
     damping, two, one = (found[kind].steady for kind in KINDS[1:])
     sizes = damping.sum(axis=1)
     widths = ", ".join(f"{n} at {k / 1e3:g}" for k, n in zip(stiffnesses, sizes, strict=True) if n)
-    shrinks = bool(sizes[0] > 0 and (np.diff(sizes) <= 1).all() and sizes[-1] < sizes[0])
     cells = np.array([two & ~one, one & ~two, two & one])
     low = cells[:, :, found[KINDS[2]].sizes <= LOW_KG].sum(axis=(1, 2))
-    wider = one.sum() > two.sum() and most[KINDS[3]] > most[KINDS[2]]
     computed = {
         "sizes": damping.shape[1],
         "widths": widths or "none",
@@ -199,12 +176,11 @@ def _findings(
         "low_g": 1e3 * LOW_KG,
         "low": "{}, {}, {}".format(*low),
     }
-    near = {kind: abs(most[kind] - 4500.0) <= 500.0 for kind in KINDS[1:3]}
     holding = {
-        "wide": shrinks,
-        "damping": near[KINDS[1]],
-        "similar": near[KINDS[2]],
-        "larger": bool(wider),
+        "wide": bool(sizes[0] > 0 and (np.diff(sizes) <= 1).all() and sizes[-1] < sizes[0]),
+        "damping": abs(most[KINDS[1]] - 4500.0) <= 500.0,
+        "similar": abs(most[KINDS[2]] - 4500.0) <= 500.0,
+        "larger": bool(one.sum() > two.sum() and most[KINDS[3]] > most[KINDS[2]]),
         "exclusive": bool((low[:2] > 0).all() and low[2] == 0),
     }
     return findings(work, CLAIMS, holding, **computed)

@@ -8,20 +8,10 @@ import numpy as np
 
 from haploop.tools.figure.style import GREY, dress, empty_figure, legend, plain_numbers
 from haploop.tools.render.units import amount, fixed
+from haploop.tools.studies.choi2022 import sampled
 from haploop.tools.studies.choi2022.claims import Finding, claims_of
 from haploop.tools.studies.choi2022.drawing import COLOURS, INSIDE, draw_momentum
-from haploop.tools.studies.choi2022.sampled import (
-    KINDS,
-    MASS_KG,
-    PERIOD_S,
-    closed_form,
-    forces,
-    mean_taken,
-    positions,
-    returned,
-    steps_J,
-    taken_J,
-)
+from haploop.tools.studies.choi2022.sampled import KINDS, MASS_KG, PERIOD_S, mean_taken, steps_J
 from haploop.tools.studies.choi2022.work import Work
 
 if TYPE_CHECKING:
@@ -75,8 +65,8 @@ def _over_samples(ax: Axes) -> dict[str, np.ndarray]:
 
 def _taken_under_jitter(kind: str, drift_m_s: float, ticks: int = 24) -> np.ndarray:
     """Returns the energy of each sample after the first few under a velocity drift +- jitter, a new sign each time."""
-    x = positions(drift_m_s + _JITTER_M_S * (-1.0) ** np.arange(ticks + 4))[:, None]
-    taken = taken_J(x, forces(x, kind))[:, 0]
+    x = sampled.positions(drift_m_s + _JITTER_M_S * (-1.0) ** np.arange(ticks + 4))[:, None]
+    taken = sampled.taken_J(x, sampled.forces(x, kind))[:, 0]
     return np.concatenate([[0.0], taken[4:]])
 
 
@@ -86,7 +76,7 @@ def _over_frequency(ax: Axes, frequencies: np.ndarray, measured: dict[tuple[str,
     for kind in KINDS:
         colour = COLOURS[kind]
         if kind != UNI:
-            curve = closed_form(kind, 2.0 * np.pi * fine * PERIOD_S, late) / _unsampled_damper(fine)
+            curve = sampled.closed_form(kind, 2.0 * np.pi * fine * PERIOD_S, late) / _unsampled_damper(fine)
             ax.plot(fine, curve, color=colour, linewidth=1.2)
         look = {"linestyle": "-" if kind == UNI else "none", "linewidth": 0.8, "marker": ".", "markersize": 5}
         ax.plot(frequencies, measured[kind, late] / scale, color=colour, label=kind.replace("-inertia", ""), **look)
@@ -110,9 +100,8 @@ def _on_alternation() -> list[Finding]:
     kept = [_closed(rng, shortest=2) for _ in range(2000)]
     broken = [_closed(rng, shortest=1) for _ in range(2000)]
     least, leaking = min(map(_cycle_J, kept)), float(np.mean([_cycle_J(v) < 0.0 for v in broken]))
-    shifts = [
-        _taken_under_jitter(BI, drift)[1:].reshape(-1, 2).sum(axis=1).mean() for drift in (-_DRIFT_M_S, 0.0, _DRIFT_M_S)
-    ]
+    drifts = (-_DRIFT_M_S, 0.0, _DRIFT_M_S)
+    shifts = [_taken_under_jitter(BI, drift)[1:].reshape(-1, 2).sum(axis=1).mean() for drift in drifts]
     return [
         CLAIMS["alternates"].holds_if(
             abs(level / formula - 1.0) < 1e-9,
@@ -158,11 +147,9 @@ def _on_unidirectional(
     until = _first_negative(frequencies, ratio - 1.0)
     at = int(np.argmin(np.abs(frequencies - 20.0)))
     rest, drift = (float(_taken_under_jitter(UNI, one)[1:].mean()) for one in (0.0, _DRIFT_M_S))
-    back = {
-        name: returned(hertz)
-        for name, hertz in (("5 Hz", 5.1), ("20 Hz", 20.3), ("50 Hz", 50.7), ("100 Hz", 101.0), ("200 Hz", 201.3))
-    }
-    at_once = abs(returned(50.7, before=False))
+    sines = {"5 Hz": 5.1, "20 Hz": 20.3, "50 Hz": 50.7, "100 Hz": 101.0, "200 Hz": 201.3}
+    back = {name: sampled.returned(hertz) for name, hertz in sines.items()}
+    at_once = abs(sampled.returned(50.7, before=False))
     up_to = "; ".join(
         how + " " + ", ".join(f"{kind.partition('-')[0]} {_hertz(ends[kind, late])}" for kind in KINDS)
         for late, how in ((0, "without delay"), (2, "with 2 ms"))
