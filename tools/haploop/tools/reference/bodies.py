@@ -130,8 +130,13 @@ def fastest_rate(bodies: Bodies) -> float:
     return max(float(np.abs(np.linalg.eigvals(rates)).max()) for rates in both)
 
 
+def product(row: Row, w: Sequence[Any]) -> Any:
+    """Returns row . w."""
+    return mp.fdot((a, b) for a, b in zip(row, w, strict=True) if a and b)
+
+
 def _times(rows: Matrix, w: Sequence[Any]) -> Row:
-    return [mp.fdot((a, b) for a, b in zip(row, w, strict=True) if a and b) for row in rows]
+    return [product(row, w) for row in rows]
 
 
 def sign_changes(series: Row, length: Any) -> Row:

@@ -117,16 +117,10 @@ def loads(scene: Scene, time: Timebase) -> Iterator[Fraction]:
     hand, points = scene.hand or Hand(), _points(scene)
     rest = Fraction(hand.stiffness) * Fraction(hand.rest)
     for tick in range(time.ticks + 1):
-        yield rest + _straight(points, Fraction(tick, time.control_rate))
-
-
-def _straight(points: list[tuple[Fraction, Fraction]], t: Fraction) -> Fraction:
-    if t <= points[0][0]:
-        return points[0][1]
-    for (t0, f0), (t1, f1) in pairwise(points):
-        if t <= t1:
-            return f0 + (f1 - f0) * (t - t0) / (t1 - t0)
-    return points[-1][1]
+        t = min(max(Fraction(tick, time.control_rate), points[0][0]), points[-1][0])
+        here = ((t0, f0, t1, f1) for (t0, f0), (t1, f1) in pairwise(points) if t <= t1)
+        t0, f0, t1, f1 = next(here, (t, points[-1][1], t, points[-1][1]))
+        yield rest + (f0 + (f1 - f0) * (t - t0) / (t1 - t0) if t1 > t0 else f0)
 
 
 def close_loop(scene: Scene, plant: Continuous, exact: Callable[[Fraction], Any], tick_done: Done) -> Closed:

@@ -4,15 +4,25 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
 from mpmath import mp, mpf
 from scipy.integrate import solve_ivp
 
 from haploop.protocol.scene.scene import Scene
-from haploop.tools.reference.bodies import COMMAND, FRICTION, LOAD, SLOPE, Bodies, Flow, Row, fastest_rate, sign_changes
+from haploop.tools.reference.bodies import (
+    COMMAND,
+    FRICTION,
+    LOAD,
+    SLOPE,
+    Bodies,
+    Flow,
+    Row,
+    fastest_rate,
+    product,
+    sign_changes,
+)
 
 # Pieces in which a switch is looked for are no longer than this part of the fastest time constant or radian ...
 _PART = 0.25
@@ -116,7 +126,7 @@ class ContinuousPlant(StickSlipPlant[Row]):
 
     def sensed(self) -> float:
         """Returns the acceleration an accelerometer feels under the force held until now, m/s^2."""
-        return float(_product(self._bodies.sensed[self.is_stuck], self.w))
+        return float(product(self._bodies.sensed[self.is_stuck], self.w))
 
     def advance(self, command: float, load: Any, next_load: Any) -> None:
         """Advances one tick under a held command; load in N at its start and end."""
@@ -130,7 +140,7 @@ class ContinuousPlant(StickSlipPlant[Row]):
             self._through(self._period_s / self._parts)
 
     def _force(self) -> Any:
-        return _product(self._bodies.force, self.w)
+        return product(self._bodies.force, self.w)
 
     def _through(self, length: Any) -> None:
         """Advances one piece, from switch to switch."""
@@ -145,7 +155,7 @@ class ContinuousPlant(StickSlipPlant[Row]):
 
     def _mode_ends(self, length: Any) -> Any:
         """Returns when the present mode ends, s; None if it lasts for ``length``."""
-        series = [_product(row, self.w) for row in self._margins[self.is_stuck]]
+        series = [product(row, self.w) for row in self._margins[self.is_stuck]]
         levels = (self._breakaway, -self._breakaway) if self.is_stuck else (mpf(0),)
         found = [t for level in levels for t in sign_changes([series[0] - level, *series[1:]], length)]
         return min((t for t in found if t > mpf(_INSTANT_S)), default=None)
@@ -192,12 +202,11 @@ class IntegratedPlant(StickSlipPlant[np.ndarray]):
 
     def _to_switch(self, length: float) -> float:
         """Advances until friction switches, at most so long; returns how long it was."""
-        v, stuck, direction = self._v, self.is_stuck, self._direction
-
-        def margin(_t: float, w: np.ndarray) -> float:
-            return self._breakaway - abs(float(self._row @ w)) if stuck else direction * float(w[v])
-
-        solved = self._solved(length, _Switch(margin))
+        if self.is_stuck:
+            switch = _Switch(lambda w: self._breakaway - abs(float(self._row @ w)))
+        else:
+            switch = _Switch(lambda w: self._direction * float(w[self._v]))
+        solved = self._solved(length, switch)
         if not solved.t_events[0].size:
             self.w = solved.y[:, -1].copy()
             return length
@@ -218,16 +227,15 @@ class IntegratedPlant(StickSlipPlant[np.ndarray]):
         return solved
 
 
-@dataclass
-class _Switch:
+class _Switch(NamedTuple):
     """An event of ``solve_ivp`` that ends the motion where the margin falls below 0."""
 
-    margin: Callable[[float, np.ndarray], float]
+    margin: Callable[[np.ndarray], float]
     terminal: bool = True
     direction: float = -1.0
 
-    def __call__(self, t: float, w: np.ndarray) -> float:
-        return self.margin(t, w)
+    def __call__(self, _t: float, w: np.ndarray) -> float:
+        return self.margin(w)
 
 
 def _coordinates(bodies: int, size: int) -> tuple[Any, Any]:
@@ -243,10 +251,6 @@ def _coordinates(bodies: int, size: int) -> tuple[Any, Any]:
 
 def _floats(matrix: Any) -> np.ndarray:
     return np.array(matrix.tolist(), float)
-
-
-def _product(row: Row, w: Row) -> Any:
-    return mp.fdot(zip(row, w, strict=True))
 
 
 def _sign(value: Any) -> int:

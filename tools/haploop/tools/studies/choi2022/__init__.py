@@ -15,9 +15,9 @@ claims. It is found by its name and needs no entry anywhere:
 Each claim gets one finding: it holds, holds under a stated assumption or does not hold, with numbers that were
 computed. The page is written from them, never by hand.
 
-    simulation/   interpretations of section V.A as scenes, the search among them, the runs of Fig. 6
-    experiment/   interpretations of section V.B as setups of the device, the search among them, which walls are steady
-    sampled, gate, scenes: energy of sampled motion, the gate of eq. 9, runs of the program
-    interpretations, search_report: tables of interpretations, and what a search among them found
+    simulation, simulation_measure: interpretations of section V.A as scenes, and how far each is from the paper
+    device, experiment, experiment_measure: those of section V.B, the search among them, which walls are steady
+    interpretations, drawing: tables of interpretations, and what a search among them found; colours
+    sampled, theory: energy of sampled motion, the gate of eq. 9, limits of the linear loop
     claims, work, command: claims and findings, a figure in the making, ``haploop paper`` and its page
 """

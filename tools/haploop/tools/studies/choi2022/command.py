@@ -81,39 +81,31 @@ def page(kept: Mapping[int, Kept], pictures: str = "") -> str:
     # The last figures are nearest to a device that is to be built.
     answers = [f"- {one['answer']} ([{number}](#figure-{number}))" for number, one in kept.items() if one.get("answer")]
     parts += ["## What a builder can take from it", "\n".join(reversed(answers))] if answers else []
-    parts += ["## Claims", _count(rows), texts["interpretations"], *_tables(rows), *_missing(kept), "## Figures"]
+    parts += ["## Claims", *_tables(rows), *_missing(kept), "## Figures"]
     for number, one in kept.items():
         parts += _figure(number, one, pictures)
     return "\n\n".join(parts) + "\n"
 
 
-def _count(rows: list[tuple[int, Finding]]) -> str:
-    count = Counter(finding.verdict for _, finding in rows)
-    return f"{len(rows)} claims: {'; '.join(f'{verdict}: {count[verdict]}' for verdict in VERDICTS)}."
-
-
 def _tables(rows: list[tuple[int, Finding]]) -> list[str]:
-    """Returns a table for each section of the paper, in its order; within it by figure."""
-    parts = []
-    for section, title in words_of("page", "sections").items():
-        if there := [row for row in rows if _section(row[1].claim.place) == section]:
-            parts += [f"### {section}. {title}", _table(there)]
-    return parts
+    """Returns how many claims there are, and a table for each section of the paper, in its order; within it by figure.
 
-
-def _section(place: str) -> str:
-    """Returns ``V.B`` of ``V.B.2, Fig. 8``."""
-    name = place.partition(",")[0]
-    return ".".join(name.split(".")[:2])
-
-
-def _table(rows: list[tuple[int, Finding]]) -> str:
-    cells = []
+    The section of a claim at ``V.B.2, Fig. 8`` is ``V.B``.
+    """
+    count = Counter(finding.verdict for _, finding in rows)
+    parts = [f"{len(rows)} claims: {'; '.join(f'{verdict}: {count[verdict]}' for verdict in VERDICTS)}."]
+    parts.append(texts_of("page")["interpretations"])
+    cells: dict[str, list[list[str]]] = {section: [] for section in words_of("page", "sections")}
     for number, finding in rows:
         claim = f"“{finding.claim.quote}” ({finding.claim.place})"
         is_so = f"**holds assuming** {finding.assumption}" if finding.verdict == ASSUMING else f"**{finding.verdict}**"
-        cells.append([claim, is_so, finding.numbers, f"[{number}](#figure-{number})"])
-    return markdown_table(["the paper says", "here", "numbers", "figure"], cells)
+        section = ".".join(finding.claim.place.partition(",")[0].split(".")[:2])
+        cells[section].append([claim, is_so, finding.numbers, f"[{number}](#figure-{number})"])
+    for section, title in words_of("page", "sections").items():
+        if cells[section]:
+            table = markdown_table(["the paper says", "here", "numbers", "figure"], cells[section])
+            parts += [f"### {section}. {title}", table]
+    return parts
 
 
 def _missing(kept: Mapping[int, Kept]) -> list[str]:

@@ -147,16 +147,13 @@ def nearest() -> Setup:
     return Setup.from_scene(shipped(SCENE_FILE))
 
 
-def elements_of(kind: str, size: float) -> Elements:
-    """Makes one element of a kind of ``KINDS``: damping in N s/m, inertia in kg."""
+def elements_of(kind: str, *sizes: float) -> Elements:
+    """Makes one element of a kind of ``KINDS``, damping in N s/m, inertia in kg; of "both" damping and inertia."""
+    if kind == "both":
+        return elements_of("damping", sizes[0]) + elements_of("unidirectional-inertia", sizes[1])
     if kind == "nothing":
         return ()
-    return (ElementTable(name=kind, parameters={"damping" if kind == "damping" else "mass": size}),)
-
-
-def both(damping: float, mass: float) -> Elements:
-    """Makes damping in N s/m with unidirectional inertia in kg."""
-    return elements_of("damping", damping) + elements_of("unidirectional-inertia", mass)
+    return (ElementTable(name=kind, parameters={"damping" if kind == "damping" else "mass": sizes[0]}),)
 
 
 def file_text(setup: Setup) -> str:

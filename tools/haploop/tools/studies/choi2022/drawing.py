@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, TypedDict
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -28,38 +28,19 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-class Inside(TypedDict):
-    """Keywords of a legend within the axes, on a ground that hides what is behind it."""
-
-    framealpha: float
-    edgecolor: str
-
-
-class UpperLeft(TypedDict):
-    """Keywords of a legend in the upper left corner."""
-
-    loc: str
-    bbox_to_anchor: tuple[float, float]
-    ncols: int
-
-
-COLOURS = {
-    "nothing": FAINT,
-    "spring": WALL,
-    "damping": ELEMENTS[0],
-    "bidirectional-inertia": ELEMENTS[1],
-    "unidirectional-inertia": ELEMENTS[2],
-    "both": ELEMENTS[3],
+# Colour and short name of each kind of element, and of the wall's spring.
+_LOOKS = {
+    "nothing": (FAINT, "nothing"),
+    "spring": (WALL, "spring"),
+    "damping": (ELEMENTS[0], "damping"),
+    "bidirectional-inertia": (ELEMENTS[1], "bidirectional"),
+    "unidirectional-inertia": (ELEMENTS[2], "unidirectional"),
+    "both": (ELEMENTS[3], "damping and unidirectional"),
 }
-SHORT = {
-    "nothing": "nothing",
-    "damping": "damping",
-    "bidirectional-inertia": "bidirectional",
-    "unidirectional-inertia": "unidirectional",
-    "both": "damping and unidirectional",
-}
-INSIDE: Inside = {"framealpha": 0.8, "edgecolor": "none"}
-UPPER_LEFT: UpperLeft = {"loc": "upper left", "bbox_to_anchor": (0.0, 1.0), "ncols": 1}
+COLOURS, SHORT = ({kind: look[i] for kind, look in _LOOKS.items()} for i in (0, 1))
+# A legend within the axes, on a ground that hides what is behind it; and one in the upper left corner.
+INSIDE: dict[str, Any] = {"framealpha": 0.8, "edgecolor": "none"}
+UPPER_LEFT: dict[str, Any] = {"loc": "upper left", "bbox_to_anchor": (0.0, 1.0), "ncols": 1}
 _TAKEN, _GIVEN = "#9FD3B0", "#E8A0A0"
 # Steps shorter than this share of all have no arrow.
 _ARROW = 0.04
@@ -114,19 +95,11 @@ def claims_table(
     rows = []
     for name, about in claims.items():
         decides = decider(found, name)
-        rows.append(
-            [
-                f"*{name}*",
-                about,
-                *(yes(row, name) for row in alone.values()),
-                *(percent(share(some, name)) for some in shares.values()),
-                decides.describe(name) if decides else "",
-            ]
-        )
+        held, often = (yes(row, name) for row in alone.values()), (percent(share(s, name)) for s in shares.values())
+        rows.append([f"*{name}*", about, *held, *often, decides.describe(name) if decides else ""])
+    first = 2 + len(alone)
     return markdown_table(
-        ["claim", "as tested", *alone, *shares, decided],
-        rows,
-        numbers=range(2 + len(alone), 2 + len(alone) + len(shares)),
+        ["claim", "as tested", *alone, *shares, decided], rows, numbers=range(first, first + len(shares))
     )
 
 

@@ -15,7 +15,7 @@ from haploop.protocol.scene.scene import Scene
 from haploop.tools.search.bisect import climb, rungs_held
 from haploop.tools.search.random import Row
 from haploop.tools.studies.choi2022.claims import words_of
-from haploop.tools.studies.choi2022.device import KINDS, Elements, Setup, both, elements_of
+from haploop.tools.studies.choi2022.device import KINDS, Setup, elements_of
 from haploop.tools.studies.choi2022.interpretations import summed_up
 
 # From 2.5 N/mm in steps of 0.5 (Choi et al. 2022, V.B.3).
@@ -54,21 +54,14 @@ CLAIMS: dict[str, str] = words_of(7, "tested")
 
 
 def is_steady(result: Summary) -> bool:
-    """Tells whether a run has no unwanted vibration: by the summary's verdict over the last 0.5 s of the press.
+    """Tells whether a run has "no unwanted vibration" (Choi et al. 2022, V.B.3): by the verdict over the last 0.5 s.
 
-    Less than an encoder step to either side is none (Choi et al. 2022, V.B.3, say no more than "no unwanted
-    vibration").
+    Less than an encoder step to either side is none.
     """
     return result.get("verdict") == "steady"
 
 
-def make_elements(name: str, size: Sequence[float]) -> Elements:
-    """Makes the elements of one size."""
-    return both(*size) if name == "both" else elements_of(name, *size)
-
-
 def _run_all(scenes: Sequence[Scene], *, energy: bool = False) -> list[Summary]:
-    """Returns the results of scenes in this process, in their order."""
     return run_batch(scenes, registry(), energy=energy, fewest=_FEWEST)
 
 
@@ -81,7 +74,7 @@ def stiffness_ladder(setups: Sequence[Setup], stiffnesses: np.ndarray = STIFFNES
     """
 
     def ask(stiffness: float, going: Sequence[tuple[int, str]]) -> list[list[bool]]:
-        scenes = [setups[i].scene(stiffness, make_elements(name, size)) for i, name in going for size in SIZES[name]]
+        scenes = [setups[i].scene(stiffness, elements_of(name, *size)) for i, name in going for size in SIZES[name]]
         steady = iter(map(is_steady, _run_all(scenes)))
         return [[next(steady) for _ in SIZES[name]] for _, name in going]
 
@@ -106,7 +99,7 @@ def measure(setups: Sequence[Setup]) -> list[Row]:
     """
     ladders = stiffness_ladder(setups)
     booked = _run_all([_booked(setup, k) for setup in setups for k in BOOKED_AT_N_M], energy=True)
-    pairs = _run_all([setup.scene(PAIR_AT_N_M, both(*PAIR)) for setup in setups])
+    pairs = _run_all([setup.scene(PAIR_AT_N_M, elements_of("both", *PAIR)) for setup in setups])
     hardest = [_stiffest(setup, steady["both"]) for setup, steady in zip(setups, ladders, strict=True)]
     stiffest = _run_all(hardest, energy=True)
     found = zip(setups, ladders, booked[::2], booked[1::2], pairs, stiffest, strict=True)
@@ -115,12 +108,8 @@ def measure(setups: Sequence[Setup]) -> list[Row]:
 
 def _booked(setup: Setup, stiffness: float) -> Scene:
     """Makes the scene of 2.7 N s/m with a millionth of both inertias, whose books are a millionth of theirs."""
-    return setup.scene(
-        stiffness,
-        elements_of(KINDS[1], BOOKED_DAMPING)
-        + elements_of(KINDS[2], _UNFELT * BOOKED_KG)
-        + elements_of(KINDS[3], _UNFELT * BOOKED_KG),
-    )
+    inertias = elements_of(KINDS[2], _UNFELT * BOOKED_KG) + elements_of(KINDS[3], _UNFELT * BOOKED_KG)
+    return setup.scene(stiffness, elements_of(KINDS[1], BOOKED_DAMPING) + inertias)
 
 
 def _stiffest(setup: Setup, steady: np.ndarray) -> Scene:
@@ -128,7 +117,7 @@ def _stiffest(setup: Setup, steady: np.ndarray) -> Scene:
     rows = np.flatnonzero(steady.any(axis=1))
     sizes = np.flatnonzero(steady[rows[-1]]) if len(rows) else np.arange(len(SIZES["both"]))
     size = SIZES["both"][int(sizes[len(sizes) // 2])]
-    return setup.scene(max(largest(steady), STIFFNESSES[0]), both(*size))
+    return setup.scene(max(largest(steady), STIFFNESSES[0]), elements_of("both", *size))
 
 
 def _taken_J(result: Summary) -> np.ndarray:
@@ -162,9 +151,8 @@ def _row(setup: Setup, steady: Steady, booked: Sequence[Summary], pair: Summary,
         "13 more": together > 0.0 and bool(of_pair[1] > of_pair[0]),
     }
     row = setup.as_dict() | {f"{name}_N_m": stiffness for name, stiffness in of.items()}
-    row |= {
-        f"{name} {i}_J": float(one[i]) for name, one in zip(("lower", "higher"), taken, strict=True) for i in range(3)
-    }
+    for name, one in zip(("lower", "higher"), taken, strict=True):
+        row |= {f"{name} {i}_J": float(one[i]) for i in range(3)}
     shortfalls = {name: float(not holds) for name, holds in found.items()}
     # Steps of the four stiffnesses from the paper's, beyond one.
     steps = sum(max(abs(of[name] - stiffness) / STEP_N_M - 1.0, 0.0) for name, stiffness in PAPER.items())

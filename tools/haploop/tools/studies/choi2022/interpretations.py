@@ -10,8 +10,9 @@ import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from operator import itemgetter
 from types import MappingProxyType
-from typing import Any, Generic, Self, TypeVar
+from typing import Any, Generic, NamedTuple, Self, TypeVar
 
 import numpy as np
 
@@ -45,12 +46,7 @@ class InterpretationSpace(Space):
 
     @classmethod
     def from_words(cls, figure: int, labels: Mapping[str, str] = MappingProxyType({}), **options: Any) -> Self:
-        """Makes the space of a figure of its tables ``choices`` and ``numbers``.
-
-        Args:
-            labels: of values besides.
-            options: as of ``Space``.
-        """
+        """Makes the space of a figure of its tables ``choices`` and ``numbers``, labels of other values besides."""
         choices, numbers = words_of(figure, "choices"), words_of(figure, "numbers")
         return cls(
             choices={key: tuple(one["options"]) for key, one in choices.items()},
@@ -105,27 +101,19 @@ def searched(
     effort: Effort,
     tie: Callable[[Row], float] = lambda _: 0.0,
 ) -> random.Found:
-    """Searches for the interpretation nearest to the paper with the fixed seed.
-
-    The same effort gives the same rows, whatever the number of workers.
-    """
-
-    def distance(row: Row) -> float:
-        return row["distance"]
+    """Searches for the interpretation nearest to the paper: the same effort gives the same rows on any workers."""
 
     def evaluate_all(stage: str, evaluate: Evaluate, groups: Sequence[Group]) -> list[list[Row]]:
         return work.map_parallel(f"{stage} interpretations, in groups", evaluate, groups)
 
+    distance = itemgetter("distance")
     return random_search(space, evaluate, effort, seed=SEED, distance=distance, tie=tie, evaluate_all=evaluate_all)
 
 
 def summed_up(shortfalls: Mapping[str, float], claims: Iterable[str], apart: float = 0.0) -> Row:
-    """Returns the last columns of a row: whether a claim fails, how many hold, and the distance from the paper.
+    """Returns the last columns of a row: whether a claim that counts fails, how many hold, and the distance.
 
-    Args:
-        shortfalls: by name of the claim.
-        claims: those that count.
-        apart: distance beyond the shortfalls.
+    That is from the paper, the sum of the shortfalls and what is ``apart`` beyond them.
     """
     counted = [shortfalls[name] for name in claims]
     holding = sum(short == 0.0 for short in counted)
@@ -189,8 +177,7 @@ def options(rows: Sequence[Row], space: InterpretationSpace) -> list[Option]:
     return [option for option in found if len(option.rows) >= _FEWEST]
 
 
-@dataclass(frozen=True)
-class Decider:
+class Decider(NamedTuple):
     """The best and the worst option of the dimension on which a claim hangs most."""
 
     best: Option
@@ -211,10 +198,11 @@ def decider(found: Iterable[Option], claim: str) -> Decider | None:
     by_dimension: dict[str, list[Option]] = {}
     for option in found:
         by_dimension.setdefault(option.dimension, []).append(option)
-    deciders = [
-        Decider(max(one, key=lambda option: option.share(claim)), min(one, key=lambda option: option.share(claim)))
-        for one in by_dimension.values()
-    ]
+
+    def share_of(option: Option) -> float:
+        return option.share(claim)
+
+    deciders = [Decider(max(one, key=share_of), min(one, key=share_of)) for one in by_dimension.values()]
     most = max(deciders, key=lambda one: one.gap(claim), default=None)
     return most if most and most.gap(claim) > 0.0 else None
 

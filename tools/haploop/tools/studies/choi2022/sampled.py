@@ -53,13 +53,9 @@ def forces(x_m: np.ndarray, kind: str, cutoff_Hz: float | None = None) -> np.nda
 
 
 def taken_J(x_m: np.ndarray, force_N: np.ndarray, late: int = 0) -> np.ndarray:
-    """Returns the energy taken in each step, -f[k-1-late] (x[k] - x[k-1]) (Choi et al. 2022, eq. 4).
+    """Returns the energy taken in each step, -f[k-1-late] (x[k] - x[k-1]) (Choi et al. 2022, eq. 4); shape of ``x_m``.
 
-    It is 0 where there is no force yet. With prescribed samples it is the true book too, since the force is held from
-    sample to sample.
-
-    Returns:
-        Shape of ``x_m``.
+    With prescribed samples it is the true book too, since the force is held from sample to sample.
     """
     acting = np.zeros_like(force_N)
     acting[1 + late :] = force_N[: len(force_N) - 1 - late]
@@ -104,9 +100,8 @@ def mean_taken(
 ) -> np.ndarray:
     """Returns the mean energy taken a sample under a sine of A = 1 by running the program's controller.
 
-    The mean is over the second half of the samples, weighted by a Hann window, which makes little of where in its
-    swing the sine is cut. The frequencies should be ones at which the samples do not repeat soon, so that they meet
-    all phases.
+    The mean is over the second half, with a Hann window, which makes little of where a swing is cut. At these
+    frequencies the samples should not repeat soon, so that they meet all phases.
     """
     x = np.sin(np.arange(ticks)[:, None] * theta)
     weights = np.hanning(ticks - ticks // 2)
@@ -154,18 +149,12 @@ def _reading(frequency_Hz: np.ndarray, age_s: float | None) -> tuple[np.ndarray,
 def returned(frequency_Hz: float, *, before: bool = True) -> float:
     """Returns the energy that unidirectional inertia gives back to a sine over what it takes, 0 to 1.
 
-    It is why eq. 9 looks at the acceleration of the sample before, or why it should not.
-
     Args:
         before: whether the gate is v[k] a[k-1] >= 0, as in eq. 9 (the program's controller), or v[k] a[k] >= 0.
     """
     x = np.sin(np.arange(_TICKS) * 2.0 * np.pi * frequency_Hz * PERIOD_S)[:, None]
-    taken = taken_J(x, forces(x, "unidirectional-inertia") if before else _at_once(x))[_TICKS // 2 :]
-    return float(-np.minimum(taken, 0.0).sum() / np.maximum(taken, 0.0).sum())
-
-
-def _at_once(x_m: np.ndarray) -> np.ndarray:
-    """Returns the force with the gate of the present acceleration, N."""
-    v = np.diff(x_m, axis=0, prepend=x_m[:1]) / PERIOD_S
+    v = np.diff(x, axis=0, prepend=x[:1]) / PERIOD_S
     a = np.diff(v, axis=0, prepend=v[:1]) / PERIOD_S
-    return np.where(v * a >= 0.0, -MASS_KG * a, 0.0)
+    force_N = forces(x, "unidirectional-inertia") if before else np.where(v * a >= 0.0, -MASS_KG * a, 0.0)
+    taken = taken_J(x, force_N)[_TICKS // 2 :]
+    return float(-np.minimum(taken, 0.0).sum() / np.maximum(taken, 0.0).sum())

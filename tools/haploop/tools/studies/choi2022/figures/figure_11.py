@@ -6,16 +6,15 @@ import numpy as np
 
 from haploop.tools.figure.style import INK, SMALL, dress, empty_figure
 from haploop.tools.studies.choi2022.claims import Finding, claims_of
-from haploop.tools.studies.choi2022.device import both
+from haploop.tools.studies.choi2022.device import elements_of
 from haploop.tools.studies.choi2022.experiment import findings, nearest
-from haploop.tools.studies.choi2022.experiment_measure import is_steady
+from haploop.tools.studies.choi2022.experiment_measure import PAIR, PAIR_AT_N_M, is_steady
 from haploop.tools.studies.choi2022.work import Work
 
 CLAIMS = claims_of(11)
 STIFFNESSES = np.arange(2500.0, 10001.0, 500.0)
 _DAMPINGS = (0.0, 0.5, 1.0, 1.5, 2.15, 3.0, 4.0, 5.5, 7.5, 10.0)
 _MASSES = (0.0, 0.003, 0.006, 0.009, 0.014, 0.02, 0.027, 0.035, 0.045)
-PAPER_N_M, PAPER_DAMPING, PAPER_MASS_KG = 6300.0, 2.15, 0.009
 
 
 def make(work: Work) -> list[Finding]:
@@ -25,7 +24,9 @@ def make(work: Work) -> list[Finding]:
     stiffnesses = STIFFNESSES[::3] if work.small else STIFFNESSES
     setup = nearest(work)
     cells = [(b, m, k) for b in dampings for m in masses for k in stiffnesses]
-    results = work.run_all("damping with inertia", [setup.scene(k, both(float(b), float(m))) for b, m, k in cells])
+    results = work.run_all(
+        "damping with inertia", [setup.scene(k, elements_of("both", float(b), float(m))) for b, m, k in cells]
+    )
     steady = np.array([is_steady(result) for result in results]).reshape(len(dampings), len(masses), -1)
     largest = largest_steady(steady, stiffnesses)
     figure = empty_figure(8.6, 5.2)
@@ -45,7 +46,7 @@ def make(work: Work) -> list[Finding]:
     work.data(
         "figure_11", {"damping_N_s_m": dampings, "mass_kg": masses, "stiffness_N_m": stiffnesses, "steady": steady}
     )
-    work.scene("figure_11", setup.scene(PAPER_N_M, both(PAPER_DAMPING, PAPER_MASS_KG)))
+    work.scene("figure_11", setup.scene(PAIR_AT_N_M, elements_of("both", *PAIR)))
     i, j = np.unravel_index(largest.argmax(), largest.shape)
     most, alone, damped = float(largest[i, j]), float(largest[0].max()), float(largest[:, 0].max())
     bears = np.flatnonzero(largest[0, 1:]) + 1
@@ -60,9 +61,7 @@ def make(work: Work) -> list[Finding]:
         "bears": len(bears),
     }
     near = bool(
-        abs(most - PAPER_N_M) <= 500.0
-        and 0.5 <= dampings[i] / PAPER_DAMPING <= 2.0
-        and 0.5 <= masses[j] / PAPER_MASS_KG <= 2.0
+        abs(most - PAIR_AT_N_M) <= 500.0 and 0.5 <= dampings[i] / PAIR[0] <= 2.0 and 0.5 <= masses[j] / PAIR[1] <= 2.0
     )
     work.answer = work.tell("answer", **computed)
     holding = {"most": near, "more": most > max(alone, damped), "step": helped == len(bears)}

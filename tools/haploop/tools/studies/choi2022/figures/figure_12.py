@@ -6,7 +6,7 @@ import numpy as np
 
 from haploop.tools.render.units import amount
 from haploop.tools.studies.choi2022.claims import Finding, claims_of
-from haploop.tools.studies.choi2022.device import both
+from haploop.tools.studies.choi2022.device import elements_of
 from haploop.tools.studies.choi2022.experiment import findings, nearest
 from haploop.tools.studies.choi2022.experiment_measure import PAIR, PAIR_AT_N_M
 from haploop.tools.studies.choi2022.figures.figure_9 import Press, Tuned, presses, tuned
@@ -18,7 +18,7 @@ _DAMPINGS, _MASSES = (1.0, 2.15, 3.0, 4.0, 5.5, 7.5), (0.009, 0.014, 0.02, 0.027
 
 def best_pair(work: Work) -> Tuned:
     """Returns the pair that swings least."""
-    choices = [both(b, m) for b in _DAMPINGS for m in _MASSES]
+    choices = [elements_of("both", b, m) for b in _DAMPINGS for m in _MASSES]
     return tuned(work, "damping with inertia", PAIR_AT_N_M, choices[2::7] if work.small else choices)
 
 
@@ -31,7 +31,10 @@ def make(work: Work) -> list[Finding]:
         "figure_12",
         {
             "best": (f"{b:g} N s/m with {mass_g:g} g, the best here", chosen.scene),
-            "paper": ("2.15 N s/m with 9 g, as in the paper", nearest(work).scene(PAIR_AT_N_M, both(*PAIR))),
+            "paper": (
+                "2.15 N s/m with 9 g, as in the paper",
+                nearest(work).scene(PAIR_AT_N_M, elements_of("both", *PAIR)),
+            ),
         },
     )
     best, of_paper, press = Tuned.from_run(ran), Tuned.from_run(papers), Press.from_run(ran)

@@ -4,20 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from haploop.logger.summary import Summary
-from haploop.protocol.scene.effects import Accelerometer
-from haploop.protocol.scene.estimators import Acceleration
-from haploop.protocol.scene.scene import Device, ElementTable, Encoder, Scene
+from haploop.protocol.scene.paths import without
+from haploop.protocol.scene.scene import Encoder, Scene
 from haploop.tools.figure.style import INK, PRESSING, RELEASING, SMALL, dress, empty_figure, legend
 from haploop.tools.render.units import amount
 from haploop.tools.studies.choi2022.claims import Finding, claims_of
 from haploop.tools.studies.choi2022.drawing import INSIDE, UPPER_LEFT
 from haploop.tools.studies.choi2022.sampled import PERIOD_S, SPRING, STIFFNESS_N_M, forces, taken_J
-from haploop.tools.studies.choi2022.work import Run, Work, fig6, hand_of, run, wall_of
+from haploop.tools.studies.choi2022.work import Run, Work, fig6, run, wall_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -69,32 +68,17 @@ def make(work: Work) -> list[Finding]:
     return _findings(curves, walls)
 
 
-def single_contact(
-    title: str,
-    *elements: ElementTable,
-    delay_s: float = 0.0,
-    encoder: Encoder | None = None,
-    accelerometer: Accelerometer | None = None,
-    acceleration: Acceleration | None = None,
-) -> Scene:
-    """Returns a scene in which the device, hand attached but slack, coasts at 0.1 m/s into 0.15 N/mm and out again."""
-    scene = fig6("b")
-    return replace(
-        scene,
-        title=title,
-        duration=0.1,
-        clock=replace(scene.clock, round_trip_delay=delay_s),
-        device=Device(
-            mass=scene.device.mass, damping=0.0, position=wall_of(scene).position + 0.0004, velocity=-_SPEED_M_S
-        ),
-        hand=replace(hand_of(scene), stiffness=0.0, damping=0.0, force=None),
-        encoder=encoder,
-        noise=None,
-        accelerometer=accelerometer,
-        velocity=None,
-        acceleration=acceleration,
-        dissipation=elements,
-    )
+def single_contact(title: str, *, delay_s: float = 0.0, **tables: Any) -> Scene:
+    """Returns a scene in which the device, hand attached but slack, coasts at 0.1 m/s into 0.15 N/mm and out again.
+
+    It is without encoder, elements and estimators unless ``tables`` say so.
+    """
+    estimates = ("encoder", "noise", "dissipation", "velocity", "acceleration")
+    scene = without(fig6("b"), *estimates, "hand.stiffness", "hand.damping", "hand.force")
+    start = wall_of(scene).position + 0.0004
+    device = replace(scene.device, position=start, velocity=-_SPEED_M_S, damping=0.0)
+    clock = replace(scene.clock, round_trip_delay=delay_s)
+    return replace(scene, title=title, duration=0.1, clock=clock, device=device, **tables)
 
 
 def area_J(depth_m: np.ndarray, force_N: np.ndarray) -> float:

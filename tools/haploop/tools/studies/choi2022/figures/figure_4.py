@@ -36,7 +36,8 @@ def make(work: Work) -> list[Finding]:
     pulse = 0.1 * np.sin(np.pi * np.arange(-1, 15) / 12.0).clip(0.0)
     pushed = run(_pushed_and_braked(_inertia(MASS_KG)))
     v = pushed.log["/controller"]["v"]
-    contact = run(single_contact("In and out of the wall, with inertia", replace(_inertia(MASS_KG), acts="in-contact")))
+    felt_inside = replace(_inertia(MASS_KG), acts="in-contact")
+    contact = run(single_contact("In and out of the wall, with inertia", dissipation=(felt_inside,)))
     figure = empty_figure(11.0, 4.6)
     left, right = figure.subplots(1, 2)
     draw_momentum(left, pulse, MASS_KG, "Prescribed: faster, then slower")
@@ -59,7 +60,7 @@ def make(work: Work) -> list[Finding]:
 
 def _pushed_and_braked(element: ElementTable) -> Scene:
     """Returns a scene of device and hand in the open, pushed for 24 ms and braked for as long, without any damping."""
-    scene = single_contact("Pushed, then braked", element)
+    scene = single_contact("Pushed, then braked", dissipation=(element,))
     force = Trace(time=(0.0, 0.012, 0.024, 0.036, 0.048), force=(0.0, 0.25, 0.0, -0.25, 0.0))
     device = replace(scene.device, position=0.0, velocity=0.0)
     return replace(scene, duration=0.06, device=device, wall=None, hand=replace(hand_of(scene), force=force))
