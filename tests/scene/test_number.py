@@ -65,14 +65,14 @@ def test_an_angular_rate_is_not_taken_for_a_frequency(text):
 
 
 def test_a_rate_is_a_whole_number():
-    assert scene(clock={"plant_rate": "20 kHz"})["clock"]["plant_rate"] == 20_000
-    assert isinstance(scene(clock={"plant_rate": 20_000.0})["clock"]["plant_rate"], int)
+    assert scene(clock={"plant_rate": "20 kHz"}).clock.plant_rate == 20_000
+    assert isinstance(scene(clock={"plant_rate": 20_000.0}).clock.plant_rate, int)
     [mistake] = mistakes(clock={"control_rate": 999.5})
     assert mistake.startswith("clock.control_rate is 999.5. It must be a whole number in Hz, at least 1")
 
 
 def test_a_seed_is_not_rounded_to_a_float():
-    assert scene(seed=2**63 - 1)["seed"] == 2**63 - 1
+    assert scene(seed=2**63 - 1).seed == 2**63 - 1
     assert mistakes(seed=2**63) == ["seed is 9223372036854775808. It must be below 9.22337e+18."]
 
 

@@ -154,7 +154,7 @@ def make_points(span: Span, number: Number) -> list[float]:
             raise PointsError("scale", "A log scale needs two ends of one sign, neither of them 0.")
         inner = (first * (last / first) ** (k / (span.count - 1)) for k in range(1, span.count - 1))
         values = [first, *inner, last]
-        return list(dict.fromkeys(map(round, values))) if number.whole else values
+        return list(dict.fromkeys(map(round, values))) if number.quantity.whole else values
     steps = span.count - 1 if span.count else _steps(number, first, last, span.step)
     # In decimal, so that 0.1, 0.2, 0.3 are the numbers that a person would write.
     begin, way = _decimal(first), _decimal(last) - _decimal(first)

@@ -172,7 +172,7 @@ class _Reader:
         else:
             if points is None or (number is None and not self._names_fit(at, key, points, scene)):
                 return None
-            return Axis(key, tuple(points), number and number.quantity.unit, bool(number and number.whole))
+            return Axis(key, tuple(points), number and number.quantity.unit, bool(number and number.quantity.whole))
         return None
 
     def _points(self, at: KeyPath, values: Any, number: Number | None) -> list[Any] | None:
