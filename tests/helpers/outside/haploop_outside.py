@@ -21,9 +21,9 @@ class Gravity(Table):
     acceleration: Annotated[float, si("m/s^2", "acceleration of free fall", above=0)] = 9.81
 
 
-def weight_N(scene: dict[str, Any]) -> float:
+def weight_N(scene: Scene) -> float:
     """Returns the weight of the device."""
-    return -scene["device"]["mass"] * scene["gravity"]["acceleration"]
+    return -scene.device.mass * scene.others["gravity"]["acceleration"]
 
 
 def check_gravity(draft: Draft) -> None:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from haploop.logger.books import one_mass
+from haploop.protocol.scene.scene import Scene
 from helpers.runs.captured import run
 from helpers.scenes.least import scene
 from helpers.scenes.random_scenes import log_uniform
@@ -50,7 +51,7 @@ def test_the_books_close_to_1e_12_in_every_hard_case(case):
     assert ran.relative_residual < 1e-12
 
 
-def extreme(seed: int) -> dict[str, Any]:
+def extreme(seed: int) -> Scene:
     """Orders of magnitude beyond any device, but in motion: millimetres at least, within half a metre of the origin."""
     rng = np.random.default_rng(seed)
     rate, n = int(rng.choice([1_000, 10_000, 50_000])), int(rng.choice([1, 2, 10]))

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from haploop.protocol.scene.paths import with_value
+from haploop.protocol.scene.scene import Scene
 from helpers.runs.captured import run
 from helpers.scenes.effect_tables import slowly
 from helpers.scenes.least import scene
@@ -19,7 +20,7 @@ from oracles.friction_heats import friction_heats
 RATE = 10_000
 
 
-def stick_slip(duration: float, **more: Any) -> tuple[dict[str, Any], float, float]:
+def stick_slip(duration: float, **more: Any) -> tuple[Scene, float, float]:
     """A mass drawn by a spring at constant speed; the scene, the time of a cycle and of the first slip.
 
     Stuck while the spring gains 2 dF / k, then it slips for (2 pi - 2 atan(dF w / (k V))) / w, dF = F_b - f_k.
@@ -132,7 +133,7 @@ SHAPES: dict[str, dict[str, float]] = {
 }
 
 
-def pushed_to_and_fro(shape: str) -> dict[str, Any]:
+def pushed_to_and_fro(shape: str) -> Scene:
     """Stops, sticks and slips both ways."""
     return scene(
         duration=0.2,

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from haploop.protocol.scene.scene import Scene
 from helpers.runs.captured import bodies, run
 from helpers.scenes.effect_tables import slowly
 from helpers.scenes.least import scene
@@ -15,7 +16,7 @@ from oracles.effects_run import follow
 from oracles.friction_heats import friction_heats
 
 
-def drawn(seed: int, fastest: float) -> dict[str, Any]:
+def drawn(seed: int, fastest: float) -> Scene:
     """A chain with friction whose modes and dampers reach to about so many radians a plant step."""
     rng = np.random.default_rng(seed)
     rate, n = int(rng.choice([1000, 2000, 10000])), int(rng.choice([1, 2, 5]))
@@ -65,7 +66,7 @@ def test_a_drawn_chain_with_friction_moves_and_sticks_as_in_an_independent_integ
     assert ran.relative_residual < 1e-12
 
 
-def jolted(velocity: float, first: float, then: float, **tables: Any) -> dict[str, Any]:
+def jolted(velocity: float, first: float, then: float, **tables: Any) -> Scene:
     """Pushed one way at the start of a plant step and as hard the other way at its end."""
     force = {"kind": "trace", "time": [0.0, 1e-3, 2e-3], "force": [first, then, 0.0]}
     clock = {"plant_rate": 1_000, "control_rate": 1_000}

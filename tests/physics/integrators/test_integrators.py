@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from haploop.logger.log.channels import motion_columns
+from haploop.protocol.scene.scene import Scene
 from helpers.runs.captured import Captured, run
 from helpers.scenes.least import scene
 from oracles.effects_run import follow
@@ -46,7 +47,7 @@ SMOOTH: dict[str, dict[str, Any]] = {
 }
 
 
-def made(method: str, plant_rate: int, duration: float = 0.1, **tables: Any) -> dict[str, Any]:
+def made(method: str, plant_rate: int, duration: float = 0.1, **tables: Any) -> Scene:
     return scene(**tables, duration=duration, clock={"integrator": method, "plant_rate": plant_rate})
 
 

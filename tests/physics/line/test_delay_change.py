@@ -89,9 +89,8 @@ def test_the_exact_flow_and_another_method_agree_about_a_motion_whose_delay_chan
 
 
 def test_jitter_comes_on_top_of_the_delay_of_the_moment():
-    late = {"jitter": {"kind": "uniform", "most": 0.0}}
     delays = [(0, 40), (40, 3), (80, 37)]
-    ran = run(changing(delays, **late))
+    ran = run(changing(delays, jitter={"kind": "uniform", "most": 0.0}))
     assert ran.plant["command"][:-1].tolist() == by_the_rule(delays)[0]
 
 
