@@ -145,7 +145,9 @@ def test_a_swap_and_a_set_change_what_is_at_work_from_their_tick_on_and_a_refuse
         (6, {"pause": True}),
         (8, {"swap": {"kind": "none"}, "element": 0}),
     ]
-    found = [(span.from_tick, AtWork.of_scene(span.scene)) for span in spans(scene, changes_of(events))]
+    found = [
+        (span.from_tick, AtWork(span.scene.dissipation, span.scene.wall)) for span in spans(scene, changes_of(events))
+    ]
     assert [(tick, [one.name for one in now.elements], now.wall and now.wall.stiffness) for tick, now in found] == [
         (0, ["damping"], 5.0),
         (3, ["damping"], 7.0),
@@ -162,8 +164,9 @@ def test_what_telemetry_says_is_at_work_is_what_its_scene_says():
         wall={"position": 0.1, "stiffness": 5.0, "occupies": "above"},
         dissipation=[{"kind": "damping", **damping["parameters"]}],
     )
-    assert AtWork.of_block({"elements": [damping], "wall": wall}) == AtWork.of_scene(scene)
-    assert AtWork.of_scene(scene).into_wall == 1.0
+    found = AtWork.of_block({"elements": [damping], "wall": wall})
+    assert found == AtWork(scene.dissipation, scene.wall)
+    assert found.into_wall == 1.0
     assert AtWork.of_block({"elements": [], "wall": dict.fromkeys(wall, 0.0)}) == AtWork()
 
 

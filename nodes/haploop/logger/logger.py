@@ -146,15 +146,23 @@ class Logger:
         number = [known for known in sorted(self._accounts) if self._accounts[known].kind == kind].index(int(book)) + 1
         return f"{kind}{f'-{number}' if number > 1 else ''}{dot}{side}"
 
-    def summary(self, ended: str, why: str, diverged: str | None, telemetry_gaps: int) -> Summary:
+    def end(self) -> None:
+        """Writes the end state; call once, when no more blocks come."""
+        if self._channels:
+            self._channels.plant_end(self.tick, self._end_state)
+
+    def summary(self, failed: str, reason: str | None, trouble: str | None, telemetry_gaps: int) -> Summary:
         """Returns the summary of what was booked so far.
 
         Args:
-            ended: "done", "stopped", "diverged" or "failed".
-            why: what ended it, as a sentence, when it is not done.
-            diverged: why the plant ended by itself, or None.
+            failed: why the run failed, "" if it did not.
+            reason: why the plant ended the run by itself, or None.
+            trouble: which element gave a force that is no finite number, or None.
             telemetry_gaps: ticks whose telemetry did not come.
         """
+        diverged = "; ".join(part for part in (trouble, reason) if part) or None
+        is_complete = self.tick >= self.time.ticks
+        ended = "failed" if failed or trouble else "diverged" if reason else "done" if is_complete else "stopped"
         ticks, wall_s = self.tick - self._first_tick, wall_clock.perf_counter() - self._began
         duration_s = ticks / self.time.control_rate
         ran: Summary = {
@@ -163,7 +171,7 @@ class Logger:
             "steps": ticks * self.time.steps_per_tick,
             "from_tick": self._first_tick,
             "ended": ended,
-            "why": why,
+            "why": failed or diverged or "",
             "final": {"x_m": float(self._end_state["x"][0]), "v_m_s": float(self._end_state["v"][0])},
             "lost": {"commands_dropped": 0, "commands_lost": 0, "telemetry_gaps": telemetry_gaps},
         }
@@ -207,8 +215,3 @@ class Logger:
             "residual_J": residual_J(books),
             "moved_J": moved_J(books),
         }
-
-    def end(self) -> None:
-        """Writes the end state; call once, when no more blocks come."""
-        if self._channels:
-            self._channels.plant_end(self.tick, self._end_state)

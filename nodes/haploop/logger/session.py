@@ -35,28 +35,17 @@ class LogSession:
             self._flush_due = now + _FLUSH_S
 
     def close(self, failed: str, reason: str | None, trouble: str | None, telemetry_gaps: int) -> Summary:
-        """Writes the end state, closes the log and writes the summary; returns the summary.
-
-        Args:
-            failed: why the run failed, "" if it did not.
-            reason: why the plant ended the run by itself, or None.
-            trouble: which element gave a force that is no finite number, or None.
-            telemetry_gaps: ticks whose telemetry did not come.
-        """
-        logger = self.logger
-        diverged = "; ".join(part for part in (trouble, reason) if part) or None
-        complete = logger.tick >= logger.time.ticks
-        ended = "failed" if failed or trouble else "diverged" if reason else "done" if complete else "stopped"
-        logger.end()
+        """Writes the end state, closes the log, writes the summary and returns it; arguments of ``Logger.summary``."""
+        self.logger.end()
         if self._log:
             self._log.close()
-        result = logger.summary(ended, failed or diverged or "", diverged, telemetry_gaps)
+        summary = finite(self.logger.summary(failed, reason, trouble, telemetry_gaps))
         if self._out:
             try:
-                write(result, self._out / SUMMARY)
+                write(summary, self._out / SUMMARY)
             except OSError as error:
                 raise LogError(f"The summary {self._out / SUMMARY} could not be written: {error.strerror}.") from error
-        return finite(result)
+        return summary
 
 
 def open_session(

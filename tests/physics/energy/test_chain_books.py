@@ -203,7 +203,7 @@ def test_a_logger_that_joins_begins_where_it_knows_every_command_and_its_books_c
         joining.append(Logger(resolved, time, None))
         joining[-1].start(plant.state(), controller.recorder.history)
     for at, logger in enumerate(joining[:-2], start=1):
-        summary = logger.summary("done", "", None, 0)
+        summary = logger.summary("", None, None, 0)
         waited.append(summary["from_tick"] - 10 * at)
         assert summary["energy"]["residual_J"] < 1e-12 * summary["energy"]["moved_J"], at
     assert min(waited) == 0

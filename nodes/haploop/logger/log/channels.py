@@ -40,10 +40,8 @@ class Channels:
         self._log, self._time, self._every_step = log, time, every_step
         self._events = log.channel("/events", {}, title="what changed the run, at its tick")
 
-    def _tick_times(self, first: int, ticks: int) -> tuple[np.ndarray, np.ndarray]:
-        """Returns log times in ns and time stamps in s of some ticks."""
-        numbers = np.arange(first, first + ticks, dtype=np.int64)
-        return numbers * 1_000_000_000 // self._time.control_rate, numbers / self._time.control_rate
+    def _log_times_ns(self, first: int, ticks: int) -> NDArray[np.int64]:
+        return np.arange(first, first + ticks, dtype=np.int64) * 1_000_000_000 // self._time.control_rate
 
     def plant(self, first: int, ticks: int, columns: dict[str, np.ndarray]) -> None:
         """Writes one message a tick, an array of its steps; ``columns`` are ``motion_columns`` of whole intervals."""
@@ -64,25 +62,24 @@ class Channels:
         start = first * self._time.steps_per_tick
         t = np.arange(start, start + ticks * samples) / self._time.plant_rate
         values = np.stack([t, t, *columns.values()], axis=1)
-        times, _ = self._tick_times(first, ticks)
-        self._log.write(channel, times, values.reshape(ticks, samples, len(units)))
+        self._log.write(channel, self._log_times_ns(first, ticks), values.reshape(ticks, samples, len(units)))
 
     def controller(self, block: Block) -> None:
         """Writes one message a tick: estimates, the force of wall and elements, their total."""
-        names = list(block["columns"])
+        columns = {name: as_float64(data) for name, data in block["columns"].items()}
         kinds = ", ".join(f"dissipation.{i} is {e['kind']}" for i, e in enumerate(block["elements"])) or "no element"
-        units = {"timestamp": "s"} | {name: CONTROLLER_UNITS.get(name, "N") for name in names}
-        channel = self._log.channel("/controller", units, title=f"the controller at every tick; {kinds}")
-        times, stamps = self._tick_times(block["from_tick"], block["ticks"])
-        values = np.stack([stamps, *map(as_float64, block["columns"].values())], axis=1)
-        self._log.write(channel, times, values)
+        units = {name: CONTROLLER_UNITS.get(name, "N") for name in columns}
+        self._ticks("/controller", f"the controller at every tick; {kinds}", units, block["from_tick"], columns)
 
     def energy(self, first: int, columns: dict[str, np.ndarray]) -> None:
         """Writes one message a tick: the books as they stand."""
-        units = {"timestamp": "s"} | dict.fromkeys(columns, "J")
-        channel = self._log.channel("/energy", units, title="the energy books at every tick")
-        times, stamps = self._tick_times(first, len(next(iter(columns.values()))))
-        self._log.write(channel, times, np.stack([stamps, *columns.values()], axis=1))
+        self._ticks("/energy", "the energy books at every tick", dict.fromkeys(columns, "J"), first, columns)
+
+    def _ticks(self, topic: str, title: str, units: dict[str, str], first: int, columns: dict[str, np.ndarray]) -> None:
+        channel = self._log.channel(topic, {"timestamp": "s"} | units, title=title)
+        ticks = len(next(iter(columns.values())))
+        stamps = np.arange(first, first + ticks) / self._time.control_rate
+        self._log.write(channel, self._log_times_ns(first, ticks), np.stack([stamps, *columns.values()], axis=1))
 
     def event(self, tick: int, event: Event) -> None:
         """Writes one message: the tick, its time in s, and the event as it was given."""

@@ -89,11 +89,8 @@ def join(
     The tables are used up on the way, so that hardly more than one column is held twice.
 
     Args:
-        pieces: log time of every row in ns, and the rows: all tables or all lists of maps.
+        pieces: log times in ns, shape (rows,), and rows: all tables or all lists of maps. What is returned is one, too.
         units: the columns there shall be, by unit; those of the pieces when None. A piece without one has NaN there.
-
-    Returns:
-        Log times in ns, shape (rows,), and the rows.
     """
     times = np.concatenate([times for times, _ in pieces] or [np.empty(0, np.uint64)])
     order = None if (times[1:] >= times[:-1]).all() else np.argsort(times, kind="stable")

@@ -54,11 +54,7 @@ def records(stream: IO[bytes]) -> Iterator[tuple[int, bytes]]:
 
 
 def chunk_body(content: bytes) -> bytes:
-    """Returns the records in a chunk, unpacked and checked against their CRC.
-
-    Raises:
-        ValueError, RuntimeError, McapError: the chunk is damaged.
-    """
+    """Returns the records in a chunk, unpacked and checked (ValueError, RuntimeError, McapError: it is damaged)."""
     chunk = Chunk.read(ReadDataStream(BytesIO(content)))
     body, size = get_chunk_data_stream(chunk, validate_crc=True)
     return body.read(size)
@@ -72,8 +68,7 @@ def lone_message(content: bytes) -> bytes:
 def parts(body: bytes) -> Iterator[MessageRun | tuple[int, bytes]]:
     """Yields the parts of a chunk's body in order: runs of messages, and other records by opcode and content.
 
-    Raises:
-        ValueError, struct.error: the body is damaged.
+    Raises ValueError or struct.error where the body is damaged.
     """
     at = 0
     while at < len(body):
@@ -114,8 +109,7 @@ class LogChannel:
     def decode(self, runs: Sequence[MessageRun], names: Collection[str] | None) -> tuple[NDArray[np.uint64], Rows]:
         """Returns log time of every row in ns, shape (rows,), and the rows: columns ``names`` (None: all), or the maps.
 
-        Raises:
-            LogError: the messages are not what the schema of the channel says.
+        Raises LogError where the messages are not what the schema of the channel says.
         """
         log_times_ns = np.concatenate([run.log_times_ns for run in runs])
         units = self.layout.columns

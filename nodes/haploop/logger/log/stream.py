@@ -110,11 +110,7 @@ class LogStream:
         return {topic: units for topic, units in chosen.items() if units or not self.units[topic]}
 
     def __iter__(self) -> Iterator[Batch]:
-        """Yields all batches that have not come yet.
-
-        Raises:
-            LogError: there are messages other than the msgpack maps their schema tells of.
-        """
+        """Yields all batches that have not come yet; raises LogError for messages that belie their schema."""
         with self.path.open("rb") as file:
             file.seek(self.read_bytes)
             try:
@@ -137,11 +133,7 @@ class LogStream:
             return self._batches(chunk_body(content))
         if opcode == Opcode.MESSAGE:
             return self._batches(lone_message(content))
-        if opcode == Opcode.ATTACHMENT:
-            attachment = Attachment.read(ReadDataStream(BytesIO(content)))
-            self.attachments[attachment.name] = attachment.data
-        else:
-            self._register(opcode, content)
+        self._register(opcode, content)
         return []
 
     def _batches(self, body: bytes) -> list[Batch]:
@@ -160,11 +152,15 @@ class LogStream:
         ]
 
     def _register(self, opcode: int, content: bytes) -> None:
-        if opcode == Opcode.SCHEMA:
-            schema = Schema.read(ReadDataStream(BytesIO(content)))
+        stream = ReadDataStream(BytesIO(content))
+        if opcode == Opcode.ATTACHMENT:
+            attachment = Attachment.read(stream)
+            self.attachments[attachment.name] = attachment.data
+        elif opcode == Opcode.SCHEMA:
+            schema = Schema.read(stream)
             self._schemas[schema.id] = schema
         elif opcode == Opcode.CHANNEL:
-            channel = Channel.read(ReadDataStream(BytesIO(content)))
+            channel = Channel.read(stream)
             if channel.message_encoding != "msgpack":
                 raise LogError(f"The channel {channel.topic} is {channel.message_encoding}; a run's log is msgpack.")
             schema = self._schemas.get(channel.schema_id)

@@ -47,13 +47,9 @@ class WindowMeasures(NamedTuple):
 
 
 class MeasuredColumns(NamedTuple):
-    """Measures of the windows of some runs, a list each.
+    """Measures of the windows of some runs, a list each: of ``swings``, the width peak to peak, the ticks in contact.
 
-    Attributes:
-        crossings, growth: of ``swings``.
-        width_m: peak to peak.
-        inside: ticks in contact.
-        stiffness_N_m, depth_m: displayed stiffness and penetration, means of ticks in contact; None of none.
+    Displayed stiffness and penetration are means of ticks in contact, None of none.
     """
 
     crossings: list[int]

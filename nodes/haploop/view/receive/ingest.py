@@ -95,12 +95,7 @@ def _is_shown(book: str) -> bool:
 
 
 class Backfill:
-    """Fills a history from the log of a run.
-
-    Args:
-        out: the run's directory.
-        scene, time: the resolved scene and its integers.
-        events: (tick, event) in order; may grow while the log does.
+    """Fills a history from the log in a run's directory; ``events``, (tick, event), may grow while the log does.
 
     Attributes:
         history: what was read so far.
@@ -114,11 +109,7 @@ class Backfill:
         self.history = History(time, 0)
 
     def read(self) -> None:
-        """Reads on, up to the present end of the log.
-
-        Raises:
-            FileNotFoundError, LogError: there is no log, or none that can be read.
-        """
+        """Reads on, up to the present end of the log; raises OSError or LogError where none can be read."""
         self._log = self._log or LogStream(self._out, topics=("/plant", "/controller", "/energy"))
         for batch in self._log:
             self._take(batch)
@@ -136,7 +127,7 @@ class Backfill:
             return
         for first, end, scene in self._spans(tick, tick + len(rows["timestamp"])):
             columns = {name: column[first - tick : end - tick] for name, column in rows.items()}
-            self.history.append_ticks(first, columns, AtWork.of_scene(scene))
+            self.history.append_ticks(first, columns, AtWork(scene.dissipation, scene.wall))
 
     def _plant(self, rows: Table) -> None:
         """Takes the steps of whole ticks, after which the end state of the run may follow."""

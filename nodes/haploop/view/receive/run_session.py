@@ -79,7 +79,8 @@ class RunSession:
         self.status |= ingest(self.history, frames)
         self._note_events()
         if self.history.at_work == AtWork():
-            self.history.at_work = AtWork.of_scene(at_work(self.scene, changes_of(self.events)))
+            now = at_work(self.scene, changes_of(self.events))
+            self.history.at_work = AtWork(now.dissipation, now.wall)
         now = wall_clock.monotonic()
         if self.history.first_tick is not None:
             self._seen.append((now, self.history.end_tick))

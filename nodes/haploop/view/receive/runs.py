@@ -91,11 +91,7 @@ class ClockAnswers:
                 await asyncio.wait_for(self._ask_now.wait(), _ASK_S)
 
     async def command(self, verb: str, arguments: Message) -> str:
-        """Sends a command to the run; returns its answer, a sentence.
-
-        Raises:
-            CommandFailed: the run refused it.
-        """
+        """Sends a command to the run; returns its answer, a sentence, or raises CommandFailed."""
         text, _ = await self._ask(verb, arguments)
         self._ask_now.set()
         return text

@@ -15,11 +15,7 @@ class MissingExtra(RuntimeError):
 
 
 def check_installed() -> None:
-    """Looks for the packages that the page needs, without importing them.
-
-    Raises:
-        MissingExtra: one of them is not installed.
-    """
+    """Looks for the packages that the page needs, without importing them; raises MissingExtra without one."""
     if importlib.util.find_spec("aiohttp") is None or _uplot() is None:
         raise MissingExtra(
             "haploop view needs aiohttp and uplot-python; install them with pip install 'haploop[view]'."
@@ -35,11 +31,7 @@ def _uplot() -> Path | None:
 
 
 def assets() -> dict[str, Path]:
-    """Returns every file the page may ask for, by name.
-
-    Raises:
-        MissingExtra: uPlot is not installed.
-    """
+    """Returns every file the page may ask for, by name; raises MissingExtra without uPlot."""
     check_installed()
     folder = _uplot()
     assert folder

@@ -131,11 +131,7 @@ class Command:
 
 
 def parse_message(text: str) -> Viewport | Command:
-    """Returns the message in a text: ``watch`` as a viewport, ``command`` as a command.
-
-    Raises:
-        BadMessage: it is neither of the two.
-    """
+    """Returns what a text says: ``watch`` as a viewport, ``command`` as a command; raises BadMessage for any other."""
     try:
         message = json.loads(text)
     except (ValueError, RecursionError) as error:

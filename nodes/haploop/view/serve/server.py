@@ -94,11 +94,7 @@ class PortTaken(OSError):
 
 
 def listen(port: int) -> socket.socket:
-    """Opens a socket that listens on loopback, at any free port for 0.
-
-    Raises:
-        PortTaken: the port cannot be had.
-    """
+    """Opens a socket that listens on loopback, at any free port for 0; raises PortTaken where it cannot be had."""
     listening = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
     listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:
@@ -121,14 +117,11 @@ async def serve(
     first: str | None = None,
     from_start: bool = True,
 ) -> None:
-    """Serves the page until SIGINT, SIGTERM or ``end``.
+    """Serves the page until SIGINT, SIGTERM or ``end``; runs, first and from_start are those of :class:`Viewer`.
 
     Args:
-        runs: where runs are found and asked.
         listening: from :func:`listen`.
         on_serving: called once the page can be opened.
-        end: set from outside to end.
-        first, from_start: of the viewer.
     """
     guard = Guard(listening.getsockname()[1])
     viewer = Viewer(runs, first, from_start)

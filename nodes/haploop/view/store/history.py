@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from haploop.logger.log.channels import motion_columns
-from haploop.protocol.scene.scene import ElementTable, Scene, Wall
+from haploop.protocol.scene.scene import ElementTable, Wall
 from haploop.protocol.ticks import Timebase
 from haploop.protocol.transport.telemetry import Block
 from haploop.view.store.lod_series import LodSeries
@@ -26,11 +26,6 @@ class AtWork(NamedTuple):
 
     elements: tuple[ElementTable, ...] = ()
     wall: Wall | None = None
-
-    @classmethod
-    def of_scene(cls, scene: Scene) -> AtWork:
-        """Returns those of a scene."""
-        return cls(scene.dissipation, scene.wall)
 
     @classmethod
     def of_block(cls, block: Block) -> AtWork:
