@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 from textwrap import wrap
 from typing import TYPE_CHECKING, Any
 
@@ -83,12 +84,11 @@ def _how_to_read(ax: Axes, cost: Cost, scenes: list[SceneCost]) -> None:
     for method in methods_of(scenes):
         colour, marker = method_look(method)
         handles.append(Line2D([], [], color=colour, marker=marker, linewidth=1.6, label=method))
-    sign: dict[str, Any] = {"linestyle": "none", "color": GREY}
-    black: dict[str, Any] = sign | {"color": INK}
+    sign = partial(Line2D, [], [], linestyle="none")
     handles += [
-        Line2D([], [], marker="o", markersize=11, markerfacecolor="none", label="at 10 kHz", **black),
-        Line2D([], [], marker="o", markerfacecolor="white", label="wrong verdict", **sign),
-        Line2D([], [], marker="x", markersize=7, markeredgewidth=1.8, label="failed: no error to draw", **sign),
+        sign(marker="o", markersize=11, markerfacecolor="none", color=INK, label="at 10 kHz"),
+        sign(marker="o", markerfacecolor="white", color=GREY, label="wrong verdict"),
+        sign(marker="x", markersize=7, markeredgewidth=1.8, color=GREY, label="failed: no error to draw"),
         Line2D([], [], color=GREY, dashes=(4, 3), linewidth=0.9, label=f"tolerance {amount(cost.tolerance_m, 'm')}"),
         Patch(facecolor=UNCERTAIN, label="the reference's own uncertainty"),
     ]
@@ -110,7 +110,7 @@ def draw_panel(ax: Axes, scene: SceneCost, tolerance_m: float) -> None:
     """Draws every point of a scene that has a time; labels come once the panel has its place."""
     reference = scene.reference
     what = "RMS error of the position (m)" if reference.pointwise else "error of the amplitude (m)"
-    dress(ax, _title(scene), "time per simulated tick, in one process (µs)", what)
+    dress(ax, "\n".join(wrap(scene.short_title, _TITLE_LETTERS)), "time per simulated tick, in one process (µs)", what)
     low, high = _limits(scene, tolerance_m)
     ax.set_xscale("log")
     ax.set_yscale("log")
@@ -123,11 +123,6 @@ def draw_panel(ax: Axes, scene: SceneCost, tolerance_m: float) -> None:
     _mark_failures(ax, scene)
     times = [edge for p in scene.points if (t := p.us_per_tick) for edge in (t.q1, t.median, t.q3)]
     ax.set_xlim(min(times) / 1.25, max(times) * 1.25)
-
-
-def _title(scene: SceneCost) -> str:
-    """Returns the scene's name, in two lines where it is long."""
-    return "\n".join(wrap(scene.short_title, _TITLE_LETTERS))
 
 
 def _limits(scene: SceneCost, tolerance_m: float) -> tuple[float, float]:
@@ -189,15 +184,13 @@ def _curve(ax: Axes, points: list[Point], scene: SceneCost) -> None:
     wide = 2.2 if method == "exact" else 1.2
     ax.plot(xy[:, 0], np.where(failed, np.nan, xy[:, 1]), color=colour, linewidth=wide, zorder=3, gid=f"line {method}")
     for point, (x, y) in zip(points, xy, strict=True):
-        wrong = point.error is not None and not point.error.verdict_right
-        style: dict[str, Any] = {"color": colour, "marker": marker, "markersize": 5.5, "zorder": 4, "linestyle": "none"}
+        mark = partial(ax.plot, [x], [y], color=colour, zorder=4, linestyle="none")
         if _failed(point):
-            style |= {"marker": "x", "markersize": 7.0, "markeredgewidth": 1.8, "clip_on": False, "gid": "failure"}
-        elif wrong:
-            style |= {"markerfacecolor": "white", "gid": "wrong verdict"}
+            mark(marker="x", markersize=7.0, markeredgewidth=1.8, clip_on=False, gid="failure")
+        elif point.error and not point.error.verdict_right:
+            mark(marker=marker, markersize=5.5, markerfacecolor="white", gid="wrong verdict")
         else:
-            style |= {"gid": "point"}
-        ax.plot([x], [y], **style)
+            mark(marker=marker, markersize=5.5, gid="point")
         spread = point.us_per_tick
         assert spread is not None
         ax.plot([spread.q1, spread.q3], [y, y], color=colour, linewidth=0.9, alpha=0.7, zorder=2, gid="quartiles")
