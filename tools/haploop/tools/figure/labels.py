@@ -68,35 +68,26 @@ class LabelRoom:
         segments = [np.stack([line[:-1], line[1:]], axis=1) for line in pixels]
         self._segments = np.concatenate([self._segments, *segments])
 
-    def on_line(self, points: np.ndarray, text: str, colour: str, gid: str) -> bool:
-        """Writes on a line, as near to its middle as there is room; tells whether there was.
-
-        Args:
-            points: of the line in data coordinates, shape (n, 2).
-            text, colour, gid: of the label.
-        """
-        left, low, right, high = self._frame
+    def on_line(self, points: np.ndarray, text: str, colour: str, gid: str) -> None:
+        """Writes on a line of points in data coordinates, shape (n, 2), as near to its middle as there is room."""
         pixels = self.pixels(points)
-        inside = (pixels >= (left, low)).all(axis=1) & (pixels <= (right, high)).all(axis=1)
-        pixels = pixels[inside]
+        pixels = pixels[((pixels >= self._frame[:2]) & (pixels <= self._frame[2:])).all(axis=1)]
         order = np.argsort(np.abs(np.arange(len(pixels)) - len(pixels) // 2), kind="stable")
         places = [tuple(pixels[index]) for index in order[:: max(1, len(order) // _PLACES)]]
-        box = self.best((_box(place, self.size(text)) for place in places), self._covers_avoided)
-        return self._written(box, text, colour, gid)
+        size = self.size(text)
+        if box := self.best((_box(place, size) for place in places), self._covers_avoided):
+            self.write(box, text, color=colour, gid=gid, bbox=_FRAME, zorder=6)
 
-    def beside(self, x: float, y: float, texts: Sequence[str], colour: str, gid: str) -> bool:
-        """Writes the first of some texts that has room beside a sign, which stays free; tells whether one had."""
+    def beside(self, x: float, y: float, texts: Sequence[str], colour: str, gid: str) -> None:
+        """Writes the first of some texts that has room beside a sign, which stays free."""
         self.take(x, y, _STAR_HALF_PX)
+        at = self.pixels((x, y))
         for text in texts:
-            boxes = (
-                box
-                for distance in _AROUND_STAR_PX
-                for box in around(self.pixels((x, y)), self.size(text), _STAR_HALF_PX + distance)
-            )
-            box = self.best(boxes, lambda box: (self._covers_avoided(box), self.crossings(box) > 0))
-            if self._written(box, text, colour, gid, fontweight="bold"):
-                return True
-        return False
+            size = self.size(text)
+            boxes = (box for distance in _AROUND_STAR_PX for box in around(at, size, _STAR_HALF_PX + distance))
+            if box := self.best(boxes, lambda box: (self._covers_avoided(box), self.crossings(box) > 0)):
+                self.write(box, text, color=colour, gid=gid, bbox=_FRAME, zorder=6, fontweight="bold")
+                return
 
     def best(self, boxes: Iterable[Box], penalty: Callable[[Box], Any]) -> Box | None:
         """Returns the first of the boxes with the least penalty that lie in the panel and cover nothing taken."""
@@ -130,11 +121,6 @@ class LabelRoom:
         x, y = self._ax.transData.inverted().transform(middle)
         self._ax.text(x, y, text, ha="center", va="center", fontsize=SMALL, **look)
         return x, y
-
-    def _written(self, box: Box | None, text: str, colour: str, gid: str, **look: Any) -> bool:
-        if box:
-            self.write(box, text, color=colour, gid=gid, bbox=_FRAME, zorder=6, **look)
-        return box is not None
 
     def _covers_avoided(self, box: Box) -> bool:
         return any(_overlap(box, other) for other in self._avoided)

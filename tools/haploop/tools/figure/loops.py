@@ -52,11 +52,6 @@ def momentum_loop(run: RunData, span: ElementSpan) -> tuple[Floats, Floats, Floa
     return times[1:], v[:-1], mass[:-1] * v[1:]
 
 
-def is_inertia(span: ElementSpan) -> bool:
-    """Tells whether an element has a virtual momentum."""
-    return "inertia" in span.element.name and "mass" in span.element.parameters
-
-
 def draw_force_position(ax: Axes, run: RunData, span_s: tuple[float, float]) -> None:
     """Draws force against penetration, pressing and releasing told apart, beside the spring it should be."""
     title = "Force against penetration"
@@ -72,7 +67,10 @@ def draw_force_position(ax: Axes, run: RunData, span_s: tuple[float, float]) -> 
     ax.plot(early_depth * MM, early_force, color=EARLY, linewidth=0.8, label="first second of contact", gid="early")
     pressing = np.diff(depth, append=depth[-1:]) > 0
     for part, colour, label in ((pressing, PRESSING, "pressing"), (~pressing, RELEASING, "releasing")):
-        ax.plot(*_stretches(depth * MM, force, part), color=colour, linewidth=1.1, label=label, gid=label)
+        # Each stretch goes on to the point after it.
+        drawn = part | np.concatenate([[False], part[:-1]]) if len(part) else part
+        x, y = np.where(drawn, depth * MM, np.nan), np.where(drawn, force, np.nan)
+        ax.plot(x, y, color=colour, linewidth=1.1, label=label, gid=label)
     _, stiffness = run.wall_at(np.array([span_s[1]]))
     in_contact = np.concatenate([d[(f != 0.0) | (d > 0.0)] for d, f in ((early_depth, early_force), (depth, force))])
     in_contact = in_contact[np.isfinite(in_contact)]
@@ -85,20 +83,21 @@ def draw_force_position(ax: Axes, run: RunData, span_s: tuple[float, float]) -> 
     corner_legend(ax)
 
 
-def _stretches(x: Floats, y: Floats, part: Floats) -> tuple[Floats, Floats]:
-    """Returns the line broken where ``part`` is False; each stretch goes on to the point after it."""
-    drawn = part.copy()
-    drawn[1:] |= part[:-1]
-    return np.where(drawn, x, np.nan), np.where(drawn, y, np.nan)
-
-
 def draw_momentum(ax: Axes, run: RunData, span_s: tuple[float, float]) -> None:
     """Draws momentum against velocity of the virtual inertias at work in a stretch of time, or the motion."""
-    spans = [(number, span) for number, span in enumerate(run.history.elements) if is_inertia(span)]
-    loops = [(number, span, within(span_s, *momentum_loop(run, span))) for number, span in spans]
+    loops = [
+        (number, span, within(span_s, *momentum_loop(run, span)))
+        for number, span in enumerate(run.history.elements)
+        if "inertia" in span.element.name and "mass" in span.element.parameters
+    ]
     loops = [loop for loop in loops if len(loop[2][0])]
     if not loops:
-        _draw_motion(ax, run, span_s)
+        about = "position (mm)\n(no virtual inertia, so no momentum loop)"
+        dress(ax, "Velocity against position", about, "velocity (m/s)")
+        for stretch, colour, name in ((run.early_s(), EARLY, "early"), (span_s, INK, "motion")):
+            x, v = within(stretch, run.t_s, run.x_m, run.v_m_s)
+            ax.plot(x * MM, v, color=colour, linewidth=0.9, gid=name)
+        few_ticks(ax)
         return
     dress(ax, "Virtual momentum against velocity", "velocity v[k−1] (m/s)", "momentum m v[k] (g m/s)")
     for number, span, (velocity, momentum) in loops:
@@ -119,12 +118,3 @@ def within(span_s: tuple[float, float], t_s: Floats, *series: Floats) -> list[Fl
     """Returns those samples of some series that lie in a stretch of time."""
     inside = (t_s >= span_s[0]) & (t_s <= span_s[1])
     return [values[inside] for values in series]
-
-
-def _draw_motion(ax: Axes, run: RunData, span_s: tuple[float, float]) -> None:
-    about = "position (mm)\n(no virtual inertia, so no momentum loop)"
-    dress(ax, "Velocity against position", about, "velocity (m/s)")
-    for stretch, colour, name in ((run.early_s(), EARLY, "early"), (span_s, INK, "motion")):
-        x, v = within(stretch, run.t_s, run.x_m, run.v_m_s)
-        ax.plot(x * MM, v, color=colour, linewidth=0.9, gid=name)
-    few_ticks(ax)

@@ -41,24 +41,23 @@ def line(ax: Axes, t: Floats, y: Floats, label: str, colour: str, held: bool = F
 def position_panel(ax: Axes, run: RunData, span_s: tuple[float, float], title: str) -> None:
     """Draws position over time with the wall shaded, fitted to the motion in contact if the approach dwarfs it."""
     inside = (run.t_s >= span_s[0]) & (run.t_s <= span_s[1])
-    t, x = run.t_s[inside], run.x_m[inside] * MM
+    t, x_mm = run.t_s[inside], np.stack([run.x_m, *run.bodies_m.values()])[:, inside] * MM
     name = ("motor" if "tip" in run.bodies_m else "device") + ("" if run.every_step else " as measured")
-    line(ax, t, x, name, INK, gid="position")
-    for body, position in run.bodies_m.items():
-        line(ax, t, position[inside] * MM, body, OF_THE_PLANT[body], linewidth=1.0, gid=body)
+    line(ax, t, x_mm[0], name, INK, gid="position")
+    for body, position in zip(run.bodies_m, x_mm[1:], strict=True):
+        line(ax, t, position, body, OF_THE_PLANT[body], linewidth=1.0, gid=body)
     ax.set_xlim(*span_s)
-    low, high, left_out = view_mm(run, t, np.stack([x, *(all_of[inside] * MM for all_of in run.bodies_m.values())]))
+    low, high, left_out = _view_mm(run, t, x_mm)
     if run.history.walls:
         _shade_wall(ax, run, span_s, low, high)
     ax.set_ylim(low, high)
     dress(ax, title + left_out, "time (s)", "position (mm)")
 
 
-def view_mm(run: RunData, t: Floats, x_mm: Floats) -> tuple[float, float, str]:
+def _view_mm(run: RunData, t: Floats, x_mm: Floats) -> tuple[float, float, str]:
     """Returns the limits of the position axis, and a note in brackets on what lies outside of them.
 
-    Args:
-        t, x_mm: times in s, and positions of all bodies in mm, shape (bodies, times).
+    ``t`` are times in s, ``x_mm`` the positions of all bodies then, shape (bodies, times).
     """
     if not np.isfinite(x_mm).any():  # the log of a run that was killed may end before
         return -0.01, 0.01, ""
@@ -114,24 +113,18 @@ def force_panel(ax: Axes, run: RunData, span_s: tuple[float, float], title: str)
 
 def energy_panel(ax: Axes, run: RunData, books: list[Book], colours: dict[str, str]) -> None:
     """Draws the energy taken out of the device: true books drawn through, sampled ones dashed."""
-    factor, letter = prefix_for(value for book in books for value in (*_finite(book.true_J), *_finite(book.sampled_J)))
+    energies = np.concatenate([np.empty(0), *(curve for book in books for curve in (book.true_J, book.sampled_J))])
+    factor, letter = prefix_for(np.abs(energies[np.isfinite(energies)]).max(initial=0.0, keepdims=True))
     dress(ax, "Energy taken out of the device (given to it below 0)", "time (s)", f"energy ({letter}J)")
     for book in books:
         line(ax, book.t_s, book.true_J / factor, book.name, colours[book.name], linewidth=1.6, gid=f"{book.name}.true")
-        line(
-            ax, book.t_s, book.sampled_J / factor, "_", colours[book.name], linewidth=1.0, dashes=(4, 2),
-            gid=f"{book.name}.sampled",
-        )  # fmt: skip
+        look = {"linewidth": 1.0, "dashes": (4, 2), "gid": f"{book.name}.sampled"}
+        line(ax, book.t_s, book.sampled_J / factor, "_", colours[book.name], **look)
     for label, style in (("true", "-"), ("sampled", (0, (4, 2)))):
         ax.plot([], [], color=GREY, linestyle=style, linewidth=1.3, label=label)
     ax.axhline(0.0, color=GREY, linewidth=0.8, zorder=0)
     ax.set_xlim(*run.span_s)
     legend(ax, only=("true", "sampled"))
-
-
-def _finite(values: Floats) -> Floats:
-    kept = values[np.isfinite(values)]
-    return np.array([kept.min(), kept.max()]) if len(kept) else kept
 
 
 def mark_events(axes: list[Axes], run: RunData) -> None:
@@ -158,13 +151,10 @@ def mark_events(axes: list[Axes], run: RunData) -> None:
 def extremes(y: np.ndarray, buckets: int = 1500) -> np.ndarray:
     """Finds the samples with which a line looks like the whole series: of each bucket the smallest and the largest.
 
-    Args:
-        y: shape (samples,); samples that are no finite number are passed over where others are at hand.
-        buckets: stretches of equal length into which the series is cut.
+    Buckets are stretches of equal length; samples that are no finite number are passed over where others are at hand.
 
     Returns:
-        Indices in rising order, at most ``2 * buckets + 2``, the first and last sample among them; all of a short
-        series.
+        Indices in rising order, at most ``2 * buckets + 2``, with the first and the last; all of a short series.
     """
     samples = len(y)
     width = -(-samples // buckets)
