@@ -36,11 +36,9 @@ _GROUP_ROWS = 1 << 16
 
 
 class ExportWriter(ABC):
-    """Writes the content of a log into files, in the memory of a few batches; a context manager.
+    """Writes the content of a log into a file, or one for every topic, in the memory of a few batches.
 
-    Attributes:
-        suffix: of its files.
-        file_per_topic: whether every topic has a file of its own, or all have one.
+    A context manager, which releases what is held beside the files.
     """
 
     suffix: ClassVar[str]
@@ -68,7 +66,7 @@ class ExportWriter(ABC):
         return self
 
     def __exit__(self, *_: object) -> None:  # noqa: B027 (most hold nothing beside their files)
-        """Releases whatever is held beside the files."""
+        pass
 
 
 def read_column(batch: Batch, name: str) -> Floats:

@@ -102,7 +102,7 @@ class History:
 
 @dataclass
 class Book:
-    """One running energy: its name, its curves over time (sampled and true) and what they end with."""
+    """One running energy: its curves over time."""
 
     name: str
     t_s: Floats

@@ -26,8 +26,7 @@ class Boundary:
     """The boundary of one row.
 
     Attributes:
-        near, far: the boundary lies between them: it holds at near and at every coarse point before, and not at far;
-            NaN where there is none.
+        near, far: it holds at near and at every coarse point before, and not at far; NaN where there is no boundary.
         changes: how often neighbouring coarse points differ.
         why: why there is no boundary, or why it is no narrower; else empty.
     """
@@ -56,10 +55,9 @@ def find_boundaries(
     Args:
         rows: how many.
         points: values on the axis, run for every row; the search goes from the first to the last.
-        tolerance: of every boundary.
-        run: runs candidates and yields the index of each with its result, in any order; one that it does not yield
-            leaves its row unknown.
-        holds: whether a result is on the near side; None where it tells nothing, as when the run failed.
+        run: runs candidates and yields the index of each with its row of the table, in any order; one that it does
+            not yield leaves its boundary unknown.
+        holds: whether that is on the near side; None where it tells nothing, as when the run failed.
         property: what holds, for the reasons.
 
     Raises:

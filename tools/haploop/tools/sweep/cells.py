@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from copy import deepcopy
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -21,6 +22,7 @@ from haploop.protocol.scene.paths import value_at
 from haploop.protocol.scene.scene import Scene
 from haploop.tools.executor.parts import Group
 from haploop.tools.executor.work import Sources, load_kinds
+from haploop.tools.search.bisect import Tolerance
 from haploop.tools.sweep.table import CELL, ENDED, NUMBER, SCENE, SEED, TEXT, WHOLE, WHY, Column, Row
 
 if TYPE_CHECKING:
@@ -34,12 +36,10 @@ _APART = ("clock", "duration", "event")
 
 @dataclass(frozen=True)
 class Axis:
-    """An axis of a sweep: a key of the scene and its values.
+    """An axis of a sweep: a dotted key of the scene and its values.
 
     Attributes:
-        key: dotted key of the scene.
-        values: SI numbers; or names, tables, whatever a scene may hold there.
-        unit: of the numbers, None where they are none.
+        values: numbers in an SI unit; or, unit None, names, tables, whatever a scene may hold there.
         whole: whether they are whole numbers.
     """
 
@@ -60,12 +60,11 @@ class Axis:
 
 @dataclass(frozen=True)
 class Bisect:
-    """The search for a boundary: its axis, its tolerance, and the verdict on its near side."""
+    """The search for a boundary: its axis, the verdict on its near side, and its tolerance."""
 
     axis: str
     holds: str
-    tolerance: float = 0.0
-    relative: float = 0.0
+    tolerance: Tolerance
 
 
 @dataclass(frozen=True)
@@ -85,13 +84,10 @@ class Sweep:
     """A sweep, resolved. Its cells are numbered with the axes that keep scenes apart outermost and seeds innermost.
 
     Attributes:
-        title: of the sweep.
-        base: the resolved scene that the axes vary.
-        axes: one to three, in the order of the file.
+        base: the resolved scene that the axes vary, one to three in the order of the file.
         repeat: seeds of every combination: that of the scene, and those after it.
         record: columns of what is recorded, by dotted keys of a summary.
         bisect: None for a grid.
-        sources: plugin files, by name and text.
     """
 
     title: str
@@ -120,10 +116,9 @@ class Sweep:
 
     def together(self, item: Item) -> bool:
         """Tells whether the scene of a cell, and those like it, go into an array."""
-        try:
+        with suppress(Exception):  # it will be a row with its reason
             return is_batchable(self.scene(item))
-        except Exception:  # it will be a row with its reason
-            return False
+        return False
 
     def number(self, places: dict[str, int], repeat: int) -> int:
         """Returns the cell at a place on each axis."""
@@ -196,19 +191,12 @@ class Sweep:
         """Returns the sweep as a file that runs by itself."""
         bisect = {}
         if self.bisect:
-            tolerances = {"tolerance": self.bisect.tolerance, "relative": self.bisect.relative}
+            tolerances = {"tolerance": self.bisect.tolerance.absolute, "relative": self.bisect.tolerance.relative}
             given = {name: value for name, value in tolerances.items() if value}
             bisect = {"bisect": {"axis": self.bisect.axis, **given, "holds": self.bisect.holds}}
-        return to_toml(
-            {
-                "title": self.title,
-                "repeat": self.repeat,
-                "record": [column.name for column in self.record],
-                "axes": {axis.key: list(axis.values) for axis in self.axes},
-                **bisect,
-                "base": self.base.as_dict(),
-            }
-        )
+        axes = {axis.key: list(axis.values) for axis in self.axes}
+        about = {"title": self.title, "repeat": self.repeat, "record": [column.name for column in self.record]}
+        return to_toml({**about, "axes": axes, **bisect, "base": self.base.as_dict()})
 
 
 def resolved(values: Values, base: Layers, kinds: Mapping[str, type[Element]]) -> Scene:

@@ -41,7 +41,6 @@ class Request:
         out: directory; one below ``runs/`` when None.
         workers: processes; as many as there are cores when None.
         dask: address of a scheduler, or None.
-        compiled: whether to run compiled by JAX.
         plugins: files that define elements.
     """
 

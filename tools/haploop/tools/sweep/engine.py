@@ -10,7 +10,6 @@ from typing import Any
 from haploop.tools.executor.parts import Group
 from haploop.tools.executor.pool import Pool
 from haploop.tools.executor.work import Work
-from haploop.tools.search.bisect import Tolerance
 from haploop.tools.sweep.boundary import Boundary, Candidate, find_boundaries, verdict_is
 from haploop.tools.sweep.cells import Axis, Bisect, Extra, Item, Sweep
 from haploop.tools.sweep.progress import SweepProgress
@@ -27,9 +26,7 @@ class Engine:
     """One sweep on its way.
 
     Args:
-        sweep: to run.
         store: where its rows go, and where those of an earlier call are.
-        pool: of workers.
         progress: told of every part.
         stop: asked between parts; True ends the sweep after those under way.
         compiled: whether to run compiled by JAX.
@@ -59,9 +56,7 @@ class Engine:
 
         Raises:
             Stopped: before all was done.
-            StoreError: a file could not be written.
-            ExecutorError: no worker can be had.
-            PluginError: a plugin does not load in a worker.
+            StoreError, ExecutorError, PluginError: a file, a worker, or a plugin in a worker failed.
         """
         if self._sweep.bisect is None:
             stored = self._store.done((CELL, ENDED, VERDICT))
@@ -119,7 +114,7 @@ class Engine:
         return find_boundaries(
             len(rows),
             axis.values,
-            Tolerance(bisect.tolerance, bisect.relative),
+            bisect.tolerance,
             run,
             verdict_is(bisect.holds),
             bisect.holds,
@@ -154,12 +149,11 @@ def _boundary_table(sweep: Sweep, bisect: Bisect, found: Sequence[Boundary]) -> 
     axis, others = sweep.bisected(bisect)
     numbers = [Column(name, NUMBER, axis.unit or "") for name in ("low", "high", "boundary")]
     columns = [*sweep.key_columns(others), *numbers, Column("changes", WHOLE), Column(WHY, TEXT)]
-    tolerance = Tolerance(bisect.tolerance, bisect.relative)
     rows: list[Row] = []
     for (places, repeat), one in zip(_rows_of(sweep, others), found, strict=True):
         row = {SEED: sweep.base.seed + repeat, "changes": one.changes, WHY: one.why}
         row |= {other.key: other.entry(other.values[places[other.key]]) for other in others}
         if not math.isnan(one.near):
-            row |= {"low": one.low, "high": one.high, "boundary": tolerance.middle(one.near, one.far)}
+            row |= {"low": one.low, "high": one.high, "boundary": bisect.tolerance.middle(one.near, one.far)}
         rows.append(row)
     return make_table(rows, make_schema(columns, sweep.toml()))

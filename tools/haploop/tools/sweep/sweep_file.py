@@ -22,6 +22,7 @@ from haploop.launch.scene.schema import TomlSchema
 from haploop.protocol.quantity import Quantity
 from haploop.protocol.scene.scene import Scene
 from haploop.tools.executor.work import Sources, load_kinds
+from haploop.tools.search.bisect import Tolerance
 from haploop.tools.sweep.cells import Axis, Bisect, Refused, Sweep, Values, resolved
 from haploop.tools.sweep.points import NoSuchKey, PointsError, Span, listed, make_points, number_at
 from haploop.tools.sweep.record import USUAL, make_columns
@@ -242,7 +243,7 @@ class _Reader:
                 tolerance = Number(Quantity(axis.unit, above=0.0)).read(given.tolerance)
             except PydanticCustomError as error:
                 self._layers.complain(("bisect", "tolerance"), error.message())
-        return Bisect(axis.key, given.holds, tolerance, given.relative or 0.0)
+        return Bisect(axis.key, given.holds, Tolerance(tolerance, given.relative or 0.0))
 
 
 def _complain(layers: Layers, error: ValidationError, model: type[Model], title: str) -> None:

@@ -26,13 +26,10 @@ _DECADES = 1000.0
 
 @dataclass(frozen=True)
 class Ruler:
-    """Converts the values of an axis to coordinates.
+    """Converts the values of an axis to coordinates: values over a factor, in the unit that is left.
 
     Attributes:
-        axis: the axis.
         scale: ``"linear"``, ``"log"``, or ``"even"``: cells of one width in the order of the values.
-        factor: coordinates are values over this.
-        unit: of the coordinates.
     """
 
     axis: Axis

@@ -7,21 +7,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from haploop.tools.figure.labels import LabelRoom
 from haploop.tools.figure.style import ELEMENTS, FAINT, INK, WALL, fix_layout
 from haploop.tools.sweep.map.axis import Ruler
 from haploop.tools.sweep.map.data import Axis, MapData
 from haploop.tools.sweep.map.edges import ALL_HOLD, FOUND, NONE_HOLDS, UNKNOWN, Edges, find_edges, furthest
 from haploop.tools.sweep.map.legend import LOOKS, Legend
-from haploop.tools.sweep.map.lines import (
-    LineStyle,
-    PanelLines,
-    draw_line,
-    draw_star,
-    find_lines,
-    line_styles,
-    name_lines,
-)
+from haploop.tools.sweep.map.lines import LineStyle, PanelLines, Star, draw_line, find_lines, line_styles, write_names
 from haploop.tools.sweep.map.sentences import edge_description, edge_notes
 from haploop.tools.sweep.map.sheet import Sheet
 
@@ -68,7 +59,9 @@ def bisect_figure(data: MapData) -> Figure:
     legend.map_lines(styles, {line.name: line.words for over in overs for line in over.lines})
     legend.notes(edge_notes(data, edges, overs))
     fix_layout(sheet.figure)
-    _names(ax, x, y, edges, overs, styles)
+    best = furthest(edges)
+    star = best and Star(x.coordinates[best.index[0]], float(y.place([best.value])[0]), [best.words])
+    write_names(ax, overs, styles, star, avoid_markers=True)
     return sheet.figure
 
 
@@ -145,17 +138,3 @@ def _fill(ax: Axes, x: Ruler, y: Ruler, edges: Edges) -> None:
             end = float(y.place([edges.nearest[i]])[0]) if state == FOUND else far
             corners = [borders[i], borders[i + 1]]
             ax.fill_between(corners, [near] * 2, [end] * 2, color=LOOKS[0].fill, linewidth=0, zorder=0.5, gid="holds")
-
-
-def _names(
-    ax: Axes, x: Ruler, y: Ruler, edges: Edges, overs: Sequence[PanelLines], styles: dict[str, LineStyle]
-) -> None:
-    """Writes the furthest boundary, and the names of the lines where there is one line of cells."""
-    room = LabelRoom(ax)
-    room.avoid_markers()
-    room.avoid_lines(line for over in overs for lines in over.drawn.values() for line in lines)
-    if best := furthest(edges):
-        at = x.coordinates[best.index[0]], float(y.place([best.value])[0])
-        draw_star(ax, room, *at, [best.words])
-    if len(overs) == 1:
-        name_lines(room, overs[0].drawn, styles)

@@ -96,13 +96,11 @@ class Cells:
 
 @dataclass(frozen=True)
 class MapData:
-    """A sweep's table, in the order of its axes.
+    """A sweep's table.
 
     Attributes:
-        title, base: of the sweep, and of the scene that it starts from.
-        axes: one to three.
-        columns: of the table, by name.
-        sweep: the resolved sweep.
+        title, base: titles of the sweep, and of the scene that it starts from.
+        axes: one to three, in the order of the sweep.
         boundary: columns of the boundaries of a bisecting sweep; empty without.
     """
 

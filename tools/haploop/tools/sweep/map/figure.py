@@ -2,27 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from haploop.tools.figure.data import FigureError
-from haploop.tools.figure.labels import LabelRoom
 from haploop.tools.figure.style import fix_layout, write_figure
 from haploop.tools.sweep.map.axis import Ruler
 from haploop.tools.sweep.map.bisect_figure import bisect_figure
-from haploop.tools.sweep.map.data import LIMIT_CYCLE, Axis, MapData, make_map_data
+from haploop.tools.sweep.map.data import LIMIT_CYCLE, MapData, make_map_data
 from haploop.tools.sweep.map.edges import stiffest_steady
 from haploop.tools.sweep.map.legend import Legend, amplitude_scale
-from haploop.tools.sweep.map.lines import (
-    LineStyle,
-    PanelLines,
-    draw_line,
-    draw_star,
-    find_lines,
-    line_styles,
-    name_lines,
-)
+from haploop.tools.sweep.map.lines import Star, draw_line, find_lines, line_styles, write_names
 from haploop.tools.sweep.map.panels import (
     SwingScale,
     count_disagreement,
@@ -31,11 +21,10 @@ from haploop.tools.sweep.map.panels import (
     mark_disagreement,
 )
 from haploop.tools.sweep.map.sentences import count_verdicts, description, map_notes, star_words
-from haploop.tools.sweep.map.sheet import Layout, Panel, Sheet, fit_title, panel_title
+from haploop.tools.sweep.map.sheet import Layout, Sheet, fit_title, panel_title
 from haploop.tools.sweep.table import NeedsPyarrow, TableError, read
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 _SIDES: tuple[Literal["x", "y"], ...] = ("x", "y")
@@ -80,31 +69,13 @@ def make_figure(data: MapData) -> Figure:
             count_disagreement(ax, rulers[0], panel.cells, swings)
         else:
             mark_disagreement(ax, rulers[0], rulers[1], panel.cells)
-        _label(ax, along, rulers, panel, over, swings, styles)
+        star = None
+        if found := stiffest_steady(along, panel.cells):
+            x, *rest = (ruler.coordinates[index] for ruler, index in zip(rulers, found.index, strict=True))
+            y = rest[0] if rest else float(swings.place(panel.cells.amplitude_m)[found.index])
+            star = Star(x, y, star_words(found))
+        write_names(ax, [over], styles, star, avoid_markers=layout.y is None)
     return sheet.figure
-
-
-def _label(
-    ax: Axes,
-    along: Sequence[Axis],
-    rulers: Sequence[Ruler],
-    panel: Panel,
-    over: PanelLines,
-    swings: SwingScale,
-    styles: dict[str, LineStyle],
-) -> None:
-    """Writes star and names, once the panel has its place."""
-    room = LabelRoom(ax)
-    found = stiffest_steady(along, panel.cells)
-    room.avoid_texts(ax.texts)
-    room.avoid_lines(line for lines in over.drawn.values() for line in lines)
-    if len(rulers) == 1:
-        room.avoid_markers()
-    if found:
-        x, *rest = (ruler.coordinates[index] for ruler, index in zip(rulers, found.index, strict=True))
-        y = rest[0] if rest else float(swings.place(panel.cells.amplitude_m)[found.index])
-        draw_star(ax, room, x, y, star_words(found))
-    name_lines(room, over.drawn, styles)
 
 
 def draw_map(directory: Path, target: Path | None = None) -> Path:

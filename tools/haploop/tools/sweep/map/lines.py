@@ -6,11 +6,12 @@ import math
 import tomllib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, NotRequired, TypedDict
+from typing import TYPE_CHECKING, NamedTuple, NotRequired, TypedDict
 
 import numpy as np
 
 from haploop.protocol.scene.scene import Scene
+from haploop.tools.figure.labels import LabelRoom
 from haploop.tools.figure.style import INK
 from haploop.tools.linear.bounds import Bound, bounds_of
 from haploop.tools.linear.linearity import installed_kinds, left_out, why_not_linear
@@ -20,8 +21,6 @@ from haploop.tools.sweep.map.plane import Level, Plane
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-    from haploop.tools.figure.labels import LabelRoom
 
 EXACT = "ρ(M) = 1"
 _MEANING = {"passivity": "passive, whatever passive hand holds it", "stability": "stable with the scene's own hand"}
@@ -192,14 +191,29 @@ def _across(place: np.ndarray, rulers: Sequence[Ruler]) -> np.ndarray:
     return points
 
 
-def draw_star(ax: Axes, room: LabelRoom, x: float, y: float, texts: Sequence[str]) -> None:
-    """Draws the star of the answer, and beside it the first of some texts that has room."""
-    ax.plot(x, y, "*", color=_STAR, markersize=13, markeredgecolor="white", zorder=6, gid="star")
-    room.beside(x, y, texts, _STAR, "star words")
+class Star(NamedTuple):
+    """The answer of a panel: where its star stands, in the coordinates of the panel, and its label, ever shorter."""
+
+    x: float
+    y: float
+    texts: Sequence[str]
 
 
-def name_lines(room: LabelRoom, drawn: Mapping[str, Sequence[np.ndarray]], styles: Mapping[str, LineStyle]) -> None:
-    """Writes the name of each line on its longest piece, where there is room."""
-    for name, pieces in drawn.items():
+def write_names(
+    ax: Axes, panels: Sequence[PanelLines], styles: Mapping[str, LineStyle], star: Star | None, avoid_markers: bool
+) -> None:
+    """Draws the star and writes its label, and each line's name on its longest piece where the lines are of one panel.
+
+    Call when the panel has its place; what has no room is not written.
+    """
+    room = LabelRoom(ax)
+    room.avoid_texts(ax.texts)
+    if avoid_markers:
+        room.avoid_markers()
+    room.avoid_lines(piece for panel in panels for pieces in panel.drawn.values() for piece in pieces)
+    if star:
+        ax.plot(star.x, star.y, "*", color=_STAR, markersize=13, markeredgecolor="white", zorder=6, gid="star")
+        room.beside(star.x, star.y, star.texts, _STAR, "star words")
+    for name, pieces in panels[0].drawn.items() if len(panels) == 1 else ():
         if pieces:
             room.on_line(max(pieces, key=len), name, styles[name]["color"], "name of a line")

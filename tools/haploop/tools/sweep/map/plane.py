@@ -132,8 +132,7 @@ def zero_lines(level: Level, xs: np.ndarray, ys: np.ndarray, exact: tuple[bool, 
     where the level itself is zero, so that only the way from one edge to the next is a guess.
 
     Args:
-        level: of x and y; NaN where there is none.
-        xs, ys: the grid, ascending.
+        level: of x and y, whose grid is ascending; NaN where there is none.
         exact: whether a point may be moved along x, along y; not where values between the grid's are not allowed.
 
     Returns:
