@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from importlib.metadata import entry_points
+from functools import cache
+from importlib.metadata import EntryPoint, entry_points
 from pkgutil import resolve_name
 from typing import Any
 
@@ -23,9 +24,15 @@ ESTIMATORS: dict[str, str | type[Estimator]] = {
 _GROUP = "haploop.estimators"
 
 
+@cache
+def _from_outside() -> dict[str, EntryPoint]:
+    """The estimators of other packages by name; looked for once, since that reads every package installed."""
+    return {entry.name: entry for entry in entry_points(group=_GROUP)}
+
+
 def estimator_names() -> tuple[str, ...]:
     """Returns the names of all estimators, those of other packages last."""
-    return *ESTIMATORS, *(entry.name for entry in entry_points(group=_GROUP) if entry.name not in ESTIMATORS)
+    return tuple({**ESTIMATORS, **_from_outside()})
 
 
 def estimator_class(name: str) -> type[Estimator]:
@@ -35,7 +42,7 @@ def estimator_class(name: str) -> type[Estimator]:
         KeyError: there is none of this name.
     """
     if name not in ESTIMATORS:
-        return {entry.name: entry for entry in entry_points(group=_GROUP)}[name].load()
+        return _from_outside()[name].load()
     found = ESTIMATORS[name]
     return resolve_name(found) if isinstance(found, str) else found
 

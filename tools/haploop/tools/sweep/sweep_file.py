@@ -173,7 +173,9 @@ class _Reader:
         else:
             if points is None or (number is None and not self._names_fit(at, key, points, scene)):
                 return None
-            return Axis(key, tuple(points), number and number.quantity.unit, bool(number and number.quantity.whole))
+            if number is None:
+                return Axis(key, tuple(points))
+            return Axis(key, tuple(points), number.quantity.unit, number.quantity.whole)
         return None
 
     def _points(self, at: KeyPath, values: Any, number: Number | None) -> list[Any] | None:
