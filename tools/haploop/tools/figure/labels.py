@@ -142,7 +142,6 @@ def place_labels(ax: Axes, labels: Sequence[Label], lines: Iterable[np.ndarray])
     """Writes labels beside their points; the axes must have their place, size and limits.
 
     Args:
-        ax: the panel.
         labels: the important ones first; no label covers the point of another.
         lines: data coordinates of lines that labels keep off where they can, shape (n, 2) each.
     """

@@ -17,9 +17,7 @@ _REFRESH_PER_S = 4
 
 
 class SweepProgress:
-    """Cells done, cells per second, time left and what came of them, on a terminal; nothing elsewhere.
-
-    A context manager.
+    """Cells done, cells per second, time left and what came of them, on a terminal; a context manager.
 
     Attributes:
         counts: of all rows, those of earlier calls too, by verdict, or by how a run ended that has none.

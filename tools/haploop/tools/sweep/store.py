@@ -24,14 +24,10 @@ class StoreError(Exception):
 
 
 class Store:
-    """DIR while a sweep writes to it; a context manager that keeps others out.
+    """An existing directory while a sweep writes a table of a schema to it; a context manager that keeps others out.
 
     Every part of the sweep that is done becomes a file of its own, complete or not there at all. At the end they are
     merged into one table.
-
-    Args:
-        directory: exists already.
-        schema: of the table.
     """
 
     def __init__(self, directory: Path, schema: Any) -> None:
@@ -72,21 +68,13 @@ class Store:
         return rows
 
     def add(self, rows: Sequence[Row]) -> None:
-        """Keeps the rows of a part that is done.
-
-        Raises:
-            StoreError: they cannot be written; what was written before is safe.
-        """
+        """Keeps the rows of a part that is done; raises StoreError where they cannot be written."""
         path = self._parts / f"{rows[0][CELL]:012d}.parquet"
         self._write(path, lambda file: pyarrow().parquet.write_table(make_table(rows, self._schema), file))
         self.rows += len(rows)
 
     def finish(self, boundaries: Any = None) -> None:
-        """Merges all parts into the table, in the order of the cells; writes the table of the boundaries, if any.
-
-        Raises:
-            StoreError: as for ``add``.
-        """
+        """Merges all parts into the table, in the order of the cells; writes the table of the boundaries, if any."""
         if boundaries is not None:
             self._write(self.directory / BOUNDARY, lambda file: pyarrow().parquet.write_table(boundaries, file))
         temporary = self.directory / f"{TABLE}.part"

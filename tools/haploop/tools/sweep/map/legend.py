@@ -83,12 +83,7 @@ _SIGN_IN, _LETTERS = 0.34, 42
 
 
 class Legend:
-    """Writes the column beside a map from the top down; lengths in inches.
-
-    Args:
-        side: the column.
-        width, height: its size.
-    """
+    """Writes the column beside a map, of a width and a height in inches, from the top down."""
 
     def __init__(self, side: SubFigure, width: float, height: float) -> None:
         self._side, self._width, self._height = side, width, height

@@ -84,18 +84,12 @@ _BEYOND = 1.05
 
 
 class Sheet:
-    """A figure with a header, panels in rows, and a column beside them.
-
-    Args:
-        panels: how many.
+    """A figure with a header, so many panels in rows, and a column beside them; FigureError without matplotlib.
 
     Attributes:
-        axes: of the panels, row by row; all that are there share their scales.
+        axes: of the panels, row by row.
         columns: panels in a row.
-        side, side_in: the column and its size.
-
-    Raises:
-        FigureError: matplotlib is missing.
+        side, side_in: the column beside them and its size.
     """
 
     def __init__(self, panels: int, title: str, line: str) -> None:
