@@ -170,7 +170,7 @@ class Batch:
                 ends[index] = MemberEnd(place, self._scenes[index], float(x[place]), float(v[place]), reason)
         counters = self._line.counters | (self._sensor.counters if self._sensor else {})
         counted = {name: counter.state for name, counter in counters.items()}
-        with _collector_at_rest(), _buffers_of(self._usual_buffer):
+        with _as_alone(self._usual_buffer):
             outcomes = self._logger.outcomes(list(ends.values()), ended, counted)
             for index, outcome in zip(ends, outcomes, strict=True):
                 self.results[index] = outcome
@@ -188,23 +188,20 @@ class Batch:
 
 
 @contextmanager
-def _collector_at_rest() -> Iterator[None]:
-    """No search for cycles among thousands of dictionaries without any: it would take as long as making them."""
+def _as_alone(buffer: int) -> Iterator[None]:
+    """NumPy before 2.3 adds so many numbers at a time as its buffers hold: sums are those of a run alone with its.
+
+    And no search for cycles among thousands of dictionaries without any: it would take as long as making them.
+    """
     was_at_work = gc.isenabled()
     gc.disable()
     try:
-        yield
+        with np.errstate():  # which gives back the buffers as well
+            np.setbufsize(buffer)
+            yield
     finally:
         if was_at_work:
             gc.enable()
-
-
-@contextmanager
-def _buffers_of(size: int) -> Iterator[None]:
-    """NumPy before 2.3 adds so many numbers at a time as its buffers hold: sums are those of a run alone with its."""
-    with np.errstate():  # which gives back the buffers as well
-        np.setbufsize(size)
-        yield
 
 
 def _keep_freed_memory() -> None:

@@ -12,6 +12,7 @@ from haploop.launch.batch.stacking import is_batchable, structures
 from haploop.launch.runs.in_process import run_in_process
 from haploop.launch.spec import RunFailed
 from haploop.logger.summary import OF_THE_MACHINE, Summary
+from haploop.plant.choose import needs_chain
 from haploop.protocol.scene.scene import Scene
 
 if TYPE_CHECKING:
@@ -65,8 +66,12 @@ def batch_results(
 def groups(scenes: Sequence[Scene]) -> list[list[int]]:
     """Returns the indices of the scenes of each structure that can be run as a batch."""
     found: dict[Hashable, list[int]] = {}
+    fits: dict[Hashable, bool] = {}
     for index, (scene, shape) in enumerate(zip(scenes, structures(scenes), strict=True)):
-        if is_batchable(scene):
+        # Of one structure all can be or none, but for chains, whose numbers decide, too.
+        if shape not in fits or needs_chain(scene):
+            fits[shape] = is_batchable(scene)
+        if fits[shape]:
             found.setdefault(shape, []).append(index)
     return list(found.values())
 

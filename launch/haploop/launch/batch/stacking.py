@@ -53,7 +53,7 @@ def structures(scenes: Iterable[Scene]) -> Iterator[Hashable]:
         if scene.friction or before.get("friction"):
             before = {}
         for key, value in entries.items():
-            if key not in _ASIDE and (key not in before or before[key] is not value):
+            if before.get(key, _ASIDE) is not value and key not in _ASIDE:
                 parts[key] = _structure(value, key in by_value)
         before = entries
         yield tuple(parts.values())
@@ -79,11 +79,10 @@ def stacked(scenes: Sequence[Scene]) -> Scene:
 
 def _stacked(values: Sequence[Any]) -> Any:
     first = values[0]
-    if all(value is first for value in values):
+    if len(set(map(id, values))) == 1:
         return first
     if isinstance(first, Table):
-        columns = zip(*(vars(value).values() for value in values), strict=True)
-        return type(first)(**{key: _stacked(column) for key, column in zip(vars(first), columns, strict=True)})
+        return type(first)(**{key: _stacked([getattr(value, key) for value in values]) for key in vars(first)})
     if isinstance(first, dict):
         return type(first)((key, _stacked([value[key] for value in values])) for key in first)
     if isinstance(first, tuple | list):

@@ -58,7 +58,7 @@ def without(table: TableType, *keys: str) -> TableType:
 
 
 def _declares(table: Table, name: str) -> bool:
-    return any(field.name == name for field in table.fields())
+    return name in vars(table)
 
 
 def _undeclared(table: Table) -> Tables:
