@@ -19,13 +19,7 @@ from haploop.protocol.scene.paths import without
 from haploop.protocol.scene.scene import Scene
 from haploop.tools.search.random import Point
 from haploop.tools.studies.choi2022.interpretations import MOST, decider, never_together, options, share
-from haploop.tools.studies.choi2022.simulation import (
-    BASE,
-    SPACE,
-    as_row,
-    scene_of,
-    scene_text,
-)
+from haploop.tools.studies.choi2022.simulation import BASE, SPACE, as_row, scene_of, scene_text
 from haploop.tools.studies.choi2022.simulation_measure import CLAIMS, SMALL_M, Extent, measure, over
 from haploop.tools.studies.choi2022.work import Work, fig6
 from helpers.scenes.least import KINDS

@@ -95,11 +95,7 @@ class Found(Generic[Nearest]):
 
 
 def searched(
-    work: Work,
-    space: Space,
-    evaluate: Evaluate,
-    effort: Effort,
-    tie: Callable[[Row], float] = lambda _: 0.0,
+    work: Work, space: Space, evaluate: Evaluate, effort: Effort, tie: Callable[[Row], float] = lambda _: 0.0
 ) -> random.Found:
     """Searches for the interpretation nearest to the paper: the same effort gives the same rows on any workers."""
 

@@ -188,10 +188,9 @@ def _best(ends: Callable[[np.ndarray], np.ndarray], sizes: np.ndarray) -> Best:
 class GatedMap:
     """The map w -> (A - K p q' + m g[k] P) w with g[k] = 1 if v[k] a[k-1] >= 0, else 0 (Choi et al. 2022, eq. 9).
 
-    The same one-tick map as of a linear loop in a contact that is never left (``OneTickMap``), switched by the signs of
-    v[k] = x[k] - x[k-1] and of the reading before the present one. The map is homogeneous: twice the swing takes
-    twice the course, so that a start either grows or decays, whatever its size. Which of them may depend on the start;
-    the fastest growth of a few random ones counts.
+    The one-tick map of a linear loop in a contact that is never left (``OneTickMap``), switched by the signs of
+    v[k] = x[k] - x[k-1] and of the reading before the present one. It is homogeneous, so that a start either grows or
+    decays, whatever its size; the fastest growth of a few random ones counts.
 
     Attributes:
         without: A, shape (w, w).
@@ -233,9 +232,11 @@ class GatedMap:
         k, m = np.broadcast_arrays(np.asarray(stiffness, float), np.asarray(mass, float))
         shape = (_STARTS, *k.shape)
         k, m = np.tile(k.ravel(), _STARTS), np.tile(m.ravel(), _STARTS)
-        w = self._starts(len(k), seed)
+        units = self._units()
+        w = np.zeros((len(self.without), len(k)))
+        w[: self.states] = np.random.default_rng(seed).normal(size=(self.states, len(k))) * units
         x_before, a_before = w[0].copy(), np.zeros(len(k))
-        peak, grown, settled, units = np.zeros(len(k)), np.zeros(len(k)), np.zeros(len(k)), self._units()
+        peak, grown, settled = np.zeros(len(k)), np.zeros(len(k)), np.zeros(len(k))
         for tick in range(1, ticks + 1):
             x, a = w[0].copy(), w[self.states].copy()
             gate = (x - x_before) * a_before >= 0.0
@@ -249,12 +250,6 @@ class GatedMap:
             if tick == _SETTLED:
                 settled = grown.copy()
         return ((grown - settled) / (ticks - _SETTLED)).reshape(shape).max(axis=0)
-
-    def _starts(self, count: int, seed: int) -> np.ndarray:
-        """Returns random positions and velocities of all bodies."""
-        w = np.zeros((len(self.without), count))
-        w[: self.states] = np.random.default_rng(seed).normal(size=(self.states, count)) * self._units()
-        return w
 
     def _units(self) -> np.ndarray:
         """Returns 1 m/s for every velocity and 1 mm for every length; what else is a state counts as a velocity."""

@@ -39,14 +39,7 @@ from haploop.tools.studies.choi2022.interpretations import (
     share,
     yes,
 )
-from haploop.tools.studies.choi2022.simulation import (
-    BASE,
-    NEAREST,
-    SPACE,
-    describe,
-    scene_of,
-    scene_text,
-)
+from haploop.tools.studies.choi2022.simulation import BASE, NEAREST, SPACE, describe, scene_of, scene_text
 from haploop.tools.studies.choi2022.simulation_measure import ASIDE, WHOLE, findings_on_logs, search
 from haploop.tools.studies.choi2022.simulation_measure import CLAIMS as COUNTED
 from haploop.tools.studies.choi2022.work import Run, Work, run, wall_of

@@ -34,30 +34,38 @@ _OFTEN = 0.05
 def make(work: Work) -> list[Finding]:
     """Searches, varies each value by itself, and writes the nearest interpretation as a scene."""
     found = search(work)
-    rows = found.of("random")
+    rows, [row], [rough] = (found.of(stage) for stage in ("random", "nearest", "friction"))
     there = options(rows, SPACE)
     if there:
         work.figure(share_map(there, list(TESTED), len(rows)), "figure_7", work.tell("seen_search"))
     keep_shares(work, list(TESTED), rows, there)
     varied = _varied(found.nearest, work.small)
-    base, influences = _influences(work, found, varied)
-    work.figure(
-        _draw(base, influences, varied | {"friction_N": (0.0, FRICTION_N)}),
-        "figure_7_influence",
-        work.tell("seen_influence", factor=_FACTOR),
-    )
-    work.data("figure_7_interpretations", _columns(found))
+    ends = [Setup.from_row(found.nearest.as_dict() | {key: value}) for key, pair in varied.items() for value in pair]
+    base, *rest = _largest(work, [found.nearest, *ends])
+    influences = {key: (rest[2 * i], rest[2 * i + 1]) for i, key in enumerate(varied)}
+    influences["friction_N"] = base, {name: rough[f"{name}_N_m"] for name in NAMES}
+    drawn = _draw(base, influences, varied | {"friction_N": (0.0, FRICTION_N)})
+    work.figure(drawn, "figure_7_influence", work.tell("seen_influence", factor=_FACTOR))
+    # That of the nearest is among the rows once already.
+    kept = [one for one in found.rows if one["stage"] != "nearest"]
+    work.data("figure_7_interpretations", {key.replace(" ", "_"): [one[key] for one in kept] for key in kept[0]})
     work.scene(SCENE.removesuffix(".toml"), found.nearest.scene(5000.0))
     work.text(SCENE_FILE, file_text(found.nearest))
     work.notes = [_notes(work, found, there)]
-    work.answer = _answer(work, found)
-    return [_on_the_unit(found, *influences["acceleration"])]
-
-
-def _columns(found: Found[Setup]) -> dict[str, list[float | str]]:
-    """Returns the rows as columns; that of the nearest is among them once."""
-    rows = [row for row in found.rows if row["stage"] != "nearest"]
-    return {key.replace(" ", "_"): [row[key] for row in rows] for key in rows[0]}
+    work.answer = work.tell(
+        "answer",
+        larger=percent(share(rows, "10 larger")),
+        count=len(rows),
+        here=", ".join(f"{SHORT[name]} {row[f'{name}_N_m'] / 1e3:.1f}" for name in PAPER),
+        papers=", ".join(f"{stiffness / 1e3:.1f}" for stiffness in PAPER.values()),
+        neighbours=percent(share(found.of("neighbour"), "10 larger")),
+    )
+    # Inertia may steady stiffer walls with the unit than with the encoder's second differences.
+    unit, encoder = influences["acceleration"]
+    better = all(unit[kind] > encoder[kind] for kind in KINDS[2:])
+    of_unit, of_encoder = (" and ".join(f"{of[kind] / 1e3:.1f}" for kind in KINDS[2:]) for of in (unit, encoder))
+    words = {"velocity": found.nearest.velocity, "nearest": NEAREST}
+    return [CLAIMS["unit"].holds_if(False, better, unit=of_unit, encoder=of_encoder, **words)]
 
 
 def _varied(setup: Setup, small: bool) -> dict[str, Pair]:
@@ -68,26 +76,12 @@ def _varied(setup: Setup, small: bool) -> dict[str, Pair]:
     }
     lower, upper = pairs["near_share"]
     pairs["near_share"] = (float(lower), min(float(upper), 0.9))
-    delays = (round(max(setup.delay_s - _DELAY_S, 0.0), 4), round(setup.delay_s + _DELAY_S, 4))
-    units = [unit for unit in SPACE.choices["unit"] if unit != setup.unit]
-    velocities = [one for one in SPACE.choices["velocity"] if one != setup.velocity]
-    pairs |= {
-        "delay_s": delays,
-        "unit": (units[0], units[-1]),
-        "mount": ("motor", "tip"),
-        "velocity": (velocities[0], velocities[-1]),
-        "acceleration": ("unit", "encoder"),
-    }
+    pairs["delay_s"] = round(max(setup.delay_s - _DELAY_S, 0.0), 4), round(setup.delay_s + _DELAY_S, 4)
+    for key in ("unit", "mount", "velocity"):
+        others = [one for one in SPACE.choices[key] if key == "mount" or one != getattr(setup, key)]
+        pairs[key] = others[0], others[-1]
+    pairs["acceleration"] = "unit", "encoder"
     return {key: pairs[key] for key in ("delay_s", "acceleration")} if small else pairs
-
-
-def _influences(work: Work, found: Found[Setup], varied: Mapping[str, Pair]) -> tuple[Largest, Influences]:
-    """Returns the largest stiffnesses of the nearest interpretation, and those at both values of each key."""
-    ends = [Setup.from_row(found.nearest.as_dict() | {key: value}) for key, pair in varied.items() for value in pair]
-    base, *rest = _largest(work, [found.nearest, *ends])
-    influences = {key: (rest[2 * i], rest[2 * i + 1]) for i, key in enumerate(varied)}
-    [rough] = found.of("friction")
-    return base, influences | {"friction_N": (base, {name: rough[f"{name}_N_m"] for name in NAMES})}
 
 
 def _largest(work: Work, setups: list[Setup]) -> list[Largest]:
@@ -158,25 +152,4 @@ def _notes(work: Work, found: Found[Setup], there: Sequence[Option]) -> str:
         never=work.tell("never", often=percent(_OFTEN), pairs=never) if never else "",
         papers=", ".join(f"{name.replace('-', ' ')} {stiffness / 1e3:.1f}" for name, stiffness in PAPER.items()),
         numbers="\n".join(bounds),
-    )
-
-
-def _answer(work: Work, found: Found[Setup]) -> str:
-    rows, [row] = found.of("random"), found.of("nearest")
-    return work.tell(
-        "answer",
-        larger=percent(share(rows, "10 larger")),
-        count=len(rows),
-        here=", ".join(f"{SHORT[name]} {row[f'{name}_N_m'] / 1e3:.1f}" for name in PAPER),
-        papers=", ".join(f"{stiffness / 1e3:.1f}" for stiffness in PAPER.values()),
-        neighbours=percent(share(found.of("neighbour"), "10 larger")),
-    )
-
-
-def _on_the_unit(found: Found[Setup], unit: Largest, encoder: Largest) -> Finding:
-    """Finds whether inertia steadies stiffer walls with the unit than with the encoder's second differences."""
-    better = all(unit[kind] > encoder[kind] for kind in KINDS[2:])
-    of_unit, of_encoder = (" and ".join(f"{of[kind] / 1e3:.1f}" for kind in KINDS[2:]) for of in (unit, encoder))
-    return CLAIMS["unit"].holds_if(
-        False, better, unit=of_unit, encoder=of_encoder, velocity=found.nearest.velocity, nearest=NEAREST
     )
