@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from haploop.tools.notebook import run_cells
+from haploop.tools.notebook import Cell, run_cells
 
 FILE = Path(__file__).parents[1] / "docs/notebook.ipynb"
 NOTEBOOK = json.loads(FILE.read_text(encoding="utf-8"))
@@ -37,7 +37,7 @@ def test_the_notebook_holds_the_figures_it_draws() -> None:
 
 
 def test_a_cell_that_fails_fails_the_whole() -> None:
-    cell = {"cell_type": "code", "source": ["1 / 0"], "outputs": []}
+    cell: Cell = {"cell_type": "code", "source": ["1 / 0"], "outputs": []}
     with pytest.raises(ZeroDivisionError):
         run_cells({"cells": [cell]})
 
