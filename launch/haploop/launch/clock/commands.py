@@ -170,14 +170,11 @@ def capabilities(scene: Scene, kinds: Mapping[str, type[Element]]) -> Message:
     return {
         "settable": {key: {**number.quantity.as_dict(), "value": value_at(scene, key)} for key, number in keys.items()},
         "kinds": {
-            kind: {"about": _about(element), "parameters": _parameters(element)} for kind, element in kinds.items()
+            kind: {"about": (element.__doc__ or "").strip().partition("\n")[0], "parameters": _parameters(element)}
+            for kind, element in kinds.items()
         },
         "elements": [element.as_dict() for element in scene.dissipation],
     }
-
-
-def _about(element: type[Element]) -> str:
-    return (element.__doc__ or "").strip().partition("\n")[0]
 
 
 def _parameters(element: type[Element]) -> dict[str, Message]:

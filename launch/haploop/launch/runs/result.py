@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import tempfile
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import nullcontext
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -109,32 +109,20 @@ def run(
     if math.isfinite(pace) and not processes:
         raise ValueError(f"A pace of {pace:g} needs the clock of a run as processes; give processes=True too.")
     if out is None and not processes:
-        return _in_memory(scene)
+        memory = MemoryLog()
+        summary = run_in_process(scene.scene, dict(scene.kinds), attachments={SCENE: str(scene)}, memory=memory)
+        return Result(scene, summary, None, memory.recording())
     if processes:
         _check_files(scene)
-    with _directory(out) as directory:
+    # Without a directory, one that is removed once it has been read.
+    with tempfile.TemporaryDirectory(prefix="haploop-") if out is None else nullcontext(out) as directory:
         target = make_output(Path(directory), scene.path)
         files = dict.fromkeys(scene.plugin_files.values())
         prepared = start.lay_out(scene.scene, dict(scene.kinds), target, list(files), dict(scene.plugin_files))
         summary = start.run(prepared, in_process=not processes, pace=pace)
-        kept = _read(target) if out is None else None
+        has_log = (target / LOG).exists()  # a scene may ask for none
+        kept = None if out is not None else haploop.logger.read(target) if has_log else Recording({}, "", {})
     return Result(scene, summary, None if out is None else target, kept)
-
-
-def _in_memory(scene: LoadedScene) -> Result:
-    memory = MemoryLog()
-    summary = run_in_process(scene.scene, dict(scene.kinds), attachments={SCENE: str(scene)}, memory=memory)
-    return Result(scene, summary, None, memory.recording())
-
-
-def _directory(out: str | Path | None) -> AbstractContextManager[str | Path]:
-    """Returns the directory asked for, or one that is removed once it has been read."""
-    return tempfile.TemporaryDirectory(prefix="haploop-") if out is None else nullcontext(out)
-
-
-def _read(directory: Path) -> Recording:
-    """Returns the log of a run, empty where the scene asks for none."""
-    return haploop.logger.read(directory) if (directory / LOG).exists() else Recording({}, "", {})
 
 
 def _check_files(scene: LoadedScene) -> None:

@@ -16,10 +16,14 @@ from haploop.protocol.transport.wire import MAX_FRAME_BYTES
 SERVER, CLIENT, CLIENTS = "server", "client", "clients"
 # A subscriber this many blocks behind starts to lose blocks; the grant window keeps lossless ones far below.
 TELEMETRY_BACKLOG_BLOCKS = 256
-# What comes in where anyone may connect is small: reports and commands, subscriptions to a role. (A large scene goes
-# out, from there to sockets that connect.)
+# What comes in at sockets that are bound, where anyone may connect, is small: reports and commands, subscriptions to a
+# role. (A large scene goes out, from there to sockets that connect.)
 _LARGEST: dict[int, int] = {zmq.ROUTER: 4 * 1024 * 1024, zmq.XPUB: 1024}
-_BINDING = (zmq.ROUTER, zmq.XPUB)
+_OPTIONS: dict[int, tuple[tuple[int, int], ...]] = {
+    zmq.ROUTER: ((zmq.ROUTER_MANDATORY, 1),),
+    zmq.XPUB: ((zmq.SNDHWM, TELEMETRY_BACKLOG_BLOCKS), (zmq.XPUB_VERBOSE, 1)),
+    zmq.SUB: ((zmq.RCVHWM, TELEMETRY_BACKLOG_BLOCKS),),
+}
 # The kernel's limit on the path of an ipc socket.
 _LONGEST_PATH = 107
 
@@ -121,16 +125,11 @@ def open_socket(context: zmq.Context[zmq.Socket[bytes]], kind: int) -> zmq.Socke
     """Opens a socket of a type such as ``zmq.DEALER`` with the options every socket of a run has."""
     socket = context.socket(kind)
     socket.linger = 0
-    _transport(context).guard(socket, binds=kind in _BINDING)
+    _transport(context).guard(socket, binds=kind in _LARGEST)
     socket.setsockopt(zmq.MAXMSGSIZE, _LARGEST.get(kind, MAX_FRAME_BYTES))
     socket.setsockopt(zmq.RECONNECT_IVL, 20)
-    if kind == zmq.ROUTER:
-        socket.setsockopt(zmq.ROUTER_MANDATORY, 1)
-    if kind == zmq.XPUB:
-        socket.setsockopt(zmq.SNDHWM, TELEMETRY_BACKLOG_BLOCKS)
-        socket.setsockopt(zmq.XPUB_VERBOSE, 1)
-    if kind == zmq.SUB:
-        socket.setsockopt(zmq.RCVHWM, TELEMETRY_BACKLOG_BLOCKS)
+    for option, value in _OPTIONS.get(kind, ()):
+        socket.setsockopt(option, value)
     return socket
 
 
