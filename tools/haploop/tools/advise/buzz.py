@@ -119,11 +119,8 @@ def _fewest(scene: Scene, parts: Causes, judge: Judge) -> list[tuple[Causes, Jud
 
 def _query(scene: Scene) -> StiffnessQuery:
     stiffness = max(LEAST_N_M, value_at(scene, "wall.stiffness"))
-
-    def make(k: float, _: bool) -> list[Scene]:
-        return [with_value(scene, "wall.stiffness", k)]
-
-    return StiffnessQuery(make, stiffness, _MOST_FACTOR * stiffness, is_one_run=True)
+    most = _MOST_FACTOR * stiffness
+    return StiffnessQuery(lambda k, _: [with_value(scene, "wall.stiffness", k)], stiffness, most, is_one_run=True)
 
 
 def _leaks(summary: Summary) -> dict[str, tuple[float, float]]:

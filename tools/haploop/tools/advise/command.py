@@ -115,7 +115,4 @@ def _progress() -> Iterator[tuple[Callable[[str], None], Callable[[int], None]]]
                 print(f"{name} ...", file=sys.stderr)
             bars.update(task, description=name, advance=1)
 
-        def on_progress(runs: int) -> None:
-            bars.update(task, runs=runs)
-
-        yield stage, on_progress
+        yield stage, lambda runs: bars.update(task, runs=runs)

@@ -183,19 +183,16 @@ class Judge:
         items = [Group([[scenes[index] for index in bundle]], together=False) for bundle in bundles]
         # Items come back as they went; identity tells which is which.
         place = {id(group.items[0]): bundle for group, bundle in zip(items, bundles, strict=True)}
-        for part in self._pool_for(sum(_seconds(scenes, bundle) for bundle in bundles)).parts(work, items):
+        heavy = self._workers != 1 and sum(_seconds(scenes, bundle) for bundle in bundles) >= _WORTH_S
+        if heavy and not self._pool:
+            self._pool = Pool(self._workers)
+        for part in (self._pool if heavy and self._pool else self._here).parts(work, items):
             for item, results in part:
                 for index, result in zip(place[id(item)], results, strict=True):
                     found[index] = result
                 self.runs += len(item)
                 self._told(self.runs)
         return found
-
-    def _pool_for(self, seconds: float) -> Pool:
-        if seconds < _WORTH_S or self._workers == 1:
-            return self._here
-        self._pool = self._pool or Pool(self._workers)
-        return self._pool
 
 
 @dataclass(frozen=True)

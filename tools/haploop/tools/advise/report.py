@@ -135,7 +135,8 @@ def why_table(buzz: Buzz) -> RenderableType:
     table.add_section()
     for one in [*buzz.alone, *buzz.together, *([buzz.without_all] if buzz.without_all else [])]:
         words = one.instead if len(one.without) == 1 else ""
-        table.add_row(" and ".join(one.without), words, *_ran(one), _format_share(one))
+        share = "–" if one.leak_share is None else f"{100 * one.leak_share:.0f} %, {amount(one.leak_J, 'J')}"
+        table.add_row(" and ".join(one.without), words, *_ran(one), share)
     return Group(Text(), Text(head, style="bold"), table)
 
 
@@ -220,13 +221,6 @@ def format_limit(limit: Limit) -> str:
         return "none"
     over = "over " if not math.isfinite(limit.not_steady_N_m) else ""
     return over + format_stiffness(limit.stiffness_N_m)
-
-
-def _format_share(one: Ablation) -> str:
-    """Formats a part of the leak: ``80 %, −973 µJ``."""
-    if one.leak_J is None or one.leak_share is None:
-        return "–"
-    return f"{100 * one.leak_share:.0f} %, {amount(one.leak_J, 'J')}"
 
 
 def _ranked(some: list[Ablation]) -> list[Ablation]:

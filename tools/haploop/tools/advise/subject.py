@@ -107,14 +107,13 @@ def presets(folder: str) -> dict[str, Path]:
 
 def _device(name: str) -> tuple[Path, bool]:
     """Returns the file that a name means, and whether it is a device without a task."""
-    path = Path(name)
-    if path.suffix == ".toml" or path.exists():
-        devices = {file.resolve() for file in presets("devices").values()}
-        return path, path.resolve() in devices
-    devices, scenes = presets("devices"), presets("scenes")
-    if name in devices or name in scenes:
-        return (devices | scenes)[name], name in devices
-    raise InvalidRequest(_unknown("DEVICE", name, list(devices | scenes), "the path of a scene file"))
+    path, devices = Path(name), presets("devices")
+    if path.suffix != ".toml" and not path.exists():
+        known = devices | presets("scenes")
+        if name not in known:
+            raise InvalidRequest(_unknown("DEVICE", name, list(known), "the path of a scene file"))
+        path = known[name]
+    return path, path.resolve() in {file.resolve() for file in devices.values()}
 
 
 def _lay_hand(layers: Layers, name: str) -> None:

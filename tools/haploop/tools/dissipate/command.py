@@ -105,11 +105,8 @@ def _open(request: Request, kinds: dict[str, type[Element]]) -> tuple[Recording,
 def _shown(name: str) -> Iterator[Callable[[float], None]]:
     """Shows a line on a terminal with the time to which the recording is booked, fed with that time in s."""
     shown = console(stderr=True)
-    if not shown.is_terminal:
-        yield lambda _to_s: None
-        return
-    with shown.status(f"reading {name}") as line:
-        yield lambda to_s: line.update(f"{name}: booked to {to_s:.6g} s")
+    with shown.status(f"reading {name}") if shown.is_terminal else contextlib.nullcontext() as line:
+        yield lambda to_s: line.update(f"{name}: booked to {to_s:.6g} s") if line else None
 
 
 def _draw(outcome: Outcome, request: Request) -> Path | None:

@@ -87,19 +87,16 @@ class LogRecording:
             rows = waiting.whole()
             if len(rows["x"]):
                 self.notes.rows += len(rows["x"])
-                yield self._samples(rows, first)
+                v = rows["v"] if "velocity" in self.recorded else None
+                a = rows["a"] if "acceleration" in self.recorded or self._readings else None
+                end = float(rows["end"][-1]) if "end" in rows else None
+                true, between = rows.get("true", rows["x"]), rows.get("between")
+                yield Samples(rows["timestamp"], rows["x"], v, a, true, between, first, end)
                 first = False
         if self.notes.rows < 2:
             raise RecordingError(f"The log {log.path} holds fewer than two ticks of the controller.")
         if log.cut:
             self.notes.remarks.append(log.cut)
-
-    def _samples(self, rows: dict[str, Floats], first: bool) -> Samples:
-        v = rows["v"] if "velocity" in self.recorded else None
-        a = rows["a"] if "acceleration" in self.recorded or self._readings else None
-        end = float(rows["end"][-1]) if "end" in rows else None
-        true, between = rows.get("true", rows["x"]), rows.get("between")
-        return Samples(rows["timestamp"], rows["x"], v, a, true, between, first, end)
 
 
 class _Waiting:

@@ -52,10 +52,10 @@ def bisect_many(
     """
     narrowed = dict(brackets)
     going = dict(brackets)
-    for done in count():
+    for _ in count() if most_rounds is None else range(most_rounds):
         middles = {member: tolerance.middle(*ends) for member, ends in going.items() if not tolerance.met(*ends)}
-        if not middles or done == most_rounds:
-            return narrowed
+        if not middles:
+            break
         answers = holds(middles)
         going = {}
         for member, middle in middles.items():
@@ -63,7 +63,7 @@ def bisect_many(
             if answer is not None:
                 near, far = narrowed[member]
                 going[member] = narrowed[member] = (middle, far) if answer else (near, middle)
-    raise AssertionError  # not reached
+    return narrowed
 
 
 def bisect(holds: Callable[[float], bool], near: float, far: float, tolerance: Tolerance = EXACT) -> Bracket:
