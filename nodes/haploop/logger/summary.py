@@ -9,12 +9,14 @@ import platform
 from collections.abc import Iterable, Sequence
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from haploop.logger.books.books import BooksState, moved_J, residual_J, stored_J, total_J
 from haploop.logger.verdict.measures import RunMeasures
 from haploop.protocol.scene.scene import Scene
-from haploop.protocol.transport.telemetry import Block
+
+if TYPE_CHECKING:
+    from haploop.controller.active_elements import Description
 
 # A summary as summary.json holds it, or an entry of it.
 Summary = dict[str, Any]
@@ -28,16 +30,17 @@ class Account(NamedTuple):
 
     book: int
     kind: str
-    parameters: dict[str, Any]
+    parameters: dict[str, float | str]
     from_tick: int
     to_tick: int
 
 
-def note_accounts(accounts: dict[int, Account], elements: Iterable[Block], to_tick: int) -> None:
+def note_accounts(accounts: dict[int, Account], elements: Iterable[Description], to_tick: int) -> None:
     """Notes by book that these elements, as telemetry describes them, have been at work up to a tick."""
     for element in elements:
-        known = accounts.get(element["book"]) or Account(**element, to_tick=to_tick)
-        accounts[known.book] = known._replace(to_tick=to_tick)
+        book, first = element["book"], element["from_tick"]
+        known = accounts.get(book) or Account(book, element["kind"], element["parameters"], first, to_tick)
+        accounts[book] = known._replace(to_tick=to_tick)
 
 
 def versions() -> dict[str, str]:
