@@ -47,11 +47,7 @@ class Runs(Protocol):
         ...
 
     def ask(self, run: Any, verb: str, arguments: Message) -> tuple[str, Message]:
-        """Sends a command to a run; returns its answer, a sentence and data.
-
-        Raises:
-            CommandFailed: the run refused, or does not answer.
-        """
+        """Sends a command to a run; returns its answer, a sentence and data, or raises CommandFailed."""
         ...
 
 

@@ -33,10 +33,10 @@ class AtWork(NamedTuple):
         elements = [
             ElementTable.from_dict({"kind": element["kind"], **element["parameters"]}) for element in block["elements"]
         ]
-        wall, into_wall = block["wall"], block["wall"]["into_wall"]
-        occupies = "above" if into_wall > 0.0 else "below"
-        there_is = Wall(position=wall["position"], stiffness=wall["stiffness"], occupies=occupies)
-        return cls(tuple(elements), there_is if into_wall else None)
+        now = block["wall"]
+        occupies = "above" if now["into_wall"] > 0.0 else "below"
+        wall = Wall(position=now["position"], stiffness=now["stiffness"], occupies=occupies)
+        return cls(tuple(elements), wall if now["into_wall"] else None)
 
     @property
     def into_wall(self) -> float:
