@@ -17,10 +17,8 @@ from haploop.protocol.changes import Event, changes_of, spans
 from haploop.protocol.scene.scene import ElementTable, Scene, Wall
 
 Floats = np.ndarray
-# The close view shows at most this much of the last contact.
-_CLOSE_S = 0.2
-# What the loops show of the beginning.
-_EARLY_S = 1.0
+# What the close view shows of the last contact at most, and the loops of the beginning.
+_CLOSE_S, _EARLY_S = 0.2, 1.0
 TOGETHER = "together"
 
 
