@@ -15,7 +15,7 @@ SWEEPS = sorted((Path(__file__).parents[2] / "launch/sweeps").glob("*.toml"))
 def test_every_corner_of_an_example_is_a_scene_that_can_be_run(path: Path) -> None:
     made = load(path)
     for cell in (0, made.count // 2, made.count - 1):
-        assert made.scene(cell)["title"] == made.base["title"]
+        assert made.scene(cell).title == made.base.title
     assert made.title != path.stem
 
 
@@ -25,4 +25,4 @@ def test_the_examples_show_a_grid_a_boundary_and_seeds_with_tables_as_an_axis() 
     assert delay_boundary.bisect
     assert delay_boundary.bisect.axis == "wall.stiffness"
     assert (elements.repeat, elements.axes[1].unit) == (5, None)
-    assert "noise" in elements.base
+    assert elements.base.noise

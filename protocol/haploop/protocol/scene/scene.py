@@ -83,8 +83,6 @@ class ElementTable(Table):
     @classmethod
     def from_dict(cls, data: Tables) -> ElementTable:
         """Makes it from ``{"kind": ..., "acts": ..., parameter: value, ...}``."""
-        if isinstance(data, cls):
-            return data
         parameters = {key: value for key, value in data.items() if key not in ("kind", "acts")}
         return cls(name=data["kind"], acts=data.get("acts", "in-contact"), parameters=parameters)
 

@@ -35,53 +35,13 @@ class Table:
         """Returns the declared keys, in order."""
         return dataclasses.fields(cls)
 
-    # TEMPORARY: string keys as of a dict, until every reader asks for attributes.
-    def __getitem__(self, key: str) -> Any:
-        if key == "kind" and self.kind:
-            return self.kind
-        value = getattr(self, key, None)
-        for open_keys in ("others", "parameters"):
-            value = getattr(self, open_keys, {}).get(key) if value is None else value
-        if value is None or ((key == "dissipation" or key == "event") and not value):
-            raise KeyError(key)
-        return value
-
-    def get(self, key: str, default: Any = None) -> Any:
-        try:
-            return self[key]
-        except KeyError:
-            return default
-
-    def __contains__(self, key: str) -> bool:
-        return self.get(key) is not None
-
-    def keys(self) -> Any:
-        return self.as_dict().keys()
-
-    def __iter__(self) -> Any:
-        return iter(self.keys())
-
-    def items(self) -> Any:
-        return [(key, self[key]) for key in self.keys()]
-
-    def values(self) -> Any:
-        return [self[key] for key in self.keys()]
-
-    def __or__(self, other: Any) -> Any:
-        return {**self, **other}
-
-    def __ror__(self, other: Any) -> Any:
-        return {**other, **self}
-
     @classmethod
-    def from_dict(cls, data: Any) -> Self:
+    def from_dict(cls, data: Tables) -> Self:
         """Makes the table from a resolved dict: every value already checked and in SI units.
 
         Raises:
             TypeError: a key is unknown or missing.
         """
-        if isinstance(data, cls):
-            return data
         tables = _tables_of(cls)
         given = {key: _read(tables.get(key, ()), value) for key, value in data.items()}
         if cls.kind:
@@ -107,10 +67,8 @@ class OpenTable(Table):
     others: dict[str, Any] = dataclasses.field(default_factory=dict)
 
     @classmethod
-    def from_dict(cls, data: Mapping[str, Any]) -> Self:
+    def from_dict(cls, data: Tables) -> Self:
         """Makes the table as ``Table.from_dict`` does; keys that it does not declare are those of others."""
-        if isinstance(data, cls):
-            return data
         declared = {field.name for field in cls.fields()}
         others = {key: value for key, value in data.items() if key not in declared and not (cls.kind and key == "kind")}
         made = super().from_dict({key: value for key, value in data.items() if key not in others})
