@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
 from functools import cache
 from types import UnionType
 from typing import Annotated, Any, ClassVar, Self, Union, dataclass_transform, get_args, get_origin, get_type_hints
@@ -64,7 +63,7 @@ class OpenTable(Table):
         others: the keys they have added, with their values in SI units.
     """
 
-    others: dict[str, Any] = dataclasses.field(default_factory=dict)
+    others: Tables = dataclasses.field(default_factory=dict)
 
     @classmethod
     def from_dict(cls, data: Tables) -> Self:
@@ -98,7 +97,7 @@ def _tables_in(hint: Any) -> list[type[Table]]:
 def _read(tables: tuple[type[Table], ...], value: Any) -> Any:
     if isinstance(value, list | tuple):
         return tuple(_read(tables, item) for item in value)
-    if not tables or not isinstance(value, Mapping) or isinstance(value, Table):
+    if not tables or not isinstance(value, dict):
         return value
     kind = value.get("kind", "")
     return next((table for table in tables if table.kind == kind), tables[0]).from_dict(value)
