@@ -73,7 +73,6 @@ class ControllerNode:
         return tick, {"strangers": self._publisher.unknown_peers, "trouble": trouble}
 
     def _flush(self) -> None:
-        """Publishes what was answered, answers new subscribers, reports."""
         recorder = self._controller.recorder
         for block in recorder.take():
             fields = (block[name] for name in ("from_tick", "ticks", "columns", "elements", "wall"))

@@ -164,7 +164,6 @@ class BatchLogger:
             yield (entries if is_finite else finite(entries)) | energies
 
     def _energies(self, ends: Sequence[MemberEnd], places: np.ndarray) -> list[Summary]:
-        """Returns the ``energy`` entry of each summary; none without books."""
         if not self.books or not ends:
             return [{} for _ in ends]
         accounts = tree_take([*self._accounts.values()], places)
@@ -180,7 +179,6 @@ def _column(values: list[Any], members: int) -> np.ndarray:
 
 
 def _is_finite(value: Any) -> bool:
-    """Tells whether all numbers of all members are finite."""
     if isinstance(value, dict | list):
         return all(map(_is_finite, value.values() if isinstance(value, dict) else value))
     return isinstance(value, str) or bool(np.isfinite(value).all())

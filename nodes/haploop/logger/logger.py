@@ -107,7 +107,6 @@ class Logger:
 
     @np.errstate(over="ignore", invalid="ignore")  # where a force is no finite number, its books are none either
     def _book(self, end: int) -> None:
-        """Books the intervals before ``end``."""
         if self._plant.tick < self.tick:
             self._plant.take(self.tick)
         plant, controller = self._plant.take(end), self._controller
@@ -195,7 +194,6 @@ class Logger:
         return outcome(self._scene, ran, self._measured(), diverged) | {"energy": energy(books, accounts, has_wall)}
 
     def _measured(self) -> RunMeasures:
-        """Returns the measures of the run as it stands, worked out once."""
         if self._measures is None:
             (self._measures,) = self.window.measures()
         return self._measures

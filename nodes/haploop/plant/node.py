@@ -71,7 +71,6 @@ class PlantNode:
         return plant.reached, {"strangers": self._loop.unknown_peers + self._publisher.unknown_peers}
 
     def _flush(self) -> None:
-        """Publishes what was stepped, answers new subscribers, reports."""
         first, ticks, columns = self._plant.take_block()
         if ticks:
             self._publisher.publish("PLANT_BLOCK", first, ticks, columns)

@@ -96,7 +96,6 @@ class Viewer:
         return None
 
     async def _receive(self, session: RunSession) -> None:
-        """Receives and shows telemetry until the run is over."""
         due = gone_due = wall_clock.monotonic()
         while not session.outcome:
             session.poll()

@@ -124,7 +124,6 @@ def _has_members(leaf: Any, members: int = 0) -> bool:
 
 
 def _children(tree: Any) -> list[Any] | None:
-    """The children of a node; None for a leaf."""
     if isinstance(tree, tuple | list):
         return [*tree]
     if isinstance(tree, dict):

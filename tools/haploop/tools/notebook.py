@@ -60,7 +60,6 @@ def run_cells(notebook: Notebook) -> None:
 
 
 def _outputs(source: str, module: ModuleType, number: int) -> list[Output]:
-    """Runs the code of cell ``number`` and returns its outputs."""
     tree, file = ast.parse(source), f"cell {number}"
     shows = bool(tree.body) and isinstance(tree.body[-1], ast.Expr) and not source.rstrip().endswith(";")
     last = tree.body.pop() if shows else None
@@ -79,7 +78,6 @@ def _outputs(source: str, module: ModuleType, number: int) -> list[Output]:
 
 
 def _figures() -> list[str]:
-    """Returns the figures that stand open, as PNG in base64; they are closed."""
     if "matplotlib.pyplot" not in sys.modules:
         return []
     from matplotlib import pyplot

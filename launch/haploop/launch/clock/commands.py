@@ -90,7 +90,6 @@ class Commands:
         return f"{state} at {self._at(data['tick'])} of {clock.end}", data
 
     def _options(self) -> tuple[str, Message]:
-        """Answers what can be set and swapped in now, with units, bounds and present values."""
         data = capabilities(self._clock.present(), self._spec.kinds)
         return f"{len(data['settable'])} keys can be set, {len(data['kinds'])} kinds swapped in", data
 

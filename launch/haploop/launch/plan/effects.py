@@ -51,7 +51,6 @@ def _integrators() -> Iterator[Effect]:
 
 
 def _estimators(of: str) -> Iterator[Effect]:
-    """Makes the effects of all estimators that ``[velocity]`` or ``[acceleration]`` may name but the difference."""
     for name, kind in estimators_for(of).items():
         if name != "difference":
             yield Effect(
@@ -75,7 +74,6 @@ def _memory_of(of: str, scene: Scene) -> int:
 
 
 def _without_estimator(of: str, scene: Scene) -> Scene:
-    """Takes out an estimator with the keys that are its own, and an acceleration that comes of it."""
     if of == "velocity":
         scene = replace(scene, velocity=Velocity(cutoff=scene.estimate(of).cutoff))
     elif table := scene.acceleration:

@@ -68,7 +68,6 @@ def replay(directory: Path) -> Replay:
 
 
 def _recorded(directory: Path) -> Recording:
-    """Returns the log of a run from its first tick on."""
     try:
         recorded = haploop.logger.read(directory)
     except FileNotFoundError as error:
@@ -129,7 +128,6 @@ def _compare(recorded: Recording, repeated: Recording, failed: bool) -> list[str
 
 
 def _compare_summaries(before: Summary, after: Summary) -> list[str]:
-    """Differences between the summary of a run that ended in order and the repeated one's."""
     keys = ("ticks", "verdict", "trajectory_sha256", "final", "extremes", "window", "energy", "lost")
     of_effects = ("actuator", "accelerometer")
     return [f"{key} of the summary differs." for key in (*keys, *of_effects) if before.get(key) != after.get(key)]

@@ -125,7 +125,6 @@ def complain(layers: Layers, what: str, message: str, key: KeyPath, schema: Sche
 
 
 def _form(rule: Schema) -> str:
-    """Returns the form of a value, from its schema."""
     if "properties" in rule:
         return f"a table with {', '.join(rule.get('required', rule['properties']))}"
     return rule["description"].rpartition(": ")[2] if "description" in rule else rule.get("type", "given")

@@ -66,7 +66,6 @@ def _check_shape(layers: Layers, key: KeyPath, event: Tables, time: Timebase | N
 
 
 def _swap(layers: Layers, key: KeyPath, event: Tables, slots: list[Any]) -> None:
-    """Puts the new kind into its slot."""
     element = _read(event, "element")
     kind = event["swap"].get("kind")
     if element < len(slots) + (kind != NO_ELEMENT):

@@ -59,7 +59,6 @@ def model_of(table: type[Table]) -> type[Model]:
 
 
 def _keys_of(table: type[Table], others: Keys) -> Keys:
-    """Returns the declared keys of a table, with others beside or in place of them."""
     keys: Keys = {"kind": (Literal[table.kind], ...)} if table.kind else {}
     hints = get_type_hints(table, include_extras=True)
     for field in table.fields():
@@ -162,7 +161,6 @@ def _model(name: str, about: str | None, keys: Keys, base: type[Model] = Model) 
 
 
 def _one_of(models: list[Any]) -> Any:
-    """Returns the type of a table of one of these kinds."""
     return Annotated[reduce(or_, models), Field(discriminator="kind")] if len(models) > 1 else models[0]
 
 

@@ -47,7 +47,6 @@ def _table(table: Tables, path: tuple[str, ...]) -> list[str]:
 
 
 def _tables(value: Any, path: tuple[str, ...]) -> list[str]:
-    """Lines of a table, or of an array of tables, under their headers."""
     name = ".".join(map(_key, path))
     if isinstance(value, dict):
         return ["", f"[{name}]", *_table(value, path)]

@@ -205,7 +205,6 @@ def plant_books(scene: Scene, time: Timebase, members: int | None = None) -> One
 
 
 def _half_of_magnitudes(flows: Iterable[np.ndarray]) -> np.ndarray:
-    """Returns half of the sum of all flows in magnitude, first to last."""
     first, *others = flows
     total, magnitude = np.abs(first), np.empty_like(first)
     for flow in others:

@@ -137,7 +137,6 @@ class LogStream:
         return []
 
     def _batches(self, body: bytes) -> list[Batch]:
-        """Returns the messages of a chunk, topic by topic."""
         found: dict[str, dict[int, list[MessageRun]]] = {}
         for part in parts(body):
             if not isinstance(part, MessageRun):

@@ -160,7 +160,6 @@ def window_measures(measured: MeasuredColumns, span: Span, rate: int) -> list[Wi
 
 
 def _means(values: np.ndarray, counted: np.ndarray) -> list[float | None]:
-    """Returns the mean of those counted in each row; None of none."""
     chosen = [row[mask] for row, mask in zip(values, counted, strict=True)]
     return [float(np.add.reduce(row)) / len(row) if len(row) else None for row in chosen]
 

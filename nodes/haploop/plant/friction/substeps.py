@@ -112,7 +112,6 @@ class SubstepSolver:
         self, mode: StickSlipState, level: int, z: np.ndarray, z_comp: np.ndarray, command: float, load: float,
         rise: float,
     ) -> float:  # fmt: skip
-        """Returns the friction force held over a piece, N."""
         if mode.is_stuck:
             return 0.0
         v, direction = float(z[self._v]), mode.direction

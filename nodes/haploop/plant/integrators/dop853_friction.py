@@ -118,7 +118,6 @@ class Dop853FrictionMotion(RubbingHistory, Dop853Motion):
         return self._clamped.under(*forces), _Event(lambda t, z: most - abs(self._other_forces(t, z, forces)))
 
     def _other_forces(self, t: float, z: np.ndarray, forces: _Forces) -> float:
-        """Returns all forces on body 0 but friction, N."""
         pull, size = self._pull, len(z)
         return float(pull[:size] @ z + pull[size] * forces.command + pull[size + 2] * forces.load_at(t))
 

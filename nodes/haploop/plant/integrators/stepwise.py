@@ -71,7 +71,6 @@ def friction_brakes(scene: Scene) -> bool:
 
 
 def _method_of(scene: Scene) -> tuple[LinearRates, OneStep, float]:
-    """Returns rates, method and plant step in s of a resolved scene."""
     step_s, rates = 1.0 / scene.clock.plant_rate, LinearRates(Chain.from_scene(scene))
     method = find_integrator(scene.clock.integrator).method
     assert method

@@ -86,7 +86,6 @@ def constant_forces(scene: Scene) -> dict[str, float]:
 
 
 def _profile(force: tables.HandForce | None) -> Profile:
-    """Returns tau(t) of a table."""
     match force:
         case None:
             return np.zeros_like

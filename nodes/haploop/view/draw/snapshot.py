@@ -63,7 +63,7 @@ def snapshot(history: History, viewport: Viewport) -> bytes:
 
 
 def _window(history: History, viewport: Viewport) -> tuple[int, int]:
-    """Returns the ticks shown, (first, end); at the start of a run the interval reaches beyond the newest tick."""
+    """Returns (first, end); at the start of a run the interval reaches beyond the newest tick."""
     rate = history.time.control_rate
     end = max(1, history.end_tick if viewport.end_s is None else math.ceil(viewport.end_s * rate))
     if viewport.span_s is None:

@@ -142,7 +142,6 @@ class Backfill:
             self.history.end(tick + whole // n, {name: column[whole:] for name, column in columns.items()})
 
     def _spans(self, tick: int, end: int) -> Iterator[tuple[int, int, Scene]]:
-        """Yields the scenes at work within some ticks: (from, to, scene)."""
         if len(self._events) != self._known_events:
             self._known_events = len(self._events)
             self._at_work = spans(self._scene, changes_of(self._events))

@@ -79,7 +79,6 @@ class PlantEnd:
         self._send(encode("LAST", tick))
 
     def _send(self, data: bytes) -> None:
-        """Sends one frame to the controller."""
         try:
             self._emit(self._partner, zmq.SNDMORE)
             self._emit(data)
@@ -87,7 +86,6 @@ class PlantEnd:
             _raise_unless_gone(error)
 
     def _receive(self) -> tuple[bytes, bytes]:
-        """Waits for the next message; returns its sender and its last frame."""
         while True:
             try:
                 sender = self.socket.recv()

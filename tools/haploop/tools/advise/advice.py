@@ -101,7 +101,6 @@ def advice(
 
 
 def _rounding(scene: Scene) -> list[str]:
-    """Returns a note where a fifth of the delay is no whole number of plant steps."""
     factors, nominal = (1.0 - SHARE, 1.0 + SHARE), scene.clock.round_trip_delay
     rounded = [delay_s(scene, factor) for factor in factors]
     if DELAY not in uncertain_quantities(scene) or all(

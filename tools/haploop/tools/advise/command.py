@@ -78,7 +78,6 @@ def advise(request: Request, as_json: bool) -> None:
 
 
 def _write(found: Advice, out: Path) -> AdviceData:
-    """Writes scene, figure and data; returns the data with the files in it."""
     files = {}
     because = " ".join(buzz_sentences(found.buzz)) if found.buzz else ""
     data = as_data(found, " ".join(gain_sentences(found)), because)
@@ -98,7 +97,6 @@ def _write(found: Advice, out: Path) -> AdviceData:
 
 @contextlib.contextmanager
 def _progress() -> Iterator[tuple[Callable[[str], None], Callable[[int], None]]]:
-    """Shows a bar of the stages on a terminal, with the runs so far; a line a stage elsewhere."""
     screen = console(stderr=True)
     columns = (
         "{task.description}",

@@ -77,7 +77,6 @@ def _gains(ax: Axes, found: Advice) -> None:
 
 
 def _beside(ax: Axes, right: float, row: int, words: str, bold: bool = False) -> None:
-    """Writes words at the end of a bar; at the axis where there is none."""
     ax.annotate(
         words, (right, row) if right else (0.0, row), (6, 0),
         xycoords="data" if right else ax.get_yaxis_transform(), textcoords="offset points",
@@ -87,7 +86,6 @@ def _beside(ax: Axes, right: float, row: int, words: str, bold: bool = False) ->
 
 
 def _bounds(ax: Axes, found: Advice) -> None:
-    """Draws a line across the row of each family that a bound speaks of."""
     colours: dict[str, str] = {}
     for row, (bounds, exact) in enumerate(zip(found.bounds, found.exact_N_m, strict=True)):
         lines = [("exact map, ρ(M) = 1", exact)] + [(f"{b.name} ({b.kind})", b.stiffness_N_m) for b in bounds]
@@ -105,7 +103,6 @@ def _bounds(ax: Axes, found: Advice) -> None:
 
 
 def _causes(ax: Axes, buzz: Buzz) -> None:
-    """Draws the largest steady wall without each cause, against the wall of the scene."""
     rows = _rows(buzz)
     names = ["as it is", *(" and ".join(f"without {name}" for name in without.without) for without in rows)]
     limits = [buzz.largest, *(without.largest for without in rows)]

@@ -122,7 +122,6 @@ def late_s(scene: Scene) -> float:
 
 
 def _rounded(value: float) -> float:
-    """Rounds to two digits, as one would set it."""
     return float(f"{value:.2g}")
 
 
@@ -220,7 +219,6 @@ class Search:
 
 
 def _best(known: dict[Choice, Limit], family: Family) -> Values:
-    """Returns the parameters that allow most; of equals the smallest."""
     tried = _tried(known, family)
     return min(tried, key=lambda values: (-tried[values].stiffness_N_m, values))
 

@@ -176,7 +176,6 @@ class Judge:
         return self._maps[key].growth(scene.wall.stiffness) < 1.0
 
     def _results(self, scenes: Sequence[Scene], energy: bool) -> list[Summary]:
-        """Runs scenes, the heaviest first, and returns their summaries, in order."""
         bundles = sorted(_bundled(scenes), key=lambda bundle: -_seconds(scenes, bundle))
         found: list[Summary] = [{}] * len(scenes)
         work = _Bundles(sources=self._sources, energy=energy)
@@ -224,7 +223,6 @@ def _bundled(scenes: Sequence[Scene]) -> list[list[int]]:
 
 
 def _seconds(scenes: Sequence[Scene], bundle: list[int]) -> float:
-    """Returns about the processor time that a bundle takes, s."""
     first = scenes[bundle[0]]
     in_array_s = _IN_IT_S * (first.friction is not None) + _ARRAY_S / len(bundle)
     return first.duration * (_ALONE_S if len(bundle) < FEWEST else in_array_s) * len(bundle)

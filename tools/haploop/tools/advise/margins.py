@@ -145,7 +145,6 @@ class MarginSearch:
         return 0.0
 
     def _failing(self, gains: Gains, stiffness: float, changes: list[Vary]) -> list[Vary]:
-        """Returns the changes under which a wall, or where that costs little a softer one, is not steady."""
         walls = [stiffness, *(max(LEAST_N_M, stiffness * share) for share in self._below)]
         failed = self._unsteady(changes, walls, gains.family.elements(gains.safe_values))
         return [changes[i] for i in failed]
@@ -158,7 +157,6 @@ class MarginSearch:
             gains.tried[values] = known[gains.family, values]
 
     def _nearest(self, gains: Gains, stiffness: float) -> Change | None:
-        """Returns the smallest change at which a stiffness, unless it is 0, is no longer steady."""
         self._search.stage("the nearest instability")
         elements = gains.family.elements(gains.safe_values)
         changes = larger_changes(self._tasks.first) if stiffness else []
@@ -169,7 +167,6 @@ class MarginSearch:
         return None
 
     def _unsteady(self, changes: Sequence[Vary], walls: Sequence[float], elements: Sequence[ElementTable]) -> list[int]:
-        """Returns the indices of the changes under which some run with some of the walls is not steady."""
         runs = [
             (i, run)
             for i, change in enumerate(changes)
@@ -201,7 +198,6 @@ def _size(change: Change) -> float:
 
 
 def _corner(alone: dict[Change, Limit]) -> dict[str, float]:
-    """Returns of every quantity the factor that allows less by itself."""
     worst: dict[str, Change] = {}
     for change, limit in alone.items():
         if limit.stiffness_N_m < alone[worst.setdefault(change.quantity, change)].stiffness_N_m:

@@ -101,7 +101,6 @@ def is_held_by(scene: Scene, time_s: float) -> bool:
 
 
 def _is_random(scene: Scene) -> bool:
-    """Tells whether another seed gives another run."""
     noisy = accelerometer_is_used(scene) and value_at(scene, "accelerometer.noise_density")
     return bool(scene.noise or scene.jitter or scene.loss or noisy)
 

@@ -197,8 +197,6 @@ def _lag(scene: Scene) -> Scene | None:
 
 
 def _of_effects(cause: str) -> Callable[[Scene], Scene | None]:
-    """Returns a function that takes every effect of a cause out of a scene."""
-
     def off(scene: Scene) -> Scene | None:
         after = scene
         for effect in all_effects():

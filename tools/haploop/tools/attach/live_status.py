@@ -107,7 +107,6 @@ class LiveStatus:
         }
 
     def _last(self, frame: str) -> dict[str, float]:
-        """Returns the last row of the newest block's columns; empty before the first."""
         columns = self._newest.get(frame, {}).get("columns", {})
         return {name: float(np.frombuffer(data, "<f8")[-1]) for name, data in columns.items() if data}
 

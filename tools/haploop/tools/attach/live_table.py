@@ -65,7 +65,6 @@ def end_sentence(run: LiveStatus) -> str:
 
 
 def _progress(run: LiveStatus) -> Text:
-    """Makes the line of state, bar, time and pace."""
     from rich.text import Text
 
     state = run.ended or ("paused" if run.paused else "running" if run.factor else "waiting")
@@ -112,7 +111,6 @@ def _where(penetration_m: float | None) -> str:
 
 
 def _books(run: LiveStatus) -> Table:
-    """Makes the table of the energy by wall and element, and of the residual."""
     numbers = ("true", "sampled")
     table = make_table("energy taken out of the device by", *numbers, numbers=numbers, least_width=9)
     books = run.books()
@@ -142,7 +140,6 @@ def attach_print(run_id: str | None) -> None:
 
 
 def _watch(live_run: LiveRun) -> LiveStatus:
-    """Shows a run to its end; returns its last state."""
     with ObservedRun(live_run, ROLE) as observed, _screen() as show:
         observer = observed.observer
         run = LiveStatus(live_run.id, observer.welcome)
@@ -159,7 +156,6 @@ def _watch(live_run: LiveRun) -> LiveStatus:
 
 @contextlib.contextmanager
 def _screen() -> Iterator[Callable[[LiveStatus], None]]:
-    """Opens the display: on a terminal a table that is redrawn in its place, in a pipe lines."""
     terminal = console()
     if not terminal.is_terminal:
         yield LinePrinter().show

@@ -60,7 +60,6 @@ def cost(
 
 
 def _measure(measurement: Measurement, with_prices: bool) -> bool:
-    """Measures, with progress on a terminal; returns whether it was interrupted."""
     try:
         # A thread that drew meanwhile would be measured too.
         with bars(by_itself=False) as stage:
@@ -74,7 +73,6 @@ def _measure(measurement: Measurement, with_prices: bool) -> bool:
 
 
 def _show(result: Cost, out: Path, as_json: bool) -> None:
-    """Prints tables and advice, or JSON, on stdout; draws the figures, and names the files on stderr."""
     from haploop.tools.cost import figure, prices_figure
     from haploop.tools.cost.data import COST_FILE
     from haploop.tools.cost.report import report
@@ -96,7 +94,6 @@ def _show(result: Cost, out: Path, as_json: bool) -> None:
 
 
 def _rates(text: str) -> list[int]:
-    """Reads rates in Hz: ``1k,2.5k,10000``."""
     rates = []
     for word in text.split(","):
         number = word.strip()
@@ -112,7 +109,6 @@ def _rates(text: str) -> list[int]:
 
 
 def _methods(text: str | None) -> list[str]:
-    """Reads names of integrators; all of them when None."""
     from haploop.launch.scene.mistakes import nearest
     from haploop.tools.cost.grid import METHODS
 

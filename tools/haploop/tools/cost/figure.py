@@ -75,7 +75,6 @@ def figure_of(cost: Cost) -> Figure:
 
 
 def _how_to_read(ax: Axes, cost: Cost, scenes: list[SceneCost]) -> None:
-    """Draws the legend of methods and signs, and names the machine."""
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
@@ -145,13 +144,11 @@ def _failed(point: Point) -> bool:
 
 
 def _failing(scene: SceneCost) -> list[str]:
-    """Returns the methods that fail at some rate, in the order of their rows."""
     failing = {point.method for point in scene.points if point.us_per_tick and _failed(point)}
     return [method for method in methods_of([scene]) if method in failing]
 
 
 def _mark_failures(ax: Axes, scene: SceneCost) -> None:
-    """Draws the line above which points are failures, without an error."""
     if not (rows := len(_failing(scene))):
         return
     low, high = np.log10(ax.get_ylim())
@@ -173,7 +170,6 @@ def _position(ax: Axes, point: Point, scene: SceneCost) -> tuple[float, float]:
 
 
 def _curve(ax: Axes, points: list[Point], scene: SceneCost) -> None:
-    """Draws a method's line, broken where it failed, the quartiles of its times, and marks of wrong verdicts."""
     points = sorted((point for point in points if point.us_per_tick), key=lambda point: point.plant_rate)
     if not points:
         return

@@ -62,7 +62,6 @@ def advice(scene: SceneCost, tolerance_m: float) -> str:
 
 
 def _own_setting(scene: SceneCost, best: Point, tolerance_m: float) -> str:
-    """Makes the clause about the scene's own setting against the cheapest one."""
     own = scene.own
     if own is best:
         return "it is the scene's own setting"
@@ -79,7 +78,6 @@ def _own_setting(scene: SceneCost, best: Point, tolerance_m: float) -> str:
 
 
 def _overlap(a: Spread, b: Spread | None) -> bool:
-    """Tells whether the middle halves of two measurements overlap."""
     return b is not None and a.q1 <= b.q3 and b.q1 <= a.q3
 
 
@@ -115,7 +113,6 @@ def _comparable(cost: Cost) -> list[SceneCost]:
 
 
 def _scene_table(cost: Cost) -> FindingTable:
-    """Makes a row a scene: its cheapest setting within the tolerance, and its own."""
     rows = []
     for scene in _comparable(cost):
         best, own = cheapest(scene, cost.tolerance_m), scene.own
@@ -174,7 +171,6 @@ def _method_table(cost: Cost) -> FindingTable:
 
 
 def _price_table(groups: dict[str, PriceGroup]) -> FindingTable:
-    """Makes a row for books, log, processes and all effects at once, the dearest first."""
     found = [(entry.ratio, *words) for (name, what), words in _PRICES.items() if (entry := _entry(groups, name, what))]
     notes: tuple[str, ...] = ()
     effects = groups.get("effects")
@@ -200,7 +196,6 @@ def _span(values: Iterable[float]) -> str:
 
 
 def _span_of_rates(points: Iterable[Point]) -> str:
-    """Formats the least and the largest plant rate; a dash for none."""
     rates = sorted(point.plant_rate for point in points)
     return " to ".join(dict.fromkeys(rate(hertz) for hertz in (*rates[:1], *rates[-1:]))) or _NONE
 

@@ -157,7 +157,6 @@ def outcome(candidate: Candidate, reference: Reference) -> Outcome:
 
 
 def _failure(ran: Trajectory, reference: Reference) -> str | None:
-    """Returns why a run cannot be compared, or None."""
     if ran.summary["ended"] in ("diverged", "failed"):
         return f"Diverged: {ran.summary['why']}."
     if not np.isfinite(ran.x_m).all():
@@ -192,7 +191,6 @@ def _errors(ran: Trajectory, scene: Scene, reference: Reference) -> Errors:
 
 
 def _apart(value: float | None, reference: float | None) -> float | None:
-    """Returns the distance of two values; None where there is nothing to compare."""
     return None if value is None or reference is None else abs(value - reference)
 
 

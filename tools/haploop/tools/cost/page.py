@@ -63,7 +63,6 @@ def page(cost: Cost) -> str:
 
 
 def _scene(scene: SceneCost) -> list[str]:
-    """Makes the section of a scene: reference, table and advice."""
     reference = scene.reference
     rates = sorted({point.plant_rate for point in scene.points})
     methods = dict.fromkeys(point.method for point in scene.points)
@@ -78,7 +77,6 @@ def _scene(scene: SceneCost) -> list[str]:
 
 
 def _cell(scene: SceneCost, method: str, hertz: int) -> str:
-    """Formats error, wrong verdict and time of a point; the scene's own setting in bold."""
     if (point := scene.point(method, hertz)) is None:
         return ""
     words = "failed" if point.error is None else _power(point.error.size_m)
@@ -93,7 +91,6 @@ def _power(metres: float) -> str:
 
 
 def _prices(groups: list[PriceGroup]) -> list[str]:
-    """Makes the section of the prices: the figure and a table a group."""
     if not groups:
         return []
     parts = ["## The other prices", f"![What books, log, effects, processes, delay and rate cost]({PRICES_FIGURE})"]
@@ -123,7 +120,6 @@ def _table(heads: list[str], rows: list[list[str]]) -> str:
 
 
 def _quiet(cost: Cost) -> str:
-    """Returns the load of the machine as sentences."""
     if cost.load is None:
         return ""
     spread = f"a fixed loop timed once a round varied by {100 * cost.load.calibration_spread:.1f} %"

@@ -103,7 +103,6 @@ def price_jobs(scenes: Path, made_with: Sequence[Any]) -> Jobs:
 
 
 def _in_process(scene: Scene, name: str = "") -> Job:
-    """Makes a job of plant, controller and books in one process; a name keeps equal jobs apart."""
     return Job(IN_PROCESS, f"books {name}", f"books {name}", scene, lambda: loop_us(scene))
 
 
@@ -195,7 +194,6 @@ class Prices:
 
 
 def _steady_up_to(limit: StiffnessLimit) -> str:
-    """Returns the stiffness that a delay or a control rate allows, in words."""
     if limit.confirmed:
         return f"a wall of up to {spring(limit.stiffness_N_m)} stays steady"
     ran = f"but runs at 0.97 and 1.03 of it were {limit.below} and {limit.above}"

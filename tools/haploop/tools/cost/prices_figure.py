@@ -64,7 +64,6 @@ def figure_of(groups: list[PriceGroup]) -> Figure:
 
 
 def _bars(ax: Axes, group: PriceGroup) -> None:
-    """Draws the time of each price, from the baseline down, with quartiles."""
     prices = group.prices
     colours = [GREY, *[WALL] * (len(prices) - 1)]
     _rows(ax, [price.what for price in prices], [price.time.median for price in prices], colours, group.title)
@@ -89,7 +88,6 @@ def _effects(ax: Axes, group: PriceGroup) -> None:
 
 
 def _counted(price: Price, group: PriceGroup) -> str:
-    """Formats the time of an effect, and its instructions where they were counted."""
     words = fixed(price.costs, 2)
     whole, without = group.baseline.instructions_per_tick, price.instructions_per_tick
     return words if whole is None or without is None else f"{words}; {fixed(whole - without)} instructions"
@@ -106,7 +104,6 @@ def _rows(ax: Axes, names: list[str], values: list[float], colours: list[str], t
 
 
 def _write(ax: Axes, ends: list[tuple[float, str]]) -> None:
-    """Writes words at the ends of the bars, and makes room for them."""
     low, high = ax.get_xlim()
     ax.set_xlim(min(low, 0.0), high + 0.42 * (high - low))
     gap = 0.015 * (high - low)
@@ -138,7 +135,6 @@ def _curve(ax: Axes, group: PriceGroup) -> None:
 
 
 def _with_limit(group: PriceGroup) -> list[Price]:
-    """Returns the prices that have a stiffness, in its order."""
     prices = [price for price in group.prices if price.stiffness]
     return sorted(prices, key=lambda price: price.stiffness.stiffness_N_m if price.stiffness else 0.0)
 

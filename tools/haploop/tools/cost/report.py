@@ -70,7 +70,6 @@ def _row(point: Point) -> list[str | Text]:
 
 
 def _figures(error: Errors) -> list[str]:
-    """Returns the errors in metres, or relative ones where swings are compared."""
     pointwise = error.final_m, error.rms_m, error.max_m
     swings = error.amplitude, error.frequency, error.energy_per_cycle
     return [_power(value) for value in (pointwise if error.rms_m is not None else swings)]
@@ -116,7 +115,6 @@ def made_with(cost: Cost) -> str:
 
 
 def _warnings(cost: Cost) -> list[Text]:
-    """Returns a warning where the machine was busy."""
     if cost.load is None or not cost.load.busy:
         return []
     seen = [f"a fixed loop varied by {100 * cost.load.calibration_spread:.0f} % (quiet: {100 * QUIET_SPREAD:.0f} %)"]

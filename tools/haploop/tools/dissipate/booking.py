@@ -123,7 +123,6 @@ class Booking:
         self._last_between: Floats | None = None
 
     def _answer(self, piece: Samples) -> Floats:
-        """Returns the force of every element at every sample, N, shape (elements, samples)."""
         nothing = [0.0] * len(piece.x_m)
         v, a = (nothing if column is None else column.tolist() for column in (piece.v_m_s, piece.a_m_s2))
         controller = self._controller

@@ -85,7 +85,6 @@ def compute_outcome(request: Request, kinds: dict[str, type[Element]]) -> Outcom
 
 
 def _open(request: Request, kinds: dict[str, type[Element]]) -> tuple[Recording, Scene]:
-    """Returns the recording and the scene of the controller."""
     if request.delay_s is not None and not 0.0 <= request.delay_s <= _LONGEST_DELAY_S:
         raise RecordingError(f"The delay must be from 0 to {_LONGEST_DELAY_S:g} s, but is {request.delay_s:g} s.")
     path, selection = request.path, request.selection
@@ -110,7 +109,6 @@ def _shown(name: str) -> Iterator[Callable[[float], None]]:
 
 
 def _draw(outcome: Outcome, request: Request) -> Path | None:
-    """Draws the figure and returns its file; None, and a note on stderr, where there is no matplotlib."""
     path = request.path
     beside = path / "dissipate.png" if path.is_dir() else path.with_name(f"{path.stem}-dissipate.png")
     try:

@@ -137,7 +137,6 @@ class DelimitedFile:
 
 @contextlib.contextmanager
 def _open_lines(path: Path) -> Iterator[Iterator[str]]:
-    """Opens the lines of a text file; whatever cannot be read as one raises a ``RecordingError``."""
     try:
         file = path.open(encoding="utf-8-sig", newline=None)
     except OSError as error:

@@ -100,7 +100,6 @@ def _energies(ax: Axes, outcome: Outcome, lines: Floats, title: str) -> None:
 
 
 def _common(ax: Axes, outcome: Outcome, t: Floats) -> None:
-    """Sets the limits of time and marks the gaps."""
     for from_s, to_s in outcome.recording.notes.gaps_s:
         if from_s < t[-1] and to_s > t[0]:
             ax.axvspan(from_s, to_s, color=style.FAINT, alpha=0.45, zorder=0.4, linewidth=0, gid="gap")
@@ -108,7 +107,6 @@ def _common(ax: Axes, outcome: Outcome, t: Floats) -> None:
 
 
 def _table(ax: Axes, outcome: Outcome, rows: int) -> None:
-    """Draws the numbers of every element, in the colours of the lines."""
     ax.set_axis_off()
     ax.set_xlim(0.0, 1.0)
     ax.set_ylim(max(rows, 4) + 0.2, -0.2)
@@ -123,7 +121,6 @@ def _table(ax: Axes, outcome: Outcome, rows: int) -> None:
 
 
 def _words(ax: Axes, outcome: Outcome) -> None:
-    """Draws the notes on the recording, beside the table."""
     ax.set_axis_off()
     more = len(outcome.elements) - _MOST
     notes = ([f"Left out here: {more} more element{'s' * (more > 1)}."] if more > 0 else []) + note_sentences(outcome)

@@ -89,7 +89,6 @@ def _estimates(scene: Scene, names: list[str]) -> str:
 
 
 def _truth(outcome: Outcome) -> str:
-    """Returns a sentence on how the true books were made."""
     delay_s = outcome.recording.delay_s
     delay = f"{amount(delay_s, 's')} after their sample" if delay_s else "at once"
     if outcome.recording.between == "plant steps":

@@ -66,7 +66,6 @@ class TextRecording:
         self.period_s = 1.0 / layout.rate_Hz if layout.rate_Hz else self._median_period()
 
     def _choose(self, file: DelimitedFile, layout: Layout) -> tuple[dict[str, Column], dict[str, float]]:
-        """Returns column and scale to SI of every quantity that is read."""
         asked = {
             "time": (layout.time, layout.time_unit, "s"),
             "position": (layout.position, layout.length, "m"),
@@ -169,7 +168,6 @@ class TextRecording:
 
 
 def _scale(unit: str, si: str) -> float:
-    """Returns the factor from a unit to SI."""
     if not unit:
         return 1.0
     try:

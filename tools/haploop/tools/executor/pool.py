@@ -101,7 +101,6 @@ class Pool:
                 future.cancel()
 
     def _by_itself(self, work: Work, items: Sequence[Any], stop: Callable[[], bool]) -> Iterator[list[tuple[Any, Any]]]:
-        """Runs items that were under way when a worker died, with nothing beside them."""
         self._executor.renew()
         if stop():
             return

@@ -64,7 +64,6 @@ class Work:
         return self.keep(item, scenes[0], _failed(scenes[0], why)) if scenes else kept[0]
 
     def _made(self, items: Sequence[Any]) -> tuple[dict[int, Scene], dict[int, Any]]:
-        """Returns scenes by index, and what is kept of the items that have none."""
         scenes, kept = {}, {}
         for index, item in enumerate(items):
             try:
@@ -74,7 +73,6 @@ class Work:
         return scenes, kept
 
     def _results(self) -> Results:
-        """Returns the function that runs scenes, in arrays or compiled."""
         kinds = load_kinds(self.sources)
         if self.compiled:
             import jax  # noqa: F401 (an error raised here is no fault of a scene)

@@ -140,7 +140,6 @@ def _row_times_ns(batch: Batch, rows: Table) -> list[int]:
 
 
 def _rows(rows: Table) -> list[str]:
-    """Returns each row as a JSON object."""
     cells = []
     for name, column in rows.items():
         key = f"{json.dumps(name)}:"

@@ -60,7 +60,6 @@ def export_run(path: Path, to: str, out: Path | None, topics: str | None, force:
 
 
 def _chosen(contents: LogStream, topics: str | None) -> dict[str, dict[str, str]]:
-    """Returns the unit by column of the topics asked for, by topic."""
     if not contents.units:
         leave(f"The log {contents.path} holds no channel yet, so there is nothing to export.", FAILED)
     if topics is None:
@@ -74,7 +73,6 @@ def _chosen(contents: LogStream, topics: str | None) -> dict[str, dict[str, str]
 
 
 def _targets(log: Path, out: Path | None, writer: type[ExportWriter], topics: list[str]) -> list[Path]:
-    """Returns the files to write: beside the log, or where ``out`` says."""
     if writer.file_per_topic:
         names = [quote(topic.strip("/"), safe="") for topic in topics]
         return [(out or log.parent) / f"{name}{writer.suffix}" for name in names]
@@ -85,7 +83,6 @@ def _targets(log: Path, out: Path | None, writer: type[ExportWriter], topics: li
 
 @contextlib.contextmanager
 def _progress(total_bytes: int) -> Iterator[Callable[[int], None]]:
-    """Shows a bar on a terminal, fed with the bytes of the log that are done; nothing elsewhere."""
     from rich.progress import Progress
 
     shown = console(stderr=True)

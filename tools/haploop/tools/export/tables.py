@@ -151,7 +151,6 @@ class ParquetWriter(ExportWriter):
             self._write(batch.topic)
 
     def _write(self, topic: str) -> None:
-        """Writes the rows held back as a group."""
         held, self._held[topic] = self._held[topic], []
         if not held:
             return

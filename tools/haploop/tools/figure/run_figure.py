@@ -92,7 +92,6 @@ def make_figure(run: RunData) -> Figure:
 
 
 def _draw_header(figure: Figure | SubFigure, run: RunData) -> None:
-    """Writes the verdict as a coloured sign, the title, and the key numbers."""
     word = run.summary.get("verdict", "no verdict")
     sign = figure.text(
         0.012, 0.66, word, fontsize=LARGE, fontweight="bold", color="white", va="center", gid="verdict",
@@ -120,7 +119,6 @@ def key_numbers(run: RunData) -> list[str]:
 
 
 def _draw_books(ax: Axes, run: RunData, books: list[Book], colours: dict[str, str]) -> None:
-    """Draws the table of the books at the end, in the colours of their lines."""
     rows = [Row("Books at the end", "true", "sampled", "at work (s)"), *book_rows(run, books)]
     height, size = 1.0 / max(len(rows), 12), TEXT * min(1.0, 13.0 / len(rows))
     ax.set_axis_off()

@@ -149,7 +149,6 @@ def close_loop(scene: Scene, plant: Continuous, exact: Callable[[Fraction], Any]
 
 
 def _verdict(scene: Scene, time: Timebase, controller: Controller, x: list[float], forces: list[float]) -> str:
-    """Returns the verdict by the program's own rule."""
     [block] = controller.recorder.take()
     rows = {name: np.frombuffer(column) for name, column in block["columns"].items()}
     rows["wall_position"] = np.full(time.ticks, block["wall"]["position"])

@@ -155,7 +155,7 @@ def statistics(scene: Scene, x_m: np.ndarray, v_m_s: np.ndarray) -> dict[str, fl
 
 
 def _damping(scene: Scene) -> float:
-    """Returns the damping between body 0 and ground, N s/m."""
+    """Between body 0 and ground, N s/m."""
     if scene.transmission:
         return scene.transmission.motor_damping
     hand = scene.hand or Hand()

@@ -143,7 +143,6 @@ class ContinuousPlant(StickSlipPlant[Row]):
         return product(self._bodies.force, self.w)
 
     def _through(self, length: Any) -> None:
-        """Advances one piece, from switch to switch."""
         left = length
         while (at := self._mode_ends(left)) is not None:
             self.w = self._flows[self.is_stuck].part(self.w, at)
@@ -201,7 +200,7 @@ class IntegratedPlant(StickSlipPlant[np.ndarray]):
         return float(self._row @ self.w)
 
     def _to_switch(self, length: float) -> float:
-        """Advances until friction switches, at most so long; returns how long it was."""
+        """Advances at most so long; returns how long it was."""
         if self.is_stuck:
             switch = _Switch(lambda w: self._breakaway - abs(float(self._row @ w)))
         else:

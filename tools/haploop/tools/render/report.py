@@ -92,7 +92,6 @@ def _growth(window: Summary) -> str:
 
 
 def _books(energy: Summary, control_rate: float) -> Table:
-    """Makes the table of energy books: wall with its leak, elements, then the plant's."""
     numbers = ("at work", "true", "sampled")
     table = make_table("energy taken out of the device by", *numbers, numbers=numbers)
     for row in _virtual_rows(energy, control_rate):

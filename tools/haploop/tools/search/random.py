@@ -192,7 +192,7 @@ def evaluated(
 
 
 def _best(trials: Sequence[Trial], count: int, key: Callable[[Row], Any]) -> list[Trial]:
-    """Returns the best trials, of one structure no more than a third of them, but one at least."""
+    """Returns the best, of one structure no more than a third of them, but one at least."""
     picked: list[Trial] = []
     for trial in sorted(trials, key=lambda one: key(one.row)):
         if sum(other.point.choices == trial.point.choices for other in picked) < max(1, count // 3):

@@ -225,6 +225,5 @@ class Refused(SceneError):
 
 
 def _entry(result: Summary, column: Column) -> Any:
-    """Returns the value of a result at a dotted key; None where there is none."""
     value = value_at(result, column.name)
     return value if value is None or column.kind != NUMBER else float(value)

@@ -84,7 +84,6 @@ def sweep(request: Request, as_json: bool) -> None:
 
 
 def _run(request: Request, made: Sweep, directory: Path) -> Summary:
-    """Runs with progress; returns the summary, which is written too."""
     began, path = time.monotonic(), directory / SUMMARY
     try:
         before_s = float(json.loads(path.read_text(encoding="utf-8"))["wall_s"])
@@ -167,7 +166,6 @@ def _first_difference(there: str, here: str) -> str:
 
 
 def _summary_sentences(summary: Summary) -> str:
-    """Returns the outcome in a line or two."""
     rate = summary["rate_1_s"]
     lines = [f"{summary['title']}: {summary['cells']} cells, {describe_counts(summary['counts'])}, {rate:.3g} cells/s"]
     if bounds := summary.get("boundaries"):

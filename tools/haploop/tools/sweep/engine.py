@@ -72,7 +72,6 @@ class Engine:
         return found
 
     def _rows(self, groups: Iterable[Group], count: int) -> Iterator[tuple[Item, Row]]:
-        """Runs and stores cells; yields them."""
         done = 0
         for part in self._pool.parts(self._work, groups, count, self._stop):
             rows = [row for _, row in part]
@@ -145,7 +144,6 @@ def _cell(item: Item) -> int:
 
 
 def _boundary_table(sweep: Sweep, bisect: Bisect, found: Sequence[Boundary]) -> Any:
-    """Makes one row a combination: the other axes, the seed, and what is known of the boundary."""
     axis, others = sweep.bisected(bisect)
     numbers = [Column(name, NUMBER, axis.unit or "") for name in ("low", "high", "boundary")]
     columns = [*sweep.key_columns(others), *numbers, Column("changes", WHOLE), Column(WHY, TEXT)]

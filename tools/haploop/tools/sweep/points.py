@@ -71,7 +71,6 @@ def number_at(path: Sequence[str], scene: Layers, kinds: Mapping[str, type[Eleme
 
 
 def _at_key(table: type[Model], name: str, place: str) -> list[Any]:
-    """Returns the alternatives at a key of a table."""
     if name not in table.model_fields:
         names = list(table.model_fields)
         where = f"[{place}]" if place else "a scene"
@@ -81,7 +80,6 @@ def _at_key(table: type[Model], name: str, place: str) -> list[Any]:
 
 
 def _chosen(tables: Sequence[type[Model]], value: Any, place: str) -> type[Model]:
-    """Returns of tables of several kinds the one that the scene names."""
     if len(tables) == 1:
         return tables[0]
     kinds = {get_args(table.model_fields["kind"].annotation)[0]: table for table in tables}
@@ -191,7 +189,6 @@ def _decimal(value: float) -> Decimal:
 
 
 def _steps(number: Number, first: float, last: float, given: Any) -> int:
-    """Counts the steps between the ends."""
     step = _decimal(_read(Number(Quantity(number.quantity.unit, above=0.0)), "step", given))
     ratio = abs(_decimal(last) - _decimal(first)) / step
     count = round(ratio)

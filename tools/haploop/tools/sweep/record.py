@@ -81,7 +81,6 @@ def _short_run(scene: Scene, kinds: Mapping[str, type[Element]]) -> Summary:
 
 
 def _leaves(value: Any, key: str = "") -> Summary:
-    """Returns the values that are no tables, by dotted key."""
     inner = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else None
     if inner is None:
         return {key: value}

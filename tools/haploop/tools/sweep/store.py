@@ -100,7 +100,6 @@ class Store:
             yield arrow.concat_tables(held).sort_by(CELL)
 
     def _files(self) -> list[Path]:
-        """Returns the parts, in the order of their first cells."""
         return sorted(self._parts.glob("*.parquet"))
 
     def _write(self, path: Path, write: Callable[[io.BytesIO], object]) -> None:

@@ -96,7 +96,6 @@ class _Reader:
         return Sweep(title, base, tuple(axes), table.repeat, tuple(record), bisect, self._sources)
 
     def _table(self) -> SweepFile | None:
-        """Validates the shape of the file; its mistakes are added."""
         table = None
         try:
             table = SweepFile.model_validate(self._data)
@@ -109,7 +108,6 @@ class _Reader:
         return table
 
     def _base(self, overrides: Sequence[str]) -> Scene | None:
-        """Returns the scene that is varied; its mistakes are added."""
         try:
             laid = [*texts(self._changes), *overrides]
             if isinstance(name := self._data.get("scene"), str):
@@ -133,7 +131,6 @@ class _Reader:
             return None
 
     def _axes(self, base: Scene | None) -> list[Axis]:
-        """Returns the axes that can be used; of the others the mistakes are added."""
         given = self._data.get("axes")
         if not isinstance(given, dict):
             return []

@@ -138,7 +138,6 @@ class CompiledBatch(Batch):
         return carry, rings
 
     def _call(self, params: BatchParams, state: BatchState, args: tuple[Carry, Rings, BlockInputs]) -> Call:
-        """The program for batches of this structure, compiled where it is not known yet."""
         carry, _, inputs = args
         elements = tuple(type(active.element) for active in params.controller.elements)
         shapes = tuple((np.shape(a), np.result_type(a)) for a in jax.tree.leaves((carry, inputs)))
@@ -204,7 +203,6 @@ class CompiledBatch(Batch):
         self._in_flight.extend(commands)
 
     def _inputs(self, params: BatchParams, first: int, end: int) -> BlockInputs:
-        """Returns the inputs of the program for the ticks first ... end - 1."""
         n, response = self._time.steps_per_tick, self._motion.response
         tau = response.tau.at_steps(first * n, (first + BLOCK_TICKS) * n + 1)
         shared = None
@@ -224,7 +222,6 @@ class CompiledBatch(Batch):
         return rows
 
     def _carry(self, tick: int, state: BatchState) -> Carry:
-        """Returns the state in which a program begins."""
         members, books, window = len(self._ended), self._logger.books, self._window
         sums = {}
         if books:
@@ -235,7 +232,6 @@ class CompiledBatch(Batch):
         return Carry(tree_leaves(state), ~self._ended, none, extremes, sums, x_m, self._past(tick))
 
     def _past(self, tick: int) -> Forces:
-        """Commands on their way, and the forces that go with them."""
         members = len(self._ended)
         columns: dict[str, list[Any]] = {"command": self._delay.in_flight(tick)}
         if self._logger.books:
@@ -265,7 +261,6 @@ class CompiledBatch(Batch):
             books.state = books.state._replace(sums=sums)
 
     def _report_ends(self, new: np.ndarray, ticks: np.ndarray) -> None:
-        """Take the results of the members that diverged after these numbers of ticks."""
         x, limit_m = self._motion.x, np.broadcast_to(self._limit_m, new.shape)
         for end in np.unique(ticks[new]).tolist():
             places = np.flatnonzero(new & (ticks == end))
@@ -280,7 +275,6 @@ class CompiledBatch(Batch):
         self._logger.note_accounts(self._rows.elements)
 
     def _resume(self, carry: Carry, tick: int) -> None:
-        """Have the logger go on from here by itself."""
         self._log_stands_at(tick)
         if self._logger.books:
             elements, self._logger.rows = self._rows.elements, []

@@ -108,7 +108,6 @@ def most() -> int:
 
 @contextmanager
 def _environment(variables: dict[str, str]) -> Iterator[None]:
-    """These variables for a while, then those of before."""
     before = {name: os.environ.pop(name, None) for name in variables}
     os.environ.update(variables)
     try:

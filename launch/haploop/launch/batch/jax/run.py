@@ -100,7 +100,6 @@ def _together(scenes: list[Scene], kinds: Kinds, energy: bool, most: int) -> lis
 
 
 def _programs() -> Any:
-    """The module that has to do with jax, which is imported only when it is used."""
     try:
         return import_module("haploop.launch.batch.jax.programs")
     except ImportError as error:

@@ -232,5 +232,4 @@ def _sum_steps(apart: Apart, flow: Rows, first: int = 0, end: int | None = None)
 
 
 def _of_steps(counts: Sequence[int], forces: Sequence[Any]) -> list[Any]:
-    """Returns the value held in each hold, at each of its steps."""
     return [force for count, force in zip(counts, forces, strict=True) for _ in range(count)]

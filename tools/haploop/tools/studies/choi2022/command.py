@@ -109,7 +109,6 @@ def _tables(rows: list[tuple[int, Finding]]) -> list[str]:
 
 
 def _missing(kept: Mapping[int, Kept]) -> list[str]:
-    """Names the figures that were not made, and how many claims they would test."""
     missing = [f"{number} ({len(figure(number).CLAIMS)} claims)" for number in numbers() if number not in kept]
     return [f"Not made here: figure {', '.join(missing)}."] if missing else []
 

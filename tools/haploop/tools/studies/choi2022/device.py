@@ -174,7 +174,6 @@ def file_text(setup: Setup) -> str:
 
 
 def _six_digits(value: Any) -> Any:
-    """Returns a table with all its numbers to six digits."""
     if isinstance(value, dict):
         return {key: _six_digits(one) for key, one in value.items()}
     return _rounded(value, 6) if isinstance(value, float) else value
@@ -186,12 +185,10 @@ def _rounded(value: float, digits: int = 3) -> float:
 
 @cache
 def _published_hand() -> Hand:
-    """Returns the hand of the file with the published mass, damping and stiffness."""
     share = nearest().hand
     return _with_impedance(hand_of(shipped(SCENE_FILE)), lambda value: _rounded(value / share, 6))
 
 
 def _with_impedance(hand: Hand, of: Callable[[float], float]) -> Hand:
-    """Returns a hand with other masses, dampings and stiffnesses, as a function of those it has."""
     grip = hand.grip and replace(hand.grip, stiffness=of(hand.grip.stiffness), damping=of(hand.grip.damping))
     return replace(hand, mass=of(hand.mass), damping=of(hand.damping), stiffness=of(hand.stiffness), grip=grip)

@@ -104,7 +104,6 @@ def keep_shares(work: Work, claims: Sequence[str], rows: Sequence[Row], options:
 
 
 def _shares(work: Work) -> _Shares | None:
-    """Returns what ``keep_shares`` left, where it was made as this figure is."""
     file = work.out / SHARES
     kept = json.loads(file.read_text(encoding="utf-8")) if file.exists() else None
     return kept if kept and kept["small"] == work.small else None

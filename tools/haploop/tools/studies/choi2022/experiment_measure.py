@@ -121,7 +121,6 @@ def _stiffest(setup: Setup, steady: np.ndarray) -> Scene:
 
 
 def _taken_J(result: Summary) -> np.ndarray:
-    """Returns the sampled books of the elements at the end; NaN for a run that failed."""
     if "energy" not in result:
         return np.full(3, np.nan)
     return np.array([element["sampled_J"] for element in result["energy"]["elements"]])

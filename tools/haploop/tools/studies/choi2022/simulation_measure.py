@@ -69,7 +69,6 @@ def measure(interpretations: Sequence[Point]) -> list[Row]:
 
 
 def _variants(interpretation: Point) -> dict[str, Scene]:
-    """Returns the scenes that are run, by name."""
     a, b, c = (scene_of(interpretation, panel) for panel in "abc")
     [damping], [inertia] = b.dissipation, c.dissipation
     return {
@@ -112,7 +111,6 @@ class Extent(NamedTuple):
 
 
 def _books(scene: Scene) -> dict[str, Extent]:
-    """Returns the extent of each book of the element; NaN where the run failed."""
     try:
         energy = run(replace(scene, run=replace(scene.run, log="ticks"))).log["/energy"]
     except RunFailed:

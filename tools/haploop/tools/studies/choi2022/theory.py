@@ -175,7 +175,6 @@ def gated_ends(gated: GatedMap, masses: np.ndarray) -> np.ndarray:
 
 
 def _best(ends: Callable[[np.ndarray], np.ndarray], sizes: np.ndarray) -> Best:
-    """Returns the best of some sizes, and of others between its neighbours."""
     found = ends(sizes)
     i = int(found.argmax())
     finer = np.geomspace(sizes[max(i - 1, 0)], sizes[min(i + 1, len(sizes) - 1)], _REFINED + 2)[1:-1]

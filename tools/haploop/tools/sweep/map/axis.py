@@ -95,7 +95,6 @@ class Ruler:
             spine.set_color(FAINT)
 
     def _names(self) -> tuple[list[float], list[str]]:
-        """Returns places and names along an even axis; only some where there are many."""
         words = [self.axis.word(i) for i in range(len(self.axis.names))] or [
             short(value / self.factor) for value in self.axis.values
         ]

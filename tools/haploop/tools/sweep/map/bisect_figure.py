@@ -66,7 +66,6 @@ def bisect_figure(data: MapData) -> Figure:
 
 
 def _over(data: MapData, rulers: Sequence[Ruler], second: Axis | None, number: int) -> PanelLines:
-    """Returns the limit and the bounds for one line."""
     rows: Any = range(len(data.columns["verdict"]))
     if second:
         rows = np.flatnonzero(second.indices(data.columns[second.key]) == number).tolist()
@@ -129,7 +128,6 @@ def _make_room(ax: Axes, y: Ruler, edges: Edges, lines: int) -> None:
 
 
 def _fill(ax: Axes, x: Ruler, y: Ruler, edges: Edges) -> None:
-    """Fills the side on which it holds, column by column."""
     bottom, top = y.edges[0], y.edges[-1]
     near, far = (bottom, top) if edges.rising else (top, bottom)
     borders = x.edges

@@ -57,7 +57,6 @@ def _hatch(ax: Axes, edges: tuple[np.ndarray, np.ndarray], where: np.ndarray, lo
 
 
 def _outline(ax: Axes, edges: tuple[np.ndarray, np.ndarray], verdict: np.ndarray) -> None:
-    """Draws the border between steady cells and others that ran."""
     from matplotlib.collections import LineCollection
 
     steady, ran = verdict == STEADY, verdict != NOT_RUN

@@ -96,7 +96,6 @@ def star_words(found: StiffestSteady) -> tuple[str, ...]:
 
 
 def _answer(axes: Sequence[Axis], found: StiffestSteady | None) -> str:
-    """Returns a sentence or two about the stiffest steady wall; empty where the wall was not swept."""
     if not any(axis.key == STIFFNESS for axis in axes):
         return ""
     if found is None:
@@ -108,7 +107,6 @@ def _answer(axes: Sequence[Axis], found: StiffestSteady | None) -> str:
 
 
 def _failures(data: MapData) -> str:
-    """Returns how many runs failed, and the commonest reason; empty if none did."""
     failed = np.flatnonzero(data.verdicts == FAILED)
     if not len(failed):
         return ""
@@ -168,7 +166,6 @@ def edge_notes(data: MapData, edges: Edges, lines: Sequence[PanelLines]) -> list
 
 
 def _those(*notes: tuple[object, str]) -> list[str]:
-    """Returns the sentences that apply."""
     return [sentence for applies, sentence in notes if applies and sentence]
 
 

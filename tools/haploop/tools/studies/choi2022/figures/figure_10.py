@@ -75,7 +75,6 @@ class Range(NamedTuple):
 
 
 def _ranges(work: Work, setup: Setup, stiffnesses: np.ndarray) -> dict[str, Range]:
-    """Returns the ranges of nothing and of the three elements, one at a time."""
     step = 6 if work.small else 1
     of_kinds = dict(zip(KINDS, (np.zeros(1), DAMPINGS[::step], MASSES[::step], MASSES[::step]), strict=True))
     cells = [(kind, k, float(size)) for kind in KINDS for k in stiffnesses for size in of_kinds[kind]]
@@ -120,7 +119,6 @@ def _draw(found: dict[str, Range], stiffnesses: np.ndarray) -> Figure:
 
 
 def _felt(work: Work, found: dict[str, Range]) -> str:
-    """Returns a note on how much still moves in what is called steady."""
     left = np.concatenate([one.swings_m[one.steady] for one in found.values()])
     if not len(left):
         return ""
@@ -129,7 +127,6 @@ def _felt(work: Work, found: dict[str, Range]) -> str:
 
 
 def _why(work: Work, setup: Setup) -> str:
-    """Returns a note on why the ranges of the two inertias can exclude each other."""
     soft_Hz, stiff_Hz = (swings_at_Hz(setup, stiffness) for stiffness in (2500.0, 7000.0))
     two, one = (float(of.damping) for of in felt_with(setup, np.array(np.mean([soft_Hz, stiff_Hz]))))
     row = int(np.argmin(abs(DELAYS_S - setup.delay_s)))

@@ -109,7 +109,6 @@ def _draw(ax: Axes, name: str, curve: Curve, wall: Summary) -> None:
 
 
 def _edges_m(depth: np.ndarray, force: np.ndarray) -> tuple[float, float]:
-    """Returns the penetration where the force begins, and where it ends."""
     acting = np.flatnonzero(force)
     return float(depth[acting[0]]), float(depth[acting[-1] + 1])
 

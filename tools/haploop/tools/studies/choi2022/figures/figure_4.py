@@ -87,7 +87,6 @@ def _on_energy(pulse: np.ndarray, v: np.ndarray, pushed: Run, contact: Run, freq
 
 
 def _on_filters(masses_g: dict[str, float]) -> list[Finding]:
-    """Tests the claims about filters and sensors of the acceleration, given the largest masses by cutoff."""
     passive = {named(cutoff): passive_up_to_Hz(cutoff) for cutoff in CUTOFFS_HZ}
     stiffest = {named(cutoff): 1e-3 * largest_stiffness_N_m(cutoff, MASS_KG) for cutoff in CUTOFFS_HZ}
     errors, fine = errors_m_s2(), errors_m_s2(_FINE_M)
@@ -169,5 +168,4 @@ def errors_m_s2(count_m: float = COUNT_M) -> dict[str, float]:
 
 
 def _listed(values: dict[str, float], unit: str) -> str:
-    """Returns names and numbers in a row."""
     return ", ".join(f"{name} {fixed(value)} {unit}" for name, value in values.items())

@@ -49,7 +49,6 @@ def make(work: Work) -> list[Finding]:
 
 
 def _over_samples(ax: Axes) -> dict[str, np.ndarray]:
-    """Draws the energy of both inertias under jitter over samples; returns what was drawn."""
     drawn: dict[str, np.ndarray] = {}
     for kind in (BI, UNI):
         for drift, style, where in ((0.0, "-", "about rest"), (_DRIFT_M_S, (0, (4, 2)), "on 50 mm/s")):
@@ -134,7 +133,6 @@ def _closed(rng: np.random.Generator, shortest: int) -> np.ndarray:
 
 
 def _cycle_J(v: np.ndarray) -> float:
-    """Returns the energy taken once around a closed cycle of velocity."""
     period = len(v) - 3
     around = np.concatenate([v[:period], v[:period]])
     return float(steps_J(around, MASS_KG)[period:].sum())

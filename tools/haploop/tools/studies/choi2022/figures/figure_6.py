@@ -92,7 +92,6 @@ def make(work: Work) -> list[Finding]:
 
 
 def _columns(runs: dict[str, Run]) -> dict[str, np.ndarray]:
-    """Returns what is drawn, by panel."""
     kept: dict[str, np.ndarray] = {}
     for panel, (_, _, log) in runs.items():
         plant, ticks, energy = log["/plant"], log["/controller"], log["/energy"]
@@ -127,7 +126,6 @@ def _verdict(name: str, found: Found[Point]) -> Finding:
 
 
 def _together(found: Found[Point]) -> Finding:
-    """Finds whether all that the search counts hold together under one interpretation."""
     rows, held = found.of("random"), [row for row in found.rows if holds(row, "all")]
     most = _fullest(found)
     lacks = ", ".join(name for name in COUNTED if not holds(most, name))
@@ -146,7 +144,6 @@ def _together(found: Found[Point]) -> Finding:
 
 
 def _notes(work: Work, found: Found[Point], there: Sequence[Option]) -> str:
-    """Returns what is told below the figure."""
     rows, refined, around = (found.of(stage) for stage in ("random", "refined", "neighbour"))
     [base], [nearest], most = found.of("base"), found.of("nearest"), _fullest(found)
     lacks = ", ".join(f"*{name}*" for name in COUNTED if not holds(most, name))
@@ -184,7 +181,7 @@ def _notes(work: Work, found: Found[Point], there: Sequence[Option]) -> str:
 
 
 def _fullest(found: Found[Point]) -> Row:
-    """Returns the interpretation with the most claims, of several the nearest to the paper."""
+    """Returns the one with the most claims, of several the nearest to the paper."""
     return max(found.rows, key=lambda row: (row["holding"], -row["distance"]))
 
 

@@ -85,7 +85,6 @@ def _varied(setup: Setup, small: bool) -> dict[str, Pair]:
 
 
 def _largest(work: Work, setups: list[Setup]) -> list[Largest]:
-    """Returns the largest stiffnesses of each setup; those of one structure run together."""
     alike: dict[tuple[float | str, ...], list[int]] = {}
     for i, setup in enumerate(setups):
         structure = (*(getattr(setup, key) for key in SPACE.choices), setup.acceleration)
@@ -119,7 +118,6 @@ def _draw(base: Largest, influences: Influences, varied: Mapping[str, Pair]) -> 
 
 
 def _notes(work: Work, found: Found[Setup], there: Sequence[Option]) -> str:
-    """Returns what is told below the figure."""
     rows, [row], [with_friction] = found.of("random"), found.of("nearest"), found.of("friction")
     described = describe(found.nearest)
     measured = {"nearest interpretation": row, "with friction of 48 mN": with_friction}

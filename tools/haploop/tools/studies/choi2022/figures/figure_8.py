@@ -130,7 +130,6 @@ def first_ahead_Hz(inertia_J: np.ndarray) -> float:
 
 
 def _tried(rough: list[Contact], work: Work) -> str:
-    """Returns what else might make the claim hold, and the books with friction."""
     ends = [contact.booked.sampled_J[:, -1] for contact in rough]
     needed_kg = max(BOOKED_KG * end[0] / end[1:].min() for end in ends)
     return work.tell("tried", labels=", ".join(LABELS), ends=_by_wall(rough, ends), needed_g=1e3 * needed_kg)
