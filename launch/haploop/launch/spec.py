@@ -35,7 +35,6 @@ class RunSpec:
     """A scene ready to run: checked, with its directory made; ``dataclasses.replace`` gives one with other options.
 
     Attributes:
-        scene: the resolved scene.
         kinds: element kinds by name; a plugin reloaded in mid-run adds its kinds.
         out: the run's directory, made.
         attachments: text files for the log, by name.

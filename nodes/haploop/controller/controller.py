@@ -90,7 +90,6 @@ class Controller:
 
     Attributes:
         params, state: what ``tick`` is given, both replaced between ticks; the state is None before the first sample.
-        tick: the next tick to be answered.
         recorder: what happened at every tick, in blocks.
     """
 

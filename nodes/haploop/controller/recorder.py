@@ -23,9 +23,6 @@ class Recorder:
     description per dissipation column) and ``wall`` (position, stiffness, into_wall) as they stood in its ticks.
 
     Attributes:
-        add: takes the row of one tick.
-        elements: descriptions of the elements at work.
-        refused: changes that could not be carried out.
         history: the newest blocks taken, covering every command that may still be in flight.
         trouble: the element that first gave a force which is no finite number, as a sentence, or None.
     """
@@ -102,7 +99,6 @@ class Row(NamedTuple):
     Attributes:
         columns: x, v, a, wall, total, in_contact, wall_position, wall_stiffness; floats, or arrays of shape (members,).
         forces: force of every book at work.
-        elements: their descriptions; parameters may be arrays.
     """
 
     columns: dict[str, float | np.ndarray]

@@ -80,11 +80,7 @@ StateTuple = tuple[Any, Any, Any, tuple[Any, ...]]
 
 
 class NoForce(Exception):
-    """An element that gave no force; raised from what it raised.
-
-    Attributes:
-        index: its place among the active elements.
-    """
+    """An element, by its index among the active ones, that gave no force; raised from what it raised."""
 
     def __init__(self, index: int) -> None:
         super().__init__(f"Element {index} gave no force.")

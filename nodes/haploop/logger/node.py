@@ -36,10 +36,6 @@ class LoggerNode:
 
     Args:
         leave: asked at every turn: None to stay, why it is no use to stay, or "" to go in order.
-
-    Attributes:
-        out: directory of log and summary.
-        session: the logger and its files.
     """
 
     def __init__(

@@ -85,9 +85,7 @@ def outcome(scene: Scene, ran: Summary, measures: RunMeasures, diverged: str | N
     """Returns the entries of ``summary.json`` but for energies: what was run, the verdict and what it rests on.
 
     Args:
-        scene: that was run, resolved.
         ran: duration_s, ticks, steps, ended, final, lost and what else was counted, trajectory_sha256.
-        measures: as they stand at the end.
         diverged: why the plant ended by itself, or None.
     """
     verdict = measures.verdict(diverged)

@@ -29,7 +29,6 @@ class Checkpoint(NamedTuple):
         delays: changes of the delay to come, (first command, plant steps).
         delay_steps: the delay that a change has brought, or None.
         motion, line, position, accelerometer: the states of the parts.
-        last: hold in effect last.
     """
 
     tick: int
@@ -49,7 +48,6 @@ class Plant:
     """Sampling, commands and record of one plant; knows nothing of sockets.
 
     Attributes:
-        tick: the next tick to be sampled.
         stop_reason: why the plant ended by itself (diverged), or None.
     """
 

@@ -25,7 +25,6 @@ class Viewer:
     """Follows one run after another.
 
     Args:
-        runs: where runs are found and asked.
         first: id of the run to follow first; the newest there is when None.
         from_start: whether what was logged before joining is shown as well.
 

@@ -13,9 +13,6 @@ class BlockLength:
     """Adapts the length of blocks so that each takes 0.05 to 0.1 s of wall time, up to the scene's ``block_ticks``.
 
     No bit of a run depends on it.
-
-    Attributes:
-        ticks: length of the block being worked on.
     """
 
     def __init__(self, most_ticks: int) -> None:

@@ -49,9 +49,6 @@ class Batch:
 
     Args:
         scenes: resolved scenes for which ``is_batchable`` holds and ``structure`` is the same.
-        kinds: element kinds at hand.
-        energy: whether to keep energy books.
-        trajectories: whether to hash the trajectories.
 
     Attributes:
         results: summary entries of each scene, in their order; None while it runs, or where it has to be run alone.
@@ -94,11 +91,7 @@ class Batch:
                 self._end = min(self._end, tick)
 
     def run(self) -> None:
-        """Run all members to their ends.
-
-        Raises:
-            ElementError: an element takes no arrays, or keeps attributes of its own; the results are void.
-        """
+        """Runs all members to their ends; on an ElementError the results are void."""
         _keep_freed_memory()
         with np.errstate(all="ignore"):  # members that have ended may come to anything
             np.setbufsize(_BUFFER)

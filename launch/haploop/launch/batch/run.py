@@ -42,7 +42,6 @@ def batch_results(
 
     Args:
         scenes: of any structure; scenes that differ in numbers alone are run together.
-        kinds: element kinds at hand.
         energy: whether to keep energy books; they take most of the time.
         trajectories: whether to hash every trajectory.
         fewest, most: members of a batch.

@@ -35,17 +35,9 @@ class Clock:
     of it in time. The grant is the least of: the end, the next pause, the target of a step, the pace, and the
     progress of the slowest lossless node plus the window; and no more than ``MOST_GRANTS`` lie ahead of that node.
 
-    Args:
-        scene, time: the resolved scene and its integers.
-        kinds: element kinds for checking live changes.
-        pace: simulated seconds per wall second; infinite for as fast as it goes.
-
     Attributes:
         until: ticks before this one are granted.
-        end: tick at which the run ends.
-        paused: whether time stands still on request.
         pace: simulated seconds per wall second.
-        events: every event of the run, scene's and live, (tick, event) in order.
     """
 
     def __init__(
@@ -196,11 +188,7 @@ class Clock:
         return self._step_target
 
     def run_at(self, pace: float, now: float) -> int:
-        """Sets another pace, in simulated seconds per wall second from ``now`` on; returns the tick.
-
-        Raises:
-            ClockError: the pace is no positive number.
-        """
+        """Sets another pace, simulated seconds per wall second, above 0, from ``now`` on; returns the tick."""
         if not pace > 0.0:
             raise ClockError(f"A pace is a number above 0, or free, but {pace:g} was asked for.")
         self._set_pace(pace)

@@ -157,10 +157,6 @@ class Commands:
 def capabilities(scene: Scene, kinds: Mapping[str, type[Element]]) -> Message:
     """Returns the keys that can be set and the kinds that can be swapped in, as plain values.
 
-    Args:
-        scene: the resolved scene as it stands now.
-        kinds: element kinds at hand.
-
     Returns:
         ``settable``: key -> unit, bounds and present value; ``kinds``: kind -> what it does and its parameters with
         unit, bounds and default; ``elements``: those at work. A bound or default that is not there is None.

@@ -13,12 +13,9 @@ class Node:
     """A node as the clock knows it.
 
     Attributes:
-        identity: where its messages come from.
         role, pid, lossless: as it said when it joined; a lossless node holds the clock back.
         tick: every tick before it is done.
         heard: wall time of its last message, s.
-        waits_for: whom it said it waits for, or "".
-        status: the last status it reported.
     """
 
     identity: bytes

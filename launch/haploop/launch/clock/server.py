@@ -28,15 +28,10 @@ class ClockServer:
     """Speaks the clock's part of the protocol.
 
     Args:
-        clock: decides how far and when.
         welcome: of the fields of WELCOME run, scene, timebase and context.
-        command: carries out a command from a client.
         start_gate: given the pids of all that are ready, returns whether the first tick may be worked on.
 
     Attributes:
-        socket: the ROUTER, for pollers.
-        address: where the clock listens.
-        roster: who takes part.
         results: role -> result of each own process that is done.
         unknown_peers: frames that were no messages, or from nobody who joined.
     """

@@ -20,13 +20,7 @@ from haploop.protocol.ticks import Timebase
 
 @dataclass(frozen=True)
 class Step:
-    """One thing that happens.
-
-    Attributes:
-        node: the process in which it does.
-        what: in one phrase.
-        effect: the name of the effect that brings it, "" for what every scene has.
-    """
+    """One thing that happens; ``effect`` names the effect that brings it, "" for what every scene has."""
 
     node: str
     what: str
@@ -41,12 +35,8 @@ class Plan:
         bodies: name -> mass in kg, from the actuator to the hand.
         states: what is integrated from plant step to plant step.
         memory: numbers that effects remember beside it from tick to tick, by the effect's name.
-        plant_step: what happens in a plant step, in order.
-        tick: what happens in a tick, in order.
         modules: node -> what its effects import beside its core.
         columns: channel of the log -> its columns, time stamps aside.
-        counts: what the summary counts, as entry and key.
-        named, absent: the effects of the scene, and the others.
     """
 
     bodies: dict[str, float]

@@ -106,11 +106,7 @@ def share_cores(run_number: int) -> tuple[set[int] | None, set[int] | None]:
 
 @contextlib.contextmanager
 def interrupts(usual_from: int) -> Iterator[list[int]]:
-    """Collects SIGINT and SIGTERM in a list.
-
-    Args:
-        usual_from: the signal of this number, counted from 1, and later ones raise KeyboardInterrupt where they come.
-    """
+    """Collects SIGINT and SIGTERM in a list; from number ``usual_from`` on, from 1, they raise KeyboardInterrupt."""
     received: list[int] = []
 
     def note(number: int, _frame: Any) -> None:

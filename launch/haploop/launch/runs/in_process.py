@@ -37,8 +37,6 @@ def run_in_process(
     """Runs a resolved scene to its end and returns the summary.
 
     Args:
-        scene: the resolved scene.
-        kinds: element kinds at hand.
         out: directory for log and summary; no file is written when None.
         attachments: text files for the log, by name.
         events: (tick, event) in order; the scene's own when None. Pauses are of the wall clock and change nothing.

@@ -23,10 +23,7 @@ class Layers:
     """The merged tables of several layers, each value with the file that gave it.
 
     Attributes:
-        path: the scene file on top.
-        data: the merged tables.
         origins: the file, or ``"--set"``, that gave each value, and the last file that wrote into each table.
-        mistakes: what was found wrong so far.
     """
 
     path: Path

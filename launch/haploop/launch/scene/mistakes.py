@@ -37,11 +37,7 @@ class Mistake:
 
 
 class SceneError(ValueError):
-    """A scene that cannot be run.
-
-    Attributes:
-        mistakes: everything that is wrong with it.
-    """
+    """A scene that cannot be run; it holds every mistake."""
 
     def __init__(self, mistakes: Iterable[Mistake]) -> None:
         self.mistakes = list(dict.fromkeys(mistakes))

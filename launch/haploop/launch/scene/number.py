@@ -21,11 +21,7 @@ from haploop.protocol.quantity import si as quantity
 
 @dataclass(frozen=True)
 class Number:
-    """Metadata that makes ``Annotated[float, Number(Quantity(...))]`` take SI numbers and text with a unit.
-
-    Attributes:
-        quantity: SI unit, bounds, meaning, and whether it is whole.
-    """
+    """Metadata that makes ``Annotated[float, Number(Quantity(...))]`` take SI numbers and text with a unit."""
 
     quantity: Quantity
 

@@ -65,13 +65,7 @@ class Books:
     energy stored at the start.
 
     Args:
-        scene: a resolved scene, or the stacked one of a batch.
-        time: its integers.
         members: of the batch; None for one run, whose arrays have no axis for members.
-
-    Attributes:
-        plant: the books of the plant.
-        state: all that changes from block to block.
     """
 
     def __init__(self, scene: Scene, time: Timebase, members: int | None = None) -> None:
@@ -99,9 +93,7 @@ class Books:
         """Books the intervals of one run from ``tick`` on that ``plant`` covers.
 
         Args:
-            tick: first interval.
             plant: telemetry columns of the plant, shape (ticks * n + 1,) each.
-            commanded: by the controller.
 
         Returns:
             The books as they stand at each of these ticks, shape (rows, ticks), rows as ``names``: true and plant books

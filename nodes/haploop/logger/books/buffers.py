@@ -27,11 +27,7 @@ def _check(block: Block, role: str, end: int) -> None:
 
 
 class PlantBuffer:
-    """Plant states at every step from ``tick`` on; the last state is the start of what comes next.
-
-    Attributes:
-        tick, end: first tick kept, and the tick after the last.
-    """
+    """Plant states at every step from ``tick`` on; the last state is the start of what comes next."""
 
     def __init__(self, steps_per_tick: int, tick: int) -> None:
         self._steps = steps_per_tick
@@ -39,11 +35,7 @@ class PlantBuffer:
         self._columns: dict[str, np.ndarray] = {}
 
     def add(self, block: Block) -> None:
-        """Appends a block.
-
-        Raises:
-            TelemetryGap: it does not start where the last one ended.
-        """
+        """Appends a block; TelemetryGap where it does not start at the end of the last one."""
         _check(block, "plant", self.end)
         keep = max(0, (self.end - self.tick) * self._steps)
         for name, data in block["columns"].items():
@@ -90,8 +82,6 @@ class ControllerBuffer:
     """Controller rows of one run by tick, with every book's force and the wall as it stood.
 
     Attributes:
-        first: tick of the first row kept.
-        end: tick after the last row.
         columns: x, v, a, wall, total, in_contact, wall_position, wall_stiffness; shape (end - first,) each.
         forces: force of every book that has acted within these ticks, 0 where it was not at work.
     """
@@ -104,11 +94,7 @@ class ControllerBuffer:
         self._part_ends: list[int] = []
 
     def add(self, block: Block) -> None:
-        """Appends a block.
-
-        Raises:
-            TelemetryGap: it does not start where the last one ended.
-        """
+        """Appends a block; TelemetryGap where it does not start at the end of the last one."""
         _check(block, "controller", self.end)
         new = {name: as_float64(data) for name, data in block["columns"].items()}
         books = {e["book"]: new.pop(f"dissipation.{i}") for i, e in enumerate(block["elements"])}

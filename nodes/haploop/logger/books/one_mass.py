@@ -41,7 +41,6 @@ class Steps(NamedTuple):
         force: held, N.
         tau: of the hand's muscles, N.
         rise: by which tau rises over the step, N; None where it rises over none.
-        dx: displacement over the step, m.
     """
 
     x: Any
@@ -93,10 +92,8 @@ def increments(
     books of a device at rest under load at rest too.
 
     Args:
-        params: of the books.
         steps, ticks: of the same intervals.
         commanded: the force of the wall and of every element over each step, N; None without an actuator's limits.
-        summed: sums steps over their interval.
 
     Yields:
         Shape (ticks,), or (ticks, batch), each, ordered as ``OneMassBooks.names``.
@@ -173,12 +170,7 @@ def sum_squares(factors: np.ndarray, w: Sequence[Any]) -> Any:
 
 
 class OneMassBooks:
-    """The books of one mass.
-
-    Attributes:
-        names: the books, in the order in which ``increments`` yields them; heats end in ``_heat``.
-        params: their numbers.
-    """
+    """The books of one mass by ``names``, in the order in which ``increments`` yields them; heats end in ``_heat``."""
 
     def __init__(self, scene: Scene, time: Timebase, members: int | None = None) -> None:
         self.params = one_mass_params(scene, time, members)
@@ -194,7 +186,6 @@ class OneMassBooks:
         """Yields the energy each interval adds to each book, J.
 
         Args:
-            first_step: step of the first state.
             columns: plant telemetry of whole intervals, the end state included; shape (ticks * n + 1,), or
                 (ticks * n + 1, batch), each.
             moved: displacement over these steps and intervals.

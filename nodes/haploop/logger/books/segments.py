@@ -96,7 +96,6 @@ def end_to_end(first_step: int, columns: Columns, pieces: list[tuple[int, Column
     """Returns the telemetry of several members as if it were that of one run, member after member.
 
     Args:
-        first_step: of the intervals.
         columns: shape (steps + 1, members).
         pieces: the columns of pieces of every member by its place, in order of the places.
 
@@ -170,7 +169,6 @@ class ChainForms:
         """Returns all integrals of all segments.
 
         Args:
-            segments: the stretches of motion.
             force: held in each, N, shape (segments,), or (segments, batch).
             tau: of the hand, at the beginning of each, N.
             rise: by which tau rises in a whole plant step, N.

@@ -30,13 +30,7 @@ _HEAD = [("channel", "<u2"), ("sequence", "<u4"), ("log_time", "<u8"), ("publish
 
 
 class TableRows:
-    """Messages of a table, as records of equal length in one array that is stamped once and then only filled in.
-
-    Attributes:
-        channel: id of the channel.
-        count: messages held.
-        size: bytes of their records.
-    """
+    """Messages of a table, as records of equal length in one array that is stamped once and then only filled in."""
 
     def __init__(self, channel: int, layout: TableLayout) -> None:
         self.channel = channel
@@ -133,7 +127,6 @@ def chunk(rows: Sequence[TableRows | FreeRows], start: int, compression: Compres
     Args:
         rows: the messages, at least one channel's and at least one message each.
         start: byte of the file at which the chunk is to stand.
-        compression: its name in the file.
     """
     body = b"".join([some.body() for some in rows])
     packed = body

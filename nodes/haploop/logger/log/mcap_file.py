@@ -25,7 +25,6 @@ class McapFile:
     """A new file, over any file of that name.
 
     Attributes:
-        path: where it is.
         size: bytes of the pieces written.
         schemas, channels, chunks, attachments, message_counts: what its summary will tell of it.
     """

@@ -45,7 +45,6 @@ class LogStream:
     have come, iterating again goes on with what was written to the file since.
 
     Attributes:
-        path: the file.
         units: by topic, unit by column, of every channel met so far, chosen or not; empty for a topic without columns.
         attachments: content of each attached file met so far, by name.
         read_bytes: how much of the file has been gone through.

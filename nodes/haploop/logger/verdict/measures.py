@@ -20,8 +20,6 @@ class Figures(NamedTuple):
     """The ``window`` entry of the summary.
 
     Attributes:
-        from_s: where the window begins.
-        oscillation_m: peak to peak.
         growth_1_s: the r of e^(r t) by which the swings grow (decay where negative); None where nothing swings.
         outside_fraction: share of its ticks that are out of contact.
         displayed_stiffness_N_m: mean of total force over penetration, ticks in contact (Choi et al. 2022, V.B.2), but
@@ -127,7 +125,6 @@ def measure_window(
     Args:
         x: positions at the last plant steps at least, shape (runs, steps), m.
         rows: ``CONTROLLER_COLUMNS`` at the last ticks at least, shape (runs, ticks).
-        span, rate: of the windows, and plant steps a second.
         swing_m: what does not count as a swing, shape (runs,).
     """
     x = x[:, -span.steps - 1 :]

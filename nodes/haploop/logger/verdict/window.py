@@ -33,7 +33,6 @@ class WindowState(NamedTuple):
     """All that a window remembers. A ring has row i in place i modulo its length.
 
     Attributes:
-        steps: plant steps taken so far.
         x: ring of positions at the steps, m, shape (ticks kept * n, members). The state at step s is row s - 1, so that
             an interval, but for its start, lies in one piece.
         rows: rings of ``CONTROLLER_COLUMNS`` at the ticks, shape (ticks kept, members) each.
@@ -49,13 +48,7 @@ class WindowState(NamedTuple):
 
 
 class Window:
-    """Keeps what the last ``WINDOW_S`` seconds (or the second half of a shorter run) need to be judged.
-
-    Attributes:
-        kept_ticks: the most ticks that a window takes.
-        swing_m: what does not count as a swing, shape (members,).
-        state: all that changes from block to block.
-    """
+    """Keeps what the last ``WINDOW_S`` seconds (or the second half of a shorter run) need to be judged."""
 
     def __init__(
         self, time: Timebase, resolution_m: float | np.ndarray, members: int = 1, *, spare_ticks: int = 0

@@ -67,10 +67,6 @@ class ChainHistory(ABC):
     """State and record of a chain; what moves it is written in the classes that build on this.
 
     It is made of what ``OneMassMotion`` is made of, and has its properties and methods.
-
-    Attributes:
-        chain: the bodies.
-        state: at the end of the last interval.
     """
 
     held_names = HELD

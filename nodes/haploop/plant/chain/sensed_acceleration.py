@@ -43,7 +43,6 @@ class SensedAcceleration:
         """Returns the accelerations at the last plant steps, m/s^2, the oldest first.
 
         Args:
-            sensed: those before an interval.
             states: of the chain at every step of the interval and at its end, shape (n + 1, states).
             command: force held over every step, N, shape (n,).
             at_ends: friction in N and whether body 0 is stuck at the end of every step, shape (n, 2).

@@ -70,11 +70,7 @@ def scaled_rates(chain: Chain, step_s: float, stuck: bool) -> Matrix:
 
 
 class ChainResponse:
-    """Transitions, and the forced (zero-state) response to the load alone within intervals of so many steps: a cache.
-
-    Attributes:
-        step, held: see ``ChainTransition`` and ``make_tables``.
-    """
+    """Transitions, and the forced (zero-state) response to the load alone, of intervals of so many steps: a cache."""
 
     def __init__(
         self, chain: Chain, step_s: float, steps: int, loads: Loads, *, stuck: bool, has_members: bool

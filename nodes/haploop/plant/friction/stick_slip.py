@@ -54,9 +54,6 @@ class StickSlip:
     friction could hold beyond the forces. g < 0 at the end means it has ceased. It may have ceased and be back where g
     falls at the start and rises at the end: its least value is not below where the tangents at both ends meet.
     States are arrays of shape (states,), or (states, many) with the other arguments to match; forces are in N.
-
-    Attributes:
-        friction: the law.
     """
 
     def __init__(self, chain: Chain, friction: Friction, step_s: float) -> None:
@@ -136,11 +133,7 @@ def _tangents_meet_below(g: Any, slope: Any, end_g: Any, end_slope: Any) -> Any:
 
 
 class RubbingHistory(ChainHistory):
-    """State and record of a chain whose first body sticks and slips; goes before the motion without friction.
-
-    Attributes:
-        friction: the law.
-    """
+    """State and record of a chain whose first body sticks and slips; goes before the motion without friction."""
 
     held_names = (*HELD, "friction", "stuck")
 

@@ -40,7 +40,6 @@ class ActuatedLine:
     """Line with an actuator at its end, which sees the commands that another line brings.
 
     Attributes:
-        line: that line.
         actuator: its parameters; the bandwidth is the motion's.
         state: (of the line, tick of the command in effect last, its force in N, saturated commands).
         counters: those of the line and, where there is a saturation, the commands it clipped, each at its first step.

@@ -24,7 +24,6 @@ class DelayLine:
     Attributes:
         lookahead: L.
         state: (tick of the oldest command kept, forces of the commands kept).
-        counters: none; nothing befalls a command.
     """
 
     def __init__(self, time: Timebase) -> None:

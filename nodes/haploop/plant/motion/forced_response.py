@@ -38,8 +38,6 @@ class ForcedResponse:
     It does not depend on the controller, and is made piece by piece of the run.
 
     Attributes:
-        transition: over a plant step.
-        tau: force of the hand.
         rest_N: force of the spring with the device at the origin, k x_rest.
         is_shared: whether all members of a batch have the same response.
     """

@@ -27,9 +27,6 @@ class HandForce:
     """The hand force of a scene at plant steps, in N; step s is at ``s / plant_rate``.
 
     In a batch it has a last axis for the members, of length 1 where all have the same force.
-
-    Attributes:
-        is_shared: whether all members have the same force.
     """
 
     def __init__(self, table: tables.HandForce | None, plant_rate: int, members: int | None = None) -> None:

@@ -53,8 +53,6 @@ def record_of_holds(
     Args:
         noted: seven entries of every hold, one after the other.
         held: coefficients of ``make_zoh_transitions``; in a batch with a last axis for the members.
-        response: forced response.
-        tick: the first interval.
         tail: (members,) in a batch, () for one run.
         positions_only: leave v, x_low and force out.
 

@@ -26,7 +26,6 @@ class PositionSensor:
     """Measured position of the device, as the encoder rounds it.
 
     Attributes:
-        encoder: the ``[encoder]`` table, or None.
         reading: returns the measured position of x in m at the next tick; to be called at every tick from tick 0 on.
         state: none, for a sensor without noise.
     """

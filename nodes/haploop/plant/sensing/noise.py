@@ -52,7 +52,6 @@ class NoisyPositionSensor(PositionSensor):
     """Measured position of the device plus band-limited noise, as the encoder rounds it; stationary from tick 0 on.
 
     Attributes:
-        noise: its parameters.
         draw: returns the standard normal number of the next tick, or a row of shape (members,).
         state: (ticks measured so far, noise at the last one or None).
     """

@@ -34,9 +34,7 @@ class Table:
     """One table of a snapshot: columns of equal length at equal steps of time.
 
     Attributes:
-        name: under which the page finds it.
         t0_s, dt_s: row i is at ``t0_s + i dt_s``, s.
-        columns: header entry of each column.
         values: shape (columns, rows).
         envelope: whether each two rows are the extremes of one interval of time, instead of samples.
         more: further numbers of the header.
@@ -128,8 +126,6 @@ def event_lines(events: Iterable[tuple[int, Event]], rate: int, options: Message
     """Returns the newest of these events as lines.
 
     Args:
-        events: (tick, event) in order.
-        rate: ticks per second, Hz.
         options: what the run lets people choose, for units by parameter of a kind (``damping.damping``) and by settable
             key; None before it is known.
     """

@@ -95,11 +95,7 @@ def _is_shown(book: str) -> bool:
 
 
 class Backfill:
-    """Fills a history from the log in a run's directory; ``events``, (tick, event), may grow while the log does.
-
-    Attributes:
-        history: what was read so far.
-    """
+    """Fills a history from the log in a run's directory; ``events``, (tick, event), may grow while the log does."""
 
     def __init__(self, out: Path, scene: Scene, time: Timebase, events: Sequence[tuple[int, Event]]) -> None:
         self._out, self._scene, self._time, self._events = out, scene, time, events

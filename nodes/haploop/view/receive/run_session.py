@@ -31,15 +31,11 @@ class RunSession:
     """Joins a run, which may take a while, and keeps all that is received of it.
 
     Attributes:
-        run: the run that was joined.
-        clock: what its clock answers.
         scene, time, out: the resolved scene, its integers, the run's directory.
         history: telemetry received, and what was logged before once ``prepend`` has been called.
         status: newest status of the logger.
-        events: (tick, event) in order, all since the start of the run.
         delay_s: the round-trip delay at present.
         outcome: "" while the run goes on, then "ended" or "failed"; ``why`` is a sentence, if there is one.
-        summary: of the run, once it is there.
 
     Raises:
         Refused, Aborted: the run did not let this viewer in.

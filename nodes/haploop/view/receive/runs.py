@@ -54,13 +54,9 @@ class Runs(Protocol):
 class ClockAnswers:
     """Keeps the latest answers of the clock of a run, asked for now and then beside the task that draws.
 
-    Args:
-        runs, run: how to ask, and whom.
-        events: of the run, (tick, event); may grow meanwhile.
-
     Attributes:
         status: the answer to ``status``, {} before the first.
-        options: the answer to ``options``, what can be changed; None before the first.
+        options: what can be changed; None before the first answer.
     """
 
     def __init__(self, runs: Runs, run: Run, events: Sequence[tuple[int, Event]]) -> None:

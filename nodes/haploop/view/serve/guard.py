@@ -19,7 +19,6 @@ class Guard:
 
     Attributes:
         token: what every command must carry.
-        address: of the page.
         link: the address with the token in its fragment, which no browser sends to any server.
         one_time_link: one that leads to ``link`` once: all users can see the command line that starts a browser.
     """

@@ -117,12 +117,7 @@ async def serve(
     first: str | None = None,
     from_start: bool = True,
 ) -> None:
-    """Serves the page until SIGINT, SIGTERM or ``end``; runs, first and from_start are those of :class:`Viewer`.
-
-    Args:
-        listening: from :func:`listen`.
-        on_serving: called once the page can be opened.
-    """
+    """Serves the page until SIGINT, SIGTERM or ``end``; runs, first and from_start are those of :class:`Viewer`."""
     guard = Guard(listening.getsockname()[1])
     viewer = Viewer(runs, first, from_start)
     loop = asyncio.get_running_loop()

@@ -48,7 +48,6 @@ class History:
     """Keeps three series of columns of one run.
 
     Args:
-        time: the integers of the run.
         origin: no rows come from before this tick.
 
     Attributes:
@@ -57,7 +56,6 @@ class History:
             their total, the wall's position and stiffness (NaN without one), and the mass of each virtual inertia while
             it is at work, else 0 (``mass.<place>.<kind>``).
         energy: at ticks: the true book of the wall and of each element (``<name>.true``), and the residual.
-        all_series: these three.
         at_work: at the newest ticks of the controller.
         stop_tick: tick at which the plant has ended; None before.
         version: changes with every row that is appended.

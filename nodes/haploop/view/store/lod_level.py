@@ -36,9 +36,7 @@ class Ring:
     always one piece of memory and a value is moved once at most, on average.
 
     Attributes:
-        capacity: values of each column that are surely held.
         start, end: numbers of the first value held and of the one after the last; the first ever appended has number 0.
-        nbytes: memory of the buffer.
     """
 
     def __init__(self, capacity: int, columns: int) -> None:
@@ -77,11 +75,7 @@ class Ring:
 
 @dataclass
 class LodLevel:
-    """A ring buffer with its scale: ``values`` values of each column per ``ticks`` ticks, from the series' origin on.
-
-    Attributes:
-        start, end: the first tick that is held in whole, and the one after the last.
-    """
+    """A ring buffer with its scale: ``values`` values of each column per ``ticks`` ticks, from the origin on."""
 
     ring: Ring
     ticks: int

@@ -32,8 +32,6 @@ class LodSeries:
         first_tick: first tick that is known; None before anything is.
         end_tick: the tick before which every tick is known, or never will be.
         full_from_tick: the tick from which on rows are held in full.
-        names: the columns, in the order of their first rows.
-        nbytes: memory of all levels.
     """
 
     def __init__(self, rows_per_tick: int, recent_ticks: int, origin: int) -> None:
@@ -161,7 +159,6 @@ class LodSeries:
         """Returns the extremes of consecutive buckets, in the order in which they came; NaN where there are none.
 
         Args:
-            names: columns.
             from_tick, to_tick: begin of the first bucket and end of the last one, ``aligned``.
             bucket_ticks: a power of two, from :meth:`bucket_from`.
 

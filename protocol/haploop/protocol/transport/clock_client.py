@@ -28,7 +28,6 @@ class ClockClient:
     """Speaks to the clock for one node.
 
     Attributes:
-        socket: the DEALER, for pollers.
         until: ticks before this one may be worked on.
         last: whether no further ticks will be granted.
         events: granted events not yet taken, (tick, event), in order.

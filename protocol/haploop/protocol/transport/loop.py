@@ -26,12 +26,7 @@ class LoopError(RuntimeError):
 class PlantEnd:
     """The plant's end of the connection: a ROUTER, so that an unknown peer gets nothing and disturbs nothing.
 
-    Args:
-        idle: called now and then while an answer is awaited.
-
-    Attributes:
-        socket: to be bound by the node.
-        unknown_peers: frames that came from anyone but the controller.
+    ``idle`` is called now and then while an answer is awaited.
     """
 
     def __init__(self, context: zmq.Context[zmq.Socket[bytes]], idle: Idle) -> None:
@@ -102,9 +97,7 @@ class PlantEnd:
 class ControllerEnd:
     """The controller's end of the connection: a DEALER that knows only the plant.
 
-    Args:
-        address: of the plant's socket.
-        idle: called now and then while samples are awaited.
+    ``idle`` is called now and then while samples are awaited.
     """
 
     def __init__(self, context: zmq.Context[zmq.Socket[bytes]], address: str, idle: Idle) -> None:

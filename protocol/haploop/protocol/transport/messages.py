@@ -29,7 +29,6 @@ class Process:
 
     Attributes:
         role: its name in messages, logs and errors.
-        module: started as ``python -m module``.
         binds: channel -> file name of the socket it binds, ``.sock`` in the run's directory of sockets.
         on_loop_core: whether it ping-pongs at every tick, and so shares one core with its partner.
     """
@@ -58,11 +57,8 @@ class Message:
     """One row of its table.
 
     Attributes:
-        code: the number on the wire.
         channel: the socket it travels on (``CHANNELS``).
-        sender, receiver: roles.
         fields: (name, type) in order.
-        meaning: one sentence.
     """
 
     code: int

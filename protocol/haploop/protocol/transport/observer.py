@@ -23,15 +23,12 @@ class Observer:
     with what is sent from there.
 
     Args:
-        context: of the run's transport.
         role: under which name the clock lists it.
-        clock: the clock's address.
         listens: roles whose telemetry it receives.
 
     Attributes:
         welcome: run, scene, timebase, endpoints, granted and context, as the clock gave them.
         ended: last frame of every stream that has ended, by role: its tick, reason and trouble.
-        client: the connection to the clock.
 
     Raises:
         Refused: the clock did not let it join.

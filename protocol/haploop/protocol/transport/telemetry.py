@@ -23,8 +23,6 @@ class Publisher:
     the next block boundary, with STATE; from its tick on the stream has no gap for whoever keeps up.
 
     Attributes:
-        socket: to be bound by the node.
-        subscribed: whether anyone has subscribed so far.
         unknown_peers: frames that were no subscriptions to this stream.
     """
 

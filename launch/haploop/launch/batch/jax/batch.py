@@ -39,9 +39,7 @@ class CompiledBatch(Batch):
     """``Batch`` that goes by itself only at its start and where a change comes, until all that is in effect is known.
 
     Args:
-        scenes, kinds, energy: as for ``Batch``.
         size: of the arrays; places beyond the scenes are computed, unheeded.
-        programs: where compiled blocks are kept.
 
     Raises:
         NotCompilable: there are several bodies.
@@ -72,11 +70,7 @@ class CompiledBatch(Batch):
         """The size stays."""
 
     def run(self) -> None:
-        """Run all members to their ends.
-
-        Raises:
-            NotCompilable: an element cannot be compiled; the results are void.
-        """
+        """Runs all members to their ends; on NotCompilable the results are void."""
         tick = 0
         with np.errstate(all="ignore"):
             while tick < self._end and not self._ended.all():

@@ -32,8 +32,6 @@ class Carry(NamedTuple):
 
     Attributes:
         state: leaves of the state.
-        running: whether the member has not ended.
-        ticks: how many intervals it has gone through in this block.
         extremes: least and greatest x in m, greatest force in N.
         books: sum and error of every book, by name.
         x_m: measured position at the last tick.
@@ -67,10 +65,8 @@ class BlockInputs(NamedTuple):
     """Inputs of a block.
 
     Attributes:
-        params: the numbers among the parameters.
         limit_m: beyond which a member has diverged.
         ticks_in: inputs of every tick, a row each.
-        first_tick, ticks: which ticks the block covers.
         keep_from: ticks from this one on go into the rings; those before into two rows that stay in the cache, as
             writing all of them to memory would take as long as computing them.
     """
@@ -102,8 +98,6 @@ class Block:
 
     Args:
         params, state: of a batch; another one with as many numbers of the same shapes is served as well.
-        book_names: of the books of the plant; empty without books.
-        has_wall: whether there is a wall.
     """
 
     def __init__(self, params: BatchParams, state: BatchState, book_names: tuple[str, ...], has_wall: bool) -> None:
@@ -196,9 +190,7 @@ def _apart(go: Any, make: Callable[[], Any]) -> Any:
     """Returns the result of ``make``, made from numbers in memory and put into memory: no part of it is made twice.
 
     A compiler that fuses by itself makes for each of many results anew what they have in common; one for a GPU may.
-
-    Args:
-        go: true, which the compiler cannot know.
+    ``go`` is true, which the compiler cannot know.
     """
     if jax.default_backend() != "cpu":
         return make()

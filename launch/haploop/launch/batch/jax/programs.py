@@ -35,8 +35,6 @@ class Programs:
     """Programs by what they depend on; the one not used for longest goes first.
 
     Attributes:
-        seconds: spent on compiling so far.
-        count: how many were compiled so far.
         asked: how many ticks of members of a structure were asked for so far.
         spare: rings that a batch is done with. Their memory serves the next one: getting it anew, and putting zeros
             into it, takes a third as long as a batch without books does.

@@ -16,9 +16,6 @@ class Rows:
 
     A compiler that is given whole columns writes every one of them to memory, shifts them against each other and sums
     them up again; given their rows it keeps a step's numbers in registers.
-
-    Args:
-        rows: arrays of one shape.
     """
 
     __array_ufunc__ = None  # NumPy leaves the operation to this class

@@ -34,12 +34,9 @@ class BatchParams(NamedTuple):
 
     Attributes:
         held, mechanics, transition, rest_N: of the motion of one mass.
-        actuator: its limits, or None.
-        encoder: the resolved ``[encoder]`` table, or None.
         noise: of the position, or None.
         feels: whether samples carry the acceleration.
         lookahead, late_steps: L and r of a round-trip delay of L n + r plant steps.
-        controller: of the controller.
         books: of the books of the plant; None without books.
     """
 
@@ -61,11 +58,9 @@ class BatchState(NamedTuple):
     """Everything that a batch remembers from tick to tick but for commands in flight; arrays of shape (members,).
 
     Attributes:
-        motion: of the mass.
         acting: force held at the end of the last interval, N.
         saturated: commands clipped so far.
         noise: of the position at the last tick, m.
-        controller: of the controller.
     """
 
     motion: OneMassState
@@ -104,7 +99,6 @@ class TickOutputs(NamedTuple):
 
     Attributes:
         x, v, x_comp: at the steps of the interval and at its end, n + 1 rows.
-        tau: of the hand at these steps, N, n + 1 rows.
         held: (steps, force in N) of every hold.
         row: x, total and in_contact of the controller.
         forces: of the wall and of every element, N, by the names of their accounts.
@@ -191,12 +185,8 @@ def added_in_tick(
     """Returns what a tick adds to each book, J, by the names of ``Books``; shape (members,).
 
     Args:
-        params, names: of the books of the plant.
-        told: the tick.
         acting: forces computed with the two newest commands that act in its interval.
         before: those computed at the tick before.
-        x_m_before: measured position at the tick before.
-        wall: None without one.
         apart: for what several books need; a compiler would make it for each of them anew.
     """
     x, v, tau, now = told.x, told.v, told.tau, told.forces

@@ -16,11 +16,7 @@ from haploop.logger.verdict.window import Window, keep_steps
 
 
 class CompiledWindow(Window):
-    """``Window`` of a batch whose rings are filled by compiled programs, and read by one.
-
-    Attributes:
-        rings: what the programs have left; None where the batch went on by itself since.
-    """
+    """``Window`` of a batch whose rings are filled by compiled programs, and read by one."""
 
     rings: Rings | None = None
 
