@@ -48,17 +48,17 @@ def test_a_setting_exactly_at_the_tolerance_meets_it():
         (
             scene(EXACT, FAST, ROUGH),
             "Cheapest within 1.00 µm of the reference: rk4 at 2 kHz, 20.0 µs a tick; "
-            "the scene's own, exact at 10 kHz, takes 50.0 µs, 2.5 times as long.",
+            "the scene's own, exact at 10 kHz, takes 50.0 µs, 2.50 times as long.",
         ),
         (
             scene(EXACT, point("rk4", 5_000, 1e-9, 40.0)),
             "Cheapest within 1.00 µm of the reference: rk4 at 5 kHz, 40.0 µs a tick; "
-            "the scene's own, exact at 10 kHz, takes 50.0 µs, 25 % more.",
+            "the scene's own, exact at 10 kHz, takes 50.0 µs, 1.25 times as long.",
         ),
         (
             scene(EXACT, point("rk4", 5_000, 1e-9, 49.0)),
             "Cheapest within 1.00 µm of the reference: rk4 at 5 kHz, 49.0 µs a tick; the scene's own, exact at 10 kHz, "
-            "takes 50.0 µs, 2 % more, which these measurements cannot tell apart.",
+            "takes 50.0 µs, 1.02 times as long, which these measurements cannot tell apart.",
         ),
         (
             scene(EXACT, ROUGH),
@@ -88,10 +88,6 @@ def test_a_setting_exactly_at_the_tolerance_meets_it():
             scene(EXACT, error_m=3e-6),
             "No setting can be said to be within 1.00 µm of the reference: "
             "the reference itself is only known to 3.00 µm.",
-        ),
-        (
-            scene(replace(EXACT, us_per_tick=None)),
-            "Nothing was timed, so no setting can be called the cheapest within 1.00 µm of the reference.",
         ),
         (
             scene(point("exact", 10_000, 1e-8, 50.0, pointwise=False), pointwise=False),
@@ -126,7 +122,7 @@ def test_the_table_holds_every_point_and_why_some_failed():
 
 def test_a_busy_machine_is_told():
     varied = shown(replace(fake_cost(), load=Load(0.9, 0.2)))
-    assert "The machine was busy while times were taken: a fixed loop varied by 20 % (quiet: 5 %)" in varied
+    assert "The machine was busy meanwhile: a fixed loop timed once a round varied by 20.0 %" in varied
     loaded = shown(replace(fake_cost(), load=Load(4.0, 0.01)))
     assert "the load average was 4.0" in loaded
     assert "busy" not in shown(replace(fake_cost(), load=None))

@@ -42,18 +42,13 @@ class Spread:
 
 @dataclass(frozen=True, kw_only=True)
 class Errors:
-    """The distance of a run from its reference.
-
-    Where the reference is pointwise the positions at the ticks and at the end are compared, and the relative entries
-    are None; where it is not, it is the other way round.
+    """The distance of a run from its reference: in positions (pointwise), or in the swings alone; the others are None.
 
     Attributes:
         final_m, rms_m, max_m: of x - x_ref: at the end, root mean square over the ticks, largest.
-        amplitude, frequency, energy_per_cycle: relative errors of the swings, >= 0.
-        amplitude_m: absolute error of the amplitude.
+        amplitude, frequency, energy_per_cycle: relative errors of the swings, >= 0; ``amplitude_m`` is absolute.
         residual: energy residual over the energy moved in total.
-        verdict: the run's own.
-        verdict_right: whether it is the reference's.
+        verdict, verdict_right: the run's own, and whether it is the reference's.
     """
 
     final_m: float | None = None
@@ -79,12 +74,10 @@ class Point:
     """One method, as ``clock.integrator`` names it, at one plant rate in Hz.
 
     Attributes:
-        error: None where the run failed.
-        failure: why there is no error, as a sentence; None where there is one.
+        error, failure: one of them is None; a failure is a sentence.
         us_per_tick: time of a simulated tick in one process, books on, no log; of a run that diverged, of the ticks it
             has until its numbers are too large. None for a scene refused by the check.
-        processes_us_per_tick: end to end as processes, every plant step logged; None where it was not measured, as for
-            failures.
+        processes_us_per_tick: end to end as processes, every plant step logged; None where not measured.
         instructions_per_tick: bytecode instructions of plant and controller.
     """
 
@@ -96,16 +89,22 @@ class Point:
     processes_us_per_tick: Spread | None = None
     instructions_per_tick: float | None = None
 
+    @property
+    def size_m(self) -> float:
+        """The size of the error; inf where the run failed."""
+        return self.error.size_m if self.error else math.inf
+
+    @property
+    def is_right(self) -> bool:
+        """Whether the run went to its end with the reference's verdict."""
+        return self.error is not None and self.error.verdict_right
+
 
 @dataclass(frozen=True)
 class ReferenceNote:
-    """The reference that errors are against.
+    """The reference that errors are against: how it was made, as a sentence; its own uncertainty; its verdict.
 
-    Attributes:
-        how: it was made, as a sentence.
-        error_m: its own uncertainty.
-        pointwise: whether positions can be compared, or amplitudes only.
-        verdict: of the reference.
+    ``pointwise`` tells whether positions can be compared, or amplitudes only.
     """
 
     how: str
@@ -116,13 +115,7 @@ class ReferenceNote:
 
 @dataclass(frozen=True)
 class SceneCost:
-    """Every point of one scene.
-
-    Attributes:
-        own_method, own_rate: what the scene itself names.
-        ticks: in a run.
-        advice: one sentence.
-    """
+    """Every point of one scene, the method and rate that the scene itself names, the ticks of a run, and the advice."""
 
     name: str
     title: str
@@ -166,6 +159,11 @@ class Load:
         """True where something else seems to have run meanwhile."""
         return self.calibration_spread > QUIET_SPREAD or (self.average or 0.0) > QUIET_LOAD
 
+    def __str__(self) -> str:
+        seen = f"a fixed loop timed once a round varied by {100 * self.calibration_spread:.1f} %"
+        average = f" and the load average was {self.average:.1f}" if self.average is not None else ""
+        return f"The machine was {'busy meanwhile' if self.busy else 'quiet'}: {seen}{average}."
+
 
 @dataclass(frozen=True)
 class Price:
@@ -174,8 +172,7 @@ class Price:
     Attributes:
         time: measured, in the unit of its group.
         ratio: the median over that of the group's baseline.
-        costs: what it adds to a run, in the unit of its group: the median less the baseline's; of an effect, the
-            baseline's, which has all of them, less the median without it.
+        costs: the median less the baseline's, in the unit of its group; of an effect, which is left out, the negative.
         buys: the gain, in words.
         instructions_per_tick: bytecode instructions of plant and controller; None where they were not counted.
         stiffness: up to where a wall stays steady; None where that was not asked for.
@@ -224,23 +221,14 @@ def price(
 
 
 def chance_in(group: PriceGroup) -> float:
-    """Returns how far two equal runs of the group's baseline are apart: less than that is no difference.
-
-    The difference of the baseline measured twice, where it was, and at least the distance of its quartiles.
-    """
+    """Returns the distance of the group's baseline measured twice, at least that of its quartiles: less is chance."""
     again = [abs(price.costs) for price in group.prices if price.what == AGAIN]
     return max([*again, group.baseline.time.q3 - group.baseline.time.q1])
 
 
 @dataclass(frozen=True)
 class Cost:
-    """All of cost.json.
-
-    Attributes:
-        load: None where no time was measured.
-        repeats, processes_repeats: of each time.
-        prices: the other prices of accuracy.
-    """
+    """All of cost.json; ``load`` is None where no time was measured."""
 
     machine: str
     versions: dict[str, str]

@@ -46,8 +46,8 @@ LOOKS: dict[str, tuple[str, str]] = {
 }
 # Below a reference's uncertainty there is nothing to see: what is smaller than this share of it is drawn there.
 _WITHIN = 0.3
-# The share of a panel's height that the failures of one method take at its top edge.
-_ROW = 0.045
+# The share of a panel's height that failures take at its top edge.
+_TOP = 0.08
 
 
 def figure_of(cost: Cost) -> Figure:
@@ -79,10 +79,11 @@ def _how_to_read(ax: Axes, cost: Cost, scenes: list[SceneCost]) -> None:
     from matplotlib.patches import Patch
 
     ax.set_axis_off()
-    handles: list[Any] = []
-    for method in methods_of(scenes):
-        colour, marker = method_look(method)
-        handles.append(Line2D([], [], color=colour, marker=marker, linewidth=1.6, label=method))
+    looks = {method: method_look(method) for method in methods_of(scenes)}
+    handles: list[Any] = [
+        Line2D([], [], color=colour, marker=marker, linewidth=1.6, label=method)
+        for method, (colour, marker) in looks.items()
+    ]
     sign = partial(Line2D, [], [], linestyle="none")
     handles += [
         sign(marker="o", markersize=11, markerfacecolor="none", color=INK, label="at 10 kHz"),
@@ -110,63 +111,46 @@ def draw_panel(ax: Axes, scene: SceneCost, tolerance_m: float) -> None:
     reference = scene.reference
     what = "RMS error of the position (m)" if reference.pointwise else "error of the amplitude (m)"
     dress(ax, "\n".join(wrap(scene.short_title, _TITLE_LETTERS)), "time per simulated tick, in one process (µs)", what)
-    low, high = _limits(scene, tolerance_m)
     ax.set_xscale("log")
     ax.set_yscale("log")
     plain_numbers(ax.xaxis)
+    low, edge, high = _limits(scene, tolerance_m)
     ax.set_ylim(low, high)
     ax.axhspan(low, max(reference.error_m, low), color=UNCERTAIN, zorder=0, linewidth=0, gid="uncertainty")
     ax.axhline(tolerance_m, color=GREY, linewidth=0.9, dashes=(4, 3), zorder=1, gid="tolerance")
     for method in methods_of([scene]):
         _curve(ax, [point for point in scene.points if point.method == method], scene)
-    _mark_failures(ax, scene)
-    times = [edge for p in scene.points if (t := p.us_per_tick) for edge in (t.q1, t.median, t.q3)]
+    if any(point.us_per_tick and _failed(point) for point in scene.points):
+        ax.axhline(edge, color=FAINT, linewidth=0.8, zorder=1)
+        ax.set_yticks([tick for tick in ax.get_yticks() if low <= tick < edge])
+        place = {"ha": "right", "va": "center", "transform": ax.transAxes}
+        ax.text(0.995, 1.0 - _TOP / 2.0, "failed", fontsize=SMALL, color=GREY, **place)
+    times = [end for p in scene.points if (t := p.us_per_tick) for end in (t.q1, t.median, t.q3)]
     ax.set_xlim(min(times) / 1.25, max(times) * 1.25)
 
 
-def _limits(scene: SceneCost, tolerance_m: float) -> tuple[float, float]:
-    """Returns whole decades around all errors, the reference's and the tolerance, with room for crosses above."""
-    sizes = [drawn_m(point, scene) for point in scene.points if point.error]
+def _limits(scene: SceneCost, tolerance_m: float) -> tuple[float, float, float]:
+    sizes = [drawn_m(point, scene) for point in scene.points]
     sizes = [size for size in [*sizes, scene.reference.error_m, tolerance_m] if 0.0 < size < math.inf]
     low, high = math.floor(math.log10(min(sizes)) - 0.3), math.ceil(math.log10(max(sizes)) + 0.2)
-    rows = 1 + len(_failing(scene))
-    return 10.0**low, 10.0 ** (low + (high - low) / (1.0 - _ROW * rows))
+    return 10.0**low, 10.0**high, 10.0 ** (low + (high - low) / (1.0 - _TOP))
 
 
 def drawn_m(point: Point, scene: SceneCost) -> float:
     """Returns the error of a point as drawn: no less than a share of the reference's uncertainty."""
-    size = point.error.size_m if point.error else math.inf
-    return max(size, _WITHIN * scene.reference.error_m, 1e-18)
+    return max(point.size_m, _WITHIN * scene.reference.error_m, 1e-18)
 
 
 def _failed(point: Point) -> bool:
-    return point.error is None or not math.isfinite(point.error.size_m)
-
-
-def _failing(scene: SceneCost) -> list[str]:
-    failing = {point.method for point in scene.points if point.us_per_tick and _failed(point)}
-    return [method for method in methods_of([scene]) if method in failing]
-
-
-def _mark_failures(ax: Axes, scene: SceneCost) -> None:
-    if not (rows := len(_failing(scene))):
-        return
-    low, high = np.log10(ax.get_ylim())
-    edge = 10.0 ** (high - _ROW * rows * (high - low))
-    ax.axhline(edge, color=FAINT, linewidth=0.8, zorder=1)
-    ax.set_yticks([tick for tick in ax.get_yticks() if 10.0**low <= tick < edge])
-    place = {"ha": "right", "va": "center", "transform": ax.transAxes}
-    ax.text(0.995, 1.0 - _ROW * rows / 2.0, "failed", fontsize=SMALL, color=GREY, **place)
+    return not math.isfinite(point.size_m)
 
 
 def _position(ax: Axes, point: Point, scene: SceneCost) -> tuple[float, float]:
-    """Returns where a point is drawn: its time and its error; without one, in the row of its method at the top edge."""
+    """Returns where a point is drawn: its time and its error; without one, at the top edge."""
     assert point.us_per_tick is not None
-    if not _failed(point):
-        return point.us_per_tick.median, drawn_m(point, scene)
     low, high = np.log10(ax.get_ylim())
-    row = 0.5 + _failing(scene).index(point.method)
-    return point.us_per_tick.median, float(10.0 ** (high - _ROW * row * (high - low)))
+    top = float(10.0 ** (high - _TOP / 2.0 * (high - low)))
+    return point.us_per_tick.median, top if _failed(point) else drawn_m(point, scene)
 
 
 def _curve(ax: Axes, points: list[Point], scene: SceneCost) -> None:
@@ -183,7 +167,7 @@ def _curve(ax: Axes, points: list[Point], scene: SceneCost) -> None:
         mark = partial(ax.plot, [x], [y], color=colour, zorder=4, linestyle="none")
         if _failed(point):
             mark(marker="x", markersize=7.0, markeredgewidth=1.8, clip_on=False, gid="failure")
-        elif point.error and not point.error.verdict_right:
+        elif not point.is_right:
             mark(marker=marker, markersize=5.5, markerfacecolor="white", gid="wrong verdict")
         else:
             mark(marker=marker, markersize=5.5, gid="point")

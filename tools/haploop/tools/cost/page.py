@@ -7,9 +7,9 @@ from pathlib import Path
 
 from haploop.tools.cli.exit_codes import WRONG_USE, leave
 from haploop.tools.cost import figure, prices_figure
-from haploop.tools.cost.data import Cost, CostFileError, Point, Price, PriceGroup, SceneCost, load
-from haploop.tools.cost.findings import findings, length, rate, setting
-from haploop.tools.cost.report import made_with
+from haploop.tools.cost.data import Cost, CostFileError, Point, PriceGroup, SceneCost, load
+from haploop.tools.cost.findings import findings, length, power, rate, setting
+from haploop.tools.cost.report import PRICE_HEADS, made_with, price_row
 from haploop.tools.figure.data import FigureError
 from haploop.tools.figure.style import write_figure
 from haploop.tools.render.terminal import markdown_table
@@ -43,6 +43,7 @@ def write(directory: Path, docs: Path) -> Path:
 
 def page(cost: Cost) -> str:
     """Makes the page in Markdown."""
+    tolerance = amount(cost.tolerance_m, "m")
     parts = [
         "# What accuracy costs",
         _INTRO,
@@ -57,7 +58,7 @@ def page(cost: Cost) -> str:
         *(part for scene in cost.scenes for part in _scene(scene)),
         *_prices(cost.prices),
         "## Measured on",
-        f"{made_with(cost)} {_quiet(cost)}".strip(),
+        " ".join([made_with(cost), *([str(cost.load)] if cost.load else []), f"The tolerance is {tolerance}."]),
     ]
     return "\n\n".join(parts) + "\n"
 
@@ -72,22 +73,18 @@ def _scene(scene: SceneCost) -> list[str]:
     # Of the failures of a method the reason is told once, that of its highest rate.
     failed: dict[str, Point] = {point.method: point for point in scene.points if point.failure}
     reasons = [f"- Failed: {setting(point)}: {point.failure}" for point in failed.values()]
-    table = _table(["error, µs", *map(rate, rates)], rows)
+    table = markdown_table(["error, µs", *map(rate, rates)], rows, numbers=range(1, len(rates) + 1))
     return [f"### {scene.short_title}", about, table, *(["\n".join(reasons)] if reasons else []), scene.advice]
 
 
 def _cell(scene: SceneCost, method: str, hertz: int) -> str:
     if (point := scene.point(method, hertz)) is None:
         return ""
-    words = "failed" if point.error is None else _power(point.error.size_m)
-    if point.error and not point.error.verdict_right:
+    words = power(point.size_m) if point.error else "failed"
+    if point.error and not point.is_right:
         words += f" ({point.error.verdict})"
     words += f", {fixed(point.us_per_tick.median)}" if point.us_per_tick else ""
     return f"**{words}**" if point is scene.own else words
-
-
-def _power(metres: float) -> str:
-    return f"{metres:.1e} m".replace("-", "−") if metres else "0 m"
 
 
 def _prices(groups: list[PriceGroup]) -> list[str]:
@@ -96,36 +93,10 @@ def _prices(groups: list[PriceGroup]) -> list[str]:
     parts = ["## The other prices", f"![What books, log, effects, processes, delay and rate cost]({PRICES_FIGURE})"]
     for group in groups:
         about = f"Medians of {group.repeats} repeats, {group.unit}: {group.how}. The first row is the baseline."
-        first = "left out" if group.name == "effects" else ""
-        heads = [first, "median", "quartiles", "ratio", "costs", "instructions", "buys"]
-        parts += [f"### {group.title}", about, _table(heads, [_price(price) for price in group.prices])]
+        heads = ["left out" if group.name == "effects" else "", *PRICE_HEADS[1:]]
+        table = markdown_table(heads, map(price_row, group.prices), numbers=range(1, len(heads) - 1))
+        parts += [f"### {group.title}", about, table]
     return parts
-
-
-def _price(price: Price) -> list[str]:
-    count, time = price.instructions_per_tick, price.time
-    return [
-        price.what,
-        fixed(time.median),
-        f"{fixed(time.q1)}–{fixed(time.q3)}",
-        fixed(price.ratio),
-        fixed(price.costs),
-        "" if count is None else f"{count:.0f}",
-        price.buys,
-    ]
-
-
-def _table(heads: list[str], rows: list[list[str]]) -> str:
-    return markdown_table(heads, rows, numbers=range(1, len(heads) - (heads[-1] == "buys")))
-
-
-def _quiet(cost: Cost) -> str:
-    if cost.load is None:
-        return ""
-    spread = f"a fixed loop timed once a round varied by {100 * cost.load.calibration_spread:.1f} %"
-    load_average = f" and the load average was {cost.load.average:.1f}" if cost.load.average is not None else ""
-    quiet = "The machine was busy meanwhile" if cost.load.busy else "The machine was quiet"
-    return f"{quiet}: {spread}{load_average}. The tolerance is {amount(cost.tolerance_m, 'm')}."
 
 
 def main() -> None:

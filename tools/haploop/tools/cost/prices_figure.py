@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -23,6 +23,7 @@ from haploop.tools.figure.style import (
     fix_layout,
     plain_numbers,
 )
+from haploop.tools.linear.stiffness_limit import StiffnessLimit
 from haploop.tools.operations import AGAIN, NONE
 from haploop.tools.render.units import fixed
 
@@ -65,26 +66,23 @@ def figure_of(groups: list[PriceGroup]) -> Figure:
 
 def _bars(ax: Axes, group: PriceGroup) -> None:
     prices = group.prices
+    dress(ax, group.title, f"{group.unit}\n{group.how}", "")
     colours = [GREY, *[WALL] * (len(prices) - 1)]
-    _rows(ax, [price.what for price in prices], [price.time.median for price in prices], colours, group.title)
-    for row, price in enumerate(prices):
-        ax.plot([price.time.q1, price.time.q3], [row, row], color=INK, linewidth=1.6, gid="quartiles")
-    ax.set_xlabel(f"{group.unit}\n{group.how}", fontsize=SMALL, color=INK)
-    _write(ax, [(price.time.q3, f"{fixed(price.time.median)}, {fixed(price.ratio)} ×") for price in prices])
+    words = [f"{fixed(price.time.median)}, {fixed(price.ratio)} ×" for price in prices]
+    _rows(ax, prices, [price.time.median for price in prices], colours, words, xerr=_quartiles(prices))
 
 
 def _effects(ax: Axes, group: PriceGroup) -> None:
     """Draws the time that each effect adds, the dearest first; the shaded band is chance."""
+    whole = f"{group.unit}, of {fixed(group.baseline.time.median)} with all effects"
+    bare = next((f" and {fixed(p.time.median)} with none" for p in group.prices if p.what == NONE), "")
+    dress(ax, "What each effect adds", f"{whole}{bare}; shaded: chance\n{group.how}", "")
     chance = chance_in(group)
     named = [price for price in group.prices[1:] if price.what not in (AGAIN, NONE)]
     named.sort(key=lambda price: -price.costs)
     ax.axvspan(-chance, chance, color=UNCERTAIN, zorder=0, linewidth=0, gid="chance")
     colours = [WALL if abs(price.costs) > chance else FAINT for price in named]
-    _rows(ax, [price.what for price in named], [price.costs for price in named], colours, "What each effect adds")
-    whole = f"{group.unit}, of {fixed(group.baseline.time.median)} with all effects"
-    bare = next((f" and {fixed(p.time.median)} with none" for p in group.prices if p.what == NONE), "")
-    ax.set_xlabel(f"{whole}{bare}; shaded: chance\n{group.how}", fontsize=SMALL, color=INK)
-    _write(ax, [(max(price.costs, 0.0), _counted(price, group)) for price in named])
+    _rows(ax, named, [price.costs for price in named], colours, [_counted(price, group) for price in named])
 
 
 def _counted(price: Price, group: PriceGroup) -> str:
@@ -93,57 +91,52 @@ def _counted(price: Price, group: PriceGroup) -> str:
     return words if whole is None or without is None else f"{words}; {fixed(whole - without)} instructions"
 
 
-def _rows(ax: Axes, names: list[str], values: list[float], colours: list[str], title: str) -> None:
-    dress(ax, title, "", "")
-    ax.barh(range(len(values)), values, color=colours, height=0.62, zorder=2)
-    ax.set_yticks(range(len(names)), names, fontsize=TEXT)
+def _quartiles(prices: list[Price]) -> np.ndarray:
+    """Returns how far the quartiles lie below and above the medians; shape (2, prices)."""
+    times = [price.time for price in prices]
+    return np.array([[time.median - time.q1, time.q3 - time.median] for time in times]).T
+
+
+def _rows(
+    ax: Axes, prices: list[Price], values: list[float], colours: list[str], words: list[str], **look: Any
+) -> None:
+    bars = ax.barh(range(len(values)), values, color=colours, height=0.62, zorder=2, ecolor=INK, **look)
+    ax.bar_label(bars, words, padding=4, fontsize=SMALL, color=INK, gid="value")
+    low, high = ax.get_xlim()
+    ax.set_xlim(min(low, 0.0), high + 0.42 * (high - low))
+    ax.set_yticks(range(len(prices)), [price.what for price in prices], fontsize=TEXT)
     ax.tick_params(axis="y", length=0)
     ax.grid(axis="y", visible=False)
     ax.invert_yaxis()
     ax.spines["left"].set_visible(False)
 
 
-def _write(ax: Axes, ends: list[tuple[float, str]]) -> None:
-    low, high = ax.get_xlim()
-    ax.set_xlim(min(low, 0.0), high + 0.42 * (high - low))
-    gap = 0.015 * (high - low)
-    for row, (end, words) in enumerate(ends):
-        ax.text(end + gap, row, words, va="center", fontsize=SMALL, color=INK, gid="value")
-
-
 def _curve(ax: Axes, group: PriceGroup) -> None:
-    """Draws the largest steady stiffness against time; hollow where runs did not agree with it."""
     dress(ax, group.title, f"{group.unit}\n{group.how}", "largest steady stiffness (N/m)")
-    ax.xaxis.label.set_fontsize(SMALL)
     ax.set_xscale("log")
     ax.set_yscale("log")
     plain_numbers(ax.xaxis)
     plain_numbers(ax.yaxis)
     colour = ELEMENTS[0] if group.name == "delay" else ELEMENTS[1]
-    prices = _with_limit(group)
-    xy = np.array([(price.time.median, price.stiffness.stiffness_N_m) for price in prices if price.stiffness])
-    if not len(xy):
+    if not (limits := _limits(group)):
         return
-    ax.plot(*xy.T, color=colour, linewidth=1.4, zorder=2, gid=f"line {group.name}")
-    for price, (x, y) in zip(prices, xy, strict=True):
-        assert price.stiffness is not None
-        face = colour if price.stiffness.confirmed else "white"
-        ax.plot([price.time.q1, price.time.q3], [y, y], color=colour, linewidth=1.0, gid="quartiles")
-        gid = "confirmed" if price.stiffness.confirmed else "not confirmed"
-        ax.plot([x], [y], marker="o", color=colour, markerfacecolor=face, linestyle="none", zorder=4, gid=gid)
+    times, stiffnesses = [price.time.median for price, _ in limits], [limit.stiffness_N_m for _, limit in limits]
+    quartiles = _quartiles([price for price, _ in limits])
+    ax.errorbar(times, stiffnesses, xerr=quartiles, color=colour, linewidth=1.4, elinewidth=1.0)
+    for price, limit in limits:
+        face, gid = (colour, "confirmed") if limit.confirmed else ("white", "not confirmed")
+        x, y = [price.time.median], [limit.stiffness_N_m]
+        ax.plot(x, y, marker="o", color=colour, markerfacecolor=face, linestyle="none", zorder=4, gid=gid)
     ax.margins(0.12)
 
 
-def _with_limit(group: PriceGroup) -> list[Price]:
-    prices = [price for price in group.prices if price.stiffness]
-    return sorted(prices, key=lambda price: price.stiffness.stiffness_N_m if price.stiffness else 0.0)
+def _limits(group: PriceGroup) -> list[tuple[Price, StiffnessLimit]]:
+    found = [(price, price.stiffness) for price in group.prices if price.stiffness]
+    return sorted(found, key=lambda limit: limit[1].stiffness_N_m)
 
 
 def _label(ax: Axes, group: PriceGroup) -> None:
-    labels = [
-        Label(price.time.median, price.stiffness.stiffness_N_m, price.what, INK, price.what)
-        for price in _with_limit(group)
-        if price.stiffness
-    ]
+    limits = _limits(group)
+    labels = [Label(price.time.median, limit.stiffness_N_m, price.what, INK, price.what) for price, limit in limits]
     lines = [np.asarray(line.get_xydata()) for line in ax.lines if line.get_marker() == "None"]
     place_labels(ax, labels, lines)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from itertools import groupby
 from typing import TYPE_CHECKING
 
 from rich.console import Group
 from rich.text import Text
 
-from haploop.tools.cost.data import QUIET_LOAD, QUIET_SPREAD, Cost, Errors, Point, PriceGroup, SceneCost, Spread
+from haploop.tools.cost.data import Cost, Errors, Point, Price, PriceGroup, SceneCost, Spread
 from haploop.tools.cost.findings import rate, setting
 from haploop.tools.render.terminal import make_table
 from haploop.tools.render.units import amount, fixed
@@ -15,6 +16,7 @@ from haploop.tools.render.units import amount, fixed
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
+PRICE_HEADS = ("", "median", "quartiles", "ratio", "costs", "instructions", "buys")
 _POINTWISE, _SWINGS = ("end m", "RMS m", "max m"), ("swing", "freq.", "energy")
 _READING = (
     "Errors are x - x_ref at the end, RMS and largest over the ticks; or relative ones of the swings' amplitude, "
@@ -27,11 +29,10 @@ _READING = (
 
 def report(cost: Cost) -> RenderableType:
     """Makes the whole report, the advice last, where it is seen."""
-    tables: list[RenderableType] = [scene_table(scene) for scene in cost.scenes]
     lines = [Text.assemble((f"{scene.name}: ", "bold"), scene.advice) for scene in cost.scenes]
     small = [Text(words, style="dim") for words in (_READING, made_with(cost))]
-    tables += [price_table(group) for group in cost.prices]
-    return Group(*tables, *small, *_warnings(cost), *lines)
+    busy = [Text(f"{cost.load} Errors stand.", style="bold yellow")] if cost.load and cost.load.busy else []
+    return Group(*map(scene_table, cost.scenes), *map(price_table, cost.prices), *small, *busy, *lines)
 
 
 def scene_table(scene: SceneCost) -> RenderableType:
@@ -40,13 +41,11 @@ def scene_table(scene: SceneCost) -> RenderableType:
     numbers = (*names, "residual", "µs/tick", "spread", "procs", "bytecode")
     unbroken = ("method", "verdict")
     table = make_table("method", *numbers, "verdict", numbers=numbers, unbroken=unbroken, padding=(0, 0, 0, 0))
-    before = ""
-    for point in scene.points:
-        if point.method != before:
-            table.add_section()
-            table.add_row(point.method)
-        table.add_row(*_row(point), style="bold" if point is scene.own else "")
-        before = point.method
+    for method, points in groupby(scene.points, key=lambda point: point.method):
+        table.add_section()
+        table.add_row(method)
+        for point in points:
+            table.add_row(*_row(point), style="bold" if point is scene.own else "")
     about = scene.reference
     known = f"{about.how} Known to {amount(about.error_m, 'm')}." if about.pointwise else about.how
     failed = [point for point in scene.points if point.failure]
@@ -55,55 +54,46 @@ def scene_table(scene: SceneCost) -> RenderableType:
 
 
 def _row(point: Point) -> list[str | Text]:
-    error, times, processes = point.error, point.us_per_tick, point.processes_us_per_tick
-    count = point.instructions_per_tick
+    """Makes the cells of a point; the time is in brackets where only the few ticks of a failure could be timed."""
+    error, times, count = point.error, point.us_per_tick, point.instructions_per_tick
+    verdict = error.verdict if error else "failed"
     return [
         f"{rate(point.plant_rate):>11}",
-        *(_figures(error) if error else ["–"] * 3),
-        _power(error.residual if error else None),
-        _time(point),
-        _spread(times),
-        fixed(processes.median) if processes else "–",
+        *(f"{value:.1e}" if value is not None else "–" for value in _figures(error)),
+        _median(times) if error or not times else f"({_median(times)})",
+        f"{100 * (times.q3 - times.q1) / times.median:.0f} %" if times else "–",
+        _median(point.processes_us_per_tick),
         "–" if count is None else f"{count:.0f}",
-        _verdict(point),
+        Text(verdict) if point.is_right else Text(f"✗ {verdict}", "red"),
     ]
 
 
-def _figures(error: Errors) -> list[str]:
-    pointwise = error.final_m, error.rms_m, error.max_m
-    swings = error.amplitude, error.frequency, error.energy_per_cycle
-    return [_power(value) for value in (pointwise if error.rms_m is not None else swings)]
+def _figures(error: Errors | None) -> tuple[float | None, ...]:
+    if error is None:
+        return (None,) * 4
+    if error.rms_m is not None:
+        return error.final_m, error.rms_m, error.max_m, error.residual
+    return error.amplitude, error.frequency, error.energy_per_cycle, error.residual
 
 
-def _power(value: float | None) -> str:
-    return "–" if value is None else f"{value:.1e}"
-
-
-def _time(point: Point) -> str:
-    """Formats the time; in brackets where only the few ticks of a failure could be timed."""
-    if point.us_per_tick is None:
-        return "–"
-    median = fixed(point.us_per_tick.median)
-    return f"({median})" if point.error is None else median
-
-
-def _spread(times: Spread | None) -> str:
-    return f"{100 * (times.q3 - times.q1) / times.median:.0f} %" if times else "–"
-
-
-def _verdict(point: Point) -> Text:
-    if point.error is None:
-        return Text("✗ failed", "red")
-    return Text(point.error.verdict) if point.error.verdict_right else Text(f"✗ {point.error.verdict}", "red")
+def _median(times: Spread | None) -> str:
+    return fixed(times.median) if times else "–"
 
 
 def price_table(group: PriceGroup) -> RenderableType:
     """Makes the table of a group of prices; ratios are over its first row."""
-    numbers = (group.unit, "spread", "ratio")
-    table = make_table("", *numbers, "what it buys", numbers=numbers, unbroken=("",), padding=(0, 1, 0, 0))
+    table = make_table(*PRICE_HEADS, numbers=PRICE_HEADS[1:-1], unbroken=("",), padding=(0, 1, 0, 0))
     for price in group.prices:
-        table.add_row(price.what, fixed(price.time.median), _spread(price.time), f"{price.ratio:.2f}", price.buys)
-    return Group(Text(group.title, style="bold"), Text(f"{group.how}.", style="dim"), table)
+        table.add_row(*price_row(price))
+    return Group(Text(group.title, style="bold"), Text(f"{group.unit}; {group.how}.", style="dim"), table)
+
+
+def price_row(price: Price) -> list[str]:
+    """Makes the cells of a price, in the order of ``PRICE_HEADS``."""
+    count, time = price.instructions_per_tick, price.time
+    quartiles = f"{fixed(time.q1)}–{fixed(time.q3)}"
+    instructions = "" if count is None else f"{count:.0f}"
+    return [price.what, fixed(time.median), quartiles, fixed(price.ratio), fixed(price.costs), instructions, price.buys]
 
 
 def made_with(cost: Cost) -> str:
@@ -112,12 +102,3 @@ def made_with(cost: Cost) -> str:
     at = f" at {cost.commit}" if cost.commit else ""
     ways = f"one process {cost.repeats}, as processes {cost.processes_repeats or 'none'}"
     return f"{cost.machine}; {made}{at}. Repeats, interleaved in random order: {ways}."
-
-
-def _warnings(cost: Cost) -> list[Text]:
-    if cost.load is None or not cost.load.busy:
-        return []
-    seen = [f"a fixed loop varied by {100 * cost.load.calibration_spread:.0f} % (quiet: {100 * QUIET_SPREAD:.0f} %)"]
-    if cost.load.average is not None:
-        seen.append(f"the load average was {cost.load.average:.1f} (quiet: {QUIET_LOAD:g}, this program included)")
-    return [Text(f"The machine was busy while times were taken: {', '.join(seen)}. Errors stand.", style="bold yellow")]
