@@ -45,11 +45,7 @@ class Output(TypedDict, total=False):
 
 
 def run_cells(notebook: Notebook) -> None:
-    """Runs every code cell and replaces its outputs.
-
-    Raises:
-        Exception: whatever a cell raises; the notebook is then to be thrown away.
-    """
+    """Runs every code cell and replaces its outputs; where one raises, the notebook is to be thrown away."""
     import matplotlib
 
     matplotlib.use("Agg")

@@ -32,12 +32,7 @@ _FIRST, _COUNTED = 20, 101
 
 @dataclass(frozen=True)
 class Operations:
-    """Bytecode instructions per exchange of samples and commands, which covers L + 1 ticks: the median.
-
-    Attributes:
-        plant, controller: instructions.
-        ticks: ticks an exchange covers.
-    """
+    """Bytecode instructions per exchange of samples and commands, which covers L + 1 ticks: the median."""
 
     plant: int
     controller: int

@@ -18,11 +18,7 @@ from haploop.protocol.transport.telemetry import Block
 
 @dataclass(frozen=True)
 class Trajectory:
-    """The motion of body 0.
-
-    Attributes:
-        x_m, v_m_s: at every tick and at the end, shape (ticks + 1,); fewer where the run diverged.
-    """
+    """The motion of body 0 at every tick and at the end, shape (ticks + 1,); fewer where the run diverged."""
 
     x_m: np.ndarray
     v_m_s: np.ndarray

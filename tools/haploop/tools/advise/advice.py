@@ -38,15 +38,11 @@ class Advice:
     """The whole advice; gains, exact limits and bounds are of each family.
 
     Attributes:
-        notes: what was assumed.
-        tasks: by which every loop was judged.
         tolerance: relative, of the limits.
         uncertain: the quantities that were taken a fifth more or less.
         exact_N_m: rho(M) = 1, None where the loop is not linear.
-        safe: the gains to use.
         scene: that shows it, steady by its own verdict; None where nothing is safe.
         buzz: the causes of buzzing; None where nothing buzzes.
-        runs: how many were run.
     """
 
     name: str

@@ -25,13 +25,11 @@ class Ablation:
     """A loop without some of its causes.
 
     Attributes:
-        without: names of the causes.
         instead: words for what took their place.
         leak_J: their part of the wall's leak with them, negative where energy came out of it; None where not told.
         leak_share: that part of all that leaked that way, 0 to 1.
         steady, verdict, oscillation_m: of its run.
         largest: the largest steady stiffness; None where it was not looked for.
-        is_element: whether it is a dissipation element.
     """
 
     without: tuple[str, ...]

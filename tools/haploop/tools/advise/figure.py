@@ -26,19 +26,14 @@ _LINE, _CLOSE = 125, 2.2
 
 
 def draw(found: Advice, target: Path) -> Path:
-    """Draws into a file, in the format of its suffix.
-
-    Raises:
-        FigureError: matplotlib is missing, or the file cannot be written.
-    """
+    """Draws into a file, in the format of its suffix; FigureError without matplotlib, or where it cannot be written."""
     return style.write_figure(figure_of(found), target)
 
 
 def figure_of(found: Advice) -> Figure:
     """Makes bars of the largest steady walls; below, where something buzzes, bars of those without each cause.
 
-    Raises:
-        FigureError: matplotlib is missing.
+    FigureError where matplotlib is missing.
     """
     buzz = found.buzz if found.buzz and _rows(found.buzz) else None
     rows = [len(found.gains), *([len(_rows(buzz)) + 1] if buzz else [])]

@@ -73,12 +73,7 @@ class Judge:
     """Runs loops, in arrays or on several cores, and judges them; a context manager.
 
     Args:
-        kinds, plugins: element kinds at hand, and the files they came from.
         workers: processes for heavy work; as many as there are cores when None.
-        on_progress: called with the number of runs done so far.
-
-    Attributes:
-        runs: their number so far.
     """
 
     def __init__(

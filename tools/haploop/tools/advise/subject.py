@@ -63,9 +63,7 @@ def make_subject(
 ) -> Subject:
     """Makes the scene that the arguments of the command name.
 
-    Raises:
-        InvalidRequest: a name that is none.
-        SceneError: the scene cannot be run.
+    InvalidRequest for a name that is none, SceneError where the scene cannot be run.
     """
     path, is_preset = _device(device)
     layers, notes = read_layers(path), []

@@ -34,7 +34,6 @@ class Tasks:
     Attributes:
         scenes: one a task, the more demanding first; walls and elements are laid in place of theirs.
         seeds: of each task; one unless something is random.
-        words: for what is done.
     """
 
     scenes: tuple[Scene, ...]

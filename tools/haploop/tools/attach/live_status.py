@@ -20,15 +20,8 @@ _FACTOR_OVER_S = 2.0
 class LiveStatus:
     """Keeps the newest message of each kind, and decodes it only when asked.
 
-    Args:
-        run_id: identifier of the run.
-        welcome: fields of the clock's WELCOME.
-
     Attributes:
-        time: the integers of the run.
-        title: of the run.
         tick: every tick before this one has been received.
-        paused: whether the run is paused.
         factor: simulated over wall time of the last 2 s; None while nothing moves.
         changes: every event so far, (tick, event) in order.
         skipped_ticks: telemetry that never came.

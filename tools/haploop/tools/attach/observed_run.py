@@ -52,7 +52,6 @@ class ObservedRun:
     """Observes one run from its present tick to its end; a context manager that leaves it.
 
     Attributes:
-        observer: the node that has joined it.
         failure: why the run ended early, as a sentence; "" while it goes on and after a normal end.
 
     Raises:

@@ -102,9 +102,6 @@ def pack_array_of_maps(layout: TableLayout, values: Floats) -> bytes:
 class Outlet:
     """The socket that PlotJuggler connects to, on this machine only; a viewer that does not read loses messages.
 
-    Attributes:
-        address: to connect to.
-
     Raises:
         PortTaken: another program has the port.
     """
@@ -169,12 +166,7 @@ def attach_plotjuggler(run_id: str | None, port: int) -> None:
 
 
 def publish(run: LiveRun, outlet: Outlet) -> None:
-    """Publishes a run from its present tick to its end.
-
-    Raises:
-        RunNotFound: it has ended already.
-        Refused: it does not let the node join.
-    """
+    """Publishes a run from its present tick to its end; RunNotFound after that, Refused where it lets no node join."""
     with ObservedRun(run, ROLE) as observed:
         print(f"run {run.id}: {run.title}", file=sys.stderr)
         stream = SampleStream(Timebase(**observed.observer.welcome["timebase"]))
@@ -191,11 +183,7 @@ def publish(run: LiveRun, outlet: Outlet) -> None:
 
 
 class SampleStream:
-    """Turns telemetry into the samples of the log, under the log's names; the state between two blocks comes once.
-
-    Attributes:
-        batches: gathers them.
-    """
+    """Turns telemetry into the samples of the log, under the log's names; the state between two blocks comes once."""
 
     def __init__(self, time: Timebase) -> None:
         self.batches = MessageBatches()

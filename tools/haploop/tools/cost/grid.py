@@ -32,10 +32,8 @@ class Candidate:
     """One scene with one method at one plant rate.
 
     Attributes:
-        path: the scene file.
         method, plant_rate: of this candidate, rate in Hz.
         scene: resolved; None where the check refuses it.
-        refusal: why it does; "" where it does not.
     """
 
     path: Path
@@ -79,11 +77,7 @@ class Grid:
 
 
 def grid(path: Path, methods: Sequence[str], rates: Sequence[int]) -> Grid:
-    """Makes every candidate of a scene file.
-
-    Raises:
-        SceneError: the scene cannot be run as it is.
-    """
+    """Makes every candidate of a scene file; SceneError where the scene cannot be run as it is."""
     made = Grid(path, load(path), [])
     order = [*methods, made.own[0]]
     settings = {*itertools.product(methods, rates), made.own}
@@ -127,7 +121,6 @@ class Outcome:
 
     Attributes:
         error: against the reference; None where it failed.
-        failure: why it did, as a sentence.
         ticks: that the run had; 0 for one that could not be run at all.
         instructions_per_tick: bytecode instructions of plant and controller.
     """

@@ -31,8 +31,6 @@ class Measurement:
     """The measurements of some grids, kept in a directory; a context manager.
 
     Args:
-        grids: what to compare.
-        out: the directory, made.
         repeats, processes_repeats: of each time in one process and as processes; 0 for not at all.
         find_reference: makes or finds what the runs of a scene, given by its file and resolved, are compared with.
     """

@@ -128,7 +128,6 @@ class Prices:
 
     Args:
         scenes: the folder of the scenes that come with haploop.
-        store: where measurements are kept, open.
         repeats: of each time, by way; prices of a way with 0 repeats are left out.
     """
 

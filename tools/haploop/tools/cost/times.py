@@ -97,8 +97,6 @@ class Job:
     Attributes:
         way: ``IN_PROCESS`` or ``PROCESSES``.
         family: jobs of which one, run untimed beforehand, warms up all.
-        key: its name in the store.
-        scene: resolved.
         clock: runs it once and returns the time of a tick, µs; None where the run failed.
     """
 
@@ -146,13 +144,9 @@ def loop_us(scene: Scene) -> float | None:
 
 
 def tick_us(block: Callable[[], bool], tick: Callable[[], int]) -> float | None:
-    """Returns the time of a tick of a loop, µs; None where there was none.
+    """Returns the time of a tick of a loop, µs; None where there was none. ``block`` is False when the run has ended.
 
     The first block, which makes what later ones only use, is not counted; a run of a single block is counted whole.
-
-    Args:
-        block: works through one block; False when the run has ended.
-        tick: tells the tick that the loop has reached.
     """
     going = True
 
@@ -185,8 +179,7 @@ def timed_s(work: Callable[[], object]) -> float:
 def run_us(path: Path, overrides: Sequence[str], ticks: int) -> float | None:
     """Returns the time of a tick as processes, starting up not included, µs; None where the run failed.
 
-    Raises:
-        KeyboardInterrupt: a signal ended the run.
+    KeyboardInterrupt where a signal ended it.
     """
     with tempfile.TemporaryDirectory() as folder:
         try:
@@ -256,10 +249,8 @@ def quiet(store: Store, jobs: Sequence[Job], repeats: int) -> Load | None:
 def _observe_machine(alone: bool) -> dict[str, float | None]:
     """Returns the time of a fixed calibration loop, s, and the load average, None where the system tells none.
 
-    The load average counts the processes that run or wait for a core in the last minute.
-
-    Args:
-        alone: this process is all that should run; otherwise the load average tells nothing.
+    The load average counts the processes that run or wait for a core in the last minute; it tells nothing unless this
+    process is ``alone`` to run.
     """
     value = 1.0
     began = time.perf_counter()

@@ -22,8 +22,7 @@ from haploop.tools.dissipate.samples import Floats, Samples
 class Booked(NamedTuple):
     """The books at some samples: t_s and x_m of shape (samples,), the others (elements, samples).
 
-    Attributes:
-        added_J: gain of the true books since the sample before.
+    ``added_J`` is the gain of the true books since the sample before.
     """
 
     t_s: Floats
@@ -43,9 +42,7 @@ class Booking:
     After a gap everything but the sums starts again; the motion within it is not known and not booked.
 
     Args:
-        scene: resolved: estimators, wall and elements of a controller.
         period_s, delay_s: T and d.
-        kinds: element kinds at hand.
         recorded: which of "velocity" and "acceleration" come with the samples and are taken as they are.
 
     Attributes:

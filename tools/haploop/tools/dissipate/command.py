@@ -32,7 +32,6 @@ class Request:
     """The arguments of the command line.
 
     Attributes:
-        path: a text file, a run's directory or its log.
         delay_s: delay of the forces; None for none, or for that of the run.
         out: file of the figure; beside the recording when None.
     """

@@ -42,11 +42,7 @@ class Selection:
     overrides: Sequence[str] = ()
 
     def tables(self) -> frozenset[str]:
-        """Returns the tables that the overrides change.
-
-        Raises:
-            RecordingError: an override is of another table.
-        """
+        """Returns the tables that the overrides change; RecordingError where one is of another table."""
         found = set()
         for text in self.overrides:
             table = (key_path(text.partition("=")[0]) or [text])[0]
@@ -68,9 +64,7 @@ def make_scene_for_text(
 ) -> Scene:
     """Makes the scene for a recording in a text file.
 
-    Raises:
-        RecordingError: the selection does not fit the recording.
-        SceneError: a number or a kind is wrong.
+    RecordingError where the selection does not fit it, SceneError where a number or a kind is wrong.
     """
     if clash := sorted(selection.tables() & recorded):
         raise RecordingError(f"Give either a column of the {clash[0]} or --set for its estimate, not both.")
@@ -84,11 +78,9 @@ def make_scene_for_text(
 
 
 def make_scene_for_log(selection: Selection, path: Path, scene: Scene, kinds: Kinds) -> Scene:
-    """Makes the scene for a run's log: its own estimators and wall unless others are selected, its events of the wall.
+    """Makes the scene for a run's log: its own estimators, wall and events of the wall unless others are selected.
 
-    Raises:
-        RecordingError: the selection does not fit the recording.
-        SceneError: a number or a kind is wrong.
+    RecordingError where the selection does not fit it, SceneError where a number or a kind is wrong.
     """
     kept = ("title", "duration", "clock", "device", "encoder", "noise", "accelerometer", *_ESTIMATED, "wall")
     made = _make_scene(Scene(**{key: getattr(scene, key) for key in kept}), selection, path, kinds)

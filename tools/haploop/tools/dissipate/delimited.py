@@ -40,15 +40,10 @@ class DelimitedFile:
 
     Attributes:
         columns: by the names of the header, or numbered from 1.
-        has_header: whether the first line names them.
     """
 
     def __init__(self, path: Path) -> None:
-        """Finds delimiter and columns from the beginning of the file.
-
-        Raises:
-            RecordingError: there is no such file, or no row in it.
-        """
+        """Finds delimiter and columns from the beginning of the file; RecordingError without a file or a row."""
         self.path = path
         with _open_lines(self.path) as lines:
             first = list(itertools.islice((line for line in lines if line.strip()), 50))
@@ -64,11 +59,7 @@ class DelimitedFile:
         self.columns = [_column(index, cell) for index, cell in enumerate(cells)]
 
     def column(self, given: str, what: str) -> Column:
-        """Returns the column of this name, or with this number from 1.
-
-        Raises:
-            RecordingError: there is none; it names the nearest.
-        """
+        """Returns the column of this name, or with this number from 1; a RecordingError names the nearest."""
         found = [c for c in self.columns if given.strip() in (c.name, f"{c.name} ({c.unit})", f"{c.name} [{c.unit}]")]
         found = found or [c for c in self.columns if c.name.lower() == given.strip().lower()]
         if not found and given.isdecimal() and 1 <= int(given) <= len(self.columns):

@@ -26,11 +26,7 @@ _LINE_LETTERS = 170
 
 
 def make_figure(outcome: Outcome) -> Figure:
-    """Draws motion and energies, whole and in detail, the table, and notes on the recording.
-
-    Raises:
-        FigureError: matplotlib is missing.
-    """
+    """Draws motion and energies, whole and in detail, the table, and notes; FigureError where matplotlib is missing."""
     figure = style.empty_figure(13.0, 7.8)
     header, body = figure.subfigures(2, 1, squeeze=False, height_ratios=(0.085, 1.0))[:, 0]
     lines, close = outcome.trace.lines(), outcome.trace.close

@@ -21,11 +21,9 @@ _COLUMNS = {"/controller": ("timestamp", "x", "v", "a"), "/plant": ("x",)}
 
 
 def read_scene(path: Path) -> Scene:
-    """Reads the resolved scene in a run's log.
+    """Reads the resolved scene in a run's log; RecordingError where none is attached.
 
-    Raises:
-        FileNotFoundError, LogError: there is no log, or none that can be read.
-        RecordingError: no scene is attached.
+    FileNotFoundError, LogError where there is no log, or none that can be read.
     """
     log = LogStream(path, topics=())
     for _ in log:
@@ -50,7 +48,6 @@ class LogRecording:
     The force of tick k would have acted from step k n + d on, n steps a tick, d the scene's delay or another one.
 
     Args:
-        path: a run's directory or its log, with this scene in it.
         delay_s: delay of the forces; that of the scene when None.
         estimated: which of "velocity" and "acceleration" are to be estimated again, not taken from the run.
     """
@@ -104,7 +101,6 @@ class _Waiting:
 
     Args:
         n, late: plant steps a tick, and the one of them at which a delayed force changes.
-        of_steps: whether the plant's steps were logged.
     """
 
     def __init__(self, n: int, late: int, of_steps: bool) -> None:

@@ -87,7 +87,6 @@ class ElementOutcome:
     """The numbers of one element.
 
     Attributes:
-        kind, parameters: as in a scene, with when it acts.
         label: kind and parameters in short: "damping 2.7 N s/m", "my element (mass 1.80 g, damping 0.1 N s/m)".
         sampled_J, true_J: its books at the end; positive: taken out of the device.
         taken_J, given_J: energy taken in the periods in which it dissipates, and given back in the others (true books).

@@ -42,11 +42,8 @@ class Notes:
     """Counts of what was found in a recording.
 
     Attributes:
-        rows, unusable_rows: used, and left out, since a number in them is missing or not finite.
         gaps_s: begin and end of each gap, s; the first hundred.
-        gaps, missing_s: number of gaps, and their length in all, s.
         uneven: periods that are more than a tenth off the others.
-        remarks: further notes for people, a sentence each.
     """
 
     rows: int = 0

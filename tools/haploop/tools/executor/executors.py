@@ -58,8 +58,7 @@ class Executor:
 def make_executor(workers: int | None = None, dask: str | None = None) -> Executor:
     """Makes the executor of ``workers`` processes, one a core when None, this one when 1, or of a Dask scheduler's.
 
-    Raises:
-        ExecutorError: there is no such cluster.
+    ExecutorError where there is no such cluster.
     """
     if dask:
         return DaskExecutor(dask)

@@ -41,7 +41,6 @@ class Sizes:
     """Finds the number of items the next part should have, of ``most``, which memory is proportional to.
 
     Args:
-        workers: that share the parts.
         count: of all items, so that no worker has to wait long for another in the end; None where it is not known.
     """
 

@@ -65,7 +65,6 @@ class Pool:
 
         Args:
             groups: of items that belong together; taken when there is room for them.
-            count: of all items, where it is known.
             stop: asked before each part; True ends the work after those under way.
 
         Yields:
@@ -130,11 +129,7 @@ class Pool:
 
 
 def read_sources(plugins: Iterable[Path]) -> tuple[tuple[str, str], ...]:
-    """Reads plugin files for workers, which have none of their own, as (path, text).
-
-    Raises:
-        PluginError: one cannot be read, or does not load.
-    """
+    """Reads plugin files for workers, which have none of their own, as (path, text); PluginError for one of no use."""
     for path in plugins:
         load_plugin(path)
     return tuple((str(path), path.read_text(encoding="utf-8")) for path in map(Path, plugins))

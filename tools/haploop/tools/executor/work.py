@@ -33,8 +33,6 @@ class Work:
             item is refused.
         keep: from an item, its scene (None where it was refused) and its result to what travels back: by default all.
         sources: plugin files as (name, text); a worker on another machine has no files of this one.
-        energy, trajectories: as for ``batch_results``.
-        compiled: whether to run compiled by JAX, which hashes no trajectories.
     """
 
     make: Callable[[Any], Scene] = _scene_itself
@@ -105,8 +103,7 @@ def _safely(results: Results, scenes: dict[int, Scene], left: list[int]) -> Iter
 def load_kinds(sources: Sources) -> dict[str, type[Element]]:
     """Loads the element kinds at hand, the installed ones and those of these sources, once in this process.
 
-    Raises:
-        PluginError: one does not load.
+    PluginError where one does not load.
     """
     from haploop.controller.dissipation import registry
     from haploop.controller.dissipation.registry import load_source

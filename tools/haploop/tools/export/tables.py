@@ -51,7 +51,6 @@ class ExportWriter(ABC):
         Args:
             files: one a topic in the order of ``units``, or one for all; closed by the caller.
             units: by topic, unit by column of all that will come; empty for a topic of free maps.
-            attachments: content of each file attached to the log, by name.
         """
 
     @abstractmethod

@@ -31,7 +31,6 @@ class ElementSpan:
     """An element with one set of parameters and the ticks it covers; it has one book of energy.
 
     Attributes:
-        element: as in the scene.
         from_tick, to_tick: ticks covered, half-open; the end is infinite while it is at work.
         slots: (place in the list of elements, from_tick, to_tick): where its force is in the log.
         name: as its book is called in the log: the kind, numbered from the second of a kind on.
@@ -118,8 +117,6 @@ class RunData:
     """The scene, summary and log of a run.
 
     Attributes:
-        summary: empty where there is none.
-        events: as logged, each with its ``tick`` and its time ``timestamp``.
         controller, energy: columns at every tick, with ``timestamp``.
         t_s, x_m, v_m_s, force_N: the motion at every plant step and the force applied from there on; at every tick
             what the controller measured and asked for, where the plant was not logged (``every_step`` is False).
@@ -145,12 +142,7 @@ class RunData:
 
     @classmethod
     def from_directory(cls, directory: Path) -> RunData:
-        """Reads a run's directory.
-
-        Raises:
-            FigureError: there is nothing that could be drawn.
-            LogError: the log is no log.
-        """
+        """Reads a run's directory; FigureError where there is nothing to be drawn, LogError where the log is none."""
         scene_file, summary_file = directory / "scene.toml", directory / "summary.json"
         text = scene_file.read_text(encoding="utf-8") if scene_file.exists() else ""
         if not (directory / "log.mcap").exists():

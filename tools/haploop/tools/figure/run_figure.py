@@ -56,11 +56,7 @@ def draw(directory: Path, target: Path | None = None) -> Path:
 
 
 def make_figure(run: RunData) -> Figure:
-    """Makes the figure of a run, with all panels.
-
-    Raises:
-        FigureError: matplotlib is missing.
-    """
+    """Makes the figure of a run, with all panels; FigureError where matplotlib is missing."""
     figure = empty_figure(15.0, 9.2)
     events = event_lines(run)
     heights = 0.085, 1.0, 0.001 + 0.025 * len(events)

@@ -86,11 +86,7 @@ _DPI = 110
 
 
 def empty_figure(width_in: float, height_in: float) -> Figure:
-    """Returns a white figure of this size in inches that makes room for what it holds.
-
-    Raises:
-        FigureError: matplotlib is missing.
-    """
+    """Returns a white figure of a size in inches that makes room for what it holds; FigureError without matplotlib."""
     try:
         from matplotlib.figure import Figure
     except ImportError as error:
@@ -99,11 +95,7 @@ def empty_figure(width_in: float, height_in: float) -> Figure:
 
 
 def write_figure(figure: Figure, target: Path) -> Path:
-    """Writes a figure in the format of the file's suffix; returns the file.
-
-    Raises:
-        FigureError: it cannot be written.
-    """
+    """Writes a figure in the format of the file's suffix; returns the file. FigureError where it cannot be written."""
     try:
         figure.savefig(target, dpi=_DPI)
     except (ValueError, OSError) as error:

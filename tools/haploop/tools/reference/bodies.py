@@ -26,11 +26,7 @@ class Bodies:
     Load is tau + k_h rest and rises by its slope, N/s; command and friction are held. p' = 2 pi bandwidth (command - p)
     and y' = 2 pi bandwidth (a - y); both are absent where the scene has no bandwidth.
 
-    Args:
-        scene: resolved.
-
     Attributes:
-        count: bodies.
         free, stuck: A, with body 0 free, and held where it is.
         force: the row of w that gives the force on body 0 without friction, N.
         sensed: by whether body 0 is stuck, the row of w that an accelerometer feels.
@@ -92,12 +88,7 @@ class Bodies:
 
 
 class Flow:
-    """e^{A t} of one mode: over a fixed length by the matrix exponential, over any shorter one by its series.
-
-    Args:
-        rates: A.
-        length_s: the fixed length.
-    """
+    """e^{A t} of one mode: over a fixed length by the matrix exponential, over any shorter one by its series."""
 
     def __init__(self, rates: Matrix, length_s: Any) -> None:
         self._rates = rates

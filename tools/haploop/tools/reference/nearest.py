@@ -33,9 +33,7 @@ class Reference:
     """The motion of a scene.
 
     Attributes:
-        scene: its name.
         how: how it was made and checked, a sentence.
-        verdict: the word.
         pointwise: whether positions at a time can be compared; if not, the scene's swings can.
         error_m: how far off they may be, the largest at any tick.
         statistics: see ``statistics``.

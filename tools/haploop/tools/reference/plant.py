@@ -39,13 +39,11 @@ class StickSlipPlant(ABC, Generic[Vector]):
 
     Args:
         scene: resolved; friction without a Stribeck velocity, since that is not linear.
-        bodies: of the scene.
         w: states at t = 0.
         number: converts a float of the scene to the numbers of w.
 
     Attributes:
         w: states, as of ``Bodies``.
-        is_stuck: whether body 0 is held by friction.
     """
 
     def __init__(self, scene: Scene, bodies: Bodies, w: Vector, number: Any) -> None:
@@ -105,7 +103,6 @@ class ContinuousPlant(StickSlipPlant[Row]):
     first root, if there is one, is where the mode ends, known to 1e-30 s. None is missed: see ``sign_changes``.
 
     Args:
-        scene: as of ``StickSlipPlant``.
         period_s: one tick, as an exact number.
     """
 
@@ -164,9 +161,6 @@ class IntegratedPlant(StickSlipPlant[np.ndarray]):
     """The plant of a scene by scipy's DOP853 in floats (Dormand and Prince), with events where friction switches.
 
     In relative coordinates, each body's from the one before: a stiff cable's force is no difference of two positions.
-
-    Args:
-        scene, period_s: as of ``ContinuousPlant``.
     """
 
     def __init__(self, scene: Scene, period_s: Any) -> None:

@@ -29,7 +29,6 @@ class ProgressLine:
     """One live line while a run goes on, gone when it ends; nothing where there is no terminal. A context manager.
 
     Args:
-        title: of the run.
         duration_s: simulated time of the run.
         console: where to show it; stderr when None.
     """
@@ -73,12 +72,9 @@ class ProgressLine:
             self._live.update(self.line(status, factor, self._live.console.width), refresh=True)
 
     def line(self, status: Message, factor: float, width: int) -> Text:
-        """Makes the line for a status, cut to ``width`` columns.
+        """Makes the line for a status of the logger, cut to ``width`` columns.
 
-        Args:
-            status: of the logger.
-            factor: simulated over real time; 0 where unknown.
-            width: columns of the terminal.
+        ``factor`` is simulated over real time; 0 where unknown.
         """
         from rich.text import Text
 

@@ -40,7 +40,6 @@ def make_table(
     """Makes a table with a line below its heads and no other.
 
     Args:
-        heads: of the columns.
         numbers: heads of the columns whose cells are set to the right, on one line.
         unbroken: heads of other columns whose cells stay on one line.
         padding: of every cell: top, right, bottom, left.
@@ -64,7 +63,6 @@ def make_facts(rows: Iterable[tuple[str, str | Text]], least_width: int | None =
     """Makes a grid of names and values, without lines or heads.
 
     Args:
-        rows: name and value.
         least_width: of the names, letters.
     """
     from rich.table import Table
@@ -81,7 +79,6 @@ def markdown_table(heads: Sequence[str], rows: Iterable[Sequence[str]], numbers:
     """Returns a table in Markdown.
 
     Args:
-        heads: of the columns.
         rows: cells in the order of the heads; a bar in a cell is escaped.
         numbers: places of the columns that are set to the right, counted from 0.
     """

@@ -53,12 +53,10 @@ def find_boundaries(
     """Finds the boundary of every row.
 
     Args:
-        rows: how many.
         points: values on the axis, run for every row; the search goes from the first to the last.
         run: runs candidates and yields the index of each with its row of the table, in any order; one that it does
             not yield leaves its boundary unknown.
         holds: whether that is on the near side; None where it tells nothing, as when the run failed.
-        property: what holds, for the reasons.
 
     Raises:
         ValueError: there are fewer than two points, or they do not go one way.

@@ -40,7 +40,6 @@ class Axis:
 
     Attributes:
         values: numbers in an SI unit; or, unit None, names, tables, whatever a scene may hold there.
-        whole: whether they are whole numbers.
     """
 
     key: str
@@ -87,7 +86,6 @@ class Sweep:
         base: the resolved scene that the axes vary, one to three in the order of the file.
         repeat: seeds of every combination: that of the scene, and those after it.
         record: columns of what is recorded, by dotted keys of a summary.
-        bisect: None for a grid.
     """
 
     title: str

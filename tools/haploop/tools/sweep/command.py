@@ -36,12 +36,9 @@ class Request:
     """The arguments of the command.
 
     Attributes:
-        path: the sweep file.
-        overrides: of the scene, ``KEY=VALUE``.
         out: directory; one below ``runs/`` when None.
         workers: processes; as many as there are cores when None.
         dask: address of a scheduler, or None.
-        plugins: files that define elements.
     """
 
     path: Path
@@ -131,11 +128,7 @@ def _run(request: Request, made: Sweep, directory: Path) -> Summary:
 
 
 def _directory(request: Request, made: Sweep) -> Path:
-    """Returns the directory: a new one, or that of this very sweep, which then goes on.
-
-    Raises:
-        OutputError: it holds something else.
-    """
+    """Returns a new directory, or that of this very sweep, which then goes on; OutputError for any other."""
     out, text = request.out, made.toml()
     if out is not None and (out / SWEEP).is_file():
         there = (out / SWEEP).read_text(encoding="utf-8")

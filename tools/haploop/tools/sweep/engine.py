@@ -27,7 +27,6 @@ class Engine:
 
     Args:
         store: where its rows go, and where those of an earlier call are.
-        progress: told of every part.
         stop: asked between parts; True ends the sweep after those under way.
         compiled: whether to run compiled by JAX.
     """

@@ -29,11 +29,7 @@ _ROUNDING = Decimal("1e-9")
 
 
 class NoSuchKey(ValueError):
-    """A key that no scene of this shape has.
-
-    Attributes:
-        given, expected, nearest: as for a ``Mistake``.
-    """
+    """A key that no scene of this shape has; its fields are those of a ``Mistake``."""
 
     def __init__(self, expected: str, given: str = "cannot be set", nearest: str | None = None) -> None:
         super().__init__(expected)
@@ -46,7 +42,6 @@ def number_at(path: Sequence[str], scene: Layers, kinds: Mapping[str, type[Eleme
     Args:
         path: parts of the dotted key.
         scene: says which kind each table is that has kinds.
-        kinds: element kinds at hand.
 
     Raises:
         NoSuchKey: no scene like this one has the key.
@@ -140,8 +135,7 @@ class PointsError(ValueError):
 def make_points(span: Span, number: Number) -> list[float]:
     """Returns the values of a span in SI units.
 
-    Raises:
-        PointsError: an end or the step is no such number, or they do not go together.
+    PointsError where an end or the step is no such number, or they do not go together.
     """
     first, last = _read(number, "from", span.start), _read(number, "to", span.to)
     if first == last:
@@ -163,8 +157,7 @@ def make_points(span: Span, number: Number) -> list[float]:
 def listed(values: list[Any], number: Number | None) -> list[Any]:
     """Returns the values of a list, numbers in SI units.
 
-    Raises:
-        PointsError: there are none, one is no such number, or stands there twice.
+    PointsError where there are none, one is no such number, or stands there twice.
     """
     if not values:
         raise PointsError("", "It must have at least one value.")

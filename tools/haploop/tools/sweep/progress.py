@@ -21,8 +21,6 @@ class SweepProgress:
 
     Attributes:
         counts: of all rows, those of earlier calls too, by verdict, or by how a run ended that has none.
-        ran: cells of this call.
-        reason: of the first cell that failed.
     """
 
     def __init__(self, title: str, terminal: Console | None = None) -> None:

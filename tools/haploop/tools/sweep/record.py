@@ -32,9 +32,7 @@ def make_columns(
     """Makes a column for each key; the verdict is always among them.
 
     Args:
-        names: dotted keys.
         sweep: what will be run; the first and the last of its cells that can be run are sampled.
-        kinds: element kinds at hand.
         complain: told the place of a key that is that of no number, word or truth value, a sentence about it, and
             the nearest key.
     """

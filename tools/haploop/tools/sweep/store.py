@@ -125,10 +125,9 @@ class Store:
 
 
 def lock(directory: Path) -> int:
-    """Keeps other sweeps out of a directory as long as the file descriptor is open; a killed program leaves no trace.
+    """Keeps other sweeps out of a directory, with an OutputError, as long as the file descriptor is open.
 
-    Raises:
-        OutputError: another one is at work there.
+    A killed program leaves no trace.
     """
     descriptor = os.open(directory / LOCK, os.O_RDWR | os.O_CREAT, 0o644)
     try:

@@ -61,7 +61,6 @@ def load(path: Path, overrides: Sequence[str] = (), sources: Sources = ()) -> Sw
     """Reads the resolved sweep of a TOML file.
 
     Args:
-        path: the sweep file.
         overrides: ``KEY=VALUE`` with dotted keys of the scene, laid over what the file says.
         sources: plugin files, by name and text.
 

@@ -28,11 +28,7 @@ class NeedsPyarrow(ImportError):
 
 
 def pyarrow() -> Any:
-    """Imports pyarrow with its Parquet.
-
-    Raises:
-        NeedsPyarrow: it is not installed.
-    """
+    """Imports pyarrow with its Parquet; NeedsPyarrow where it is not installed."""
     try:
         import pyarrow
         import pyarrow.parquet

@@ -58,7 +58,6 @@ class Finding:
     """The outcome of a test of a claim.
 
     Attributes:
-        numbers: what was computed, with units.
         assumption: what has to be assumed for it to hold; empty for the other verdicts.
 
     Raises:

@@ -45,8 +45,7 @@ def make_figure(
 ) -> None:
     """Makes one figure: picture, data, scenes and findings go into ``out``.
 
-    Raises:
-        FigureError: matplotlib is missing, or a picture cannot be written.
+    FigureError where matplotlib is missing, or a picture cannot be written.
     """
     module, work = figure(number), Work(out, number, small=small, workers=workers, stage=stage)
     work.keep(module.make(work))
@@ -57,7 +56,6 @@ def write_page(directory: Path, target: Path | None = None, pictures: str = "") 
 
     Args:
         directory: what ``haploop paper`` made, wholly or in part.
-        target: the page; ``paper.md`` in the directory when None.
         pictures: where the pictures lie, seen from the page, with a slash at the end.
     """
     target = target or directory / PAGE

@@ -86,11 +86,8 @@ def claims_table(
     """Returns a table with a row a claim: where it holds, how often, and what decides it.
 
     Args:
-        claims: what is tested, by name.
         alone: interpretations with a column of yes or no, by heading.
         shares: sets of interpretations with a column of shares, by heading.
-        found: options that may decide.
-        decided: heading of the column of options.
     """
     rows = []
     for name, about in claims.items():

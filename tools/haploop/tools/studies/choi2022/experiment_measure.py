@@ -68,9 +68,7 @@ def _run_all(scenes: Sequence[Scene], *, energy: bool = False) -> list[Summary]:
 def stiffness_ladder(setups: Sequence[Setup], stiffnesses: np.ndarray = STIFFNESSES) -> list[Steady]:
     """Returns for each setup and element which sizes leave which walls steady, up to the first wall that none does.
 
-    Args:
-        setups: best of one structure, so that they run in one batch.
-        stiffnesses: of the walls, N/m, upwards.
+    The setups are best of one structure, so that they run in one batch; the stiffnesses in N/m go upwards.
     """
 
     def ask(stiffness: float, going: Sequence[tuple[int, str]]) -> list[list[bool]]:
@@ -94,8 +92,7 @@ def largest(steady: np.ndarray, stiffnesses: np.ndarray = STIFFNESSES) -> float:
 def measure(setups: Sequence[Setup]) -> list[Row]:
     """Returns a row for each setup: its values, the largest stiffnesses, 0.0 for each claim that holds, its distance.
 
-    Args:
-        setups: best of one structure, so that they run in one batch.
+    The setups are best of one structure, so that they run in one batch.
     """
     ladders = stiffness_ladder(setups)
     booked = _run_all([_booked(setup, k) for setup in setups for k in BOOKED_AT_N_M], energy=True)

@@ -56,8 +56,7 @@ def search(work: Work) -> Found[Point]:
 def measure(interpretations: Sequence[Point]) -> list[Row]:
     """Returns a row for each interpretation: its ``as_row``, the swings in m, and by name the shortfall of each claim.
 
-    Args:
-        interpretations: best of one structure, so that they run in one batch.
+    The interpretations are best of one structure, so that they run in one batch.
     """
     variants = [_variants(interpretation) for interpretation in interpretations]
     names, count = list(variants[0]), len(interpretations)

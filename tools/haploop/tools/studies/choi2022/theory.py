@@ -225,8 +225,7 @@ class GatedMap:
     def growth(self, stiffness: ArrayLike, mass: ArrayLike, *, seed: int = 1, ticks: int = _TICKS) -> np.ndarray:
         """Returns ln of the factor per tick by which the fastest of some random starts grows in the end, peak to peak.
 
-        Args:
-            stiffness, mass: N/m and kg, of the same shape or broadcast to one.
+        ``stiffness`` (N/m) and ``mass`` (kg) are of the same shape or broadcast to one.
         """
         k, m = np.broadcast_arrays(np.asarray(stiffness, float), np.asarray(mass, float))
         shape = (_STARTS, *k.shape)

@@ -52,14 +52,10 @@ class Work:
     """The means and the results of one figure.
 
     Args:
-        out: directory of all figures.
-        number: of the figure.
         small: whether a version of seconds is wanted, with fewer runs; it need not come to the same verdicts.
         workers: processes for many runs; as many as there are cores when None.
-        stage: shows the progress of many runs.
 
     Attributes:
-        kinds: classes of elements, by name.
         texts: of the figure, by name: its title among them.
         answer: what a builder of devices can take from it, in a sentence or two; empty for what has none.
         caption: what is to be seen, in a sentence or two; that of the texts unless set.

@@ -37,8 +37,6 @@ class Axis:
     """An axis of a map.
 
     Attributes:
-        key: dotted key of the scene.
-        unit: of its values; "" for none.
         values: ascending; the numbers 0, 1, ... where they stand for ``names``.
         names: of the values where they are no numbers, in the order of the sweep; else empty.
         planned: the values that the sweep asks for, ascending; a search runs others in between.
@@ -96,13 +94,7 @@ class Cells:
 
 @dataclass(frozen=True)
 class MapData:
-    """A sweep's table.
-
-    Attributes:
-        title, base: titles of the sweep, and of the scene that it starts from.
-        axes: one to three, in the order of the sweep.
-        boundary: columns of the boundaries of a bisecting sweep; empty without.
-    """
+    """A sweep's table."""
 
     title: str
     base: str
@@ -193,8 +185,7 @@ def make_map_data(
 ) -> MapData:
     """Makes the data of a map from a sweep's table, its units and the table of its boundaries.
 
-    Raises:
-        FigureError: there is no row, or no verdict was recorded.
+    FigureError where there is no row, or no verdict was recorded.
     """
     if "verdict" not in columns:
         raise FigureError('A map shows verdicts, and this sweep recorded none; add "verdict" to its record.')

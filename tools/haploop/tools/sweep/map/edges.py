@@ -136,8 +136,7 @@ def furthest(edges: Edges) -> Furthest | None:
 class StiffestSteady:
     """A cell, as an index into the cells it was looked for in.
 
-    Attributes:
-        open_end: whether no stiffer wall was tried with its other values.
+    ``open_end``: no stiffer wall was tried with its other values.
     """
 
     index: tuple[int, ...]
@@ -150,9 +149,6 @@ def stiffest_steady(axes: Sequence[Axis], cells: Cells) -> StiffestSteady | None
 
     Where several cells share it, the one in the middle of them is taken. None where the wall was not swept, or no
     softest wall is steady.
-
-    Args:
-        axes: of the cells, in the order of their dimensions.
     """
     keys = [axis.key for axis in axes]
     if STIFFNESS not in keys:

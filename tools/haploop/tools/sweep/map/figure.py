@@ -33,8 +33,7 @@ _SIDES: tuple[Literal["x", "y"], ...] = ("x", "y")
 def make_figure(data: MapData) -> Figure:
     """Makes the map of a sweep's cells, a panel for each combination of the axes that do not lie along it.
 
-    Raises:
-        FigureError: matplotlib is missing.
+    FigureError where matplotlib is missing.
     """
     cells, layout = data.cells(), Layout.from_axes(data.axes)
     along = [data.axes[layout.x]] + ([] if layout.y is None else [data.axes[layout.y]])
@@ -79,14 +78,10 @@ def make_figure(data: MapData) -> Figure:
 
 
 def draw_map(directory: Path, target: Path | None = None) -> Path:
-    """Draws the map of a sweep, finished or not, into a file.
+    """Draws the map of a sweep, finished or not, into a file, and returns that.
 
     Args:
-        directory: that ``haploop sweep`` writes to.
         target: file of the figure, in the format of its suffix; ``figure.png`` in the directory when None.
-
-    Returns:
-        The file.
 
     Raises:
         FigureError: matplotlib or pyarrow is missing, there is nothing to draw, or the file cannot be written.

@@ -37,7 +37,6 @@ class MapLine:
     """A named line over a map.
 
     Attributes:
-        name: what is written on it.
         words: what it says, and its source.
         pieces: points of each, values of the axes in SI, shape (n, axes).
     """
@@ -151,10 +150,9 @@ def line_styles(names: Sequence[str]) -> dict[str, LineStyle]:
 
 
 def draw_line(ax: Axes, line: MapLine, rulers: Sequence[Ruler], style: LineStyle) -> list[np.ndarray]:
-    """Draws all pieces of a line; a piece that is one value of the only axis stands upright.
+    """Draws all pieces of a line, and returns them in the coordinates of the panel.
 
-    Returns:
-        The pieces in the coordinates of the panel.
+    A piece that is one value of the only axis stands upright.
     """
     from matplotlib.patheffects import Normal, withStroke
 

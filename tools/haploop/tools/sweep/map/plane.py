@@ -30,7 +30,6 @@ class Plane:
     """All scenes of a panel, those between its cells included.
 
     Attributes:
-        scene: of one of its cells.
         rulers: of its axes, x first; one of them where there is one axis, whose y is of no account.
     """
 

@@ -87,8 +87,6 @@ class Sheet:
     """A figure with a header, so many panels in rows, and a column beside them; FigureError without matplotlib.
 
     Attributes:
-        axes: of the panels, row by row.
-        columns: panels in a row.
         side, side_in: the column beside them and its size.
     """
 
