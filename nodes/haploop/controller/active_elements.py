@@ -37,7 +37,6 @@ class ActiveElement:
     from_tick: int
 
     def describe(self) -> Description:
-        """Returns the description of the element and its book."""
         parameters = {**self.element.values(), "acts": self.acts}
         return {"book": self.book, "kind": self.element.kind, "parameters": parameters, "from_tick": self.from_tick}
 

@@ -92,7 +92,6 @@ class ControllerNode:
 
 
 def work(client: ClockClient, context: zmq.Context[zmq.Socket[bytes]], directory: Path) -> tuple[int, Message]:
-    """Runs the controller as a node of a run."""
     try:
         node = ControllerNode(client, context, directory)
         node.connect()

@@ -50,7 +50,6 @@ class Recorder:
 
     @property
     def is_empty(self) -> bool:
-        """Tells whether every tick so far has been taken."""
         return not self._rows and not self._cut
 
     def cover(self, ticks: int) -> None:
@@ -58,7 +57,6 @@ class Recorder:
         self._history_ticks = max(self._history_ticks, ticks)
 
     def cut(self) -> None:
-        """Ends the present block."""
         width = len(self._names)
         ticks = len(self._rows) // width
         if not ticks:

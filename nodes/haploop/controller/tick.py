@@ -27,7 +27,6 @@ class Wall:
 
     @classmethod
     def from_scene(cls, scene: Scene) -> Wall:
-        """Makes the wall of a resolved scene, which may have none."""
         if (table := scene.wall) is None:
             return cls(0.0, 0.0, 0.0)
         return cls(table.position, table.stiffness, -1.0 if table.occupies == "below" else 1.0)

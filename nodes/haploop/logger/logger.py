@@ -51,7 +51,6 @@ class Logger:
         self.tick = self._first_tick = 0
 
     def count_wall_time(self) -> None:
-        """Counts wall time from now on."""
         self._began = wall_clock.perf_counter()
 
     def start(self, plant: dict[str, float], history: list[Block]) -> None:
@@ -67,12 +66,10 @@ class Logger:
         self._started = False
 
     def plant_block(self, block: Block) -> None:
-        """Takes a block of the plant."""
         self._plant.add(block)
         self._book_common()
 
     def controller_block(self, block: Block) -> None:
-        """Takes a block of the controller."""
         self._buffer(block)
         if self._channels:
             self._channels.controller(block)

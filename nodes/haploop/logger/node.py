@@ -162,7 +162,6 @@ class LoggerNode:
 
 
 def work(client: ClockClient, context: zmq.Context[zmq.Socket[bytes]], directory: Path) -> tuple[int, Summary]:
-    """Runs the run's own logger."""
     node: LoggerNode
     publisher = Publisher(context, ROLE, lambda: (node.session.logger.tick, node.session.logger.status()))
     address = bind(publisher.socket, directory, PROCESSES[ROLE].binds["telemetry"])

@@ -48,7 +48,6 @@ def make_motion(scene: Scene, time: Timebase, members: int | None = None) -> Any
 
 
 def make_position_sensor(scene: Scene, time: Timebase) -> PositionSensor:
-    """Makes the position sensor of a resolved scene, or of the stacked scene of a batch."""
     if scene.noise is None:
         return PositionSensor(scene.encoder)
     from haploop.plant.sensing.noise import NoisyPositionSensor

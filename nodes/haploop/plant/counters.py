@@ -36,7 +36,6 @@ class Counter:
         return self._before, tuple(self._steps)
 
     def restore(self, state: Any) -> None:
-        """Goes on from a state."""
         self._before, self._steps = state[0], list(state[1])
 
     def column(self, first: int, end: int) -> np.ndarray:
@@ -77,5 +76,4 @@ class BatchCounter(Counter):
 
 
 def make_counter(members: int | None) -> Counter:
-    """Makes the counter of one run (None), or of a batch of so many members."""
     return Counter() if members is None else BatchCounter(members)

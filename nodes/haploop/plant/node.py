@@ -48,7 +48,6 @@ class PlantNode:
         self._client.ready(0)
 
     def run(self) -> tuple[int, Message]:
-        """Works until the run ends; returns the tick it ended at."""
         client, plant = self._client, self._plant
         while plant.stop_reason is None and not (client.last and plant.tick >= client.until):
             for tick, event in client.take_events():
@@ -84,7 +83,6 @@ class PlantNode:
 
 
 def work(client: ClockClient, context: zmq.Context[zmq.Socket[bytes]], directory: Path) -> tuple[int, Message]:
-    """Runs the plant as a node of a run."""
     node = PlantNode(client, context, directory)
     node.connect()
     try:

@@ -124,7 +124,6 @@ class Plant:
         return samples
 
     def receive(self, forces: list[float]) -> None:
-        """Takes the next commands, in order of their ticks."""
         self._line.receive(forces)
         total = sum(forces)
         if total - total != 0.0:  # infinite or not a number

@@ -39,7 +39,6 @@ class RandomStream:
     name: str
 
     def normal(self, first: int = 0) -> Draw:
-        """Returns standard normal numbers."""
         return self._draws(lambda generator: generator.standard_normal(PIECE), first)
 
     def uniform(self, first: int = 0) -> Draw:

@@ -47,7 +47,6 @@ class Viewer:
         turned.set()
 
     async def follow_runs(self) -> None:
-        """Follows runs, one after another, until it is cancelled."""
         while True:
             session = await self._join(await self._next_run())
             if session is None:

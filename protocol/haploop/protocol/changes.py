@@ -162,7 +162,6 @@ def spans(scene: Scene, changes: Iterable[Change]) -> list[Span]:
 
 
 def at_work(scene: Scene, changes: Iterable[Change]) -> Scene:
-    """Returns the scene after all these changes."""
     return reduce(lambda now, change: change.apply(now), changes, scene)
 
 

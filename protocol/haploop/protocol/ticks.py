@@ -71,17 +71,17 @@ class Timebase:
 
     @property
     def steps_per_tick(self) -> int:
-        """Returns n, the number of plant steps in one control period."""
+        """n, the number of plant steps in one control period."""
         return self.plant_rate // self.control_rate
 
     @property
     def step_s(self) -> float:
-        """Returns h, one plant step in seconds."""
+        """h, s."""
         return 1.0 / self.plant_rate
 
     @property
     def period_s(self) -> float:
-        """Returns T, one control period in seconds."""
+        """T, s."""
         return 1.0 / self.control_rate
 
     @property

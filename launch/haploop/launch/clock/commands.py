@@ -55,7 +55,6 @@ class Commands:
         }
 
     def __call__(self, verb: str, arguments: Message) -> Answer:
-        """Carries out one command."""
         act = self._verbs.get(verb)
         if act is None:
             return False, f"{verb[:40]!r} is no command; these are: {', '.join(self._verbs)}.", {}

@@ -37,8 +37,6 @@ class Node:
 
 
 class Roster:
-    """The nodes of a run, by identity."""
-
     def __init__(self) -> None:
         self.nodes: dict[bytes, Node] = {}
 
@@ -51,15 +49,13 @@ class Roster:
         return all((node := self.own(role)) is not None and getattr(node, what) for role in PROCESSES)
 
     def joined(self) -> bool:
-        """Tells whether all the run's own processes have joined."""
         return all(self.own(role) for role in PROCESSES)
 
     def endpoints(self) -> dict[str, dict[str, str]]:
-        """Addresses by role and channel."""
         return {node.role: node.endpoints for node in self.nodes.values() if node.is_own}
 
     def slowest(self) -> int:
-        """Returns the tick of the slowest lossless node but plant and controller; it bounds what is in flight."""
+        """The tick of the slowest lossless node but plant and controller; it bounds what is in flight."""
         return min((node.tick for node in self.nodes.values() if node.lossless and not node.done), default=0)
 
     def common_tick(self) -> int:

@@ -137,7 +137,6 @@ class Effect:
         return bool(found) if self.value is None else found == self.value
 
     def is_in(self, scene: Scene) -> bool:
-        """Returns whether a resolved scene simulates it."""
         return self.is_named(scene) and self.used(scene)
 
     def batches_in(self, scene: Scene) -> bool:
@@ -147,7 +146,6 @@ class Effect:
         return self.batches if isinstance(self.batches, bool) else self.batches(scene)
 
     def states_in(self, scene: Scene) -> int:
-        """Returns how many states it adds to a scene that names it."""
         return self.states if isinstance(self.states, int) else self.states(scene)
 
     def without(self, scene: Scene) -> Scene:

@@ -52,7 +52,6 @@ class Plan:
 
 
 def plan(scene: Scene) -> Plan:
-    """Returns the plan of a resolved scene."""
     named = effects_of(scene)
     chain = Chain.from_scene(scene)
     # The states of effects in the motion are integrated instead.

@@ -65,7 +65,6 @@ def check_grip(draft: Draft) -> None:
 
 
 def check_actuator(draft: Draft) -> None:
-    """Refuses an ``[actuator]`` without a limit."""
     if draft.table("actuator", Actuator) == Actuator():
         draft.complain(("actuator",), "It must have at least one of saturation, bandwidth and resolution.", "is empty")
 
@@ -82,7 +81,6 @@ def check_accelerometer(draft: Draft) -> None:
 
 
 def check_jitter(draft: Draft) -> None:
-    """Refuses a longest delay of no whole number of plant steps."""
     if (jitter := draft.data.get("jitter")) and (uniform := draft.valid(UniformJitter, jitter)):
         _whole_steps(draft, ("jitter", "most"), "longest additional delay", uniform.most)
 
@@ -144,7 +142,6 @@ def noiseless(scene: Scene) -> Scene:
 
 
 def rigid(scene: Scene) -> Scene:
-    """Makes one body of motor and tip."""
     cable, device = scene.transmission, scene.device
     if cable is None:
         return scene
@@ -153,5 +150,4 @@ def rigid(scene: Scene) -> Scene:
 
 
 def left_out(table: str) -> Callable[[Scene], Scene]:
-    """Makes what leaves a whole table out."""
     return lambda scene: without(scene, table)

@@ -47,7 +47,6 @@ class Child:
         return self._process.pid
 
     def exit_description(self) -> str:
-        """Returns how the process ended, in words."""
         try:
             code = self._process.wait(timeout=1.0)
         except subprocess.TimeoutExpired:

@@ -67,7 +67,6 @@ class LiveRun:
     keys: str | None = None
 
     def make_context(self) -> SecureContext:
-        """Makes a context whose sockets may connect to the run."""
         return SecureContext.from_transport(Transport(keys=Path(self.keys) if self.keys else None))
 
 
@@ -92,7 +91,6 @@ def announce(sockets: Path, clock: str, title: str, out: str, keys: str | None =
 
 
 def remove(sockets: Path) -> None:
-    """Removes a run's directory with all its sockets."""
     shutil.rmtree(sockets, ignore_errors=True)
 
 
@@ -109,7 +107,6 @@ def live_runs() -> list[LiveRun]:
 
 
 def is_live(run: LiveRun) -> bool:
-    """Tells whether the run's launcher is still there."""
     return _is_alive(run.pid)
 
 

@@ -78,7 +78,6 @@ class Supervisor:
         self._stopping = False
 
     def run(self) -> Summary:
-        """Leads the run to its end; returns its summary."""
         try:
             address = f" at {self._server.address}" if self._spec.transport.host else ""
             self._spec.on_started(self._sockets.name + address)

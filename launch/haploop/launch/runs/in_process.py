@@ -82,7 +82,6 @@ class Loop:
         session.logger.start(self._plant.state(), [])
 
     def schedule(self, events: list[tuple[int, Event]]) -> None:
-        """Schedules events at their ticks."""
         for tick, event in events:
             self._session.logger.event(tick, event)
             if is_change(event):
@@ -112,7 +111,6 @@ class Loop:
         self._controller.recorder.refused = []
 
     def end_here(self) -> None:
-        """Ends the run at the ticks worked on so far."""
         self.schedule([(self._plant.tick, {"stop": True})])
 
     def fail(self, reason: str) -> NoReturn:

@@ -46,7 +46,6 @@ class Layers:
         self.mistakes.append(Mistake(file, ".".join(map(str, key)), given, expected, nearest))
 
     def value(self, key: KeyPath) -> Any:
-        """Returns the value at ``key``."""
         value: Any = self.data
         for part in key:
             value = value[part]

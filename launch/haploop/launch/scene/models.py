@@ -113,7 +113,6 @@ def _validated(hint: Any) -> Any:
 
 
 def number_of(table: type[Table], key: str) -> Number:
-    """Returns the number declared at ``key`` of a table."""
     return next(mark for mark in model_of(table).model_fields[key].metadata if isinstance(mark, Number))
 
 

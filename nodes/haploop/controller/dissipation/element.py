@@ -76,7 +76,6 @@ class Element(ABC):
         """Force of the element on the device at this tick, N, positive along +x, and the memory where it has one."""
 
     def values(self) -> dict[str, float]:
-        """Returns the parameters as they are now."""
         return {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
 
     @classmethod

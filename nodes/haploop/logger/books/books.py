@@ -215,7 +215,7 @@ _ENDINGS = {"_work": 1.0, "_heat": -1.0, ".true": -1.0}
 
 
 def balance_sign(name: str) -> float:
-    """Returns how a book counts in the balance, 0 where it is no part of it."""
+    """Returns 0 for a book that is no part of the balance."""
     return _SIGNS.get(name) or next((sign for ending, sign in _ENDINGS.items() if name.endswith(ending)), 0.0)
 
 

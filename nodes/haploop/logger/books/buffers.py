@@ -13,7 +13,6 @@ PIECES = "pieces."
 
 
 def as_float64(data: bytes) -> np.ndarray:
-    """Returns a telemetry column as an array."""
     return np.frombuffer(data, "<f8")
 
 

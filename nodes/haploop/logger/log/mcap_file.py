@@ -84,7 +84,6 @@ class McapFile:
         return not self._file.closed
 
     def close(self) -> None:
-        """Closes the file as it is."""
         self._file.close()
 
     def append_summary(self) -> None:
@@ -121,7 +120,6 @@ class McapFile:
 
 
 def bytes_of(*records: mcap.McapRecord) -> bytes:
-    """Returns records end to end."""
     builder = RecordBuilder()
     for record in records:
         record.write(builder)

@@ -19,7 +19,6 @@ Floats = NDArray[np.float64]
 
 
 def pack(value: Any) -> bytes:
-    """Returns one value as msgpack."""
     return cast(bytes, msgpack.packb(value))
 
 

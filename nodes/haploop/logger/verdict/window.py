@@ -25,7 +25,6 @@ _TOGETHER = 32
 
 
 def keep_steps(plant_rate: int) -> int:
-    """Returns the number of plant steps a window covers."""
     return math.ceil(WINDOW_S * plant_rate)
 
 
@@ -105,7 +104,6 @@ class Window:
             yield from map(RunMeasures, windows, self.extremes(some), swing_m.tolist())
 
     def extremes(self, places: np.ndarray) -> Iterator[Extremes]:
-        """Yields the extremes of the members at these places."""
         s = self.state
         return map(Extremes, *(of[places].tolist() for of in (s.x_min_m, s.x_max_m, s.force_max_N)))
 

@@ -88,12 +88,10 @@ class Chain:
 
     @property
     def positions(self) -> tuple[str, ...]:
-        """Names of the states that are lengths."""
         return "x", *(f"{link.name}.stretch" for link in self.links)
 
     @property
     def states(self) -> tuple[str, ...]:
-        """Names of all states, in their order."""
         rates = ["v", *(f"{link.name}.rate" for link in self.links)]
         actuator = ["actuator"] if self.actuator_rate is not None else []
         return *self.positions, *rates, *actuator, *(["accelerometer"] if self.sensor else [])

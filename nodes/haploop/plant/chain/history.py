@@ -93,12 +93,10 @@ class ChainHistory(ABC):
 
     @property
     def x(self) -> Any:
-        """Position of body 0, m."""
         return first_row(self.state.z)
 
     @property
     def v(self) -> Any:
-        """Velocity of body 0, m/s."""
         return first_row(self.state.z[self._v :])
 
     @property
@@ -166,7 +164,6 @@ class ChainHistory(ABC):
         return record
 
     def select(self, kept: np.ndarray) -> None:
-        """Drops the members of a batch that are not kept, shape (members,); the record must have been taken."""
         self.state, self._rest_N = tree_select((self.state, self._rest_N), kept)
         self._tau.select(kept)
         self._sensor.select(kept)

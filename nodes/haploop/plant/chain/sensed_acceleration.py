@@ -64,6 +64,5 @@ class SensedAcceleration:
         return total
 
     def select(self, kept: np.ndarray) -> None:
-        """Drops the members of a batch that are not kept, shape (members,)."""
         if self.none and not self._state:
             self._factors = tree_select(self._factors, kept)

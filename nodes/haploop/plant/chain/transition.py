@@ -105,7 +105,6 @@ class ChainResponse:
         return np.ascontiguousarray(np.moveaxis(response, 2, 0))
 
     def select(self, kept: np.ndarray) -> None:
-        """Drops the members of a batch that are not kept, shape (members,)."""
         self.step, self.held = tree_select((self.step, self.held), kept)
         self._piece.cache_clear()
 

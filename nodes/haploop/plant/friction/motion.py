@@ -175,6 +175,5 @@ class BatchFrictionMotion(RubbingHistory, ChainMotion):
         return record if positions_only else record | {"pieces": pieces}
 
     def select(self, kept: np.ndarray) -> None:
-        """Drops the members that are not kept, shape (members,); the record must have been taken."""
         super().select(kept)
         self._clamped.select(kept)

@@ -71,7 +71,6 @@ class StickSlip:
         return StickSlipState(bool(holds), float(direction))
 
     def at_rest(self, z: Any, command: Any, load: Any) -> StickSlipState:
-        """Returns the mode of a body at rest."""
         force = self._force.on(z, command, load)
         return StickSlipState(self.friction.holds(force), np.copysign(1.0, force))
 

@@ -32,7 +32,6 @@ class LinearRates:
         self._rows = [[(i, factor) for i, factor in enumerate(row) if factor] for row in rows]
 
     def at(self, z: Rows, push: Rows) -> Rows:
-        """Returns A z + p, term by term."""
         rates = []
         for row, rate in zip(self._rows, push, strict=True):
             for i, factor in row:
@@ -52,7 +51,6 @@ class OneStep(Protocol):
 
 
 def moved(z: Rows, h: float, rates: Rows) -> Rows:
-    """Returns z + h z'."""
     return [a + h * rate for a, rate in zip(z, rates, strict=True)]
 
 

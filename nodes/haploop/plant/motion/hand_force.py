@@ -37,7 +37,6 @@ class HandForce:
         self._piece = lru_cache(maxsize=3)(self._made)
 
     def add(self, constant_N: float) -> None:
-        """Adds a constant force; for one run."""
         profile = self._profile
         self._profile = lambda t: profile(t) + constant_N
 
@@ -54,7 +53,6 @@ class HandForce:
         return self._profile(times[:, None] if self._has_members else times)
 
     def select(self, kept: np.ndarray) -> None:
-        """Drops the members of a batch that are not kept, shape (members,)."""
         if not self.is_shared:
             self._table = tree_select(self._table, kept)
             self._profile = _profile(self._table)

@@ -25,7 +25,6 @@ class Mechanics:
 
     @classmethod
     def from_scene(cls, scene: Scene) -> Mechanics:
-        """Reads the ``[device]`` and, where present, ``[hand]`` tables of a resolved scene."""
         device, hand = scene.device, scene.hand
         start = device.position, device.velocity
         if hand is None:

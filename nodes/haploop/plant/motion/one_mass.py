@@ -109,16 +109,13 @@ class OneMassMotion:
 
     @property
     def x(self) -> Any:
-        """Position, m."""
         return self._state[0]
 
     @property
     def v(self) -> Any:
-        """Velocity, m/s."""
         return self._state[1]
 
     def restore(self, state: Sequence[Any], last: Sequence[Any]) -> None:
-        """Goes on from a state and the hold in effect last."""
         count, force, command = last
         self.state, self.last = OneMassState(*state), (count, force, command)
 
@@ -156,7 +153,6 @@ class OneMassMotion:
         return record
 
     def select(self, kept: np.ndarray) -> None:
-        """Drops the members of a batch that are not kept, shape (members,); the record must have been taken."""
         self.mechanics, self.held, self.state, self.last = tree_select(
             (self.mechanics, self.held, self.state, self.last), kept
         )

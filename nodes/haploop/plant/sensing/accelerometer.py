@@ -102,7 +102,6 @@ class Accelerometer:
             self.draw = make_normal(self._seed, "accelerometer", self._read)
 
     def select(self, kept: np.ndarray) -> None:
-        """Drops the members of a batch that are not kept, shape (members,)."""
         self.parameters, self._noise, self._seed = tree_select((self.parameters, self._noise, self._seed), kept)
         self._clipped.select(kept)
         select_draws(self.draw, kept)

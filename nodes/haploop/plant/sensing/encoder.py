@@ -42,7 +42,6 @@ class PositionSensor:
         """Goes on from a state."""
 
     def select(self, kept: np.ndarray) -> None:
-        """Drops the members of a batch that are not kept, shape (members,)."""
         self.encoder = tree_select(self.encoder, kept)
         self.reading = make_encoder(self.encoder)
 

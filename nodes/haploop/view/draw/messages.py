@@ -80,7 +80,6 @@ def encode(from_s: float, to_s: float, tables: Sequence[Table]) -> bytes:
 
 
 def state(session: RunSession) -> Message:
-    """Returns the state message of a run."""
     history, time, summary, status = session.history, session.time, session.summary, session.clock.status
     elements, wall = history.at_work
     message: Message = {

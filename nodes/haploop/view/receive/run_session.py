@@ -64,7 +64,6 @@ class RunSession:
         self._seen: deque[tuple[float, int]] = deque()
 
     def poll(self) -> None:
-        """Takes the messages that have come."""
         if self.outcome:
             return
         try:
@@ -93,7 +92,6 @@ class RunSession:
 
     @property
     def skipped_ticks(self) -> int:
-        """Returns how many never came."""
         return sum(self._observer.skipped.values())
 
     @property

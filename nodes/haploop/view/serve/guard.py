@@ -39,11 +39,9 @@ class Guard:
         return True
 
     def is_own_host(self, host: str | None) -> bool:
-        """Tells whether a request names this server as its host."""
         return host in self._hosts
 
     def is_own_origin(self, origin: str | None) -> bool:
-        """Tells whether a request comes from a page of this server."""
         return origin in [f"http://{host}" for host in self._hosts]
 
     def may_steer(self, token: str) -> bool:

@@ -29,7 +29,6 @@ class AtWork(NamedTuple):
 
     @classmethod
     def of_block(cls, block: Block) -> AtWork:
-        """Returns those of a CONTROLLER_BLOCK."""
         elements = [
             ElementTable.from_dict({"kind": element["kind"], **element["parameters"]}) for element in block["elements"]
         ]

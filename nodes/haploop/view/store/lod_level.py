@@ -69,7 +69,6 @@ class Ring:
         self._values = np.concatenate([self._values, more])
 
     def clear(self, column: int) -> None:
-        """Sets all values of a column to NaN."""
         self._values[column] = np.nan
 
 

@@ -95,7 +95,6 @@ class ClockClient:
         return frame
 
     def take_events(self) -> list[tuple[int, Event]]:
-        """Returns the events granted since the last call, (tick, event) in order."""
         events, self.events = self.events, []
         return events
 
@@ -121,5 +120,4 @@ class ClockClient:
         self.socket.close(linger=1000)
 
     def close(self) -> None:
-        """Closes without a message."""
         self.socket.close(linger=0)

@@ -71,12 +71,10 @@ class Transport:
         return cls("127.0.0.1" if host == "localhost" else host, keys and keys.resolve())
 
     def as_dict(self) -> dict[str, str | None]:
-        """Returns plain values, for JSON."""
         return {"host": self.host, "keys": str(self.keys) if self.keys else None}
 
     @classmethod
     def from_dict(cls, values: dict[str, str | None]) -> Transport:
-        """Makes the transport from the values of ``as_dict``."""
         keys = values.get("keys")
         return cls(values.get("host"), Path(keys) if keys else None)
 

@@ -36,7 +36,6 @@ class Publisher:
         self.unknown_peers = 0
 
     def publish(self, name: str, *fields: Any) -> None:
-        """Sends one message to all subscribers."""
         self.socket.send_multipart([self._topic, encode(name, *fields)])
 
     def serve(self) -> None:
@@ -87,7 +86,6 @@ class Subscriber:
         return min(self._next_tick.values(), default=0) if len(self._next_tick) == len(self.gaps) else 0
 
     def register(self, poller: zmq.Poller) -> None:
-        """Registers all sockets with a poller."""
         for socket in self._sockets:
             poller.register(socket, zmq.POLLIN)
 
@@ -130,6 +128,5 @@ class Subscriber:
         return True
 
     def close(self) -> None:
-        """Closes all sockets."""
         for socket in self._sockets:
             socket.close(0)

@@ -27,7 +27,6 @@ class Frame(NamedTuple):
     fields: list[Any]
 
     def as_dict(self) -> Message:
-        """Returns the fields by name."""
         return {name: value for (name, _), value in zip(MESSAGES[self.name].fields, self.fields, strict=True)}
 
 

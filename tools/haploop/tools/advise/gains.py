@@ -25,7 +25,6 @@ class Family:
     parts: tuple[tuple[str, str], ...]
 
     def elements(self, values: Values) -> list[ElementTable]:
-        """Makes the scene's elements with these parameters."""
         pairs = zip(self.parts, values, strict=True)
         return [ElementTable(name=kind, parameters={key: value}) for (kind, key), value in pairs]
 

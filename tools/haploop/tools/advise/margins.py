@@ -186,7 +186,6 @@ def _likely_worst(gains: Gains) -> list[Vary]:
 
 
 def rounded_down(value: float) -> float:
-    """Rounds down to two digits."""
     if value <= 0.0:
         return 0.0
     rounded = float(f"{value:.1e}")

@@ -53,7 +53,6 @@ _HELPS = "Less is steady without: {}."
 
 
 def report(found: Advice) -> RenderableType:
-    """Makes the whole report."""
     judged = f"Judged by {found.tasks.words}; limits to {100.0 * found.tolerance:.0f} %, {found.runs} runs."
     parts: list[RenderableType] = [
         Text(f"{found.name}: the largest steady wall", style="bold"),

@@ -57,12 +57,10 @@ class Tasks:
 
     @property
     def is_one_run(self) -> bool:
-        """True where a loop is judged by one run."""
         return len(self.scenes) == self.seeds == 1
 
     @property
     def first(self) -> Scene:
-        """The scene of the first task."""
         return self.scenes[0]
 
 

@@ -55,7 +55,6 @@ class Change:
         return f"{share * 100:.0f} % {'more' if self.factor > 1.0 else 'less'} {self.quantity}"
 
     def apply(self, scene: Scene) -> Scene:
-        """Returns the scene so changed."""
         if self.added_s:
             return with_value(scene, "clock.round_trip_delay", scene.clock.round_trip_delay + self.added_s)
         return scale_quantities(scene, {self.quantity: self.factor})

@@ -46,7 +46,6 @@ class LiveStatus:
 
     @property
     def t_s(self) -> float:
-        """Returns the simulated time, s."""
         return self.tick / self.time.control_rate
 
     def ingest(self, frames: Iterable[tuple[str, Frame]], now: float) -> None:
@@ -79,7 +78,6 @@ class LiveStatus:
         self.factor = moved / self.time.control_rate / (now - began) if moved and now > began else None
 
     def note_event(self, tick: int, event: Event) -> None:
-        """Notes an event."""
         self.changes.append((tick, event))
         if "pause" in event or "step" in event:
             self.paused = True

@@ -33,7 +33,6 @@ _STATES = {"paused": "bold yellow", "running": "bold green", "waiting": "bold", 
 
 
 def live_table(run: LiveStatus) -> RenderableType:
-    """Makes the table of a run, at most 80 columns wide."""
     from rich.console import Group
     from rich.text import Text
 
@@ -58,7 +57,6 @@ def live_line(run: LiveStatus) -> str:
 
 
 def end_sentence(run: LiveStatus) -> str:
-    """Returns a sentence on how a run ended."""
     why = f": {run.why.rstrip('.')}" if run.why else ""
     word = "" if run.ended in ("ended", "done") else f" ({run.ended})"
     return f"Run {run.run_id} ended at tick {run.tick}, {run.t_s:g} s{word}{why}."
@@ -175,7 +173,6 @@ class LinePrinter:
         self._printed = 0
 
     def show(self, run: LiveStatus) -> None:
-        """Prints the events that are new, and a line if one is due."""
         for tick, event in run.changes[self._printed :]:
             print(f"{tick / run.time.control_rate:.3f} s  {describe(event)}", flush=True)
         self._printed = len(run.changes)

@@ -123,11 +123,9 @@ class Outlet:
 
     @property
     def has_subscribers(self) -> bool:
-        """Tells whether anyone has subscribed."""
         return bool(self._subscriptions)
 
     def take_subscriptions(self) -> None:
-        """Takes the subscriptions that have come."""
         for _ in range(_AT_ONCE):
             if not has_message(self._socket):
                 return
@@ -191,7 +189,6 @@ class SampleStream:
         self._reached: tuple[int, dict[str, np.ndarray]] | None = None
 
     def ingest(self, role: str, frame: Frame) -> None:
-        """Takes a message of a publisher."""
         block = frame.as_dict()
         if frame.name == "PLANT_BLOCK":
             motion = motion_columns({name: as_float64(data) for name, data in block["columns"].items()})
