@@ -24,7 +24,6 @@ def machine() -> str:
 
 
 def cores() -> int:
-    """Counts the cores this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 

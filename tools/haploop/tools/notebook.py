@@ -88,7 +88,6 @@ def _figures() -> list[str]:
 
 
 def main(path: Path) -> None:
-    """Runs a notebook and writes it back."""
     path = path.resolve()
     notebook = json.loads(path.read_text(encoding="utf-8"))
     os.chdir(path.parent)

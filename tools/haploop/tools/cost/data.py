@@ -33,7 +33,6 @@ class Spread:
 
     @classmethod
     def from_values(cls, values: Sequence[float]) -> Spread:
-        """Makes it of at least one value."""
         if len(values) == 1:
             return cls(values[0], values[0], values[0])
         q1, median, q3 = statistics.quantiles(values, n=4, method="inclusive")
@@ -91,7 +90,7 @@ class Point:
 
     @property
     def size_m(self) -> float:
-        """The size of the error; inf where the run failed."""
+        """Inf where the run failed."""
         return self.error.size_m if self.error else math.inf
 
     @property
@@ -128,11 +127,9 @@ class SceneCost:
 
     @property
     def own(self) -> Point | None:
-        """The point of the scene's own method and plant rate."""
         return self.point(self.own_method, self.own_rate)
 
     def point(self, method: str, plant_rate: int) -> Point | None:
-        """Returns the point of a method and a plant rate, None where there is none."""
         return next((p for p in self.points if (p.method, p.plant_rate) == (method, plant_rate)), None)
 
     @property
@@ -206,7 +203,6 @@ class PriceGroup:
 
     @property
     def baseline(self) -> Price:
-        """The price that the others are held against."""
         return self.prices[0]
 
 

@@ -101,7 +101,6 @@ def _how_to_read(ax: Axes, cost: Cost, scenes: list[SceneCost]) -> None:
 
 
 def method_look(method: str) -> tuple[str, str]:
-    """Returns colour and marker of a method."""
     return LOOKS.get(method, (GREY, "X"))
 
 

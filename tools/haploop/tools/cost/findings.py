@@ -92,7 +92,6 @@ def power(metres: float) -> str:
 
 
 def findings(cost: Cost) -> list[FindingTable]:
-    """Returns the tables for which there are data."""
     return [table for table in (_scene_table(cost), _method_table(cost), _price_table(cost)) if table.rows]
 
 

@@ -44,7 +44,6 @@ class Candidate:
 
     @property
     def overrides(self) -> list[str]:
-        """The ``KEY=VALUE`` that are laid over the scene file."""
         return [f"clock.integrator={self.method}", f"clock.plant_rate={self.plant_rate}"]
 
     def key(self, *made_with: Any) -> str:
@@ -67,12 +66,10 @@ class Grid:
 
     @property
     def name(self) -> str:
-        """The name of the scene."""
         return self.path.stem
 
     @property
     def own(self) -> tuple[str, int]:
-        """The method and the plant rate that the scene itself names."""
         return self.scene.clock.integrator, self.scene.clock.plant_rate
 
 
@@ -111,7 +108,6 @@ def scenes_folder() -> Path:
 
 
 def accuracy_scenes() -> list[Path]:
-    """Returns the scenes made for this comparison."""
     return sorted((scenes_folder() / "accuracy").glob("*.toml"))
 
 

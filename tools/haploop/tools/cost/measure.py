@@ -112,7 +112,6 @@ class Measurement:
         return Outcome(**{**record, "error": error})
 
     def cost(self, tolerance_m: float) -> Cost:
-        """Returns all that is known so far, the prices included."""
         loads = [times.quiet(self._store, self._jobs(way), n) for way, n in self._repeats.items()]
         busiest = max(filter(None, loads), key=lambda load: (load.busy, load.calibration_spread), default=None)
         return Cost(

@@ -40,7 +40,6 @@ def write(directory: Path, docs: Path) -> Path:
 
 
 def page(cost: Cost) -> str:
-    """Makes the page in Markdown."""
     tolerance = amount(cost.tolerance_m, "m")
     parts = [
         "# What accuracy costs",

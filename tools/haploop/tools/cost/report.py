@@ -28,7 +28,6 @@ _READING = (
 
 
 def report(cost: Cost) -> RenderableType:
-    """Makes the whole report, the advice last, where it is seen."""
     lines = [Text.assemble((f"{scene.name}: ", "bold"), scene.advice) for scene in cost.scenes]
     small = [Text(words, style="dim") for words in (_READING, made_with(cost))]
     busy = [Text(f"{cost.load} Errors stand.", style="bold yellow")] if cost.load and cost.load.busy else []
@@ -36,7 +35,6 @@ def report(cost: Cost) -> RenderableType:
 
 
 def scene_table(scene: SceneCost) -> RenderableType:
-    """Makes the table of a scene: every point, method by method."""
     names = _POINTWISE if scene.reference.pointwise else _SWINGS
     numbers = (*names, "residual", "µs/tick", "spread", "procs", "bytecode")
     unbroken = ("method", "verdict")
@@ -89,7 +87,7 @@ def price_table(group: PriceGroup) -> RenderableType:
 
 
 def price_row(price: Price) -> list[str]:
-    """Makes the cells of a price, in the order of ``PRICE_HEADS``."""
+    """Returns the cells in the order of ``PRICE_HEADS``."""
     count, time = price.instructions_per_tick, price.time
     quartiles = f"{fixed(time.q1)}–{fixed(time.q3)}"
     instructions = "" if count is None else f"{count:.0f}"

@@ -78,11 +78,9 @@ class Store:
         self._file.flush()
 
     def get(self, what: str, key: str) -> Any:
-        """Returns a record, or None where there is none."""
         return self._records.get((what, key, 0))
 
     def has(self, what: str, key: str, repeat: int = 0) -> bool:
-        """Tells whether there is a record."""
         return (what, key, repeat) in self._records
 
     def all(self, what: str, key: str, repeats: int) -> list[Any]:
@@ -192,7 +190,6 @@ def run_us(path: Path, overrides: Sequence[str], ticks: int) -> float | None:
 
 
 def missing(store: Store, jobs: Sequence[Job], repeats: int) -> int:
-    """Returns how many measurements are still to be made."""
     return sum(not store.has(job.way, job.key, repeat) for job in jobs for repeat in range(repeats))
 
 

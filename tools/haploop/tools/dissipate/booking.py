@@ -103,12 +103,10 @@ class Booking:
 
     @property
     def sampled_J(self) -> Floats:
-        """Returns the sampled books at present, shape (elements,)."""
         return (self._sums.sums + self._sums.errors)[: self._count]
 
     @property
     def true_J(self) -> Floats:
-        """Returns the true books at present, shape (elements,)."""
         return (self._sums.sums + self._sums.errors)[self._count :]
 
     def _begin(self) -> None:
@@ -186,7 +184,6 @@ class Recorded(Unchanged):
     place: int
 
     def step(self, memory: Any, u: Any, sample: Sample) -> tuple[Any, Any]:
-        """Returns no memory and what was recorded."""
         return None, sample[self.place]
 
 

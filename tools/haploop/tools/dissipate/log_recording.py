@@ -109,7 +109,6 @@ class _Waiting:
         self._plant = np.empty(0)
 
     def add(self, batch: Batch) -> None:
-        """Takes the rows of a batch."""
         rows = cast(Table, batch.rows)
         if batch.topic == "/plant":
             self._plant = np.concatenate([self._plant, rows["x"]])

@@ -44,7 +44,6 @@ class Trace:
         self.close: Floats | None = None
 
     def add(self, booked: Booked) -> None:
-        """Takes the books at more samples."""
         rows = np.vstack([booked.t_s, booked.x_m, booked.sampled_J, booked.true_J])
         self._keep(rows)
         self._look_closely(np.vstack([rows, -np.minimum(booked.added_J, 0.0).sum(axis=0)]))
@@ -113,7 +112,6 @@ class Outcome:
 
     @property
     def span_s(self) -> tuple[float, float]:
-        """Returns the times of the first and of the last sample."""
         times = self.trace.lines()[0]
         return float(times[0]), float(times[-1])
 
@@ -126,7 +124,7 @@ class Outcome:
         )
 
     def as_data(self) -> dict[str, Any]:
-        """Returns everything but the trace, for JSON."""
+        """Everything but the trace, for JSON."""
         recording, (from_s, to_s) = self.recording, self.span_s
         notes = asdict(recording.notes)
         return {
@@ -146,7 +144,6 @@ class Outcome:
 def make_outcome(
     recording: Recording, booking: Booking, trace: Trace, scene: Scene, kinds: Mapping[str, type[Element]]
 ) -> Outcome:
-    """Makes the outcome once all samples are booked."""
     books = (booking.sampled_J, booking.true_J, booking.taken_J, booking.given_J, booking.strongest_N)
     elements = [
         ElementOutcome(

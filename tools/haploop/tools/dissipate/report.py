@@ -29,7 +29,6 @@ def make_row(element: ElementOutcome) -> tuple[str, ...]:
 
 
 def conclusion(outcome: Outcome) -> str:
-    """Returns a sentence on which element would have dissipated most."""
     ranked = sorted(outcome.elements, key=lambda element: element.true_J, reverse=True)
     best, others = ranked[0], ranked[1:]
     if best.true_J <= 0.0:

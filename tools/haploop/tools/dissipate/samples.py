@@ -55,7 +55,6 @@ class Notes:
     remarks: list[str] = field(default_factory=list)
 
     def gap(self, from_s: float, to_s: float) -> None:
-        """Counts a gap between two times."""
         self.gaps, self.missing_s = self.gaps + 1, self.missing_s + to_s - from_s
         if len(self.gaps_s) < 100:
             self.gaps_s.append((from_s, to_s))

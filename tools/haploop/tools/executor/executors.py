@@ -86,8 +86,6 @@ def map_parallel(
 
 
 class InlineExecutor(Executor):
-    """Runs calls in this process, when they are submitted."""
-
     count = room = 1
     worker_died: tuple[type[BaseException], ...] = ()
 

@@ -62,7 +62,6 @@ class Sizes:
         return max(1, size)
 
     def taken(self, items: int) -> None:
-        """Notes that a part of so many items has been cut."""
         if self._left is not None:
             self._left = max(0, self._left - items)
 
@@ -74,7 +73,6 @@ class Sizes:
 
 
 def cut(groups: Iterable[Group], sizes: Sizes) -> Iterator[Group]:
-    """Yields parts of each group, none of two."""
     for items, together in groups:
         together = together and len(items) >= FEWEST
         first = 0

@@ -33,7 +33,6 @@ class Pool:
 
     @property
     def count(self) -> int:
-        """Workers at once."""
         return self._executor.count
 
     def results(

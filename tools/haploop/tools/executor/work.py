@@ -57,7 +57,6 @@ class Work:
         return time.perf_counter() - began, [kept[index] for index in range(len(items))]
 
     def lost(self, item: Any, why: str) -> Any:
-        """Returns what is kept of an item that cannot be run."""
         scenes, kept = self._made([item])
         return self.keep(item, scenes[0], _failed(scenes[0], why)) if scenes else kept[0]
 

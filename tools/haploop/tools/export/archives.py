@@ -92,8 +92,6 @@ def _move(file: IO[bytes], archive: zipfile.ZipFile, member: str) -> None:
 
 
 class JsonMcapWriter(ExportWriter):
-    """Writes one MCAP file with JSON messages."""
-
     suffix = ".json.mcap"
 
     def __init__(self, files: Sequence[IO[bytes]], units: Units, attachments: Mapping[str, bytes]) -> None:

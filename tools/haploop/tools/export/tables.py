@@ -80,8 +80,6 @@ def to_json(value: Any) -> str:
 
 
 class CsvWriter(ExportWriter):
-    """Writes a CSV file for each topic."""
-
     suffix, file_per_topic = ".csv", True
 
     def __init__(self, files: Sequence[IO[bytes]], units: Units, attachments: Mapping[str, bytes]) -> None:
@@ -118,8 +116,6 @@ def _line(cells: Iterable[str]) -> bytes:
 
 
 class ParquetWriter(ExportWriter):
-    """Writes a Parquet file for each topic."""
-
     suffix, file_per_topic = ".parquet", True
 
     def __init__(self, files: Sequence[IO[bytes]], units: Units, attachments: Mapping[str, bytes]) -> None:

@@ -44,8 +44,6 @@ class ElementSpan:
 
 
 class WallSpan(NamedTuple):
-    """The wall as it stood from a tick on."""
-
     from_tick: int
     wall: Wall
 
@@ -177,12 +175,10 @@ class RunData:
 
     @property
     def ticks_s(self) -> Floats:
-        """Time of every tick of the controller, s."""
         return self.controller["timestamp"]
 
     @property
     def control_rate(self) -> int:
-        """Ticks per second, Hz."""
         return self.scene.clock.control_rate
 
     @property
@@ -191,7 +187,6 @@ class RunData:
         return float(self.t_s[0]), float(max(self.t_s[-1], self.ticks_s[-1] + 1 / self.control_rate))
 
     def contact_s(self) -> Floats:
-        """Returns the times of the ticks in contact, s."""
         return self.ticks_s[self.controller["in_contact"] > 0]
 
     def close_s(self) -> tuple[float, float]:

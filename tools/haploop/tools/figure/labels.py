@@ -42,7 +42,6 @@ class LabelRoom:
         self._segments = np.empty((0, 2, 2))
 
     def pixels(self, points: Any) -> np.ndarray:
-        """Converts data coordinates, shape (..., 2), to pixels."""
         return self._ax.transData.transform(points)
 
     def take(self, x: float, y: float, half_px: float) -> None:
@@ -50,13 +49,11 @@ class LabelRoom:
         self._taken.append(_square(self.pixels((x, y)), half_px))
 
     def avoid_texts(self, texts: Iterable[Text]) -> None:
-        """Avoids texts that are written."""
         for text in texts:
             extent = text.get_window_extent()
             self._avoided.append((extent.x0, extent.y0, extent.x1, extent.y1))
 
     def avoid_markers(self) -> None:
-        """Avoids all markers of the panel."""
         for line in self._ax.lines:
             if line.get_marker() not in ("", "None", None):
                 places = np.asarray(line.get_transform().transform(line.get_xydata()))
@@ -108,7 +105,6 @@ class LabelRoom:
         return int(inside.all(axis=2).any(axis=0).sum())
 
     def size(self, text: str) -> tuple[float, float]:
-        """Returns width and height of a text with its margin, in pixels."""
         probe = self._ax.text(0.5, 0.5, text, transform=self._ax.transAxes, fontsize=SMALL, fontweight="bold")
         extent = probe.get_window_extent()
         probe.remove()

@@ -115,6 +115,5 @@ def draw_momentum(ax: Axes, run: RunData, span_s: tuple[float, float]) -> None:
 
 
 def within(span_s: tuple[float, float], t_s: Floats, *series: Floats) -> list[Floats]:
-    """Returns those samples of some series that lie in a stretch of time."""
     inside = (t_s >= span_s[0]) & (t_s <= span_s[1])
     return [values[inside] for values in series]

@@ -31,7 +31,6 @@ def element_colour(number: int) -> str:
 
 
 def dress(ax: Axes, title: str, x_label: str, y_label: str) -> None:
-    """Sets title and labels, a light grid, and no box."""
     ax.set_title(title, loc="left", fontsize=TEXT + 1, fontweight="bold", color=INK)
     ax.set_xlabel(x_label, fontsize=TEXT, color=INK)
     ax.set_ylabel(y_label, fontsize=TEXT, color=INK)

@@ -45,7 +45,6 @@ class Bound:
 
     @property
     def applies(self) -> bool:
-        """Tells whether the scene is within its domain."""
         return self.stiffness_N_m is not None
 
 

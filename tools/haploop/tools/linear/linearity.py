@@ -30,7 +30,6 @@ _ALWAYS_INSIDE = Wall(position=1e300, stiffness=0.0)
 
 @cache
 def installed_kinds() -> dict[str, type[Element]]:
-    """Every installed kind of element."""
     return registry()
 
 

@@ -33,7 +33,6 @@ class StiffnessLimit:
 
     @property
     def confirmed(self) -> bool:
-        """Steady below, and not steady above."""
         return self.below == "steady" and self.above in ("limit-cycle", "diverged")
 
 

@@ -95,7 +95,6 @@ class Flow:
         self._over = mp.expm(mp.matrix(rates) * length_s).tolist()
 
     def whole(self, w: Row) -> Row:
-        """Returns w after the fixed length."""
         return _times(self._over, w)
 
     def part(self, w: Row, t: Any) -> Row:
@@ -122,7 +121,6 @@ def fastest_rate(bodies: Bodies) -> float:
 
 
 def product(row: Row, w: Sequence[Any]) -> Any:
-    """Returns row . w."""
     return mp.fdot((a, b) for a, b in zip(row, w, strict=True) if a and b)
 
 

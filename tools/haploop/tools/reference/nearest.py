@@ -96,7 +96,6 @@ def made_now(name: str, scene: Scene) -> Reference:
 
 
 def exactly(scene: Scene, plant_rate: int) -> Scene:
-    """Returns the scene with the exact method at a plant rate."""
     return replace(scene, clock=replace(scene.clock, plant_rate=plant_rate, integrator="exact"))
 
 

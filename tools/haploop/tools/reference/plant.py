@@ -61,12 +61,10 @@ class StickSlipPlant(ABC, Generic[Vector]):
 
     @property
     def x(self) -> float:
-        """Position of body 0, m."""
         return float(self.w[0])
 
     @property
     def v(self) -> float:
-        """Velocity of body 0, m/s."""
         return float(self.w[self._v])
 
     def begin(self, load: Any) -> None:
@@ -176,11 +174,9 @@ class IntegratedPlant(StickSlipPlant[np.ndarray]):
         self._row = _floats(mp.matrix([bodies.force]) * absolute)[0]
 
     def sensed(self) -> float:
-        """Returns the acceleration an accelerometer feels under the force held until now, m/s^2."""
         return float(self._sensed[self.is_stuck] @ self.w)
 
     def advance(self, command: float, load: float, next_load: float) -> None:
-        """Advances one tick under a held command; load in N at its start and end."""
         self.w[[COMMAND, LOAD, SLOPE]] = command, load, (next_load - load) / self._period_s
         if not self._has_friction:
             self.w = self._solved(self._period_s, None).y[:, -1].copy()

@@ -96,7 +96,6 @@ class ProgressLine:
 
 
 def silent(_name: str, _count: int) -> Callable[[], None]:
-    """Begins a stage that shows nothing."""
     return lambda: None
 
 

@@ -46,7 +46,6 @@ def count_losses(summary: Summary) -> dict[str, int]:
 
 
 def print_summary(summary: Summary) -> None:
-    """Shows the summary of a run on stderr."""
     console(stderr=True).print(summary_table(summary))
 
 

@@ -26,7 +26,6 @@ class Point:
     seed: int = 0
 
     def rounded(self, digits: int) -> Point:
-        """Returns the point with numbers of so many significant digits."""
         return replace(self, numbers={key: float(f"{value:.{digits}g}") for key, value in self.numbers.items()})
 
 
@@ -134,7 +133,6 @@ class Found(NamedTuple):
 
 
 def evaluate_in_turn(_: str, evaluate: Evaluate, groups: Sequence[Group]) -> list[list[Row]]:
-    """Evaluates groups one after another in this process."""
     return [evaluate(group) for group in groups]
 
 

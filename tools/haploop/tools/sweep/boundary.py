@@ -38,12 +38,10 @@ class Boundary:
 
     @property
     def low(self) -> float:
-        """The lesser end of the bracket."""
         return min(self.near, self.far)
 
     @property
     def high(self) -> float:
-        """The greater end."""
         return max(self.near, self.far)
 
 

@@ -98,12 +98,11 @@ class Sweep:
 
     @cached_property
     def order(self) -> tuple[Axis, ...]:
-        """The axes from the outermost to the innermost."""
+        """From the outermost to the innermost."""
         return tuple(sorted(self.axes, key=lambda axis: not axis.apart))
 
     @cached_property
     def count(self) -> int:
-        """Number of cells of the grid."""
         return math.prod(len(axis.values) for axis in self.axes) * self.repeat
 
     def groups(self) -> Iterator[Group]:
@@ -176,7 +175,6 @@ class Sweep:
         return next(axis for axis in self.axes if axis not in others), others
 
     def columns(self) -> list[Column]:
-        """Returns the columns of the table."""
         texts = [Column(name, TEXT) for name in (ENDED, WHY, SCENE)]
         return [Column(CELL, WHOLE), *self.key_columns(self.axes), *self.record, *texts]
 

@@ -42,7 +42,6 @@ class Claim:
         return Finding(self, ASSUMING, numbers, assumption)
 
     def fails(self, numbers: str) -> Finding:
-        """Finds that it does not hold."""
         return Finding(self, FAILS, numbers)
 
     def holds_if(self, is_so: bool, under_it: bool = False, /, **computed: Any) -> Finding:
@@ -92,7 +91,6 @@ def _figures() -> dict[str, Any]:
 
 
 def claims_of(figure: int) -> dict[str, Claim]:
-    """Returns the claims that a figure tests, by name."""
     return {name: Claim(name=name, **claim) for name, claim in words_of(figure, "claims").items()}
 
 

@@ -105,7 +105,6 @@ class Setup:
         return cls(**{key.name: row[key.name] for key in fields(cls)})
 
     def as_dict(self) -> Row:
-        """Returns all values by name."""
         return asdict(self)
 
     def scene(self, stiffness: float, elements: Elements = ()) -> Scene:

@@ -48,7 +48,6 @@ def setup_of(point: Point) -> Setup:
 
 
 def evaluate(points: Sequence[Point]) -> list[Row]:
-    """Returns the rows of points of the space."""
     return measure([setup_of(point) for point in points])
 
 
@@ -66,7 +65,6 @@ def search(work: Work) -> Found[Setup]:
 
 
 def describe(setup: Setup) -> str:
-    """Returns an interpretation in one line."""
     return SPACE.describe(setup.as_dict(), (*SPACE.choices, *SPACE.bounds))
 
 

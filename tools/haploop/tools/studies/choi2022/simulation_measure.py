@@ -94,7 +94,6 @@ class Extent(NamedTuple):
 
     @classmethod
     def from_book(cls, book_J: np.ndarray) -> Extent:
-        """Measures a book, shape (ticks,)."""
         fall = np.maximum.accumulate(book_J) - book_J
         return cls(float(book_J[-1]), float(book_J.min()), float(fall.max()))
 

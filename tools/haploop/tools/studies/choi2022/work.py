@@ -99,7 +99,6 @@ class Work:
         return self.texts[name].format(**computed)
 
     def text(self, name: str, text: str) -> None:
-        """Writes a text file."""
         self.path(name).write_text(text, encoding="utf-8")
 
     def figure(self, figure: Figure, name: str, seen: str = "") -> None:
@@ -122,7 +121,6 @@ class Work:
         pyarrow.parquet.write_table(pyarrow.Table.from_pylist(list(rows)), self.path(f"{name}.parquet"))
 
     def scene(self, name: str, scene: Scene) -> None:
-        """Writes a resolved scene that runs by itself."""
         self.text(f"{name}.toml", to_toml(scene.as_dict()))
 
     def keep(self, findings: Sequence[Finding]) -> None:
@@ -174,7 +172,6 @@ class Run(NamedTuple):
 
 
 def run(scene: Scene) -> Run:
-    """Runs a resolved scene in this process."""
     memory = MemoryLog()
     summary = run_in_process(scene, registry(), memory=memory)
     return Run(scene, summary, memory.recording())
@@ -192,7 +189,6 @@ def spectrum(log: Recording) -> tuple[np.ndarray, np.ndarray]:
 
 
 def strongest_Hz(log: Recording) -> float:
-    """Returns the frequency of the largest swing."""
     frequencies, amplitudes = spectrum(log)
     return float(frequencies[np.argmax(amplitudes[1:]) + 1])
 

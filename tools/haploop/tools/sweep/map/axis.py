@@ -39,7 +39,6 @@ class Ruler:
 
     @classmethod
     def from_axis(cls, axis: Axis) -> Ruler:
-        """Makes the ruler that suits an axis' values."""
         if axis.names:
             return cls(axis, "even", 1.0, "")
         return cls(axis, _scale(axis.planned), *with_prefix(axis.values, axis.unit))
@@ -53,7 +52,7 @@ class Ruler:
 
     @property
     def coordinates(self) -> np.ndarray:
-        """Coordinates of the axis' own values."""
+        """Those of the axis' own values."""
         return self.place(self.axis.values)
 
     @property

@@ -65,7 +65,6 @@ class Axis:
         return np.searchsorted(self.values, np.asarray(column, dtype=float))
 
     def word(self, index: int) -> str:
-        """Returns one value with its unit."""
         if self.names:
             return _short_name(self.names[index])
         factor, unit = with_prefix([self.values[index]], self.unit)
@@ -105,12 +104,10 @@ class MapData:
 
     @property
     def seeds(self) -> list[int]:
-        """All seeds that ran."""
         return sorted({int(seed) for seed in self.columns.get("seed", [])})
 
     @property
     def verdicts(self) -> np.ndarray:
-        """The verdict's number of every row."""
         return np.array([verdict_number(word) for word in self.columns["verdict"]], dtype=int)
 
     @property
@@ -120,7 +117,6 @@ class MapData:
 
     @property
     def has_amplitudes(self) -> bool:
-        """Tells whether the sweep recorded how far everything swings."""
         return AMPLITUDE in self.columns
 
     def cells(self) -> Cells:

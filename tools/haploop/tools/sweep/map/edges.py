@@ -53,12 +53,10 @@ class Edges:
 
     @property
     def begin(self) -> str:
-        """The value from which the search goes, in words."""
         return self.along.word(0 if self.rising else -1)
 
 
 def find_edges(data: MapData) -> Edges:
-    """Finds the boundaries of a bisecting sweep that is finished."""
     key, holds = data.sweep["bisect"]["axis"], data.sweep["bisect"].get("holds", "steady")
     along = next(axis for axis in data.axes if axis.key == key)
     along = replace(along, values=along.planned)

@@ -45,7 +45,6 @@ _RANGE = 1e-5
 
 
 def verdict_words(verdict: int) -> str:
-    """Returns a verdict in words."""
     return VERDICTS[verdict].replace("-", " ")
 
 

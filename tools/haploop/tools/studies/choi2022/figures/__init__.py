@@ -11,7 +11,6 @@ _NAME = re.compile(r"figure_(\d+)")
 
 
 def numbers() -> list[int]:
-    """Returns the numbers of the figures, in order."""
     names = (module.name for module in pkgutil.iter_modules(__path__))
     return sorted(int(found[1]) for name in names if (found := _NAME.fullmatch(name)))
 

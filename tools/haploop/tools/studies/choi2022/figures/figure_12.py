@@ -17,7 +17,6 @@ _DAMPINGS, _MASSES = (1.0, 2.15, 3.0, 4.0, 5.5, 7.5), (0.009, 0.014, 0.02, 0.027
 
 
 def best_pair(work: Work) -> Tuned:
-    """Returns the pair that swings least."""
     choices = [elements_of("both", b, m) for b in _DAMPINGS for m in _MASSES]
     return tuned(work, "damping with inertia", PAIR_AT_N_M, choices[2::7] if work.small else choices)
 

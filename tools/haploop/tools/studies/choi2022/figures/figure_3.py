@@ -37,7 +37,6 @@ class Curve(NamedTuple):
 
     @classmethod
     def from_run(cls, ran: Run) -> Curve:
-        """Takes it from a run."""
         plant = ran.log["/plant"]
         return cls(wall_of(ran.scene).position - plant["x"], plant["force"])
 

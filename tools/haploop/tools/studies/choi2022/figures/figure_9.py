@@ -67,17 +67,14 @@ class Tuned(NamedTuple):
         return cls(ran.scene, ran.summary)
 
     def size(self, parameter: str) -> float:
-        """Returns the parameter of the element that has it."""
         return next(e.parameters[parameter] for e in self.scene.dissipation if parameter in e.parameters)
 
     @property
     def steady(self) -> bool:
-        """True if there is no unwanted vibration."""
         return is_steady(self.result)
 
     @property
     def ended(self) -> str:
-        """The verdict, and the swing at the end."""
         if not self.swing_m:
             return f"{self.result['verdict']}, comes to rest"
         dying = ", dying down" if self.steady and self.swing_m > _STEPS_M else ""
@@ -135,7 +132,6 @@ class Press(NamedTuple):
 
     @classmethod
     def from_run(cls, ran: Run) -> Press:
-        """Takes it from a run."""
         ticks = ran.log["/controller"]
         depth = wall_of(ran.scene).position - ticks["x"]
         wall, total = ticks["wall"], ticks["total"]
