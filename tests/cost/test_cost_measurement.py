@@ -90,7 +90,7 @@ def test_another_scene_or_another_source_is_measured_anew(smooth, tmp_path, monk
     assert [made(), made()] == [1, 0]
     smooth.write_text(SMOOTH.replace("damping = 0.4", "damping = 0.5"))
     assert [made(), made()] == [1, 0]
-    monkeypatch.setattr(measure, "_sources", lambda: "edited")
+    monkeypatch.setattr(measure, "made_with", lambda: ["edited"])
     assert [made(), made()] == [1, 0]
 
 
@@ -155,7 +155,7 @@ def test_the_first_block_of_a_longer_run_is_not_timed(smooth, ticks, beyond_m, t
 
     At rest under 50 N/s, 20 g are 0.4 um away after 1 ms and 3.3 um after 2 ms: a limit of 1 um leaves two ticks.
     """
-    monkeypatch.setattr(times, "timed_s", lambda work: work() or 1.0)
+    monkeypatch.setattr(times, "timed", lambda work: (1.0, work()))
     scene = load_scene(smooth, [f"duration={ticks / 1000}", f"diverged_beyond={beyond_m}", "clock.integrator=exact"])
     us: Any = times.loop_us(scene)
     assert 1e6 / us == pytest.approx(timed)

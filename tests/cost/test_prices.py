@@ -69,7 +69,7 @@ def test_groups_survive_cost_json(tmp_path: Path) -> None:
 
 @pytest.fixture(scope="module")
 def jobs() -> prices.Jobs:
-    return prices.price_jobs(SCENES, [])
+    return prices.price_jobs([])
 
 
 def test_each_group_has_its_jobs_baseline_first(jobs: prices.Jobs) -> None:
@@ -149,7 +149,7 @@ class Measuring:
 
     def measure(self, processes_repeats: int = 2) -> list[PriceGroup]:
         with Store(self.directory) as store:
-            measured = prices.Prices(SCENES, store, {IN_PROCESS: 3, PROCESSES: processes_repeats})
+            measured = prices.Prices(store, {IN_PROCESS: 3, PROCESSES: processes_repeats})
             measured.measure(lambda name, count: lambda: None)
             return measured.groups()
 

@@ -20,20 +20,25 @@ from haploop.launch.scene.mistakes import COMMAND_LINE, SceneError
 from haploop.plant.integrators.registry import INTEGRATORS
 from haploop.protocol.scene.scene import Scene
 from haploop.tools.cost.data import Errors
+from haploop.tools.machine import machine, source_digest, versions
 from haploop.tools.operations import operations
 from haploop.tools.reference.nearest import Reference, statistics
 from haploop.tools.trajectory import Trajectory, trajectory
 
 METHODS = tuple(INTEGRATORS)
+# Measurements depend on these packages whole, and of this one on these files.
+_PACKAGES = ("haploop.protocol", "haploop.plant", "haploop.controller", "haploop.logger", "haploop.launch")
+_FILES = (
+    *("cost/grid.py", "cost/times.py", "cost/prices.py", "linear/one_tick.py", "linear/stiffness_limit.py"),
+    *("operations.py", "trajectory.py", "reference/nearest.py"),
+)
 
 
 @dataclass(frozen=True)
 class Candidate:
-    """One scene with one method at one plant rate.
+    """One scene file with one method at one plant rate, Hz.
 
-    Attributes:
-        method, plant_rate: of this candidate, rate in Hz.
-        scene: resolved; None where the check refuses it.
+    ``scene`` is resolved, or None where the check refuses it; ``refusal`` says why.
     """
 
     path: Path
@@ -53,12 +58,7 @@ class Candidate:
 
 @dataclass(frozen=True)
 class Grid:
-    """All candidates of one scene.
-
-    Attributes:
-        scene: as its file has it, resolved.
-        candidates: method by method, rates rising; the scene's own setting is one of them.
-    """
+    """All candidates of one scene, method by method, rates rising; the scene's own setting is one of them."""
 
     path: Path
     scene: Scene
@@ -98,6 +98,13 @@ def digest(data: Any) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:20]
 
 
+def made_with() -> list[Any]:
+    """Returns what measurements depend on beside the scenes: machine, versions and the source of what is measured."""
+    tools = Path(__file__).parents[1]
+    files = [*(tools / name for name in _FILES), *sorted((tools / "reference/stored").glob("*"))]
+    return [machine(), versions(), source_digest(_PACKAGES, files)]
+
+
 def scenes_folder() -> Path:
     """Returns the folder of haploop's own scenes: in a wheel inside haploop.launch, in a checkout beside it."""
     import haploop.launch
@@ -113,13 +120,7 @@ def accuracy_scenes() -> list[Path]:
 
 @dataclass(frozen=True)
 class Outcome:
-    """The outcome of one candidate, in one run that is not timed.
-
-    Attributes:
-        error: against the reference; None where it failed.
-        ticks: that the run had; 0 for one that could not be run at all.
-        instructions_per_tick: bytecode instructions of plant and controller.
-    """
+    """The outcome of one candidate in one run that is not timed: an error or a failure, and the ticks that it had."""
 
     error: Errors | None
     failure: str | None
@@ -162,21 +163,16 @@ def _errors(ran: Trajectory, scene: Scene, reference: Reference) -> Errors:
     chaotic reference forbids that, the swings in the verdict's window are: |a - a_ref| / |a_ref|.
     """
     verdict, energy = ran.summary["verdict"], ran.summary["energy"]
-    residual = _share(_apart(energy["residual_J"], 0.0), energy["moved_J"])
+    residual = _share(energy["residual_J"], energy["moved_J"])
     common = {"residual": residual, "verdict": verdict, "verdict_right": verdict == reference.verdict}
     if reference.pointwise:
         off = np.abs(ran.x_m - np.asarray(reference.x_m))[1:]
-        rms_m = math.sqrt(np.mean(off**2))
-        return Errors(final_m=float(off[-1]), rms_m=rms_m, max_m=float(off.max()), **common)
+        return Errors(final_m=float(off[-1]), rms_m=math.sqrt(np.mean(off**2)), max_m=float(off.max()), **common)
     theirs, ours = reference.statistics, statistics(scene, ran.x_m, ran.v_m_s)
     off_by = {name: _apart(ours[name], theirs[name]) for name in theirs}
-    return Errors(
-        amplitude=_share(off_by["amplitude_m"], theirs["amplitude_m"]),
-        frequency=_share(off_by["frequency_Hz"], theirs["frequency_Hz"]),
-        energy_per_cycle=_share(off_by["energy_per_cycle_J"], theirs["energy_per_cycle_J"]),
-        amplitude_m=off_by["amplitude_m"],
-        **common,
-    )
+    names = {"amplitude": "amplitude_m", "frequency": "frequency_Hz", "energy_per_cycle": "energy_per_cycle_J"}
+    relative = {entry: _share(off_by[name], theirs[name]) for entry, name in names.items()}
+    return Errors(**relative, amplitude_m=off_by["amplitude_m"], **common)
 
 
 def _apart(value: float | None, reference: float | None) -> float | None:
@@ -184,4 +180,4 @@ def _apart(value: float | None, reference: float | None) -> float | None:
 
 
 def _share(off_by: float | None, reference: float | None) -> float | None:
-    return off_by / abs(reference) if off_by is not None and reference else None
+    return abs(off_by / reference) if off_by is not None and reference else None

@@ -14,25 +14,21 @@ from haploop.protocol.ticks import Timebase
 from haploop.tools.cost import times
 from haploop.tools.cost.data import Cost, Errors, Point, ReferenceNote, SceneCost, Spread
 from haploop.tools.cost.findings import advice
-from haploop.tools.cost.grid import Candidate, Grid, Outcome, digest, outcome, scenes_folder
+from haploop.tools.cost.grid import Candidate, Grid, Outcome, digest, made_with, outcome
 from haploop.tools.cost.prices import Prices
 from haploop.tools.cost.times import IN_PROCESS, PROCESSES, Job, Store
-from haploop.tools.machine import commit, machine, source_digest, versions
+from haploop.tools.machine import commit, machine, versions
 from haploop.tools.reference.nearest import Reference, reference_for
 from haploop.tools.render.progress import Stage
 
 _OUTCOME, _REFERENCE = "outcome", "reference"
-# What the errors and the times depend on, beside the scenes: packages whole, and of this one these files.
-_PACKAGES = ("haploop.protocol", "haploop.plant", "haploop.controller", "haploop.logger", "haploop.launch")
-_FILES = ("cost/grid.py", "cost/times.py", "operations.py", "trajectory.py", "reference/nearest.py")
 
 
 class Measurement:
-    """The measurements of some grids, kept in a directory; a context manager.
+    """The measurements of some grids, kept in a directory that is there; a context manager.
 
-    Args:
-        repeats, processes_repeats: of each time in one process and as processes; 0 for not at all.
-        find_reference: makes or finds what the runs of a scene, given by its file and resolved, are compared with.
+    Repeats are of each time in one process and as processes, 0 for not at all. ``find_reference`` makes or finds what
+    the runs of a scene, given by its file and resolved, are compared with.
     """
 
     def __init__(
@@ -46,7 +42,7 @@ class Measurement:
         self._grids = grids
         self._repeats = {IN_PROCESS: repeats, PROCESSES: processes_repeats}
         self._find_reference = find_reference
-        self._made_with = [machine(), versions(), _sources()]
+        self._made_with = made_with()
         self._store = Store(out)
 
     def __enter__(self) -> Self:
@@ -63,10 +59,7 @@ class Measurement:
         return digest([grid.scene, *self._made_with])
 
     def errors(self, stage: Stage) -> None:
-        """Runs every candidate of which nothing is known, and compares it.
-
-        The order is random, so that the time left is told well.
-        """
+        """Runs and compares every candidate of which nothing is known, in random order, to tell the time left well."""
         for grid in self._grids:
             left = [c for c in grid.candidates if not self._store.has(_OUTCOME, self._key(c))]
             if not left and self._store.has(_REFERENCE, self._reference_key(grid)):
@@ -91,7 +84,7 @@ class Measurement:
 
     @cached_property
     def _prices(self) -> Prices:
-        return Prices(scenes_folder(), self._store, self._repeats)
+        return Prices(self._store, self._repeats)
 
     def _jobs(self, way: str) -> list[Job]:
         """Returns a job for every candidate whose run had a tick; as processes, for those that ended as planned."""
@@ -106,10 +99,7 @@ class Measurement:
 
     def _outcome(self, candidate: Candidate) -> Outcome | None:
         record = self._store.get(_OUTCOME, self._key(candidate))
-        if record is None:
-            return None
-        error = Errors(**record["error"]) if record["error"] else None
-        return Outcome(**{**record, "error": error})
+        return record and Outcome(**{**record, "error": record["error"] and Errors(**record["error"])})
 
     def cost(self, tolerance_m: float) -> Cost:
         loads = [times.quiet(self._store, self._jobs(way), n) for way, n in self._repeats.items()]
@@ -138,26 +128,12 @@ class Measurement:
         return dataclasses.replace(made, advice=advice(made, tolerance_m)) if complete else made
 
     def _point(self, candidate: Candidate) -> Point | None:
-        came = self._outcome(candidate)
-        if came is None:
+        if (came := self._outcome(candidate)) is None:
             return None
-        key = self._key(candidate)
-        return Point(
-            candidate.method,
-            candidate.plant_rate,
-            came.error,
-            came.failure,
-            us_per_tick=self._spread(IN_PROCESS, key),
-            processes_us_per_tick=self._spread(PROCESSES, key),
-            instructions_per_tick=came.instructions_per_tick,
-        )
+        one, processes = (self._spread(way, self._key(candidate)) for way in (IN_PROCESS, PROCESSES))
+        setting = candidate.method, candidate.plant_rate
+        return Point(*setting, came.error, came.failure, one, processes, came.instructions_per_tick)
 
     def _spread(self, what: str, key: str) -> Spread | None:
         values = [value for value in self._store.all(what, key, self._repeats[what]) if value is not None]
         return Spread.from_values(values) if values else None
-
-
-def _sources() -> str:
-    tools = Path(__file__).parents[1]
-    files = [*(tools / name for name in _FILES), *sorted((tools / "reference/stored").glob("*"))]
-    return source_digest(_PACKAGES, files)

@@ -8,7 +8,6 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 from haploop.controller.controller import Controller
@@ -20,10 +19,9 @@ from haploop.protocol.block_length import BlockLength
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
 from haploop.tools.cost.data import Price, PriceGroup, price
-from haploop.tools.cost.grid import digest
+from haploop.tools.cost.grid import digest, made_with, scenes_folder
 from haploop.tools.cost.times import IN_PROCESS, PROCESSES, Job, Store, loop_us, measure, run_us, tick_us
 from haploop.tools.linear.stiffness_limit import StiffnessLimit, stiffness_limit
-from haploop.tools.machine import machine, source_digest, versions
 from haploop.tools.operations import AGAIN, NONE, WHOLE, ablations, operations
 from haploop.tools.render.progress import Stage
 from haploop.tools.render.units import spring
@@ -34,8 +32,6 @@ _LOGS = ("none", "ticks", "steps")
 # Held long enough that a time is no accident; a scene that swings apart runs to its end all the same.
 _IN_PROCESS_S, _EFFECTS_S, _PROCESSES_S = 4.0, 0.5, 2.0
 _FREE, _PROMPT = "diverged_beyond=1e9", "clock.round_trip_delay=0.0"
-_PACKAGES = ("haploop.protocol", "haploop.plant", "haploop.controller", "haploop.logger", "haploop.launch")
-_FILES = ("cost/prices.py", "cost/times.py", "linear/one_tick.py", "linear/stiffness_limit.py", "operations.py")
 _LIMIT, _INSTRUCTIONS = "stiffness limit", "instructions"
 _WITH_LIMIT, _COUNTED = ("delay", "control rate"), ("effects", "delay", "control rate")
 _WALL = "fig6a.toml without delay"
@@ -66,13 +62,13 @@ _BUYS = {
 Jobs = dict[str, dict[str, Job]]
 
 
-def price_jobs(scenes: Path, made_with: Sequence[Any]) -> Jobs:
+def price_jobs(depends_on: Sequence[Any]) -> Jobs:
     """Makes every job of every group, baselines first; its key is made of all that its time depends on.
 
-    Args:
-        scenes: the folder of the scenes: the paper's wall, fig6a.toml, without delay, and all_effects.toml.
-        made_with: what the times depend on beside the scenes, as JSON can hold it.
+    They are runs of the paper's wall, fig6a.toml, without delay, and of all_effects.toml; ``depends_on`` is what times
+    depend on beside the scenes, as JSON can hold it.
     """
+    scenes = scenes_folder()
     wall = scenes / "fig6a.toml"
 
     def in_process(*settings: str) -> Job:
@@ -97,7 +93,7 @@ def price_jobs(scenes: Path, made_with: Sequence[Any]) -> Jobs:
         "control rate": {f"{hz / 1e3:g} kHz": in_process(f"clock.control_rate={hz}") for hz in _CONTROL_RATES_HZ},
     }
     return {
-        group: {what: replace(job, key=digest([job.key, job.scene, *made_with])) for what, job in members.items()}
+        group: {what: replace(job, key=digest([job.key, job.scene, *depends_on])) for what, job in members.items()}
         for group, members in jobs.items()
     }
 
@@ -124,17 +120,13 @@ def bare_us(scene: Scene) -> float | None:
 
 
 class Prices:
-    """Measures what is missing in a store, and puts together what is there.
+    """Measures what is missing in an open store, and puts together what is there.
 
-    Args:
-        scenes: the folder of the scenes that come with haploop.
-        repeats: of each time, by way; prices of a way with 0 repeats are left out.
+    Repeats are of each time, by way; prices of a way with 0 repeats are left out.
     """
 
-    def __init__(self, scenes: Path, store: Store, repeats: Mapping[str, int]) -> None:
-        tools = Path(__file__).parents[1]
-        sources = source_digest(_PACKAGES, [tools / name for name in _FILES])
-        jobs = price_jobs(scenes, [machine(), versions(), sources])
+    def __init__(self, store: Store, repeats: Mapping[str, int]) -> None:
+        jobs = price_jobs(made_with())
         self._store, self._repeats = store, repeats
         self._jobs = {
             name: members for name, members in jobs.items() if all(repeats[job.way] for job in members.values())

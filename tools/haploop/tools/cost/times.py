@@ -14,11 +14,12 @@ import statistics
 import tempfile
 import time
 import warnings
+from collections import deque
 from collections.abc import Callable, Hashable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, Self, TypeVar
 
 import numpy as np
 
@@ -33,6 +34,7 @@ from haploop.tools.cost.data import Load, Spread
 from haploop.tools.cost.grid import Candidate
 from haploop.tools.render.progress import Stage
 
+T = TypeVar("T")
 POINTS_FILE = "points.jsonl"
 IN_PROCESS, PROCESSES = "us in one process", "us as processes"
 _SEED = 20_220_711
@@ -45,7 +47,7 @@ _STEPS = 100_000
 
 
 class Store:
-    """DIR/points.jsonl: records by (what, key, repeat), a line each, appended and never rewritten; a context manager.
+    """DIR/points.jsonl: records by (what, key, repeat), a line each, only appended; a context manager.
 
     A line that was cut off when the program was killed is passed over: its record is measured again.
     """
@@ -90,12 +92,10 @@ class Store:
 
 @dataclass(frozen=True)
 class Job:
-    """A scene and a way to time its run.
+    """A resolved scene and a way to time its run, ``IN_PROCESS`` or ``PROCESSES``.
 
-    Attributes:
-        way: ``IN_PROCESS`` or ``PROCESSES``.
-        family: jobs of which one, run untimed beforehand, warms up all.
-        clock: runs it once and returns the time of a tick, µs; None where the run failed.
+    Of the jobs of one ``family`` one, run untimed beforehand, warms up all. ``key`` is its name in the store. ``clock``
+    runs it once and returns the time of a tick, µs; None where the run failed.
     """
 
     way: str
@@ -146,30 +146,22 @@ def tick_us(block: Callable[[], bool], tick: Callable[[], int]) -> float | None:
 
     The first block, which makes what later ones only use, is not counted; a run of a single block is counted whole.
     """
-    going = True
-
-    def first() -> None:
-        nonlocal going
-        going = block()
-
-    def rest() -> None:
-        while block():
-            pass
-
-    took_s, before, ticks = timed_s(first), tick(), tick()
-    if going:
-        took_s, ticks = timed_s(rest), tick() - before
+    took_s, goes_on = timed(block)
+    ticks = tick()
+    if goes_on:
+        took_s, _ = timed(lambda: deque(iter(block, False), maxlen=0))
+        ticks = tick() - ticks
     return took_s / ticks * 1e6 if ticks else None
 
 
-def timed_s(work: Callable[[], object]) -> float:
-    """Returns how long some work takes, s, with the garbage collector off."""
+def timed(work: Callable[[], T]) -> tuple[float, T]:
+    """Returns how long some work takes, s, with the garbage collector off, and its result."""
     gc.collect()
     gc.disable()
     try:
         began = time.perf_counter()
-        work()
-        return time.perf_counter() - began
+        result = work()
+        return time.perf_counter() - began, result
     finally:
         gc.enable()
 
@@ -244,10 +236,9 @@ def quiet(store: Store, jobs: Sequence[Job], repeats: int) -> Load | None:
 
 
 def _observe_machine(alone: bool) -> dict[str, float | None]:
-    """Returns the time of a fixed calibration loop, s, and the load average, None where the system tells none.
+    """Returns the time of a fixed calibration loop, s, and the load average, None where it cannot be known.
 
-    The load average counts the processes that run or wait for a core in the last minute; it tells nothing unless this
-    process is ``alone`` to run.
+    The load average counts processes that run or wait for a core: it tells something only where this one is alone.
     """
     value = 1.0
     began = time.perf_counter()
