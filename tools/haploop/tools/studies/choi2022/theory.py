@@ -21,6 +21,7 @@ from haploop.protocol.scene.scene import ElementTable, Scene
 from haploop.tools.linear.one_tick import OneTickMap
 from haploop.tools.search.bisect import bisect_many
 from haploop.tools.studies.choi2022.device import KINDS, UNITS, VELOCITIES, Setup, elements_of
+from haploop.tools.studies.choi2022.sampled import PERIOD_S
 
 FREQUENCIES_HZ = np.linspace(2.0, 498.0, 249)
 # Age of a reading of an MPU-9250 at its setting of 420 Hz.
@@ -50,25 +51,18 @@ class Felt(NamedTuple):
     damping: np.ndarray
 
 
-def bidirectional(
-    frequency_Hz: np.ndarray, *, reading_s: float, delay_s: float | np.ndarray, period_s: float = 1e-3
-) -> Felt:
+def bidirectional(frequency_Hz: np.ndarray, *, reading_s: float, delay_s: float | np.ndarray) -> Felt:
     """Returns what f = -m a comes to, late by the age of the reading, the extra delay and half a period of the hold.
 
     By psi = w (reading + delay + T / 2) it lags, so that the device feels m cos(psi) and the damping m w sin(psi): late
     inertia damps, most at a quarter of a period, and drives from half a period on.
     """
     w = 2.0 * np.pi * np.asarray(frequency_Hz, float)
-    return _felt(np.ones_like(w), np.ones_like(w, complex), w * (reading_s + delay_s + period_s / 2.0))
+    return _felt(np.ones_like(w), np.ones_like(w, complex), w * (reading_s + delay_s + PERIOD_S / 2.0))
 
 
 def unidirectional(
-    frequency_Hz: np.ndarray,
-    *,
-    reading_s: float,
-    delay_s: float | np.ndarray,
-    velocity_s: float | np.ndarray = 5e-4,
-    period_s: float = 1e-3,
+    frequency_Hz: np.ndarray, *, reading_s: float, delay_s: float | np.ndarray, velocity_s: float | np.ndarray = 5e-4
 ) -> Felt:
     """Returns the describing function of f = -m a[k] while v[k] a[k-1] >= 0 (Choi et al. 2022, eq. 9).
 
@@ -86,10 +80,10 @@ def unidirectional(
         velocity_s: age of the velocity; of one that is low-passed by frequency, ``low_passed_s``.
     """
     w = 2.0 * np.pi * np.asarray(frequency_Hz, float)
-    p, q = np.pi / 2.0 + w * (velocity_s - reading_s), w * period_s
+    p, q = np.pi / 2.0 + w * (velocity_s - reading_s), w * PERIOD_S
     open_rad = np.pi - np.arccos(np.cos(p - q))
     left = (open_rad + np.exp(-1j * (p + q)) * np.sin(open_rad)) / np.pi
-    return _felt(open_rad / np.pi, left, w * (reading_s + delay_s + period_s / 2.0))
+    return _felt(open_rad / np.pi, left, w * (reading_s + delay_s + PERIOD_S / 2.0))
 
 
 def _felt(duty: np.ndarray, left: np.ndarray, lag: np.ndarray) -> Felt:
@@ -103,9 +97,9 @@ def low_passed_s(frequency_Hz: np.ndarray, cutoff_Hz: float | None, age_s: float
     return age_s + (np.arctan(f / cutoff_Hz) / (2.0 * np.pi * f) if cutoff_Hz else np.zeros_like(f))
 
 
-def always_open_Hz(*, reading_s: float, velocity_s: float = 5e-4, period_s: float = 1e-3) -> float:
-    """Returns the lowest frequency at which the gate never closes, Hz: w (T + reading - velocity) = pi / 2."""
-    return 0.25 / (period_s + reading_s - velocity_s)
+def always_open_Hz(*, reading_s: float) -> float:
+    """Returns the lowest frequency at which the gate never closes, Hz: w (T + reading - T / 2) = pi / 2."""
+    return 0.25 / (PERIOD_S + reading_s - 5e-4)
 
 
 def damps(reading_s: float) -> np.ndarray:
@@ -222,20 +216,21 @@ class GatedMap:
         per_kg = (more.without_wall - least.without_wall) / (_SOME_MASS - _NO_MASS)
         return cls(least.without_wall, per_kg, least.pushed, len(Chain.from_scene(scene).states))
 
-    def growth(self, stiffness: ArrayLike, mass: ArrayLike, *, seed: int = 1, ticks: int = _TICKS) -> np.ndarray:
+    def growth(self, stiffness: ArrayLike, mass: ArrayLike) -> np.ndarray:
         """Returns ln of the factor per tick by which the fastest of some random starts grows in the end, peak to peak.
 
-        ``stiffness`` (N/m) and ``mass`` (kg) are of the same shape or broadcast to one.
+        Stiffness in N/m and mass in kg are broadcast to one shape.
         """
         k, m = np.broadcast_arrays(np.asarray(stiffness, float), np.asarray(mass, float))
         shape = (_STARTS, *k.shape)
         k, m = np.tile(k.ravel(), _STARTS), np.tile(m.ravel(), _STARTS)
-        units = self._units()
+        # 1 m/s for every velocity and 1 mm for every length; what else is a state counts as a velocity.
+        units = np.where(np.arange(self.states) < self.states // 2, 1e-3, 1.0)[:, None]
         w = np.zeros((len(self.without), len(k)))
-        w[: self.states] = np.random.default_rng(seed).normal(size=(self.states, len(k))) * units
+        w[: self.states] = np.random.default_rng(1).normal(size=(self.states, len(k))) * units
         x_before, a_before = w[0].copy(), np.zeros(len(k))
         peak, grown, settled = np.zeros(len(k)), np.zeros(len(k)), np.zeros(len(k))
-        for tick in range(1, ticks + 1):
+        for tick in range(1, _TICKS + 1):
             x, a = w[0].copy(), w[self.states].copy()
             gate = (x - x_before) * a_before >= 0.0
             w = self.without @ w - self.pushed[:, None] * (k * x) + self.per_kg @ (w * (m * gate))
@@ -247,10 +242,4 @@ class GatedMap:
                 w, x_before, a_before, peak = w / size, x_before / size, a_before / size, np.zeros(len(k))
             if tick == _SETTLED:
                 settled = grown.copy()
-        return ((grown - settled) / (ticks - _SETTLED)).reshape(shape).max(axis=0)
-
-    def _units(self) -> np.ndarray:
-        """Returns 1 m/s for every velocity and 1 mm for every length; what else is a state counts as a velocity."""
-        units = np.ones((self.states, 1))
-        units[: self.states // 2] = 1e-3
-        return units
+        return ((grown - settled) / (_TICKS - _SETTLED)).reshape(shape).max(axis=0)

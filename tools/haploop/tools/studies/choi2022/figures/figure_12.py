@@ -25,18 +25,13 @@ def make(work: Work) -> list[Finding]:
     """Runs the paper's values, and the best of ours."""
     chosen = best_pair(work)
     b, mass_g = chosen.size("damping"), 1e3 * chosen.size("mass")
-    ran, papers = presses(
-        work,
-        "figure_12",
-        {
-            "best": (f"{b:g} N s/m with {mass_g:g} g, the best here", chosen.scene),
-            "paper": (
-                "2.15 N s/m with 9 g, as in the paper",
-                nearest(work).scene(PAIR_AT_N_M, elements_of("both", *PAIR)),
-            ),
-        },
-    )
-    best, of_paper, press = Tuned.from_run(ran), Tuned.from_run(papers), Press.from_run(ran)
+    of_paper = nearest(work).scene(PAIR_AT_N_M, elements_of("both", *PAIR))
+    cases = {
+        "best": (f"{b:g} N s/m with {mass_g:g} g, the best here", chosen.scene),
+        "paper": ("2.15 N s/m with 9 g, as in the paper", of_paper),
+    }
+    runs = presses(work, "figure_12", cases)
+    (best, paper), press = (Tuned(ran.scene, ran.summary) for ran in runs), Press.from_run(runs[0])
     shown = best.result["window"]["displayed_stiffness_N_m"]
     off = abs(shown / PAIR_AT_N_M - 1.0)
     inside = press.displayed_N_m[press.output_N != 0.0]
@@ -53,6 +48,6 @@ def make(work: Work) -> list[Finding]:
             ripple=amount(float(np.ptp(press.output_N[len(press.output_N) // 2 :])), "N", 2),
             **sizes,
         ),
-        *findings(work, CLAIMS, {"values": of_paper.steady}, ended=of_paper.ended, **sizes),
+        *findings(work, CLAIMS, {"values": paper.steady}, ended=paper.ended, **sizes),
         *findings(work, CLAIMS, {"instant": within <= 2}, within=within, first=inside[0] / 1e3),
     ]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import product
-from typing import TYPE_CHECKING, TypedDict
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -33,19 +33,12 @@ _BASE = Setup(
 DRAW = 1.05
 
 
-class Drive(TypedDict):
-    """What tells a drive from ``_BASE``, beside mode and delay: where the masses sit, and how old the reading is."""
-
-    near_share: float
-    unit: str
-    mount: str
-
-
-DRIVES: dict[str, Drive] = {
-    "rotor against the rest, ideal unit": {"near_share": 0.055, "unit": "ideal", "mount": "motor"},
-    "near mass 0.3, ideal unit": {"near_share": 0.3, "unit": "ideal", "mount": "motor"},
-    "near mass 0.3, unit of 420 Hz and 1 ms": {"near_share": 0.3, "unit": "420 Hz", "mount": "motor"},
-    "halves, unit on the far one, 420 Hz and 1 ms": {"near_share": 0.45, "unit": "420 Hz", "mount": "tip"},
+# Drives differ in where the masses sit, and in how old the reading is.
+DRIVES = {
+    "rotor against the rest, ideal unit": replace(_BASE, near_share=0.055),
+    "near mass 0.3, ideal unit": _BASE,
+    "near mass 0.3, unit of 420 Hz and 1 ms": replace(_BASE, unit="420 Hz"),
+    "halves, unit on the far one, 420 Hz and 1 ms": replace(_BASE, near_share=0.45, unit="420 Hz", mount="tip"),
 }
 
 
@@ -54,7 +47,7 @@ def make(work: Work) -> list[Finding]:
     modes, delays = (_MODES_HZ[2:7:2], _DELAYS_S[1:2]) if work.small else (_MODES_HZ, _DELAYS_S)
     names = [*DRIVES][1:2] if work.small else [*DRIVES]
     cells = product((DRIVES[name] for name in names), delays, modes)
-    setups = [replace(_BASE, **choice, mode_Hz=mode, delay_s=delay) for choice, delay, mode in cells]
+    setups = [replace(drive, mode_Hz=mode, delay_s=delay) for drive, delay, mode in cells]
     found = work.map_parallel("which element wins", limits, setups)
     best = np.array([[cell[kind] for kind in KINDS] for cell in found])
     stiffness, sizes = np.moveaxis(best.reshape(len(names), len(delays), len(modes), len(KINDS), 2), -1, 0)
@@ -108,9 +101,9 @@ def _higher(stiffness: np.ndarray) -> tuple[Finding, str]:
     best, by = winner(cells)
     clear = by >= DRAW
     shares = ", ".join(f"{SHORT[kind]} {np.sum(clear & (best == i))}" for i, kind in enumerate(KINDS))
+    winners = f"{shares}, nobody {np.sum(~clear)}"
     uni, others = cells[:, 3], cells[:, 1:3].max(axis=1)
     above = uni >= DRAW * others
-    winners = f"{shares}, nobody {np.sum(~clear)}"
     finding = CLAIMS["higher"].holds_if(
         False,
         bool(above.any()),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from haploop.tools.render.units import amount
 from haploop.tools.studies.choi2022.claims import Finding, claims_of
 from haploop.tools.studies.choi2022.drawing import INSIDE, UPPER_LEFT
 from haploop.tools.studies.choi2022.sampled import PERIOD_S, SPRING, STIFFNESS_N_M, forces, taken_J
-from haploop.tools.studies.choi2022.work import Run, Work, fig6, run, wall_of
+from haploop.tools.studies.choi2022.work import Work, fig6, run, wall_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -29,16 +29,8 @@ _SPEED_M_S = 0.1
 _FILL = "#E8A0A0"
 
 
-class Curve(NamedTuple):
-    """Penetration in m, negative outside, and force out of the wall in N at every plant step."""
-
-    depth_m: np.ndarray
-    force_N: np.ndarray
-
-    @classmethod
-    def from_run(cls, ran: Run) -> Curve:
-        plant = ran.log["/plant"]
-        return cls(wall_of(ran.scene).position - plant["x"], plant["force"])
+# Penetration in m, negative outside, and force out of the wall in N at every plant step.
+Curve = tuple[np.ndarray, np.ndarray]
 
 
 def make(work: Work) -> list[Finding]:
@@ -53,12 +45,12 @@ def make(work: Work) -> list[Finding]:
     curves, walls, columns = {}, {}, {}
     for number, (name, scene) in enumerate(scenes.items()):
         ran = run(scene)
-        curves[name], walls[name] = Curve.from_run(ran), ran.summary["energy"]["wall"]
-        columns |= {f"penetration_{number}_m": curves[name].depth_m, f"force_{number}_N": curves[name].force_N}
+        depth, force = wall_of(scene).position - ran.log["/plant"]["x"], ran.log["/plant"]["force"]
+        curves[name], walls[name] = (depth, force), ran.summary["energy"]["wall"]
+        columns |= {f"penetration_{number}_m": depth, f"force_{number}_N": force}
         work.scene(f"figure_3_{number}", scene)
     figure = empty_figure(13.0, 4.4)
-    axes = figure.subplots(1, 3, sharey=True, sharex=True)
-    for ax, (name, curve) in zip(axes, curves.items(), strict=True):
+    for ax, (name, curve) in zip(figure.subplots(1, 3, sharey=True, sharex=True), curves.items(), strict=True):
         _draw(ax, name, curve, walls[name])
     work.figure(figure, "figure_3")
     work.data("figure_3", columns)
@@ -80,14 +72,6 @@ def single_contact(title: str, *, delay_s: float = 0.0, **tables: Any) -> Scene:
     return replace(scene, title=title, duration=0.1, clock=clock, device=device, **tables)
 
 
-def area_J(depth_m: np.ndarray, force_N: np.ndarray) -> float:
-    """Returns the area within the closed curve of a held force over penetration, positive if counter-clockwise.
-
-    -sum f dx: the force points out, so what it gives on the way out is counted positive.
-    """
-    return float(-np.sum(force_N[:-1] * np.diff(depth_m)))
-
-
 def _draw(ax: Axes, name: str, curve: Curve, wall: Summary) -> None:
     depth, force = curve
     mm = 1e3 * depth
@@ -95,21 +79,15 @@ def _draw(ax: Axes, name: str, curve: Curve, wall: Summary) -> None:
     ax.fill(mm, force, color=_FILL, linewidth=0, alpha=0.7)
     reach = np.array([0.0, mm[deepest]])
     ax.plot(reach, STIFFNESS_N_M * reach / 1e3, color=INK, linewidth=1.6, label="ideal")
-    ax.plot(
-        mm[: deepest + 1], force[: deepest + 1], color=PRESSING, linewidth=1.2, drawstyle="steps-post", label="pressing"
-    )
-    ax.plot(mm[deepest:], force[deepest:], color=RELEASING, linewidth=1.2, drawstyle="steps-post", label="releasing")
+    way_in, way_out, held = slice(deepest + 1), slice(deepest, None), {"linewidth": 1.2, "drawstyle": "steps-post"}
+    ax.plot(mm[way_in], force[way_in], color=PRESSING, label="pressing", **held)
+    ax.plot(mm[way_out], force[way_out], color=RELEASING, label="releasing", **held)
     dress(ax, name, "penetration (mm)", "force out of the wall (N)")
     ax.set_xlim(-0.45, None)
     took, gave = map(_J, _taken_and_given_J(depth, force))
     text = f"took {took}\ngave {gave}\nleak {_J(-wall['true_J'])}"
     ax.text(0.97, 0.06, text, transform=ax.transAxes, ha="right", va="bottom", fontsize=SMALL, color=INK)
     legend(ax, **UPPER_LEFT, **INSIDE)
-
-
-def _edges_m(depth: np.ndarray, force: np.ndarray) -> tuple[float, float]:
-    acting = np.flatnonzero(force)
-    return float(depth[acting[0]]), float(depth[acting[-1] + 1])
 
 
 def _taken_and_given_J(depth: np.ndarray, force: np.ndarray) -> tuple[float, float]:
@@ -119,11 +97,15 @@ def _taken_and_given_J(depth: np.ndarray, force: np.ndarray) -> tuple[float, flo
 
 def _findings(curves: Mapping[str, Curve], walls: Mapping[str, Summary]) -> list[Finding]:
     energies = {name: _taken_and_given_J(*one) for name, one in curves.items()}
-    areas, leaks = [area_J(*one) for one in curves.values()], [-wall["true_J"] for wall in walls.values()]
+    # -sum f dx: the force points out, so what it gives on the way out is counted positive: counter-clockwise.
+    areas = [float(-np.sum(force[:-1] * np.diff(depth))) for depth, force in curves.values()]
+    leaks = [-wall["true_J"] for wall in walls.values()]
     apart = max(abs(area / leak - 1.0) for area, leak in zip(areas, leaks, strict=True))
     leak = walls["and 2 ms of delay"]["leak"]
     causes = ("sampling_and_hold", "quantisation", "delay")
-    edges = [_edges_m(*one) for one in curves.values()]
+    # Penetration where the force begins, and where it ends.
+    acting = ((depth, np.flatnonzero(force)) for depth, force in curves.values())
+    edges = [(float(depth[there[0]]), float(depth[there[-1] + 1])) for depth, there in acting]
     late = [began > 0.0 > ended for began, ended in edges]
     levels = [len(np.unique(force)) for _, force in curves.values()]
     steps = [int(np.count_nonzero(force)) for _, force in curves.values()]

@@ -85,18 +85,8 @@ def _varied(setup: Setup, small: bool) -> dict[str, Pair]:
 
 
 def _largest(work: Work, setups: list[Setup]) -> list[Largest]:
-    alike: dict[tuple[float | str, ...], list[int]] = {}
-    for i, setup in enumerate(setups):
-        structure = (*(getattr(setup, key) for key in SPACE.choices), setup.acceleration)
-        alike.setdefault(structure, []).append(i)
-    groups = [[setups[i] for i in members] for members in alike.values()]
-    ladders = work.map_parallel("what each value changes", stiffness_ladder, groups)
-    found = {
-        i: {name: largest(steady[name]) for name in NAMES}
-        for members, of_group in zip(alike.values(), ladders, strict=True)
-        for i, steady in zip(members, of_group, strict=True)
-    }
-    return [found[i] for i in range(len(setups))]
+    ladders = work.map_parallel("what each value changes", stiffness_ladder, [[setup] for setup in setups])
+    return [{name: largest(steady[name]) for name in NAMES} for [steady] in ladders]
 
 
 def _draw(base: Largest, influences: Influences, varied: Mapping[str, Pair]) -> Figure:
@@ -123,7 +113,7 @@ def _notes(work: Work, found: Found[Setup], there: Sequence[Option]) -> str:
     measured = {"nearest interpretation": row, "with friction of 48 mN": with_friction}
     bears = [["the paper", "", *(f"{stiffness / 1e3:.1f}" for stiffness in PAPER.values())]]
     bears += [[name, *(f"{one[f'{kind}_N_m'] / 1e3:.1f}" for kind in NAMES)] for name, one in measured.items()]
-    kinds = ["nothing", "damping", "bidirectional", "unidirectional", "damping with unidirectional"]
+    kinds = [*(SHORT[kind] for kind in KINDS), "damping with unidirectional"]
     never = never_together(rows, [name for name in TESTED if share(rows, name) >= _OFTEN])
     alone = claims_table(
         TESTED,

@@ -20,7 +20,6 @@ from haploop.tools.studies.choi2022.sampled import bidirectional_J, damper_J, un
 from haploop.tools.studies.choi2022.work import Run, Work, run, strongest_Hz
 
 CLAIMS = claims_of(8)
-
 LABELS = ("damping", "bidirectional inertia", "unidirectional inertia")
 # Relative to the energy moved, what rounding leaves of a sum that cancels.
 _ROUNDING = 1e-9

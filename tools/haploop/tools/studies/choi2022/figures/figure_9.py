@@ -29,20 +29,18 @@ _STEPS_M = 2.0 * 28.7e-6
 def make(work: Work) -> list[Finding]:
     """Tunes each on a grid of sizes, and runs the best of them."""
     # The next stiffness beyond those that are drawn is for "larger than 5.0".
-    cases = {"damping": (5000.0, DAMPINGS), "unidirectional-inertia": (5500.0, MASSES)}
-    best = {kind: _tuned(work, kind, *case) for kind, case in cases.items()}
-    damping, inertia = presses(
-        work,
-        "figure_9",
-        {
-            kind.split("-")[0]: (f"{kind.replace('-', ' ')} at {cases[kind][0] / 1e3:.1f} N/mm", one.scene)
-            for kind, one in best.items()
-        },
-    )
+    cases = {
+        "damping": ("damping at 5.0 N/mm", _tuned(work, "damping", 5000.0, DAMPINGS).scene),
+        "unidirectional": (
+            "unidirectional inertia at 5.5 N/mm",
+            _tuned(work, "unidirectional-inertia", 5500.0, MASSES).scene,
+        ),
+    }
+    damping, inertia = presses(work, "figure_9", cases)
     beyond = _tuned(work, "damping", 5500.0, DAMPINGS)
     shown = inertia.summary["window"]["displayed_stiffness_N_m"]
     off = abs(shown / 5500.0 - 1.0)
-    here, ours = Tuned.from_run(damping), Tuned.from_run(inertia)
+    here, ours = (Tuned(ran.scene, ran.summary) for ran in (damping, inertia))
     return findings(
         work,
         CLAIMS,
@@ -60,11 +58,6 @@ class Tuned(NamedTuple):
 
     scene: Scene
     result: Summary
-
-    @classmethod
-    def from_run(cls, ran: Run) -> Tuned:
-        """Takes it from a run that kept its log."""
-        return cls(ran.scene, ran.summary)
 
     def size(self, parameter: str) -> float:
         return next(e.parameters[parameter] for e in self.scene.dissipation if parameter in e.parameters)
