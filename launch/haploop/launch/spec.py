@@ -65,8 +65,7 @@ class RunSpec:
 def make_output(out: Path | None, scene_path: Path) -> Path:
     """Makes the run's directory: ``out``, or a new one below ``runs/`` named by scene and time.
 
-    Raises:
-        OutputError: ``out`` holds something already, or cannot be made.
+    Raises OutputError where ``out`` holds something already, or cannot be made.
     """
     if out is None:
         stem = f"{scene_path.stem}-{time.strftime('%Y%m%d-%H%M%S')}"
@@ -100,8 +99,7 @@ def kept_name(path: Path) -> str:
 def keep_plugin(path: Path, out: Path) -> Path:
     """Copies a plugin file into the run's directory under a name with its digest, so that a replay finds it.
 
-    Raises:
-        OutputError: the file cannot be read or copied.
+    Raises OutputError where it cannot be read or copied.
     """
     try:
         name = kept_name(path)

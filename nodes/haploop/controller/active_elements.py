@@ -28,7 +28,6 @@ class ActiveElement:
     Attributes:
         acts: "always", or "in-contact": the force is 0 out of contact.
         book: number of the book, in order of opening within the run.
-        from_tick: the tick at which it was opened.
     """
 
     element: Element
@@ -44,8 +43,7 @@ class ActiveElement:
 def make_element(table: ElementTable, kinds: Mapping[str, type[Element]]) -> tuple[Element, str]:
     """Makes the element that a validated ``[[dissipation]]`` table names; returns it, and when it acts.
 
-    Raises:
-        ElementError: the element's own code does not take these parameters.
+    Raises ElementError where its own code does not take these parameters.
     """
     try:
         return kinds[table.name](**table.parameters), table.acts

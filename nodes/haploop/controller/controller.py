@@ -90,7 +90,6 @@ class Controller:
 
     Attributes:
         params, state: what ``tick`` is given, both replaced between ticks; the state is None before the first sample.
-        recorder: what happened at every tick, in blocks.
     """
 
     def __init__(self, scene: Scene, time: Timebase, kinds: Kinds, recorder: Recorder | None = None) -> None:

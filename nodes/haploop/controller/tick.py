@@ -46,7 +46,6 @@ class ControllerParams:
         velocity, acceleration: from x_m[k] to v[k], and from an input to a[k].
         input: that input: "encoder": v[k]; "accelerometer": the reading; "kalman": what the velocity's filter found.
         elements: the active elements, in the order in which their forces are added.
-        books: how many books of elements have been opened so far.
         motion: what elements are given; written anew at every tick.
     """
 
@@ -63,7 +62,6 @@ class ControllerState(NamedTuple):
     """Everything that a controller remembers from tick to tick; a tree of numbers (``haploop.protocol.trees``).
 
     Attributes:
-        velocity, acceleration: memories of the estimators.
         a_before: a of the tick before, m/s^2; 0 before the first.
         elements: memory of every active element; None where it has none.
     """

@@ -30,9 +30,9 @@ def needs_chain(scene: Scene) -> bool:
 
 
 def make_motion(scene: Scene, time: Timebase, members: int | None = None) -> Any:
-    """Makes the least motion that moves a scene, or a batch of so many members, whose integrator is exact.
+    """Makes the least motion that moves a scene, or a batch of so many members; nothing else is even imported.
 
-    Nothing else is even imported.
+    The integrator of a batch is exact.
     """
     if not needs_chain(scene):
         return OneMassMotion(scene, time, members)

@@ -51,11 +51,7 @@ class Counter:
 
 
 class BatchCounter(Counter):
-    """Counter of the events of every member of a batch, whatever their steps.
-
-    Attributes:
-        state: the number of events so far, shape (members,).
-    """
+    """Counter of the events of every member of a batch, whatever their steps; the state is of shape (members,)."""
 
     def __init__(self, members: int) -> None:
         self._count: Any = np.zeros(members, np.int64)

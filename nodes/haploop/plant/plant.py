@@ -47,8 +47,7 @@ class Checkpoint(NamedTuple):
 class Plant:
     """Sampling, commands and record of one plant; knows nothing of sockets.
 
-    Attributes:
-        stop_reason: why the plant ended by itself (diverged), or None.
+    ``stop_reason`` says why the plant ended by itself (diverged), or is None.
     """
 
     def __init__(self, scene: Scene, time: Timebase) -> None:

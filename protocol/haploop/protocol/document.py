@@ -53,8 +53,7 @@ def _markdown(header: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> str:
 def with_tables(text: str) -> str:
     """Returns ``text`` with everything between the two marker comments replaced by ``table()``.
 
-    Raises:
-        ValueError: the markers are not there, once each and in order.
+    Raises ValueError where the markers are not there, once each and in order.
     """
     before, begin, rest = text.partition(BEGIN)
     _, end, after = rest.partition(END)

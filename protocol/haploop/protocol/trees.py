@@ -22,8 +22,7 @@ T = TypeVar("T")
 def tree_map(function: Callable[..., Any], tree: T, *rest: Any) -> T:
     """Returns the tree with ``function(leaf, *leaves of the rest at the same place)`` in place of every leaf.
 
-    Raises:
-        ValueError: a node of the rest has another number of children.
+    Raises ValueError where a node of the rest has another number of children.
     """
     children = _children(tree)
     if children is None:
@@ -42,11 +41,7 @@ def tree_leaves(tree: Any) -> list[Any]:
 
 
 def tree_unflatten(tree: T, leaves: Iterable[Any]) -> T:
-    """Returns the tree with these leaves, given in the order of ``tree_leaves``.
-
-    Raises:
-        ValueError: there are fewer or more of them than the tree has.
-    """
+    """Returns the tree with these leaves, in the order of ``tree_leaves``; ValueError for another number of them."""
     left: Iterator[Any] = iter([*leaves])
     try:
         rebuilt = tree_map(lambda _: next(left), tree)
@@ -58,13 +53,9 @@ def tree_unflatten(tree: T, leaves: Iterable[Any]) -> T:
 
 
 def tree_select(tree: T, kept: np.ndarray) -> T:
-    """Returns the tree of the members that are kept.
+    """Returns the tree of the members that are kept, a truth value of every member, shape (members,).
 
-    Args:
-        kept: truth value of every member, shape (members,).
-
-    Raises:
-        ValueError: the last axis of an array is neither of length 1 nor of that of ``kept``.
+    Raises ValueError where the last axis of an array is neither of length 1 nor of that of ``kept``.
     """
     import numpy as np
 

@@ -36,7 +36,6 @@ class Clock:
     progress of the slowest lossless node plus the window; and no more than ``MOST_GRANTS`` lie ahead of that node.
 
     Attributes:
-        until: ticks before this one are granted.
         pace: simulated seconds per wall second.
     """
 

@@ -30,10 +30,6 @@ class ClockServer:
     Args:
         welcome: of the fields of WELCOME run, scene, timebase and context.
         start_gate: given the pids of all that are ready, returns whether the first tick may be worked on.
-
-    Attributes:
-        results: role -> result of each own process that is done.
-        unknown_peers: frames that were no messages, or from nobody who joined.
     """
 
     def __init__(
@@ -63,8 +59,7 @@ class ClockServer:
     def serve(self) -> None:
         """Takes the messages that are there, up to a limit, then grants what can be granted.
 
-        Raises:
-            RunFailed: one of the run's own processes said that it cannot go on.
+        Raises RunFailed where one of the run's own processes said that it cannot go on.
         """
         for _ in range(_AT_ONCE):
             if not has_message(self.socket):

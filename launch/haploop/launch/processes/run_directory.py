@@ -36,8 +36,7 @@ class CommandRefused(Exception):
 def base_directory() -> Path:
     """Returns the user's directory of live runs, mode 0700, below XDG_RUNTIME_DIR or the temporary directory.
 
-    Raises:
-        PermissionError: a directory of that name belongs to somebody else.
+    Raises PermissionError where a directory of that name belongs to somebody else.
     """
     candidate = Path(os.environ.get("XDG_RUNTIME_DIR") or "/nonexistent") / "haploop"
     if not candidate.parent.is_dir() or len(os.fsencode(candidate)) > _LONGEST_BASE:
@@ -111,11 +110,7 @@ def is_live(run: LiveRun) -> bool:
 
 
 def find(run_id: str | None) -> LiveRun:
-    """Returns the run with this id (or its beginning), or the only one there is.
-
-    Raises:
-        RunNotFound: none, or several, fit.
-    """
+    """Returns the run with this id (or its beginning), or the only one there is; RunNotFound where not one fits."""
     runs = live_runs()
     fitting = [run for run in runs if run_id is None or run.id.startswith(run_id)]
     if len(fitting) == 1:

@@ -43,11 +43,7 @@ def lay_out(
     plugins: Sequence[Path] = (),
     sources: dict[str, Path] | None = None,
 ) -> RunSpec:
-    """Puts a resolved scene and its plugin files into the directory of its run.
-
-    Raises:
-        OutputError: a file cannot be written.
-    """
+    """Puts a resolved scene and its plugin files into the directory of its run; OutputError where that fails."""
     attachments = {"scene.toml": write_scene(scene, directory)}
     kept = [keep_plugin(plugin, directory) for plugin in plugins]
     attachments |= {f"plugins/{path.name}": path.read_text(encoding="utf-8") for path in kept}

@@ -145,10 +145,6 @@ def swapped_in(events: Iterable[EventTable]) -> list[ElementTable]:
 
 
 def try_out(tables: Iterable[ElementTable], kinds: Mapping[str, type[Element]]) -> None:
-    """Makes each element once, since its own code may refuse what its declaration allows.
-
-    Raises:
-        ElementError: one cannot be made.
-    """
+    """Makes each element once, since its own code may refuse what its declaration allows, with an ElementError."""
     for table in tables:
         make_element(table, kinds)

@@ -32,11 +32,7 @@ def load(path: Path | str, overrides: Sequence[str] = (), kinds: Mapping[str, ty
 
 
 def resolved(layers: Layers, overrides: Sequence[str] = (), kinds: Mapping[str, type[Element]] | None = None) -> Scene:
-    """Returns the resolved scene of layers that were read already.
-
-    Raises:
-        SceneError: the scene cannot be run; it holds every mistake.
-    """
+    """Returns the resolved scene of layers that were read already; a SceneError holds every mistake."""
     lay_overrides(layers, overrides)
     layers.data.setdefault("title", layers.path.stem)
     _read_recording(layers)

@@ -87,8 +87,7 @@ class Layers:
 def read_layers(path: Path) -> Layers:
     """Returns the scene file at ``path`` laid over all that it extends; of several the later wins.
 
-    Raises:
-        SceneError: a file that cannot be read, or that extends itself.
+    Raises SceneError for a file that cannot be read, or that extends itself.
     """
     layers = Layers(path)
     _read(layers, path, ())
@@ -123,8 +122,7 @@ def _read(layers: Layers, path: Path, chain: tuple[Path, ...]) -> None:
 def parse(path: Path, what: str = "scene", needs: str = "a duration and a [device]") -> Tables:
     """Returns the tables of one TOML file, which is a ``what`` and needs some keys at least.
 
-    Raises:
-        SceneError: it is missing, empty, no file, no text or no TOML (with line and column).
+    Raises SceneError where it is missing, empty, no file, no text or no TOML (with line and column).
     """
     try:
         if table := tomllib.loads(path.read_bytes().decode("utf-8-sig")):

@@ -91,8 +91,7 @@ _TEXT = re.compile(rf"\s*({_NUMBER})\s*({_FACTOR}(?:(?:\s*[*/·]\s*|\s+){_FACTOR
 def from_text(text: str, target: str) -> Decimal:
     """Returns the number that ``text``, such as ``"0.15 N/mm"``, is in the unit ``target``.
 
-    Raises:
-        ValueError: a full sentence that says why it is none.
+    Raises ValueError with a full sentence that says why it is none.
     """
     match = _TEXT.fullmatch(text)
     if not match:

@@ -13,11 +13,7 @@ _ESCAPES = {ord('"'): '\\"', ord("\\"): "\\\\", **{c: f"\\u{c:04x}" for c in [*r
 
 
 def to_toml(scene: Tables) -> str:
-    """Returns the TOML text of a dict of str, bool, int, finite float, lists and dicts.
-
-    Raises:
-        TypeError: another type of value, None and infinite numbers included.
-    """
+    """Returns the TOML text of a dict of str, bool, int, finite float, lists and dicts; TypeError for other values."""
     return "\n".join(_table(scene, ())).lstrip("\n") + "\n"
 
 

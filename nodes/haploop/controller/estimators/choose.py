@@ -36,11 +36,7 @@ def estimator_names() -> tuple[str, ...]:
 
 
 def estimator_class(name: str) -> type[Estimator]:
-    """Returns the estimator of a name; its module is imported here.
-
-    Raises:
-        KeyError: there is none of this name.
-    """
+    """Returns the estimator of a name, KeyError for none; its module is imported here."""
     if name not in ESTIMATORS:
         return _from_outside()[name].load()
     found = ESTIMATORS[name]

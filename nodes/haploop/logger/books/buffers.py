@@ -65,7 +65,6 @@ class Commanded(NamedTuple):
     """Controller rows of some ticks and of all commands in effect in them; columns may have a last axis for a batch.
 
     Attributes:
-        first: tick of the first row.
         x_m: positions as measured, shape (rows,), m.
         forces: of the wall, by the name "wall", and of every element's book, shape (rows,) each, N.
         wall: position in m, stiffness in N/m and direction into it, +1 or -1, as they stand in all intervals booked.

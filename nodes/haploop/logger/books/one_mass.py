@@ -137,12 +137,9 @@ def beyond_limits(commanded: Iterable[Any], force: Any) -> Any:
 
 
 def as_squares(form: np.ndarray) -> np.ndarray:
-    """Returns the factors of w' Q w as a sum of squares a (w0 + b w1 + c w2)^2 + d (w1 + e w2)^2 + f w2^2.
+    """Returns (a, b, c, d, e, f) of w' Q w as a sum of squares a (w0 + b w1 + c w2)^2 + d (w1 + e w2)^2 + f w2^2.
 
     Q is positive: no term is below 0, and where they are far apart none cancels another.
-
-    Returns:
-        (a, b, c, d, e, f).
     """
     a = form[0, 0]
     b, c = form[0, 1:] / a

@@ -160,10 +160,7 @@ def with_rows(state: Sums, rows: int) -> Sums:
 
 
 def add_columns(state: Sums, increments: np.ndarray) -> tuple[Sums, np.ndarray]:
-    """Adds column after column and keeps every total on the way.
-
-    Args:
-        increments: shape (rows, columns).
+    """Adds column after column, shape (rows, columns), and keeps every total on the way.
 
     Returns:
         The sums after the last column, and the totals before the first column and after each one, shape
@@ -178,11 +175,7 @@ def add_columns(state: Sums, increments: np.ndarray) -> tuple[Sums, np.ndarray]:
 
 
 def add_ticks_of_batch(state: Sums, increments: np.ndarray) -> Sums:
-    """Adds tick after tick for every member of a batch, to the same bits as :func:`add_columns`.
-
-    Args:
-        increments: shape (ticks, rows, batch).
-    """
+    """Adds tick after tick, shape (ticks, rows, batch), for every member to the same bits as :func:`add_columns`."""
     sums, errors = (part.copy() for part in state)
     after, added, lost = (np.empty_like(sums) for _ in range(3))
     for increment in increments:

@@ -20,6 +20,7 @@ class Figures(NamedTuple):
     """The ``window`` entry of the summary.
 
     Attributes:
+        oscillation_m: peak to peak.
         growth_1_s: the r of e^(r t) by which the swings grow (decay where negative); None where nothing swings.
         outside_fraction: share of its ticks that are out of contact.
         displayed_stiffness_N_m: mean of total force over penetration, ticks in contact (Choi et al. 2022, V.B.2), but

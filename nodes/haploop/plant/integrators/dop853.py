@@ -58,8 +58,7 @@ class Dop853Motion(ChainHistory):
     ) -> Any:
         """Returns the motion over a span of time in s; states at ``ends``.
 
-        Raises:
-            ArithmeticError: the steps became too small to go on.
+        Raises ArithmeticError where the steps became too small to go on.
         """
         from scipy.integrate import solve_ivp  # half a second to import
 

@@ -75,11 +75,7 @@ def integrator_module(name: str) -> str:
 
 
 def find_integrator(name: str) -> Integrator:
-    """Returns the integrator of a name; no other is imported.
-
-    Raises:
-        KeyError: there is none of this name.
-    """
+    """Returns the integrator of a name, KeyError for none; no other is imported."""
     return resolve_name(_place(name))
 
 

@@ -61,7 +61,6 @@ class Accelerometer:
     can tell, D sqrt(rate / 2), and it is white.
 
     Attributes:
-        parameters: of the reading.
         draw: returns the next standard normal number of the noise, or a row of them; None without noise.
         state: (ticks read so far, noise at the last one or None, clipped readings).
         counters: the ticks at which the range clipped the reading, where there is a range.

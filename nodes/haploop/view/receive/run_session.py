@@ -34,7 +34,6 @@ class RunSession:
         scene, time, out: the resolved scene, its integers, the run's directory.
         history: telemetry received, and what was logged before once ``prepend`` has been called.
         status: newest status of the logger.
-        delay_s: the round-trip delay at present.
         outcome: "" while the run goes on, then "ended" or "failed"; ``why`` is a sentence, if there is one.
 
     Raises:

@@ -18,7 +18,6 @@ class Guard:
     """Holds the host names, the token and the one-time key of one server.
 
     Attributes:
-        token: what every command must carry.
         link: the address with the token in its fragment, which no browser sends to any server.
         one_time_link: one that leads to ``link`` once: all users can see the command line that starts a browser.
     """

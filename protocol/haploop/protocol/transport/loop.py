@@ -51,8 +51,7 @@ class PlantEnd:
     def exchange(self, tick: int, samples: list[tuple[float, ...]]) -> list[float]:
         """Sends the samples of the ticks from ``tick`` on and returns the forces that answer them, N.
 
-        Raises:
-            LoopError: the answer is for other ticks.
+        Raises LoopError where the answer is for other ticks.
         """
         emit, partner = self._emit, self._partner
         try:
@@ -117,8 +116,7 @@ class ControllerEnd:
     def samples(self, tick: int) -> list[list[float]] | None:
         """Waits for the next samples, which must start at ``tick``; returns None when the run ends there.
 
-        Raises:
-            LoopError: samples of other ticks came, or none will come although some are missing.
+        Raises LoopError where samples of other ticks came, or none will come although some are missing.
         """
         data = self._receive()
         items = msgpack.unpackb(data)

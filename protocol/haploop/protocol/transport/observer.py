@@ -68,8 +68,7 @@ class Observer:
     def poll(self) -> list[tuple[str, Frame]]:
         """Returns the messages since the last call, (role, message), without waiting.
 
-        Raises:
-            Aborted: the run failed, or the clock goes on without this node for good.
+        Raises Aborted where the run failed, or the clock goes on without this node for good.
         """
         frames = self._streams.drain()
         self.ended |= {role: frame for role, frame in frames if frame.name == "END"}

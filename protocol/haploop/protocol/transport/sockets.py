@@ -148,8 +148,7 @@ def has_message(socket: zmq.Socket[bytes]) -> bool:
 def bind(socket: zmq.Socket[bytes], directory: Path, name: str) -> str:
     """Binds in the run's directory of sockets, or to a free port of the transport's TCP host; returns the address.
 
-    Raises:
-        OSError: the path is longer than the kernel allows, or is taken.
+    Raises OSError where the path is longer than the kernel allows, or is taken.
     """
     host = _transport(socket.context).host
     if host:

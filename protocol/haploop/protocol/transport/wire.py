@@ -41,8 +41,7 @@ def encode(name: str, *fields: Any) -> bytes:
 def decode(data: bytes) -> Frame:
     """Returns the message in a frame.
 
-    Raises:
-        WireError: not msgpack, another version, an unknown code, missing or wrong fields.
+    Raises WireError where it is not msgpack, another version, an unknown code, or has missing or wrong fields.
     """
     try:
         items = msgpack.unpackb(data, strict_map_key=False)

@@ -33,7 +33,7 @@ def draw(found: Advice, target: Path) -> Path:
 def figure_of(found: Advice) -> Figure:
     """Makes bars of the largest steady walls; below, where something buzzes, bars of those without each cause.
 
-    FigureError where matplotlib is missing.
+    Raises FigureError where matplotlib is missing.
     """
     buzz = found.buzz if found.buzz and _rows(found.buzz) else None
     rows = [len(found.gains), *([len(_rows(buzz)) + 1] if buzz else [])]

@@ -63,7 +63,7 @@ def make_subject(
 ) -> Subject:
     """Makes the scene that the arguments of the command name.
 
-    InvalidRequest for a name that is none, SceneError where the scene cannot be run.
+    Raises InvalidRequest for a name that is none, SceneError where the scene cannot be run.
     """
     path, is_preset = _device(device)
     layers, notes = read_layers(path), []

@@ -27,8 +27,7 @@ _IDLE_MS = 200
 def iterate_runs(run_id: str | None) -> Iterator[LiveRun]:
     """Yields the run with this id alone; without one, the run that is live or starts next, and then all later ones.
 
-    Raises:
-        RunNotFound: no run has the id, or several are live and none was named.
+    Raises RunNotFound where no run has the id, or several are live and none was named.
     """
     if run_id is not None or len(run_directory.live_runs()) > 1:
         yield run_directory.find(run_id)

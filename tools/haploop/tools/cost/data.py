@@ -249,8 +249,7 @@ def save(cost: Cost, directory: Path) -> Path:
 def load(directory: Path) -> Cost:
     """Reads DIR/cost.json.
 
-    Raises:
-        CostFileError: there is none, or it is not one that ``haploop cost`` of this version wrote.
+    Raises CostFileError where there is none, or it is not one that ``haploop cost`` of this version wrote.
     """
     from pydantic import TypeAdapter, ValidationError
 

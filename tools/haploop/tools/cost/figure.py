@@ -53,7 +53,7 @@ _TOP = 0.08
 def figure_of(cost: Cost) -> Figure:
     """Makes the figure: one panel a scene, and one that says how to read them.
 
-    FigureError where matplotlib is missing, or no scene has a point with a time.
+    Raises FigureError where matplotlib is missing, or no scene has a point with a time.
     """
     scenes = [scene for scene in cost.scenes if any(point.us_per_tick for point in scene.points)]
     if not scenes:

@@ -27,7 +27,7 @@ in bold, the scene's own setting."""
 def write(directory: Path, docs: Path) -> Path:
     """Writes page and figures from DIRECTORY/cost.json into ``docs``; returns the page's file.
 
-    CostFileError where there is no cost.json, FigureError where matplotlib is missing or there is nothing to draw.
+    Raises CostFileError without a cost.json, FigureError without matplotlib or anything to draw.
     """
     cost = load(directory)
     docs.mkdir(parents=True, exist_ok=True)

@@ -40,7 +40,7 @@ _CURVES = {"delay": (0, 3, 2), "control rate": (3, 3, 2)}
 def figure_of(groups: list[PriceGroup]) -> Figure:
     """Makes a panel a group; the place of a group that was not measured stays empty.
 
-    FigureError where matplotlib is missing, or there is no group.
+    Raises FigureError where matplotlib is missing, or there is no group.
     """
     if not groups:
         raise FigureError("No price was measured, so there is nothing to draw.")

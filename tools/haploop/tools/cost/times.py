@@ -169,7 +169,7 @@ def timed(work: Callable[[], T]) -> tuple[float, T]:
 def run_us(path: Path, overrides: Sequence[str], ticks: int) -> float | None:
     """Returns the time of a tick as processes, starting up not included, µs; None where the run failed.
 
-    KeyboardInterrupt where a signal ended it.
+    Raises KeyboardInterrupt where a signal ended it.
     """
     with tempfile.TemporaryDirectory() as folder:
         try:

@@ -72,8 +72,7 @@ class Booking:
     def add(self, piece: Samples) -> Booked:
         """Books a piece; returns the books at its samples.
 
-        Raises:
-            ElementError: an element raised, or gave something that is no finite number.
+        Raises ElementError where an element raised, or gave something that is no finite number.
         """
         if piece.begins:
             self._begin()

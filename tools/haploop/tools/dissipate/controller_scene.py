@@ -64,7 +64,7 @@ def make_scene_for_text(
 ) -> Scene:
     """Makes the scene for a recording in a text file.
 
-    RecordingError where the selection does not fit it, SceneError where a number or a kind is wrong.
+    Raises RecordingError where the selection does not fit it, SceneError where a number or a kind is wrong.
     """
     if clash := sorted(selection.tables() & recorded):
         raise RecordingError(f"Give either a column of the {clash[0]} or --set for its estimate, not both.")
@@ -80,7 +80,7 @@ def make_scene_for_text(
 def make_scene_for_log(selection: Selection, path: Path, scene: Scene, kinds: Kinds) -> Scene:
     """Makes the scene for a run's log: its own estimators, wall and events of the wall unless others are selected.
 
-    RecordingError where the selection does not fit it, SceneError where a number or a kind is wrong.
+    Raises RecordingError where the selection does not fit it, SceneError where a number or a kind is wrong.
     """
     kept = ("title", "duration", "clock", "device", "encoder", "noise", "accelerometer", *_ESTIMATED, "wall")
     made = _make_scene(Scene(**{key: getattr(scene, key) for key in kept}), selection, path, kinds)

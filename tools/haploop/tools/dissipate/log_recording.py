@@ -23,7 +23,7 @@ _COLUMNS = {"/controller": ("timestamp", "x", "v", "a"), "/plant": ("x",)}
 def read_scene(path: Path) -> Scene:
     """Reads the resolved scene in a run's log; RecordingError where none is attached.
 
-    FileNotFoundError, LogError where there is no log, or none that can be read.
+    Raises FileNotFoundError, LogError where there is no log, or none that can be read.
     """
     log = LogStream(path, topics=())
     for _ in log:

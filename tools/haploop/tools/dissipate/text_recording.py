@@ -55,7 +55,7 @@ class TextRecording:
     def __init__(self, path: Path, layout: Layout, delay_s: float) -> None:
         """Finds the columns and the period.
 
-        RecordingError where a column, a unit or a rate is missing or wrong, or for fewer than two samples.
+        Raises RecordingError where a column, a unit or a rate is missing or wrong, or for fewer than two samples.
         """
         self.name, self.delay_s, self.notes = path.name, delay_s, Notes()
         self._file = file = DelimitedFile(path)

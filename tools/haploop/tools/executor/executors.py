@@ -58,7 +58,7 @@ class Executor:
 def make_executor(workers: int | None = None, dask: str | None = None) -> Executor:
     """Makes the executor of ``workers`` processes, one a core when None, this one when 1, or of a Dask scheduler's.
 
-    ExecutorError where there is no such cluster.
+    Raises ExecutorError where there is no such cluster.
     """
     if dask:
         return DaskExecutor(dask)

@@ -102,7 +102,7 @@ def _safely(results: Results, scenes: dict[int, Scene], left: list[int]) -> Iter
 def load_kinds(sources: Sources) -> dict[str, type[Element]]:
     """Loads the element kinds at hand, the installed ones and those of these sources, once in this process.
 
-    PluginError where one does not load.
+    Raises PluginError where one does not load.
     """
     from haploop.controller.dissipation import registry
     from haploop.controller.dissipation.registry import load_source

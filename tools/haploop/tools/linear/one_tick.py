@@ -107,8 +107,7 @@ class OneTickMap:
     def stiffness_limit(self) -> float:
         """The smallest stiffness with rho(M) = 1 in N/m: the end of the first stable range.
 
-        Raises:
-            NeverStable: the loop grows even with the softest wall.
+        Raises NeverStable where the loop grows even with the softest wall.
         """
         low, limit = next(self._ranges(), (np.inf, np.inf))
         if not low:

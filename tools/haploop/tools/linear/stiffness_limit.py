@@ -37,11 +37,7 @@ class StiffnessLimit:
 
 
 def stiffness_limit(scene: Scene, kinds: dict[str, type[Element]]) -> StiffnessLimit:
-    """The limit of a resolved scene's loop, confirmed by a run on either side.
-
-    Raises:
-        NotLinear, NeverStable: there is no limit to ask for.
-    """
+    """The limit of a resolved scene's loop, confirmed by a run on either side; NotLinear, NeverStable without one."""
     limit = OneTickMap.from_scene(scene, kinds).stiffness_limit()
     verdicts = [run_in_process(pressed_deep(scene, share * limit, kinds), kinds)["verdict"] for share in (BELOW, ABOVE)]
     return StiffnessLimit(limit, *verdicts)

@@ -76,8 +76,7 @@ class Closed:
 def make_timebase(scene: Scene) -> Timebase:
     """Makes the time base of a scene whose only steps are ticks.
 
-    Raises:
-        ValueError: something in it falls between ticks, depends on the plant rate, or is not linear.
+    Raises ValueError where something falls between ticks, depends on the plant rate, or is not linear.
     """
     wrong = ["jitter"] * (scene.jitter is not None) + ["event"] * bool(scene.event) + [*constant_forces(scene)]
     if scene.friction and scene.friction.stribeck_velocity is not None:

@@ -196,11 +196,7 @@ class Sweep:
 
 
 def resolved(values: Values, base: Layers, kinds: Mapping[str, type[Element]]) -> Scene:
-    """Resolves a scene with other values at some dotted keys.
-
-    Raises:
-        SceneError: there is no such scene; its mistakes name no file.
-    """
+    """Resolves a scene with other values at some dotted keys; SceneError, with no file named, where there is none."""
     changed = {key_path(key)[0] for key in values}
     tables = {name: deepcopy(table) if name in changed else table for name, table in base.data.items()}
     layers = Layers(Path(), tables)

@@ -135,7 +135,7 @@ class PointsError(ValueError):
 def make_points(span: Span, number: Number) -> list[float]:
     """Returns the values of a span in SI units.
 
-    PointsError where an end or the step is no such number, or they do not go together.
+    Raises PointsError where an end or the step is no such number, or they do not go together.
     """
     first, last = _read(number, "from", span.start), _read(number, "to", span.to)
     if first == last:
@@ -157,7 +157,7 @@ def make_points(span: Span, number: Number) -> list[float]:
 def listed(values: list[Any], number: Number | None) -> list[Any]:
     """Returns the values of a list, numbers in SI units.
 
-    PointsError where there are none, one is no such number, or stands there twice.
+    Raises PointsError where there are none, one is no such number, or stands there twice.
     """
     if not values:
         raise PointsError("", "It must have at least one value.")

@@ -40,9 +40,6 @@ class CompiledBatch(Batch):
 
     Args:
         size: of the arrays; places beyond the scenes are computed, unheeded.
-
-    Raises:
-        NotCompilable: there are several bodies.
     """
 
     def __init__(

@@ -105,11 +105,7 @@ class Block:
         self._book_names, self._has_wall = book_names, has_wall
 
     def run(self, carry: Carry, rings: Rings, inputs: BlockInputs) -> tuple[Carry, Rings]:
-        """Goes through the ticks of a block.
-
-        Raises:
-            NotCompilable: the state after a tick is no state to begin a tick with.
-        """
+        """Goes through the ticks of a block; NotCompilable where the state after one is none to begin a tick with."""
         numbers = iter(inputs.params)
         params = tree_map(lambda leaf: next(numbers) if _is_number(leaf) else leaf, self._params)
 

@@ -45,7 +45,7 @@ def make_figure(
 ) -> None:
     """Makes one figure: picture, data, scenes and findings go into ``out``.
 
-    FigureError where matplotlib is missing, or a picture cannot be written.
+    Raises FigureError where matplotlib is missing, or a picture cannot be written.
     """
     module, work = figure(number), Work(out, number, small=small, workers=workers, stage=stage)
     work.keep(module.make(work))

@@ -32,7 +32,7 @@ _STRIP = 0.024
 def bisect_figure(data: MapData) -> Figure:
     """Makes the figure of the boundaries of a finished bisecting sweep with two or three axes.
 
-    FigureError where matplotlib is missing.
+    Raises FigureError where matplotlib is missing.
     """
     edges = find_edges(data)
     x, y = Ruler.from_axis(edges.others[0]), Ruler.from_axis(edges.along)

@@ -181,7 +181,7 @@ def make_map_data(
 ) -> MapData:
     """Makes the data of a map from a sweep's table, its units and the table of its boundaries.
 
-    FigureError where there is no row, or no verdict was recorded.
+    Raises FigureError where there is no row, or no verdict was recorded.
     """
     if "verdict" not in columns:
         raise FigureError('A map shows verdicts, and this sweep recorded none; add "verdict" to its record.')

@@ -33,7 +33,7 @@ _SIDES: tuple[Literal["x", "y"], ...] = ("x", "y")
 def make_figure(data: MapData) -> Figure:
     """Makes the map of a sweep's cells, a panel for each combination of the axes that do not lie along it.
 
-    FigureError where matplotlib is missing.
+    Raises FigureError where matplotlib is missing.
     """
     cells, layout = data.cells(), Layout.from_axes(data.axes)
     along = [data.axes[layout.x]] + ([] if layout.y is None else [data.axes[layout.y]])
