@@ -25,6 +25,7 @@ class LiveStatus:
         factor: simulated over wall time of the last 2 s; None while nothing moves.
         changes: every event so far, (tick, event) in order.
         skipped_ticks: telemetry that never came.
+        figures: verdict, oscillation_m and residual_J so far, in the end those of the summary; empty before any.
         ended: how the run ended, in a word; "" while it goes on.
         why: a sentence on that; "" for none.
     """
@@ -40,7 +41,7 @@ class LiveStatus:
         self.skipped_ticks = 0
         self.ended = self.why = ""
         self._newest: dict[str, Block] = {}
-        self._figures: Message = {}
+        self.figures: Message = {}
         self._motion_at_start: dict[str, float] = {}
         self._marks: deque[tuple[float, int]] = deque()
 
@@ -56,8 +57,13 @@ class LiveStatus:
             elif frame.name.endswith("_BLOCK"):
                 self._newest[frame.name] = frame.as_dict()
                 self.tick = max(self.tick, frame.fields[0] + frame.fields[1])
-        self._figures = self._newest.get("ENERGY_BLOCK", {}).get("status") or self._figures
-        self._count_time(now)
+        self.figures = self._newest.get("ENERGY_BLOCK", {}).get("status") or self.figures
+        self._marks.append((now, self.tick))
+        while len(self._marks) > 2 and now - self._marks[1][0] >= _FACTOR_OVER_S:
+            self._marks.popleft()
+        began, tick = self._marks[0]
+        moved = self.tick - tick
+        self.factor = moved / self.time.control_rate / (now - began) if moved and now > began else None
 
     def _note_state(self, role: str, tick: int, state: Message) -> None:
         """Notes the STATE of a publisher, all there is to see of a run that stands still."""
@@ -67,15 +73,7 @@ class LiveStatus:
         elif role == "controller" and state["history"]:
             self._newest["CONTROLLER_BLOCK"] = state["history"][-1]
         elif role == "logger":
-            self._figures = state
-
-    def _count_time(self, now: float) -> None:
-        self._marks.append((now, self.tick))
-        while len(self._marks) > 2 and now - self._marks[1][0] >= _FACTOR_OVER_S:
-            self._marks.popleft()
-        began, tick = self._marks[0]
-        moved = self.tick - tick
-        self.factor = moved / self.time.control_rate / (now - began) if moved and now > began else None
+            self.figures = state
 
     def note_event(self, tick: int, event: Event) -> None:
         self.changes.append((tick, event))
@@ -91,19 +89,17 @@ class LiveStatus:
             self.ended, self.why = ("failed" if failure else "ended"), failure
             return
         self.ended, self.why = summary["ended"], summary["why"] or failure
-        self._figures = {
-            "verdict": summary["verdict"],
-            "oscillation_m": summary["window"]["oscillation_m"],
-            "residual_J": summary["energy"]["residual_J"],
-        }
+        verdict, window = summary["verdict"], summary["window"]
+        residual_J = summary["energy"]["residual_J"]
+        self.figures = {"verdict": verdict, "oscillation_m": window["oscillation_m"], "residual_J": residual_J}
 
-    def _last(self, frame: str) -> dict[str, float]:
+    def last(self, frame: str) -> dict[str, float]:
         columns = self._newest.get(frame, {}).get("columns", {})
         return {name: float(np.frombuffer(data, "<f8")[-1]) for name, data in columns.items() if data}
 
     def motion(self) -> dict[str, float]:
         """Returns x (m), v (m/s) and force (N) of the device at the end of the last block."""
-        return self._last("PLANT_BLOCK") or self._motion_at_start
+        return self.last("PLANT_BLOCK") or self._motion_at_start
 
     def penetration_m(self) -> float | None:
         """Returns the penetration of the wall, negative outside; None without a wall, or before any telemetry."""
@@ -112,17 +108,9 @@ class LiveStatus:
 
     def parts(self) -> dict[str, float]:
         """Returns the commanded force of the wall and of each element at the last tick, N, by name in their order."""
-        forces = self._last("CONTROLLER_BLOCK")
+        forces = self.last("CONTROLLER_BLOCK")
         names = {"wall": "wall"} if self.penetration_m() is not None else {}
         for index, element in enumerate(self._newest.get("CONTROLLER_BLOCK", {}).get("elements", [])):
             kind = element["kind"]
             names[f"dissipation.{index}"] = kind if kind not in names.values() else f"{kind} ({index})"
         return {name: forces[column] for column, name in names.items() if column in forces}
-
-    def books(self) -> dict[str, float]:
-        """Returns the energy books at present, J, by the names of the log."""
-        return self._last("ENERGY_BLOCK")
-
-    def figures(self) -> Message:
-        """Returns verdict, oscillation_m and residual_J so far, in the end those of the summary; empty before any."""
-        return self._figures

@@ -42,7 +42,7 @@ def live_table(run: LiveStatus) -> RenderableType:
 
 def live_line(run: LiveStatus) -> str:
     """Returns the state of a run as one line, for a pipe."""
-    motion, figures = run.motion(), run.figures()
+    motion, figures = run.motion(), run.figures
     words = [f"{run.t_s:.3f} s"]
     if motion:
         words += [f"x {amount(motion['x'], 'm')}", f"force {amount(motion['force'], 'N')}"]
@@ -83,41 +83,33 @@ def _figures(run: LiveStatus) -> Table:
     from rich.text import Text
 
     grid = make_facts([], least_width=12)
-    figures, motion = run.figures(), run.motion()
+    figures, motion = run.figures, run.motion()
     if figures:
-        word = figures["verdict"]
-        swing = f"  oscillation {amount(figures['oscillation_m'], 'm')} peak to peak"
+        word, swing = figures["verdict"], f"  oscillation {amount(figures['oscillation_m'], 'm')} peak to peak"
         grid.add_row("verdict" if run.ended else "so far", Text.assemble((word, verdict_style(word)), swing))
-    grid.add_row("position", amount(motion.get("x"), "m") + _where(run.penetration_m()))
+    depth_m = run.penetration_m()
+    side = "" if depth_m is None else f"  {amount(abs(depth_m), 'm')} {'inside' if depth_m > 0 else 'outside'} the wall"
+    grid.add_row("position", amount(motion.get("x"), "m") + side)
     grid.add_row("velocity", amount(motion.get("v"), "m/s"))
     parts = ", ".join(f"{name} {amount(force, 'N')}" for name, force in run.parts().items())
     grid.add_row("force", amount(motion.get("force"), "N") + (f"  commanded: {parts}" if parts else ""))
     grid.add_row("skipped", Text(f"{run.skipped_ticks} ticks", "yellow" if run.skipped_ticks else ""))
     if run.changes:
         tick, event = run.changes[-1]
-        words = f"{describe(event)}, at {tick / run.time.control_rate:g} s (tick {tick})"
-        grid.add_row("last change", Text(words))
+        grid.add_row("last change", Text(f"{describe(event)}, at {tick / run.time.control_rate:g} s (tick {tick})"))
     return grid
-
-
-def _where(penetration_m: float | None) -> str:
-    if penetration_m is None:
-        return ""
-    if penetration_m > 0.0:
-        return f"  {amount(penetration_m, 'm')} inside the wall"
-    return f"  {amount(-penetration_m, 'm')} outside the wall"
 
 
 def _books(run: LiveStatus) -> Table:
     numbers = ("true", "sampled")
     table = make_table("energy taken out of the device by", *numbers, numbers=numbers, least_width=9)
-    books = run.books()
+    books = run.last("ENERGY_BLOCK")
     no_wall = run.penetration_m() is None
     for name in (name.removesuffix(_TRUE) for name in books if name.endswith(_TRUE)):
         if not (name == "wall" and no_wall):
             table.add_row(name, *(amount(books[name + side], "J") for side in (_TRUE, _SAMPLED)))
     moved = books.get("moved")
-    residual = run.figures().get("residual_J")
+    residual = run.figures.get("residual_J")
     share = f", {residual / moved:.1e} of what moved" if residual is not None and moved else ""
     table.add_section()
     table.add_row(f"residual{share}", amount(residual, "J"), "")

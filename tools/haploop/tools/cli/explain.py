@@ -51,22 +51,13 @@ def as_data(scene: Scene, planned: Plan, costs: Bill) -> dict[str, Any]:
     return {
         "title": scene.title,
         "bodies_kg": planned.bodies,
-        "states": planned.states,
-        "memory": planned.memory,
+        **{name: getattr(planned, name) for name in ("states", "memory", "modules", "columns", "counts")},
         "plant_step": [dataclasses.asdict(step) for step in planned.plant_step],
         "tick": [dataclasses.asdict(step) for step in planned.tick],
-        "modules": planned.modules,
-        "columns": planned.columns,
-        "counts": planned.counts,
         "effects": [
             {
-                "name": effect.name,
-                "node": effect.node,
+                **{name: getattr(effect, name) for name in ("name", "node", "acts", "does", "columns", "counts")},
                 "modules": effect.modules_in(scene),
-                "acts": effect.acts,
-                "does": effect.does,
-                "columns": effect.columns,
-                "counts": effect.counts,
                 "states": effect.states_in(scene),
                 "instructions_per_tick": costs.effects[effect.name],
                 "multiplications_per_tick": costs.multiplications[1][effect.name],
@@ -108,16 +99,12 @@ def _facts(planned: Plan) -> Table:
         "remembered": ", ".join(f"{count} by {name}" for name, count in planned.memory.items()) or "nothing",
     }
     for node, modules in planned.modules.items():
-        facts[f"{node} also loads"] = ", ".join(map(_short, modules)) or "nothing"
+        facts[f"{node} also loads"] = ", ".join(modules).replace("haploop.", "") or "nothing"
     for channel, columns in planned.columns.items():
         facts[f"log {channel}"] = ", ".join(columns)
     facts["counts"] = ", ".join(planned.counts) or "nothing"
     facts["absent"] = ", ".join(effect.name for effect in planned.absent)
     return make_facts(facts.items())
-
-
-def _short(module: str) -> str:
-    return module.removeprefix("haploop.")
 
 
 def _order(title: str, steps: tuple[Step, ...]) -> Table:
@@ -133,7 +120,7 @@ def _costs(scene: Scene, planned: Plan, costs: Bill) -> Table:
     table = make_table("what is named", "written in", "every", *numbers, numbers=numbers)
     for effect in planned.named:
         modules = effect.modules_in(scene)
-        module = _short(modules[0]) if modules else effect.node
+        module = modules[0].removeprefix("haploop.") if modules else effect.node
         numbers = f"{costs.multiplications[1][effect.name]:+d}", f"{costs.effects[effect.name]:+.0f}"
         table.add_row(effect.name, module, effect.acts.removeprefix("every "), str(effect.states_in(scene)), *numbers)
     for element, cost in zip(scene.dissipation, costs.elements, strict=True):

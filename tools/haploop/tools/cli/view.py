@@ -122,22 +122,8 @@ def _at_eof(loop: asyncio.AbstractEventLoop, act: Callable[[], None]) -> None:
     threading.Thread(target=wait, daemon=True).start()
 
 
-class Viewing:
-    """The viewer of a run, which does nothing where nobody looks."""
-
-    def on_started(self, run_id: str) -> None:
-        """Takes the id by which the run can be found from now on."""
-
-    def may_start(self, ready: set[int]) -> bool:
-        """Returns whether the run may begin, given the pids of all nodes that are ready."""
-        return True
-
-    def stay(self) -> None:
-        """Keeps showing the run, which is over, as long as its viewer stays."""
-
-
 @contextlib.contextmanager
-def viewing(wanted: bool, in_process: bool) -> Iterator[Viewing]:
+def viewing(wanted: bool, in_process: bool) -> Iterator[Viewer]:
     """Shows what is run meanwhile from its first tick on; when it is over, keeps the page until Ctrl-C.
 
     The viewer is a process of its own; what becomes of it is no matter to the run.
@@ -146,20 +132,24 @@ def viewing(wanted: bool, in_process: bool) -> Iterator[Viewing]:
         leave("--view needs the sockets of a run as processes; leave out --in-process.", WRONG_USE)
     if wanted:
         check_extra()
-    shown = _Viewer() if wanted else Viewing()
+    shown = Viewer(wanted)
     try:
         yield shown
     finally:
         shown.stay()
 
 
-class _Viewer(Viewing):
-    """A viewer as a process of its own."""
+class Viewer:
+    """The viewer of a run as a process of its own; does nothing where nobody looks."""
 
-    _process: subprocess.Popen[str] | None = None
-    _link = ""
+    def __init__(self, wanted: bool) -> None:
+        self._wanted, self._link = wanted, ""
+        self._process: subprocess.Popen[str] | None = None
 
     def on_started(self, run_id: str) -> None:
+        """Takes the id by which the run can be found from now on."""
+        if not self._wanted:
+            return
         words = ["view", "--run", run_id.partition(" ")[0], "--led"]
         self._since = time.monotonic()
         self._process = subprocess.Popen(
@@ -172,6 +162,7 @@ class _Viewer(Viewing):
         threading.Thread(target=self._tell, daemon=True).start()
 
     def may_start(self, ready: set[int]) -> bool:
+        """Returns whether the run may begin, given the pids of all nodes that are ready."""
         process = self._process
         is_on_its_way = process is not None and process.pid not in ready and process.poll() is None
         return not is_on_its_way or time.monotonic() - self._since >= _HELD_S

@@ -16,7 +16,6 @@ from haploop.tools.render.progress import bars
 
 if TYPE_CHECKING:
     from haploop.tools.cost.data import Cost
-    from haploop.tools.cost.measure import Measurement
 
 
 def cost(
@@ -50,26 +49,22 @@ def cost(
             out.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             leave(f"The directory {out} cannot be used: {error.strerror}.", WRONG_USE)
+        interrupted = False
         with Measurement(grids, out, repeats, repeats if processes else 0) as measurement:
-            interrupted = _measure(measurement, with_prices=not scenes)
+            try:
+                # A thread that drew meanwhile would be measured too.
+                with bars(by_itself=False) as stage:
+                    measurement.errors(stage)
+                    measurement.times(stage)
+                    if not scenes:
+                        measurement.other_prices(stage)
+            except KeyboardInterrupt:
+                interrupted = True
             result = measurement.cost(tolerance)
     save(result, out)
     if interrupted:
         leave(f"Stopped; what was measured is in {out}, and the same command takes it up again.", FAILED)
     _show(result, out, json)
-
-
-def _measure(measurement: Measurement, with_prices: bool) -> bool:
-    try:
-        # A thread that drew meanwhile would be measured too.
-        with bars(by_itself=False) as stage:
-            measurement.errors(stage)
-            measurement.times(stage)
-            if with_prices:
-                measurement.other_prices(stage)
-    except KeyboardInterrupt:
-        return True
-    return False
 
 
 def _show(result: Cost, out: Path, as_json: bool) -> None:
@@ -98,14 +93,13 @@ def _rates(text: str) -> list[int]:
     for word in text.split(","):
         number = word.strip()
         try:
-            rate = float(number.removesuffix("k")) * (1000.0 if number.endswith("k") else 1.0)
+            rates.append(float(number.removesuffix("k")) * (1000.0 if number.endswith("k") else 1.0))
         except ValueError:
-            rate = math.nan
-        if not (0 < rate < math.inf and rate == round(rate)):
+            rates.append(math.nan)
+        if not (0 < rates[-1] < math.inf and rates[-1].is_integer()):
             expected = "--rates must be whole numbers of Hz above 0, such as 1k,10k,20000"
             leave(f"{expected}, but {word!r} was given.", WRONG_USE)
-        rates.append(round(rate))
-    return rates
+    return list(map(int, rates))
 
 
 def _methods(text: str | None) -> list[str]:

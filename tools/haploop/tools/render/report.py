@@ -67,10 +67,13 @@ def summary_table(summary: Summary) -> RenderableType:
 
 def _key_figures(summary: Summary) -> list[tuple[str, str]]:
     window = summary["window"]
+    # Nothing is said where swings grow as little as a limit cycle's.
+    rate = window.get("growth_1_s") or 0.0
+    growth = f", {'growing' if rate > 0 else 'dying away'} as e^({rate:+.2g} t/s)" if abs(rate) >= 0.5 else ""
     ran = f"{summary['duration_s']:g} s, {summary['ticks']} ticks"
     if summary["wall_s"]:
         ran += f", in {amount(summary['wall_s'], 's')} ({fixed(summary['real_time_factor'])} times real time)"
-    figures = [("ran", ran), ("oscillation", f"{amount(window['oscillation_m'], 'm')} peak to peak{_growth(window)}")]
+    figures = [("ran", ran), ("oscillation", f"{amount(window['oscillation_m'], 'm')} peak to peak{growth}")]
     if window["penetration_mean_m"] is not None:
         depth = f"{amount(window['penetration_mean_m'], 'm')} on average"
         outside = 100 * window["outside_fraction"]
@@ -82,14 +85,6 @@ def _key_figures(summary: Summary) -> list[tuple[str, str]]:
     return figures
 
 
-def _growth(window: Summary) -> str:
-    """Returns the growth of the swings in words; nothing where they grow as little as a limit cycle's."""
-    rate = window.get("growth_1_s") or 0.0
-    if abs(rate) < 0.5:
-        return ""
-    return f", {'growing' if rate > 0 else 'dying away'} as e^({rate:+.2g} t/s)"
-
-
 def _books(energy: Summary, control_rate: float) -> Table:
     numbers = ("at work", "true", "sampled")
     table = make_table("energy taken out of the device by", *numbers, numbers=numbers)
@@ -97,8 +92,12 @@ def _books(energy: Summary, control_rate: float) -> Table:
         table.add_row(*row)
     table.add_section()
     table.add_row("energy in the plant", "", "", "", style="bold")
-    for name, value in _plant_rows(energy):
-        table.add_row(name, "", value, "")
+    residual, moved = energy["residual_J"], energy["moved_J"]
+    share = f", {residual / moved:.1e} of what moved" if residual is not None and moved else ""
+    rows = {words: energy[key] for key, words in plant_books(energy).items()}
+    rows |= {"stored at the end": energy["stored_J"], "moved in total": moved, f"residual{share}": residual}
+    for name, value in rows.items():
+        table.add_row(name, "", amount(value, "J"), "")
     return table
 
 
@@ -107,26 +106,16 @@ def _virtual_rows(energy: Summary, control_rate: float) -> list[tuple[str, str, 
     if "leak" in wall:
         rows.append(("wall", "", amount(wall["true_J"], "J"), amount(wall["sampled_J"], "J")))
         rows += [(f"  leak by {words}", "", amount(wall["leak"][key], "J"), "") for key, words in LEAK_CAUSES.items()]
-        rows.append(("  held by an ideal spring", "", amount(_rounded(wall["ideal_J"], wall["true_J"]), "J"), ""))
+        # The rounding error of a much larger number is zero.
+        ideal_J, true_J = wall["ideal_J"], wall["true_J"]
+        is_zero = None not in (ideal_J, true_J) and abs(ideal_J) < 1e-9 * abs(true_J)
+        rows.append(("  held by an ideal spring", "", amount(0.0 if is_zero else ideal_J, "J"), ""))
     for element in energy["elements"]:
         values = parameters(element["parameters"])
         ticks = f"{element['from_tick'] / control_rate:g}–{element['to_tick'] / control_rate:g} s"
         name = element["kind"] + (f" ({values})" if values else "")
         rows.append((name, ticks, amount(element["true_J"], "J"), amount(element["sampled_J"], "J")))
     return rows
-
-
-def _plant_rows(energy: Summary) -> list[tuple[str, str]]:
-    rows = [(words, amount(energy[key], "J")) for key, words in plant_books(energy).items()]
-    rows.append(("stored at the end", amount(energy["stored_J"], "J")))
-    residual, moved = energy["residual_J"], energy["moved_J"]
-    share = f", {residual / moved:.1e} of what moved" if residual is not None and moved else ""
-    return [*rows, ("moved in total", amount(moved, "J")), (f"residual{share}", amount(residual, "J"))]
-
-
-def _rounded(value: float | None, beside: float | None) -> float | None:
-    """Returns zero for the rounding error of a much larger number."""
-    return 0.0 if value is not None and beside is not None and abs(value) < 1e-9 * abs(beside) else value
 
 
 def status_table(data: Message) -> RenderableType:
