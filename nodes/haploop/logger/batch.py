@@ -42,13 +42,9 @@ class Row(Protocol):
 
 
 class MemberEnd(NamedTuple):
-    """The end of one member of a batch.
+    """The end of one member of a batch: where it is in the arrays, and how the device ended.
 
-    Attributes:
-        place: where it is in the arrays.
-        scene: its resolved scene.
-        x_m, v_m_s: where the device ended, and how fast.
-        reason: why the plant ended by itself, or None.
+    ``reason`` says why the plant ended by itself, or is None.
     """
 
     place: int
@@ -61,16 +57,7 @@ class MemberEnd(NamedTuple):
 class BatchLogger:
     """Books the intervals of a batch, whose plant and controller come block by block, and tells what came of each run.
 
-    Args:
-        scene: the stacked scene.
-        time: the integers all members share.
-        members: how many there are.
-        energy: whether to keep energy books.
-        trajectories: whether to hash the trajectories.
-
     Attributes:
-        books: None where there are none.
-        window: the last half second.
         rows: the last controller rows, which books still need; the latest is of tick ``tick - 1``.
         tick: every interval before it is booked.
     """
@@ -85,13 +72,7 @@ class BatchLogger:
         self.tick = 0
 
     def book(self, plant: dict[str, np.ndarray], rows: Sequence[Row], into_wall: float) -> None:
-        """Books the intervals from ``tick`` on.
-
-        Args:
-            plant: telemetry columns, shape (ticks * n + 1, members).
-            rows: of the controller, one a tick.
-            into_wall: direction into the wall.
-        """
+        """Books the intervals from ``tick`` on: plant columns of shape (ticks * n + 1, members), and a row a tick."""
         first, ticks, x = self.tick, len(rows), plant["x"]
         members = x.shape[1]
         columns = {name: _column([row.columns[name] for row in rows], members) for name in CONTROLLER_COLUMNS}
@@ -135,7 +116,6 @@ class BatchLogger:
         """Yields the entries of the summary of each of these members but for the machine's, as they stand now.
 
         Args:
-            ends: members that end here.
             ended: "done", "stopped" or "diverged".
             counted: what was counted besides, by name of the counter, shape (members,).
         """

@@ -54,6 +54,7 @@ def open_session(
     """Makes a logger with its files in directory ``out``, or without any when None.
 
     Args:
+        scene: the resolved scene; ``run.log`` decides what is logged.
         attachments: text files to put into the log, by name (the scene as TOML, plugins).
         memory: where to log without a directory; when None, only the books are kept then.
 

@@ -92,7 +92,6 @@ def increments(
     books of a device at rest under load at rest too.
 
     Args:
-        steps, ticks: of the same intervals.
         commanded: the force of the wall and of every element over each step, N; None without an actuator's limits.
 
     Yields:
@@ -185,7 +184,6 @@ class OneMassBooks:
         Args:
             columns: plant telemetry of whole intervals, the end state included; shape (ticks * n + 1,), or
                 (ticks * n + 1, batch), each.
-            moved: displacement over these steps and intervals.
             commanded: the force of the wall and of every element over each step, shape (ticks * n,), or with a batch.
 
         Yields:

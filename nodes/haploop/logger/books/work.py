@@ -32,6 +32,7 @@ def displacement(x: Any, x_low: Any, steps_per_tick: int | None, sum_steps: SumS
 
     Args:
         x: positions at every step and at the end, shape (ticks * n + 1,), or (ticks * n + 1, batch), m.
+        x_low: what rounding left of them, m.
         steps_per_tick: n; None where the steps are those of one interval and have no axis for ticks.
     """
     dx = x[1:] - x[:-1]

@@ -151,7 +151,6 @@ def make_tables(
 
     Args:
         make: from a chain of floats to tables; it may not look at the start and the rest.
-        chain: of a scene, or of a batch.
         has_members: whether it is of a batch: a last axis is then for the members, of length 1 where all share it.
     """
 

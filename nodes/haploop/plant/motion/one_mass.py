@@ -38,7 +38,6 @@ def advance(over: Any, state: tuple[Any, ...], holds: Sequence[Hold], drive: Any
 
     Args:
         over: coefficients of ``make_zoh_transitions``, indexed by the number of steps.
-        holds: forces held in the interval.
         drive: what the forced response adds to (x, v) by the end of the interval.
         noted: takes seven entries for every hold: steps, x, v, x_comp and v_comp at its beginning, force, command.
     """
@@ -75,7 +74,6 @@ class OneMassMotion:
 
     Attributes:
         held: coefficients of ``make_zoh_transitions``; in a batch with a last axis, of length 1 where all share them.
-        state: at the end of the last interval.
     """
 
     def __init__(self, scene: Scene, time: Timebase, members: int | None = None) -> None:

@@ -54,7 +54,6 @@ def record_of_holds(
         noted: seven entries of every hold, one after the other.
         held: coefficients of ``make_zoh_transitions``; in a batch with a last axis for the members.
         tail: (members,) in a batch, () for one run.
-        positions_only: leave v, x_low and force out.
 
     Returns:
         Shape (steps + 1, *tail) each, the last row left to be filled in, but for ``command``, of shape (steps + 1,); in

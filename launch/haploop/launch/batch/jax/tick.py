@@ -99,6 +99,7 @@ class TickOutputs(NamedTuple):
 
     Attributes:
         x, v, x_comp: at the steps of the interval and at its end, n + 1 rows.
+        tau: of the hand at these steps, N, n + 1 rows.
         held: (steps, force in N) of every hold.
         row: x, total and in_contact of the controller.
         forces: of the wall and of every element, N, by the names of their accounts.
