@@ -71,17 +71,17 @@ class Timebase:
 
     @property
     def steps_per_tick(self) -> int:
-        """n, the number of plant steps in one control period."""
+        """Number n of plant steps in one control period."""
         return self.plant_rate // self.control_rate
 
     @property
     def step_s(self) -> float:
-        """h, s."""
+        """Plant step h, s."""
         return 1.0 / self.plant_rate
 
     @property
     def period_s(self) -> float:
-        """T, s."""
+        """Control period T, s."""
         return 1.0 / self.control_rate
 
     @property
