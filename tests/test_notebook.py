@@ -26,7 +26,7 @@ def test_every_cell_runs_and_says_what_the_notebook_holds(monkeypatch: pytest.Mo
     pytest.importorskip("matplotlib")
     monkeypatch.chdir(FILE.parent)
     again = copy.deepcopy(NOTEBOOK)
-    run_cells(again)
+    run_cells(again["cells"])
     assert words([cell for cell in again["cells"] if cell["cell_type"] == "code"]) == words(CODE)
 
 
@@ -39,7 +39,7 @@ def test_the_notebook_holds_the_figures_it_draws() -> None:
 def test_a_cell_that_fails_fails_the_whole() -> None:
     cell: Cell = {"cell_type": "code", "source": ["1 / 0"], "outputs": []}
     with pytest.raises(ZeroDivisionError):
-        run_cells({"cells": [cell]})
+        run_cells([cell])
 
 
 def test_the_file_is_a_notebook_of_the_format_it_names() -> None:

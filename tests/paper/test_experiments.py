@@ -27,7 +27,6 @@ from haploop.tools.studies.choi2022.experiment import nearest as nearest_in
 from haploop.tools.studies.choi2022.experiment_measure import CLAIMS, NAMES, SIZES, largest, measure, stiffness_ladder
 from haploop.tools.studies.choi2022.figures import figure
 from haploop.tools.studies.choi2022.figures.figure_8 import contacts as figure_8_contacts
-from haploop.tools.studies.choi2022.figures.figure_11 import largest_steady
 from haploop.tools.studies.choi2022.interpretations import options
 from haploop.tools.studies.choi2022.theory import GatedMap, first_end, gated_ends
 from haploop.tools.studies.choi2022.work import Work, wall_of
@@ -130,7 +129,6 @@ def test_the_largest_stiffness_has_no_gap_below_it() -> None:
     stiffnesses = np.array([2500.0, 3000.0, 3500.0, 4000.0])
     rows = np.array([[True, True, False, True], [False] * 4, [True] * 4])
     assert [largest(row[:, None], stiffnesses) for row in rows] == [3000.0, 0.0, 4000.0]
-    assert largest_steady(rows, stiffnesses).tolist() == [3000.0, 0.0, 4000.0]
 
 
 @pytest.mark.slow

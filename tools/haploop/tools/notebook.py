@@ -13,6 +13,7 @@ import io
 import json
 import os
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from types import ModuleType
 from typing import Literal, NotRequired, TypedDict
@@ -27,12 +28,6 @@ class Cell(TypedDict):
     outputs: NotRequired[list[Output]]
 
 
-class Notebook(TypedDict):
-    """A notebook of format 4, of which only the cells are looked at."""
-
-    cells: list[Cell]
-
-
 class Output(TypedDict, total=False):
     """An output of a cell."""
 
@@ -44,13 +39,13 @@ class Output(TypedDict, total=False):
     data: dict[str, str | list[str]]
 
 
-def run_cells(notebook: Notebook) -> None:
-    """Runs every code cell and replaces its outputs; where one raises, the notebook is to be thrown away."""
+def run_cells(cells: Sequence[Cell]) -> None:
+    """Runs every code cell of a notebook of format 4 and replaces its outputs. Where one raises, throw it away."""
     import matplotlib
 
     matplotlib.use("Agg")
     main_module = ModuleType("__main__")
-    for number, cell in enumerate((c for c in notebook["cells"] if c["cell_type"] == "code"), start=1):
+    for number, cell in enumerate((c for c in cells if c["cell_type"] == "code"), start=1):
         cell["execution_count"] = number
         cell["outputs"] = _outputs("".join(cell["source"]), main_module, number)
 
@@ -91,7 +86,7 @@ def main(path: Path) -> None:
     path = path.resolve()
     notebook = json.loads(path.read_text(encoding="utf-8"))
     os.chdir(path.parent)
-    run_cells(notebook)
+    run_cells(notebook["cells"])
     path.write_text(json.dumps(notebook, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
 
 

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any, Literal, cast
 
 Verdict = Literal["holds", "holds under a stated assumption", "does not hold here"]
-HOLDS, ASSUMING, FAILS = "holds", "holds under a stated assumption", "does not hold here"
-VERDICTS: tuple[Verdict, ...] = (HOLDS, ASSUMING, FAILS)
+VERDICTS: tuple[Verdict, Verdict, Verdict] = ("holds", "holds under a stated assumption", "does not hold here")
+HOLDS, ASSUMING, FAILS = VERDICTS
 
 
 @dataclass(frozen=True)

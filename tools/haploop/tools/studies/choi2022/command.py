@@ -79,7 +79,10 @@ def page(kept: Mapping[int, Kept], pictures: str = "") -> str:
     # The last figures are nearest to a device that is to be built.
     answers = [f"- {one['answer']} ([{number}](#figure-{number}))" for number, one in kept.items() if one.get("answer")]
     parts += ["## What a builder can take from it", "\n".join(reversed(answers))] if answers else []
-    parts += ["## Claims", *_tables(rows), *_missing(kept), "## Figures"]
+    parts += ["## Claims", *_tables(rows)]
+    if missing := [f"{number} ({len(figure(number).CLAIMS)} claims)" for number in numbers() if number not in kept]:
+        parts.append(f"Not made here: figure {', '.join(missing)}.")
+    parts.append("## Figures")
     for number, one in kept.items():
         parts += _figure(number, one, pictures)
     return "\n\n".join(parts) + "\n"
@@ -104,11 +107,6 @@ def _tables(rows: list[tuple[int, Finding]]) -> list[str]:
             table = markdown_table(["the paper says", "here", "numbers", "figure"], cells[section])
             parts += [f"### {section}. {title}", table]
     return parts
-
-
-def _missing(kept: Mapping[int, Kept]) -> list[str]:
-    missing = [f"{number} ({len(figure(number).CLAIMS)} claims)" for number in numbers() if number not in kept]
-    return [f"Not made here: figure {', '.join(missing)}."] if missing else []
 
 
 def _figure(number: int, one: Kept, pictures: str) -> list[str]:

@@ -94,10 +94,8 @@ def claims_table(
         decides = decider(found, name)
         held, often = (yes(row, name) for row in alone.values()), (percent(share(s, name)) for s in shares.values())
         rows.append([f"*{name}*", about, *held, *often, decides.describe(name) if decides else ""])
-    first = 2 + len(alone)
-    return markdown_table(
-        ["claim", "as tested", *alone, *shares, decided], rows, numbers=range(first, first + len(shares))
-    )
+    heads = ["claim", "as tested", *alone, *shares, decided]
+    return markdown_table(heads, rows, numbers=range(2 + len(alone), len(heads) - 1))
 
 
 def search_words(

@@ -59,22 +59,18 @@ class InterpretationSpace(Space):
 
     def label(self, key: str) -> str:
         """Returns what a key is called, without its unit."""
-        return self._label_and_unit(key)[0]
+        return self.labels.get(key, key).partition(" (")[0]
 
     def value(self, key: str, value: Any) -> str:
         """Returns a value with its unit: ``"0.6 ms"``."""
         if not isinstance(value, float):
             return str(value)
-        unit = self._label_and_unit(key)[1]
+        unit = self.labels.get(key, key).partition(" (")[2].removesuffix(")")
         return amount(value, unit, 2).removesuffix(".0") if unit else f"{float(f'{value:.2g}'):g}"
 
     def describe(self, values: Row, keys: Iterable[str]) -> str:
         """Returns labels and values of some keys in one line."""
         return ", ".join(f"{self.label(key)} {self.value(key, values[key])}" for key in keys)
-
-    def _label_and_unit(self, key: str) -> tuple[str, str]:
-        label, _, unit = self.labels.get(key, key).partition(" (")
-        return label, unit.removesuffix(")")
 
 
 @dataclass(frozen=True)

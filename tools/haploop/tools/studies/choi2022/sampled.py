@@ -26,15 +26,10 @@ _SINE_TICKS, _PHASES, _TICKS = 400, 16, 4000
 
 
 def forces(x_m: np.ndarray, kind: str, cutoff_Hz: float | None = None) -> np.ndarray:
-    """Returns the force at every sample of the wall's spring or of an element that always acts, N.
+    """Returns the force of the wall's spring, or of an element that always acts, N, shape (ticks, batch) as ``x_m``.
 
-    Args:
-        x_m: samples 1 ms apart, shape (ticks, batch); a spring's wall is above 0 and is never left.
-        kind: "spring", or the kind of an element, with the paper's parameter.
-        cutoff_Hz: of a low-pass over the acceleration.
-
-    Returns:
-        Shape (ticks, batch).
+    Samples are 1 ms apart, numbers are the paper's; a spring's wall is above 0 and is never left. The cutoff is that of
+    a low-pass over the acceleration.
     """
     element = ElementTable(name=kind, acts="always", parameters=_PARAMETERS.get(kind, {}))
     scene = Scene(
@@ -118,10 +113,8 @@ def bidirectional_J(frequency_Hz: np.ndarray, age_s: float | None) -> np.ndarray
     """Returns the mean energy a sample that 1 kg takes from a sine of 1 m: |a| sin(theta / 2) sin(w (age + T / 2)).
 
     |a| = w^2, and f[k-1] = -|a| sin(w (t[k] - T - age)) times x[k] - x[k-1], which goes as cos(w (t[k] - T / 2)).
-    The older the reading, the more it takes: all of what is moved at a quarter of a swing.
-
-    Args:
-        age_s: None for a difference of differences: T old, and |a| = (2 / T)^2 sin^2(theta / 2).
+    The older the reading, the more it takes: all of what is moved at a quarter of a swing. Without an age it is a
+    difference of differences: T old, and |a| = (2 / T)^2 sin^2(theta / 2).
     """
     w, size, age = _reading(frequency_Hz, age_s)
     return size * np.sin(w * PERIOD_S / 2.0) * np.sin(w * (age + PERIOD_S / 2.0))
@@ -149,8 +142,7 @@ def _reading(frequency_Hz: np.ndarray, age_s: float | None) -> tuple[np.ndarray,
 def returned(frequency_Hz: float, *, before: bool = True) -> float:
     """Returns the energy that unidirectional inertia gives back to a sine over what it takes, 0 to 1.
 
-    Args:
-        before: whether the gate is v[k] a[k-1] >= 0, as in eq. 9 (the program's controller), or v[k] a[k] >= 0.
+    The gate is v[k] a[k-1] >= 0 if ``before``, as in eq. 9 (the program's controller), else v[k] a[k] >= 0.
     """
     x = np.sin(np.arange(_TICKS) * 2.0 * np.pi * frequency_Hz * PERIOD_S)[:, None]
     v = np.diff(x, axis=0, prepend=x[:1]) / PERIOD_S

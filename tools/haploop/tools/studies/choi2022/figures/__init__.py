@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 import pkgutil
-import re
 from importlib import import_module
 from types import ModuleType
 
-_NAME = re.compile(r"figure_(\d+)")
-
 
 def numbers() -> list[int]:
-    names = (module.name for module in pkgutil.iter_modules(__path__))
-    return sorted(int(found[1]) for name in names if (found := _NAME.fullmatch(name)))
+    return sorted(int(module.name.removeprefix("figure_")) for module in pkgutil.iter_modules(__path__))
 
 
 def figure(number: int) -> ModuleType:

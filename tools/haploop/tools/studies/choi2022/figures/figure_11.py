@@ -8,7 +8,7 @@ from haploop.tools.figure.style import INK, SMALL, dress, empty_figure
 from haploop.tools.studies.choi2022.claims import Finding, claims_of
 from haploop.tools.studies.choi2022.device import elements_of
 from haploop.tools.studies.choi2022.experiment import findings, nearest
-from haploop.tools.studies.choi2022.experiment_measure import PAIR, PAIR_AT_N_M, is_steady
+from haploop.tools.studies.choi2022.experiment_measure import PAIR, PAIR_AT_N_M, is_steady, largest
 from haploop.tools.studies.choi2022.work import Work
 
 CLAIMS = claims_of(11)
@@ -28,47 +28,32 @@ def make(work: Work) -> list[Finding]:
         "damping with inertia", [setup.scene(k, elements_of("both", float(b), float(m))) for b, m, k in cells]
     )
     steady = np.array([is_steady(result) for result in results]).reshape(len(dampings), len(masses), -1)
-    largest = largest_steady(steady, stiffnesses)
+    reached = np.array([[largest(one[:, None], stiffnesses) for one in row] for row in steady])
     figure = empty_figure(8.6, 5.2)
     ax = figure.subplots()
-    image = ax.imshow(largest / 1e3, origin="lower", aspect="auto", cmap="cividis")
-    for (row, column), value in np.ndenumerate(largest):
-        tone = "white" if value < 0.6 * largest.max() else INK
-        ax.text(
-            column, row, f"{value / 1e3:.1f}" if value else "–", ha="center", va="center", fontsize=SMALL, color=tone
-        )
+    image = ax.imshow(reached / 1e3, origin="lower", aspect="auto", cmap="cividis")
+    for (row, column), value in np.ndenumerate(reached):
+        tone = "white" if value < 0.6 * reached.max() else INK
+        text = f"{value / 1e3:.1f}" if value else "–"
+        ax.text(column, row, text, ha="center", va="center", fontsize=SMALL, color=tone)
     dress(ax, "largest steady stiffness (N/mm)", "unidirectional inertia (g)", "damping (N s/m)")
     ax.grid(visible=False)
     ax.set_xticks(range(len(masses)), [f"{1e3 * mass:g}" for mass in masses])
     ax.set_yticks(range(len(dampings)), [f"{damping:g}" for damping in dampings])
     figure.colorbar(image, ax=ax, label="N/mm")
     work.figure(figure, "figure_11")
-    work.data(
-        "figure_11", {"damping_N_s_m": dampings, "mass_kg": masses, "stiffness_N_m": stiffnesses, "steady": steady}
-    )
+    grid = {"damping_N_s_m": dampings, "mass_kg": masses, "stiffness_N_m": stiffnesses}
+    work.data("figure_11", grid | {"steady": steady})
     work.scene("figure_11", setup.scene(PAIR_AT_N_M, elements_of("both", *PAIR)))
-    i, j = np.unravel_index(largest.argmax(), largest.shape)
-    most, alone, damped = float(largest[i, j]), float(largest[0].max()), float(largest[:, 0].max())
-    bears = np.flatnonzero(largest[0, 1:]) + 1
-    helped = int((largest[1:, bears].max(axis=0) >= largest[0, bears] + 500.0).sum())
-    computed = {
-        "most": most / 1e3,
-        "damping": dampings[i],
-        "mass_g": 1e3 * masses[j],
-        "damped": damped / 1e3,
-        "alone": alone / 1e3,
-        "helped": helped,
-        "bears": len(bears),
-    }
+    i, j = np.unravel_index(reached.argmax(), reached.shape)
+    most, alone, damped = float(reached[i, j]), float(reached[0].max()), float(reached[:, 0].max())
+    bears = np.flatnonzero(reached[0, 1:]) + 1
+    helped = int((reached[1:, bears].max(axis=0) >= reached[0, bears] + 500.0).sum())
+    computed = {"most": most / 1e3, "damping": dampings[i], "mass_g": 1e3 * masses[j], "helped": helped}
+    computed |= {"damped": damped / 1e3, "alone": alone / 1e3, "bears": len(bears)}
     near = bool(
         abs(most - PAIR_AT_N_M) <= 500.0 and 0.5 <= dampings[i] / PAIR[0] <= 2.0 and 0.5 <= masses[j] / PAIR[1] <= 2.0
     )
     work.answer = work.tell("answer", **computed)
     holding = {"most": near, "more": most > max(alone, damped), "step": helped == len(bears)}
     return findings(work, CLAIMS, holding, **computed)
-
-
-def largest_steady(steady: np.ndarray, stiffnesses: np.ndarray) -> np.ndarray:
-    """Returns the last stiffness, along the last axis, before the first that is not steady; 0 if none is."""
-    count = np.where(steady.all(axis=-1), steady.shape[-1], (~steady).argmax(axis=-1))
-    return np.where(count > 0, stiffnesses[np.maximum(count - 1, 0)], 0.0)

@@ -36,18 +36,18 @@ def make(work: Work) -> list[Finding]:
     off = abs(shown / PAIR_AT_N_M - 1.0)
     inside = press.displayed_N_m[press.output_N != 0.0]
     within = int(np.argmax(np.abs(inside / PAIR_AT_N_M - 1.0) < 0.5))
-    sizes = {"damping": b, "mass_g": mass_g}
-    return [
-        *findings(
-            work,
-            CLAIMS,
-            {"displayed": best.steady and off < 0.01},
-            shown=shown / 1e3,
-            off=100 * off,
-            ended=best.ended,
-            ripple=amount(float(np.ptp(press.output_N[len(press.output_N) // 2 :])), "N", 2),
-            **sizes,
-        ),
-        *findings(work, CLAIMS, {"values": paper.steady}, ended=paper.ended, **sizes),
-        *findings(work, CLAIMS, {"instant": within <= 2}, within=within, first=inside[0] / 1e3),
-    ]
+    holding = {"displayed": best.steady and off < 0.01, "values": paper.steady, "instant": within <= 2}
+    return findings(
+        work,
+        CLAIMS,
+        holding,
+        shown=shown / 1e3,
+        off=100 * off,
+        ended=best.ended,
+        papers=paper.ended,
+        ripple=amount(float(np.ptp(press.output_N[len(press.output_N) // 2 :])), "N", 2),
+        damping=b,
+        mass_g=mass_g,
+        within=within,
+        first=inside[0] / 1e3,
+    )

@@ -22,7 +22,8 @@ from haploop.tools.studies.choi2022.sampled import MASS_KG, PERIOD_S, closed_for
 from haploop.tools.studies.choi2022.work import Run, Work, fig6, hand_of, run
 
 CLAIMS = claims_of(4)
-CUTOFFS_HZ = (None, 100.0, 30.0, 10.0)
+# Cutoffs in Hz by what a row of numbers calls them.
+CUTOFFS_HZ = {"unfiltered": None, "100 Hz": 100.0, "30 Hz": 30.0, "10 Hz": 10.0}
 # An IMU of the class of the paper's: 300 ug/Hz^0.5, 16 bit over 8 g, 420 Hz (MPU-9250's data sheet).
 IMU = Accelerometer(noise_density=2.9e-3, range=78.5, resolution=2.4e-3, bandwidth=420.0, delay=0.0014)
 # PHANToM Premium 1.5, one count.
@@ -49,13 +50,10 @@ def make(work: Work) -> list[Finding]:
     work.data("figure_4", {"prescribed_v_m_s": pulse, "run_v_m_s": v})
     work.scene("figure_4_pushed", pushed.scene)
     work.scene("figure_4_contact", contact.scene)
-    masses_g = {cutoff: 1e3 * largest_mass_kg(cutoff, 0.0) for cutoff in CUTOFFS_HZ}
-    masses = [f"{mass:.0f} g {'at ' * bool(cutoff)}{named(cutoff)}" for cutoff, mass in masses_g.items()]
+    masses_g = {name: 1e3 * largest_mass_kg(cutoff, 0.0) for name, cutoff in CUTOFFS_HZ.items()}
+    masses = [f"{mass:.0f} g {'at ' * bool(CUTOFFS_HZ[name])}{name}" for name, mass in masses_g.items()]
     work.answer = work.tell("answer", masses=", ".join(masses))
-    return [
-        *_on_energy(pulse, v, pushed, contact, 20 if work.small else 160),
-        *_on_filters({named(cutoff): mass for cutoff, mass in masses_g.items()}),
-    ]
+    return [*_on_energy(pulse, v, pushed, contact, 20 if work.small else 160), *_on_filters(masses_g)]
 
 
 def _pushed_and_braked(element: ElementTable) -> Scene:
@@ -87,8 +85,8 @@ def _on_energy(pulse: np.ndarray, v: np.ndarray, pushed: Run, contact: Run, freq
 
 
 def _on_filters(masses_g: dict[str, float]) -> list[Finding]:
-    passive = {named(cutoff): passive_up_to_Hz(cutoff) for cutoff in CUTOFFS_HZ}
-    stiffest = {named(cutoff): 1e-3 * largest_stiffness_N_m(cutoff, MASS_KG) for cutoff in CUTOFFS_HZ}
+    passive = {name: passive_up_to_Hz(cutoff) for name, cutoff in CUTOFFS_HZ.items()}
+    stiffest = {name: 1e-3 * _stiffest_N_m(cutoff) for name, cutoff in CUTOFFS_HZ.items()}
     errors, fine = errors_m_s2(), errors_m_s2(_FINE_M)
     best, finest = (min(of[name] for name in of if name != "accelerometer") for of in (errors, fine))
     return [
@@ -99,7 +97,7 @@ def _on_filters(masses_g: dict[str, float]) -> list[Finding]:
             least=min(passive.values()),
         ),
         CLAIMS["range"].holds_if(
-            all(masses_g[named(cutoff)] > masses_g["unfiltered"] for cutoff in CUTOFFS_HZ[1:]),
+            all(mass > masses_g["unfiltered"] for name, mass in masses_g.items() if name != "unfiltered"),
             masses=_listed(masses_g, "g"),
         ),
         CLAIMS["lag"].holds_if(stiffest["unfiltered"] >= max(stiffest.values()), stiffest=_listed(stiffest, "N/mm")),
@@ -108,11 +106,6 @@ def _on_filters(masses_g: dict[str, float]) -> list[Finding]:
             finest < fine["accelerometer"], difference=fixed(finest), accelerometer=fixed(fine["accelerometer"])
         ),
     ]
-
-
-def named(cutoff_Hz: float | None) -> str:
-    """Returns what a row of numbers calls a cutoff."""
-    return "unfiltered" if cutoff_Hz is None else f"{cutoff_Hz:g} Hz"
 
 
 def passive_up_to_Hz(cutoff_Hz: float | None) -> float:
@@ -137,16 +130,15 @@ def largest_mass_kg(cutoff_Hz: float | None, stiffness_N_m: float) -> float:
     return bisect(is_stable, low, high, Tolerance(relative=1e-6))[0] if low else 0.0
 
 
-def largest_stiffness_N_m(cutoff_Hz: float | None, mass_kg: float) -> float:
+def _stiffest_N_m(cutoff_Hz: float | None) -> float:
     """Returns the end of the stiffnesses, from 0 on, at which device and hand stay stable in contact; 0 for none."""
-    ranges = _one_tick(mass_kg, cutoff_Hz).stable_ranges()
+    ranges = _one_tick(MASS_KG, cutoff_Hz).stable_ranges()
     return ranges[0][1] if ranges and ranges[0][0] == 0.0 else 0.0
 
 
 def _one_tick(mass_kg: float, cutoff_Hz: float | None) -> OneTickMap:
-    estimate = Acceleration(cutoff=cutoff_Hz)
-    scene = replace(fig6("c"), encoder=None, acceleration=estimate, dissipation=(_inertia(mass_kg),))
-    return OneTickMap.from_scene(scene)
+    filtered = replace(fig6("c"), encoder=None, acceleration=Acceleration(cutoff=cutoff_Hz))
+    return OneTickMap.from_scene(replace(filtered, dissipation=(_inertia(mass_kg),)))
 
 
 def errors_m_s2(count_m: float = COUNT_M) -> dict[str, float]:
@@ -162,7 +154,7 @@ def errors_m_s2(count_m: float = COUNT_M) -> dict[str, float]:
 
     measured = Acceleration(source="accelerometer")
     true = accelerations(measured)
-    found = {f"encoder, {named(cutoff)}": accelerations(Acceleration(cutoff=cutoff)) for cutoff in CUTOFFS_HZ}
+    found = {f"encoder, {name}": accelerations(Acceleration(cutoff=one)) for name, one in CUTOFFS_HZ.items()}
     found["accelerometer"] = accelerations(measured, IMU)
     return {name: float(np.sqrt(np.mean((a - true) ** 2))) for name, a in found.items()}
 

@@ -42,8 +42,7 @@ def make(work: Work) -> list[Finding]:
     named = {f"{kind}_{late}_ticks_late_J_m2".replace("-", "_"): value for (kind, late), value in measured.items()}
     work.data("figure_5", {"frequency_Hz": frequencies, **named, **books})
     ends = {(kind, late): _first_negative(frequencies, measured[kind, late]) for kind, late in measured}
-    names = (("damping", "damping"), ("bidirectional inertia", BI), ("unidirectional inertia", UNI))
-    both = (f"{name} {_hertz(ends[kind, 0])} and {_hertz(ends[kind, 2])}" for name, kind in names)
+    both = (f"{kind.replace('-', ' ')} {_hertz(ends[kind, 0])} and {_hertz(ends[kind, 2])}" for kind in KINDS[1:])
     work.answer = work.tell("answer", ends=", ".join(both))
     return [*_on_alternation(), *_on_unidirectional(frequencies, measured, ends)]
 
@@ -134,8 +133,7 @@ def _closed(rng: np.random.Generator, shortest: int) -> np.ndarray:
 
 def _cycle_J(v: np.ndarray) -> float:
     period = len(v) - 3
-    around = np.concatenate([v[:period], v[:period]])
-    return float(steps_J(around, MASS_KG)[period:].sum())
+    return float(steps_J(np.tile(v[:period], 2), MASS_KG)[period:].sum())
 
 
 def _on_unidirectional(

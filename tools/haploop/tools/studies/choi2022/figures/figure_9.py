@@ -100,7 +100,8 @@ def presses(work: Work, name: str, cases: Mapping[str, tuple[str, Scene]]) -> li
         runs.append(run(scene))
         press = Press.from_run(runs[-1])
         _draw(column[0], column[1], press, f"{heading}: {runs[-1].summary['verdict']}", wall_of(scene).stiffness)
-        columns |= press.columns(key)
+        # Outside the wall the displayed stiffness is 0 there.
+        columns |= {f"{key}_{name}": np.nan_to_num(column) for name, column in press._asdict().items()}
         work.scene(f"{name}_{key}", scene)
     legend(axes[0, 0], loc="upper right", ncols=3, **INSIDE)
     work.figure(figure, name)
@@ -132,11 +133,6 @@ class Press(NamedTuple):
         displayed = np.full(len(depth), np.nan)
         displayed[inside] = total[inside] / depth[inside]
         return cls(np.arange(len(depth)) / ran.scene.clock.control_rate, wall, total - wall, total, displayed)
-
-    def columns(self, prefix: str) -> dict[str, np.ndarray]:
-        """Returns the data beside the figure; outside the wall the displayed stiffness is 0."""
-        named = self._asdict() | {"displayed_N_m": np.nan_to_num(self.displayed_N_m)}
-        return {f"{prefix}_{name}": column for name, column in named.items()}
 
 
 def _draw(forces: Axes, stiffness: Axes, press: Press, heading: str, wanted_N_m: float) -> None:
