@@ -10,21 +10,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from haploop.tools.cost.data import Cost, Point, SceneCost
+from haploop.tools.figure import style
 from haploop.tools.figure.data import FigureError
 from haploop.tools.figure.labels import Label, place_labels
-from haploop.tools.figure.style import (
-    ELEMENTS,
-    FAINT,
-    GREY,
-    INK,
-    SMALL,
-    TEXT,
-    WALL,
-    dress,
-    empty_figure,
-    fix_layout,
-    plain_numbers,
-)
 from haploop.tools.render.units import amount
 
 if TYPE_CHECKING:
@@ -37,13 +25,14 @@ UNCERTAIN = "#E4E4E4"
 _TITLE_LETTERS = 58
 # Colours that the colour-blind tell apart, and a marker each, for those who see none; others begin anew.
 LOOKS: dict[str, tuple[str, str]] = {
-    "exact": (WALL, "o"),
-    "semi-implicit-euler": (ELEMENTS[0], "s"),
-    "euler": (ELEMENTS[2], "v"),
-    "rk4": (ELEMENTS[1], "D"),
-    "implicit-midpoint": (ELEMENTS[3], "^"),
-    "dop853": (ELEMENTS[5], "P"),
+    "exact": (style.WALL, "o"),
+    "semi-implicit-euler": (style.ELEMENTS[0], "s"),
+    "euler": (style.ELEMENTS[2], "v"),
+    "rk4": (style.ELEMENTS[1], "D"),
+    "implicit-midpoint": (style.ELEMENTS[3], "^"),
+    "dop853": (style.ELEMENTS[5], "P"),
 }
+_OTHER = style.GREY, "X"
 # Below a reference's uncertainty there is nothing to see: what is smaller than this share of it is drawn there.
 _WITHIN = 0.3
 # The share of a panel's height that failures take at its top edge.
@@ -60,14 +49,14 @@ def figure_of(cost: Cost) -> Figure:
         raise FigureError("No scene has a point with a time, so there is nothing to draw.")
     columns = min(3, len(scenes) + 1)
     rows = -(-(len(scenes) + 1) // columns)
-    figure = empty_figure(columns * _PANEL_IN[0], rows * _PANEL_IN[1])
+    figure = style.empty_figure(columns * _PANEL_IN[0], rows * _PANEL_IN[1])
     panels = figure.subplots(rows, columns, squeeze=False).ravel()
     for ax, scene in zip(panels, scenes, strict=False):
         draw_panel(ax, scene, cost.tolerance_m)
     _how_to_read(panels[len(scenes)], cost, scenes)
     for ax in panels[len(scenes) + 1 :]:
         ax.set_axis_off()
-    fix_layout(figure)
+    style.fix_layout(figure)
     for ax, scene in zip(panels, scenes, strict=False):
         label_points(ax, scene)
     return figure
@@ -78,51 +67,59 @@ def _how_to_read(ax: Axes, cost: Cost, scenes: list[SceneCost]) -> None:
     from matplotlib.patches import Patch
 
     ax.set_axis_off()
-    looks = {method: method_look(method) for method in methods_of(scenes)}
+    looks = {method: LOOKS.get(method, _OTHER) for method in methods_of(scenes)}
     handles: list[Any] = [
         Line2D([], [], color=colour, marker=marker, linewidth=1.6, label=method)
         for method, (colour, marker) in looks.items()
     ]
     sign = partial(Line2D, [], [], linestyle="none")
     handles += [
-        sign(marker="o", markersize=11, markerfacecolor="none", color=INK, label="at 10 kHz"),
-        sign(marker="o", markerfacecolor="white", color=GREY, label="wrong verdict"),
-        sign(marker="x", markersize=7, markeredgewidth=1.8, color=GREY, label="failed: no error to draw"),
-        Line2D([], [], color=GREY, dashes=(4, 3), linewidth=0.9, label=f"tolerance {amount(cost.tolerance_m, 'm')}"),
+        sign(marker="o", markersize=11, markerfacecolor="none", color=style.INK, label="at 10 kHz"),
+        sign(marker="o", markerfacecolor="white", color=style.GREY, label="wrong verdict"),
+        sign(marker="x", markersize=7, markeredgewidth=1.8, color=style.GREY, label="failed: no error to draw"),
+        Line2D(
+            [], [], color=style.GREY, dashes=(4, 3), linewidth=0.9, label=f"tolerance {amount(cost.tolerance_m, 'm')}"
+        ),
         Patch(facecolor=UNCERTAIN, label="the reference's own uncertainty"),
     ]
-    ax.legend(handles=handles, loc="upper left", bbox_to_anchor=(0.0, 1.0), frameon=False, fontsize=TEXT, ncols=1)
+    ax.legend(handles=handles, loc="upper left", bbox_to_anchor=(0.0, 1.0), frameon=False, fontsize=style.TEXT, ncols=1)
     words = [
         "Numbers: plant rate in kHz. Lower is more exact, further left is cheaper.",
         f"Times: medians of {cost.repeats} repeats, interleaved in random order; bars: quartiles.",
         cost.machine + (", which was busy meanwhile" if cost.load and cost.load.busy else ""),
     ]
-    ax.text(0.02, 0.0, "\n".join(words), fontsize=SMALL, color=GREY, va="bottom", transform=ax.transAxes, gid="words")
-
-
-def method_look(method: str) -> tuple[str, str]:
-    return LOOKS.get(method, (GREY, "X"))
+    ax.text(
+        0.02,
+        0.0,
+        "\n".join(words),
+        fontsize=style.SMALL,
+        color=style.GREY,
+        va="bottom",
+        transform=ax.transAxes,
+        gid="words",
+    )
 
 
 def draw_panel(ax: Axes, scene: SceneCost, tolerance_m: float) -> None:
     """Draws every point of a scene that has a time; labels come once the panel has its place."""
     reference = scene.reference
     what = "RMS error of the position (m)" if reference.pointwise else "error of the amplitude (m)"
-    dress(ax, "\n".join(wrap(scene.short_title, _TITLE_LETTERS)), "time per simulated tick, in one process (µs)", what)
-    ax.set_xscale("log")
-    ax.set_yscale("log")
-    plain_numbers(ax.xaxis)
+    style.dress(
+        ax, "\n".join(wrap(scene.short_title, _TITLE_LETTERS)), "time per simulated tick, in one process (µs)", what
+    )
+    ax.loglog()
+    style.plain_numbers(ax.xaxis)
     low, edge, high = _limits(scene, tolerance_m)
     ax.set_ylim(low, high)
     ax.axhspan(low, max(reference.error_m, low), color=UNCERTAIN, zorder=0, linewidth=0, gid="uncertainty")
-    ax.axhline(tolerance_m, color=GREY, linewidth=0.9, dashes=(4, 3), zorder=1, gid="tolerance")
+    ax.axhline(tolerance_m, color=style.GREY, linewidth=0.9, dashes=(4, 3), zorder=1, gid="tolerance")
     for method in methods_of([scene]):
         _curve(ax, [point for point in scene.points if point.method == method], scene)
     if any(point.us_per_tick and _failed(point) for point in scene.points):
-        ax.axhline(edge, color=FAINT, linewidth=0.8, zorder=1)
+        ax.axhline(edge, color=style.FAINT, linewidth=0.8, zorder=1)
         ax.set_yticks([tick for tick in ax.get_yticks() if low <= tick < edge])
         place = {"ha": "right", "va": "center", "transform": ax.transAxes}
-        ax.text(0.995, 1.0 - _TOP / 2.0, "failed", fontsize=SMALL, color=GREY, **place)
+        ax.text(0.995, 1.0 - _TOP / 2.0, "failed", fontsize=style.SMALL, color=style.GREY, **place)
     times = [end for p in scene.points if (t := p.us_per_tick) for end in (t.q1, t.median, t.q3)]
     ax.set_xlim(min(times) / 1.25, max(times) * 1.25)
 
@@ -156,7 +153,7 @@ def _curve(ax: Axes, points: list[Point], scene: SceneCost) -> None:
     if not points:
         return
     method = points[0].method
-    colour, marker = method_look(method)
+    colour, marker = LOOKS.get(method, _OTHER)
     xy = np.array([_position(ax, point, scene) for point in points])
     failed = np.array([_failed(point) for point in points])
     wide = 2.2 if method == "exact" else 1.2
@@ -173,7 +170,9 @@ def _curve(ax: Axes, points: list[Point], scene: SceneCost) -> None:
         assert spread is not None
         ax.plot([spread.q1, spread.q3], [y, y], color=colour, linewidth=0.9, alpha=0.7, zorder=2, gid="quartiles")
         if point.plant_rate == _MARKED_HZ:
-            ax.plot([x], [y], marker="o", markersize=11, markerfacecolor="none", markeredgecolor=INK, gid="10 kHz")
+            ax.plot(
+                [x], [y], marker="o", markersize=11, markerfacecolor="none", markeredgecolor=style.INK, gid="10 kHz"
+            )
 
 
 def label_points(ax: Axes, scene: SceneCost) -> None:
@@ -181,7 +180,7 @@ def label_points(ax: Axes, scene: SceneCost) -> None:
     timed = [point for point in scene.points if point.us_per_tick]
     labels = []
     for point in sorted(timed, key=lambda point: (point.method != scene.own_method, _failed(point))):
-        in_kHz, colour = f"{point.plant_rate / 1000:g}", method_look(point.method)[0]
+        in_kHz, colour = f"{point.plant_rate / 1000:g}", LOOKS.get(point.method, _OTHER)[0]
         half_px = 9.0 if point.plant_rate == _MARKED_HZ else 5.0
         labels.append(Label(*_position(ax, point, scene), in_kHz, colour, in_kHz, half_px))
     lines = [line.get_xydata() for line in ax.lines if (line.get_gid() or "").startswith("line ")]

@@ -8,21 +8,9 @@ import numpy as np
 
 from haploop.tools.cost.data import Price, PriceGroup, chance_in
 from haploop.tools.cost.figure import UNCERTAIN
+from haploop.tools.figure import style
 from haploop.tools.figure.data import FigureError
 from haploop.tools.figure.labels import Label, place_labels
-from haploop.tools.figure.style import (
-    ELEMENTS,
-    FAINT,
-    GREY,
-    INK,
-    SMALL,
-    TEXT,
-    WALL,
-    dress,
-    empty_figure,
-    fix_layout,
-    plain_numbers,
-)
 from haploop.tools.linear.stiffness_limit import StiffnessLimit
 from haploop.tools.operations import AGAIN, NONE
 from haploop.tools.render.units import fixed
@@ -34,7 +22,7 @@ if TYPE_CHECKING:
 _SIZE_IN = 15.0, 8.0
 # Where each group stands: (row, rows, column) of six rows and three columns.
 _PLACES = {"books": (0, 2, 0), "log": (2, 2, 0), "processes": (4, 2, 0), "effects": (0, 6, 1)}
-_CURVES = {"delay": (0, 3, 2), "control rate": (3, 3, 2)}
+_PLACES |= {"delay": (0, 3, 2), "control rate": (3, 3, 2)}
 
 
 def figure_of(groups: list[PriceGroup]) -> Figure:
@@ -44,29 +32,22 @@ def figure_of(groups: list[PriceGroup]) -> Figure:
     """
     if not groups:
         raise FigureError("No price was measured, so there is nothing to draw.")
-    figure = empty_figure(*_SIZE_IN)
+    figure = style.empty_figure(*_SIZE_IN)
     grid = figure.add_gridspec(6, 3, width_ratios=(1.0, 1.25, 1.0))
-    curves: list[tuple[Axes, PriceGroup]] = []
+    special = {"effects": _effects, "delay": _curve, "control rate": _curve}
     for group in groups:
-        row, rows, column = (_PLACES | _CURVES)[group.name]
-        ax = figure.add_subplot(grid[row : row + rows, column])
-        if group.name in _CURVES:
-            _curve(ax, group)
-            curves.append((ax, group))
-        elif group.name == "effects":
-            _effects(ax, group)
-        else:
-            _bars(ax, group)
-    fix_layout(figure)
-    for ax, group in curves:
+        row, rows, column = _PLACES[group.name]
+        special.get(group.name, _bars)(figure.add_subplot(grid[row : row + rows, column]), group)
+    style.fix_layout(figure)
+    for ax, group in zip(figure.axes, groups, strict=True):
         _label(ax, group)
     return figure
 
 
 def _bars(ax: Axes, group: PriceGroup) -> None:
     prices = group.prices
-    dress(ax, group.title, f"{group.unit}\n{group.how}", "")
-    colours = [GREY, *[WALL] * (len(prices) - 1)]
+    style.dress(ax, group.title, f"{group.unit}\n{group.how}", "")
+    colours = [style.GREY, *[style.WALL] * (len(prices) - 1)]
     words = [f"{fixed(price.time.median)}, {fixed(price.ratio)} ×" for price in prices]
     _rows(ax, prices, [price.time.median for price in prices], colours, words, xerr=_quartiles(prices))
 
@@ -75,12 +56,12 @@ def _effects(ax: Axes, group: PriceGroup) -> None:
     """Draws the time that each effect adds, the dearest first; the shaded band is chance."""
     whole = f"{group.unit}, of {fixed(group.baseline.time.median)} with all effects"
     bare = next((f" and {fixed(p.time.median)} with none" for p in group.prices if p.what == NONE), "")
-    dress(ax, "What each effect adds", f"{whole}{bare}; shaded: chance\n{group.how}", "")
+    style.dress(ax, "What each effect adds", f"{whole}{bare}; shaded: chance\n{group.how}", "")
     chance = chance_in(group)
     named = [price for price in group.prices[1:] if price.what not in (AGAIN, NONE)]
     named.sort(key=lambda price: -price.costs)
     ax.axvspan(-chance, chance, color=UNCERTAIN, zorder=0, linewidth=0, gid="chance")
-    colours = [WALL if abs(price.costs) > chance else FAINT for price in named]
+    colours = [style.WALL if abs(price.costs) > chance else style.FAINT for price in named]
     _rows(ax, named, [price.costs for price in named], colours, [_counted(price, group) for price in named])
 
 
@@ -99,11 +80,11 @@ def _quartiles(prices: list[Price]) -> np.ndarray:
 def _rows(
     ax: Axes, prices: list[Price], values: list[float], colours: list[str], words: list[str], **look: Any
 ) -> None:
-    bars = ax.barh(range(len(values)), values, color=colours, height=0.62, zorder=2, ecolor=INK, **look)
-    ax.bar_label(bars, words, padding=4, fontsize=SMALL, color=INK, gid="value")
+    bars = ax.barh(range(len(values)), values, color=colours, height=0.62, zorder=2, ecolor=style.INK, **look)
+    ax.bar_label(bars, words, padding=4, fontsize=style.SMALL, color=style.INK, gid="value")
     low, high = ax.get_xlim()
     ax.set_xlim(min(low, 0.0), high + 0.42 * (high - low))
-    ax.set_yticks(range(len(prices)), [price.what for price in prices], fontsize=TEXT)
+    ax.set_yticks(range(len(prices)), [price.what for price in prices], fontsize=style.TEXT)
     ax.tick_params(axis="y", length=0)
     ax.grid(axis="y", visible=False)
     ax.invert_yaxis()
@@ -111,21 +92,19 @@ def _rows(
 
 
 def _curve(ax: Axes, group: PriceGroup) -> None:
-    dress(ax, group.title, f"{group.unit}\n{group.how}", "largest steady stiffness (N/m)")
-    ax.set_xscale("log")
-    ax.set_yscale("log")
-    plain_numbers(ax.xaxis)
-    plain_numbers(ax.yaxis)
-    colour = ELEMENTS[0] if group.name == "delay" else ELEMENTS[1]
+    style.dress(ax, group.title, f"{group.unit}\n{group.how}", "largest steady stiffness (N/m)")
+    ax.loglog()
+    style.plain_numbers(ax.xaxis)
+    style.plain_numbers(ax.yaxis)
+    colour = style.ELEMENTS[0] if group.name == "delay" else style.ELEMENTS[1]
     if not (limits := _limits(group)):
         return
-    times, stiffnesses = [price.time.median for price, _ in limits], [limit.stiffness_N_m for _, limit in limits]
     quartiles = _quartiles([price for price, _ in limits])
-    ax.errorbar(times, stiffnesses, xerr=quartiles, color=colour, linewidth=1.4, elinewidth=1.0)
-    for price, limit in limits:
+    xy = np.array([(price.time.median, limit.stiffness_N_m) for price, limit in limits])
+    ax.errorbar(*xy.T, xerr=quartiles, color=colour, linewidth=1.4, elinewidth=1.0)
+    for (_, limit), (x, y) in zip(limits, xy, strict=True):
         face, gid = (colour, "confirmed") if limit.confirmed else ("white", "not confirmed")
-        x, y = [price.time.median], [limit.stiffness_N_m]
-        ax.plot(x, y, marker="o", color=colour, markerfacecolor=face, linestyle="none", zorder=4, gid=gid)
+        ax.plot([x], [y], marker="o", color=colour, markerfacecolor=face, linestyle="none", zorder=4, gid=gid)
     ax.margins(0.12)
 
 
@@ -136,6 +115,8 @@ def _limits(group: PriceGroup) -> list[tuple[Price, StiffnessLimit]]:
 
 def _label(ax: Axes, group: PriceGroup) -> None:
     limits = _limits(group)
-    labels = [Label(price.time.median, limit.stiffness_N_m, price.what, INK, price.what) for price, limit in limits]
+    labels = [
+        Label(price.time.median, limit.stiffness_N_m, price.what, style.INK, price.what) for price, limit in limits
+    ]
     lines = [np.asarray(line.get_xydata()) for line in ax.lines if line.get_marker() == "None"]
     place_labels(ax, labels, lines)
