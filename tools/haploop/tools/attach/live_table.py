@@ -9,7 +9,6 @@ from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING
 
 from haploop.launch.processes import run_directory
-from haploop.launch.processes.run_directory import LiveRun
 from haploop.protocol.changes import describe
 from haploop.protocol.transport.clock_client import Refused
 from haploop.tools.attach.live_status import LiveStatus
@@ -119,7 +118,18 @@ def _books(run: LiveStatus) -> Table:
 def attach_print(run_id: str | None) -> None:
     """Shows a run until it ends or Ctrl-C; lossy, so it never holds the run up."""
     try:
-        run = _watch(run_directory.find(run_id))
+        live_run = run_directory.find(run_id)
+        with ObservedRun(live_run, ROLE) as observed, _screen() as show:
+            observer = observed.observer
+            run = LiveStatus(live_run.id, observer.welcome)
+            for frames in observed.frames(_DRAWN_S):
+                run.ingest(frames, time.monotonic())
+                for tick, event in observer.take_events():
+                    run.note_event(tick, event)
+                run.skipped_ticks = observed.skipped_ticks
+                show(run)
+            run.end(observed.failure, read_summary(observer.welcome))
+            show(run)
     except Refused as error:
         leave(str(error), WRONG_USE)
     except KeyboardInterrupt:
@@ -127,21 +137,6 @@ def attach_print(run_id: str | None) -> None:
     print(end_sentence(run), file=sys.stderr)
     if run.ended == "failed":
         raise SystemExit(FAILED)
-
-
-def _watch(live_run: LiveRun) -> LiveStatus:
-    with ObservedRun(live_run, ROLE) as observed, _screen() as show:
-        observer = observed.observer
-        run = LiveStatus(live_run.id, observer.welcome)
-        for frames in observed.frames(_DRAWN_S):
-            run.ingest(frames, time.monotonic())
-            for tick, event in observer.take_events():
-                run.note_event(tick, event)
-            run.skipped_ticks = observed.skipped_ticks
-            show(run)
-        run.end(observed.failure, read_summary(observer.welcome))
-        show(run)
-    return run
 
 
 @contextlib.contextmanager

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Self
 
@@ -58,10 +58,10 @@ class ObservedRun:
         Refused: it does not let the observer join.
     """
 
-    def __init__(self, run: LiveRun, role: str, listens: Sequence[str] = tuple(PROCESSES)) -> None:
-        self._run, self._listens = run, listens
+    def __init__(self, run: LiveRun, role: str) -> None:
+        self._run = run
         self._over = False
-        self._received = dict.fromkeys(listens, 0)
+        self._received = dict.fromkeys(PROCESSES, 0)
         self._missed_ticks = 0
         self.failure = ""
         self._context = run.make_context()
@@ -76,7 +76,7 @@ class ObservedRun:
         give_up = time.monotonic() + _BEGINS_WITHIN_S
         while not is_over(self._run):
             try:
-                return Observer(self._context, role, self._run.clock, self._listens)
+                return Observer(self._context, role, self._run.clock, tuple(PROCESSES))
             except Refused:
                 if time.monotonic() > give_up:
                     raise
@@ -107,7 +107,7 @@ class ObservedRun:
                 return
             for role, frame in frames:
                 self._received[role] = frame.fields[0] + (frame.fields[1] if frame.name.endswith("_BLOCK") else 0)
-            ended = self.observer.ended.keys() >= set(self._listens)
+            ended = self.observer.ended.keys() >= set(PROCESSES)
             self._over = ended or last
             if last and not ended:
                 self._count_missed()

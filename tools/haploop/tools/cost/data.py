@@ -201,10 +201,6 @@ class PriceGroup:
     how: str
     prices: list[Price]
 
-    @property
-    def baseline(self) -> Price:
-        return self.prices[0]
-
 
 def price(
     what: str, times: Sequence[float], baseline: Spread | None, buys: str, is_left_out: bool = False, **more: Any
@@ -219,7 +215,7 @@ def price(
 def chance_in(group: PriceGroup) -> float:
     """Returns the distance of the group's baseline measured twice, at least that of its quartiles: less is chance."""
     again = [abs(price.costs) for price in group.prices if price.what == AGAIN]
-    return max([*again, group.baseline.time.q3 - group.baseline.time.q1])
+    return max([*again, group.prices[0].time.q3 - group.prices[0].time.q1])
 
 
 @dataclass(frozen=True)

@@ -157,7 +157,7 @@ def _price_table(cost: Cost) -> FindingTable:
         dearest = max((price for price in effects.prices[1:] if price.what != NONE), key=lambda price: price.costs)
         if dearest.costs > chance_in(effects):
             note = "The dearest effect is {}: without it a tick with all effects would save {} of {} µs."
-            notes = (note.format(dearest.what, fixed(dearest.costs), fixed(effects.baseline.time.median)),)
+            notes = (note.format(dearest.what, fixed(dearest.costs), fixed(effects.prices[0].time.median)),)
     rows = [[words, against, fixed(ratio)] for ratio, words, against in sorted(found, reverse=True)]
     return FindingTable("The other prices", ("", "against", "ratio of times"), rows, notes)
 

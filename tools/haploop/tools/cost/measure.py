@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import dataclasses
 import random
 from collections.abc import Callable
+from dataclasses import asdict, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Self
@@ -21,6 +21,10 @@ from haploop.tools.machine import commit, machine, versions
 from haploop.tools.reference.nearest import Reference, reference_for
 from haploop.tools.render.progress import Stage
 
+# Far enough for some ticks more, near enough for squares to stay finite.
+_FAR_M = 1e40
+# Shorter blocks cost more than what is in them.
+_LEAST_BLOCK = 20
 _OUTCOME, _REFERENCE = "outcome", "reference"
 
 
@@ -67,10 +71,10 @@ class Measurement:
             advance = stage(f"{grid.name}: errors", len(left))
             reference = self._find_reference(grid.path, grid.scene)
             note = ReferenceNote(reference.how, reference.error_m, reference.pointwise, reference.verdict)
-            self._store.add(_REFERENCE, self._reference_key(grid), dataclasses.asdict(note))
+            self._store.add(_REFERENCE, self._reference_key(grid), asdict(note))
             for candidate in random.Random(0).sample(left, len(left)):
                 came = outcome(candidate, reference)
-                self._store.add(_OUTCOME, self._key(candidate), dataclasses.asdict(came))
+                self._store.add(_OUTCOME, self._key(candidate), asdict(came))
                 advance()
 
     def times(self, stage: Stage) -> None:
@@ -87,15 +91,26 @@ class Measurement:
         return Prices(self._store, self._repeats)
 
     def _jobs(self, way: str) -> list[Job]:
-        """Returns a job for every candidate whose run had a tick; as processes, for those that ended as planned."""
-        found = [(c, self._key(c), self._outcome(c)) for grid in self._grids for c in grid.candidates]
+        return [job for grid in self._grids for candidate in grid.candidates if (job := self._job(candidate, way))]
+
+    def _job(self, candidate: Candidate, way: str) -> Job | None:
+        """Makes a job of a candidate whose run had a tick; as processes, logging every step, only if it had no failure.
+
+        A run that diverges has but a few ticks: it is let go on far beyond where it is stopped otherwise, in blocks so
+        short that there is more than the first one where it can be.
+        """
+        came, scene, key = self._outcome(candidate), candidate.scene, self._key(candidate)
+        if scene is None or came is None or not (ticks := came.ticks):
+            return None
         if way == PROCESSES:
-            return [times.processes_job(c, key, came.ticks) for c, key, came in found if came and came.error]
-        return [
-            times.in_process_job(c, key, came.ticks, diverges=came.error is None)
-            for c, key, came in found
-            if came and came.ticks
-        ]
+            overrides = [*candidate.overrides, "run.log=steps"]
+            job = Job(way, "", key, scene, lambda: times.run_us(candidate.path, overrides, ticks))
+            return job if came.error else None
+        measured = scene
+        if came.error is None:
+            short = replace(scene.run, block_ticks=max(_LEAST_BLOCK, ticks // 2))
+            measured = replace(scene, diverged_beyond=_FAR_M, run=short)
+        return Job(way, (candidate.path, candidate.method), key, measured, lambda: times.loop_us(measured))
 
     def _outcome(self, candidate: Candidate) -> Outcome | None:
         record = self._store.get(_OUTCOME, self._key(candidate))
@@ -125,7 +140,7 @@ class Measurement:
         made = SceneCost(grid.name, grid.scene.title, *grid.own, ticks, ReferenceNote(**note), points)
         untimed = times.missing(self._store, self._jobs(IN_PROCESS), self._repeats[IN_PROCESS])
         complete = len(points) == len(grid.candidates) and not untimed
-        return dataclasses.replace(made, advice=advice(made, tolerance_m)) if complete else made
+        return replace(made, advice=advice(made, tolerance_m)) if complete else made
 
     def _point(self, candidate: Candidate) -> Point | None:
         if (came := self._outcome(candidate)) is None:

@@ -134,25 +134,22 @@ class Prices:
 
     def measure(self, stage: Stage) -> None:
         """Makes every measurement that is missing: limits and counts first, since they do not depend on the hour."""
-        self._limits_and_counts(stage)
-        every = {job.key: job for members in self._jobs.values() for job in members.values()}
-        for way, repeats in self._repeats.items():
-            jobs = [job for job in every.values() if job.way == way]
-            measure(self._store, jobs, repeats, f"other prices, {way}", stage)
-
-    def _limits_and_counts(self, stage: Stage) -> None:
-        kinds = registry()
+        kinds, groups = registry(), self._jobs.items()
         makers = {
             (_LIMIT, _WITH_LIMIT): lambda scene: dataclasses.asdict(stiffness_limit(scene, kinds)),
             (_INSTRUCTIONS, _COUNTED): lambda scene: operations(scene, kinds).per_tick,
         }
-        for (what, groups), make in makers.items():
-            jobs = {job.key: job for name in groups for job in self._jobs.get(name, {}).values()}
-            left = [job for job in jobs.values() if not self._store.has(what, job.key)]
-            advance = stage(f"other prices, {what}", len(left)) if left else lambda: None
-            for job in left:
-                self._store.add(what, job.key, make(job.scene))
-                advance()
+        for (what, names), make in makers.items():
+            jobs = {job.key: job for name, members in groups if name in names for job in members.values()}
+            if left := [job for job in jobs.values() if not self._store.has(what, job.key)]:
+                advance = stage(f"other prices, {what}", len(left))
+                for job in left:
+                    self._store.add(what, job.key, make(job.scene))
+                    advance()
+        every = {job.key: job for _, members in groups for job in members.values()}
+        for way, repeats in self._repeats.items():
+            jobs = [job for job in every.values() if job.way == way]
+            measure(self._store, jobs, repeats, f"other prices, {way}", stage)
 
     def groups(self) -> list[PriceGroup]:
         """Returns the groups of which every time is known."""
@@ -171,16 +168,11 @@ class Prices:
             scale = job.scene.clock.control_rate / 1000.0 if name == "control rate" else 1.0
             found = self._store.get(_LIMIT, job.key) if name in _WITH_LIMIT else None
             limit = StiffnessLimit(**found) if found else None
-            made = price(
-                what,
-                [value * scale for value in self._times(job)],
-                prices[0].time if prices else None,
-                _steady_up_to(limit) if limit else buys[what],
-                is_left_out=name == "effects",
-                instructions_per_tick=self._store.get(_INSTRUCTIONS, job.key) if name in _COUNTED else None,
-                stiffness=limit,
-            )
-            prices.append(made)
+            words = _steady_up_to(limit) if limit else buys[what]
+            count = self._store.get(_INSTRUCTIONS, job.key) if name in _COUNTED else None
+            values, base = [value * scale for value in self._times(job)], prices[0].time if prices else None
+            more = {"instructions_per_tick": count, "stiffness": limit}
+            prices.append(price(what, values, base, words, is_left_out=name == "effects", **more))
         return PriceGroup(name, title, unit, self._repeats[way], how, prices)
 
 

@@ -54,7 +54,7 @@ def _bars(ax: Axes, group: PriceGroup) -> None:
 
 def _effects(ax: Axes, group: PriceGroup) -> None:
     """Draws the time that each effect adds, the dearest first; the shaded band is chance."""
-    whole = f"{group.unit}, of {fixed(group.baseline.time.median)} with all effects"
+    whole = f"{group.unit}, of {fixed(group.prices[0].time.median)} with all effects"
     bare = next((f" and {fixed(p.time.median)} with none" for p in group.prices if p.what == NONE), "")
     style.dress(ax, "What each effect adds", f"{whole}{bare}; shaded: chance\n{group.how}", "")
     chance = chance_in(group)
@@ -67,7 +67,7 @@ def _effects(ax: Axes, group: PriceGroup) -> None:
 
 def _counted(price: Price, group: PriceGroup) -> str:
     words = fixed(price.costs, 2)
-    whole, without = group.baseline.instructions_per_tick, price.instructions_per_tick
+    whole, without = group.prices[0].instructions_per_tick, price.instructions_per_tick
     return words if whole is None or without is None else f"{words}; {fixed(whole - without)} instructions"
 
 

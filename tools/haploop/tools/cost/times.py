@@ -17,7 +17,7 @@ import warnings
 from collections import deque
 from collections.abc import Callable, Hashable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Self, TypeVar
 
@@ -31,17 +31,12 @@ from haploop.logger.session import open_session
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
 from haploop.tools.cost.data import Load, Spread
-from haploop.tools.cost.grid import Candidate
 from haploop.tools.render.progress import Stage
 
 T = TypeVar("T")
 POINTS_FILE = "points.jsonl"
 IN_PROCESS, PROCESSES = "us in one process", "us as processes"
 _SEED = 20_220_711
-# Far enough for some ticks more, near enough for squares to stay finite.
-_FAR_M = 1e40
-# Shorter blocks cost more than what is in them.
-_LEAST_BLOCK = 20
 _QUIET = "quiet for "
 _STEPS = 100_000
 
@@ -103,27 +98,6 @@ class Job:
     key: str
     scene: Scene
     clock: Callable[[], float | None]
-
-
-def in_process_job(candidate: Candidate, key: str, ticks: int, diverges: bool) -> Job:
-    """Makes a job of a candidate in this process.
-
-    A run that diverges has but a few ticks: it is let go on far beyond where it is stopped otherwise, in blocks so
-    short that there is more than the first one where it can be.
-    """
-    assert candidate.scene is not None
-    scene = candidate.scene
-    if diverges:
-        short = replace(scene.run, block_ticks=max(_LEAST_BLOCK, ticks // 2))
-        scene = replace(scene, diverged_beyond=_FAR_M, run=short)
-    return Job(IN_PROCESS, (candidate.path, candidate.method), key, scene, lambda: loop_us(scene))
-
-
-def processes_job(candidate: Candidate, key: str, ticks: int) -> Job:
-    """Makes a job of a candidate as processes, every plant step logged."""
-    assert candidate.scene is not None
-    overrides = [*candidate.overrides, "run.log=steps"]
-    return Job(PROCESSES, "", key, candidate.scene, lambda: run_us(candidate.path, overrides, ticks))
 
 
 def loop_us(scene: Scene) -> float | None:
