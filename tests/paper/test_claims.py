@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from haploop.tools.studies.choi2022.claims import VERDICTS, Claim, Finding, claims_of, texts_of
+from haploop.tools.studies.choi2022.claims import ASSUMING, FAILS, HOLDS, VERDICTS, Claim, Finding, claims_of, texts_of
 from haploop.tools.studies.choi2022.command import made, page, paper
 from haploop.tools.studies.choi2022.figures import figure, numbers
 from haploop.tools.studies.choi2022.work import Work
@@ -16,9 +16,9 @@ CLAIM = Claim("III, Fig. 4", "inertia dissipates | stores", "dissipates")
 
 
 def test_an_assumption_belongs_to_one_verdict_alone() -> None:
-    assert CLAIM.holds("1 J").verdict == "holds"
-    assert CLAIM.assuming("slow", "1 J").verdict == "holds under a stated assumption"
-    assert CLAIM.fails("1 J").verdict == "does not hold here"
+    assert VERDICTS == ("holds", "holds under a stated assumption", "does not hold here")
+    for verdict, assumption in zip(VERDICTS, ("", "slow", ""), strict=True):
+        assert Finding(CLAIM, verdict, "1 J", assumption).verdict == verdict
     for verdict, assumption in [(VERDICTS[0], "slow"), (VERDICTS[1], ""), (VERDICTS[2], "slow"), ("perhaps", "")]:
         with pytest.raises(ValueError, match="verdict"):
             Finding(CLAIM, verdict, "1 J", assumption)  # pyright: ignore[reportArgumentType]
@@ -27,20 +27,20 @@ def test_an_assumption_belongs_to_one_verdict_alone() -> None:
 def test_a_claim_holds_or_holds_under_its_assumption_or_fails_with_the_numbers_in_its_own_words() -> None:
     claim = Claim("III", "slowly", "", "{energy} J", "slower than {limit:.0f} Hz")
     computed = {"energy": 2, "limit": 80.0}
-    assert claim.holds_if(True, True, **computed) == claim.holds("2 J")
-    assert claim.holds_if(False, True, **computed) == claim.assuming("slower than 80 Hz", "2 J")
-    assert claim.holds_if(False, **computed) == claim.fails("2 J")
+    assert claim.holds_if(True, True, **computed) == Finding(claim, HOLDS, "2 J")
+    assert claim.holds_if(False, True, **computed) == Finding(claim, ASSUMING, "2 J", "slower than 80 Hz")
+    assert claim.holds_if(False, **computed) == Finding(claim, FAILS, "2 J")
 
 
 def test_what_is_kept_of_a_finding_reads_back_to_it() -> None:
-    for finding in (CLAIM.holds("1"), CLAIM.assuming("slow", "2"), CLAIM.fails("3")):
+    for finding in (Finding(CLAIM, HOLDS, "1"), Finding(CLAIM, ASSUMING, "2", "slow"), Finding(CLAIM, FAILS, "3")):
         assert Finding.from_dict(finding.as_dict(), {CLAIM.name: CLAIM}) == finding
 
 
 def test_the_page_tells_every_finding_by_section_and_what_was_not_made() -> None:
     kept = {}
     for number, name in ((6, "heat"), (5, "only_stored"), (3, "generates")):
-        finding = claims_of(number)[name].holds("a | b")
+        finding = Finding(claims_of(number)[name], HOLDS, "a | b")
         kept[number] = {
             "title": f"title {number}", "small": False, "caption": "seen", "notes": ["#### Note"],
             "files": [f"figure_{number}.png", f"figure_{number}.npz"], "findings": [finding.as_dict()],

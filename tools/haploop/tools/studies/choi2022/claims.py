@@ -33,23 +33,14 @@ class Claim:
     assumption: str = field(default="", compare=False, repr=False)
     tested: str = field(default="", compare=False, repr=False)
 
-    def holds(self, numbers: str) -> Finding:
-        """Finds that it holds, without any assumption beyond the paper's own words."""
-        return Finding(self, HOLDS, numbers)
-
-    def assuming(self, assumption: str, numbers: str) -> Finding:
-        """Finds that it holds where the assumption is met, and not elsewhere."""
-        return Finding(self, ASSUMING, numbers, assumption)
-
-    def fails(self, numbers: str) -> Finding:
-        return Finding(self, FAILS, numbers)
-
     def holds_if(self, is_so: bool, under_it: bool = False, /, **computed: Any) -> Finding:
         """Finds that it holds if ``is_so``, else that it holds under its assumption if ``under_it``, else neither."""
         numbers = self.numbers.format(**computed)
         if is_so:
-            return self.holds(numbers)
-        return self.assuming(self.assumption.format(**computed), numbers) if under_it else self.fails(numbers)
+            return Finding(self, HOLDS, numbers)
+        if under_it:
+            return Finding(self, ASSUMING, numbers, self.assumption.format(**computed))
+        return Finding(self, FAILS, numbers)
 
 
 @dataclass(frozen=True)

@@ -36,7 +36,7 @@ def paper(wanted: Sequence[int], out: Path, small: bool, workers: int | None) ->
                 make_figure(number, out, small=small, workers=workers, stage=stage)
             except FigureError as error:
                 leave(str(error), WRONG_USE)
-    write_page(out)
+    (out / PAGE).write_text(page(made(out)), encoding="utf-8")
     print(out / PAGE)
 
 
@@ -51,18 +51,6 @@ def make_figure(
     work.keep(module.make(work))
 
 
-def write_page(directory: Path, target: Path | None = None, pictures: str = "") -> Path:
-    """Writes the page of the figures in a directory and returns its file.
-
-    Args:
-        directory: what ``haploop paper`` made, wholly or in part.
-        pictures: where the pictures lie, seen from the page, with a slash at the end.
-    """
-    target = target or directory / PAGE
-    target.write_text(page(made(directory), pictures), encoding="utf-8")
-    return target
-
-
 def made(directory: Path) -> dict[int, Kept]:
     """Returns what the directory holds, by the number of the figure."""
     files = ((number, directory / f"figure_{number}.json") for number in numbers())
@@ -70,7 +58,10 @@ def made(directory: Path) -> dict[int, Kept]:
 
 
 def page(kept: Mapping[int, Kept], pictures: str = "") -> str:
-    """Returns the page in Markdown: answers, the finding of every claim, then the figures."""
+    """Returns the page in Markdown: answers, the finding of every claim, then the figures.
+
+    ``pictures`` is where they lie, seen from the page, with a slash at the end.
+    """
     claims = {number: claims_of(number) for number in kept}
     rows = [(number, Finding.from_dict(one, claims[number])) for number in kept for one in kept[number]["findings"]]
     texts = texts_of("page")
@@ -140,7 +131,8 @@ def main() -> None:
         for number, one in kept.items():
             for name in (f"figure_{number}.json", *(name for name in one["files"] if name.endswith(".png"))):
                 shutil.copyfile(directory / name, pictures / name)
-    print(write_page(directory, docs / PAGE, "paper/"))
+    (docs / PAGE).write_text(page(kept, "paper/"), encoding="utf-8")
+    print(docs / PAGE)
 
 
 if __name__ == "__main__":

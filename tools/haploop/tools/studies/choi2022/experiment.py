@@ -11,7 +11,7 @@ from typing import Any, TypedDict
 
 from haploop.launch.scene.file import load
 from haploop.tools.search.random import Effort, Point, Row, Scale
-from haploop.tools.studies.choi2022.claims import Claim, Finding
+from haploop.tools.studies.choi2022.claims import ASSUMING, FAILS, Claim, Finding
 from haploop.tools.studies.choi2022.device import FRICTION_N, Setup
 from haploop.tools.studies.choi2022.device import nearest as nearest_of_scene_file
 from haploop.tools.studies.choi2022.experiment_measure import gap_N_m, measure
@@ -138,7 +138,7 @@ def finding(work: Work, claim: Claim, is_so: bool, /, **computed: Any) -> Findin
         numbers += f". In {percent(found['share'])} of {kept['interpretations']} random interpretations"
         likeliest = found["likeliest"] if found["share"] else ""
     if is_so:
-        return claim.assuming(NEAREST + claim.assumption.format(**computed), numbers)
+        return Finding(claim, ASSUMING, numbers, NEAREST + claim.assumption.format(**computed))
     if likeliest:
-        return claim.assuming(f"another interpretation, likeliest with {likeliest}", numbers)
-    return claim.fails(numbers)
+        return Finding(claim, ASSUMING, numbers, f"another interpretation, likeliest with {likeliest}")
+    return Finding(claim, FAILS, numbers)

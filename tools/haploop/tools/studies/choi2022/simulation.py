@@ -75,18 +75,14 @@ def scene_of(interpretation: Point, panel: str) -> Scene:
 
 
 def _force(kind: str, value: float, number: Mapping[str, float]) -> HandForce:
-    match kind:
-        case "ramp":
-            return Ramp(value=value, rise_time=number["rise_s"])
-        case "minimum-jerk":
-            return MinimumJerk(value=value, rise_time=number["rise_s"])
-        case "step":
-            return Step(value=value, at=_STEP_AT_S)
-        case "constant":
-            return Constant(value=value)
-        case _:
-            swing_N = number["swing_share"] * number["push_N"]
-            return Sine(amplitude=swing_N, frequency=number["swing_Hz"], offset=value)
+    forces: dict[str, HandForce] = {
+        "ramp": Ramp(value=value, rise_time=number["rise_s"]),
+        "minimum-jerk": MinimumJerk(value=value, rise_time=number["rise_s"]),
+        "step": Step(value=value, at=_STEP_AT_S),
+        "constant": Constant(value=value),
+        "sine": Sine(amplitude=number["swing_share"] * number["push_N"], frequency=number["swing_Hz"], offset=value),
+    }
+    return forces[kind]
 
 
 def scene_text(interpretation: Point, panel: str) -> str:
@@ -94,13 +90,8 @@ def scene_text(interpretation: Point, panel: str) -> str:
     scene = scene_of(interpretation, panel)
     hand, texts = hand_of(scene), texts_of(6)
     title = texts[f"scene_{panel}"]
-    tables = {
-        "hand.force": hand.force,
-        "encoder": scene.encoder,
-        "noise": scene.noise,
-        "velocity": scene.velocity,
-        "acceleration": scene.acceleration,
-    }
+    sensing = ("encoder", "noise", "velocity", "acceleration")
+    tables = {"hand.force": hand.force} | {name: getattr(scene, name) for name in sensing}
     lines = [
         texts["about_scene"].format(title=title).rstrip(),
         f"title = {inline(title)}",

@@ -26,7 +26,7 @@ from haploop.tools.linear.one_tick import OneTickMap
 from haploop.tools.render.terminal import markdown_table
 from haploop.tools.render.units import amount
 from haploop.tools.search.random import Point, Row
-from haploop.tools.studies.choi2022.claims import Finding, claims_of
+from haploop.tools.studies.choi2022.claims import ASSUMING, FAILS, HOLDS, Finding, claims_of
 from haploop.tools.studies.choi2022.drawing import claims_table, search_words, share_map
 from haploop.tools.studies.choi2022.interpretations import (
     Found,
@@ -116,13 +116,13 @@ def _verdict(name: str, found: Found[Point]) -> Finding:
         growth = OneTickMap.from_scene(replace(scene_of(BASE, "b"), dissipation=())).growth(150.0)
         numbers += f". In contact the loop is linear and grows by a factor of {growth:.4f} a tick"
     if often >= _ALWAYS and holds(base, name):
-        return claim.holds(numbers)
+        return Finding(claim, HOLDS, numbers)
     if holds(nearest, name):
-        return claim.assuming(NEAREST, numbers)
+        return Finding(claim, ASSUMING, numbers, NEAREST)
     if not any(holds(row, name) for row in found.rows):
-        return claim.fails(numbers)
+        return Finding(claim, FAILS, numbers)
     decides = decider(options(rows, SPACE), name)
-    return claim.assuming(f"an interpretation with {decides.best}" if decides else _ANOTHER, numbers)
+    return Finding(claim, ASSUMING, numbers, f"an interpretation with {decides.best}" if decides else _ANOTHER)
 
 
 def _together(found: Found[Point]) -> Finding:
