@@ -21,16 +21,14 @@ def test_without_a_terminal_a_stage_is_one_line(capsys: pytest.CaptureFixture[st
     assert (shown.out, shown.err) == ("", "runs: 2\n")
 
 
-@pytest.mark.parametrize("by_itself", [True, False])
-def test_on_a_terminal_a_bar_counts_the_parts(by_itself: bool, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Whether a thread draws it or every part does."""
+def test_on_a_terminal_a_bar_counts_the_parts(monkeypatch: pytest.MonkeyPatch) -> None:
     screen = io.StringIO()
 
     def terminal(**_: Any) -> Console:
         return Console(file=screen, force_terminal=True, width=80)
 
     monkeypatch.setattr(progress, "console", terminal)
-    with bars(by_itself=by_itself) as stage:
+    with bars() as stage:
         advance = stage("runs", 3)
         advance()
     assert "runs" in screen.getvalue()

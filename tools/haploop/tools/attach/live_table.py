@@ -20,7 +20,6 @@ from haploop.tools.render.units import amount, fixed
 if TYPE_CHECKING:
     from rich.console import RenderableType
     from rich.table import Table
-    from rich.text import Text
 
 # The role under which the clock lists the table.
 ROLE = "print"
@@ -36,7 +35,17 @@ def live_table(run: LiveStatus) -> RenderableType:
     from rich.text import Text
 
     head = Text.assemble((run.run_id, "bold"), "  ", run.title, no_wrap=True, overflow="ellipsis")
-    return Group(head, _progress(run), _figures(run), _books(run))
+    state = run.ended or ("paused" if run.paused else "running" if run.factor else "waiting")
+    end = run.time.ticks
+    done = round(min(1.0, run.tick / end) * _BAR)
+    progress = Text.assemble(
+        (f"{state:<8}", _STATES.get(state, "bold")), "  ",
+        ("━" * done, "green"), ("─" * (_BAR - done), "dim"),
+        f"  {run.t_s:.3f} s of {end / run.time.control_rate:g} s, tick {run.tick}",
+        f"  {fixed(run.factor)}× real time" if run.factor is not None and not run.paused else "",
+        no_wrap=True, overflow="ellipsis",
+    )  # fmt: skip
+    return Group(head, progress, _figures(run), _books(run))
 
 
 def live_line(run: LiveStatus) -> str:
@@ -59,23 +68,6 @@ def end_sentence(run: LiveStatus) -> str:
     why = f": {run.why.rstrip('.')}" if run.why else ""
     word = "" if run.ended in ("ended", "done") else f" ({run.ended})"
     return f"Run {run.run_id} ended at tick {run.tick}, {run.t_s:g} s{word}{why}."
-
-
-def _progress(run: LiveStatus) -> Text:
-    from rich.text import Text
-
-    state = run.ended or ("paused" if run.paused else "running" if run.factor else "waiting")
-    end = run.time.ticks
-    done = round(min(1.0, run.tick / end) * _BAR)
-    text = Text.assemble(
-        (f"{state:<8}", _STATES.get(state, "bold")), "  ",
-        ("━" * done, "green"), ("─" * (_BAR - done), "dim"),
-        f"  {run.t_s:.3f} s of {end / run.time.control_rate:g} s, tick {run.tick}",
-        no_wrap=True, overflow="ellipsis",
-    )  # fmt: skip
-    if run.factor is not None and not run.paused:
-        text.append(f"  {fixed(run.factor)}× real time")
-    return text
 
 
 def _figures(run: LiveStatus) -> Table:
@@ -103,9 +95,8 @@ def _books(run: LiveStatus) -> Table:
     numbers = ("true", "sampled")
     table = make_table("energy taken out of the device by", *numbers, numbers=numbers, least_width=9)
     books = run.last("ENERGY_BLOCK")
-    no_wall = run.penetration_m() is None
     for name in (name.removesuffix(_TRUE) for name in books if name.endswith(_TRUE)):
-        if not (name == "wall" and no_wall):
+        if name != "wall" or run.penetration_m() is not None:
             table.add_row(name, *(amount(books[name + side], "J") for side in (_TRUE, _SAMPLED)))
     moved = books.get("moved")
     residual = run.figures.get("residual_J")

@@ -50,12 +50,8 @@ def is_over(run: LiveRun) -> bool:
 class ObservedRun:
     """Observes one run from its present tick to its end; a context manager that leaves it.
 
-    Attributes:
-        failure: why the run ended early, as a sentence; "" while it goes on and after a normal end.
-
-    Raises:
-        RunNotFound: the run has ended before it could be joined.
-        Refused: it does not let the observer join.
+    ``failure`` says why the run ended early; "" while it goes on and after a normal end. Raises RunNotFound where the
+    run has ended before it could be joined, Refused where it does not let the observer join.
     """
 
     def __init__(self, run: LiveRun, role: str) -> None:

@@ -100,8 +100,7 @@ def _facts(planned: Plan) -> Table:
     }
     for node, modules in planned.modules.items():
         facts[f"{node} also loads"] = ", ".join(modules).replace("haploop.", "") or "nothing"
-    for channel, columns in planned.columns.items():
-        facts[f"log {channel}"] = ", ".join(columns)
+    facts |= {f"log {channel}": ", ".join(columns) for channel, columns in planned.columns.items()}
     facts["counts"] = ", ".join(planned.counts) or "nothing"
     facts["absent"] = ", ".join(effect.name for effect in planned.absent)
     return make_facts(facts.items())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -46,10 +47,8 @@ def parse_seconds(text: str | None, option: str = "--at") -> float | None:
     """Returns a time in s, given in seconds or with its unit; None for none."""
     if text is None:
         return None
-    try:
+    with suppress(ValueError):
         return float(text)
-    except ValueError:
-        pass
     from haploop.launch.scene.number import Number
     from haploop.protocol.quantity import Quantity
 

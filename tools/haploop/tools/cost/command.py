@@ -52,8 +52,7 @@ def cost(
         interrupted = False
         with Measurement(grids, out, repeats, repeats if processes else 0) as measurement:
             try:
-                # A thread that drew meanwhile would be measured too.
-                with bars(by_itself=False) as stage:
+                with bars() as stage:
                     measurement.errors(stage)
                     measurement.times(stage)
                     if not scenes:

@@ -65,10 +65,6 @@ class Grid:
     candidates: list[Candidate]
 
     @property
-    def name(self) -> str:
-        return self.path.stem
-
-    @property
     def own(self) -> tuple[str, int]:
         return self.scene.clock.integrator, self.scene.clock.plant_rate
 

@@ -68,7 +68,7 @@ class Measurement:
             left = [c for c in grid.candidates if not self._store.has(_OUTCOME, self._key(c))]
             if not left and self._store.has(_REFERENCE, self._reference_key(grid)):
                 continue
-            advance = stage(f"{grid.name}: errors", len(left))
+            advance = stage(f"{grid.path.stem}: errors", len(left))
             reference = self._find_reference(grid.path, grid.scene)
             note = ReferenceNote(reference.how, reference.error_m, reference.pointwise, reference.verdict)
             self._store.add(_REFERENCE, self._reference_key(grid), asdict(note))
@@ -137,7 +137,7 @@ class Measurement:
             return None
         points = [point for candidate in grid.candidates if (point := self._point(candidate))]
         ticks = Timebase.from_scene(grid.scene).ticks
-        made = SceneCost(grid.name, grid.scene.title, *grid.own, ticks, ReferenceNote(**note), points)
+        made = SceneCost(grid.path.stem, grid.scene.title, *grid.own, ticks, ReferenceNote(**note), points)
         untimed = times.missing(self._store, self._jobs(IN_PROCESS), self._repeats[IN_PROCESS])
         complete = len(points) == len(grid.candidates) and not untimed
         return replace(made, advice=advice(made, tolerance_m)) if complete else made

@@ -34,7 +34,6 @@ from haploop.tools.cost.data import Load, Spread
 from haploop.tools.render.progress import Stage
 
 T = TypeVar("T")
-POINTS_FILE = "points.jsonl"
 IN_PROCESS, PROCESSES = "us in one process", "us as processes"
 _SEED = 20_220_711
 _QUIET = "quiet for "
@@ -48,7 +47,7 @@ class Store:
     """
 
     def __init__(self, directory: Path) -> None:
-        self._path = directory / POINTS_FILE
+        self._path = directory / "points.jsonl"
         self._records: dict[tuple[str, str, int], Any] = {}
 
     def __enter__(self) -> Self:

@@ -100,36 +100,28 @@ def silent(_name: str, _count: int) -> Callable[[], None]:
 
 
 @contextmanager
-def bars(*, by_itself: bool = True) -> Iterator[Stage]:
+def bars() -> Iterator[Stage]:
     """Shows a bar a stage on a terminal's stderr, and a line a stage elsewhere.
 
-    Args:
-        by_itself: whether a thread keeps them moving; without one they move after each part only, so that what is
-            measured between is not disturbed.
+    They move after each part only: a thread that drew meanwhile would disturb what is measured.
     """
     from rich import progress
 
     terminal = console(stderr=True)
+    columns = progress.BarColumn(), progress.MofNCompleteColumn(), progress.TimeRemainingColumn()
     shown = terminal.is_terminal
-    columns = (
-        "{task.description}",
-        progress.BarColumn(),
-        progress.MofNCompleteColumn(),
-        progress.TimeRemainingColumn(),
-    )
-    with progress.Progress(*columns, console=terminal, disable=not shown, auto_refresh=by_itself) as drawn:
+    look = {"console": terminal, "disable": not shown, "auto_refresh": False}
+    with progress.Progress("{task.description}", *columns, **look) as drawn:
 
         def stage(name: str, count: int) -> Callable[[], None]:
             if not shown:
                 print(f"{name}: {count}", file=sys.stderr)
             task = drawn.add_task(name, total=count)
-            if not by_itself:
-                drawn.refresh()
+            drawn.refresh()
 
             def advance() -> None:
                 drawn.advance(task)
-                if not by_itself:
-                    drawn.refresh()
+                drawn.refresh()
 
             return advance
 

@@ -88,8 +88,20 @@ def _key_figures(summary: Summary) -> list[tuple[str, str]]:
 def _books(energy: Summary, control_rate: float) -> Table:
     numbers = ("at work", "true", "sampled")
     table = make_table("energy taken out of the device by", *numbers, numbers=numbers)
-    for row in _virtual_rows(energy, control_rate):
-        table.add_row(*row)
+    wall = energy["wall"]
+    if "leak" in wall:
+        table.add_row("wall", "", amount(wall["true_J"], "J"), amount(wall["sampled_J"], "J"))
+        for key, words in LEAK_CAUSES.items():
+            table.add_row(f"  leak by {words}", "", amount(wall["leak"][key], "J"), "")
+        # The rounding error of a much larger number is zero.
+        ideal_J, true_J = wall["ideal_J"], wall["true_J"]
+        is_zero = None not in (ideal_J, true_J) and abs(ideal_J) < 1e-9 * abs(true_J)
+        table.add_row("  held by an ideal spring", "", amount(0.0 if is_zero else ideal_J, "J"), "")
+    for element in energy["elements"]:
+        values = parameters(element["parameters"])
+        ticks = f"{element['from_tick'] / control_rate:g}–{element['to_tick'] / control_rate:g} s"
+        name = element["kind"] + (f" ({values})" if values else "")
+        table.add_row(name, ticks, amount(element["true_J"], "J"), amount(element["sampled_J"], "J"))
     table.add_section()
     table.add_row("energy in the plant", "", "", "", style="bold")
     residual, moved = energy["residual_J"], energy["moved_J"]
@@ -99,23 +111,6 @@ def _books(energy: Summary, control_rate: float) -> Table:
     for name, value in rows.items():
         table.add_row(name, "", amount(value, "J"), "")
     return table
-
-
-def _virtual_rows(energy: Summary, control_rate: float) -> list[tuple[str, str, str, str]]:
-    wall, rows = energy["wall"], []
-    if "leak" in wall:
-        rows.append(("wall", "", amount(wall["true_J"], "J"), amount(wall["sampled_J"], "J")))
-        rows += [(f"  leak by {words}", "", amount(wall["leak"][key], "J"), "") for key, words in LEAK_CAUSES.items()]
-        # The rounding error of a much larger number is zero.
-        ideal_J, true_J = wall["ideal_J"], wall["true_J"]
-        is_zero = None not in (ideal_J, true_J) and abs(ideal_J) < 1e-9 * abs(true_J)
-        rows.append(("  held by an ideal spring", "", amount(0.0 if is_zero else ideal_J, "J"), ""))
-    for element in energy["elements"]:
-        values = parameters(element["parameters"])
-        ticks = f"{element['from_tick'] / control_rate:g}–{element['to_tick'] / control_rate:g} s"
-        name = element["kind"] + (f" ({values})" if values else "")
-        rows.append((name, ticks, amount(element["true_J"], "J"), amount(element["sampled_J"], "J")))
-    return rows
 
 
 def status_table(data: Message) -> RenderableType:

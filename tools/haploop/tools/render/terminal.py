@@ -39,12 +39,8 @@ def make_table(
 ) -> Table:
     """Makes a table with a line below its heads and no other.
 
-    Args:
-        numbers: heads of the columns whose cells are set to the right, on one line.
-        unbroken: heads of other columns whose cells stay on one line.
-        padding: of every cell: top, right, bottom, left.
-        least_width: of the columns of numbers, letters.
-        first_width: least width of the first column, letters.
+    Cells below ``numbers`` are set to the right and, as those below ``unbroken``, stay on one line. Widths, in letters,
+    are of the columns of numbers and of the first one; padding is top, right, bottom, left.
     """
     from rich import box
     from rich.table import Table
@@ -60,11 +56,7 @@ def make_table(
 
 
 def make_facts(rows: Iterable[tuple[str, str | Text]], least_width: int | None = None) -> Table:
-    """Makes a grid of names and values, without lines or heads.
-
-    Args:
-        least_width: of the names, letters.
-    """
+    """Makes a grid of names, at least so many letters wide, and values, without lines or heads."""
     from rich.table import Table
 
     grid = Table.grid(padding=(0, 2))
@@ -76,12 +68,7 @@ def make_facts(rows: Iterable[tuple[str, str | Text]], least_width: int | None =
 
 
 def markdown_table(heads: Sequence[str], rows: Iterable[Sequence[str]], numbers: Collection[int] = ()) -> str:
-    """Returns a table in Markdown.
-
-    Args:
-        rows: cells in the order of the heads; a bar in a cell is escaped.
-        numbers: places of the columns that are set to the right, counted from 0.
-    """
+    """Returns a table in Markdown; ``numbers`` are the places of the columns set to the right. Bars are escaped."""
     rule = ["---:" if place in numbers else "---" for place in range(len(heads))]
     lines = [[cell.replace("\\|", "|").replace("|", "\\|") for cell in line] for line in (heads, rule, *rows)]
     return "\n".join(f"| {' | '.join(line)} |" for line in lines)
