@@ -41,7 +41,9 @@ def make(work: Work) -> list[Finding]:
     keep_shares(work, list(TESTED), rows, there)
     varied = _varied(found.nearest, work.small)
     ends = [Setup.from_row(found.nearest.as_dict() | {key: value}) for key, pair in varied.items() for value in pair]
-    base, *rest = _largest(work, [found.nearest, *ends])
+    groups = [[setup] for setup in (found.nearest, *ends)]
+    ladders = work.map_parallel("what each value changes", stiffness_ladder, groups)
+    base, *rest = ({name: largest(steady[name]) for name in NAMES} for [steady] in ladders)
     influences = {key: (rest[2 * i], rest[2 * i + 1]) for i, key in enumerate(varied)}
     influences["friction_N"] = base, {name: rough[f"{name}_N_m"] for name in NAMES}
     drawn = _draw(base, influences, varied | {"friction_N": (0.0, FRICTION_N)})
@@ -82,11 +84,6 @@ def _varied(setup: Setup, small: bool) -> dict[str, Pair]:
         pairs[key] = others[0], others[-1]
     pairs["acceleration"] = "unit", "encoder"
     return {key: pairs[key] for key in ("delay_s", "acceleration")} if small else pairs
-
-
-def _largest(work: Work, setups: list[Setup]) -> list[Largest]:
-    ladders = work.map_parallel("what each value changes", stiffness_ladder, [[setup] for setup in setups])
-    return [{name: largest(steady[name]) for name in NAMES} for [steady] in ladders]
 
 
 def _draw(base: Largest, influences: Influences, varied: Mapping[str, Pair]) -> Figure:

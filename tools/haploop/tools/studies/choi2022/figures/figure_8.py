@@ -53,7 +53,10 @@ def make(work: Work) -> list[Finding]:
     sizes = {"damping": BOOKED_DAMPING, "mass_g": 1e3 * BOOKED_KG}
     work.caption = work.tell("caption", **sizes)
     if not work.small:
-        work.notes = [_tried(contacts(replace(nearest(work), friction_N=FRICTION_N), work), work)]
+        rough = contacts(replace(nearest(work), friction_N=FRICTION_N), work)
+        ends = [contact.booked.sampled_J[:, -1] for contact in rough]
+        needed_g = 1e3 * max(BOOKED_KG * end[0] / end[1:].min() for end in ends)
+        work.notes = [work.tell("tried", labels=", ".join(LABELS), ends=_by_wall(rough, ends), needed_g=needed_g)]
     first = first_ahead_Hz(bidirectional_J(_FREQUENCIES_HZ, None))
     work.answer = work.tell("answer", first=first, swings=found[0].swings_Hz, **sizes)
     return _findings(found, work)
@@ -126,12 +129,6 @@ def first_ahead_Hz(inertia_J: np.ndarray) -> float:
     """Returns the lowest frequency below 250 Hz from which the inertia is ahead; NaN if none."""
     over = ahead(inertia_J) >= 1.0
     return float(_FREQUENCIES_HZ[over.argmax()]) if over.any() else float("nan")
-
-
-def _tried(rough: list[Contact], work: Work) -> str:
-    ends = [contact.booked.sampled_J[:, -1] for contact in rough]
-    needed_kg = max(BOOKED_KG * end[0] / end[1:].min() for end in ends)
-    return work.tell("tried", labels=", ".join(LABELS), ends=_by_wall(rough, ends), needed_g=1e3 * needed_kg)
 
 
 def _findings(contacts: list[Contact], work: Work) -> list[Finding]:
