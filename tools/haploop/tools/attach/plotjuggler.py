@@ -116,9 +116,8 @@ class Outlet:
         except zmq.ZMQError as error:
             self._context.destroy(linger=0)
             taken = f"Port {port} is taken" if error.errno == errno.EADDRINUSE else f"Port {port} cannot be used"
-            raise PortTaken(
-                f"{taken} ({error.strerror}); name another one with --port, and the same in PlotJuggler."
-            ) from error
+            hint = "name another one with --port, and the same in PlotJuggler"
+            raise PortTaken(f"{taken} ({error.strerror}); {hint}.") from error
         self.address = bytes(self._socket.getsockopt(zmq.LAST_ENDPOINT)).rstrip(b"\0").decode()
 
     @property

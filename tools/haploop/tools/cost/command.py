@@ -6,16 +6,13 @@ import dataclasses
 import math
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from haploop.tools.cli.exit_codes import FAILED, WRONG_USE, leave, plain_errors, print_json
 from haploop.tools.cli.options import Json
 from haploop.tools.render.progress import bars
-
-if TYPE_CHECKING:
-    from haploop.tools.cost.data import Cost
 
 
 def cost(
@@ -34,9 +31,14 @@ def cost(
 
     Can be stopped; the same command goes on.
     """
-    from haploop.tools.cost.data import save
+    from haploop.tools.cost import figure, prices_figure
+    from haploop.tools.cost.data import COST_FILE, save
     from haploop.tools.cost.grid import accuracy_scenes, grid
     from haploop.tools.cost.measure import Measurement
+    from haploop.tools.cost.report import report
+    from haploop.tools.figure.data import FigureError
+    from haploop.tools.figure.style import write_figure
+    from haploop.tools.render.terminal import console
 
     plant_rates, names = _rates(rates), _methods(methods)
     if not (tolerance > 0 and math.isfinite(tolerance)):
@@ -56,25 +58,14 @@ def cost(
                     measurement.errors(stage)
                     measurement.times(stage)
                     if not scenes:
-                        measurement.other_prices(stage)
+                        measurement.other_prices.measure(stage)
             except KeyboardInterrupt:
                 interrupted = True
             result = measurement.cost(tolerance)
     save(result, out)
     if interrupted:
         leave(f"Stopped; what was measured is in {out}, and the same command takes it up again.", FAILED)
-    _show(result, out, json)
-
-
-def _show(result: Cost, out: Path, as_json: bool) -> None:
-    from haploop.tools.cost import figure, prices_figure
-    from haploop.tools.cost.data import COST_FILE
-    from haploop.tools.cost.report import report
-    from haploop.tools.figure.data import FigureError
-    from haploop.tools.figure.style import write_figure
-    from haploop.tools.render.terminal import console
-
-    if as_json:
+    if json:
         print_json(dataclasses.asdict(result))
     else:
         console().print(report(result))

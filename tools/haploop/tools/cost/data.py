@@ -141,11 +141,9 @@ class SceneCost:
 
 @dataclass(frozen=True)
 class Load:
-    """The load of the machine while times were taken.
+    """The load of the machine while times were taken: the median of one-minute load averages, and a spread.
 
-    Attributes:
-        average: median of the one-minute load averages seen, this program's own share included; None if unknown.
-        calibration_spread: (q3 - q1) / median of a fixed loop timed once a round.
+    The average counts this program too, and is None if unknown; the spread is (q3 - q1) / median of a fixed loop.
     """
 
     average: float | None
@@ -186,12 +184,9 @@ class Price:
 
 @dataclass(frozen=True)
 class PriceGroup:
-    """Prices of one kind; the first of them is the baseline.
+    """Prices of one kind, such as "books" or "delay"; the first of them is the baseline.
 
-    Attributes:
-        name: "books", "log", "effects", "processes", "delay" or "control rate"; ``title`` says it in words.
-        unit, repeats: of the times.
-        how: in one process or as processes, which scene, what is logged.
+    ``how`` tells whether in one process or as processes, which scene, and what is logged.
     """
 
     name: str

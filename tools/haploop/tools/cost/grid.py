@@ -153,10 +153,9 @@ def _failure(ran: Trajectory, reference: Reference) -> str | None:
 
 
 def _errors(ran: Trajectory, scene: Scene, reference: Reference) -> Errors:
-    """Compares a run that went to its end.
+    """Compares positions at the ticks after the start: sqrt(mean((x - x_ref)^2)) and the like.
 
-    Positions are compared at the ticks after the start and at the end: sqrt(mean((x - x_ref)^2)) and the like. Where a
-    chaotic reference forbids that, the swings in the verdict's window are: |a - a_ref| / |a_ref|.
+    Where a chaotic reference forbids that, the swings in the verdict's window are: |a - a_ref| / |a_ref|.
     """
     verdict, energy = ran.summary["verdict"], ran.summary["energy"]
     residual = _share(energy["residual_J"], energy["moved_J"])

@@ -82,12 +82,9 @@ class Measurement:
         for way, repeats in self._repeats.items():
             times.measure(self._store, self._jobs(way), repeats, f"times, {way}", stage)
 
-    def other_prices(self, stage: Stage) -> None:
-        """Measures the prices of books, log, effects, processes, delay and control rate."""
-        self._prices.measure(stage)
-
     @cached_property
-    def _prices(self) -> Prices:
+    def other_prices(self) -> Prices:
+        """The prices of books, log, effects, processes, delay and control rate."""
         return Prices(self._store, self._repeats)
 
     def _jobs(self, way: str) -> list[Job]:
@@ -128,7 +125,7 @@ class Measurement:
             tolerance_m=tolerance_m,
             load=busiest,
             scenes=[made for grid in self._grids if (made := self._scene_cost(grid, tolerance_m))],
-            prices=self._prices.groups(),
+            prices=self.other_prices.groups(),
         )
 
     def _scene_cost(self, grid: Grid, tolerance_m: float) -> SceneCost | None:
