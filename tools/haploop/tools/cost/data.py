@@ -238,10 +238,7 @@ def save(cost: Cost, directory: Path) -> Path:
 
 
 def load(directory: Path) -> Cost:
-    """Reads DIR/cost.json.
-
-    Raises CostFileError where there is none, or it is not one that ``haploop cost`` of this version wrote.
-    """
+    """Reads DIR/cost.json; raises CostFileError where there is none that this version of ``haploop cost`` wrote."""
     from pydantic import TypeAdapter, ValidationError
 
     path = directory / COST_FILE
