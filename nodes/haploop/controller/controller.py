@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from copy import copy, deepcopy
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -101,6 +102,15 @@ class Controller:
         self._next_change = _NEVER
         self.recorder = recorder or Recorder(time.lookahead_ticks + 2)
         self.recorder.open(self.params)
+
+    def fork(self) -> Controller:
+        """Returns a controller of one loop that goes on from here by itself, without the changes still to come."""
+        other = copy(self)
+        other.params = deepcopy(self.params)  # an element may keep attributes of its own
+        other.recorder = Recorder(0)
+        other.recorder.open(other.params)
+        other._changes, other._next_change = [], _NEVER
+        return other
 
     def select(self, kept: np.ndarray) -> None:
         """Keeps these members of a batch, whose rows have been taken; ``kept`` is their mask, shape (members,)."""

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 import haploop.logger
-from haploop.controller.dissipation import load_plugin, registry
+from haploop.controller.dissipation import Element, load_plugin, registry
 from haploop.launch.runs.in_process import run_in_process
 from haploop.launch.scene.file import load
 from haploop.launch.spec import PLUGINS, SCENE, RunFailed
@@ -18,6 +18,7 @@ from haploop.logger.log.recording import Recording
 from haploop.logger.session import SUMMARY
 from haploop.logger.summary import Summary, finite
 from haploop.protocol.changes import Event
+from haploop.protocol.scene.scene import Scene
 
 
 class ReplayError(Exception):
@@ -45,14 +46,8 @@ def replay(directory: Path) -> Replay:
     Raises:
         ReplayError, LogError, SceneError: the directory does not hold a run that can be repeated.
     """
-    if not (directory / SCENE).is_file():
-        raise ReplayError(f"{directory} holds no {SCENE}; a directory that haploop run has written was expected.")
     recorded = _recorded(directory)
-    kinds = registry([Path(directory) / PLUGINS / name for name in _launch_plugins(directory, recorded)])
-    scene = load(directory / SCENE, (), kinds)
-    events = [_event(dict(event), directory) for event in recorded["/events"]] if "/events" in recorded else []
-    logged = len(recorded["/controller"]["x"]) if "/controller" in recorded else 0
-    events.append((logged, {"stop": True}))  # a run that was cut off is repeated as far as its log goes
+    scene, kinds, events = _repeatable(directory, recorded)
     with tempfile.TemporaryDirectory(prefix="haploop-replay-") as scratch:
         try:
             summary = run_in_process(scene, kinds, out=Path(scratch), events=events)
@@ -67,7 +62,28 @@ def replay(directory: Path) -> Replay:
     return Replay(summary, differences)
 
 
+def repeatable(directory: Path) -> tuple[Scene, dict[str, type[Element]], list[tuple[int, Event]]]:
+    """Returns what a run can be repeated from: its scene, the elements at hand, and every event by its tick.
+
+    Raises:
+        ReplayError, LogError, SceneError: the directory does not hold a run that can be repeated.
+    """
+    return _repeatable(directory, _recorded(directory))
+
+
+def _repeatable(
+    directory: Path, recorded: Recording
+) -> tuple[Scene, dict[str, type[Element]], list[tuple[int, Event]]]:
+    kinds = registry([directory / PLUGINS / name for name in _launch_plugins(directory, recorded)])
+    scene = load(directory / SCENE, (), kinds)
+    events = [_event(dict(event), directory) for event in recorded["/events"]] if "/events" in recorded else []
+    logged = len(recorded["/controller"]["x"]) if "/controller" in recorded else 0
+    return scene, kinds, [*events, (logged, {"stop": True})]  # one that was cut off: as far as its log goes
+
+
 def _recorded(directory: Path) -> Recording:
+    if not (directory / SCENE).is_file():
+        raise ReplayError(f"{directory} holds no {SCENE}; a directory that haploop run has written was expected.")
     try:
         recorded = haploop.logger.read(directory)
     except FileNotFoundError as error:

@@ -6,7 +6,7 @@ import typer
 
 from haploop.tools.cli.explain import explain
 from haploop.tools.cli.live_commands import attach, pace, pause, resume, set_, status, step, stop, swap
-from haploop.tools.cli.scenes import check, export, plot, plugins, replay, run
+from haploop.tools.cli.scenes import check, export, judge, plot, plugins, replay, run
 from haploop.tools.cli.study_commands import advise, dissipate, paper, sweep
 from haploop.tools.cli.view import view
 from haploop.tools.cost.command import cost
@@ -21,7 +21,7 @@ app = typer.Typer(
 # In the order in which the help lists them.
 for command in (
     run, check, explain, plugins, status, pause, resume, step, pace, stop, swap, set_, attach, view,
-    plot, replay, export, cost, sweep, dissipate, paper, advise,
+    plot, replay, judge, export, cost, sweep, dissipate, paper, advise,
 ):  # fmt: skip
     app.command(command.__name__.rstrip("_"))(command)
 

@@ -167,6 +167,28 @@ def replay(directory: Directory, json: Json = False) -> None:
         raise SystemExit(FAILED)
 
 
+def judge(directory: Directory, json: Json = False) -> None:
+    """Say whether the loop of a run is stable: held still and pushed at the run's end, does it come to rest?
+
+    The run is repeated from its log, the hand then held still without noise, pushed hard and softly, and watched for
+    up to 64 s of simulated time. The word is steady, limit-cycle, growing, diverged, no-contact or undecided.
+    """
+    from haploop.launch.runs.replay import ReplayError, repeatable
+    from haploop.launch.stability.judge import judge_scene
+    from haploop.tools.render.report import finding_table
+    from haploop.tools.render.terminal import console
+
+    with plain_errors():
+        try:
+            finding = judge_scene(*repeatable(directory))
+        except ReplayError as error:
+            leave(str(error), WRONG_USE)
+    if json:
+        print_json(dataclasses.asdict(finding) | {"sentence": finding.sentence()})
+    else:
+        console().print(finding_table(finding))
+
+
 def export(
     directory: Annotated[Path, typer.Argument(help="directory of a run, or its log", show_default=False)],
     to: Annotated[str, typer.Option(help="csv, npz, parquet or json-mcap (for Foxglove)", show_default=False)],

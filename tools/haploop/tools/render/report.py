@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from haploop.controller.dissipation import Element
+    from haploop.launch.stability.decide import Finding
     from haploop.logger.summary import Summary
     from haploop.protocol.quantity import Quantity
     from haploop.protocol.transport.wire import Message
@@ -111,6 +112,28 @@ def _books(energy: Summary, control_rate: float) -> Table:
     for name, value in rows.items():
         table.add_row(name, "", amount(value, "J"), "")
     return table
+
+
+def finding_table(finding: Finding) -> RenderableType:
+    """Makes the report of a judged run: the word, why, and what it rests on."""
+    from rich.console import Group
+    from rich.text import Text
+
+    parts: list[RenderableType] = [Text(finding.word, style=verdict_style(finding.word)), Text(finding.sentence())]
+    if finding.word in ("steady", "limit-cycle", "growing", "undecided") and finding.watched_s:
+        felt = "felt" if finding.felt else "not felt"
+        swing = f"{amount(finding.width_m, 'm')} +- {amount(finding.spread_m, 'm', 2)} peak to peak, {felt}"
+        rows = [
+            ("swing", swing),
+            ("frequency", amount(finding.frequency_Hz, "Hz")),
+            ("force ripple above 30 Hz", f"{amount(finding.force_ripple_N, 'N')} peak to peak"),
+            ("growth", f"{finding.rate_1_s:.3g} +- {finding.error_1_s:.1g} 1/s" if finding.rate_1_s else "none"),
+            ("watched", amount(finding.watched_s, "s")),
+        ]
+        if finding.chaotic is not None:
+            rows.append(("chaotic", "yes" if finding.chaotic else "no"))
+        parts.append(make_facts(rows))
+    return Group(*parts)
 
 
 def status_table(data: Message) -> RenderableType:

@@ -1,0 +1,87 @@
+"""Measures of a swing: how wide, at which frequency, how fast it grows, its force, and whether a hand feels it."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+# Swings of the command slower than this are the hand's and the task's; faster ones are felt as a buzz.
+RIPPLE_ABOVE_HZ = 30.0
+# Widths below this are rounding.
+LEAST_WIDTH_M = 1e-15
+# Frequency in Hz and smallest amplitude in m that is felt, 0 to peak (Israr, Choi and Tan 2006, three of their points).
+_FREQUENCIES_HZ = (10.0, 20.0, 320.0)
+_SMALLEST_M = (26e-6, 8.5e-6, 0.06e-6)
+
+
+class Trend(NamedTuple):
+    """Growth of the width of a swing, e^(rate t).
+
+    Attributes:
+        rate_1_s: from a straight line through the logarithms of the widths.
+        error_1_s: its standard error, from how the widths scatter about the line.
+        change: change of the logarithm over the time looked at; ``error`` its standard error.
+    """
+
+    rate_1_s: float
+    error_1_s: float
+    change: float
+    error: float
+
+
+def widths(x: np.ndarray, size: int) -> np.ndarray:
+    """Returns the width of x about its straight trend, peak to peak, in pieces of ``size`` samples, oldest first."""
+    pieces = x[len(x) % size :].reshape(-1, size)
+    t = np.arange(size) - (size - 1) / 2.0
+    offset = pieces - pieces.mean(axis=1, keepdims=True)
+    offset -= t * ((offset @ t) / (t @ t))[:, None]
+    return np.ptp(offset, axis=1)
+
+
+def trend(width: np.ndarray, spacing_s: float) -> Trend:
+    """Returns the growth of widths that lie ``spacing_s`` apart, three at least."""
+    logs = np.log(np.maximum(width, LEAST_WIDTH_M))
+    t = (np.arange(len(logs)) - (len(logs) - 1) / 2.0) * spacing_s
+    square = t @ t
+    rate = (t @ logs) / square
+    left = logs - logs.mean() - rate * t
+    error = math.sqrt((left @ left) / ((len(logs) - 2) * square))
+    seconds = len(logs) * spacing_s
+    return Trend(float(rate), error, float(rate) * seconds, error * seconds)
+
+
+def frequency_Hz(x: np.ndarray, rate: float) -> float:
+    """Returns the frequency at which x, sampled at ``rate`` in Hz, swings most; 0 for one that rests."""
+    offset = (x - x.mean()) * np.hanning(len(x))
+    power = np.abs(np.fft.rfft(offset))
+    return float(np.fft.rfftfreq(len(x), 1.0 / rate)[1 + np.argmax(power[1:])]) if power[1:].any() else 0.0
+
+
+def ripple(force_N: np.ndarray, rate: float) -> float:
+    """Returns what a force, sampled at ``rate`` in Hz, swings by above ``RIPPLE_ABOVE_HZ``, peak to peak in N."""
+    if len(force_N) < 4:
+        return 0.0
+    spectrum = np.fft.rfft(force_N - force_N.mean())
+    spectrum[np.fft.rfftfreq(len(force_N), 1.0 / rate) < RIPPLE_ABOVE_HZ] = 0.0
+    return float(np.ptp(np.fft.irfft(spectrum, len(force_N))))
+
+
+def smallest_felt_m(frequency_Hz: float) -> float:
+    """Returns the smallest amplitude that is felt at a frequency, 0 to peak, in m.
+
+    Straight lines in the logarithms join the points of Israr, Choi and Tan (2006); below the first and above the last
+    the lines go on, and nothing is felt at 0 Hz.
+    """
+    if frequency_Hz <= 0.0:
+        return float("inf")
+    at, f, a = np.log(frequency_Hz), np.log(_FREQUENCIES_HZ), np.log(_SMALLEST_M)
+    piece = 0 if at < f[1] else 1
+    slope = (a[piece + 1] - a[piece]) / (f[piece + 1] - f[piece])
+    return float(np.exp(a[piece] + slope * (at - f[piece])))
+
+
+def is_felt(width_m: float, frequency_Hz: float) -> bool:
+    """Tells whether a swing of a width, peak to peak, is felt at its frequency."""
+    return width_m / 2.0 >= smallest_felt_m(frequency_Hz)

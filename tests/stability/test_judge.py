@@ -1,0 +1,122 @@
+"""What is called steady, a limit cycle, growing or undecided: cases in which the end of the run alone misleads."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from haploop.launch.scene.file import load
+from haploop.launch.stability.judge import judge
+from haploop.launch.stability.traces import frequency_Hz, is_felt, ripple, smallest_felt_m, trend, widths
+from helpers.runs.judged import ended, found
+from helpers.scenes.least import scene
+
+PLAIN = {
+    "duration": 2.0,
+    "device": {"mass": 0.1, "damping": 0.5},
+    "wall": {"position": 0.0, "stiffness": 500.0},
+    "clock": {"round_trip_delay": 0.0},
+}
+
+
+def pressed(value: float = -1.0, **tables) -> dict:
+    """The plain loop pressed against the wall; for it alone K = 1 000 N/m is the limit."""
+    return {**PLAIN, "hand": {"force": {"kind": "constant", "value": value}}, **tables}
+
+
+def word(**tables) -> str:
+    finding = found(scene(**tables))
+    return finding.word
+
+
+def test_a_stable_wall_is_steady_and_one_beyond_its_limit_is_not():
+    assert word(**pressed()) == "steady"
+    assert word(**pressed(wall={"position": 0.0, "stiffness": 1100.0})) in ("growing", "limit-cycle")
+
+
+def test_an_unstable_run_of_a_tenth_of_a_second_is_not_steady():
+    assert word(**pressed(wall={"position": 0.0, "stiffness": 1100.0}, duration=0.1)) in ("growing", "limit-cycle")
+
+
+def test_a_hand_that_trembles_at_a_stable_wall_is_no_limit_cycle():
+    force = {"kind": "sine", "amplitude": 0.4, "frequency": 5.0, "offset": -1.0}
+    assert word(**{**pressed(), "hand": {"force": force}}) == "steady"
+
+
+def test_noise_of_the_sensor_is_no_limit_cycle():
+    assert word(**pressed(noise={"deviation": 2e-5, "cutoff": 200.0})) == "steady"
+
+
+def test_a_slow_decay_is_steady():
+    """The width falls by e in 2 s: too slowly for the last half second to show."""
+    tables = pressed(device={"mass": 0.5, "damping": 0.6}, wall={"position": 0.0, "stiffness": 200.0}, duration=1.0)
+    finding = found(scene(**tables))
+    assert finding.word == "steady"
+    assert finding.rate_1_s == pytest.approx(-0.5, rel=0.1)  # -(b / 2m - K T / 4m), to first order in T
+
+
+def test_the_chatter_of_a_coarse_encoder_is_a_limit_cycle_and_that_of_a_fine_one_is_not():
+    coarse, fine = ({"resolution": resolution} for resolution in (1e-3, 1e-7))
+    assert word(**pressed(encoder=coarse, wall={"position": 0.0, "stiffness": 800.0})) == "limit-cycle"
+    assert word(**pressed(encoder=fine, wall={"position": 0.0, "stiffness": 800.0})) == "steady"
+
+
+def test_friction_that_holds_the_device_is_rest():
+    assert word(**pressed(friction={"kinetic": 0.3})) == "steady"
+
+
+def test_a_device_that_nobody_holds_at_the_wall_is_undecided():
+    thrown = {"mass": 0.1, "damping": 0.0, "position": 0.01, "velocity": -0.1}
+    finding = found(scene(**{**PLAIN, "device": thrown, "duration": 0.15}))
+    assert (finding.word, finding.why) == ("undecided", "leaves the wall")
+
+
+def test_the_limit_cycles_of_the_paper_are_found_and_the_chaotic_one_is_told():
+    regular, chaotic = (found(load(f"launch/scenes/fig6{letter}.toml")) for letter in "ac")
+    assert (regular.word, regular.chaotic, chaotic.word, chaotic.chaotic) == ("limit-cycle", False, "limit-cycle", True)
+    assert chaotic.spread_m > 0.05 * chaotic.width_m
+
+
+def test_judging_leaves_the_run_as_it_was():
+    """A plant and a controller that are judged go on to the bits of those that are not."""
+    judged, other = ended(load("launch/scenes/fig6c.toml")), ended(load("launch/scenes/fig6c.toml"))
+    judge(judged)
+    ends = []
+    for end in (judged, other):
+        end.plant.run_until(end.plant.tick + 500, lambda _, samples, end=end: list(end.controller.answer(samples)))
+        ends.append(end.plant.take_block()[2])
+    assert ends[0] == ends[1]
+
+
+def test_an_element_that_keeps_attributes_is_judged_on_a_copy_of_them():
+    end = ended(load("launch/scenes/fig6b.toml"))
+    element = end.controller.params.elements[0].element
+    fork = end.controller.fork()
+    assert fork.params.elements[0].element is not element
+
+
+def test_what_a_finger_feels_is_that_of_the_source_and_falls_with_frequency():
+    assert [smallest_felt_m(f) for f in (10.0, 20.0, 320.0)] == pytest.approx([26e-6, 8.5e-6, 0.06e-6])
+    assert smallest_felt_m(5.0) > 26e-6 > smallest_felt_m(100.0) > smallest_felt_m(400.0)
+    assert is_felt(3e-6, 120.0)
+    assert not is_felt(3e-6, 20.0)
+
+
+def test_growth_frequency_and_ripple_of_a_sine_are_its_own():
+    rate = 1000
+    t = np.arange(4000) / rate
+    x = 1e-4 * np.exp(0.3 * t) * np.sin(2 * np.pi * 40.0 * t) + 5e-3 * t
+    found_trend = trend(widths(x, 200), 0.2)
+    assert found_trend.rate_1_s == pytest.approx(0.3, abs=3 * found_trend.error_1_s)
+    assert found_trend.rate_1_s == pytest.approx(0.3, rel=0.05)
+    assert frequency_Hz(x - 5e-3 * t, rate) == pytest.approx(40.0, abs=0.3)
+    force = 2.0 * np.sin(2 * np.pi * 97.0 * t) + 7.0 * np.sin(2 * np.pi * 5.0 * t)
+    assert ripple(force, rate) == pytest.approx(4.0, rel=0.02)
+
+
+def test_a_scene_without_noise_is_judged_the_same_with_its_noise_off():
+    plain = scene(**pressed(noise={"deviation": 1e-12, "cutoff": 100.0}))
+    finding, without = found(plain), found(replace(plain, noise=None))
+    assert finding.word == without.word == "steady"

@@ -1,0 +1,67 @@
+"""``haploop judge``: the end of a recorded run, whichever way it was run, and what cannot be judged."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+from typer.testing import CliRunner
+
+from haploop.launch.runs.replay import repeatable
+from haploop.launch.stability.judge import judge_scene
+from haploop.tools.cli.main import app
+
+
+def haploop(*arguments: str):
+    return CliRunner().invoke(app, list(arguments))
+
+
+@pytest.fixture
+def run(tmp_path):
+    """Runs a shipped scene in one process; returns its directory."""
+
+    def start(*arguments: str):
+        result = haploop("run", *arguments, "--in-process", "--out", str(tmp_path / "run"))
+        assert result.exit_code in (0, 1), result.output
+        return tmp_path / "run"
+
+    return start
+
+
+def test_a_recorded_run_is_judged_from_its_log_and_the_swap_in_it(run):
+    """The damping of figure 6(b) holds the loop steady; the inertia that takes its place at 1.5 s does not."""
+    directory = run("launch/scenes/swap.toml")
+    result = haploop("judge", str(directory), "--json")
+    assert result.exit_code == 0, result.output
+    told = json.loads(result.stdout)
+    assert told["word"] == "limit-cycle"
+    assert told["chaotic"]
+    scene, kinds, events = repeatable(directory)
+    assert judge_scene(scene, kinds, events).sentence() == told["sentence"]
+    assert judge_scene(scene, kinds, [event for event in events if "swap" not in event[1]]).word == "steady"
+
+
+def test_the_terminal_says_the_word_first_and_then_why(run):
+    result = haploop("judge", str(run("launch/scenes/fig6a.toml")))
+    lines = [line.strip() for line in result.stdout.splitlines()]
+    assert lines[0] == "limit-cycle"
+    assert lines[1].startswith("Pushes of 0.195 N and a tenth of it end in the same swing")
+    assert any(line.startswith("force ripple above 30 Hz") for line in lines)
+
+
+def test_a_run_out_of_contact_is_called_so(run):
+    directory = run("launch/scenes/fig6a.toml", "--set", "wall.position=-0.5")
+    assert json.loads(haploop("judge", str(directory), "--json").stdout)["word"] == "no-contact"
+
+
+def test_a_run_that_diverged_is_called_so(run):
+    directory = run("launch/scenes/fig6a.toml", "--set", "wall.stiffness=30 N/mm", "--set", "diverged_beyond=5 mm")
+    told = json.loads(haploop("judge", str(directory), "--json").stdout)
+    assert told["word"] == "diverged"
+    assert "beyond the limit of 0.005 m" in told["sentence"]
+
+
+def test_a_directory_without_a_log_is_refused_with_what_is_missing(tmp_path):
+    result = haploop("judge", str(tmp_path))
+    assert result.exit_code == 2
+    assert "holds no scene.toml" in result.output

@@ -1,0 +1,64 @@
+"""Loops whose stability is known from their linear map: none that grows is called steady, few others are accused."""
+
+from __future__ import annotations
+
+import itertools
+from collections import Counter
+
+import pytest
+
+from haploop.launch.stability.judge import PUSH
+from haploop.launch.stability.still_hand import StillHand
+from haploop.launch.stability.traces import widths
+from helpers.runs.judged import ended, found
+from helpers.scenes.unseen_loops import KINDS, drawn
+
+
+@pytest.mark.parametrize("kind", range(len(KINDS)), ids=KINDS)
+def test_a_loop_that_grows_is_never_called_steady(kind):
+    """Two loops of each kind; hundreds are slow."""
+    drawn_loops = filter(None, map(drawn, itertools.count(kind, len(KINDS))))
+    for loop in itertools.islice((loop for loop in drawn_loops if loop.rate_1_s > 0.0), 2):
+        assert found(loop.scene).word != "steady", loop
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("first", range(1000, 1360, 60))
+def test_of_hundreds_of_loops_none_is_called_steady_that_grows_and_few_stay_undecided(first):
+    words: Counter[tuple[bool, str]] = Counter()
+    gone = 0
+    for seed in range(first, first + 60):
+        loop = drawn(seed)
+        finding = found(loop.scene) if loop else None
+        if loop and finding and finding.word not in ("diverged", "no-contact"):
+            grows = loop.rate_1_s > 0.0
+            words[grows, finding.word] += 1
+            if not grows and finding.word == "limit-cycle":
+                gone += not still_swings(loop.scene, finding.width_m)
+    assert not words[True, "steady"], words
+    assert not gone, "called a limit cycle, yet at rest two minutes later"
+    assert words[False, "undecided"] + words[True, "undecided"] <= 0.15 * sum(words.values()), words
+
+
+def still_swings(scene, width_m: float) -> bool:
+    """Whether the loop still swings a minute after the push: large swings may last where small ones die."""
+    end = ended(scene)
+    copy = StillHand(end, PUSH * end.hold_N)
+    copy.go_to(120.0)
+    return bool(copy.stop_reason) or widths(copy.x[-2000:], 500).max() > 0.5 * width_m
+
+
+def test_the_rate_is_that_of_the_linear_map():
+    """ln rho(M) / T within three standard errors and 2 %, for unrounded loops that decay slowly enough to see."""
+    seen = 0
+    for seed in range(4, 200, len(KINDS)):
+        loop = drawn(seed)
+        if loop is None or loop.scene.encoder or not -3.0 < loop.rate_1_s < -0.1:
+            continue
+        finding = found(loop.scene)
+        if finding.word != "steady" or finding.rate_1_s is None:
+            continue
+        assert finding.error_1_s is not None
+        assert abs(finding.rate_1_s - loop.rate_1_s) < 3.0 * finding.error_1_s - 0.02 * loop.rate_1_s, seed
+        seen += finding.error_1_s < -0.1 * loop.rate_1_s
+    assert seen >= 3
