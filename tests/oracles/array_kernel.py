@@ -6,8 +6,7 @@ import numba  # pyright: ignore[reportMissingImports]
 import numpy as np
 
 from haploop.logger.books.one_mass import as_squares
-from haploop.plant.motion.mechanics import Mechanics
-from haploop.plant.motion.one_mass import OneMassMotion
+from haploop.plant.motion.one_mass import Mechanics, OneMassMotion
 from haploop.plant.motion.transition import make_zoh_transitions, motion_integrals, natural_rate
 from haploop.protocol.scene.paths import value_at
 from haploop.protocol.scene.scene import Scene

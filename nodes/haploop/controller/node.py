@@ -9,10 +9,9 @@ import zmq
 
 from haploop.controller.controller import Controller
 from haploop.controller.dissipation import ElementError, PluginError, registry
-from haploop.protocol.block_length import BlockLength
 from haploop.protocol.changes import is_change, refusals_as_status
 from haploop.protocol.scene.scene import Scene
-from haploop.protocol.ticks import Timebase
+from haploop.protocol.ticks import BlockLength, Timebase
 from haploop.protocol.transport.clock_client import ClockClient
 from haploop.protocol.transport.loop import ControllerEnd
 from haploop.protocol.transport.messages import PROCESSES

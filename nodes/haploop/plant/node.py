@@ -7,9 +7,8 @@ from pathlib import Path
 import zmq
 
 from haploop.plant.plant import Plant
-from haploop.protocol.block_length import BlockLength
 from haploop.protocol.scene.scene import Scene
-from haploop.protocol.ticks import Timebase
+from haploop.protocol.ticks import BlockLength, Timebase
 from haploop.protocol.transport.clock_client import ClockClient
 from haploop.protocol.transport.loop import PlantEnd
 from haploop.protocol.transport.messages import PROCESSES

@@ -9,7 +9,7 @@ import pytest
 
 from haploop.logger.books.one_mass import OneMassBooks
 from haploop.logger.books.work import Displacement, by_interval, sum_steps
-from haploop.plant.motion.mechanics import Mechanics
+from haploop.plant.motion.one_mass import Mechanics
 from haploop.plant.motion.transition import make_foh_transition
 from haploop.protocol.ticks import Timebase
 from helpers.runs.captured import run

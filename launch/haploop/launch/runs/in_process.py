@@ -12,10 +12,9 @@ from haploop.launch.spec import RunFailed
 from haploop.logger.session import LogSession, open_session
 from haploop.logger.summary import Summary
 from haploop.plant.plant import Plant
-from haploop.protocol.block_length import BlockLength
 from haploop.protocol.changes import Event, is_change, refusal
 from haploop.protocol.scene.scene import Scene
-from haploop.protocol.ticks import Timebase
+from haploop.protocol.ticks import BlockLength, Timebase
 
 if TYPE_CHECKING:
     from haploop.controller.dissipation import Element

@@ -9,7 +9,7 @@ import numpy as np
 
 from haploop.logger.books.work import Displacement, SumSteps, by_interval, sum_rows, sum_steps
 from haploop.plant.motion.hand_force import constant_forces, make_hand_force
-from haploop.plant.motion.mechanics import Mechanics
+from haploop.plant.motion.one_mass import Mechanics
 from haploop.plant.motion.transition import motion_integrals, natural_rate
 from haploop.protocol.arrays import each, first_row
 from haploop.protocol.scene.scene import Scene

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -10,12 +11,50 @@ import numpy as np
 from haploop.plant.line import Hold
 from haploop.plant.motion.forced_response import ForcedResponse
 from haploop.plant.motion.hand_force import make_hand_force
-from haploop.plant.motion.mechanics import Mechanics
 from haploop.plant.motion.record import record_of_holds
 from haploop.plant.motion.transition import make_foh_transition, make_zoh_transitions
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
 from haploop.protocol.trees import tree_select
+
+
+@dataclass(frozen=True)
+class Mechanics:
+    """The device with the hand rigidly attached (Choi et al. 2022, eq. 10 and 11 added), or the device alone.
+
+    Attributes:
+        dampers: physical dampers by name, N s/m; their sum is b.
+        stiffness, rest_m: k_h, N/m; x_rest.
+        start: initial position in m and velocity in m/s.
+    """
+
+    mass_kg: float
+    dampers: dict[str, float]
+    stiffness: float
+    rest_m: float
+    start: tuple[float, float]
+
+    @classmethod
+    def from_scene(cls, scene: Scene) -> Mechanics:
+        device, hand = scene.device, scene.hand
+        start = device.position, device.velocity
+        if hand is None:
+            return cls(device.mass, {"device": device.damping}, 0.0, 0.0, start)
+        dampers = {"device": device.damping, "hand": hand.damping}
+        return cls(device.mass + hand.mass, dampers, hand.stiffness, hand.rest, start)
+
+    @property
+    def damping(self) -> float:
+        """b, N s/m."""
+        return sum(self.dampers.values())
+
+    def kinetic_J(self, v):
+        """Kinetic energy at velocity v (m/s)."""
+        return 0.5 * self.mass_kg * v * v
+
+    def spring_J(self, x):
+        """Energy in the hand's spring at position x (m)."""
+        return 0.5 * self.stiffness * (x - self.rest_m) * (x - self.rest_m)
 
 
 class OneMassState(NamedTuple):

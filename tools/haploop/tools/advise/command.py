@@ -20,7 +20,7 @@ from haploop.tools.advise.figure import draw
 from haploop.tools.advise.judge import Judge
 from haploop.tools.advise.report import buzz_sentences, gain_sentences, report
 from haploop.tools.advise.subject import InvalidRequest, make_subject
-from haploop.tools.cli.exit_codes import FAILED, WRONG_USE, leave, plain_errors, print_json
+from haploop.tools.cli.options import FAILED, WRONG_USE, leave, plain_errors, print_json
 from haploop.tools.cli.scenes import kinds_with, print_notes
 from haploop.tools.figure.data import FigureError
 from haploop.tools.render.terminal import console

@@ -5,8 +5,7 @@ from __future__ import annotations
 import dataclasses
 from typing import TYPE_CHECKING, Any
 
-from haploop.tools.cli.exit_codes import plain_errors, print_json
-from haploop.tools.cli.options import Json, Plugin, SceneFile, Set
+from haploop.tools.cli.options import Json, Plugin, SceneFile, Set, plain_errors, print_json
 from haploop.tools.cli.scenes import kinds_with, print_notes
 from haploop.tools.render.terminal import make_facts, make_table
 

@@ -8,8 +8,16 @@ from typing import Annotated, Any
 
 import typer
 
-from haploop.tools.cli.exit_codes import plain_errors, print_json
-from haploop.tools.cli.options import At, Json, Run, parse_assignments, parse_pace, parse_seconds
+from haploop.tools.cli.options import (
+    At,
+    Json,
+    Run,
+    parse_assignments,
+    parse_pace,
+    parse_seconds,
+    plain_errors,
+    print_json,
+)
 
 
 def status(run: Run = None, json: Json = False) -> None:

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import contextlib
+import json
 import math
+import sys
+from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, NoReturn
 
 import typer
-
-from haploop.tools.cli.exit_codes import WRONG_USE, leave
 
 SceneFile = Annotated[Path, typer.Argument(help="scene file (TOML)", show_default=False)]
 Directory = Annotated[Path, typer.Argument(help="directory of a run", show_default=False)]
@@ -56,3 +58,39 @@ def parse_seconds(text: str | None, option: str = "--at") -> float | None:
         return float(Number(Quantity("s", at_least=0, about="time")).read(text))
     except ValueError as error:
         leave(f"{option} must be a time such as 1.5 or '1500 ms', but {text!r} was given: {error}", WRONG_USE)
+
+
+FAILED, WRONG_USE = 1, 2
+
+
+def leave(message: str, status: int) -> NoReturn:
+    """Prints a message for people and exits."""
+    print(message, file=sys.stderr)
+    raise SystemExit(status)
+
+
+def print_json(data: Any) -> None:
+    """Prints one JSON object on stdout; numbers that are not finite become null."""
+    from haploop.logger.summary import finite
+
+    print(json.dumps(finite(data)), flush=True)
+
+
+@contextlib.contextmanager
+def plain_errors() -> Iterator[None]:
+    """Turns the errors of the packages below into messages: 2 for wrong use, 1 for a run that failed."""
+    from haploop.controller.dissipation import ElementError, PluginError
+    from haploop.launch.processes.run_directory import CommandRefused, RunNotFound
+    from haploop.launch.scene.mistakes import SceneError
+    from haploop.launch.spec import OutputError
+    from haploop.logger.log import LogError
+
+    try:
+        yield
+    except SceneError as error:
+        count = len(error.mistakes)
+        leave(f"{error}\n{count} mistake{'s' * (count != 1)}; nothing was started.", WRONG_USE)
+    except (PluginError, ElementError, OutputError, CommandRefused, RunNotFound) as error:
+        leave(str(error), WRONG_USE)
+    except LogError as error:
+        leave(str(error), FAILED)

@@ -11,8 +11,19 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from haploop.tools.cli.exit_codes import FAILED, WRONG_USE, leave, plain_errors, print_json
-from haploop.tools.cli.options import Directory, Json, Plugin, SceneFile, Set, parse_pace
+from haploop.tools.cli.options import (
+    FAILED,
+    WRONG_USE,
+    Directory,
+    Json,
+    Plugin,
+    SceneFile,
+    Set,
+    leave,
+    parse_pace,
+    plain_errors,
+    print_json,
+)
 
 if TYPE_CHECKING:
     from haploop.controller.dissipation import Element

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from haploop.tools.cli.exit_codes import WRONG_USE, leave, plain_errors
+from haploop.tools.cli.options import WRONG_USE, leave, plain_errors
 
 if TYPE_CHECKING:
     import asyncio

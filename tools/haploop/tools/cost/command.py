@@ -10,8 +10,7 @@ from typing import Annotated
 
 import typer
 
-from haploop.tools.cli.exit_codes import FAILED, WRONG_USE, leave, plain_errors, print_json
-from haploop.tools.cli.options import Json
+from haploop.tools.cli.options import FAILED, WRONG_USE, Json, leave, plain_errors, print_json
 from haploop.tools.render.progress import bars
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from haploop.tools.cli.exit_codes import WRONG_USE, leave
+from haploop.tools.cli.options import WRONG_USE, leave
 from haploop.tools.cost import figure, prices_figure
 from haploop.tools.cost.data import Cost, CostFileError, Point, PriceGroup, SceneCost, load
 from haploop.tools.cost.findings import findings, length, power, rate, setting

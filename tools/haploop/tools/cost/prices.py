@@ -15,9 +15,8 @@ from haploop.controller.dissipation import registry
 from haploop.launch.plan.effects import EFFECTS
 from haploop.launch.scene.file import load
 from haploop.plant.plant import Plant
-from haploop.protocol.block_length import BlockLength
 from haploop.protocol.scene.scene import Scene
-from haploop.protocol.ticks import Timebase
+from haploop.protocol.ticks import BlockLength, Timebase
 from haploop.tools.cost.data import Price, PriceGroup, price
 from haploop.tools.cost.grid import digest, made_with, scenes_folder
 from haploop.tools.cost.times import IN_PROCESS, PROCESSES, Job, Store, loop_us, measure, run_us, tick_us

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from haploop.controller.dissipation import Element
 from haploop.protocol.scene.scene import Scene
-from haploop.tools.cli.exit_codes import FAILED, WRONG_USE, leave, plain_errors, print_json
+from haploop.tools.cli.options import FAILED, WRONG_USE, leave, plain_errors, print_json
 from haploop.tools.cli.scenes import kinds_with
 from haploop.tools.dissipate.booking import Booking
 from haploop.tools.dissipate.controller_scene import Selection, make_scene_for_log, make_scene_for_text

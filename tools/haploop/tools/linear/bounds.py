@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 
 from haploop.plant.chain.chain import Chain
-from haploop.plant.motion.mechanics import Mechanics
+from haploop.plant.motion.one_mass import Mechanics
 from haploop.plant.sensing.encoder import accelerometer_is_used
 from haploop.protocol.scene.paths import value_at
 from haploop.protocol.scene.scene import Scene

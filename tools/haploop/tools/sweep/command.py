@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 from haploop.launch.processes.children import interrupts
 from haploop.launch.spec import PLUGINS, OutputError, keep_plugin, kept_name, make_output
 from haploop.logger.summary import Summary, write
-from haploop.tools.cli.exit_codes import FAILED, WRONG_USE, leave, plain_errors, print_json
+from haploop.tools.cli.options import FAILED, WRONG_USE, leave, plain_errors, print_json
 from haploop.tools.executor.executors import ExecutorError
 from haploop.tools.executor.pool import Pool, read_sources
 from haploop.tools.machine import machine, versions

@@ -9,7 +9,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from haploop.tools.cli.exit_codes import WRONG_USE, leave, plain_errors
+from haploop.tools.cli.options import WRONG_USE, leave, plain_errors
 from haploop.tools.figure.data import FigureError
 from haploop.tools.render.progress import Stage, bars, silent
 from haploop.tools.render.terminal import markdown_table
