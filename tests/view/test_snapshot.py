@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from haploop.logger.log.writer import Log
-from haploop.protocol.changes import changes_of, spans
+from haploop.protocol.changes import Change, changes_of, refusal, spans
 from haploop.protocol.scene.scene import ElementTable, Wall
 from haploop.protocol.ticks import Timebase
 from haploop.tools.cli.view import LiveRuns
@@ -140,7 +140,7 @@ def test_a_swap_and_a_set_change_what_is_at_work_from_their_tick_on_and_a_refuse
     events = [
         (3, {"set": {"wall.stiffness": 7.0, "dissipation.0.damping": 2.0}}),
         (4, swap),
-        (4, {"refused": "swap of element 0 to bad (mass = 1.0) at tick 4 was refused: ValueError: no"}),
+        (4, refusal(Change.from_dict(4, swap).refuse(ValueError("no")))),
         (5, {"swap": {"kind": "inertia", "mass": 1.0}, "element": 1}),
         (6, {"pause": True}),
         (8, {"swap": {"kind": "none"}, "element": 0}),
