@@ -12,6 +12,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from haploop.controller.dissipation import ElementError
+from haploop.tools.dissipate.report import note_sentences
 from haploop.tools.dissipate.samples import RecordingError
 from haploop.tools.dissipate.text_recording import Layout, TextRecording
 from helpers.data.recordings import outcome, write
@@ -89,32 +90,62 @@ def test_recorded_rates_have_the_units_of_the_lengths(tmp_path: Path) -> None:
 
 def test_what_is_missing_is_a_gap_and_counted(tmp_path: Path) -> None:
     t, x = T.copy(), X.copy()
-    x[50], x[60] = np.nan, np.inf
+    x[50:52], x[60:62] = np.nan, np.inf
     keep = np.r_[0:100, 130:200]
     path = write(tmp_path / "gaps.csv", {"t": t[keep], "x": x[keep]})
     path.write_text(path.read_text().replace("nan", ""))
     notes = outcome(path, dampings=["1.0"]).recording.notes
-    assert (notes.rows, notes.unusable_rows, notes.gaps) == (168, 2, 3)
-    assert notes.missing_s == pytest.approx(2e-3 + 2e-3 + 31e-3)
+    assert (notes.rows, notes.unusable_rows, notes.gaps, notes.bridged) == (166, 4, 3, 0)
+    assert notes.missing_s == pytest.approx(3e-3 + 3e-3 + 31e-3)
     assert notes.gaps_s[2] == pytest.approx((0.099, 0.130))
 
 
-def test_a_gap_is_booked_as_two_recordings(tmp_path: Path) -> None:
-    whole = write(tmp_path / "whole.csv", {"t": np.r_[T[:80], T[120:]], "x": np.r_[X[:80], X[120:]]})
-    parts = [
-        write(tmp_path / f"{i}.csv", {"t": T[at], "x": X[at]}) for i, at in enumerate((slice(80), slice(120, 200)))
-    ]
-    assert true_J(whole) == pytest.approx(sum(map(true_J, parts)), rel=1e-12)
+def test_after_a_gap_no_force_is_booked_that_would_need_the_motion_within_it(tmp_path: Path) -> None:
+    """A device at 0.1 m/s throughout: an estimate that starts at rest would book m v^2 for an inertia."""
+    x = 0.1 * T
+    kept = np.r_[0:80, 120:200]
+    whole, gap = (
+        write(tmp_path / "whole.csv", {"t": T, "x": x}),
+        write(tmp_path / "gap.csv", {"t": T[kept], "x": x[kept]}),
+    )
+    inertia_J = [outcome(path, masses=["0.01"]).elements[0].true_J for path in (whole, gap)]
+    assert inertia_J[1] == pytest.approx(inertia_J[0], abs=1e-9)
+    damped_J = [true_J(path) for path in (whole, gap)]
+    assert damped_J[1] == pytest.approx(damped_J[0] * (78 + 77) / 198, rel=1e-9)
 
 
-def test_with_a_rate_a_row_without_a_number_is_a_gap_too(tmp_path: Path) -> None:
+def test_one_missing_sample_is_bridged_and_a_percent_of_them_changes_little(tmp_path: Path) -> None:
+    whole = write(tmp_path / "whole.csv", {"t": T, "x": X})
     x = X.copy()
-    x[40] = np.nan
-    notes = outcome(
-        write(tmp_path / "x.csv", {"x": x}), layout=Layout(rate_Hz=1000.0), dampings=["1.0"]
-    ).recording.notes
-    assert (notes.rows, notes.unusable_rows, notes.gaps) == (199, 1, 1)
-    assert notes.gaps_s == [pytest.approx((0.039, 0.041))]
+    x[[40, 77, 123]] = np.nan
+    holes = write(tmp_path / "holes.csv", {"t": T, "x": x})
+    notes = outcome(holes, masses=["0.01"]).recording.notes
+    assert (notes.rows, notes.unusable_rows, notes.gaps, notes.bridged) == (197, 3, 0, 3)
+    assert true_J(holes) == pytest.approx(true_J(whole), rel=0.02)
+    by_rate = outcome(write(tmp_path / "x.csv", {"x": x}), layout=Layout(rate_Hz=1000.0), dampings=["2.7"])
+    assert by_rate.elements[0].true_J == pytest.approx(true_J(holes), rel=1e-9)
+
+
+def test_samples_that_repeat_in_mid_motion_are_counted_and_a_device_at_rest_is_not(tmp_path: Path) -> None:
+    x = np.round(X / 1e-6) * 1e-6
+    x[150:] = x[150]
+    assert outcome(write(tmp_path / "once.csv", {"t": T, "x": x}), masses=["0.01"]).recording.notes.repeated == 0
+    x[5:150:7] = x[4:149:7]
+    found = outcome(write(tmp_path / "twice.csv", {"t": T, "x": x}), masses=["0.01"])
+    assert 15 <= found.recording.notes.repeated <= 21
+    assert any("repeat the one before" in sentence for sentence in note_sentences(found))
+
+
+@pytest.mark.parametrize("name", ["t", "time", "Stamp"])
+def test_whole_numbers_of_a_time_without_a_unit_are_asked_after(tmp_path: Path, name: str) -> None:
+    path = write(tmp_path / "ticks.csv", {name: 1001.0 + np.arange(200.0), "x": X})
+    layout = Layout(time=name)
+    with pytest.raises(RecordingError, match=r"1001, 1002 and so on, seconds or milliseconds\? Give --time-unit"):
+        outcome(path, layout=layout, dampings=["1.0"])
+    given = Layout(time=name, time_unit="ms")
+    assert outcome(path, layout=given, dampings=["1.0"]).recording.period_s == pytest.approx(1e-3)
+    seconds = write(tmp_path / "seconds.csv", {"time_s": 1001.0 + np.arange(200.0), "x": X})
+    assert outcome(seconds, dampings=["1.0"]).recording.period_s == 1.0
 
 
 def test_uneven_times_are_counted_and_change_nothing(plain: Path, tmp_path: Path) -> None:

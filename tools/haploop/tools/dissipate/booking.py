@@ -39,7 +39,9 @@ class Booking:
     true     E += -f_held dx: command k is held for a period from t_k + d on, d = (L + mu) T; in the period after
              sample k command k - L - 1 still holds for mu T, and command k - L for the rest
 
-    After a gap everything but the sums starts again; the motion within it is not known and not booked.
+    After a gap everything but the sums starts again; the motion within it is not known and not booked. Nor are
+    the forces of its first samples, whose velocity and acceleration would need those that are missing: an estimate that
+    starts at rest there would book the device's kinetic energy out of nothing.
 
     Args:
         period_s, delay_s: T and d.
@@ -77,7 +79,9 @@ class Booking:
         if piece.begins:
             self._begin()
         first, count = len(self._last_x), len(piece.x_m)
-        forces = np.hstack([self._forces, self._answer(piece)])
+        answer = self._answer(piece)
+        answer[:, : piece.unknown] = 0.0
+        forces = np.hstack([self._forces, answer])
         x_m, true_x = np.append(self._last_x, piece.x_m), np.append(self._last_true_x, piece.true_x_m)
         between = self._between(piece, true_x)
         periods = slice(1 - first, count), slice(2 - first, count + 1)  # of the old and the new command in each

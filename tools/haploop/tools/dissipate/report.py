@@ -68,6 +68,14 @@ def note_sentences(outcome: Outcome) -> list[str]:
         )
     if notes.unusable_rows:
         sentences.append(f"Rows left out, since a number in them is missing or not finite: {notes.unusable_rows}.")
+    if notes.bridged:
+        sentences.append(f"Single missing samples, taken as the mean of their neighbours: {notes.bridged}.")
+    if notes.repeated:
+        sentences.append(
+            f"{notes.repeated} samples ({100.0 * notes.repeated / notes.rows:.2g} %) repeat the one before in "
+            "mid-motion, as where a sensor is read faster than it measures: each looks like a stop and a jump, "
+            "in which an inertia seems to generate energy."
+        )
     if notes.uneven:
         sentences.append(
             f"{notes.uneven} periods are more than a tenth off the others; estimates take them for equal, as a "

@@ -25,6 +25,8 @@ class Samples:
             line from sample to sample.
         begins: whether a gap lies before it, or it is the first.
         end_x_m: position a period after the last sample; None where it is in the next piece, or not known.
+        unknown: samples at its beginning whose velocity or acceleration would need those in the gap before: no element
+            is taken to act there.
     """
 
     t_s: Floats
@@ -35,6 +37,7 @@ class Samples:
     between_x_m: Floats | None
     begins: bool
     end_x_m: float | None = None
+    unknown: int = 0
 
 
 @dataclass
@@ -43,6 +46,8 @@ class Notes:
 
     Attributes:
         gaps_s: begin and end of each gap, s; the first hundred.
+        bridged: single samples that were missing and are the mean of their neighbours.
+        repeated: samples equal to the one before although the device moved, by three counts or more, before and after.
         uneven: periods that are more than a tenth off the others.
     """
 
@@ -51,6 +56,8 @@ class Notes:
     gaps_s: list[tuple[float, float]] = field(default_factory=list)
     gaps: int = 0
     missing_s: float = 0.0
+    bridged: int = 0
+    repeated: int = 0
     uneven: int = 0
     remarks: list[str] = field(default_factory=list)
 

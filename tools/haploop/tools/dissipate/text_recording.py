@@ -17,8 +17,14 @@ from haploop.tools.dissipate.samples import Floats, Notes, RecordingError, Sampl
 # Names of columns that are looked for where none is given.
 _TIMES = ("t", "time", "timestamp", "time_s", "t_s", "seconds")
 _POSITIONS = ("x", "position", "pos", "position_m", "x_m", "displacement")
-# Periods above which there is a gap between two samples, and deviation above which a period is uneven.
-_GAP, _UNEVEN = 1.5, 0.1
+# Times without a unit are seconds by these names; by others only if they are no whole numbers far apart.
+_IN_SECONDS = ("time_s", "t_s", "seconds")
+_FAR_APART_S = 0.1
+# Periods above which there is a gap between two samples, and below which a single one is missing; deviation above which
+# a period is uneven.
+_GAP, _ONE_MISSING, _UNEVEN = 1.5, 2.5, 0.1
+# Steps before and after a sample that repeats the one before, in counts: a device this fast does not stand still.
+_MOVING_COUNTS = 3.0
 # Shortest and longest period that is accepted.
 _PERIODS_S = 1e-7, 1e3
 
@@ -62,7 +68,9 @@ class TextRecording:
         self._rate_Hz = layout.rate_Hz
         self._columns, self._scales = self._choose(file, layout)
         self.recorded = frozenset(name for name in ("velocity", "acceleration") if name in self._columns)
-        self.period_s = 1.0 / layout.rate_Hz if layout.rate_Hz else self._median_period()
+        self.period_s = 1.0 / layout.rate_Hz if layout.rate_Hz else self._median_period(layout.time_unit)
+        # The velocity needs one sample before, the acceleration two; what was recorded needs none.
+        self._unknown = 2 - len(self.recorded)
 
     def _choose(self, file: DelimitedFile, layout: Layout) -> tuple[dict[str, Column], dict[str, float]]:
         asked = {
@@ -100,7 +108,7 @@ class TextRecording:
             f"Which column of {file.path} is the {what}? Name it with --{what}{instead}. There are: {there}."
         )
 
-    def _median_period(self) -> float:
+    def _median_period(self, unit: str | None) -> float:
         block = next(self._rows(), None)
         if block is None or len(block[0]["time"]) < 2:
             raise RecordingError(f"{self._file.path} holds fewer than two samples.")
@@ -109,6 +117,13 @@ class TextRecording:
             raise RecordingError(
                 f"The times in column {self._columns['time'].name} of {self._file.path} do not increase; "
                 "give the rate with --rate if samples came faster than their clock."
+            )
+        column, times = self._columns["time"], block[0]["time"]
+        has_unit = unit or column.unit or column.name.strip().lower() in _IN_SECONDS
+        if not has_unit and period_s >= _FAR_APART_S and (times == np.rint(times)).all():
+            raise RecordingError(
+                f"Are the times in column {column.name} of {self._file.path}, {times[0]:g}, {times[1]:g} and so on, "
+                "seconds or milliseconds? Give --time-unit s or --time-unit ms."
             )
         if not _PERIODS_S[0] <= period_s <= _PERIODS_S[1]:
             raise RecordingError(
@@ -120,6 +135,7 @@ class TextRecording:
         """Yields all samples, in pieces without a gap."""
         last_s: float | None = None
         for columns, lines in self._rows():
+            columns, lines = self._bridged(columns, lines)
             t = columns["time"]
             steps = np.diff(t, prepend=t[:1] if last_s is None else last_s)
             self._refuse_disorder(t, steps, lines, last_s)
@@ -134,7 +150,10 @@ class TextRecording:
             for first, end in pairwise(starts):
                 part = {name: column[first:end] for name, column in columns.items()}
                 x, v, a = part["position"], part.get("velocity"), part.get("acceleration")
-                yield Samples(part["time"], x, v, a, x, None, begins=bool(is_gap[first]))
+                self._note_repeats(x)
+                begins = bool(is_gap[first])
+                unknown = self._unknown if begins and (first or last_s is not None) else 0
+                yield Samples(part["time"], x, v, a, x, None, begins, unknown=unknown)
             last_s = float(t[-1])
         if self.notes.rows < 2:
             raise RecordingError(f"{self._file.path} holds fewer than two samples.")
@@ -153,6 +172,21 @@ class TextRecording:
             self.notes.unusable_rows += int((~usable).sum())
             if usable.any():
                 yield {name: column[usable] for name, column in columns.items()}, lines[usable]
+
+    def _bridged(self, columns: dict[str, Floats], lines: Floats) -> tuple[dict[str, Floats], Floats]:
+        """Returns the rows with the mean of both neighbours where a single one is missing between them."""
+        steps = np.diff(columns["time"])
+        at = np.flatnonzero((steps > _GAP * self.period_s) & (steps < _ONE_MISSING * self.period_s)) + 1
+        self.notes.bridged += len(at)
+        whole = {name: np.insert(column, at, (column[at - 1] + column[at]) / 2.0) for name, column in columns.items()}
+        return whole, np.insert(lines, at, lines[at])
+
+    def _note_repeats(self, x: Floats) -> None:
+        step = np.abs(np.diff(x))
+        if not step.any() or len(step) < 3:
+            return
+        fast = step >= _MOVING_COUNTS * step[step > 0.0].min()
+        self.notes.repeated += int(((step[1:-1] == 0.0) & fast[:-2] & fast[2:]).sum())
 
     def _refuse_disorder(self, t: Floats, steps: Floats, lines: Floats, last_s: float | None) -> None:
         wrong = np.flatnonzero(steps <= 0.0)
