@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from haploop.launch.runs.start import prepare, run
-from haploop.plant.sensing.encoder import accelerometer_is_used
+from haploop.protocol.scene.scene import accelerometer_is_used
 from helpers.runs.estimates import COUNT, ENCODER, EVERYTHING, FUSED, KALMAN, SIGMA, T, estimates, floats
 from helpers.scenes.least import typed
 

@@ -11,7 +11,7 @@ import pytest
 from haploop.controller.controller import Controller
 from haploop.controller.dissipation import Element, Motion, Quantity, where
 from haploop.controller.tick import initial_state, tick
-from haploop.plant.sensing.encoder import accelerometer_is_used
+from haploop.protocol.scene.scene import accelerometer_is_used
 from haploop.protocol.ticks import Timebase
 from haploop.protocol.trees import tree_leaves, tree_map, tree_unflatten
 from helpers.runs.estimates import COUNT, ENCODER, FUSED, KALMAN

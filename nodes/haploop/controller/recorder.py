@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import math
 from array import array
-from typing import Any, NamedTuple
-
-import numpy as np
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from haploop.controller.active_elements import Description
 from haploop.controller.tick import ControllerParams
 from haploop.protocol.changes import Change
 from haploop.protocol.transport.telemetry import Block
+
+if TYPE_CHECKING:
+    import numpy as np
 
 MOTION_COLUMNS = ("x", "v", "a", "wall")
 

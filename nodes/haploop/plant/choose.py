@@ -6,8 +6,8 @@ from typing import Any
 
 from haploop.plant.integrators.registry import find_integrator
 from haploop.plant.motion.one_mass import OneMassMotion
-from haploop.plant.sensing.encoder import PositionSensor, accelerometer_is_used
-from haploop.protocol.scene.scene import Scene
+from haploop.plant.sensing.encoder import PositionSensor
+from haploop.protocol.scene.scene import Scene, accelerometer_is_used
 from haploop.protocol.ticks import Timebase
 
 

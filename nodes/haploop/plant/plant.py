@@ -9,9 +9,8 @@ from typing import Any, NamedTuple
 from haploop.plant.choose import make_motion, make_position_sensor
 from haploop.plant.line import Hold
 from haploop.plant.line.delay import make_line
-from haploop.plant.sensing.encoder import accelerometer_is_used
 from haploop.protocol.changes import Event
-from haploop.protocol.scene.scene import Scene
+from haploop.protocol.scene.scene import Scene, accelerometer_is_used
 from haploop.protocol.ticks import DELAY, Timebase
 
 # From the first tick of at most L + 1 samples and these to the forces in N that answer them.

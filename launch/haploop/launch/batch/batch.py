@@ -21,8 +21,7 @@ from haploop.plant.choose import make_motion, make_position_sensor
 from haploop.plant.line.delay import make_line
 from haploop.plant.plant import beyond
 from haploop.plant.sensing.accelerometer import make_accelerometer
-from haploop.plant.sensing.encoder import accelerometer_is_used
-from haploop.protocol.scene.scene import Scene
+from haploop.protocol.scene.scene import Scene, accelerometer_is_used
 from haploop.protocol.ticks import Timebase
 from haploop.protocol.trees import tree_select
 

@@ -14,11 +14,10 @@ from haploop.controller.estimators.choose import estimator_class, estimators_for
 from haploop.launch.plan import rules
 from haploop.launch.plan.effect import CHAIN, COUNTED, HISTORY, LINE, LINEAR_RATES, NOISY, RUBBING, Effect
 from haploop.plant.integrators.registry import find_integrator, integrator_module, integrator_names
-from haploop.plant.sensing.encoder import accelerometer_is_used
 from haploop.protocol.scene.effects import Accelerometer
 from haploop.protocol.scene.estimators import Acceleration, Velocity
 from haploop.protocol.scene.paths import value_at, without
-from haploop.protocol.scene.scene import Scene
+from haploop.protocol.scene.scene import Scene, accelerometer_is_used
 from haploop.protocol.ticks import Timebase
 from haploop.protocol.trees import tree_leaves
 

@@ -96,7 +96,7 @@ def _whole_steps(draft: Draft, key: tuple[str, ...], name: str, seconds: float) 
 
 def note_accelerometer(scene: Scene) -> list[str]:
     """Says that nothing reads the accelerometer, or that there is no motor to mount it on."""
-    from haploop.plant.sensing.encoder import accelerometer_is_used
+    from haploop.protocol.scene.scene import accelerometer_is_used
 
     if not accelerometer_is_used(scene):
         return [

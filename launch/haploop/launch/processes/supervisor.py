@@ -6,6 +6,7 @@ import json
 import secrets
 import time
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import zmq
 
@@ -15,9 +16,11 @@ from haploop.launch.clock.server import ClockServer
 from haploop.launch.processes import run_directory
 from haploop.launch.processes.children import Child, interrupts, start_children
 from haploop.launch.spec import RunFailed, RunSpec
-from haploop.logger.summary import Summary
 from haploop.protocol.ticks import Timebase
 from haploop.protocol.transport.sockets import SecureContext
+
+if TYPE_CHECKING:
+    from haploop.logger.summary import Summary
 
 _START_DEADLINE_S = 20.0
 # What the logger is given to save its files after another node has failed.

@@ -5,14 +5,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from haploop.controller.dissipation import Element, load_plugin, registry
 from haploop.launch.scene.events import elements_of, try_out
 from haploop.launch.scene.file import load
 from haploop.launch.spec import RunSpec, keep_plugin, make_output, write_scene
-from haploop.logger.summary import Summary
 from haploop.protocol.scene.scene import Scene
+
+if TYPE_CHECKING:
+    from haploop.logger.summary import Summary
 
 
 def prepare(

@@ -22,10 +22,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar
-
-import numpy as np
-import numpy.typing as npt
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from haploop.controller.estimators.base import Estimator, Sample
 from haploop.protocol.arrays import each
@@ -33,7 +30,9 @@ from haploop.protocol.scene.effects import Accelerometer
 from haploop.protocol.scene.estimators import Velocity
 from haploop.protocol.scene.scene import Scene
 
-Array = npt.NDArray[np.float64]
+if TYPE_CHECKING:
+    import numpy as np
+
 Memory = tuple[Any, Any, Any]
 # Decimals of a gain times the least surprise it meets: LAPACK's last bits, which differ between machines, lie beyond.
 _DECIMALS = 12
@@ -122,7 +121,7 @@ def jerk_density_limits(noise_m: float, period_s: float) -> tuple[float, float]:
     return 1e-15 * unit, 1e12 * unit
 
 
-def steady_state(jerk_density: float, noises: list[float], period_s: float) -> tuple[Array, Array]:
+def steady_state(jerk_density: float, noises: list[float], period_s: float) -> tuple[np.ndarray, np.ndarray]:
     """Returns the gain, shape (3, m), and the covariance of the estimate's error, shape (3, 3), both SI.
 
     P = A (P - P H' (H P H' + R)^-1 H P) A' + Q, gain = P H' (H P H' + R)^-1, solved with sigma as the unit of length
@@ -132,6 +131,7 @@ def steady_state(jerk_density: float, noises: list[float], period_s: float) -> t
         jerk_density: root of the jerk's density S, m/s^3/Hz^0.5, within ``jerk_density_limits``.
         noises: standard deviation of the position, m, above 0, and where it is measured of the acceleration, m/s^2.
     """
+    import numpy as np
     from scipy.linalg import solve_discrete_are
 
     density = (jerk_density / noises[0]) ** 2
@@ -149,8 +149,10 @@ def steady_state(jerk_density: float, noises: list[float], period_s: float) -> t
     return gain * units[:, None] / units[measured], estimated * np.outer(units, units) * noises[0] ** 2
 
 
-def _model(T: float, S: float) -> tuple[Array, Array]:
+def _model(T: float, S: float) -> tuple[np.ndarray, np.ndarray]:
     """Returns A and Q of x''' = w over the time T."""
+    import numpy as np
+
     step = np.array([[1.0, T, T**2 / 2], [0.0, 1.0, T], [0.0, 0.0, 1.0]])
     noise = [[T**5 / 20, T**4 / 8, T**3 / 6], [T**4 / 8, T**3 / 3, T**2 / 2], [T**3 / 6, T**2 / 2, T]]
     return step, S * np.array(noise)

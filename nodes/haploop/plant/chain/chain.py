@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from haploop.plant.motion.transition import real_for
-from haploop.plant.sensing.encoder import accelerometer_is_used
-from haploop.protocol.scene.scene import Scene
+from haploop.protocol.scene.scene import Scene, accelerometer_is_used
 
 Matrix = np.ndarray
 _wide = np.longdouble

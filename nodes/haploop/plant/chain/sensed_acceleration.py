@@ -8,8 +8,7 @@ import numpy as np
 
 from haploop.plant.chain.chain import Chain, sensor_body
 from haploop.plant.chain.transition import Loads, make_tables
-from haploop.plant.sensing.encoder import accelerometer_is_used
-from haploop.protocol.scene.scene import Scene
+from haploop.protocol.scene.scene import Scene, accelerometer_is_used
 from haploop.protocol.ticks import Timebase
 from haploop.protocol.trees import tree_select
 

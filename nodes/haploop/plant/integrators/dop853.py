@@ -9,7 +9,6 @@ import numpy as np
 
 from haploop.plant.chain.chain import Chain
 from haploop.plant.chain.history import ChainHistory, Interval
-from haploop.plant.integrators.registry import Integrator
 from haploop.plant.line import Hold
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
@@ -83,16 +82,3 @@ class System:
         matrix, rise = self._matrix, slope * self._of_load
         push = command * self._of_command + load * self._of_load - start * rise
         return lambda t, z: matrix @ z + push + t * rise
-
-
-DOP853 = Integrator(
-    "dop853",
-    "made of DOP853's own steps, order 8, from event to event",
-    order=None,
-    evaluations=12,
-    chooses_steps=True,
-    motions=(
-        "haploop.plant.integrators.dop853:Dop853Motion",
-        "haploop.plant.integrators.dop853_friction:Dop853FrictionMotion",
-    ),
-)

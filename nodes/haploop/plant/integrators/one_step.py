@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from haploop.plant.integrators.linear_rates import LinearRates, Rows, moved
-from haploop.plant.integrators.registry import Integrator
 
 
 class Euler:
@@ -39,12 +38,6 @@ class SemiImplicitEuler:
         return after
 
 
-EULER = Integrator("euler", "one of the explicit Euler method, order 1", 1, Euler)
-SEMI_IMPLICIT_EULER = Integrator(
-    "semi-implicit-euler", "one of the semi-implicit Euler method, order 1", 1, SemiImplicitEuler
-)
-
-
 class ImplicitMidpoint:
     """z+ = z + h z'((z + z+) / 2).
 
@@ -66,9 +59,6 @@ class ImplicitMidpoint:
         return [2.0 * mean - a for mean, a in zip(means, z, strict=True)]
 
 
-IMPLICIT_MIDPOINT = Integrator("implicit-midpoint", "one of the implicit midpoint rule, order 2", 2, ImplicitMidpoint)
-
-
 class RungeKutta4:
     """Four rates, at the beginning, twice in the middle and at the end, weighted 1 : 2 : 2 : 1 (Kutta 1901).
 
@@ -87,6 +77,3 @@ class RungeKutta4:
         k4 = rates.at(moved(z, h, k3), end)
         mean = [(a + 2.0 * (b + c) + d) / 6.0 for a, b, c, d in zip(k1, k2, k3, k4, strict=True)]
         return moved(z, h, mean)
-
-
-RK4 = Integrator("rk4", "one of the classical Runge-Kutta method, order 4", 4, RungeKutta4, evaluations=4)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from importlib.metadata import entry_points
+from functools import cache
 from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Any
 
@@ -12,16 +12,7 @@ from haploop.protocol.scene.scene import Scene
 if TYPE_CHECKING:
     from haploop.plant.integrators.linear_rates import OneStep
 
-# Name in ``clock.integrator`` -> module and name of its ``Integrator``, imported when it is asked for.
-INTEGRATORS = {
-    "exact": "haploop.plant.integrators.registry:EXACT",
-    "semi-implicit-euler": "haploop.plant.integrators.one_step:SEMI_IMPLICIT_EULER",
-    "euler": "haploop.plant.integrators.one_step:EULER",
-    "rk4": "haploop.plant.integrators.one_step:RK4",
-    "implicit-midpoint": "haploop.plant.integrators.one_step:IMPLICIT_MIDPOINT",
-    "dop853": "haploop.plant.integrators.dop853:DOP853",
-}
-# Other packages name theirs in this group of entry points, as here.
+# Other packages name the objects of theirs in this group of entry points.
 _GROUP = "haploop.integrators"
 
 
@@ -33,7 +24,7 @@ class Integrator:
         name: in ``clock.integrator``.
         does: what it makes every plant step, in one phrase.
         order: of its error in the plant step; None where that depends on no plant step.
-        method: the formula of a one-step method; None for a motion of its own.
+        method: the formula of a one-step method, or its "module:class"; None for a motion of its own.
         evaluations: of the rates, in every plant step, or in every tick where it chooses its own steps.
         chooses_steps: whether its steps are its own, at a tolerance, whatever ``clock.plant_rate``.
         motions: "module:class" of the motion without friction and of that with it.
@@ -42,7 +33,7 @@ class Integrator:
     name: str
     does: str
     order: int | None
-    method: type[OneStep] | None = None
+    method: str | type[OneStep] | None = None
     evaluations: int = 1
     chooses_steps: bool = False
     motions: tuple[str, str] = (
@@ -55,31 +46,77 @@ class Integrator:
         """Tells whether its error is near the last bits, whatever the plant step."""
         return self.order is None
 
+    def one_step(self) -> type[OneStep] | None:
+        """Returns the formula of a one-step method; None for a motion of its own."""
+        return resolve_name(self.method) if isinstance(self.method, str) else self.method
+
     def make_motion(self, scene: Scene, *args: Any) -> Any:
         """Makes the motion of a resolved scene; nothing else is imported."""
         return resolve_name(self.motions[scene.friction is not None])(scene, *args)
 
 
-_EXACT_MOTIONS = "haploop.plant.chain.motion:ChainMotion", "haploop.plant.friction.motion:FrictionMotion"
-EXACT = Integrator("exact", "exact", order=None, motions=_EXACT_MOTIONS)
+_HERE = "haploop.plant.integrators"
+# What is written here imports no motion: whoever checks a scene or lists what there is needs none.
+_BUILT_IN = (
+    Integrator(
+        "exact",
+        "exact",
+        order=None,
+        motions=("haploop.plant.chain.motion:ChainMotion", "haploop.plant.friction.motion:FrictionMotion"),
+    ),
+    Integrator(
+        "semi-implicit-euler",
+        "one of the semi-implicit Euler method, order 1",
+        order=1,
+        method=f"{_HERE}.one_step:SemiImplicitEuler",
+    ),
+    Integrator("euler", "one of the explicit Euler method, order 1", order=1, method=f"{_HERE}.one_step:Euler"),
+    Integrator(
+        "rk4",
+        "one of the classical Runge-Kutta method, order 4",
+        order=4,
+        method=f"{_HERE}.one_step:RungeKutta4",
+        evaluations=4,
+    ),
+    Integrator(
+        "implicit-midpoint",
+        "one of the implicit midpoint rule, order 2",
+        order=2,
+        method=f"{_HERE}.one_step:ImplicitMidpoint",
+    ),
+    Integrator(
+        "dop853",
+        "made of DOP853's own steps, order 8, from event to event",
+        order=None,
+        evaluations=12,
+        chooses_steps=True,
+        motions=(f"{_HERE}.dop853:Dop853Motion", f"{_HERE}.dop853_friction:Dop853FrictionMotion"),
+    ),
+)
+INTEGRATORS = {integrator.name: integrator for integrator in _BUILT_IN}
 
 
 def integrator_names() -> tuple[str, ...]:
     """Returns the names of all integrators, those of other packages last."""
-    return *INTEGRATORS, *(entry.name for entry in entry_points(group=_GROUP) if entry.name not in INTEGRATORS)
+    return *INTEGRATORS, *(name for name in _places() if name not in INTEGRATORS)
 
 
 def integrator_module(name: str) -> str:
     """Returns the module an integrator is written in; raises as ``find_integrator`` does."""
-    return _place(name).partition(":")[0]
+    if name not in INTEGRATORS:
+        return _places()[name].partition(":")[0]
+    integrator = INTEGRATORS[name]
+    return str(integrator.method or integrator.motions[0]).partition(":")[0]
 
 
 def find_integrator(name: str) -> Integrator:
-    """Returns the integrator of a name, KeyError for none; no other is imported."""
-    return resolve_name(_place(name))
+    """Returns the integrator of a name, KeyError for none; of other packages no other is imported."""
+    return INTEGRATORS[name] if name in INTEGRATORS else resolve_name(_places()[name])
 
 
-def _place(name: str) -> str:
-    if name not in INTEGRATORS:
-        return {entry.name: entry.value for entry in entry_points(group=_GROUP)}[name]
-    return INTEGRATORS[name]
+@cache
+def _places() -> dict[str, str]:
+    """Returns module and name of the integrators of other packages; whoever uses none of them needs no search."""
+    from importlib.metadata import entry_points
+
+    return {entry.name: entry.value for entry in entry_points(group=_GROUP)}

@@ -26,7 +26,7 @@ class StepwiseMotion(ChainHistory):
 
     def __init__(self, scene: Scene, time: Timebase) -> None:
         super().__init__(scene, time)
-        method = find_integrator(scene.clock.integrator).method
+        method = find_integrator(scene.clock.integrator).one_step()
         assert method
         self._method, self._rates = method, LinearRates(self.chain)
         self._of_command, _, self._of_load = self._rates.of_inputs
@@ -72,6 +72,6 @@ def friction_brakes(scene: Scene) -> bool:
 
 def _method_of(scene: Scene) -> tuple[LinearRates, OneStep, float]:
     step_s, rates = 1.0 / scene.clock.plant_rate, LinearRates(Chain.from_scene(scene))
-    method = find_integrator(scene.clock.integrator).method
+    method = find_integrator(scene.clock.integrator).one_step()
     assert method
     return rates, method(rates, step_s), step_s

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import lru_cache
-from importlib.metadata import entry_points
 
 import numpy as np
 
@@ -77,6 +76,8 @@ def constant_forces(scene: Scene) -> dict[str, float]:
     """
     if not scene.others:
         return {}
+    from importlib.metadata import entry_points
+
     return {entry.name: entry.load()(scene) for entry in entry_points(group=_GROUP) if entry.name in scene.others}
 
 

@@ -8,12 +8,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from haploop.plant.counters import CLIPPED, Counter, make_counter
-from haploop.plant.sensing.encoder import accelerometer_is_used
 from haploop.plant.sensing.noise import Noise, make_noise
 from haploop.plant.streams import make_normal, select_draws
 from haploop.protocol.arrays import clipped, each, nearest_multiple
 from haploop.protocol.scene import effects
-from haploop.protocol.scene.scene import Scene
+from haploop.protocol.scene.scene import Scene, accelerometer_is_used
 from haploop.protocol.ticks import Timebase
 from haploop.protocol.trees import tree_select
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from haploop.protocol.arrays import floor, rint
-from haploop.protocol.scene.scene import Encoder, Scene
+from haploop.protocol.scene.scene import Encoder
 from haploop.protocol.trees import tree_select
 
 ROUNDINGS = {"nearest": rint, "floor": floor}
@@ -44,9 +44,3 @@ class PositionSensor:
     def select(self, kept: np.ndarray) -> None:
         self.encoder = tree_select(self.encoder, kept)
         self.reading = make_encoder(self.encoder)
-
-
-def accelerometer_is_used(scene: Scene) -> bool:
-    """Tells whether samples carry the plant's acceleration beside the position."""
-    by_itself = scene.acceleration is not None and scene.acceleration.source == "accelerometer"
-    return by_itself or bool(scene.velocity and scene.velocity.accelerometer)

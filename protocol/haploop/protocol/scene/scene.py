@@ -141,3 +141,9 @@ class Scene(OpenTable):
     def as_dict(self) -> Tables:
         """Returns the scene as nested dicts and lists, absent tables and empty lists left out."""
         return {key: value for key, value in super().as_dict().items() if value != []}
+
+
+def accelerometer_is_used(scene: Scene) -> bool:
+    """Tells whether samples carry the plant's acceleration beside the position."""
+    by_itself = scene.acceleration is not None and scene.acceleration.source == "accelerometer"
+    return by_itself or bool(scene.velocity and scene.velocity.accelerometer)

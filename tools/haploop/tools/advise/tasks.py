@@ -6,10 +6,9 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
-from haploop.plant.sensing.encoder import accelerometer_is_used
 from haploop.protocol.scene.hand_force import MinimumJerk
 from haploop.protocol.scene.paths import value_at, with_value
-from haploop.protocol.scene.scene import ElementTable, Hand, Scene, Wall
+from haploop.protocol.scene.scene import ElementTable, Hand, Scene, Wall, accelerometer_is_used
 from haploop.tools.render.units import amount
 
 # Speed of a firm tap; more than that no task starts with.

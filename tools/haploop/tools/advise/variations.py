@@ -7,10 +7,9 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 
 from haploop.launch.plan.effects import all_effects
-from haploop.plant.sensing.encoder import accelerometer_is_used
 from haploop.protocol.scene.estimators import Acceleration
 from haploop.protocol.scene.paths import value_at, with_value, without
-from haploop.protocol.scene.scene import Scene
+from haploop.protocol.scene.scene import Scene, accelerometer_is_used
 from haploop.tools.render.units import amount
 
 SHARE = 0.2

@@ -11,8 +11,7 @@ from typing import Any
 from haploop.controller.dissipation import Element
 from haploop.launch.scene.file import resolved
 from haploop.launch.scene.layers import Layers, key_path
-from haploop.plant.sensing.encoder import accelerometer_is_used
-from haploop.protocol.scene.scene import Clock, Device, Scene
+from haploop.protocol.scene.scene import Clock, Device, Scene, accelerometer_is_used
 from haploop.tools.cli.options import parse_assignments
 from haploop.tools.dissipate.log_recording import holds_readings
 from haploop.tools.dissipate.samples import RecordingError

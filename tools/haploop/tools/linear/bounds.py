@@ -11,9 +11,8 @@ import numpy as np
 
 from haploop.plant.chain.chain import Chain
 from haploop.plant.motion.one_mass import Mechanics
-from haploop.plant.sensing.encoder import accelerometer_is_used
 from haploop.protocol.scene.paths import value_at
-from haploop.protocol.scene.scene import Scene
+from haploop.protocol.scene.scene import Scene, accelerometer_is_used
 from haploop.tools.linear.linearity import Kinds, LinearController, installed_kinds, why_not_linear
 
 # Gil et al. leave out what grows with the square of this: the angle in rad by which the wall's swing turns in T/2 + td.

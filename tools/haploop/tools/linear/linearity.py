@@ -18,9 +18,8 @@ from haploop.controller.dissipation import Element, registry
 from haploop.controller.tick import ControllerParams, StateTuple, initial_state, tick
 from haploop.launch.plan.effect import as_written
 from haploop.launch.plan.effects import all_effects
-from haploop.plant.sensing.encoder import accelerometer_is_used
 from haploop.protocol.scene.paths import value_at
-from haploop.protocol.scene.scene import Scene, Wall
+from haploop.protocol.scene.scene import Scene, Wall, accelerometer_is_used
 from haploop.protocol.trees import tree_leaves, tree_unflatten
 
 Kinds = Mapping[str, "type[Element]"]

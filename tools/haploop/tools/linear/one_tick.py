@@ -11,9 +11,8 @@ from scipy.linalg import eigvals, matrix_balance
 
 from haploop.plant.chain.chain import Chain, sensor_body
 from haploop.plant.chain.transition import ChainTransition
-from haploop.plant.sensing.encoder import accelerometer_is_used
 from haploop.protocol.scene.effects import Accelerometer
-from haploop.protocol.scene.scene import Scene
+from haploop.protocol.scene.scene import Scene, accelerometer_is_used
 from haploop.protocol.ticks import Timebase
 from haploop.tools.linear.linearity import Kinds, LinearController, installed_kinds, why_not_linear
 from haploop.tools.search.bisect import bisect

@@ -27,9 +27,8 @@ from haploop.plant.choose import make_position_sensor
 from haploop.plant.line.delay import make_line
 from haploop.plant.motion.hand_force import constant_forces
 from haploop.plant.sensing.accelerometer import make_accelerometer
-from haploop.plant.sensing.encoder import accelerometer_is_used
 from haploop.protocol.scene.hand_force import Constant, Ramp, Trace
-from haploop.protocol.scene.scene import Hand, Scene
+from haploop.protocol.scene.scene import Hand, Scene, accelerometer_is_used
 from haploop.protocol.ticks import Timebase
 from haploop.tools.reference.nearest import (
     REFERENCES,

@@ -11,8 +11,7 @@ from haploop.launch.batch.run import FEWEST, Kinds, batch_results, groups
 from haploop.launch.batch.stacking import structure
 from haploop.logger.summary import Summary
 from haploop.plant.choose import needs_chain
-from haploop.plant.sensing.encoder import accelerometer_is_used
-from haploop.protocol.scene.scene import Scene
+from haploop.protocol.scene.scene import Scene, accelerometer_is_used
 from haploop.protocol.ticks import Timebase
 
 # Arrays are of the greatest size, or of a half, a quarter or an eighth of it: few sizes have to be compiled.
