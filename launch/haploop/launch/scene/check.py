@@ -59,9 +59,11 @@ def resolve(layers: Layers, kinds: Mapping[str, type[Element]]) -> Scene:
     check_estimators(layers)
     if scene:
         check_filter(layers, scene)
-    settings = check_events(layers, _timebase(layers), kinds)
+    settings = check_events(layers, _timebase(layers, scene), kinds)
     if layers.mistakes or scene is None:
         raise SceneError(layers.mistakes)
+    if not scene.event:
+        return scene
     events = [
         replace(event, element=event.element or 0) if event.swap else replace(event, set=settings.get(index))
         for index, event in enumerate(scene.event)
@@ -80,18 +82,19 @@ def resolve_event(event: Tables, scene: Scene, kinds: Mapping[str, type[Element]
     return resolve(layers, kinds).event[-1]
 
 
-def _timebase(layers: Layers) -> Timebase | None:
+def _timebase(layers: Layers, scene: Scene | None) -> Timebase | None:
     """Returns the integers of the run; None when there are none, which is a mistake here unless it is one already."""
+    table = scene.clock if scene else read_table(Clock, layers.data.get("clock", {}))
     try:
-        duration = number_of(Scene, "duration").read(layers.data.get("duration"))
+        duration = scene.duration if scene else number_of(Scene, "duration").read(layers.data.get("duration"))
     except PydanticCustomError:
         return None
-    if (table := read_table(Clock, layers.data.get("clock", {}))) is None:
+    if table is None:
         return None
-    clock = table.as_dict()
     try:
         return Timebase.from_clock(table, duration)
     except TimebaseError as error:
+        clock = table.as_dict()
         for sentence in str(error).splitlines():
             name = sentence.split()[0]
             key, value = (("clock", name), clock[name]) if name in clock else ((name,), duration)

@@ -4,17 +4,27 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Mapping
 from typing import Any
 
 from haploop.protocol.scene.table import Tables
 
+_NOTHING: Mapping[str, list[str]] = {}
 _BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
 _ESCAPES = {ord('"'): '\\"', ord("\\"): "\\\\", **{c: f"\\u{c:04x}" for c in [*range(0x20), 0x7F]}}
 
 
-def to_toml(scene: Tables) -> str:
-    """Returns the TOML text of a dict of str, bool, int, finite float, lists and dicts; TypeError for other values."""
-    return "\n".join(_table(scene, ())).lstrip("\n") + "\n"
+def to_toml(scene: Tables, known: Mapping[str, list[str]] | None = None) -> str:
+    """Returns the TOML text of a dict of str, bool, int, finite float, lists and dicts; TypeError for other values.
+
+    ``known`` has the ``lines`` of some of its tables by key, which are then not made anew.
+    """
+    return "\n".join(_table(scene, (), known or {})).lstrip("\n") + "\n"
+
+
+def lines(scene: Tables) -> dict[str, list[str]]:
+    """Returns the lines of each table of a scene, by key."""
+    return {key: _tables(value, (key,)) for key, value in scene.items() if _has_header(value)}
 
 
 def inline(value: Any) -> str:
@@ -32,14 +42,14 @@ def inline(value: Any) -> str:
     raise TypeError(f"A scene holds text, numbers, true or false, lists and tables, but not {value!r}.")
 
 
-def _table(table: Tables, path: tuple[str, ...]) -> list[str]:
+def _table(table: Tables, path: tuple[str, ...], known: Mapping[str, list[str]] = _NOTHING) -> list[str]:
     """Lines of a table: its plain keys first, since they belong to the header above them, then its sub-tables."""
     headed = [(key, value) for key, value in table.items() if _has_header(value)]
     keys = {key for key, _ in headed}
-    lines = [f"{_key(key)} = {inline(value)}" for key, value in table.items() if key not in keys]
+    made = [f"{_key(key)} = {inline(value)}" for key, value in table.items() if key not in keys]
     for key, value in headed:
-        lines += _tables(value, (*path, key))
-    return lines
+        made += known[key] if key in known else _tables(value, (*path, key))
+    return made
 
 
 def _tables(value: Any, path: tuple[str, ...]) -> list[str]:

@@ -43,6 +43,7 @@ def estimator_class(name: str) -> type[Estimator]:
     return resolve_name(found) if isinstance(found, str) else found
 
 
+@cache
 def estimators_for(table: str) -> dict[str, type[Estimator]]:
     """Returns the estimators that a table of the scene ("velocity", "acceleration") may name; all are imported."""
     classes = {name: estimator_class(name) for name in estimator_names()}

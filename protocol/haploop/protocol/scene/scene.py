@@ -136,7 +136,8 @@ class Scene(OpenTable):
 
     def in_order(self) -> Scene:
         """Returns the scene with its events in order of time."""
-        return replace(self, event=tuple(sorted(self.event, key=lambda event: event.at)))
+        in_order = tuple(sorted(self.event, key=lambda event: event.at))
+        return self if in_order == self.event else replace(self, event=in_order)
 
     def as_dict(self) -> Tables:
         """Returns the scene as nested dicts and lists, absent tables and empty lists left out."""

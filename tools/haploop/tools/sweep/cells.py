@@ -16,7 +16,7 @@ from haploop.launch.scene.check import resolve
 from haploop.launch.scene.events import elements_of, try_out
 from haploop.launch.scene.layers import Layers, key_path, lay_value
 from haploop.launch.scene.mistakes import Mistake, SceneError
-from haploop.launch.scene.toml_writer import inline, to_toml
+from haploop.launch.scene.toml_writer import inline, lines, to_toml
 from haploop.logger.summary import Summary
 from haploop.protocol.scene.paths import value_at
 from haploop.protocol.scene.scene import Scene
@@ -161,8 +161,17 @@ class Sweep:
             SEED: values.get(SEED, seed),
             ENDED: result["ended"],
             WHY: result.get("why", ""),
-            SCENE: None if scene is None else to_toml(scene.as_dict()),
+            SCENE: None if scene is None else self._text(scene),
         }
+
+    def _text(self, scene: Scene) -> str:
+        """Returns a cell's scene as TOML; tables that are those of the base have its lines."""
+        same = {key: made for key, made in self._lines.items() if getattr(scene, key, None) is getattr(self.base, key)}
+        return to_toml(scene.as_dict(), same)
+
+    @cached_property
+    def _lines(self) -> dict[str, list[str]]:
+        return {key: made for key, made in lines(self.base.as_dict()).items() if key in vars(self.base)}
 
     @cached_property
     def _tables(self) -> Layers:
