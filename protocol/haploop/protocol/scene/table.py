@@ -9,6 +9,8 @@ from typing import Annotated, Any, ClassVar, Self, Union, dataclass_transform, g
 
 # Tables as plain dicts, as TOML and the wire hold them.
 Tables = dict[str, Any]
+# Values that stand in a table as they are.
+_PLAIN = (float, int, str, bool)
 
 
 @dataclass_transform(kw_only_default=True, frozen_default=True)
@@ -42,7 +44,10 @@ class Table:
             TypeError: a key is unknown or missing.
         """
         tables = _tables_of(cls)
-        given = {key: _read(tables.get(key, ()), value) for key, value in data.items()}
+        given = {
+            key: value if value.__class__ in _PLAIN else _read(tables.get(key, ()), value)
+            for key, value in data.items()
+        }
         if cls.kind:
             given.pop("kind", None)
         return cls(**given)
@@ -68,7 +73,9 @@ class OpenTable(Table):
     @classmethod
     def from_dict(cls, data: Tables) -> Self:
         """Makes the table as ``Table.from_dict`` does; keys that it does not declare are those of others."""
-        declared = {field.name for field in cls.fields()}
+        declared = _declared(cls)
+        if declared.issuperset(data):
+            return super().from_dict(data)
         others = {key: value for key, value in data.items() if key not in declared and not (cls.kind and key == "kind")}
         made = super().from_dict({key: value for key, value in data.items() if key not in others})
         return dataclasses.replace(made, others=others) if others else made
@@ -77,6 +84,11 @@ class OpenTable(Table):
         """Returns the table as ``Table.as_dict`` does, the keys of others last."""
         written = super().as_dict()
         return written | written.pop("others")
+
+
+@cache
+def _declared(cls: type[Table]) -> frozenset[str]:
+    return frozenset(field.name for field in cls.fields())
 
 
 @cache

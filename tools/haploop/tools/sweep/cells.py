@@ -20,6 +20,7 @@ from haploop.launch.scene.toml_writer import inline, lines, to_toml
 from haploop.logger.summary import Summary
 from haploop.protocol.scene.paths import value_at
 from haploop.protocol.scene.scene import Scene
+from haploop.protocol.scene.table import Table
 from haploop.tools.executor.parts import Group
 from haploop.tools.executor.work import Sources, load_kinds
 from haploop.tools.search.bisect import Tolerance
@@ -148,7 +149,7 @@ class Sweep:
         scene = resolved(values, self._tables, kinds)
         try_out(elements_of(scene), kinds)
         others = vars(self.base).keys() - {key_path(key)[0] for key in values}
-        kept = {name: getattr(self.base, name) for name in others}
+        kept = {name: table for name in others if isinstance(table := getattr(self.base, name), Table | tuple)}
         return replace(scene, **{name: table for name, table in kept.items() if getattr(scene, name) == table})
 
     def row(self, item: Item, scene: Scene | None, result: Summary) -> Row:
