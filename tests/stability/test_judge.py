@@ -1,4 +1,4 @@
-"""What is called steady, a limit cycle, growing or undecided: cases in which the end of the run alone misleads."""
+"""Judgements: loops of which the end of the run alone would give the wrong word."""
 
 from __future__ import annotations
 
@@ -95,6 +95,18 @@ def test_an_element_that_keeps_attributes_is_judged_on_a_copy_of_them():
     element = end.controller.params.elements[0].element
     fork = end.controller.fork()
     assert fork.params.elements[0].element is not element
+
+
+def test_an_element_that_fails_while_the_loop_is_watched_leaves_it_undecided(monkeypatch):
+    end = ended(load("launch/scenes/fig6b.toml"))
+
+    def fails(self, motion):
+        raise ValueError("worn out")
+
+    monkeypatch.setattr(type(end.controller.params.elements[0].element), "force", fails)
+    finding = judge(end)
+    assert (finding.word, finding.why) == ("undecided", "failed")
+    assert "worn out" in finding.sentence()
 
 
 def test_what_a_finger_feels_is_that_of_the_source_and_falls_with_frequency():

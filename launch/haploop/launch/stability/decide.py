@@ -35,6 +35,7 @@ WHY = {
     "changing by less than 2 %.",
     "grows": "Its swing grew by {rate_1_s:.3g} +- {error_1_s:.2g} 1/s, at {frequency_Hz:.3g} Hz.",
     "leaves the limit": "Its swing grew until the device was beyond its limit.",
+    "failed": "The loop failed while it was watched: {detail}",
     "leaves the wall": "Held still, the hand does not keep the device at the wall.",
     "too slow": "Its swing of {width_um:.4g} um peak to peak at {frequency_Hz:.3g} Hz changes by {rate_1_s:.2g} +- "
     "{error_1_s:.1g} 1/s, too slowly to tell within {watched_s:g} s; {needs_s:.3g} s would tell.",
@@ -57,7 +58,7 @@ class Finding:
         force_ripple_N: what the command swings by above 30 Hz, peak to peak, in the last quarter.
         felt: whether a hand feels the swing.
         chaotic: whether two copies started a thousandth apart ended apart by a fifth of the swing; None if not asked.
-        detail: why the run itself ended, where it diverged.
+        detail: why the run itself ended, where it diverged, or what failed.
         needs_s: time after which a swing that changes too slowly would be told; None otherwise.
     """
 

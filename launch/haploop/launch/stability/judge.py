@@ -83,8 +83,8 @@ def judge(end: End) -> Finding:
         try:
             small.go_to(seconds)
             large.go_to(seconds)
-        except (ArithmeticError, ElementError):
-            return Finding("growing", "leaves the limit", abs(push_N), seconds)
+        except (ArithmeticError, ElementError) as error:
+            return Finding("undecided", "failed", abs(push_N), seconds, detail=str(error))
         gone = [each for each in (small, large) if each.stop_reason]
         if gone:
             touched = any(_is_inside(end, each.x[len(each.x) // 2 :]) for each in gone)
