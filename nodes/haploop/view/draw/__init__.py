@@ -1,1 +1,1 @@
-"""What a page is sent: ``messages`` are how it is written, ``snapshot`` is what there is to draw."""
+"""Data sent to a page: ``messages`` are its written form, ``snapshot`` the numbers that are drawn."""

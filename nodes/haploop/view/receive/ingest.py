@@ -1,4 +1,4 @@
-"""What fills a history: telemetry as it comes, and the log of what came before, read while the run goes on."""
+"""Ingestion into a history: telemetry as it comes, and the log of what came before, read while the run goes on."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What recordings give: samples of a motion, piece by piece, and notes on what was found."""
+"""Samples of a recorded motion, piece by piece, and notes on what was found."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What theory says of a virtual inertia with the gate of eq. 9, and of linear elements, without a single run.
+"""Theory of a virtual inertia with the gate of eq. 9, and of linear elements, without a single run.
 
 At one frequency: the mass and the damping that the device feels of an inertia. In a contact: the largest stiffness that
 the loop bears with each element and its best size. Linear elements: where the one-tick map of the loop has the spectral
