@@ -100,6 +100,7 @@ def test_jitter_of_another_kind_keeps_nothing_of_the_old_one():
         ),
         ({"hand": {"grip": {"stiffness": 500}}}, "hand.grip holds no mass. The grip lies between the device and"),
         ({"hand": {"mass": "0 g", "grip": {"stiffness": 500}}}, "hand.grip holds no mass."),
+        ({"hand": {"grip": {"stiffness": 500}}, "friction": {"kinetic": 0.1}}, "hand.grip holds no mass."),
         ({"actuator": {}}, "actuator is empty. It must have at least one of saturation, bandwidth and resolution."),
         (
             {"accelerometer": {"range": "2 g_0", "resolution": 20}},

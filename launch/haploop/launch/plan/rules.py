@@ -30,8 +30,14 @@ def check_friction(draft: Draft) -> None:
     if friction.stribeck_velocity is not None and friction.breakaway is None:
         expected = "It says how breakaway falls towards kinetic, so friction.breakaway must be given too."
         draft.complain(("friction", "stribeck_velocity"), expected)
-    if draft.scene and not find_integrator(draft.scene.clock.integrator).chooses_steps:
-        _check_rate(draft, draft.scene)
+    scene = draft.scene
+    if scene and not find_integrator(scene.clock.integrator).chooses_steps and not _grips_nothing(scene):
+        _check_rate(draft, scene)
+
+
+def _grips_nothing(scene: Scene) -> bool:
+    """Tells whether there is a grip without a mass to move, which ``check_grip`` refuses."""
+    return scene.hand is not None and scene.hand.grip is not None and not scene.hand.mass
 
 
 def _check_rate(draft: Draft, scene: Scene) -> None:

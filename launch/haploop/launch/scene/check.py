@@ -44,15 +44,31 @@ def resolve(layers: Layers, kinds: Mapping[str, type[Element]]) -> Scene:
     Raises:
         SceneError: all mistakes, those already known to ``layers`` included.
     """
-    scene: Scene | None = None
+    return with_rules(layers, validated(layers, layers.data, kinds), kinds)
+
+
+def validated(layers: Layers, tables: Tables, kinds: Mapping[str, type[Element]]) -> Scene | None:
+    """Returns a scene of some tables of ``layers``; None where values are not in order, which it complains of."""
     try:
-        resolved = scene_model(kinds).model_validate(layers.data).model_dump(exclude_none=True)
-        scene = Scene.from_dict(resolved)
+        return Scene.from_dict(scene_model(kinds).model_validate(tables).model_dump(exclude_none=True))
     except ValidationError as error:
         schema = whole_schema(kinds)
         tagged = _TAGGED if len(kinds) > 1 else _TAGGED - {("dissipation", 0)}  # one kind alone is no choice
         for detail in error.errors(include_url=False):
             complain(layers, detail["type"], detail["msg"], _plain(detail["loc"], tagged), schema)
+    return None
+
+
+def with_rules(layers: Layers, scene: Scene | None, kinds: Mapping[str, type[Element]]) -> Scene:
+    """Returns a scene after the rules between keys: its events with what they set read.
+
+    Args:
+        layers: the tables of the scene.
+        scene: each value of it in order by itself; None where one is not, which is a mistake of ``layers`` already.
+
+    Raises:
+        SceneError: all mistakes, those already known to ``layers`` included.
+    """
     draft = Draft(layers.data, scene, read_table, layers.complain)
     for effect in all_effects():
         effect.check(draft)

@@ -44,12 +44,16 @@ def inline(value: Any) -> str:
 
 def _table(table: Tables, path: tuple[str, ...], known: Mapping[str, list[str]] = _NOTHING) -> list[str]:
     """Lines of a table: its plain keys first, since they belong to the header above them, then its sub-tables."""
-    headed = [(key, value) for key, value in table.items() if _has_header(value)]
-    keys = {key for key, _ in headed}
-    made = [f"{_key(key)} = {inline(value)}" for key, value in table.items() if key not in keys]
-    for key, value in headed:
-        made += known[key] if key in known else _tables(value, (*path, key))
-    return made
+    made: list[str] = []
+    headed: list[str] = []
+    for key, value in table.items():
+        if key in known:
+            headed += known[key]
+        elif _has_header(value):
+            headed += _tables(value, (*path, key))
+        else:
+            made.append(f"{_key(key)} = {inline(value)}")
+    return made + headed
 
 
 def _tables(value: Any, path: tuple[str, ...]) -> list[str]:
@@ -60,8 +64,9 @@ def _tables(value: Any, path: tuple[str, ...]) -> list[str]:
 
 
 def _has_header(value: Any) -> bool:
-    is_array_of_tables = isinstance(value, list) and value and all(isinstance(item, dict) for item in value)
-    return isinstance(value, dict) or bool(is_array_of_tables)
+    if isinstance(value, list):
+        return bool(value) and all(isinstance(item, dict) for item in value)
+    return isinstance(value, dict)
 
 
 def _key(key: str) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Mapping
 from typing import Any, TypeVar
 
 from haploop.protocol.scene.scene import ElementTable
@@ -18,12 +19,14 @@ def value_at(table: Any, key: str) -> Any:
     """
     found = table
     for part in key.split("."):
-        if isinstance(found, tuple | list):
-            found = found[int(part)] if part.isdecimal() and int(part) < len(found) else None
+        if isinstance(found, dict):
+            found = found.get(part)
         elif isinstance(found, Table):
             found = getattr(found, part) if _declares(found, part) else _undeclared(found).get(part)
+        elif isinstance(found, tuple | list):
+            found = found[int(part)] if part.isdecimal() and int(part) < len(found) else None
         else:
-            found = found.get(part) if isinstance(found, dict) else None
+            return None
     return found
 
 
@@ -33,17 +36,29 @@ def with_value(table: TableType, key: str, value: Any) -> TableType:
     Raises:
         KeyError: the key leads through a table that is absent.
     """
-    first, _, rest = key.partition(".")
+    return with_values(table, {key: value})
+
+
+def with_values(table: TableType, values: Mapping[str, Any]) -> TableType:
+    """Returns a table with other values at some dotted keys, as ``with_value`` does one by one."""
+    changed: Tables = {}
+    for key, value in values.items():
+        first, _, rest = key.partition(".")
+        changed[first] = _within(changed[first] if first in changed else value_at(table, first), key, rest, value)
+    return _put(table, changed)
+
+
+def _within(inner: Any, key: str, rest: str, value: Any) -> Any:
+    """Returns what stands at the first part of a key with another value at the rest of it."""
     if not rest:
-        return _put(table, first, value)
-    inner = value_at(table, first)
+        return value
     if isinstance(inner, tuple):
         index, _, name = rest.partition(".")
-        changed = with_value(inner[int(index)], name, value)
-        return _put(table, first, (*inner[: int(index)], changed, *inner[int(index) + 1 :]))
+        place = int(index)
+        return (*inner[:place], with_values(inner[place], {name: value}), *inner[place + 1 :])
     if not isinstance(inner, Table):
-        raise KeyError(f"There is no table {first} to set {key} in.")
-    return _put(table, first, with_value(inner, rest, value))
+        raise KeyError(f"There is no table {key.partition('.')[0]} to set {key} in.")
+    return with_values(inner, {rest: value})
 
 
 def without(table: TableType, *keys: str) -> TableType:
@@ -53,7 +68,7 @@ def without(table: TableType, *keys: str) -> TableType:
         inner = value_at(table, first)
         if inner is None:
             continue
-        table = _put(table, first, without(inner, rest) if rest else _default(table, first))
+        table = _put(table, {first: without(inner, rest) if rest else _default(table, first)})
     return table
 
 
@@ -68,12 +83,13 @@ def _undeclared(table: Table) -> Tables:
     return kind | (table.others if isinstance(table, OpenTable) else {})
 
 
-def _put(table: TableType, name: str, value: Any) -> TableType:
-    if _declares(table, name):
-        return dataclasses.replace(table, **{name: value})
-    inside = "parameters" if isinstance(table, ElementTable) else "others"
-    kept = {key: old for key, old in getattr(table, inside).items() if key != name or value is not None}
-    return dataclasses.replace(table, **{inside: kept if value is None else {**kept, name: value}})
+def _put(table: TableType, values: Tables) -> TableType:
+    declared = {name: value for name, value in values.items() if _declares(table, name)}
+    if len(declared) < len(values):
+        inside = "parameters" if isinstance(table, ElementTable) else "others"
+        undeclared = getattr(table, inside) | {name: values[name] for name in values if name not in declared}
+        declared[inside] = {name: value for name, value in undeclared.items() if value is not None}
+    return dataclasses.replace(table, **declared)
 
 
 def _default(table: Table, name: str) -> Any:

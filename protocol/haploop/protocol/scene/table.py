@@ -55,9 +55,9 @@ class Table:
     def as_dict(self) -> Tables:
         """Returns the table as nested dicts and lists, absent keys left out, in the order of declaration."""
         written = {"kind": self.kind} if self.kind else {}
-        for field in self.fields():
-            if (value := getattr(self, field.name)) is not None:
-                written[field.name] = _written(value)
+        for name, value in vars(self).items():
+            if value is not None:
+                written[name] = as_plain(value)
         return written
 
 
@@ -115,9 +115,12 @@ def _read(tables: tuple[type[Table], ...], value: Any) -> Any:
     return next((table for table in tables if table.kind == kind), tables[0]).from_dict(value)
 
 
-def _written(value: Any) -> Any:
+def as_plain(value: Any) -> Any:
+    """Returns a value of a table with tables in it as dicts and tuples as lists."""
+    if value.__class__ in _PLAIN:
+        return value
     if isinstance(value, Table):
         return value.as_dict()
     if isinstance(value, list | tuple):
-        return [_written(item) for item in value]
+        return [as_plain(item) for item in value]
     return value

@@ -3,34 +3,26 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
-from copy import deepcopy
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from haploop.launch.batch.stacking import is_batchable
-from haploop.launch.scene.check import resolve
 from haploop.launch.scene.events import elements_of, try_out
-from haploop.launch.scene.layers import Layers, key_path, lay_value
-from haploop.launch.scene.mistakes import Mistake, SceneError
-from haploop.launch.scene.toml_writer import inline, lines, to_toml
+from haploop.launch.scene.layers import key_path
+from haploop.launch.scene.models import number_of
+from haploop.launch.scene.toml_writer import inline, to_toml
 from haploop.logger.summary import Summary
 from haploop.protocol.scene.paths import value_at
 from haploop.protocol.scene.scene import Scene
-from haploop.protocol.scene.table import Table
 from haploop.tools.executor.parts import Group
 from haploop.tools.executor.work import Sources, load_kinds
 from haploop.tools.search.bisect import Tolerance
+from haploop.tools.sweep.cell_scene import Base, Values
 from haploop.tools.sweep.table import CELL, ENDED, NUMBER, SCENE, SEED, TEXT, WHOLE, WHY, Column, Row
 
-if TYPE_CHECKING:
-    from haploop.controller.dissipation import Element
-
-# By dotted key of a scene, what may stand there: numbers in SI units, names, tables.
-Values = dict[str, Any]
 # Scenes that differ in these tables are run in different arrays.
 _APART = ("clock", "duration", "event")
 
@@ -144,13 +136,17 @@ class Sweep:
             ElementError: an element's own code refuses its parameters.
         """
         values, seed = self.values(item)
-        values = {SEED: seed, **values}
         kinds = load_kinds(self.sources)
-        scene = resolved(values, self._tables, kinds)
+        make = self._base.with_numbers if self._in_numbers else self._base.with_values
+        scene = make({SEED: seed, **values}, kinds)
         try_out(elements_of(scene), kinds)
-        others = vars(self.base).keys() - {key_path(key)[0] for key in values}
-        kept = {name: table for name in others if isinstance(table := getattr(self.base, name), Table | tuple)}
-        return replace(scene, **{name: table for name, table in kept.items() if getattr(scene, name) == table})
+        return scene
+
+    @cached_property
+    def _in_numbers(self) -> bool:
+        """Tells whether cells differ from the base in numbers alone, each known to be in order by itself."""
+        seeds = number_of(Scene, SEED).quantity.complaint(self.base.seed + self.repeat - 1) is None
+        return seeds and all(axis.unit is not None and self._base.has_number(axis.key) for axis in self.axes)
 
     def row(self, item: Item, scene: Scene | None, result: Summary) -> Row:
         """Makes the row of a cell in the table."""
@@ -162,22 +158,12 @@ class Sweep:
             SEED: values.get(SEED, seed),
             ENDED: result["ended"],
             WHY: result.get("why", ""),
-            SCENE: None if scene is None else self._text(scene),
+            SCENE: None if scene is None else self._base.text(scene),
         }
 
-    def _text(self, scene: Scene) -> str:
-        """Returns a cell's scene as TOML; tables that are those of the base have its lines."""
-        same = {key: made for key, made in self._lines.items() if getattr(scene, key, None) is getattr(self.base, key)}
-        return to_toml(scene.as_dict(), same)
-
     @cached_property
-    def _lines(self) -> dict[str, list[str]]:
-        return {key: made for key, made in lines(self.base.as_dict()).items() if key in vars(self.base)}
-
-    @cached_property
-    def _tables(self) -> Layers:
-        """The base scene as its file would have it; not to be changed."""
-        return Layers(Path(), self.base.as_dict())
+    def _base(self) -> Base:
+        return Base(self.base)
 
     def bisected(self, bisect: Bisect) -> tuple[Axis, list[Axis]]:
         """Returns the axis of a search, and the other axes."""
@@ -203,27 +189,6 @@ class Sweep:
         axes = {axis.key: list(axis.values) for axis in self.axes}
         about = {"title": self.title, "repeat": self.repeat, "record": [column.name for column in self.record]}
         return to_toml({**about, "axes": axes, **bisect, "base": self.base.as_dict()})
-
-
-def resolved(values: Values, base: Layers, kinds: Mapping[str, type[Element]]) -> Scene:
-    """Resolves a scene with other values at some dotted keys; SceneError, with no file named, where there is none."""
-    changed = {key_path(key)[0] for key in values}
-    tables = {name: deepcopy(table) if name in changed else table for name, table in base.data.items()}
-    layers = Layers(Path(), tables)
-    for key, value in values.items():
-        if complaint := lay_value(layers, key_path(key), deepcopy(value)):
-            layers.mistakes.append(Mistake("", key, "cannot be set", complaint))
-    try:
-        return resolve(layers, kinds).in_order()
-    except SceneError as error:
-        raise Refused(error.mistakes) from error
-
-
-class Refused(SceneError):
-    """Values that make no scene; the message names no file, since none is at fault."""
-
-    def __str__(self) -> str:
-        return " ".join(str(mistake).partition(": ")[2] for mistake in self.mistakes)
 
 
 def _entry(result: Summary, column: Column) -> Any:

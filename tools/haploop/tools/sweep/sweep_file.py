@@ -23,7 +23,8 @@ from haploop.protocol.quantity import Quantity
 from haploop.protocol.scene.scene import Scene
 from haploop.tools.executor.work import Sources, load_kinds
 from haploop.tools.search.bisect import Tolerance
-from haploop.tools.sweep.cells import Axis, Bisect, Refused, Sweep, Values, resolved
+from haploop.tools.sweep.cell_scene import Refused, Values, resolved
+from haploop.tools.sweep.cells import Axis, Bisect, Sweep
 from haploop.tools.sweep.points import NoSuchKey, PointsError, Span, listed, make_points, number_at
 from haploop.tools.sweep.record import USUAL, make_columns
 from haploop.tools.sweep.table import Column
@@ -198,7 +199,7 @@ class _Reader:
         count = len(self._layers.mistakes)
         for place, value in enumerate(values):
             try:
-                resolved({key: value}, scene, self._kinds)
+                resolved({key: value}, scene.data, self._kinds)
             except Refused as error:
                 for mistake in error.mistakes:
                     if mistake.key == key:
