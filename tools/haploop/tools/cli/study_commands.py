@@ -46,12 +46,16 @@ def dissipate(
     rate: Annotated[float | None, typer.Option(min=1e-6, max=1e9, help="samples a second, in place of times")] = None,
     velocity: Annotated[str | None, typer.Option(metavar="COLUMN", help="recorded, not estimated")] = None,
     acceleration: Annotated[str | None, typer.Option(metavar="COLUMN", help="recorded, not estimated")] = None,
+    force: Annotated[
+        str | None, typer.Option(metavar="COLUMN", help="on the device, commanded: its work, and the sum F v T")
+    ] = None,
     unit: Annotated[
         str | None, typer.Option(help="of the position, such as mm, or metres a count [the header's (unit), m]")
     ] = None,
     time_unit: Annotated[str | None, typer.Option(help="such as ms [the header's (unit), s]")] = None,
     velocity_unit: Annotated[str | None, typer.Option(help="such as mm/s [the header's (unit), m/s]")] = None,
     acceleration_unit: Annotated[str | None, typer.Option(help="such as g_0 [the header's (unit), m/s^2]")] = None,
+    force_unit: Annotated[str | None, typer.Option(help="such as mN [the header's (unit), N]")] = None,
     wall: Annotated[str | None, typer.Option(metavar="POSITION", help="elements act beyond it only, m or text")] = None,
     occupies: Annotated[str, typer.Option(metavar="below|above", help="which side of it the wall is")] = "below",
     delay: Annotated[str | None, typer.Option(metavar="TIME", help="age of a force as it acts [0; a run's]")] = None,
@@ -64,7 +68,8 @@ def dissipate(
 ) -> None:
     """Tell what elements would have dissipated on a motion that was recorded, which they do not change.
 
-    One pass in flat memory. The last line names the figure's file.
+    Of a force that was recorded too: its true work, held from sample to sample, and whether it is passive. One pass in
+    flat memory. The last line names the figure's file.
     """
     from haploop.tools.dissipate.command import Request
     from haploop.tools.dissipate.command import dissipate as book
@@ -72,7 +77,8 @@ def dissipate(
     from haploop.tools.dissipate.text_recording import Layout
 
     selection = Selection(damping or [], mass or [], element or [], wall, occupies, set or [])
-    layout = Layout(position, time, rate, velocity, acceleration, unit, time_unit, velocity_unit, acceleration_unit)
+    units = unit, time_unit, velocity_unit, acceleration_unit
+    layout = Layout(position, time, rate, velocity, acceleration, *units, force, force_unit)
     book(Request(recording, selection, layout, parse_seconds(delay, "--delay"), plugin or [], out), json)
 
 

@@ -16,13 +16,14 @@ from haploop.logger.books.work import add_columns, no_sums, sampled_work
 from haploop.protocol.changes import Event
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
+from haploop.tools.dissipate.force_book import ForceBook, ForceRows
 from haploop.tools.dissipate.samples import Floats, Samples
 
 
 class Booked(NamedTuple):
     """The books at some samples: t_s and x_m of shape (samples,), the others (elements, samples).
 
-    ``added_J`` is the gain of the true books since the sample before.
+    ``added_J`` is the gain of the true books since the sample before; ``force`` is None where none was recorded.
     """
 
     t_s: Floats
@@ -30,6 +31,7 @@ class Booked(NamedTuple):
     sampled_J: Floats
     true_J: Floats
     added_J: Floats
+    force: ForceRows | None = None
 
 
 class Booking:
@@ -43,14 +45,18 @@ class Booking:
     the forces of its first samples, whose velocity and acceleration would need those that are missing: an estimate that
     starts at rest there would book the device's kinetic energy out of nothing.
 
+    A recorded force is booked as the elements' forces are, in the last row.
+
     Args:
         period_s, delay_s: T and d.
         recorded: which of "velocity" and "acceleration" come with the samples and are taken as they are.
+        has_force: whether the samples come with a force.
 
     Attributes:
+        force: the naive sum of the recorded force, and its passivity.
         taken_J, given_J: sum of the gains of the true books over the periods in which they gained, and of the losses
-            over the others, shape (elements,).
-        strongest_N: the largest force of every element, shape (elements,).
+            over the others, shape (rows,), a row an element and one more for a recorded force.
+        strongest_N: the largest force of each, shape (rows,).
     """
 
     def __init__(
@@ -60,13 +66,16 @@ class Booking:
         delay_s: float,
         kinds: dict[str, type[Element]],
         recorded: frozenset[str],
+        has_force: bool = False,
     ) -> None:
         self._scene, self._kinds, self._recorded = scene, kinds, recorded
         periods = delay_s / period_s
         self._lookahead = math.floor(periods + 1e-9)
         self._late = max(0.0, periods - self._lookahead)
         self._time = MeasuredTime.from_period(period_s, self._lookahead)
-        self._count = len(scene.dissipation)
+        self._elements = len(scene.dissipation)
+        self._count = self._elements + has_force
+        self.force = ForceBook(period_s, delay_s) if has_force else None
         self._sums = no_sums(2 * self._count)
         self._events = _wall_events(scene, self._time)
         self.taken_J, self.given_J, self.strongest_N = np.zeros((3, self._count))
@@ -79,8 +88,8 @@ class Booking:
         if piece.begins:
             self._begin()
         first, count = len(self._last_x), len(piece.x_m)
-        answer = self._answer(piece)
-        answer[:, : piece.unknown] = 0.0
+        answer, v = self._answer(piece)
+        answer[: self._elements, : piece.unknown] = 0.0
         forces = np.hstack([self._forces, answer])
         x_m, true_x = np.append(self._last_x, piece.x_m), np.append(self._last_true_x, piece.true_x_m)
         between = self._between(piece, true_x)
@@ -89,19 +98,29 @@ class Booking:
         added = np.zeros((2 * self._count, count))
         added[: self._count, 1 - first :] = sampled_work(x_m, known)
         added[self._count :, 1 - first :] = _held(forces[:, periods[0]], forces[:, periods[1]], true_x, between)
+        if piece.taken_J is not None:
+            taken = np.append(self._last_taken_J, piece.taken_J)
+            added[-1, 1 - first :], self._last_taken_J = taken[:-1], taken[-1:]
         self._forces = forces[:, -self._lookahead - 2 :]
         self._last_x, self._last_true_x = piece.x_m[-1:], piece.true_x_m[-1:]
         self._last_between = None if piece.between_x_m is None else piece.between_x_m[-1:]
         self.strongest_N = np.fmax(self.strongest_N, np.abs(forces).max(axis=1))
         totals = self._add(added)[:, 1:]
         sampled, true = np.split(totals, 2)
-        return Booked(piece.t_s, piece.x_m, sampled, true, added[self._count :])
+        force = self.force.add(piece, v, added[-1], true[-1]) if self.force else None
+        elements = slice(self._elements)
+        gains = added[self._count :][elements]
+        return Booked(piece.t_s, piece.x_m, sampled[elements], true[elements], gains, force)
 
     def finish(self, end_x_m: float) -> None:
         """Books the true energy of the period after the last sample, which ends at ``end_x_m``."""
         true_x = np.append(self._last_true_x, end_x_m)
         between = self._last_between if self._last_between is not None else self._on_a_line(true_x)
         held = _held(self._forces[:, :1], self._forces[:, 1:2], true_x, between)
+        if self._last_taken_J.size:
+            held[-1] = self._last_taken_J
+        if self.force:
+            self.force.finish(float(held[-1, 0]))
         self._add(np.vstack([np.zeros_like(held), held]))
 
     @property
@@ -117,10 +136,11 @@ class Booking:
         for tick, event in self._events:
             self._controller.schedule(tick, event)
         self._forces = np.zeros((self._count, self._lookahead + 2))
-        self._last_x = self._last_true_x = np.empty(0)
+        self._last_x = self._last_true_x = self._last_taken_J = np.empty(0)
         self._last_between: Floats | None = None
 
-    def _answer(self, piece: Samples) -> Floats:
+    def _answer(self, piece: Samples) -> tuple[Floats, Floats]:
+        """Returns the forces of all rows, shape (rows, samples), and the velocity at every sample."""
         nothing = [0.0] * len(piece.x_m)
         v, a = (nothing if column is None else column.tolist() for column in (piece.v_m_s, piece.a_m_s2))
         controller = self._controller
@@ -128,8 +148,12 @@ class Booking:
         blocks = controller.recorder.take()
         if controller.recorder.trouble:
             raise ElementError(f"On this recording {controller.recorder.trouble}.")
-        rows = [[as_float64(block["columns"][f"dissipation.{i}"]) for block in blocks] for i in range(self._count)]
-        return np.array([np.concatenate(row) for row in rows])
+        names = ["v", *(f"dissipation.{i}" for i in range(self._elements))]
+        velocity, *rows = ([as_float64(block["columns"][name]) for block in blocks] for name in names)
+        forces = [np.concatenate(row) for row in rows]
+        if piece.force_N is not None and self.force:
+            forces.append(piece.force_N)
+        return np.array(forces), np.concatenate(velocity)
 
     def _between(self, piece: Samples, true_x: Floats) -> Floats:
         """Returns the position at which the command changed, of every period that ends within the piece."""

@@ -70,7 +70,7 @@ def compute_outcome(request: Request, kinds: dict[str, type[Element]]) -> Outcom
     """
 
     recording, scene = _open(request, kinds)
-    booking = Booking(scene, recording.period_s, recording.delay_s, kinds, recording.recorded)
+    booking = Booking(scene, recording.period_s, recording.delay_s, kinds, recording.recorded, recording.has_force)
     trace = Trace(recording.period_s)
     end_x_m = None
     with _shown(request.path.name) as show:
@@ -96,6 +96,11 @@ def _open(request: Request, kinds: dict[str, type[Element]]) -> tuple[Recording,
         return recording, make_scene_for_log(selection, path, scene, kinds)
 
     recording = TextRecording(path, request.layout, request.delay_s or 0.0)
+    if not (selection.has_elements or recording.has_force):
+        raise RecordingError(
+            "Say which elements, --damping 2.7, --mass 0.0018, or --element KIND KEY=VALUE in quotes, "
+            "or which column is a force with --force."
+        )
     return recording, make_scene_for_text(selection, path, recording.period_s, recording.recorded, kinds)
 
 

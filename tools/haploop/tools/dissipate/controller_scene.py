@@ -40,6 +40,10 @@ class Selection:
     occupies: str = "below"
     overrides: Sequence[str] = ()
 
+    @property
+    def has_elements(self) -> bool:
+        return bool(self.dampings or self.masses or self.elements)
+
     def tables(self) -> frozenset[str]:
         """Returns the tables that the overrides change; RecordingError where one is of another table."""
         found = set()
@@ -101,8 +105,6 @@ def _make_scene(bare: Scene, selection: Selection, path: Path, kinds: Kinds) -> 
     for text in selection.elements:
         kind, *parameters = shlex.split(text) or [""]
         elements.append({"kind": kind, **parse_assignments(parameters)})
-    if not elements:
-        raise RecordingError("Say which elements: --damping 2.7, --mass 0.0018, or --element KIND KEY=VALUE in quotes.")
     if "wall" not in layers.data:
         if any(table["kind"] == "unidirectional-damping" for table in elements):
             raise RecordingError("Unidirectional damping acts on the way into a wall; say where it begins with --wall.")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from haploop.tools.dissipate.outcome import Outcome
-from haploop.tools.dissipate.report import conclusion, make_row, note_sentences
+from haploop.tools.dissipate.report import conclusion, make_row, note_sentences, rows
 from haploop.tools.dissipate.samples import Floats
 from haploop.tools.figure import style
 from haploop.tools.render.units import prefix_for
@@ -30,17 +30,23 @@ def make_figure(outcome: Outcome) -> Figure:
     figure = style.empty_figure(13.0, 7.8)
     header, body = figure.subfigures(2, 1, squeeze=False, height_ratios=(0.085, 1.0))[:, 0]
     lines, close = outcome.trace.lines(), outcome.trace.close
-    rows = 1 + min(len(outcome.elements), _MOST)
-    grid = body.add_gridspec(3, 2, width_ratios=(1.4, 1.0), height_ratios=(0.8, 1.6, max(0.14 * rows, 0.55)))
+    lines_of_table = 1 + min(len(rows(outcome)), _MOST)
+    heights = (0.8, 1.6, max(0.14 * lines_of_table, 0.55))
+    grid = body.add_gridspec(3, 2, width_ratios=(1.4, 1.0), height_ratios=heights)
     motion, energy = body.add_subplot(grid[0, 0]), body.add_subplot(grid[1, 0])
     _motion(motion, outcome, lines, "Recorded motion", whole=True)
-    _energies(energy, outcome, lines, "Energy that would have been taken out of the device (fed to it below 0)")
-    near = [body.add_subplot(grid[row, 1]) for row in range(2)]
-    if close is None:
+    if outcome.elements:
+        _energies(energy, outcome, lines, "Energy that would have been taken out of the device (fed to it below 0)")
+        near = [body.add_subplot(grid[row, 1]) for row in range(2)]
+    else:
+        near = []
+        _force(energy, outcome, lines)
+        _force_energies(body.add_subplot(grid[:2, 1]), outcome, lines)
+    if close is None and near:
         for ax in near:
             ax.set_axis_off()
         near[0].text(0.5, 0.5, "No element gave anything back.", ha="center", fontsize=style.TEXT, color=style.GREY)
-    else:
+    elif close is not None:
         _motion(near[0], outcome, close, "Where most was given back", whole=False)
         since = close.copy()
         since[2:] -= close[2:, :1]
@@ -49,7 +55,7 @@ def make_figure(outcome: Outcome) -> Figure:
             ax.axvspan(close[0, 0], close[0, -1], color=style.CLOSE, alpha=0.5, zorder=0.5, linewidth=0, gid="close")
         for ax in near:
             style.few_ticks(ax)
-    _table(body.add_subplot(grid[2, 0]), outcome, rows)
+    _table(body.add_subplot(grid[2, 0]), outcome, lines_of_table)
     _words(body.add_subplot(grid[2, 1]), outcome)
     _header(header, outcome)
     body.align_ylabels()
@@ -78,7 +84,7 @@ def _motion(ax: Axes, outcome: Outcome, lines: Floats, title: str, whole: bool) 
 
 def _energies(ax: Axes, outcome: Outcome, lines: Floats, title: str) -> None:
     count, agree = len(outcome.elements), outcome.books_agree
-    books = lines[2:]
+    books = lines[2 : 2 + 2 * count]
     factor, letter = prefix_for([float(np.abs(books).max())])
     for index, element in enumerate(outcome.elements[:_MOST]):
         colour, name = style.element_colour(index), element.label
@@ -95,6 +101,26 @@ def _energies(ax: Axes, outcome: Outcome, lines: Floats, title: str) -> None:
     style.dress(ax, title, "time (s)", f"energy ({letter}J)")
 
 
+def _force(ax: Axes, outcome: Outcome, lines: Floats) -> None:
+    factor, letter = prefix_for([float(np.abs(lines[-3]).max())])
+    ax.plot(lines[0], lines[-3] / factor, color=style.INK, linewidth=1.0, gid="force")
+    _common(ax, outcome, lines[0])
+    style.dress(ax, "Recorded force on the device", "time (s)", f"force ({letter}N)")
+
+
+def _force_energies(ax: Axes, outcome: Outcome, lines: Floats) -> None:
+    """Draws the true book of the recorded force beside the sum F v T."""
+    factor, letter = prefix_for([float(np.abs(lines[-2:]).max())])
+    ax.plot(lines[0], lines[-2] / factor, color=style.INK, linewidth=1.5, label="true", gid="force.true")
+    ax.plot(lines[0], lines[-1] / factor, color=style.GREY, dashes=(4, 2), label="sum F v T", gid="force.naive")
+    style.legend(ax, loc="upper left", bbox_to_anchor=(0.0, 1.0), ncols=1)
+    ax.axhline(0.0, color=style.GREY, linewidth=0.8, zorder=0)
+    _common(ax, outcome, lines[0])
+    style.dress(
+        ax, "Energy that the force took out of the device (fed to it below 0)", "time (s)", f"energy ({letter}J)"
+    )
+
+
 def _common(ax: Axes, outcome: Outcome, t: Floats) -> None:
     for from_s, to_s in outcome.recording.notes.gaps_s:
         if from_s < t[-1] and to_s > t[0]:
@@ -102,14 +128,15 @@ def _common(ax: Axes, outcome: Outcome, t: Floats) -> None:
     ax.set_xlim(float(t[0]), float(t[-1]))
 
 
-def _table(ax: Axes, outcome: Outcome, rows: int) -> None:
+def _table(ax: Axes, outcome: Outcome, lines: int) -> None:
     ax.set_axis_off()
     ax.set_xlim(0.0, 1.0)
-    ax.set_ylim(max(rows, 4) + 0.2, -0.2)
-    for number, cells in enumerate([_COLUMNS, *(make_row(element) for element in outcome.elements[: rows - 1])]):
+    ax.set_ylim(max(lines, 4) + 0.2, -0.2)
+    shown = rows(outcome)[: lines - 1]
+    for number, cells in enumerate([_COLUMNS, *(make_row(element) for element in shown)]):
         y = number + 0.5
         if number:
-            colour = style.element_colour(number - 1)
+            colour = style.element_colour(number - 1) if number <= len(outcome.elements) else style.INK
             ax.plot([0.0, 0.025], [y, y], color=colour, linewidth=2.5, solid_capstyle="butt")
         for x, cell, align in zip(_AT, cells, ("left", *["right"] * 5), strict=True):
             weight = "normal" if number else "bold"

@@ -17,7 +17,7 @@ from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import DELAY, Timebase, TimebaseError
 from haploop.tools.dissipate.samples import Floats, Notes, RecordingError, Samples
 
-_COLUMNS = {"/controller": ("timestamp", "x", "v", "a"), "/plant": ("x",)}
+_COLUMNS = {"/controller": ("timestamp", "x", "v", "a", "total"), "/plant": ("x", "force")}
 
 
 def read_scene(path: Path) -> Scene:
@@ -45,12 +45,16 @@ def holds_readings(scene: Scene) -> bool:
 class LogRecording:
     """Reads samples from a run's log; in between, the plant's own steps where they were logged.
 
-    The force of tick k would have acted from step k n + d on, n steps a tick, d the scene's delay or another one.
+    The force of tick k would have acted from step k n + d on, n steps a tick, d the scene's delay or another one. The
+    recorded force is that commanded in all; its work is that of the force held at every plant step, where they were
+    logged.
 
     Args:
         delay_s: delay of the forces; that of the scene when None.
         estimated: which of "velocity" and "acceleration" are to be estimated again, not taken from the run.
     """
+
+    has_force = True
 
     def __init__(self, path: Path, scene: Scene, delay_s: float | None, estimated: frozenset[str]) -> None:
         self._path, self.name = path, scene.title
@@ -88,7 +92,8 @@ class LogRecording:
                 a = rows["a"] if "acceleration" in self.recorded or self._readings else None
                 end = float(rows["end"][-1]) if "end" in rows else None
                 true, between = rows.get("true", rows["x"]), rows.get("between")
-                yield Samples(rows["timestamp"], rows["x"], v, a, true, between, first, end)
+                force = {"force_N": rows["total"], "taken_J": rows.get("taken_J")}
+                yield Samples(rows["timestamp"], rows["x"], v, a, true, between, first, end, **force)
                 first = False
         if self.notes.rows < 2:
             raise RecordingError(f"The log {log.path} holds fewer than two ticks of the controller.")
@@ -106,12 +111,12 @@ class _Waiting:
     def __init__(self, n: int, late: int, of_steps: bool) -> None:
         self._n, self._late, self._of_steps = n, late, of_steps
         self._controller: dict[str, Floats] = {name: np.empty(0) for name in _COLUMNS["/controller"]}
-        self._plant = np.empty(0)
+        self._plant = np.empty((2, 0))
 
     def add(self, batch: Batch) -> None:
         rows = cast(Table, batch.rows)
         if batch.topic == "/plant":
-            self._plant = np.concatenate([self._plant, rows["x"]])
+            self._plant = np.hstack([self._plant, [rows[name] for name in _COLUMNS["/plant"]]])
         else:
             self._controller = {name: np.concatenate([kept, rows[name]]) for name, kept in self._controller.items()}
 
@@ -119,11 +124,12 @@ class _Waiting:
         """Returns the columns of all ticks whose period has ended, with the plant's positions at and within them."""
         n, ticks = self._n, len(self._controller["x"])
         if self._of_steps:
-            ticks = min(ticks, max(0, len(self._plant) - 1) // n)
+            ticks = min(ticks, max(0, self._plant.shape[1] - 1) // n)
         rows = {name: column[:ticks] for name, column in self._controller.items()}
         self._controller = {name: column[ticks:] for name, column in self._controller.items()}
         if self._of_steps:
-            steps = self._plant[: ticks * n].reshape(ticks, n)
-            rows |= {"true": steps[:, 0], "between": steps[:, self._late], "end": self._plant[n::n][:ticks]}
-            self._plant = self._plant[ticks * n :]
+            x, force = self._plant[:, : ticks * n + 1]
+            steps, work = x[:-1].reshape(ticks, n), (force[:-1] * np.diff(x)).reshape(ticks, n)
+            rows |= {"true": steps[:, 0], "between": steps[:, self._late], "end": x[n::n], "taken_J": -work.sum(axis=1)}
+            self._plant = self._plant[:, ticks * n :]
         return rows

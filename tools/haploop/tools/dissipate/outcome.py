@@ -11,6 +11,7 @@ import numpy as np
 from haploop.controller.dissipation import Element, Quantity
 from haploop.protocol.scene.scene import ElementTable, Scene
 from haploop.tools.dissipate.booking import Booked, Booking
+from haploop.tools.dissipate.force_book import Passivity
 from haploop.tools.dissipate.log_recording import LogRecording
 from haploop.tools.dissipate.samples import Floats
 from haploop.tools.dissipate.text_recording import TextRecording
@@ -18,8 +19,8 @@ from haploop.tools.render.units import amount
 from haploop.view.store.lod_level import extremes
 
 # Both have a name, the control period and the delay of the forces in s, ``between``: what the motion between samples is
-# taken from, ``recorded``: which of "velocity" and "acceleration" are not estimated, and notes, complete once all
-# samples have been read.
+# taken from, ``recorded``: which of "velocity" and "acceleration" are not estimated, ``has_force``, and notes, complete
+# once all samples have been read.
 Recording = LogRecording | TextRecording
 # Points above which the trace is decimated.
 _MOST = 8192
@@ -44,12 +45,12 @@ class Trace:
         self.close: Floats | None = None
 
     def add(self, booked: Booked) -> None:
-        rows = np.vstack([booked.t_s, booked.x_m, booked.sampled_J, booked.true_J])
+        rows = np.vstack([booked.t_s, booked.x_m, booked.sampled_J, booked.true_J, *(booked.force or ())])
         self._keep(rows)
         self._look_closely(np.vstack([rows, -np.minimum(booked.added_J, 0.0).sum(axis=0)]))
 
     def lines(self) -> Floats:
-        """Returns t, x, and the sampled and the true books of every element, shape (rows, points)."""
+        """Returns t, x, sampled and true books of every element, rows of a recorded force; shape (rows, points)."""
         return np.hstack([self._points, self._left]) if self._points.size else self._left
 
     def _keep(self, rows: Floats) -> None:
@@ -102,13 +103,37 @@ class ElementOutcome:
 
 
 @dataclass(frozen=True)
+class ForceOutcome:
+    """The work of a recorded force, positive where it was taken out of the device.
+
+    Attributes:
+        books: as those of an element.
+        naive_J: the sum -F v T over the same samples.
+        excess_J: the most that it gave out beyond what it had taken.
+    """
+
+    books: ElementOutcome
+    naive_J: float
+    passivity: Passivity
+    excess_J: float
+
+    def as_data(self) -> dict[str, Any]:
+        entries = asdict(self)
+        return entries.pop("books") | entries | {"work_on_device_J": -self.books.true_J}
+
+
+@dataclass(frozen=True)
 class Outcome:
-    """The outcome of the elements, in the order of their selection, on a recording, with the controller's scene."""
+    """The outcome of the elements, in the order of their selection, on a recording, with the controller's scene.
+
+    ``force`` is that of a recorded force, None where there was none.
+    """
 
     recording: Recording
     elements: list[ElementOutcome]
     trace: Trace
     scene: Scene
+    force: ForceOutcome | None
 
     @property
     def span_s(self) -> tuple[float, float]:
@@ -138,23 +163,26 @@ class Outcome:
             "samples": notes.pop("rows"),
             **notes,
             "elements": [asdict(element) for element in self.elements],
+            "force": self.force and self.force.as_data(),
         }
 
 
 def make_outcome(
     recording: Recording, booking: Booking, trace: Trace, scene: Scene, kinds: Mapping[str, type[Element]]
 ) -> Outcome:
-    books = (booking.sampled_J, booking.true_J, booking.taken_J, booking.given_J, booking.strongest_N)
+    columns = (booking.sampled_J, booking.true_J, booking.taken_J, booking.given_J, booking.strongest_N)
+    books = np.array(columns).T.tolist()
     elements = [
         ElementOutcome(
-            table.name,
-            {"acts": table.acts, **table.parameters},
-            _label(table, kinds[table.name].parameters()),
-            *(float(of[index]) for of in books),
+            table.name, {"acts": table.acts, **table.parameters}, _label(table, kinds[table.name].parameters()), *row
         )
-        for index, table in enumerate(scene.dissipation)
+        for table, row in zip(scene.dissipation, books, strict=False)
     ]
-    return Outcome(recording, elements, trace, scene)
+    force = None
+    if of := booking.force:
+        own = ElementOutcome("recorded-force", {}, "recorded force", *books[-1])
+        force = ForceOutcome(own, of.naive_J, of.passivity, of.excess_J)
+    return Outcome(recording, elements, trace, scene, force)
 
 
 def _label(table: ElementTable, declared: Mapping[str, tuple[Quantity, object]]) -> str:

@@ -7,19 +7,38 @@ from rich.text import Text
 
 from haploop.protocol.scene.estimators import Acceleration
 from haploop.protocol.scene.scene import Scene
-from haploop.tools.dissipate.outcome import ElementOutcome, Outcome
+from haploop.tools.dissipate.force_book import Passivity
+from haploop.tools.dissipate.outcome import ElementOutcome, ForceOutcome, Outcome
 from haploop.tools.render.terminal import make_table
 from haploop.tools.render.units import amount, fixed
+
+_PASSIVITY: dict[Passivity, str] = {
+    "passive": "it never gave out more than it had taken: passive on this recording",
+    "generated": "it gave out up to {excess} more than it had taken: not passive",
+    "unresolved": (
+        "it gave out up to {excess} more than it had taken, as rounded positions alone can: "
+        "whether it is passive cannot be said"
+    ),
+    "begins loaded": (
+        "it is at work where the recording, or a part after a gap, begins, so energy may have been stored before: "
+        "whether it is passive cannot be said"
+    ),
+}
 
 
 def make_report(outcome: Outcome) -> RenderableType:
     """Makes the report: conclusion, table and notes."""
     numbers = ("true", "sampled", "took", "gave back", "largest force")
-    table = make_table("would have taken out of the device", *numbers, numbers=numbers)
-    for element in outcome.elements:
+    table = make_table("taken out of the device", *numbers, numbers=numbers)
+    for element in rows(outcome):
         table.add_row(*make_row(element))
     head = Text(f"{outcome.recording.name}: {conclusion(outcome)}", style="bold")
     return Group(head, table, *(Text(sentence, style="dim") for sentence in note_sentences(outcome)))
+
+
+def rows(outcome: Outcome) -> list[ElementOutcome]:
+    """Returns what has books: the elements, and a recorded force last."""
+    return [*outcome.elements, *([outcome.force.books] if outcome.force else [])]
 
 
 def make_row(element: ElementOutcome) -> tuple[str, ...]:
@@ -29,6 +48,8 @@ def make_row(element: ElementOutcome) -> tuple[str, ...]:
 
 
 def conclusion(outcome: Outcome) -> str:
+    if not outcome.elements and outcome.force:
+        return _passivity(outcome.force)
     ranked = sorted(outcome.elements, key=lambda element: element.true_J, reverse=True)
     best, others = ranked[0], ranked[1:]
     if best.true_J <= 0.0:
@@ -60,6 +81,7 @@ def note_sentences(outcome: Outcome) -> list[str]:
         f"{notes.rows} samples at {1.0 / recording.period_s:.6g} Hz, {from_s:g} to {to_s:g} s.",
         (f"Taken as recorded: {taken}. " if taken else "") + _estimates(outcome.scene, estimated),
         _truth(outcome),
+        *_force_sentences(outcome),
     ]
     if notes.gaps:
         sentences.append(
@@ -82,6 +104,27 @@ def note_sentences(outcome: Outcome) -> list[str]:
             "controller does that counts its ticks."
         )
     return [sentence for sentence in [*sentences, *notes.remarks] if sentence]
+
+
+def _force_sentences(outcome: Outcome) -> list[str]:
+    if not outcome.force:
+        return []
+    said = _passivity(outcome.force)
+    return [*([said[:1].upper() + said[1:]] if outcome.elements else []), _naive(outcome.force)]
+
+
+def _passivity(force: ForceOutcome) -> str:
+    words = _PASSIVITY[force.passivity].format(excess=amount(force.excess_J, "J"))
+    return f"the recorded force did {amount(-force.books.true_J, 'J')} of work on the device; {words}."
+
+
+def _naive(force: ForceOutcome) -> str:
+    true_J, off_J = force.books.true_J, abs(force.naive_J - force.books.true_J)
+    share = f" ({100.0 * off_J / abs(true_J):.3g} % of it)" if true_J else ""
+    return (
+        f"That is the work of a force on the device, positive along the position, held to the next sample; the "
+        f"sum F v T would make it {amount(-force.naive_J, 'J')}, off by {amount(off_J, 'J')}{share}."
+    )
 
 
 def _estimates(scene: Scene, names: list[str]) -> str:

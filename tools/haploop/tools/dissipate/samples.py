@@ -25,6 +25,8 @@ class Samples:
             line from sample to sample.
         begins: whether a gap lies before it, or it is the first.
         end_x_m: position a period after the last sample; None where it is in the next piece, or not known.
+        force_N: recorded force on the device, along the position; None where it was not read.
+        taken_J: what the force took out of the device in the period after each sample, where that is known exactly.
         unknown: samples at its beginning whose velocity or acceleration would need those in the gap before: no element
             is taken to act there.
     """
@@ -38,6 +40,8 @@ class Samples:
     begins: bool
     end_x_m: float | None = None
     unknown: int = 0
+    force_N: Floats | None = None
+    taken_J: Floats | None = None
 
 
 @dataclass

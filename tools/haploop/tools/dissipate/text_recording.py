@@ -17,6 +17,8 @@ from haploop.tools.dissipate.samples import Floats, Notes, RecordingError, Sampl
 # Names of columns that are looked for where none is given.
 _TIMES = ("t", "time", "timestamp", "time_s", "t_s", "seconds")
 _POSITIONS = ("x", "position", "pos", "position_m", "x_m", "displacement")
+# Columns that may be a force, which is read only where it is asked for: its sign and its hold are not in the file.
+_FORCES = ("force", "force_n", "f_n", "f")
 # Times without a unit are seconds by these names; by others only if they are no whole numbers far apart.
 _IN_SECONDS = ("time_s", "t_s", "seconds")
 _FAR_APART_S = 0.1
@@ -47,6 +49,8 @@ class Layout:
     time_unit: str | None = None
     velocity_unit: str | None = None
     acceleration_unit: str | None = None
+    force: str | None = None
+    force_unit: str | None = None
 
 
 class TextRecording:
@@ -67,6 +71,9 @@ class TextRecording:
         self._file = file = DelimitedFile(path)
         self._rate_Hz = layout.rate_Hz
         self._columns, self._scales = self._choose(file, layout)
+        self.has_force = "force" in self._columns
+        if not self.has_force and (unread := file.find(_FORCES)):
+            self.notes.remarks.append(f"Column {unread.name} was not read: --force {unread.name} books its work.")
         self.recorded = frozenset(name for name in ("velocity", "acceleration") if name in self._columns)
         self.period_s = 1.0 / layout.rate_Hz if layout.rate_Hz else self._median_period(layout.time_unit)
         # The velocity needs one sample before, the acceleration two; what was recorded needs none.
@@ -78,6 +85,7 @@ class TextRecording:
             "position": (layout.position, layout.length, "m"),
             "velocity": (layout.velocity, layout.velocity_unit, "m/s"),
             "acceleration": (layout.acceleration, layout.acceleration_unit, "m/s^2"),
+            "force": (layout.force, layout.force_unit, "N"),
         }
         columns = {what: file.column(name, what) for what, (name, *_) in asked.items() if name is not None}
         if "position" not in columns:
@@ -149,11 +157,12 @@ class TextRecording:
             starts = [0, *np.flatnonzero(is_gap[1:]) + 1, len(t)]
             for first, end in pairwise(starts):
                 part = {name: column[first:end] for name, column in columns.items()}
-                x, v, a = part["position"], part.get("velocity"), part.get("acceleration")
+                x, v, a, force = (part.get(name) for name in ("position", "velocity", "acceleration", "force"))
+                assert x is not None
                 self._note_repeats(x)
                 begins = bool(is_gap[first])
                 unknown = self._unknown if begins and (first or last_s is not None) else 0
-                yield Samples(part["time"], x, v, a, x, None, begins, unknown=unknown)
+                yield Samples(part["time"], x, v, a, x, None, begins, unknown=unknown, force_N=force)
             last_s = float(t[-1])
         if self.notes.rows < 2:
             raise RecordingError(f"{self._file.path} holds fewer than two samples.")
