@@ -17,7 +17,8 @@ from haploop.protocol.ticks import DELAY
 # What says nothing of what is simulated.
 _ASIDE = ("title", "seed", "run")
 _TIMES = ("clock", "duration", "at", "delay")
-# Members with friction have the same bodies.
+# Members with friction have the same bodies; the hand may press as it likes.
+_PRESSES = "force"
 _BODIES = ("device", "hand", "transmission", "friction", "actuator", "accelerometer")
 
 
@@ -64,7 +65,9 @@ def _structure(value: Any, by_value: bool) -> Hashable:
         return value if by_value else value != 0.0
     if isinstance(value, Table | dict):
         entries = value if isinstance(value, dict) else vars(value)
-        parts = [(key, _structure(entry, by_value or key in _TIMES)) for key, entry in entries.items()]
+        parts = [
+            (key, _structure(entry, (by_value and key != _PRESSES) or key in _TIMES)) for key, entry in entries.items()
+        ]
         return value.__class__, *parts
     if isinstance(value, tuple | list):
         of_numbers = bool(value) and not isinstance(value[0], Table | dict)

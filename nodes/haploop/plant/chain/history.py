@@ -81,15 +81,14 @@ class ChainHistory(ABC):
         tail = [] if members is None else [members]
         z = chain.start_state(*tail)
         held, mode = self._begun(z)
-        held = held if members is None else np.multiply.outer(held, np.ones(members))
         self._sensor = SensedAcceleration(scene, chain, time, self.loads, members)
         at_end = np.append(held[2:], np.zeros((2, *tail)), axis=0)[None, :2]
         sensed = self._sensor.after(self._sensor.none, np.stack([z, z]), held[:1], at_end, 0)
         self.state = ChainState(z, np.zeros_like(z), held, sensed, mode)
 
     def _begun(self, z: np.ndarray) -> tuple[np.ndarray, StickSlipState | None]:
-        """Returns (what is held at the start of one run, before any command has come; the mode of friction)."""
-        return np.array([0.0, -1.0]), None
+        """Returns (what is held at the start, before any command has come, shape (columns,); the mode of friction)."""
+        return np.multiply.outer([0.0, -1.0], np.ones(z.shape[1:])), None
 
     @property
     def x(self) -> Any:

@@ -31,7 +31,7 @@ class ChainMotion(ChainHistory):
 
     def advance(self, tick: int, holds: list[Hold]) -> Any:
         interval = self._begin(holds)
-        follow(self._free, interval, 0, holds, tick, 0.0)
+        follow(self._free.held, self._free.of_interval(tick), interval, 0, holds, 0.0)
         return self._accept(tick, interval)
 
     def select(self, kept: np.ndarray) -> None:
@@ -40,16 +40,19 @@ class ChainMotion(ChainHistory):
 
 
 def follow(
-    response: ChainResponse, interval: Interval, begin: int, holds: list[Hold], tick: int, friction: Any
+    held: np.ndarray, forced: np.ndarray, interval: Interval, begin: int, holds: list[Hold], friction: Any
 ) -> None:
-    """Fills in the states of an interval from step ``begin`` on, under one transition and one friction force.
+    """Fills in the states of an interval from step ``begin`` on, where they are known.
 
     Two motions under the same load differ by a motion without any: y = z - D at any step.
 
-    The states of the interval ``tick``, in which ``holds`` are held, are known at step ``begin``; friction in N.
+    Args:
+        held: of ``ChainTransition``, the transition that holds.
+        forced: D, the forced response at every step and at the end, shape (n + 1, states).
+        holds: what is held in the interval.
+        friction: force of friction in N, the same throughout.
     """
     states, comps = interval.states, interval.comps
-    forced, held = response.of_interval(tick), response.held
     acting = np.empty((states.shape[1] + 2, *states.shape[2:]))
     y, comp = states[begin], comps[begin]
     if begin:

@@ -35,25 +35,36 @@ class FrictionMotion(RubbingHistory, ChainMotion):
         self._solver = SubstepSolver(self.chain, self._stick_slip, free, clamped, self._step_s)
 
     def advance(self, tick: int, holds: list[Hold]) -> Any:
-        interval, mode = self._begin(holds), self.state.mode
         loads = self.loads(tick * self._n, (tick + 1) * self._n + 1)
+        return self.advance_under(loads, self.forced(tick), tick, holds)
+
+    def forced(self, tick: int) -> tuple[np.ndarray, np.ndarray]:
+        """Returns the forced response of interval ``tick`` while the first body slips, and while it is stuck."""
+        return self._free.of_interval(tick), self._clamped.of_interval(tick)
+
+    def advance_under(
+        self, loads: np.ndarray, forced: tuple[np.ndarray, np.ndarray], tick: int, holds: list[Hold]
+    ) -> Any:
+        """Moves through an interval as ``advance`` does, under given loads, shape (n + 1,), and their responses."""
+        interval, mode = self._begin(holds), self.state.mode
         step = 0
         assert mode
         while step < self._n:
             if self._solver.whole_steps:
                 mode = self._stick_slip.decide_at_rest(mode, interval.states[step], interval.held[step, 0], loads[step])
-                step = self._follow(mode, interval, step, holds, tick, loads)
+                step = self._follow(mode, interval, step, holds, loads, forced[mode.is_stuck])
             if step < self._n:
                 mode = self._solve(mode, interval, step, tick, loads)
                 step += 1
         return self._accept(tick, interval, mode)
 
     def _follow(
-        self, mode: StickSlipState, interval: Interval, begin: int, holds: list[Hold], tick: int, loads: np.ndarray
-    ) -> int:
+        self, mode: StickSlipState, interval: Interval, begin: int, holds: list[Hold], loads: np.ndarray,
+        forced: np.ndarray,
+    ) -> int:  # fmt: skip
         """Follows a mode from step ``begin`` on; returns the first step in which it does not hold."""
         friction = self._stick_slip.slipping(mode)
-        follow(self._clamped if mode.is_stuck else self._free, interval, begin, holds, tick, friction)
+        follow((self._clamped if mode.is_stuck else self._free).held, forced, interval, begin, holds, friction)
         interval.held[begin:, 2:] = interval.at_ends[begin:] = friction, mode.is_stuck
         holds_through = self.holds_through(mode, interval, begin, friction, loads)
         return self._n if holds_through.all() else begin + int(holds_through.argmin())
@@ -98,7 +109,7 @@ class FrictionMotion(RubbingHistory, ChainMotion):
 
 
 class BatchFrictionMotion(RubbingHistory, ChainMotion):
-    """``FrictionMotion`` of the members of a batch with the same chain and the same friction.
+    """``FrictionMotion`` of the members of a batch with the same chain and the same friction; loads may differ.
 
     In an interval all members go as far as they would if nothing switched, those that stick and those that slip apart.
     Most do. For each of the others the interval is solved anew by the motion of one run.
@@ -112,21 +123,24 @@ class BatchFrictionMotion(RubbingHistory, ChainMotion):
         self._clamped = self._response(stuck=True)
 
     def _begun(self, z: np.ndarray) -> tuple[np.ndarray, StickSlipState | None]:
-        held, mode = self._one.state.held, self._one.state.mode
-        assert mode
-        return held, StickSlipState(*(np.full(z.shape[1:], part) for part in mode))
+        loads = np.broadcast_to(self.loads(0, 1)[0], z.shape[1:]).tolist()
+        held, modes = zip(*map(self._one.begun_under, z.T, loads), strict=True)
+        return np.stack(held, axis=-1), StickSlipState(*map(np.array, zip(*modes, strict=True)))
 
     def advance(self, tick: int, holds: list[Hold]) -> Any:
         interval, loads = self._begin(holds), self.loads(tick * self._n, (tick + 1) * self._n + 1)
+        forced = self._free.of_interval(tick), self._clamped.of_interval(tick)
         is_stuck, direction = self._decided(interval, loads)
         holds_through = np.empty(is_stuck.shape, bool)
         for kind in (False, True):
             places = np.flatnonzero(is_stuck == kind)
             if len(places):
                 mode = StickSlipState(kind, direction[places])
-                holds_through[places] = self._follow(mode, interval, places, holds, tick, loads)
+                of_these = tree_take((loads, forced[kind]), places)
+                holds_through[places] = self._follow(mode, interval, places, tree_take(holds, places), *of_these)
         for place in np.flatnonzero(~holds_through).tolist():
-            is_stuck[place], direction[place] = self._solve(interval, place, holds, tick)
+            of_this = tree_member((loads, forced), place)
+            is_stuck[place], direction[place] = self._solve(interval, place, tick, tree_member(holds, place), *of_this)
         return self._accept(tick, interval, StickSlipState(is_stuck, direction))
 
     def _begin(self, holds: list[Hold]) -> Interval:
@@ -141,25 +155,28 @@ class BatchFrictionMotion(RubbingHistory, ChainMotion):
         return is_stuck, np.where(is_at_rest, at_rest.direction, mode.direction)
 
     def _follow(
-        self, mode: StickSlipState, interval: Interval, places: np.ndarray, holds: list[Hold], tick: int,
-        loads: np.ndarray,
+        self, mode: StickSlipState, interval: Interval, places: np.ndarray, holds: list[Hold], loads: np.ndarray,
+        forced: np.ndarray,
     ) -> np.ndarray:  # fmt: skip
         """Lets some members, of which all stick or all slip, follow their mode; returns which of them it holds for."""
         some = Interval(*(np.ascontiguousarray(part[..., places]) for part in interval))
         friction = self._stick_slip.slipping(mode)
-        follow(self._clamped if mode.is_stuck else self._free, some, 0, tree_take(holds, places), tick, friction)
+        follow((self._clamped if mode.is_stuck else self._free).held, forced, some, 0, holds, friction)
         some.held[:, 2], some.held[:, 3] = friction, mode.is_stuck
         some.at_ends[:, 0], some.at_ends[:, 1] = friction, mode.is_stuck
         for part, of_these in zip(interval, some, strict=True):
             part[..., places] = of_these
         return np.all(self._one.holds_through(mode, some, 0, friction, loads), axis=0)
 
-    def _solve(self, interval: Interval, place: int, holds: list[Hold], tick: int) -> StickSlipState:
+    def _solve(
+        self, interval: Interval, place: int, tick: int, holds: list[Hold], loads: np.ndarray,
+        forced: tuple[np.ndarray, np.ndarray],
+    ) -> StickSlipState:  # fmt: skip
         """Takes one member through the interval alone; returns its mode at the end."""
         one, state = self._one, self.state
         held, mode = one.state.held, tree_member(state.mode, place)
         one.state = ChainState(state.z[:, place].copy(), state.z_comp[:, place].copy(), held, one.state.sensed, mode)
-        one.advance(tick, tree_member(holds, place))
+        one.advance_under(loads, forced, tick, holds)
         for part, of_this in zip(interval, one.take_interval(), strict=True):
             part[..., place] = of_this
         pieces = one.take_pieces()

@@ -143,7 +143,11 @@ class RubbingHistory(ChainHistory):
 
     def _begun(self, z: np.ndarray) -> tuple[np.ndarray, StickSlipState | None]:
         self._stick_slip = StickSlip(self.chain, self.friction, self._step_s)
+        return self.begun_under(z, float(self.loads(0, 1)[0]))
+
+    def begun_under(self, z: np.ndarray, load: float) -> tuple[np.ndarray, StickSlipState]:
+        """Returns (what is held at the start of one run in state z, shape (states,), under a load in N; the mode)."""
         slipping = StickSlipState(False, math.copysign(1.0, z[self._v]))
-        mode = self._stick_slip.decide_at_rest(slipping, z, 0.0, float(self.loads(0, 1)[0]))
+        mode = self._stick_slip.decide_at_rest(slipping, z, 0.0, load)
         friction = self._stick_slip.friction_at(mode, z[self._v])
         return np.array([0.0, -1.0, friction, float(mode.is_stuck)]), mode
