@@ -1,6 +1,6 @@
-"""Advice on a device: the stiffest wall it renders safely, the element to use, and the cause of buzzing beyond.
+"""Advice on a device: how stiff a wall is safe, with which element, what breaks it first, what change gains most.
 
-``command`` is ``haploop advise``; ``subject`` reads device and scene, ``tasks`` makes the runs that ``judge`` calls
-steady or not; ``largest`` searches the stiffness, ``gains`` the parameters, ``margins`` what the ``variations`` leave;
-``buzz`` switches off causes; ``advice`` holds it all together; ``report`` and ``figure`` show it.
+``command`` is ``haploop advise``; ``subject`` reads device and scene, ``cases`` says what a wall has to bear, ``loops``
+moves many at once, ``felt`` tells a buzz, ``trial`` puts these together. ``limit`` searches one limit, ``search`` the
+element; ``changes`` and ``assumptions`` alter the device; ``advice`` holds it all, ``report`` and ``figure`` show it.
 """

@@ -1,4 +1,4 @@
-"""``haploop advise``: the stiffest wall that is safe, and the cause of buzzing beyond."""
+"""``haploop advise``: the stiffest wall that is safe, what breaks it first, and what to change to gain most."""
 
 from __future__ import annotations
 
@@ -17,16 +17,17 @@ from haploop.launch.spec import make_output
 from haploop.logger.summary import finite
 from haploop.tools.advise.advice import Advice, AdviceData, advice, as_data
 from haploop.tools.advise.figure import draw
-from haploop.tools.advise.judge import Judge
-from haploop.tools.advise.report import buzz_sentences, gain_sentences, report
+from haploop.tools.advise.report import report, sentences
+from haploop.tools.advise.store import Store
 from haploop.tools.advise.subject import InvalidRequest, make_subject
+from haploop.tools.advise.trial import Trial
 from haploop.tools.cli.options import FAILED, WRONG_USE, leave, plain_errors, print_json
 from haploop.tools.cli.scenes import kinds_with, print_notes
 from haploop.tools.figure.data import FigureError
 from haploop.tools.render.terminal import console
 
-ADVICE, SCENE, FIGURE = "advice.json", "advice.toml", "figure.png"
-_STAGES = 9
+ADVICE, SCENE, FIGURE, WALLS = "advice.json", "advice.toml", "figure.png", "walls.jsonl"
+_STAGES = 7
 
 
 @dataclass(frozen=True)
@@ -57,17 +58,13 @@ def advise(request: Request, as_json: bool) -> None:
             leave(str(error), WRONG_USE)
         try_out(elements_of(asked.scene), kinds)
         print_notes(asked.scene)
-        out = make_output(request.out, Path(f"advice-{asked.name}"))
+        out = _output(request.out, asked.name)
+        store = Store(out / WALLS)
         try:
-            with (
-                _progress() as (stage, on_progress),
-                Judge(kinds, request.plugins, request.workers, on_progress) as judge,
-            ):
-                found = advice(asked, kinds, judge, stage)
+            with _progress() as (stage, on_progress), Trial(store, request.workers, on_progress) as trial:
+                found = advice(asked, trial, stage)
         except KeyboardInterrupt:
-            if request.out is None:
-                out.rmdir()
-            leave(f"Interrupted; nothing was written{f' to {out}' if request.out else ''}.", FAILED)
+            leave(f"Interrupted; the same command with --out {out} goes on.", FAILED)
     data = _write(found, out)
     if as_json:
         print_json(data)
@@ -77,10 +74,15 @@ def advise(request: Request, as_json: bool) -> None:
         print(path, file=sys.stderr)
 
 
+def _output(out: Path | None, name: str) -> Path:
+    """Returns a new directory, or one with the walls of an advice, which then goes on; OutputError for any other."""
+    if out is not None and (out / WALLS).exists():
+        return out
+    return make_output(out, Path(f"advice-{name}"))
+
+
 def _write(found: Advice, out: Path) -> AdviceData:
-    files = {}
-    because = " ".join(buzz_sentences(found.buzz)) if found.buzz else ""
-    data = as_data(found, " ".join(gain_sentences(found)), because)
+    files, data = {}, as_data(found, sentences(found))
     try:
         if found.scene:
             (out / SCENE).write_text(to_toml(found.scene.as_dict()), encoding="utf-8")

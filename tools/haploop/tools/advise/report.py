@@ -1,4 +1,4 @@
-"""The terminal report of ``haploop advise``, and its sentences: limits, causes of buzzing, and the advice, last."""
+"""The terminal report of ``haploop advise``: the answer first, then the tables it rests on."""
 
 from __future__ import annotations
 
@@ -9,200 +9,127 @@ from rich.table import Table
 from rich.text import Text
 
 from haploop.tools.advise.advice import Advice
-from haploop.tools.advise.buzz import Ablation, Buzz
-from haploop.tools.advise.gains import Gains
-from haploop.tools.advise.largest import Limit
-from haploop.tools.advise.variations import SAMPLING
-from haploop.tools.render.terminal import make_table, verdict_style
+from haploop.tools.advise.limit import Limit
+from haploop.tools.advise.search import Best
+from haploop.tools.advise.store import Failure
+from haploop.tools.render.terminal import make_facts, make_table
 from haploop.tools.render.units import amount, fixed
 
-_LONGEST_WORD = len("unidirectional")
+_NO_WALL = "none: no wall bears every case"
+_NOTHING_BREAKS = "nothing that was tried"
+# A changed limit tells something where it differs by more than how closely it is known.
+_TELLS = 1.2
+_NO_CHANGE = "no single change that was tried gains a fifth"
 _READING = (
-    "Steady: every run of the task comes to rest, at this stiffness and at softer ones; swings that die away are "
-    "followed longer, in a linear loop by the exact map. One 20 % off: the one quantity that then takes most. All 20 % "
-    "off: the combinations that are likely the worst, with the gains that bear them best."
+    "Every corner: all quantities 20 % more or less, in all combinations; a dash where a simpler element bears as "
+    "much. Changes and assumptions: with the element advised or with none, whichever bears more. These limits are to "
+    "6 to 12 %, at holds of 0.3, 1 and 3 times the task's; the safe stiffness is to 3 %, in all cases."
 )
 
-# A stiffness this much larger is worth a sentence.
-_MORE = 1.1
-# Every loop is sampled: that is named before a cause of this loop's own where it allows so many times as much.
-_STANDS_OUT = 2.0
-_NO_WALL = "No wall stays steady when delay, hand and device may each be 20 % off: add damping or cut the delay."
-_RENDER = "Render at most {} with {}: steady{}."
-_MARGIN = ", also with {} each 20 % off, in all {} combinations"
-_AS_DESCRIBED = "In the loop as described the largest steady wall with these gains is {}."
-_NO_ELEMENT = "Without any element the largest safe wall is {}."
-_TEMPTING = "Up to {} would be steady in the loop as described with {}, but with 20 % doubt only {}."
-_NEAREST = "The nearest instability is {}."
-_NO_NEAREST = "No other single change that was tried, up to five times more or less, makes it unsteady."
-_NEVER_BUZZES = "It does not buzz, nor does any wall that was tried, up to {}."
-_ISLAND = "It does not buzz at {}, but a softer wall of {} does: it stands on an island."
-_STEADY = "It does not buzz: its wall of {} could be {} times as stiff, {}, before it does."
-_CAUSE = "It buzzes because of the {}: without it the wall is steady up to {}."
-_OTHER_CAUSES = "It would also be steady without: {}."
-_OTHER_ELEMENTS = "It would also be steady without the element: {}."
-_ELEMENTS = "It is steady without the element: {}; no other single cause makes it buzz."
-_TOGETHER = "No single cause makes it buzz: it is steady, up to {}, only without {} together."
-_OTHER_SETS = "So would it be without: {}."
-_TOO_STIFF = (
-    "It buzzes even without all of these together: the wall is too stiff for what damping there is, sampled as finely "
-    "as the plant steps."
-)
-_NO_CAUSE = "Nothing that could be switched off makes it buzz."
-_HELPS = "Less is steady without: {}."
 
-
-def report(found: Advice) -> RenderableType:
-    judged = f"Judged by {found.tasks.words}; limits to {100.0 * found.tolerance:.0f} %, {found.runs} runs."
+def report(told: Advice) -> RenderableType:
+    """Makes the report, 80 columns wide; the first lines are the answer."""
+    style = "bold yellow" if told.is_ideal else "bold"
     parts: list[RenderableType] = [
-        Text(f"{found.name}: the largest steady wall", style="bold"),
-        Text(judged, style="dim"),
-        *(Text(note, style="dim") for note in found.notes),
-        gains_table(found),
-        *_islands(found.gains),
+        Text(told.headline, style=style),
+        make_facts(answer(told), least_width=11),
+        Text(),
+        *(Text(note, style="dim") for note in told.notes),
+        Text(f"Tried by {told.tried_by}, in {told.found.cases} cases; {told.runs} runs.", style="dim"),
+        _elements(told),
         Text(_READING, style="dim"),
+        _limits(told),
+        _changes(told),
     ]
-    if any(bound.applies for bounds in found.bounds for bound in bounds) or any(found.exact_N_m):
-        parts.append(bounds_table(found))
-    if found.buzz:
-        parts += [why_table(found.buzz), *map(Text, buzz_sentences(found.buzz)), Text()]
-    first, *more = gain_sentences(found)
-    return Group(*parts, Text(first, style="bold"), *map(Text, more))
+    return Group(*parts, *([_assumed(told)] if told.assumed else []))
 
 
-def gains_table(found: Advice) -> Table:
-    """Makes a row a family: stiffnesses, and below each the gains, or the change, that it comes with."""
-    table = _table("element")
-    for name in ("largest steady", "one 20 % off", "all 20 % off"):
-        table.add_column(name, justify="right")
-    for gains in found.gains:
-        worst = gains.worst
-        row = [
-            gains.family.name,
-            _with(gains.limit, gains, gains.values),
-            f"{format_limit(gains.alone[worst])}\n{worst.words}" if worst and gains.limit.stiffness_N_m else "–",
-            _with(gains.safe, gains, gains.safe_values) if found.uncertain else "–",
-        ]
-        table.add_row(*row, style="bold" if gains is found.safe.gains else "")
-    return table
-
-
-def _with(limit: Limit, gains: Gains, values: tuple[float, ...]) -> str:
-    has_values = bool(values and limit.stiffness_N_m)
-    return format_limit(limit) + f"\n{gains.family.words(values)}" * has_values
-
-
-def _islands(found: list[Gains]) -> list[Text]:
-    told = [
-        f"with {gains.family.name} up to {format_stiffness(max(gains.limit.steady_above_N_m))}"
-        for gains in found
-        if gains.limit.steady_above_N_m
+def answer(told: Advice) -> list[tuple[str, str]]:
+    """Returns the lines that a builder reads first, each with its name."""
+    found, best = told.found, told.found.advised
+    wall = format_stiffness(found.stiffness_N_m)
+    lines = [("safe up to", f"{wall} with {best.family.phrase(best.values)}" if found.stiffness_N_m else _NO_WALL)]
+    broken = found.breaks
+    lines.append(
+        ("breaks first", f"{format_stiffness(broken[0])}: {describe(broken[1])}" if broken else _NOTHING_BREAKS)
+    )
+    gains = [f"{words}: {fixed(factor, 2)} times" for words, _, factor in told.changed if factor >= _TELLS]
+    lines.append(("gains most", "; ".join(gains[:3]) or _NO_CHANGE))
+    if told.published:
+        values = [f"{format_stiffness(value.stiffness_N_m)} ({value.what})" for value in told.published]
+        lines.append(("published", "; ".join(values)))
+    moving = [
+        f"{of.key} halved: {format_limit(half)}, doubled: {format_limit(double)}"
+        for of, half, double in told.assumed
+        if _moves(half, double, best.nominal)
     ]
-    return [Text(f"Some stiffer walls are steady all the same: {', '.join(told)}.", style="dim")] if told else []
-
-
-def bounds_table(found: Advice) -> Table:
-    """Makes a row an analytic bound, a column a family; only families of which a bound speaks."""
-    columns = [
-        index for index, bounds in enumerate(found.bounds)
-        if any(bound.applies for bound in bounds) or found.exact_N_m[index] is not None
-    ]  # fmt: skip
-    table = _table("analytic, for comparison", "of")
-    for index in columns:
-        gains = found.gains[index]
-        table.add_column(f"{gains.family.name}\n{gains.family.words(gains.values)}", justify="right")
-    rows = [("exact map, ρ(M) = 1", "stability", [found.exact_N_m[index] for index in columns])]
-    for bounds in zip(*(found.bounds[index] for index in columns), strict=True):
-        rows.append((bounds[0].name, bounds[0].kind, [bound.stiffness_N_m for bound in bounds]))
-    for name, kind, stiffnesses in rows:
-        if any(value is not None for value in stiffnesses):
-            cells = ["–" if value is None else format_stiffness(value) if value else "none" for value in stiffnesses]
-            table.add_row(name, kind, *cells)
-    return table
-
-
-def why_table(buzz: Buzz) -> RenderableType:
-    """Makes a row a cause."""
-    state = "is steady" if buzz.steady else "buzzes"
-    head = f"{buzz.scene.title}: a wall of {format_stiffness(buzz.stiffness_N_m)} {state}"
-    table = _table("without", "instead")
-    table.add_column("verdict", no_wrap=True)
-    for name in ("swing", "largest\nsteady"):
-        table.add_column(name, justify="right", no_wrap=True)
-    table.add_column("its part\nof the leak", justify="right")
-    table.add_row("as it is", "", *_ran(buzz), "")
-    table.add_section()
-    for one in [*buzz.alone, *buzz.together, *([buzz.without_all] if buzz.without_all else [])]:
-        words = one.instead if len(one.without) == 1 else ""
-        share = "–" if one.leak_share is None else f"{100 * one.leak_share:.0f} %, {amount(one.leak_J, 'J')}"
-        table.add_row(" and ".join(one.without), words, *_ran(one), share)
-    return Group(Text(), Text(head, style="bold"), table)
-
-
-def _ran(run: Buzz | Ablation) -> tuple[Text, str, str]:
-    """Returns verdict, swing peak to peak (0 where it is less than an atom) and largest steady stiffness of a row."""
-    word = "dies away" if run.steady and run.verdict != "steady" else run.verdict
-    verdict = Text(word, style=verdict_style("steady" if run.steady else run.verdict))
-    swing = amount(run.oscillation_m if run.oscillation_m >= 1e-10 else 0.0, "m")
-    return verdict, swing, format_limit(run.largest) if run.largest else "–"
-
-
-def _table(*names: str) -> Table:
-    return make_table(*names, padding=(0, 1, 0, 0), first_width=_LONGEST_WORD)
-
-
-def gain_sentences(found: Advice) -> list[str]:
-    """Makes the advice in sentences: what to render, what else is known of it, and the nearest instability."""
-    safe, best = found.safe, found.safe.gains
-    if not safe.stiffness_N_m:
-        return [_NO_WALL]
-    margin = _MARGIN.format(", ".join(found.uncertain), safe.corners) if found.uncertain else ""
-    nominal = best.tried[best.safe_values]
-    said = [
-        _RENDER.format(format_stiffness(safe.stiffness_N_m), best.family.phrase(best.safe_values), margin),
-        _AS_DESCRIBED.format(format_limit(nominal)),
-    ]
-    if best is not found.gains[0]:
-        said.append(_NO_ELEMENT.format(format_limit(found.gains[0].safe)))
-    most = max((gains for gains in found.gains if gains is not best), key=lambda gains: gains.limit.stiffness_N_m)
-    if most.limit.stiffness_N_m > _MORE * nominal.stiffness_N_m:
-        said.append(
-            _TEMPTING.format(format_limit(most.limit), most.family.phrase(most.values), format_limit(most.safe))
+    if told.assumed:
+        names = ", ".join(of.key for of, _, _ in told.assumed)
+        lines.append(
+            ("rests on", "; ".join(moving) if moving else f"assumed {names}, none of which moves it by a fifth")
         )
-    return [*said, _NEAREST.format(safe.nearest.words) if safe.nearest else _NO_NEAREST]
+    if told.own:
+        own, failure = told.own
+        does = f"buzzes: {describe(failure)}" if failure else "bears every case"
+        lines.append(("its own wall", f"{format_stiffness(own)} {does}"))
+    return lines
 
 
-def buzz_sentences(buzz: Buzz) -> list[str]:
-    """Makes the explanation in sentences: the cause of the buzzing, or the distance from it."""
-    wall, limit = format_stiffness(buzz.stiffness_N_m), buzz.largest
-    if buzz.steady:
-        if not math.isfinite(limit.not_steady_N_m):
-            return [_NEVER_BUZZES.format(format_stiffness(limit.stiffness_N_m))]
-        if limit.stiffness_N_m < buzz.stiffness_N_m:
-            return [_ISLAND.format(wall, format_stiffness(limit.not_steady_N_m))]
-        times = fixed(limit.stiffness_N_m / buzz.stiffness_N_m, 2)
-        return [_STEADY.format(wall, times, format_limit(limit))]
-    cures = _ranked([one for one in buzz.alone if one.steady and not one.is_element])
-    elements = _ranked([one for one in buzz.alone if one.steady and one.is_element])
-    sets = _ranked(list(buzz.together))
-    if cures:
-        said = [_CAUSE.format(cures[0].without[0], _up_to(cures[0]))]
-        others = [one for one in cures[1:] if one.largest and one.largest.stiffness_N_m > _MORE * buzz.stiffness_N_m]
-        if others:
-            said.append(_OTHER_CAUSES.format(_with_limits(others)))
-        if elements:
-            said.append(_OTHER_ELEMENTS.format(_with_limits(elements)))
-    elif elements:
-        said = [_ELEMENTS.format(_with_limits(elements))]
-    elif sets:
-        said = [_TOGETHER.format(_up_to(sets[0]), " and ".join(sets[0].without))]
-        if sets[1:]:
-            said.append(_OTHER_SETS.format("; ".join(" and ".join(one.without) for one in sets[1:])))
-    else:
-        said = [_TOO_STIFF if buzz.without_all else _NO_CAUSE]
-    helps = [one.without[0] for one in buzz.alone if one.largest and not one.steady
-             and one.largest.stiffness_N_m * _MORE < limit.stiffness_N_m]  # fmt: skip
-    return [*said, _HELPS.format(", ".join(helps))] if helps else said
+def sentences(told: Advice) -> list[str]:
+    """Returns headline and answer as lines of text."""
+    return [told.headline, *(f"{name}: {words}." for name, words in answer(told))]
+
+
+def describe(failure: Failure) -> str:
+    """Describes what a wall does in the case that it does not bear."""
+    if failure.gone:
+        return f"the device leaves its limits; {failure.case}"
+    felt = "force" if failure.by_force else "motion"
+    swing = f"{amount(failure.force_N, 'N', 2)} and {amount(failure.motion_m, 'm', 2)} peak to peak"
+    return f"{swing} at {failure.frequency_Hz:.0f} Hz, felt as {felt}; {failure.case}"
+
+
+def _moves(half: Limit, double: Limit, nominal: Limit) -> bool:
+    ends = [limit.stiffness_N_m for limit in (half, double)]
+    return min(ends) * _TELLS < nominal.stiffness_N_m or max(ends) > _TELLS * nominal.stiffness_N_m
+
+
+def _elements(told: Advice) -> Table:
+    table = make_table("element", "parameter", "as described", "every corner", numbers=("as described", "every corner"))
+    for best in told.found.bests:
+        is_advised = best is told.found.advised
+        safe = format_limit(best.safe) if best.safe else "–"
+        row = (best.family.name, best.family.words(best.values), format_limit(best.nominal) + _island(best), safe)
+        table.add_row(*row, style="bold" if is_advised else "")
+    return table
+
+
+def _island(best: Best) -> str:
+    return "*" if best.nominal.borne_above_N_m else ""
+
+
+def _limits(told: Advice) -> Table:
+    table = make_table("limit or published value", "with", "wall", numbers=("wall",))
+    for row in told.formulas:
+        value = format_stiffness(row.stiffness_N_m)
+        table.add_row(f"{row.formula}\n{row.source}", f"{row.numbers}; beyond, it {row.means}", value)
+    for value in told.published:
+        table.add_row(value.what, value.source, format_stiffness(value.stiffness_N_m))
+    return table
+
+
+def _changes(told: Advice) -> Table:
+    table = make_table("one change, or an ideal", "limit", "times", numbers=("limit", "times"))
+    for words, limit, factor in (*told.changed, *told.without):
+        table.add_row(words, format_limit(limit), fixed(factor, 2), style="bold" if factor >= _TELLS else "")
+    return table
+
+
+def _assumed(told: Advice) -> Table:
+    table = make_table("assumed of the device", "why", "halved", "doubled", numbers=("halved", "doubled"))
+    for of, half, double in told.assumed:
+        table.add_row(of.key, of.words, format_limit(half), format_limit(double))
+    return table
 
 
 def format_stiffness(stiffness_N_m: float) -> str:
@@ -215,26 +142,8 @@ def format_stiffness(stiffness_N_m: float) -> str:
 
 
 def format_limit(limit: Limit) -> str:
-    """Formats a limit: ``none`` where no wall is steady, ``over ...`` where no end was found."""
+    """Formats a limit: ``none`` where no wall bears it, ``over ...`` where no end was found."""
     if not limit.stiffness_N_m:
         return "none"
-    over = "over " if not math.isfinite(limit.not_steady_N_m) else ""
+    over = "over " if not math.isfinite(limit.fails_N_m) else ""
     return over + format_stiffness(limit.stiffness_N_m)
-
-
-def _ranked(some: list[Ablation]) -> list[Ablation]:
-    """Sorts by the stiffest steady wall; sampling, which every loop has, counts only where it stands out."""
-
-    def stands_out(one: Ablation) -> float:
-        limit = one.largest.stiffness_N_m if one.largest else 0.0
-        return limit / _STANDS_OUT if SAMPLING in one.without else limit
-
-    return sorted(some, key=stands_out, reverse=True)
-
-
-def _with_limits(some: list[Ablation]) -> str:
-    return ", ".join(f"{one.without[0]} (up to {_up_to(one)})" for one in some)
-
-
-def _up_to(one: Ablation) -> str:
-    return format_limit(one.largest) if one.largest else "this"

@@ -14,7 +14,8 @@ from haploop.launch.scene.layers import Layers, read_layers
 from haploop.launch.scene.mistakes import nearest
 from haploop.protocol.changes import Change, at_work
 from haploop.protocol.scene.scene import Scene
-from haploop.tools.advise.tasks import MOST_DELAY_S
+from haploop.tools.advise.assumptions import Assumed, assumptions
+from haploop.tools.advise.cases import MOST_DELAY_S
 from haploop.tools.cost.grid import scenes_folder
 
 # The only measured hand there is, along the axis of Choi et al. 2022.
@@ -44,13 +45,15 @@ class Subject:
     Attributes:
         scene: resolved; events that change it are taken as done from the start.
         has_task: whether it came with a task of its own; a preset has none.
-        notes: what was assumed, one sentence each.
+        notes: what was taken, one sentence each.
+        assumed: numbers of the device that its file assumes.
     """
 
     name: str
     scene: Scene
     has_task: bool
     notes: tuple[str, ...]
+    assumed: tuple[Assumed, ...] = ()
 
 
 def make_subject(
@@ -87,7 +90,7 @@ def make_subject(
     if scene.event:
         scene = apply_events(scene)
         notes.append("What the scene's events change is taken as changed from the start.")
-    return Subject(path.stem, scene, not is_preset, tuple(notes))
+    return Subject(path.stem, scene, not is_preset, tuple(notes), assumptions(path))
 
 
 def apply_events(scene: Scene) -> Scene:

@@ -110,11 +110,14 @@ def advise(
     plugin: Plugin = None,
     workers: Annotated[int | None, typer.Option(help="processes [as many as cores]", show_default=False)] = None,
     out: Annotated[
-        Path | None, typer.Option(help="directory to write to, new or empty [runs/advice-DEVICE-TIME]")
+        Path | None, typer.Option(help="directory; one of an advice that was stopped goes on [runs/advice-DEVICE-TIME]")
     ] = None,
     json: Json = False,
 ) -> None:
-    """Say which wall a device can render safely, with which element, and why it buzzes beyond."""
+    """Say how stiff a wall a device can render safely, with which element, what breaks it, and what would gain most.
+
+    Can be stopped; the same command with --out DIR, the directory of the first, goes on.
+    """
     from haploop.tools.advise.command import Request
     from haploop.tools.advise.command import advise as give
 

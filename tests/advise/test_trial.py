@@ -1,0 +1,115 @@
+"""Many loops side by side do what one run does, and a wall is tried in all its cases."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from haploop.plant.chain.chain import Chain
+from haploop.protocol.scene.paths import with_value
+from haploop.protocol.scene.scene import ElementTable, Scene
+from haploop.tools.advise.cases import Case, make_loop
+from haploop.tools.advise.loops import LoneLoop, Loops, make_loops
+from haploop.tools.advise.store import Store, Tried
+from haploop.tools.advise.subject import make_subject
+from haploop.tools.advise.trial import Trial
+from haploop.tools.linear.one_tick import OneTickMap
+from helpers.scenes.least import KINDS, scene
+
+
+def loop_of(device: str, *overrides: str) -> Scene:
+    asked = make_subject(device, None, None, None, overrides, KINDS)
+    return make_loop(asked.scene, asked.has_task)
+
+
+def placed(loop: Scene, case: Case, stiffness: float, *elements: ElementTable) -> Scene:
+    return replace(with_value(case.scene(loop), "wall.stiffness", stiffness), dissipation=elements)
+
+
+DAMPING = ElementTable(name="damping", parameters={"damping": 1.0})
+
+
+def test_without_friction_loops_side_by_side_have_the_bits_of_each_alone():
+    loop = replace(loop_of("touch"), friction=None)
+    scenes = [placed(loop, Case(hold), k, DAMPING) for hold in (0.3, 1.0) for k in (300.0, 900.0)]
+    together = Loops(scenes, KINDS).go_on(400)
+    for place, one in enumerate(scenes):
+        alone = LoneLoop(one, KINDS).go_on(400)
+        assert np.array_equal(together.x[:, place], alone.x[:, 0])
+        assert np.array_equal(together.command[:, place], alone.command[:, 0])
+
+
+def test_projected_friction_follows_the_exact_one_and_ever_closer_with_shorter_steps():
+    def apart(rate: int) -> float:
+        loop = loop_of("premium15", f"clock.plant_rate={rate}", "encoder.resolution=1e-9")
+        scenes = [placed(loop, Case(hold), 1500.0, DAMPING) for hold in (0.5, 1.0)]
+        together = Loops(scenes, KINDS).go_on(300)
+        alone = [LoneLoop(one, KINDS).go_on(300).x[:, 0] for one in scenes]
+        return float(max(np.abs(together.x[:, place] - x).max() for place, x in enumerate(alone)))
+
+    coarse, fine = apart(10_000), apart(80_000)
+    assert coarse < 5e-6, "of a motion of a millimetre"
+    assert fine < 0.3 * coarse
+
+
+def test_what_sticks_under_projected_friction_does_not_move_by_a_bit():
+    loop = loop_of("touch")
+    seen = Loops([placed(loop, Case(1.0, sway=0.0), 1000.0)], KINDS).go_on(2000)
+    assert np.ptp(seen.x[-500:]) == 0.0
+
+
+def test_members_may_differ_in_bodies_friction_holds_walls_and_gains_and_be_one_array():
+    loop = loop_of("premium15_cable")
+    corner = (("device mass", 1.2), ("hand damping", 0.8))
+    rubs = with_value(loop, "friction.kinetic", 0.1)
+    some = [placed(loop, Case(0.3), 500.0, DAMPING), placed(loop, Case(3.0, corner), 900.0, DAMPING),
+            placed(rubs, Case(1.0), 700.0, replace(DAMPING, parameters={"damping": 2.0}))]  # fmt: skip
+    [(group, loops)] = make_loops(some, KINDS)
+    assert group == [0, 1, 2]
+    together = loops.go_on(200)
+    for place, one in enumerate(some):
+        assert np.allclose(Loops([one], KINDS).go_on(200).x[:, 0], together.x[:, place], rtol=0.0, atol=1e-15)
+
+
+def test_a_loop_with_jitter_runs_by_itself_and_is_judged_all_the_same():
+    loop = loop_of("premium15_cable", "jitter.kind=uniform", "jitter.most=0.001")
+    with Trial(Store()) as trial:
+        soft, stiff = trial.failures(loop, [Tried(200.0), Tried(6000.0)], [Case(1.0)])
+    assert soft is None
+    assert stiff
+
+
+def test_above_what_friction_bridges_a_wall_chatters_and_below_it_rests():
+    loop = loop_of("premium15")  # 2 f_c / q = 3.34 N/mm
+    with Trial(Store()) as trial:
+        below, above = trial.failures(loop, [Tried(3100.0), Tried(3900.0)], [Case(hold) for hold in (0.3, 1.0, 3.0)])
+    assert below is None
+    assert above
+    assert above.by_force
+
+
+def test_a_hold_of_the_task_alone_does_not_tell_a_wall_that_buzzes_at_another():
+    loop = loop_of("omega3")
+    with Trial(Store()) as trial:
+        [at_its_own] = trial.failures(loop, [Tried(20_000.0)], [Case(1.0)])
+        [at_three_times] = trial.failures(loop, [Tried(20_000.0)], [Case(3.0)])
+    assert at_its_own is None
+    assert at_three_times
+
+
+@pytest.mark.parametrize("factor", [0.8, 1.15])
+def test_where_the_loop_is_linear_a_wall_is_borne_below_the_limit_of_the_exact_map_and_not_above(factor):
+    read = scene(
+        device={"mass": 0.05, "damping": 1.0}, hand={"stiffness": 20.0, "damping": 0.5},
+        clock={"round_trip_delay": 0.002}, wall={"position": 0.0, "stiffness": 100.0},
+    )  # fmt: skip
+    limit = OneTickMap.from_scene(read).stiffness_limit()
+    with Trial(Store()) as trial:
+        [failure] = trial.failures(make_loop(read, has_task=False), [Tried(factor * limit)], [Case(1.0)])
+    assert (failure is None) == (factor < 1.0)
+
+
+def test_the_hands_share_of_a_corner_reaches_the_bodies():
+    loop = loop_of("premium15")
+    changed = Case(1.0, (("hand mass", 0.8),)).scene(loop)
+    assert Chain.from_scene(changed).masses_kg[-1] == pytest.approx(0.8 * 0.269)

@@ -1,0 +1,152 @@
+"""The cases a wall has to bear: how hard the hand holds it and sways, and loops that are not quite as described."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+from haploop.launch.plan.effects import all_effects
+from haploop.protocol.scene.hand_force import Constant, Sine
+from haploop.protocol.scene.paths import value_at, with_value
+from haploop.protocol.scene.scene import Hand, Scene, Wall
+from haploop.tools.render.units import amount
+
+# The device meets the wall at this speed, a firm tap.
+TAP_M_S = 0.2
+# The hand presses with this, or with this share of what the actuator can give where that is less.
+PRESS_N, OF_THE_ACTUATOR = 1.0, 0.3
+# Holds as multiples of the task's, and those that are tried first.
+HOLDS = (0.3, 0.5, 0.7, 1.0, 1.5, 2.0, 3.0)
+FIRST_HOLDS = (0.3, 1.0, 3.0)
+# The hand sways by this share of its hold, this often a second, and a run lasts so long.
+SWAY, SWAY_HZ, LASTS_S = 0.3, 0.5, 2.75
+# A loop that is later than this has no answer in a reasonable time; a run lasts so many round trips at least.
+MOST_DELAY_S, ROUND_TRIPS = 0.5, 60
+# By so much may delay, device mass and the hand be other than described.
+SHARE = 0.2
+DELAY = "delay"
+# What else is uncertain, and its key; effects such as a grip and a motor have keys that go with it.
+_KEYS = {
+    "device mass": "device.mass",
+    "hand mass": "hand.mass",
+    "hand damping": "hand.damping",
+    "hand stiffness": "hand.stiffness",
+}
+_STAYS = (None, "constant", "ramp", "step", "minimum-jerk")
+
+Corner = tuple[tuple[str, float], ...]
+
+
+@dataclass(frozen=True)
+class Case:
+    """One of the conditions under which a wall is tried.
+
+    Attributes:
+        hold: the hand's mean force as a multiple of the task's.
+        corner: quantities and what each is multiplied by; empty for the loop as described.
+        sway: share of the hold by which the hand sways.
+        sway_Hz: how often.
+        tap_m_s: speed at which device and hand meet the wall.
+    """
+
+    hold: float
+    corner: Corner = ()
+    sway: float = SWAY
+    sway_Hz: float = SWAY_HZ
+    tap_m_s: float = TAP_M_S
+
+    @property
+    def words(self) -> str:
+        """The case in words: ``a hold of 3 times the task's, 20 % less device mass``."""
+        changed = [f"{abs(factor - 1.0) * 100:.0f} % {'more' if factor > 1.0 else 'less'} {name}"
+                   for name, factor in self.corner if factor != 1.0]  # fmt: skip
+        return ", ".join([f"hold {self.hold:g} x the task's", *changed])
+
+    def scene(self, loop: Scene) -> Scene:
+        """Returns the scene of this case, with a wall of 1 N/m, made of a loop of ``make_loop``."""
+        scene, mean_N = scale_quantities(loop, dict(self.corner)), -self.hold * hold_N(loop)
+        frequency_Hz = self.sway_Hz / slowness(loop)
+        force = Sine(amplitude=self.sway * mean_N, frequency=frequency_Hz, offset=mean_N)
+        return replace(
+            scene,
+            duration=slowness(loop) * LASTS_S,
+            device=replace(scene.device, position=2e-4, velocity=-self.tap_m_s),
+            hand=replace(scene.hand or Hand(), rest=0.0, force=force),
+            wall=Wall(position=0.0, stiffness=1.0),
+        )
+
+
+def make_loop(scene: Scene, has_task: bool) -> Scene:
+    """Returns the loop of a resolved scene, of which the cases are made: its hand's force is what the wall then bears.
+
+    That of a task that stays, less what the hand's own spring takes; 1 N without one, or 30 % of what the actuator
+    gives where that is less.
+    """
+    kind, most_N = value_at(scene, "hand.force.kind"), value_at(scene, "actuator.saturation")
+    force_N = min(PRESS_N, OF_THE_ACTUATOR * (math.inf if most_N is None else most_N))
+    hand = scene.hand or Hand()
+    if has_task and scene.wall and kind in _STAYS[1:]:
+        inward = -1.0 if scene.wall.occupies == "below" else 1.0
+        net_N = inward * (value_at(scene, "hand.force.value") + hand.stiffness * (hand.rest - scene.wall.position))
+        force_N = net_N if net_N > 0.0 else force_N
+    held = replace(hand, force=Constant(value=force_N))
+    return replace(with_value(scene, "run.log", "none"), title="", event=(), hand=held)
+
+
+def hold_N(loop: Scene) -> float:
+    """Returns the force with which the task holds the wall."""
+    return value_at(loop, "hand.force.value")
+
+
+def slowness(loop: Scene) -> float:
+    """Returns how many times as long as usual everything takes, where the delay is long."""
+    return max(1.0, ROUND_TRIPS * loop.clock.round_trip_delay / LASTS_S)
+
+
+def corners(loop: Scene) -> list[Corner]:
+    """Returns every combination of all quantities a fifth less or more, first the likely worst: all of them less."""
+    names = uncertain_quantities(loop)
+    factors = itertools.product((1.0 - SHARE, 1.0 + SHARE), repeat=len(names))
+    return [tuple(zip(names, some, strict=True)) for some in factors] if names else []
+
+
+def uncertain_quantities(loop: Scene) -> list[str]:
+    """Returns the quantities that can be a fifth more or less: those that are there and not 0."""
+    found = [DELAY] if loop.clock.round_trip_delay else []
+    return found + [name for name in _KEYS if any(value_at(loop, key) for key in _keys_of(name))]
+
+
+def scale_quantities(scene: Scene, factors: Mapping[str, float]) -> Scene:
+    """Returns the scene with these quantities multiplied; a delay is rounded to whole plant steps, by at least one."""
+    for name, factor in factors.items():
+        if name == DELAY:
+            scene = with_value(scene, "clock.round_trip_delay", delay_s(scene, factor))
+            continue
+        for key in _keys_of(name):
+            if value := value_at(scene, key):
+                scene = with_value(scene, key, value * factor)
+    return scene
+
+
+def delay_s(scene: Scene, factor: float) -> float:
+    """Returns the delay multiplied and rounded to whole plant steps, but not to what it was, s."""
+    rate = scene.clock.plant_rate
+    steps = round(scene.clock.round_trip_delay * rate)
+    rounded = round(steps * factor)
+    if rounded == steps and factor != 1.0:
+        rounded += 1 if factor > 1.0 else -1
+    return rounded / rate
+
+
+def task_words(loop: Scene) -> str:
+    """Returns what a wall is tried by, in one phrase."""
+    return (
+        f"a tap at {TAP_M_S:g} m/s into holds of {HOLDS[0]:g} to {HOLDS[-1]:g} times {amount(hold_N(loop), 'N')}, that "
+        f"sway by {SWAY * 100:.0f} % at {SWAY_HZ / slowness(loop):.2g} Hz"
+    )
+
+
+def _keys_of(quantity: str) -> list[str]:
+    return [_KEYS[quantity], *(e.scaled_with[quantity] for e in all_effects() if quantity in e.scaled_with)]

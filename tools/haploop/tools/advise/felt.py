@@ -1,0 +1,101 @@
+"""Whether a stretch of a run buzzes: it goes to and fro, and a hand feels that, by its motion or by its force."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from haploop.launch.stability.traces import RIPPLE_ABOVE_HZ, smallest_felt_m
+from haploop.plant.chain.chain import Chain
+from haploop.protocol.scene.scene import Scene
+
+# So many turns within a stretch are a buzz; what only follows a hand that sways turns once.
+TURNS = 4
+# Turns of less than this are rounding: an atom is as wide.
+_LEAST_M = 1e-10
+
+# From frequencies in Hz to what a hand feels at them.
+Threshold = Callable[[np.ndarray], np.ndarray]
+
+
+class Buzz(NamedTuple):
+    """How a member went to and fro in a stretch, all arrays of shape (members,).
+
+    Attributes:
+        turns: times that the measured position (the true one without an encoder) changed its direction.
+        motion_m, force_N: what position and command swing by, peak to peak, see ``_ripple``.
+        frequency_Hz: of whichever is felt more.
+        times_felt: the larger of both as a multiple of what is felt; 0 where it does not go to and fro.
+        by_force: whether that is the force.
+    """
+
+    turns: np.ndarray
+    motion_m: np.ndarray
+    force_N: np.ndarray
+    frequency_Hz: np.ndarray
+    times_felt: np.ndarray
+    by_force: np.ndarray
+
+
+def felt_m(frequency_Hz: np.ndarray) -> np.ndarray:
+    """Returns the narrowest swing that is felt, peak to peak, m (Israr, Choi and Tan 2006)."""
+    return 2.0 * np.vectorize(smallest_felt_m)(frequency_Hz)
+
+
+def felt_force_N(scene: Scene) -> Threshold:
+    """Makes the threshold of the force: a command that would move device and hand, were there no friction, so far that
+    it is felt. |F| = felt / |x / F|, with x / F of the scene's own chain of bodies at the encoder.
+
+    No threshold of force is published for a stylus; this is that of the motion, taken through the device.
+    """
+    chain = Chain.from_scene(scene)
+    size = len(chain.states)
+    rates = chain.rates().astype(float)
+    a, b = rates[:, :size], rates[:, size]
+
+    def threshold(frequency_Hz: np.ndarray) -> np.ndarray:
+        w = 2j * np.pi * np.maximum(frequency_Hz, 1.0)
+        x = np.linalg.solve(w[:, None, None] * np.eye(size) - a, np.broadcast_to(b[:, None], (len(w), size, 1)))
+        return felt_m(frequency_Hz) / np.abs(x[:, 0, 0])
+
+    return threshold
+
+
+def buzz(x: np.ndarray, measured: np.ndarray, command: np.ndarray, rate: float, felt_N: Threshold) -> Buzz:
+    """Measures a stretch of ticks; arrays of shape (ticks, members).
+
+    A hand that presses harder moves on, and a coarse encoder makes a staircase of its wall's force; neither goes to and
+    fro. So the measured position has to turn ``TURNS`` times before anything counts.
+    """
+    turns = _turns(measured)
+    motion, f_motion = _ripple(x, rate)
+    force, f_force = _ripple(command, rate)
+    by_motion, by_force = motion / felt_m(f_motion), force / felt_N(f_force)
+    strongest = np.where(turns >= TURNS, np.maximum(by_motion, by_force), 0.0)
+    frequency = np.where(by_force > by_motion, f_force, f_motion)
+    return Buzz(turns, motion, force, frequency, strongest, by_force > by_motion)
+
+
+def _turns(u: np.ndarray) -> np.ndarray:
+    """Counts the changes of direction of each column; steps of less than rounding are none."""
+    move = np.diff(u, axis=0)
+    direction = np.where(np.abs(move) > _LEAST_M, np.sign(move), 0.0)
+    rows = np.arange(len(direction))[:, None]
+    last = np.maximum.accumulate(np.where(direction != 0.0, rows, -1), axis=0)
+    held = np.where(last >= 0, np.take_along_axis(direction, np.maximum(last, 0), axis=0), 0.0)
+    return (held[1:] * held[:-1] < 0.0).sum(axis=0)
+
+
+def _ripple(u: np.ndarray, rate: float) -> tuple[np.ndarray, np.ndarray]:
+    """Returns what each column swings by, peak to peak, faster than ``TURNS`` turns a stretch, and how fast in Hz.
+
+    The column's parabola is taken off first: a hand that sways would leave steps at the ends.
+    """
+    u = np.where(np.isfinite(u).all(axis=0), u, 0.0)
+    parabolas = np.linalg.qr(np.vander(np.linspace(-1.0, 1.0, len(u)), 3))[0]
+    u = u - parabolas @ (parabolas.T @ u)
+    spectrum, frequencies = np.fft.rfft(u, axis=0), np.fft.rfftfreq(len(u), 1.0 / rate)
+    spectrum[frequencies < min(RIPPLE_ABOVE_HZ, TURNS / 2.0 * rate / len(u))] = 0.0
+    return np.ptp(np.fft.irfft(spectrum, len(u), axis=0), axis=0), frequencies[np.abs(spectrum).argmax(axis=0)]

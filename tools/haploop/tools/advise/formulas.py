@@ -1,0 +1,59 @@
+"""Known formulas for the stiffest wall, each with this device's numbers, one by one."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import NamedTuple
+
+from haploop.plant.chain.chain import Chain
+from haploop.protocol.scene.scene import Scene
+from haploop.tools.linear.linearity import installed_kinds, is_linear
+from haploop.tools.linear.one_tick import NeverStable, OneTickMap
+from haploop.tools.render.units import amount
+
+ABBOTT = "Abbott & Okamura 2005"
+
+
+class Formula(NamedTuple):
+    """A formula with its numbers.
+
+    Attributes:
+        formula, numbers, means: in the field's letters, with this device's numbers, and what happens beyond.
+        stiffness_N_m: infinite where it sets no limit.
+    """
+
+    formula: str
+    numbers: str
+    means: str
+    source: str
+    stiffness_N_m: float
+
+
+def formulas(loop: Scene) -> list[Formula]:
+    """Returns the formulas for a wall alone on this loop.
+
+    Both halves of Abbott and Okamura (2005): friction has to bridge one step of the encoder's force, or the wall has no
+    place to rest; and viscous damping has to take what sampling generates, or friction or the hand must. Then the exact
+    map of one tick of the same loop without encoder and friction, where it is linear.
+    """
+    q = loop.encoder.resolution if loop.encoder else 0.0
+    friction = loop.friction.kinetic if loop.friction else 0.0
+    chain, period_s = Chain.from_scene(loop), 1.0 / loop.clock.control_rate
+    b = next(b for name, (body, b) in chain.grounded.items() if body == 0 and name != "hand")
+    found = [
+        Formula("K q <= 2 f_c", f"2 x {amount(friction, 'N')} / {amount(q, 'm')}" if q else "no encoder",
+                "chatters between two counts", ABBOTT, 2.0 * friction / q if q else math.inf),
+        Formula("K <= 2 b / T", f"2 x {b:.3g} N s/m / {amount(period_s, 's')}",
+                "generates energy; friction or hand must take it", ABBOTT, 2.0 * b / period_s),
+    ]  # fmt: skip
+    smooth = replace(loop, encoder=None, friction=None, noise=None, actuator=None, dissipation=())
+    kinds = installed_kinds()
+    if is_linear(smooth, kinds):
+        try:
+            limit = OneTickMap.from_scene(smooth, kinds).stiffness_limit()
+        except NeverStable:
+            limit = 0.0
+        found.append(Formula("rho(M) = 1", "exact map of a tick", "grows, but for encoder and friction",
+                             "this loop, linear", limit))  # fmt: skip
+    return found

@@ -1,0 +1,221 @@
+"""The search of the advice: which element with which parameter, how stiff, and that it withstands an attack."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+from haploop.launch.stability.judge import judge_scene
+from haploop.protocol.scene.scene import Scene
+from haploop.tools.advise.cases import FIRST_HOLDS, HOLDS, Case, corners
+from haploop.tools.advise.families import (
+    BOTH,
+    DAMPING,
+    FAMILIES,
+    NOTHING,
+    SINGLE,
+    UNIDIRECTIONAL,
+    Family,
+    Values,
+    beside,
+    first_choices,
+    together,
+)  # fmt: skip
+from haploop.tools.advise.limit import LEAST_N_M, Limit, Query, ladder, limits
+from haploop.tools.advise.store import Failure, Tried
+from haploop.tools.advise.trial import Trial
+from haploop.tools.linear.linearity import installed_kinds
+
+# How closely limits are found while elements are compared, and that of the one advised.
+_ROUGH, _FINE = 0.12, 0.03
+# An element that allows no more than this much beyond a simpler one is not worth having.
+WORTH = 1.1
+# Softer walls that have to bear everything, too, as shares of the limit.
+_SOFTER = (0.8, 0.62, 0.48, 0.35, 0.25, 0.15, 0.08, 0.03)
+# A wall that does not withstand the attack is lowered by this, so often at most.
+_LOWER, _TIMES = 0.96, 40
+# A slow press, and the fastest of the taps on a wall that were measured (0.20 to 0.24 m/s).
+_SPEEDS = (1e-3, 0.24)
+_STEADY = ("steady", "no-contact")
+
+Choice = tuple[Family, Values]
+
+
+@dataclass(frozen=True)
+class Best:
+    """The best of one family.
+
+    Attributes:
+        nominal: the limit of the loop as described, at the holds tried first.
+        safe: the limit in every corner, where the family came that far; None where a simpler one bears as much.
+    """
+
+    family: Family
+    values: Values
+    nominal: Limit
+    safe: Limit | None = None
+
+
+@dataclass(frozen=True)
+class Found:
+    """What the search found.
+
+    Attributes:
+        bests: of every family.
+        advised: the best of the family to use.
+        stiffness_N_m: that withstood the attack, rounded down; 0 where none does.
+        breaks: the softest wall known not to bear everything, and what it does; None where none was found.
+        cases: how many it was tried in, attack included.
+    """
+
+    bests: tuple[Best, ...]
+    advised: Best
+    stiffness_N_m: float
+    breaks: tuple[float, Failure] | None
+    cases: int
+
+
+def search(loop: Scene, trial: Trial, stage: Callable[[str], object] = lambda name: None) -> Found:
+    """Finds the element that bears the stiffest wall in all cases, and how stiff."""
+    first = tuple(Case(hold) for hold in FIRST_HOLDS)
+
+    def nominal(choices: Sequence[Choice], rungs: tuple[float, ...]) -> dict[Choice, Limit]:
+        queries = [Query(loop, family.elements(values), first, rungs) for family, values in choices]
+        return dict(zip(choices, limits(trial, queries, _ROUGH), strict=True))
+
+    stage("the wall alone")
+    known = nominal([(NOTHING, ())], ladder(10.0, 1e5, 1.6))
+    alone = max(10.0 * LEAST_N_M, known[NOTHING, ()].stiffness_N_m)
+    stage("one element")
+    rungs = ladder(alone / 2.0, alone * 8.0, 1.4)
+    known |= nominal([(family, values) for family in SINGLE for values in first_choices(family, loop)], rungs)
+    more = [(family, values) for family in SINGLE for values in beside(_best(known, family))]
+    known |= nominal([choice for choice in more if choice not in known], rungs)
+    stage("two elements")
+    pairs = together(_best(known, DAMPING), _best(known, UNIDIRECTIONAL))
+    known |= nominal([(BOTH, values) for values in pairs], rungs)
+    stage("every corner")
+    bests = _in_corners(loop, trial, known)
+    advised = _advised(bests)
+    stage("softer walls")
+    top = _softer(loop, trial, advised)
+    stage("the attack")
+    stiffness, broken, count = _attacked(loop, trial, advised, top)
+    if not broken and top.failure:
+        broken = [(top.fails_N_m, top.failure)]
+    return Found(tuple(bests), advised, stiffness, broken[-1] if broken else None, count + len(every_case(loop)))
+
+
+def every_case(loop: Scene, holds: Sequence[float] = HOLDS) -> tuple[Case, ...]:
+    """Returns every hold in every corner, and in the loop as described."""
+    return tuple(Case(hold, corner) for corner in ((), *corners(loop)) for hold in holds)
+
+
+def _best(known: dict[Choice, Limit], family: Family) -> Values:
+    """Returns the parameters with the largest limit; of equals the smallest."""
+    tried = {values: limit.stiffness_N_m for (other, values), limit in known.items() if other is family}
+    most = max(tried.values())
+    return min(values for values, stiffness in tried.items() if stiffness >= most / (1.0 + _ROUGH))
+
+
+def _in_corners(loop: Scene, trial: Trial, known: dict[Choice, Limit]) -> list[Best]:
+    """Returns the best of each family; those worth it with their limit in every corner, at the holds tried first.
+
+    The parameter with the stiffest nominal wall often bears less change than a gentler one: half of it is tried, too.
+    """
+    bests: list[Best] = []
+    candidates: list[Choice] = []
+    most_so_far = 0.0
+    for family in FAMILIES:
+        values = _best(known, family)
+        limit = known[family, values]
+        bests.append(Best(family, values, limit))
+        if limit.stiffness_N_m > most_so_far * (WORTH if family.parts else 0.0):
+            gentler = [choice for choice in known if choice[0] is family and all(
+                2.5 * a > b > 1.5 * a for a, b in zip(choice[1], values, strict=True))] if values else []  # fmt: skip
+            candidates += [(family, values), *gentler]
+        if not family.parts:
+            most_so_far = limit.stiffness_N_m
+    cases = every_case(loop, FIRST_HOLDS)
+    queries = []
+    for family, values in candidates:
+        top = known[family, values].stiffness_N_m or LEAST_N_M
+        queries.append(Query(loop, family.elements(values), cases, ladder(top / 3.0, top * 1.06, 1.5)))
+    safe = dict(zip(candidates, limits(trial, queries, _ROUGH / 2.0), strict=True))
+    for place, best in enumerate(bests):
+        of_family = {values: limit for (family, values), limit in safe.items() if family is best.family}
+        if of_family:
+            values = max(of_family, key=lambda some: (of_family[some].stiffness_N_m, [-value for value in some]))
+            bests[place] = Best(best.family, values, known[best.family, values], of_family[values])
+    return bests
+
+
+def _advised(bests: Sequence[Best]) -> Best:
+    """Returns the family that bears most in every corner; one with more elements has to bear a tenth more."""
+    advised = bests[0]
+    for best in bests[1:]:
+        less = advised.safe.stiffness_N_m if advised.safe else 0.0
+        if best.safe and best.safe.stiffness_N_m > WORTH * less:
+            advised = best
+    return advised
+
+
+def _softer(loop: Scene, trial: Trial, advised: Best) -> Limit:
+    """Returns the limit at every hold in every corner, with all softer walls bearing it, too."""
+    assert advised.safe
+    near = advised.safe.stiffness_N_m
+    if not near:
+        return advised.safe
+    elements, cases = advised.family.elements(advised.values), every_case(loop)
+    rungs = (*sorted(near * share for share in _SOFTER), near, min(advised.safe.fails_N_m, near * 1.1))
+    return limits(trial, [Query(loop, elements, cases, rungs)], _FINE)[0]
+
+
+def attack(loop: Scene) -> tuple[Case, ...]:
+    """Returns cases that the search has not seen: other holds and sways, a hand held still, another approach."""
+    holds = [0.3 * 10.0 ** (i / 10.0) for i in range(11)]
+    found: list[Case] = []
+    for corner in ((), *corners(loop)):
+        found += [Case(hold, corner, sway_Hz=0.8) for hold in holds]
+        found += [Case(hold, corner, sway=0.0) for hold in holds]
+        found += [Case(hold, corner, sway=0.2, sway_Hz=0.4, tap_m_s=speed) for hold in holds[::5] for speed in _SPEEDS]
+    return tuple(found)
+
+
+def _attacked(loop: Scene, trial: Trial, advised: Best, top: Limit) -> tuple[float, list[tuple[float, Failure]], int]:
+    """Lowers the wall until no attack breaks it: projected friction in every case, exact friction in a few."""
+    elements, cases, broken = advised.family.elements(advised.values), attack(loop), []
+    stiffness = rounded_down(top.stiffness_N_m)
+    for _ in range(_TIMES):
+        if stiffness < LEAST_N_M:
+            return 0.0, broken, len(cases)
+        [failure] = trial.failures(loop, [Tried(stiffness, elements)], cases)
+        failure = failure or _judged(loop, Tried(stiffness, elements))
+        if not failure:
+            return stiffness, broken, len(cases)
+        broken.append((stiffness, failure))
+        stiffness = rounded_down(stiffness * _LOWER)
+    return 0.0, broken, len(cases)
+
+
+def _judged(loop: Scene, wall: Tried) -> Failure | None:
+    """Judges the wall by pushes and with exact friction, see ``haploop.launch.stability``, at the holds tried first."""
+    for hold in FIRST_HOLDS:
+        case = Case(hold, sway=0.0)
+        scene = case.scene(loop)
+        assert scene.wall
+        scene = replace(scene, wall=replace(scene.wall, stiffness=wall.stiffness_N_m), dissipation=wall.elements)
+        found = judge_scene(scene, installed_kinds())
+        if found.word not in _STEADY and not (found.word == "limit-cycle" and not found.felt):
+            numbers = found.width_m, found.force_ripple_N, found.frequency_Hz
+            return Failure(f"{case.words}, pushed: {found.word}", scene.duration, found.word == "diverged", *numbers)
+    return None
+
+
+def rounded_down(stiffness: float) -> float:
+    """Returns a stiffness rounded down to two digits, three where it begins with a 1."""
+    if not stiffness:
+        return 0.0
+    digits = 2 if f"{stiffness:e}"[0] == "1" else 1
+    exponent = int(f"{stiffness:e}".split("e")[1]) - digits
+    return int(stiffness / 10.0**exponent * (1.0 + 1e-12)) * 10.0**exponent

@@ -1,0 +1,154 @@
+"""The trial of walls: each with an element, in many cases at once, until one of them buzzes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Self
+
+import numpy as np
+
+from haploop.controller.dissipation import ElementError
+from haploop.protocol.scene.scene import Scene, Wall
+from haploop.protocol.ticks import Timebase
+from haploop.tools.advise.cases import LASTS_S, Case, slowness
+from haploop.tools.advise.felt import Buzz, Threshold, buzz, felt_force_N
+from haploop.tools.advise.loops import LoneLoop, Loops, make_loops
+from haploop.tools.advise.store import Failure, Store, Tried
+from haploop.tools.executor.executors import Executor, InlineExecutor, make_executor, map_parallel
+from haploop.tools.linear.linearity import installed_kinds
+
+# Stretches in which a run is looked at, and when the first one begins: what the tap has left is gone by then, or dies.
+STRETCH_S, FROM_S = 0.25, 0.75
+# A stretch of a swing that dies is this share of the one before at most.
+_DYING = 0.8
+# Members that are worth a worker of their own.
+_PART = 150
+
+
+@dataclass(frozen=True)
+class Job:
+    """Walls that are tried on one loop, all in the same cases."""
+
+    loop: Scene
+    walls: tuple[Tried, ...]
+    cases: tuple[Case, ...]
+
+
+class Trial:
+    """Tries walls, on several cores where that is worth it, and remembers what came of them; a context manager.
+
+    Args:
+        store: results of an earlier, interrupted advice, and where to keep these.
+        workers: processes; one a core when None.
+        on_progress: called with the number of runs so far.
+
+    Attributes:
+        runs: loops that were moved.
+    """
+
+    def __init__(
+        self, store: Store, workers: int | None = 1, on_progress: Callable[[int], object] = lambda runs: None
+    ) -> None:
+        self._store, self._told, self.runs = store, on_progress, 0
+        self._here, self._there = InlineExecutor(), make_executor(workers)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        self._there.close(at_once=kind is not None)
+
+    def failures(self, loop: Scene, walls: Sequence[Tried], cases: Sequence[Case]) -> list[Failure | None]:
+        """Returns for each wall the case that it does not bear; None where it bears all."""
+        return self.of_jobs([Job(loop, tuple(walls), tuple(cases))])[0]
+
+    def of_jobs(self, jobs: Sequence[Job]) -> list[list[Failure | None]]:
+        """Returns the failures of each job's walls, in order."""
+        keys = [[self._store.key(job.loop, wall, job.cases) for wall in job.walls] for job in jobs]
+        parts = self._parts(jobs, keys)
+        executor: Executor = self._there if len(parts) > 1 else self._here
+        for (some, job), found in zip(parts, map_parallel(executor, run_job, [job for _, job in parts]), strict=True):
+            self._store.add(dict(zip(some, found, strict=True)))
+            self.runs += len(job.walls) * len(job.cases)
+            self._told(self.runs)
+        return [[self._store.known[key] for key in of_job] for of_job in keys]
+
+    def _parts(self, jobs: Sequence[Job], keys: list[list[str]]) -> list[tuple[list[str], Job]]:
+        """Returns what is not known yet, walls that run in one array together; a large one is shared by the workers."""
+        together: dict[tuple[object, ...], tuple[Job, dict[str, Tried]]] = {}
+        for job, of_job in zip(jobs, keys, strict=True):
+            for wall, key in zip(job.walls, of_job, strict=True):
+                if key not in self._store.known:
+                    kinds = tuple(element.name for element in wall.elements)
+                    together.setdefault((id(job.loop), job.cases, kinds), (job, {}))[1][key] = wall
+        parts: list[tuple[list[str], Job]] = []
+        for job, new in together.values():
+            members = len(new) * len(job.cases)
+            count = min(max(1, members // _PART), self._there.count, len(new))
+            for part in range(count):
+                some = [*new][part::count]
+                parts.append((some, replace(job, walls=tuple(new[key] for key in some))))
+        return parts
+
+
+def run_job(job: Job) -> list[Failure | None]:
+    """Tries every wall of a job in all its cases; a wall that fails leaves the arrays with the rest of them."""
+    base = [case.scene(job.loop) for case in job.cases]
+    members = [(wall, case) for wall in range(len(job.walls)) for case in range(len(job.cases))]
+    scenes = [
+        replace(
+            base[case],
+            seed=job.loop.seed + case,
+            wall=Wall(position=0.0, stiffness=float(job.walls[wall].stiffness_N_m)),
+            dissipation=job.walls[wall].elements,
+        )
+        for wall, case in members
+    ]
+    failed: dict[int, Failure] = {}
+    felt_N, kinds = felt_force_N(job.loop), installed_kinds()
+    for group, loops in make_loops(scenes, kinds):
+        _watch(job, loops, [members[index] for index in group], failed, felt_N)
+    return [failed.get(index) for index in range(len(job.walls))]
+
+
+def _watch(
+    job: Job, loops: Loops | LoneLoop, members: list[tuple[int, int]], failed: dict[int, Failure], felt_N: Threshold
+) -> None:
+    """Follows loops to their end, or until every wall among them has failed."""
+    rate, late = Timebase.from_scene(job.loop).control_rate, slowness(job.loop)
+    stretches, first = round(LASTS_S / STRETCH_S), round(FROM_S / STRETCH_S)
+    before = np.full(len(members), math.inf)
+    for stretch in range(stretches):
+        kept = np.array([wall not in failed for wall, _ in members])
+        if not kept.any():
+            return
+        if not kept.all():
+            loops.select(kept)
+            members = [member for member, stays in zip(members, kept, strict=True) if stays]
+            before = before[kept]
+        try:
+            seen = loops.go_on(round(STRETCH_S * late * rate))
+        except (ArithmeticError, ElementError):
+            failed.update((wall, Failure(job.cases[case].words, 0.0, gone=True)) for wall, case in members)
+            return
+        bad, found = seen.gone, None
+        if stretch >= first and not bad.all():
+            found = buzz(seen.x, seen.measured, seen.command, rate, felt_N)
+            felt = found.times_felt >= 1.0
+            bad = bad | (felt & ((found.times_felt > _DYING * before) | (stretch == stretches - 1)))
+            before = np.where(felt, found.times_felt, 0.0)
+        for place in np.flatnonzero(bad).tolist():
+            wall, case = members[place]
+            failure = _failure(job.cases[case].words, (stretch + 1) * STRETCH_S * late, seen.gone[place], found, place)
+            worst = failed.setdefault(wall, failure)
+            if worst.at_s == failure.at_s and worst.times_felt < failure.times_felt:
+                failed[wall] = failure
+
+
+def _failure(case: str, at_s: float, gone: bool, found: Buzz | None, place: int) -> Failure:
+    if gone or found is None:
+        return Failure(case, at_s, gone=True)
+    motion_m, force_N, frequency_Hz, times_felt = (float(column[place]) for column in found[1:5])
+    return Failure(case, at_s, False, motion_m, force_N, frequency_Hz, times_felt, bool(found.by_force[place]))
