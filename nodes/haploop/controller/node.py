@@ -32,11 +32,12 @@ class ControllerNode:
         address = bind(self._publisher.socket, directory, PROCESSES[ROLE].binds["telemetry"])
         welcome = client.join({"telemetry": address})
         scene = Scene.from_dict(welcome["scene"])
-        kinds = registry([Path(path) for path in welcome["context"]["plugins"]])
+        told = welcome["context"]
+        kinds = registry([Path(path) for path in told["plugins"]], told["elements"])
         self._controller = Controller(scene, Timebase(**welcome["timebase"]), kinds)
         self._block = BlockLength(scene.run.block_ticks)
         self._reported = 0
-        self._secret = welcome["context"]["secret"]
+        self._secret = told["secret"]
         self._loop = ControllerEnd(context, welcome["endpoints"]["plant"]["loop"], lambda: self._wait("plant"))
 
     def _state(self) -> tuple[int, Message]:

@@ -8,12 +8,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 from functools import cache, partial
-from importlib.metadata import entry_points
 
 from haploop.controller.estimators.choose import estimator_class, estimators_for
 from haploop.launch.plan import rules
 from haploop.launch.plan.effect import CHAIN, COUNTED, HISTORY, LINE, LINEAR_RATES, NOISY, RUBBING, Effect
 from haploop.plant.integrators.registry import find_integrator, integrator_module, integrator_names
+from haploop.protocol.installed import entry_points_of
 from haploop.protocol.scene.effects import Accelerometer
 from haploop.protocol.scene.estimators import Acceleration, Velocity
 from haploop.protocol.scene.paths import value_at, without
@@ -155,7 +155,7 @@ EFFECTS: tuple[Effect, ...] = (
 @cache
 def all_effects() -> tuple[Effect, ...]:
     """Returns the effects of the table and, after them, those of other packages."""
-    return *EFFECTS, *(entry.load() for entry in entry_points(group=_GROUP))
+    return *EFFECTS, *(entry.load() for entry in entry_points_of(_GROUP))
 
 
 @cache

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import json
 import os
 import signal
 import subprocess
@@ -12,6 +13,10 @@ from pathlib import Path
 from typing import Any
 
 from haploop.protocol.transport.messages import PROCESSES
+from haploop.protocol.transport.wire import Message
+
+# NumPy's linear algebra would start a thread a core in every process, which takes longer than NumPy itself.
+THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
 
 
 class Child:
@@ -21,7 +26,7 @@ class Child:
     tells the launcher, without polling, that the process has ended.
     """
 
-    def __init__(self, role: str, sockets: Path, start: bytes, cores: set[int] | None) -> None:
+    def __init__(self, role: str, sockets: Path, start: Message) -> None:
         self.role = role
         command = [sys.executable, "-m", PROCESSES[role].module, str(sockets)]
         self._process = subprocess.Popen(
@@ -31,14 +36,12 @@ class Child:
             # A group of its own, since Ctrl-C is for the launcher, which ends the run in order; but the same session:
             # the kernel schedules sessions as groups, and two of them preempt each other at every message.
             process_group=0,
+            env=dict.fromkeys(THREADS, "1") | os.environ,
         )
         assert self._process.stdin
         assert self._process.stdout
-        if cores and hasattr(os, "sched_setaffinity"):
-            with contextlib.suppress(OSError):
-                os.sched_setaffinity(self._process.pid, cores)
         with contextlib.suppress(BrokenPipeError):
-            self._process.stdin.write(start + b"\n")
+            self._process.stdin.write(json.dumps(start).encode() + b"\n")
             self._process.stdin.flush()
         self.died = self._process.stdout.fileno()
 
@@ -79,20 +82,21 @@ class Child:
                     pipe.close()
 
 
-def start_children(sockets: Path, start: bytes, pin: bool, run_number: int) -> dict[str, Child]:
+def start_children(sockets: Path, start: Message, pin: bool, run_number: int) -> dict[str, Child]:
     """Starts every process of the table.
 
     Plant and controller wait for each other at every tick and gain nothing from two cores, but lose the wake-up from
-    one to the other: they share a core, the others get the rest. Runs beside each other take different cores.
+    one to the other: they share a core, the others get the rest. Runs beside each other take different cores. A process
+    goes to its cores when it has imported what it needs, which all of them do beside each other.
     """
     loop_cores, other_cores = share_cores(run_number) if pin else (None, None)
     return {
-        role: Child(role, sockets, start, loop_cores if process.on_loop_core else other_cores)
+        role: Child(role, sockets, {**start, "cores": loop_cores if process.on_loop_core else other_cores})
         for role, process in PROCESSES.items()
     }
 
 
-def share_cores(run_number: int) -> tuple[set[int] | None, set[int] | None]:
+def share_cores(run_number: int) -> tuple[list[int] | None, list[int] | None]:
     """Returns (core of plant and controller, cores of the others); (None, None) where nothing can be gained."""
     if not hasattr(os, "sched_getaffinity"):
         return None, None
@@ -100,7 +104,7 @@ def share_cores(run_number: int) -> tuple[set[int] | None, set[int] | None]:
     if len(cores) < 2:
         return None, None
     shared = cores[run_number % len(cores)]
-    return {shared}, set(cores) - {shared}
+    return [shared], [core for core in cores if core != shared]
 
 
 @contextlib.contextmanager

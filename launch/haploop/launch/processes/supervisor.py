@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import secrets
 import time
 from pathlib import Path
@@ -10,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import zmq
 
+from haploop.controller.dissipation.registry import installed
 from haploop.launch.clock.clock import Clock
 from haploop.launch.clock.commands import Commands
 from haploop.launch.clock.server import ClockServer
@@ -66,6 +66,7 @@ class Supervisor:
         context = {
             "out": str(spec.out.resolve()),
             "plugins": [str(path.resolve()) for path in spec.plugins],
+            "elements": installed(),
             "attachments": spec.attachments,
         }
         welcome = sockets.name, scene.as_dict(), timebase.as_dict(), context
@@ -75,7 +76,7 @@ class Supervisor:
         run_directory.announce(sockets, self._server.address, scene.title, str(spec.out), keys)
         run_number = len(run_directory.live_runs()) - 1
         start = {"address": self._server.address, "secret": secret, "transport": spec.transport.as_dict()}
-        self._children = start_children(sockets, json.dumps(start).encode(), scene.run.pin, run_number)
+        self._children = start_children(sockets, start, scene.run.pin, run_number)
         self._started = self._looked = time.monotonic()
         self._probe_due = 0.0
         self._stopping = False

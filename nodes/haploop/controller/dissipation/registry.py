@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-import hashlib
 import inspect
 import sys
-from importlib.metadata import entry_points
+from collections.abc import Mapping
 from pathlib import Path
+from pkgutil import resolve_name
 from types import ModuleType
 
 from haploop.controller.dissipation.element import Element
+from haploop.protocol.installed import entry_points_of
 
 ENTRY_POINT_GROUP = "haploop.dissipation"
 
@@ -18,18 +19,29 @@ class PluginError(Exception):
     """A plugin that cannot be used; the message says why."""
 
 
-def registry(plugin_files: list[Path] | None = None) -> dict[str, type[Element]]:
+def installed() -> dict[str, str]:
+    """Returns "module:class" of every installed kind by name."""
+    found = sorted(entry_points_of(ENTRY_POINT_GROUP), key=lambda point: point.name)
+    return {point.name: f"{point.module}:{point.attr}" for point in found}
+
+
+def registry(
+    plugin_files: list[Path] | None = None, places: Mapping[str, str] | None = None
+) -> dict[str, type[Element]]:
     """Returns every kind by name: the installed ones, then those of ``plugin_files``, which win.
+
+    Args:
+        places: what ``installed`` returned elsewhere; to look for it anew reads a file of every package there is.
 
     Raises:
         PluginError: an entry point or a file does not load, or holds no element.
     """
     kinds: dict[str, type[Element]] = {}
-    for point in sorted(entry_points(group=ENTRY_POINT_GROUP), key=lambda p: p.name):
+    for name, place in (installed() if places is None else places).items():
         try:
-            kinds[point.name] = checked(point.load(), f"entry point {point.name} = {point.value}")
+            kinds[name] = checked(resolve_name(place), f"entry point {name} = {place}")
         except Exception as error:
-            raise PluginError(f"The installed element {point.name!r} ({point.value}) does not load: {error}") from error
+            raise PluginError(f"The installed element {name!r} ({place}) does not load: {error}") from error
     for path in plugin_files or []:
         kinds.update(load_plugin(path))
     return kinds
@@ -54,6 +66,8 @@ def load_source(source: str, origin: str) -> dict[str, type[Element]]:
     Raises:
         PluginError: the text cannot be run, or defines no usable element.
     """
+    import hashlib
+
     try:
         module = ModuleType("haploop_plugin_" + hashlib.sha256(source.encode()).hexdigest()[:12])
         module.__file__ = origin

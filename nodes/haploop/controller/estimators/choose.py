@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import math
 from functools import cache
-from importlib.metadata import EntryPoint, entry_points
 from pkgutil import resolve_name
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from haploop.controller.estimators.base import Difference, Estimator, LowPass, Unchanged
 from haploop.protocol.arrays import each
+from haploop.protocol.installed import entry_points_of
 from haploop.protocol.scene.estimators import Acceleration
 from haploop.protocol.scene.scene import Scene
+
+if TYPE_CHECKING:
+    from importlib.metadata import EntryPoint
 
 # Every estimator by the name that a scene gives it: the class, or "module:class", which is imported where it is used.
 ESTIMATORS: dict[str, str | type[Estimator]] = {
@@ -24,10 +27,9 @@ ESTIMATORS: dict[str, str | type[Estimator]] = {
 _GROUP = "haploop.estimators"
 
 
-@cache
 def _from_outside() -> dict[str, EntryPoint]:
-    """The estimators of other packages by name; looked for once, since that reads every package installed."""
-    return {entry.name: entry for entry in entry_points(group=_GROUP)}
+    """Returns the estimators of other packages by name; whoever uses none of them needs no search."""
+    return {entry.name: entry for entry in entry_points_of(_GROUP)}
 
 
 def estimator_names() -> tuple[str, ...]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache
 from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Any
 
@@ -114,9 +113,8 @@ def find_integrator(name: str) -> Integrator:
     return INTEGRATORS[name] if name in INTEGRATORS else resolve_name(_places()[name])
 
 
-@cache
 def _places() -> dict[str, str]:
     """Returns module and name of the integrators of other packages; whoever uses none of them needs no search."""
-    from importlib.metadata import entry_points
+    from haploop.protocol.installed import entry_points_of
 
-    return {entry.name: entry.value for entry in entry_points(group=_GROUP)}
+    return {entry.name: entry.value for entry in entry_points_of(_GROUP)}

@@ -76,9 +76,9 @@ def constant_forces(scene: Scene) -> dict[str, float]:
     """
     if not scene.others:
         return {}
-    from importlib.metadata import entry_points
+    from haploop.protocol.installed import entry_points_of
 
-    return {entry.name: entry.load()(scene) for entry in entry_points(group=_GROUP) if entry.name in scene.others}
+    return {entry.name: entry.load()(scene) for entry in entry_points_of(_GROUP) if entry.name in scene.others}
 
 
 def _profile(force: tables.HandForce | None) -> Profile:

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
+import sys
+from collections.abc import Callable
 from functools import cache
 from types import UnionType
-from typing import Annotated, Any, ClassVar, Self, Union, dataclass_transform, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, ClassVar, NoReturn, Self, Union, dataclass_transform, get_args, get_origin
 
 # Tables as plain dicts, as TOML and the wire hold them.
 Tables = dict[str, Any]
@@ -14,22 +16,59 @@ _PLAIN = (float, int, str, bool)
 
 
 @dataclass_transform(kw_only_default=True, frozen_default=True)
-@dataclasses.dataclass(kw_only=True, frozen=True)
+@dataclasses.dataclass(init=False, repr=False, eq=False)
 class Table:
     """Base of every table; a subclass is a frozen dataclass with keyword arguments by itself.
 
     A key declared ``X | None`` with default None is absent unless it is given: the effect is then not simulated.
     A number that differs from member to member of a batch is an array of shape (batch,).
 
+    The methods of a dataclass stand here once for all tables: compiled for each of them, as ``dataclass`` does, they
+    would take longer than all else that a node does before its first tick.
+
     Attributes:
         kind: name by which a scene file chooses between tables in one place; "" where there is no choice.
     """
 
     kind: ClassVar[str] = ""
+    # Default of every key, in order of declaration; the keys that have none, and what makes those of others.
+    _defaults: ClassVar[Tables] = {}
+    _needed: ClassVar[tuple[str, ...]] = ()
+    _made: ClassVar[tuple[tuple[str, Callable[[], Any]], ...]] = ()
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)
-        dataclasses.dataclass(kw_only=True, frozen=True)(cls)
+        dataclasses.dataclass(kw_only=True, init=False, repr=False, eq=False)(cls)
+        fields, none = dataclasses.fields(cls), dataclasses.MISSING
+        cls._defaults = {field.name: field.default for field in fields}
+        cls._made = tuple((f.name, f.default_factory) for f in fields if f.default_factory is not none)
+        cls._needed = tuple(f.name for f in fields if f.default is none and f.default_factory is none)
+
+    def __init__(self, **values: Any) -> None:
+        own = vars(self)
+        own.update(self._defaults)
+        own.update(values)
+        for name, make in self._made:
+            if name not in values:
+                own[name] = make()
+        if len(own) > len(self._defaults) or any(own[name] is dataclasses.MISSING for name in self._needed):
+            unknown, lacks = values.keys() - self._defaults.keys(), set(self._needed) - values.keys()
+            raise TypeError(f"{type(self).__name__} is made without {sorted(lacks)} or with {sorted(unknown)}.")
+
+    def __setattr__(self, name: str, value: Any) -> NoReturn:
+        raise dataclasses.FrozenInstanceError(f"cannot assign to field {name!r}")
+
+    def __delattr__(self, name: str) -> NoReturn:
+        raise dataclasses.FrozenInstanceError(f"cannot delete field {name!r}")
+
+    def __eq__(self, other: object) -> bool:
+        return vars(self) == vars(other) if other.__class__ is self.__class__ else NotImplemented
+
+    def __hash__(self) -> int:
+        return hash(tuple(vars(self).values()))
+
+    def __repr__(self) -> str:
+        return f"{type(self).__qualname__}({', '.join(f'{name}={value!r}' for name, value in vars(self).items())})"
 
     @classmethod
     def fields(cls) -> tuple[dataclasses.Field[Any], ...]:
@@ -43,11 +82,7 @@ class Table:
         Raises:
             TypeError: a key is unknown or missing.
         """
-        tables = _tables_of(cls)
-        given = {
-            key: value if value.__class__ in _PLAIN else _read(tables.get(key, ()), value)
-            for key, value in data.items()
-        }
+        given = {key: value if value.__class__ in _PLAIN else _read(cls, key, value) for key, value in data.items()}
         if cls.kind:
             given.pop("kind", None)
         return cls(**given)
@@ -73,8 +108,8 @@ class OpenTable(Table):
     @classmethod
     def from_dict(cls, data: Tables) -> Self:
         """Makes the table as ``Table.from_dict`` does; keys that it does not declare are those of others."""
-        declared = _declared(cls)
-        if declared.issuperset(data):
+        declared = cls._defaults.keys()
+        if declared >= data.keys():
             return super().from_dict(data)
         others = {key: value for key, value in data.items() if key not in declared and not (cls.kind and key == "kind")}
         made = super().from_dict({key: value for key, value in data.items() if key not in others})
@@ -87,15 +122,14 @@ class OpenTable(Table):
 
 
 @cache
-def _declared(cls: type[Table]) -> frozenset[str]:
-    return frozenset(field.name for field in cls.fields())
-
-
-@cache
-def _tables_of(cls: type[Table]) -> dict[str, tuple[type[Table], ...]]:
-    """The table classes that may stand at each key that holds tables."""
-    hints = get_type_hints(cls)
-    return {name: found for name, hint in hints.items() if (found := tuple(_tables_in(hint)))}
+def _tables_at(cls: type[Table], key: str) -> tuple[type[Table], ...]:
+    """The table classes that may stand at a key."""
+    field = cls.__dataclass_fields__.get(key)
+    hint = field.type if field else None
+    if isinstance(hint, str):
+        declares = next(base for base in cls.__mro__ if key in vars(base).get("__annotations__", ()))
+        hint = eval(hint, vars(sys.modules[declares.__module__]))
+    return tuple(_tables_in(hint))
 
 
 def _tables_in(hint: Any) -> list[type[Table]]:
@@ -106,10 +140,10 @@ def _tables_in(hint: Any) -> list[type[Table]]:
     return []
 
 
-def _read(tables: tuple[type[Table], ...], value: Any) -> Any:
+def _read(cls: type[Table], key: str, value: Any) -> Any:
     if isinstance(value, list | tuple):
-        return tuple(_read(tables, item) for item in value)
-    if not tables or not isinstance(value, dict):
+        return tuple(_read(cls, key, item) for item in value)
+    if not isinstance(value, dict) or not (tables := _tables_at(cls, key)):
         return value
     kind = value.get("kind", "")
     return next((table for table in tables if table.kind == kind), tables[0]).from_dict(value)

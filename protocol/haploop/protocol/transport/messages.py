@@ -6,7 +6,7 @@ checking and the documentation in ``protocol/README.md`` derive from it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 VERSION = 1
 
@@ -23,8 +23,7 @@ _TYPES: dict[str, tuple[type, ...]] = {
 }
 
 
-@dataclass(frozen=True)
-class Process:
+class Process(NamedTuple):
     """One row of its table.
 
     Attributes:
@@ -52,8 +51,7 @@ PROCESSES: dict[str, Process] = {
 OBSERVER = "observer"
 
 
-@dataclass(frozen=True)
-class Message:
+class Message(NamedTuple):
     """One row of its table.
 
     Attributes:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import gc
 import json
 import os
@@ -28,7 +29,8 @@ class NodeError(Exception):
 def run_node(role: str, work: Work) -> None:
     """Runs a node as a process, ``python -m module DIRECTORY``, and exits with status 0 after DONE, else 1.
 
-    Stdin brings one line of JSON: address of the clock, secret and transport of the run.
+    Stdin brings one line of JSON: address of the clock, secret and transport of the run, and the cores to stay on, null
+    for any.
 
     It stays open as long as the launcher lives; at its end this process ends at once, whatever it is doing.
     """
@@ -37,6 +39,9 @@ def run_node(role: str, work: Work) -> None:
     if not line:
         sys.exit(1)  # the launcher is gone already
     start = json.loads(line)
+    if start["cores"]:
+        with contextlib.suppress(OSError):
+            os.sched_setaffinity(0, start["cores"])
     threading.Thread(target=_end_with_parent, daemon=True).start()
     gc.freeze()
     context = SecureContext.from_transport(Transport.from_dict(start["transport"]))

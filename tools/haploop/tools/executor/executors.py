@@ -13,12 +13,11 @@ from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from typing import Any, Self, TypeVar
 
+from haploop.launch.processes.children import THREADS
 from haploop.tools.machine import cores
 
 Item = TypeVar("Item")
 Answer = TypeVar("Answer")
-# NumPy's linear algebra would start a thread a core in every worker.
-_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
 
 
 class ExecutorError(Exception):
@@ -191,7 +190,7 @@ def _begin(held: Connection) -> None:
 @contextlib.contextmanager
 def _one_thread_each() -> Iterator[None]:
     """Gives processes started in here one thread each, unless the user asked for another number."""
-    ours = [name for name in _THREADS if name not in os.environ]
+    ours = [name for name in THREADS if name not in os.environ]
     os.environ.update(dict.fromkeys(ours, "1"))
     try:
         yield
