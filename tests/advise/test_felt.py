@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from haploop.tools.advise.felt import TURNS, buzz, felt_force_N, felt_m
+from haploop.tools.advise.walls.felt import TURNS, buzz, felt_force_N, felt_m
 from helpers.scenes.least import scene
 
 RATE, T = 1000.0, np.arange(250) / 1000.0

@@ -8,11 +8,11 @@ import pytest
 from haploop.plant.chain.chain import Chain
 from haploop.protocol.scene.paths import with_value
 from haploop.protocol.scene.scene import ElementTable, Scene
-from haploop.tools.advise.cases import Case, make_loop
-from haploop.tools.advise.loops import LoneLoop, Loops, make_loops
-from haploop.tools.advise.store import Store, Tried
 from haploop.tools.advise.subject import make_subject
-from haploop.tools.advise.trial import Trial
+from haploop.tools.advise.walls.cases import Case, make_loop
+from haploop.tools.advise.walls.loops import LoneLoop, Loops, make_loops
+from haploop.tools.advise.walls.store import Store, Tried
+from haploop.tools.advise.walls.trial import Trial
 from haploop.tools.linear.one_tick import OneTickMap
 from helpers.scenes.least import KINDS, scene
 

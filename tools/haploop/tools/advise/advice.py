@@ -9,15 +9,15 @@ from typing import Any, NamedTuple
 
 from haploop.protocol.scene.scene import Scene
 from haploop.tools.advise.assumptions import Assumed
-from haploop.tools.advise.cases import Case, make_loop, task_words, uncertain_quantities
 from haploop.tools.advise.changes import assumed_otherwise, changed_limits, changes, idealised
 from haploop.tools.advise.formulas import Formula, formulas
-from haploop.tools.advise.limit import Limit
 from haploop.tools.advise.published import PUBLISHED, Published
 from haploop.tools.advise.search import Best, Found, every_case, search
-from haploop.tools.advise.store import Failure, Tried
 from haploop.tools.advise.subject import Subject
-from haploop.tools.advise.trial import Trial
+from haploop.tools.advise.walls.cases import Case, make_loop, task_words, uncertain_quantities
+from haploop.tools.advise.walls.limit import Limit
+from haploop.tools.advise.walls.store import Failure, Tried
+from haploop.tools.advise.walls.trial import Trial
 
 # An advice as one JSON object.
 AdviceData = dict[str, Any]

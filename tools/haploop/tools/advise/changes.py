@@ -8,10 +8,10 @@ from haploop.launch.plan.effects import all_effects
 from haploop.protocol.scene.paths import value_at, with_value
 from haploop.protocol.scene.scene import Scene
 from haploop.tools.advise.assumptions import Assumed
-from haploop.tools.advise.cases import DELAY, FIRST_HOLDS, Case, delay_s
-from haploop.tools.advise.limit import Limit, Query, ladder, limits
 from haploop.tools.advise.search import Best
-from haploop.tools.advise.trial import Trial
+from haploop.tools.advise.walls.cases import DELAY, FIRST_HOLDS, Case, delay_s
+from haploop.tools.advise.walls.limit import Limit, Query, ladder, limits
+from haploop.tools.advise.walls.trial import Trial
 
 _TOLERANCE = 0.06
 # One value halved or doubled: words, key, factor.

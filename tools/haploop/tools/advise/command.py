@@ -18,9 +18,9 @@ from haploop.logger.summary import finite
 from haploop.tools.advise.advice import Advice, AdviceData, advice, as_data
 from haploop.tools.advise.figure import draw
 from haploop.tools.advise.report import report, sentences
-from haploop.tools.advise.store import Store
 from haploop.tools.advise.subject import InvalidRequest, make_subject
-from haploop.tools.advise.trial import Trial
+from haploop.tools.advise.walls.store import Store
+from haploop.tools.advise.walls.trial import Trial
 from haploop.tools.cli.options import FAILED, WRONG_USE, leave, plain_errors, print_json
 from haploop.tools.cli.scenes import kinds_with, print_notes
 from haploop.tools.figure.data import FigureError

@@ -9,9 +9,9 @@ from rich.table import Table
 from rich.text import Text
 
 from haploop.tools.advise.advice import Advice
-from haploop.tools.advise.limit import Limit
 from haploop.tools.advise.search import Best
-from haploop.tools.advise.store import Failure
+from haploop.tools.advise.walls.limit import Limit
+from haploop.tools.advise.walls.store import Failure
 from haploop.tools.render.terminal import make_facts, make_table
 from haploop.tools.render.units import amount, fixed
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from haploop.launch.stability.judge import judge_scene
 from haploop.protocol.scene.scene import Scene
-from haploop.tools.advise.cases import FIRST_HOLDS, HOLDS, Case, corners
 from haploop.tools.advise.families import (
     BOTH,
     DAMPING,
@@ -21,9 +21,10 @@ from haploop.tools.advise.families import (
     first_choices,
     together,
 )  # fmt: skip
-from haploop.tools.advise.limit import LEAST_N_M, Limit, Query, ladder, limits
-from haploop.tools.advise.store import Failure, Tried
-from haploop.tools.advise.trial import Trial
+from haploop.tools.advise.walls.cases import FIRST_HOLDS, HOLDS, Case, corners
+from haploop.tools.advise.walls.limit import LEAST_N_M, Limit, Query, ladder, limits
+from haploop.tools.advise.walls.store import Failure, Tried
+from haploop.tools.advise.walls.trial import Trial
 from haploop.tools.linear.linearity import installed_kinds
 
 # How closely limits are found while elements are compared, and that of the one advised.
@@ -213,9 +214,8 @@ def _judged(loop: Scene, wall: Tried) -> Failure | None:
 
 
 def rounded_down(stiffness: float) -> float:
-    """Returns a stiffness rounded down to two digits, three where it begins with a 1."""
+    """Returns a stiffness rounded down to three digits, of which the last is 0 or 5."""
     if not stiffness:
         return 0.0
-    digits = 2 if f"{stiffness:e}"[0] == "1" else 1
-    exponent = int(f"{stiffness:e}".split("e")[1]) - digits
-    return int(stiffness / 10.0**exponent * (1.0 + 1e-12)) * 10.0**exponent
+    unit = 5.0 * 10.0 ** (math.floor(math.log10(stiffness)) - 2)
+    return float(f"{math.floor(stiffness / unit * (1.0 + 1e-12)) * unit:.12g}")

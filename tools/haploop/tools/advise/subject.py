@@ -15,7 +15,7 @@ from haploop.launch.scene.mistakes import nearest
 from haploop.protocol.changes import Change, at_work
 from haploop.protocol.scene.scene import Scene
 from haploop.tools.advise.assumptions import Assumed, assumptions
-from haploop.tools.advise.cases import MOST_DELAY_S
+from haploop.tools.advise.walls.cases import MOST_DELAY_S
 from haploop.tools.cost.grid import scenes_folder
 
 # The only measured hand there is, along the axis of Choi et al. 2022.

@@ -7,7 +7,10 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from haploop.launch.plan.effects import all_effects
+from haploop.plant.chain.chain import Chain
 from haploop.protocol.scene.hand_force import Constant, Sine
 from haploop.protocol.scene.paths import value_at, with_value
 from haploop.protocol.scene.scene import Hand, Scene, Wall
@@ -24,6 +27,9 @@ FIRST_HOLDS = (0.3, 1.0, 3.0)
 SWAY, SWAY_HZ, LASTS_S = 0.3, 0.5, 2.75
 # A loop that is later than this has no answer in a reasonable time; a run lasts so many round trips at least.
 MOST_DELAY_S, ROUND_TRIPS = 0.5, 60
+# So does one so many periods of device and hand without a wall, where that swings, being damped by less than this share
+# of the critical; no run is longer than so many usual ones for that.
+PERIODS, _DAMPED, _SLOWEST = 22, 0.3, 10.0
 # By so much may delay, device mass and the hand be other than described.
 SHARE = 0.2
 DELAY = "delay"
@@ -71,7 +77,7 @@ class Case:
         force = Sine(amplitude=self.sway * mean_N, frequency=frequency_Hz, offset=mean_N)
         return replace(
             scene,
-            duration=slowness(loop) * LASTS_S,
+            duration=math.ceil(slowness(loop) * LASTS_S),
             device=replace(scene.device, position=2e-4, velocity=-self.tap_m_s),
             hand=replace(scene.hand or Hand(), rest=0.0, force=force),
             wall=Wall(position=0.0, stiffness=1.0),
@@ -101,8 +107,13 @@ def hold_N(loop: Scene) -> float:
 
 
 def slowness(loop: Scene) -> float:
-    """Returns how many times as long as usual everything takes, where the delay is long."""
-    return max(1.0, ROUND_TRIPS * loop.clock.round_trip_delay / LASTS_S)
+    """Returns how many times as long as usual everything takes, where the delay is long or the hand swings slowly."""
+    chain = Chain.from_scene(loop)
+    poles = np.linalg.eigvals(chain.rates()[:, : len(chain.states)].astype(float))
+    swinging = [abs(pole) for pole in poles if pole.imag and -pole.real < _DAMPED * abs(pole)]
+    period_s = 2.0 * math.pi / min(swinging) if swinging else 0.0
+    times = max(ROUND_TRIPS * loop.clock.round_trip_delay, min(_SLOWEST * LASTS_S, PERIODS * period_s)) / LASTS_S
+    return max(1.0, math.ceil(10.0 * times) / 10.0)
 
 
 def corners(loop: Scene) -> list[Corner]:

@@ -10,7 +10,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 from haploop.protocol.scene.scene import ElementTable, Scene
-from haploop.tools.advise.cases import Case
+from haploop.tools.advise.walls.cases import Case
 
 
 @dataclass(frozen=True)

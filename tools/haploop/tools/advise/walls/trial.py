@@ -12,17 +12,18 @@ import numpy as np
 from haploop.controller.dissipation import ElementError
 from haploop.protocol.scene.scene import Scene, Wall
 from haploop.protocol.ticks import Timebase
-from haploop.tools.advise.cases import LASTS_S, Case, slowness
-from haploop.tools.advise.felt import Buzz, Threshold, buzz, felt_force_N
-from haploop.tools.advise.loops import LoneLoop, Loops, make_loops
-from haploop.tools.advise.store import Failure, Store, Tried
+from haploop.tools.advise.walls.cases import LASTS_S, Case, slowness
+from haploop.tools.advise.walls.felt import Buzz, Threshold, buzz, felt_force_N
+from haploop.tools.advise.walls.loops import LoneLoop, Loops, make_loops
+from haploop.tools.advise.walls.store import Failure, Store, Tried
 from haploop.tools.executor.executors import Executor, InlineExecutor, make_executor, map_parallel
 from haploop.tools.linear.linearity import installed_kinds
 
 # Stretches in which a run is looked at, and when the first one begins: what the tap has left is gone by then, or dies.
 STRETCH_S, FROM_S = 0.25, 0.75
-# A stretch of a swing that dies is this share of the one before at most.
-_DYING = 0.8
+# A stretch of a swing that dies is this share of the one before at most; what then still dies is watched so many times
+# as long.
+_DYING, _LONGER = 0.95, 4
 # Members that are worth a worker of their own.
 _PART = 150
 
@@ -118,10 +119,11 @@ def _watch(
 ) -> None:
     """Follows loops to their end, or until every wall among them has failed."""
     rate, late = Timebase.from_scene(job.loop).control_rate, slowness(job.loop)
-    stretches, first = round(LASTS_S / STRETCH_S), round(FROM_S / STRETCH_S)
+    usual, first = round(LASTS_S / STRETCH_S), round(FROM_S / STRETCH_S)
     before = np.full(len(members), math.inf)
-    for stretch in range(stretches):
+    for stretch in range(_LONGER * usual):
         kept = np.array([wall not in failed for wall, _ in members])
+        kept &= (before > 0.0) | (stretch < usual)
         if not kept.any():
             return
         if not kept.all():
@@ -136,8 +138,8 @@ def _watch(
         bad, found = seen.gone, None
         if stretch >= first and not bad.all():
             found = buzz(seen.x, seen.measured, seen.command, rate, felt_N)
-            felt = found.times_felt >= 1.0
-            bad = bad | (felt & ((found.times_felt > _DYING * before) | (stretch == stretches - 1)))
+            felt, is_last = found.times_felt >= 1.0, stretch == _LONGER * usual - 1
+            bad = bad | (felt & ((found.times_felt > _DYING * before) | is_last))
             before = np.where(felt, found.times_felt, 0.0)
         for place in np.flatnonzero(bad).tolist():
             wall, case = members[place]

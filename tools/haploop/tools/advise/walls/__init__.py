@@ -1,0 +1,3 @@
+"""Walls that are tried: ``cases`` says what one has to bear, ``loops`` moves many at once, ``felt`` tells a buzz,
+``trial`` puts these together, ``store`` remembers, ``limit`` searches the stiffest that bears all.
+"""
