@@ -103,11 +103,19 @@ class Controller:
         self.recorder = recorder or Recorder(time.lookahead_ticks + 2)
         self.recorder.open(self.params)
 
-    def fork(self) -> Controller:
-        """Returns a controller of one loop that goes on from here by itself, without the changes still to come."""
+    def fork(
+        self, params: ControllerParams | None = None, state: Any = None, recorder: Recorder | None = None
+    ) -> Controller:
+        """Returns a controller that goes on from here by itself, without the changes still to come.
+
+        Args:
+            params, state: of the members that go on; all of them when None.
+            recorder: of a batch.
+        """
         other = copy(self)
-        other.params = deepcopy(self.params)  # an element may keep attributes of its own
-        other.recorder = Recorder(0)
+        other.params = deepcopy(self.params if params is None else params)  # an element may keep attributes of its own
+        other.state = self.state if params is None else state
+        other.recorder = recorder or Recorder(0)
         other.recorder.open(other.params)
         other._changes, other._next_change = [], _NEVER
         return other

@@ -6,24 +6,22 @@ import gc
 from collections import deque
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from haploop.controller.active_elements import Unchanged
 from haploop.controller.controller import Controller
 from haploop.controller.recorder import BatchRecorder
+from haploop.launch.batch.loop import BatchLoop
 from haploop.launch.batch.stacking import stacked
 from haploop.launch.runs.in_process import scene_events
 from haploop.logger.batch import BatchLogger, MemberEnd
 from haploop.logger.summary import Summary
-from haploop.plant.choose import make_motion, make_position_sensor
-from haploop.plant.line.delay import make_line
 from haploop.plant.plant import beyond
-from haploop.plant.sensing.accelerometer import make_accelerometer
-from haploop.protocol.scene.scene import Scene, accelerometer_is_used
+from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
-from haploop.protocol.trees import tree_select
+from haploop.protocol.trees import tree_select, tree_take
 
 if TYPE_CHECKING:
     from haploop.controller.dissipation import Element
@@ -39,7 +37,34 @@ _BUFFER = 512
 _UNHEEDED = 0.25
 
 
-class Batch:
+class BatchEnd(NamedTuple):
+    """The end of some members of a batch; trees have the members on the last axis of their arrays.
+
+    Attributes:
+        index: of their scenes among those of the batch, shape (members,).
+        tick: at which they ended.
+        controller: of the whole batch.
+        params, state: of the controller, for these members.
+        motion, last, line, accelerometer: states of the plant's parts, and the hold in effect last.
+        inside: whether each tick of the last half second, or of the second half of a shorter run, was in contact,
+            shape (members, ticks).
+    """
+
+    index: np.ndarray
+    scenes: list[Scene]
+    time: Timebase
+    tick: int
+    controller: Controller
+    params: Any
+    state: Any
+    motion: Any
+    last: Any
+    line: Any
+    accelerometer: Any
+    inside: np.ndarray
+
+
+class Batch(BatchLoop):
     """Scenes of one structure, each a place in arrays: sensor, line, motion, controller and books.
 
     The code that computes is that of a single run, on arrays. What decides for a single run when it ends is written
@@ -62,14 +87,9 @@ class Batch:
         trajectories: bool = False,
     ) -> None:
         self._scenes, scene = scenes, stacked(scenes)
-        self._time = time = Timebase.from_scene(scene)
-        members = len(scenes)
-        self._motion, self._line = make_motion(scene, time, members), make_line(scene, time, members)
-        self._position, self._sensor = make_position_sensor(scene, time), make_accelerometer(scene, time, members)
-        self._feels = accelerometer_is_used(scene)
-        self._rows = BatchRecorder()
-        self._controller = Controller(scene, time, kinds, self._rows)
-        self._elements = Unchanged(self._controller.params.elements)
+        time = Timebase.from_scene(scene)
+        rows = BatchRecorder()
+        super().__init__(scene, time, Controller(scene, time, kinds, rows), rows, len(scenes))
         self._logger = BatchLogger(scene, time, len(scenes), energy=energy, trajectories=trajectories)
         self._positions_only = not (energy or trajectories)
         self._in_flight: deque[Any] = deque(maxlen=time.lookahead_ticks + 1)
@@ -113,22 +133,15 @@ class Batch:
             return True
         return False
 
-    def _work(self, tick: int) -> None:
-        motion, x_m = self._motion, self._position.reading(self._motion.x)
-        sample = (x_m, self._felt(tick)) if self._feels else (x_m,)
-        forces = self._controller.answer([sample])
+    def _work(self, tick: int) -> list[Any]:
+        forces = super()._work(tick)
         if tick in self._changes:
             self._elements = Unchanged(self._controller.params.elements)
-        self._line.receive(forces)
         self._in_flight += forces
-        motion.advance(tick, self._line.holds(tick))
         waiting = tick + 1 - self._logger.tick
         if waiting * self._time.steps_per_tick * len(self._ended) >= BLOCK:
             self._book()
-
-    def _felt(self, tick: int) -> Any:
-        acceleration = self._motion.acceleration(tick)
-        return self._sensor.reading(acceleration) if self._sensor else acceleration
+        return forces
 
     def _book(self) -> None:
         rows = self._rows.take_rows()
@@ -167,12 +180,37 @@ class Batch:
             for index, outcome in zip(ends, outcomes, strict=True):
                 self.results[index] = outcome
 
+    def end(self) -> BatchEnd:
+        """Returns the end of the members that ran to it, for others to go on from; call it once they have."""
+        places = np.flatnonzero(~self._ended)
+        index = self._scene_of[places]
+        places = places[[self.results[i] is not None for i in index]]
+        index = self._scene_of[places]
+        controller, sensor = self._controller, self._sensor
+        return BatchEnd(
+            index,
+            [self._scenes[i] for i in index],
+            self._time,
+            self._end,
+            controller,
+            *tree_take(
+                (
+                    controller.params,
+                    controller.state,
+                    self._motion.state,
+                    self._motion.last,
+                    self._line.state,
+                    sensor.state if sensor else None,
+                ),
+                places,
+            ),
+            self._logger.window.contacts(places),
+        )
+
     def _drop_ended(self) -> None:
         on = ~self._ended
-        for part in (self._motion, self._line, self._position, self._sensor, self._controller, self._logger):
-            if part:
-                part.select(on)
-        self._elements = Unchanged(self._controller.params.elements)
+        self._select(on)
+        self._logger.select(on)
         in_flight = tree_select([*self._in_flight], on)
         self._in_flight.clear()
         self._in_flight.extend(in_flight)

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
-from haploop.launch.stability.traces import Trend, frequency_Hz, is_felt, ripple, smallest_felt_m, trend, widths
+from haploop.launch.stability.traces import frequency_Hz, is_felt, ripple, smallest_felt_m, trend, widths
 
 # Pieces in which the width of a swing is measured, and the periods that one covers at least.
 PIECES = 24
@@ -84,90 +85,129 @@ class Finding:
         return WHY[self.why].format(**numbers, width_um=1e6 * self.width_m, felt_um=felt_um)
 
 
-@dataclass(frozen=True)
-class Pushed:
-    """The loop after both pushes.
+class Pushed(NamedTuple):
+    """Some loops after both pushes; arrays have the members on their first axis.
 
     Attributes:
-        small, large: position at ticks after the smaller and the larger push, m, of equal length.
-        command: command at ticks after the larger one, N.
+        small, large: position at the ticks after the smaller and the larger push, shape (members, ticks), m.
+        command: command at the ticks after the larger one, shape (members, ticks), N.
         rate: ticks a second.
-        push_N: the larger push.
-        count_m: one count of the encoder; 0 without.
-        inside: whether a tick in the last quarter of both was in contact.
+        push_N: the larger push, shape (members,).
+        count_m: one count of the encoder, shape (members,); 0 without.
+        inside: whether a tick in the last quarter of both was in contact, shape (members,).
     """
 
     small: np.ndarray
     large: np.ndarray
     command: np.ndarray
     rate: float
+    push_N: np.ndarray
+    count_m: np.ndarray
+    inside: np.ndarray
+
+
+class Swing(NamedTuple):
+    """Measures of one loop after both pushes.
+
+    Attributes:
+        watched_s: time since the push.
+        changes, errors: of the logarithm of the width over the second half, small and large, and their standard errors.
+        rate_1_s, error_1_s: growth of the one that changes less, and its standard error.
+        width_m, spread_m, most_m: mean, half range and maximum of the widths in the last quarter of both.
+        at_first, at_last: width after the larger push over that after the smaller, in the first piece and at the last.
+        frequency_Hz: of the end.
+        covers_periods: periods that a piece covers.
+    """
+
+    watched_s: float
     push_N: float
     count_m: float
     inside: bool
+    changes: tuple[float, float]
+    errors: tuple[float, float]
+    rate_1_s: float
+    error_1_s: float
+    width_m: float
+    spread_m: float
+    most_m: float
+    at_first: float
+    at_last: float
+    frequency_Hz: float
+    ripple_N: float
+    covers_periods: float
+
+    def lasts(self, within: float) -> bool:
+        """Tells whether both swings neither grow nor decay, as far as their scatter lets one say."""
+        pairs = zip(self.changes, self.errors, strict=True)
+        return all(abs(change) < max(within, 2 * error) and error < 0.1 for change, error in pairs)
+
+    def finding(self, word: str, why: str) -> Finding:
+        felt_m = 2.0 * smallest_felt_m(self.frequency_Hz)
+        needs_s = None
+        if word == "undecided":
+            slower = min(zip(self.changes, self.errors, strict=True), key=lambda each: abs(each[0]))
+            needs_s = self.watched_s * max(2.0, 4.0 * slower[1] / max(abs(slower[0]), 1e-12))
+            if self.rate_1_s < 0.0:
+                needs_s = max(needs_s, self.watched_s + math.log(max(self.width_m / felt_m, 1.0)) / -self.rate_1_s)
+        return Finding(
+            word, why, self.push_N, self.watched_s, self.rate_1_s, self.error_1_s, self.frequency_Hz, self.width_m,
+            self.spread_m, self.ripple_N, self.width_m >= felt_m, None, needs_s,
+        )  # fmt: skip
 
 
-def decide(pushed: Pushed, *, last: bool) -> Finding:
+def measure(pushed: Pushed) -> list[Swing]:
+    """Returns the measures of each loop, worked out as if it were alone."""
+    small_x, large_x, command, rate, *of_each = pushed
+    ticks = large_x.shape[-1]
+    size, quarter_ticks = ticks // PIECES, -(-ticks // 4)
+    small, large = widths(small_x, size), widths(large_x, size)
+    half, quarter = small.shape[-1] // 2, small.shape[-1] // 4
+    small_trend, large_trend = (trend(width[:, half:], size / rate) for width in (small, large))
+    slower = np.where(np.abs(large_trend.rate_1_s) < np.abs(small_trend.rate_1_s), large_trend[:2], small_trend[:2])
+    tail = np.concatenate([small[:, -quarter:], large[:, -quarter:]], axis=1)
+    ends = [width[:, -quarter:].mean(axis=1) for width in (small, large)]
+    frequency = frequency_Hz(large_x[:, -quarter_ticks:], rate)
+    columns = [
+        *of_each,
+        np.stack([small_trend.change, large_trend.change], axis=-1),
+        np.stack([small_trend.error, large_trend.error], axis=-1),
+        *slower,
+        tail.mean(axis=1),
+        np.ptp(tail, axis=1) / 2.0,
+        tail.max(axis=1),
+        large[:, 0] / np.maximum(small[:, 0], _REST_M),
+        ends[1] / np.maximum(ends[0], _REST_M),
+        frequency,
+        ripple(command[:, -quarter_ticks:], rate),
+        size * frequency / rate,
+    ]
+    rows = zip(*(column.tolist() for column in columns), strict=True)
+    return [Swing(ticks / rate, *row) for row in rows]
+
+
+def decide(swing: Swing, *, last: bool) -> Finding:
     """Returns the finding; ``undecided`` asks for a longer time unless it is the ``last`` one.
 
     *steady*: the swing died, or dies and what is left of it no hand feels. *limit-cycle*: it forgets how hard it was
     pushed, yet remains, and is felt. *growing*: both swings grow.
     """
-    watched_s = len(pushed.large) / pushed.rate
-    if not pushed.inside:
-        return Finding("undecided", "leaves the wall", pushed.push_N, watched_s)
-    size = len(pushed.large) // PIECES
-    small, large = widths(pushed.small, size), widths(pushed.large, size)
-    half, quarter = len(small) // 2, len(small) // 4
-    of_small, of_large = (trend(width[half:], size / pushed.rate) for width in (small, large))
-    tail = np.concatenate([small[-quarter:], large[-quarter:]])
-    end = pushed.large[-len(pushed.large) // 4 :]
-    found = _Found(pushed, watched_s, of_small, of_large, tail, frequency_Hz(end, pushed.rate))
-    width, frequency = float(tail.mean()), found.frequency_Hz
-    if tail.max() < _REST_M:
-        return found.finding("steady", "rest")
-    rising = any(each.change > max(_LASTING, 3 * each.error) for each in (of_small, of_large))
-    falling = of_small.change < -_LASTING and of_large.change < -_LASTING and (width < _SMALL_M or watched_s >= _LONG_S)
-    if not is_felt(width, frequency) and not rising and (falling or width <= 2.0 * pushed.count_m):
-        return found.finding("steady", "unfelt")
-    if size * frequency < _LEAST_PERIODS * pushed.rate and not last:
-        return found.finding("undecided", "too slow")
-    at_first = large[0] / max(small[0], _REST_M)
-    at_last = large[-quarter:].mean() / max(small[-quarter:].mean(), _REST_M)
-    if found.lasts(_LASTING) and _SAME[0] < at_last < _SAME[1] and not 0.5 < at_first < 2.0:
-        return found.finding("limit-cycle", "forgets")
-    kept_ratio = at_first > 2.0 and _SAME[0] < at_last / at_first < _SAME[1]
-    if found.lasts(_LASTING_LONG) and watched_s >= _LONG_S and not kept_ratio:
-        return found.finding("limit-cycle", "lasts")
-    if watched_s >= _LONG_S and all(each.change > 4 * each.error for each in (of_small, of_large)):
-        return found.finding("growing", "grows")
-    return found.finding("undecided", "too slow")
-
-
-@dataclass(frozen=True)
-class _Found:
-    pushed: Pushed
-    watched_s: float
-    small: Trend
-    large: Trend
-    tail: np.ndarray
-    frequency_Hz: float
-
-    def lasts(self, within: float) -> bool:
-        """Tells whether both swings neither grow nor decay, as far as their scatter lets one say."""
-        both = self.small, self.large
-        return all(abs(each.change) < max(within, 2 * each.error) and each.error < 0.1 for each in both)
-
-    def finding(self, word: str, why: str) -> Finding:
-        slower = min((self.small, self.large), key=lambda each: abs(each.rate_1_s))
-        width = float(self.tail.mean())
-        felt_m = 2.0 * smallest_felt_m(self.frequency_Hz)
-        needs_s = None
-        if word == "undecided":
-            needs_s = self.watched_s * max(2.0, 4.0 * slower.error / max(abs(slower.change), 1e-12))
-            if slower.rate_1_s < 0.0:
-                needs_s = max(needs_s, self.watched_s + math.log(max(width / felt_m, 1.0)) / -slower.rate_1_s)
-        end = self.pushed.command[-len(self.pushed.command) // 4 :]
-        return Finding(
-            word, why, self.pushed.push_N, self.watched_s, slower.rate_1_s, slower.error_1_s, self.frequency_Hz, width,
-            float(np.ptp(self.tail)) / 2.0, ripple(end, self.pushed.rate), width >= felt_m, None, needs_s,
-        )  # fmt: skip
+    if not swing.inside:
+        return Finding("undecided", "leaves the wall", swing.push_N, swing.watched_s)
+    if swing.most_m < _REST_M:
+        return swing.finding("steady", "rest")
+    is_long, changes = swing.watched_s >= _LONG_S, [*zip(swing.changes, swing.errors, strict=True)]
+    rising = any(change > max(_LASTING, 3 * error) for change, error in changes)
+    falling = max(swing.changes) < -_LASTING and (swing.width_m < _SMALL_M or is_long)
+    unfelt = not is_felt(swing.width_m, swing.frequency_Hz)
+    if unfelt and not rising and (falling or swing.width_m <= 2.0 * swing.count_m):
+        return swing.finding("steady", "unfelt")
+    if swing.covers_periods < _LEAST_PERIODS and not last:
+        return swing.finding("undecided", "too slow")
+    if swing.lasts(_LASTING) and _SAME[0] < swing.at_last < _SAME[1] and not 0.5 < swing.at_first < 2.0:
+        return swing.finding("limit-cycle", "forgets")
+    kept_ratio = swing.at_first > 2.0 and _SAME[0] < swing.at_last / swing.at_first < _SAME[1]
+    if swing.lasts(_LASTING_LONG) and is_long and not kept_ratio:
+        return swing.finding("limit-cycle", "lasts")
+    if is_long and all(change > 4 * error for change, error in changes):
+        return swing.finding("growing", "grows")
+    return swing.finding("undecided", "too slow")

@@ -8,16 +8,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from haploop.controller.controller import Controller
-from haploop.plant.motion.hand_force import make_hand_force
+from haploop.plant.motion.hand_force import HandForce
 from haploop.plant.plant import Plant
-from haploop.protocol.scene.hand_force import Trace
-from haploop.protocol.scene.paths import value_at, with_value
+from haploop.protocol.scene.hand_force import Constant
 from haploop.protocol.scene.scene import Hand, Scene
 from haploop.protocol.ticks import Timebase
 
-# A push lasts this long; its edges take one plant step.
+# A push lasts this long.
 PUSH_S = 0.05
-_NOISES = ("noise.deviation", "accelerometer.noise_density")
 
 
 @dataclass(frozen=True)
@@ -51,13 +49,11 @@ class StillHand:
     """
 
     def __init__(self, end: End, push_N: float) -> None:
-        tick, rate = end.plant.reached, end.time.control_rate
-        self._scene = _held(end.scene, end.hold_N, push_N, tick / rate, end.time.step_s)
-        self._plant = Plant(self._scene, replace(end.time, ticks=2**53))
-        self._plant.restore(deepcopy(end.plant.checkpoint()))
+        self._time, self._rate = replace(end.time, ticks=2**53), end.time.control_rate
+        self._plant = _went_on(held(end.scene, end.hold_N + push_N), self._time, end.plant)
         self._controller = end.controller.fork()
-        self._first, self._rate = tick + round((PUSH_S + end.time.step_s) * rate) + 1, rate
-        self._steps = end.time.steps_per_tick
+        self._first, self._steps = end.plant.reached + push_ticks(self._rate), end.time.steps_per_tick
+        self._then: Scene | None = held(end.scene, end.hold_N)
         self.x, self.command = np.zeros(0), np.zeros(0)
 
     @property
@@ -69,7 +65,17 @@ class StillHand:
 
         Raises:
             ElementError: an element raised.
+            ArithmeticError: the plant's arithmetic failed.
         """
+        if self._then:
+            self._run_until(self._first)
+            if self.stop_reason:
+                return
+            self._plant, self._then = _went_on(self._then, self._time, self._plant), None
+            self.x, self.command = np.zeros(0), np.zeros(0)
+        self._run_until(self._first + round(seconds * self._rate))
+
+    def _run_until(self, tick: int) -> None:
         commands: list[float] = []
 
         def exchange(_: int, samples: list[tuple[float, ...]]) -> list[float]:
@@ -77,29 +83,37 @@ class StillHand:
             commands.extend(forces)
             return forces
 
-        began = self._plant.tick
-        self._plant.run_until(self._first + round(seconds * self._rate), exchange)
-        first, ticks, columns = self._plant.take_block()
+        self._plant.run_until(tick, exchange)
+        _, ticks, columns = self._plant.take_block()
         self._controller.recorder.take()
-        x = np.frombuffer(columns["x"])[: ticks * self._steps : self._steps]
-        self.x = np.append(self.x, x[max(0, self._first - first) :])
-        self.command = np.append(self.command, commands[max(0, self._first - began) :])
+        self.x = np.append(self.x, np.frombuffer(columns["x"])[: ticks * self._steps : self._steps])
+        self.command = np.append(self.command, commands[:ticks])
 
 
-def hold_of(scene: Scene, time: Timebase, first: int, inside: np.ndarray) -> float:
-    """Returns the mean force of the hand in N over the ticks from ``first`` on that were in contact (``inside``)."""
+def push_ticks(rate: int) -> int:
+    """Returns how many ticks a push lasts at so many ticks a second, one at least."""
+    return max(1, round(PUSH_S * rate))
+
+
+def held(scene: Scene, force_N: float) -> Scene:
+    """Returns the scene with a constant force of the hand, without noise and events."""
+    sensor = scene.accelerometer and replace(scene.accelerometer, noise_density=0.0)
+    hand = replace(scene.hand or Hand(), force=Constant(value=force_N))
+    return replace(scene, hand=hand, event=(), noise=None, accelerometer=sensor)
+
+
+def _went_on(scene: Scene, time: Timebase, plant: Plant) -> Plant:
+    """Returns a plant of the scene that goes on from where another one is."""
+    other = Plant(scene, time)
+    other.restore(deepcopy(plant.checkpoint()))
+    return other
+
+
+def hold_of(scene: Scene, time: Timebase, last: int, inside: np.ndarray) -> float:
+    """Returns the mean force of the hand in N over the ticks before ``last`` that were in contact.
+
+    ``inside`` tells which these are, shape (ticks,).
+    """
     n = time.steps_per_tick
-    force = make_hand_force(scene, time.plant_rate).at_steps(first * n, (first + len(inside)) * n)[::n]
-    return float(force[inside].mean())
-
-
-def _held(scene: Scene, hold_N: float, push_N: float, at_s: float, step_s: float) -> Scene:
-    """Returns the scene with the hand held from a time on but for the push, without noise and events."""
-    times = (at_s + step_s, at_s + 2 * step_s, at_s + PUSH_S, at_s + PUSH_S + step_s)
-    pushed = hold_N + push_N
-    force = Trace(time=times, force=(hold_N, pushed, pushed, hold_N))
-    scene = replace(scene, hand=replace(scene.hand or Hand(), force=force), event=())
-    for key in _NOISES:
-        if value_at(scene, key):
-            scene = with_value(scene, key, 0.0)
-    return scene
+    force = HandForce(scene.hand.force if scene.hand else None, time.plant_rate)
+    return float(force.at_steps((last - len(inside)) * n, last * n)[::n][inside].mean())

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 import numpy as np
@@ -17,7 +16,7 @@ _SMALLEST_M = (26e-6, 8.5e-6, 0.06e-6)
 
 
 class Trend(NamedTuple):
-    """Growth of the width of a swing, e^(rate t).
+    """Growth of the width of swings, e^(rate t); arrays of one shape.
 
     Attributes:
         rate_1_s: from a straight line through the logarithms of the widths.
@@ -25,47 +24,58 @@ class Trend(NamedTuple):
         change: change of the logarithm over the time looked at; ``error`` its standard error.
     """
 
-    rate_1_s: float
-    error_1_s: float
-    change: float
-    error: float
+    rate_1_s: np.ndarray
+    error_1_s: np.ndarray
+    change: np.ndarray
+    error: np.ndarray
 
 
 def widths(x: np.ndarray, size: int) -> np.ndarray:
-    """Returns the width of x about its straight trend, peak to peak, in pieces of ``size`` samples, oldest first."""
-    pieces = x[len(x) % size :].reshape(-1, size)
+    """Returns the width of x about its straight trend, peak to peak, in pieces of ``size`` samples, oldest first.
+
+    ``x`` is of shape (..., samples), the result of shape (..., pieces); samples left over come first.
+    """
+    pieces = x[..., x.shape[-1] % size :].reshape(*x.shape[:-1], -1, size)
     t = np.arange(size) - (size - 1) / 2.0
-    offset = pieces - pieces.mean(axis=1, keepdims=True)
-    offset -= t * ((offset @ t) / (t @ t))[:, None]
-    return np.ptp(offset, axis=1)
+    offset = pieces - pieces.mean(axis=-1, keepdims=True)
+    offset -= t * (np.vecdot(offset, t) / np.vecdot(t, t))[..., None]
+    return np.ptp(offset, axis=-1)
 
 
 def trend(width: np.ndarray, spacing_s: float) -> Trend:
-    """Returns the growth of widths that lie ``spacing_s`` apart, three at least."""
+    """Returns the growth of widths that lie ``spacing_s`` apart, shape (..., three at least)."""
     logs = np.log(np.maximum(width, LEAST_WIDTH_M))
-    t = (np.arange(len(logs)) - (len(logs) - 1) / 2.0) * spacing_s
-    square = t @ t
-    rate = (t @ logs) / square
-    left = logs - logs.mean() - rate * t
-    error = math.sqrt((left @ left) / ((len(logs) - 2) * square))
-    seconds = len(logs) * spacing_s
-    return Trend(float(rate), error, float(rate) * seconds, error * seconds)
+    count = logs.shape[-1]
+    t = (np.arange(count) - (count - 1) / 2.0) * spacing_s
+    square = np.vecdot(t, t)
+    rate = np.vecdot(logs, t) / square
+    left = logs - logs.mean(axis=-1, keepdims=True) - rate[..., None] * t
+    error = np.sqrt(np.vecdot(left, left) / ((count - 2) * square))
+    seconds = count * spacing_s
+    return Trend(rate, error, rate * seconds, error * seconds)
 
 
-def frequency_Hz(x: np.ndarray, rate: float) -> float:
-    """Returns the frequency at which x, sampled at ``rate`` in Hz, swings most; 0 for one that rests."""
-    offset = (x - x.mean()) * np.hanning(len(x))
-    power = np.abs(np.fft.rfft(offset))
-    return float(np.fft.rfftfreq(len(x), 1.0 / rate)[1 + np.argmax(power[1:])]) if power[1:].any() else 0.0
+def frequency_Hz(x: np.ndarray, rate: float) -> np.ndarray:
+    """Returns the frequency at which x, sampled at ``rate`` in Hz, swings most; 0 for one that rests.
+
+    ``x`` is of shape (..., samples).
+    """
+    count = x.shape[-1]
+    power = np.abs(np.fft.rfft((x - x.mean(axis=-1, keepdims=True)) * np.hanning(count)))[..., 1:]
+    return np.where(power.any(axis=-1), np.fft.rfftfreq(count, 1.0 / rate)[1 + np.argmax(power, axis=-1)], 0.0)
 
 
-def ripple(force_N: np.ndarray, rate: float) -> float:
-    """Returns what a force, sampled at ``rate`` in Hz, swings by above ``RIPPLE_ABOVE_HZ``, peak to peak in N."""
-    if len(force_N) < 4:
-        return 0.0
-    spectrum = np.fft.rfft(force_N - force_N.mean())
-    spectrum[np.fft.rfftfreq(len(force_N), 1.0 / rate) < RIPPLE_ABOVE_HZ] = 0.0
-    return float(np.ptp(np.fft.irfft(spectrum, len(force_N))))
+def ripple(force_N: np.ndarray, rate: float) -> np.ndarray:
+    """Returns what a force, sampled at ``rate`` in Hz, swings by above ``RIPPLE_ABOVE_HZ``, peak to peak in N.
+
+    ``force_N`` is of shape (..., samples).
+    """
+    count = force_N.shape[-1]
+    if count < 4:
+        return np.zeros(force_N.shape[:-1])
+    spectrum = np.fft.rfft(force_N - force_N.mean(axis=-1, keepdims=True))
+    spectrum[..., np.fft.rfftfreq(count, 1.0 / rate) < RIPPLE_ABOVE_HZ] = 0.0
+    return np.ptp(np.fft.irfft(spectrum, count), axis=-1)
 
 
 def smallest_felt_m(frequency_Hz: float) -> float:

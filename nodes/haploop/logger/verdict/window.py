@@ -103,6 +103,12 @@ class Window:
             windows = measure_window(x, rows, span, rate, swing_m)
             yield from map(RunMeasures, windows, self.extremes(some), swing_m.tolist())
 
+    def contacts(self, places: np.ndarray) -> np.ndarray:
+        """Returns whether each tick of the window was in contact, shape (places, ticks); at least the last tick's."""
+        ran = self.state.steps // self._time.steps_per_tick
+        ticks = ran - max(ran // 2, ran - self._time.control_rate // 2)
+        return _read(self.state.rows["in_contact"], ran, places)[:, -ticks:] > 0.0
+
     def extremes(self, places: np.ndarray) -> Iterator[Extremes]:
         s = self.state
         return map(Extremes, *(of[places].tolist() for of in (s.x_min_m, s.x_max_m, s.force_max_N)))

@@ -162,6 +162,10 @@ class ChainHistory(ABC):
             self._forces = []
         return record
 
+    def forget_record(self) -> None:
+        """Drops what ``take_record`` would return."""
+        self._done, self._forces = [], []
+
     def select(self, kept: np.ndarray) -> None:
         self.state, self._rest_N = tree_select((self.state, self._rest_N), kept)
         self._tau.select(kept)

@@ -191,6 +191,10 @@ class BatchFrictionMotion(RubbingHistory, ChainMotion):
         record = super().take_record(tick, positions_only=positions_only)
         return record if positions_only else record | {"pieces": pieces}
 
+    def forget_record(self) -> None:
+        super().forget_record()
+        self._pieces = []
+
     def select(self, kept: np.ndarray) -> None:
         super().select(kept)
         self._clamped.select(kept)

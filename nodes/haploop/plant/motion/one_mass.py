@@ -189,6 +189,10 @@ class OneMassMotion:
                 record[name][-1] = end
         return record
 
+    def forget_record(self) -> None:
+        """Drops what ``take_record`` would return."""
+        self._noted = []
+
     def select(self, kept: np.ndarray) -> None:
         self.mechanics, self.held, self.state, self.last = tree_select(
             (self.mechanics, self.held, self.state, self.last), kept
