@@ -18,8 +18,10 @@ from haploop.protocol.trees import tree_select, tree_take
 
 # An operand that all copies share is copied into buffers of NumPy's unless these are shorter than a row of copies.
 _BUFFER = 512
-# Records are dropped once so many ticks.
+# Records are dropped once in so many ticks.
 _FORGET_TICKS = 256
+# Copies that have left the limit are computed on, unheeded, until they are more than this share.
+_UNHEEDED = 0.25
 
 
 class StillBatch(BatchLoop):
@@ -50,8 +52,10 @@ class StillBatch(BatchLoop):
         self._then = _held(scenes, hold_N)
         self._limit_m = np.array([scene.diverged_beyond for scene in scenes])
         self._tick, self._first = end.tick, end.tick + push_ticks(time.control_rate)
-        self._x: list[np.ndarray] = []
-        self._commands: list[np.ndarray] = []
+        self._traces = np.empty((2, 0, len(member)))
+        # Friction might switch for ever in a copy that has left the limit.
+        self._unheeded = 0.0 if scenes[0].friction else _UNHEEDED
+        self._gone = np.zeros(len(member), bool)
 
     def go_to(self, seconds: float) -> list[tuple[int, np.ndarray]]:
         """Goes on until so many seconds have passed since the push; what leaves the limit on the way is dropped.
@@ -62,59 +66,61 @@ class StillBatch(BatchLoop):
         Raises:
             ElementError: an element raised.
         """
-        gone: list[tuple[int, np.ndarray]] = []
+        left: list[tuple[int, np.ndarray]] = []
         with np.errstate(all="ignore"):  # which gives back the buffers as well
             np.setbufsize(_BUFFER)
-            while self._tick < self._first + round(seconds * self._time.control_rate) and len(self.copy):
-                if self._tick == self._first:
-                    self._let_go()
-                gone += self._go_on()
+            if self._tick < self._first:
+                left += self._go_until(self._first)
+                motion = make_motion(self._then, self._time, max(1, len(self.copy)))
+                motion.restore(self._motion.state, self._motion.last)
+                self._motion = motion
+                self._traces = self._traces[:, :0]
+            left += self._go_until(self._first + round(seconds * self._time.control_rate))
+        return left
+
+    def _go_until(self, end: int) -> list[tuple[int, np.ndarray]]:
+        ticks = self._traces.shape[1]
+        more = np.empty((2, end - self._tick, len(self.copy)))
+        self._traces = traces = np.concatenate([self._traces, more], axis=1)
+        left: list[tuple[int, np.ndarray]] = []
+        while self._tick < end and len(self.copy):
+            traces[0, ticks] = self._motion.x
+            [traces[1, ticks]] = self._work(self._tick)
+            self._tick, ticks = self._tick + 1, ticks + 1
+            inside = (np.abs(self._motion.x) <= self._limit_m) | self._gone
+            if not inside.all():
+                left += [(int(self.copy[place]), traces[0, :ticks, place].copy()) for place in np.flatnonzero(~inside)]
+                self._gone |= ~inside
+                if np.count_nonzero(self._gone) > self._unheeded * len(self._gone):
+                    self.keep(~self._gone)
+                    traces = self._traces
+            if self._tick % _FORGET_TICKS == 0:
+                self._forget()
+        self._forget()
+        self.keep(~self._gone)
+        return left
+
+    def _forget(self) -> None:
         self._motion.forget_record()
         self._rows.take_rows()
         self._elements.check()
-        return gone
-
-    def _let_go(self) -> None:
-        """Ends the push."""
-        motion = make_motion(self._then, self._time, len(self.copy))
-        motion.restore(self._motion.state, self._motion.last)
-        self._motion, self._x, self._commands = motion, [], []
-
-    def _go_on(self) -> list[tuple[int, np.ndarray]]:
-        self._x.append(self._motion.x)
-        [force] = self._work(self._tick)
-        self._commands.append(np.broadcast_to(force, self._limit_m.shape))
-        self._tick += 1
-        if self._tick % _FORGET_TICKS == 0:
-            self._motion.forget_record()
-            self._rows.take_rows()
-        inside = np.abs(self._motion.x) <= self._limit_m
-        if inside.all():
-            return []
-        x = self.positions()
-        gone = [(int(self.copy[place]), x[place]) for place in np.flatnonzero(~inside)]
-        self.keep(inside)
-        return gone
 
     def positions(self) -> np.ndarray:
         """Returns the positions at the ticks since the push, shape (copies, ticks), m."""
-        return np.ascontiguousarray(np.stack(self._x, axis=-1))
+        return np.ascontiguousarray(self._traces[0].T)
 
     def commands(self) -> np.ndarray:
         """Returns the commands at the ticks since the push, shape (copies, ticks), N."""
-        return np.ascontiguousarray(np.stack(self._commands, axis=-1))
+        return np.ascontiguousarray(self._traces[1].T)
 
     def keep(self, kept: np.ndarray) -> None:
         """Drops the copies for which ``kept``, shape (copies,), is false."""
         if kept.all():
             return
-        if not kept.any():
-            self.copy = self.copy[kept]
-            return
-        self._select(kept)
-        self.copy, self._limit_m, self._x, self._commands, self._then = tree_select(
-            (self.copy, self._limit_m, self._x, self._commands, self._then), kept
-        )
+        self._traces, self.copy, self._gone = self._traces[..., kept], self.copy[kept], self._gone[kept]
+        if len(self.copy):  # arrays of none would be taken for those that all share
+            self._select(kept)
+            self._limit_m, self._then = tree_select((self._limit_m, self._then), kept)
 
 
 def _held(scenes: Sequence[Scene], force_N: np.ndarray) -> Scene:
