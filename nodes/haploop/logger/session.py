@@ -41,11 +41,16 @@ class LogSession:
             self._log.close()
         summary = finite(self.logger.summary(failed, reason, trouble, telemetry_gaps))
         if self._out:
-            try:
-                write(summary, self._out / SUMMARY)
-            except OSError as error:
-                raise LogError(f"The summary {self._out / SUMMARY} could not be written: {error.strerror}.") from error
+            write_summary(summary, self._out)
         return summary
+
+
+def write_summary(summary: Summary, out: Path) -> None:
+    """Writes the summary into the directory of its run; LogError where that fails."""
+    try:
+        write(summary, out / SUMMARY)
+    except OSError as error:
+        raise LogError(f"The summary {out / SUMMARY} could not be written: {error.strerror}.") from error
 
 
 def open_session(

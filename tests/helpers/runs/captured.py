@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from haploop.launch.runs.in_process import Loop, scene_events
+from haploop.launch.runs.in_process import Loop
+from haploop.launch.scene.events import scene_events
 from haploop.logger.logger import Block, Logger
 from haploop.logger.session import LogSession
 from haploop.protocol.scene.scene import Scene

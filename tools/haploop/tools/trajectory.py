@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from haploop.controller.dissipation import registry
-from haploop.launch.runs.in_process import Loop, scene_events
+from haploop.launch.runs.in_process import Loop
+from haploop.launch.scene.events import scene_events
 from haploop.logger.logger import Logger
 from haploop.logger.session import LogSession
 from haploop.logger.summary import Summary

@@ -15,7 +15,7 @@ from haploop.controller.controller import Controller
 from haploop.controller.recorder import BatchRecorder
 from haploop.launch.batch.loop import BatchLoop
 from haploop.launch.batch.stacking import stacked
-from haploop.launch.runs.in_process import scene_events
+from haploop.launch.scene.events import scene_events
 from haploop.logger.batch import BatchLogger, MemberEnd
 from haploop.logger.summary import Summary
 from haploop.plant.plant import beyond
@@ -180,11 +180,9 @@ class Batch(BatchLoop):
             for index, outcome in zip(ends, outcomes, strict=True):
                 self.results[index] = outcome
 
-    def end(self) -> BatchEnd:
-        """Returns the end of the members that ran to it, for others to go on from; call it once they have."""
-        places = np.flatnonzero(~self._ended)
-        index = self._scene_of[places]
-        places = places[[self.results[i] is not None for i in index]]
+    def end(self, members: Sequence[int]) -> BatchEnd:
+        """Returns where members that ran to their end stand, by the numbers of their scenes, two at least."""
+        places = np.flatnonzero(np.isin(self._scene_of, members))
         index = self._scene_of[places]
         controller, sensor = self._controller, self._sensor
         return BatchEnd(

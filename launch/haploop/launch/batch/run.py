@@ -11,6 +11,7 @@ from haploop.launch.batch.batch import Batch
 from haploop.launch.batch.stacking import is_batchable, structures
 from haploop.launch.runs.in_process import run_in_process
 from haploop.launch.spec import RunFailed
+from haploop.launch.stability.judge import is_watched, judge_batch, with_verdict
 from haploop.logger.summary import OF_THE_MACHINE, Summary
 from haploop.plant.choose import needs_chain
 from haploop.protocol.scene.scene import Scene
@@ -93,9 +94,30 @@ def _together(scenes: Sequence[Scene], kinds: Kinds, energy: bool, trajectories:
     try:
         batch = Batch(scenes, kinds, energy=energy, trajectories=trajectories)
         batch.run()
+        return with_verdicts(batch, scenes)
     except (ElementError, ArithmeticError):
         return [None] * len(scenes)
-    return batch.results
+
+
+def with_verdicts(batch: Batch, scenes: Sequence[Scene]) -> list[Summary | None]:
+    """Returns the results of a batch that has run, with the verdicts that its scenes ask for.
+
+    None where a scene has to be run alone: a single one that is left to be judged is no batch.
+
+    Raises:
+        ElementError: an element raised while its loop was watched.
+    """
+    results = batch.results[: len(scenes)]
+    watched = [index for index, result in enumerate(results) if result and is_watched(scenes[index], result)]
+    if len(watched) == 1:
+        results[watched[0]] = None
+        watched = []
+    end = batch.end(watched) if watched else None
+    found = dict(zip(end.index.tolist(), judge_batch(end), strict=True)) if end else {}
+    return [
+        result and with_verdict(scene, result, lambda index=index: found[index])
+        for index, (scene, result) in enumerate(zip(scenes, results, strict=True))
+    ]
 
 
 def _alone(scene: Scene, kinds: Kinds, energy: bool, trajectories: bool) -> Summary:

@@ -16,6 +16,7 @@ from haploop.launch.clock.server import ClockServer
 from haploop.launch.processes import run_directory
 from haploop.launch.processes.children import Child, interrupts, start_children
 from haploop.launch.spec import RunFailed, RunSpec
+from haploop.protocol.changes import Event
 from haploop.protocol.ticks import Timebase
 from haploop.protocol.transport.sockets import SecureContext
 
@@ -35,8 +36,8 @@ _PROBE_S = 0.2
 _HELD_UP_S = 1.0
 
 
-def run_processes(spec: RunSpec) -> Summary:
-    """Runs to the end and returns the summary.
+def run_processes(spec: RunSpec) -> tuple[Summary, list[tuple[int, Event]]]:
+    """Runs to the end; returns the summary, and every event with its tick.
 
     The first SIGINT or SIGTERM ends the run in order, with a summary of what ran; the second at once.
 
@@ -47,7 +48,8 @@ def run_processes(spec: RunSpec) -> Summary:
     sockets = run_directory.create()
     try:
         with interrupts(usual_from=3) as received:
-            return Supervisor(spec, sockets, received).run()
+            supervisor = Supervisor(spec, sockets, received)
+            return supervisor.run(), supervisor.events
     finally:
         run_directory.remove(sockets)
 
@@ -95,6 +97,10 @@ class Supervisor:
                 child.kill()
             self._server.close()
             self._context.destroy(linger=0)
+
+    @property
+    def events(self) -> list[tuple[int, Event]]:
+        return self._clock.events
 
     def _lead(self) -> None:
         poller = zmq.Poller()

@@ -6,9 +6,15 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
 
+import numpy as np
+
 from haploop.controller.controller import Controller
 from haploop.controller.dissipation import ElementError
+from haploop.launch.scene.events import scene_events
 from haploop.launch.spec import RunFailed
+from haploop.launch.stability.decide import Finding
+from haploop.launch.stability.judge import LOOKS_S, end_at, judge, with_verdict
+from haploop.launch.stability.still_hand import End
 from haploop.logger.session import LogSession, open_session
 from haploop.logger.summary import Summary
 from haploop.plant.plant import Plant
@@ -62,12 +68,7 @@ def run_in_process(
         loop.fail(f"The controller failed: {error}")
     except ArithmeticError as error:
         loop.fail(f"The plant failed: {error}")
-    return loop.finish()
-
-
-def scene_events(scene: Scene, time: Timebase) -> list[tuple[int, Event]]:
-    """Returns the events of a scene with their ticks, in order."""
-    return [(time.first_tick_at(event.at), event.as_dict()) for event in scene.event]
+    return loop.judged(out)
 
 
 class Loop:
@@ -75,7 +76,7 @@ class Loop:
 
     def __init__(self, scene: Scene, time: Timebase, kinds: dict[str, type[Element]], session: LogSession) -> None:
         self._plant, self._controller = Plant(scene, time), Controller(scene, time, kinds)
-        self._session = session
+        self._scene, self._session = scene, session
         self._end = time.ticks
         self._block = BlockLength(scene.run.block_ticks)
         session.logger.start(self._plant.state(), [])
@@ -121,3 +122,14 @@ class Loop:
     def finish(self, failed: str = "") -> Summary:
         """Closes the books and returns the summary; ``failed`` says why the run could not go on."""
         return self._session.close(failed, self._plant.stop_reason, self._controller.recorder.trouble, 0)
+
+    def judged(self, out: Path | None) -> Summary:
+        """Closes the books of a run that came to its end and returns the summary with the verdict it asks for."""
+        summary, logger = self.finish(), self._session.logger
+
+        def find() -> Finding:
+            [inside] = logger.window.contacts(np.zeros(1, np.intp))
+            end = end_at(self._scene, self._plant, self._controller, inside)
+            return judge(end, LOOKS_S) if isinstance(end, End) else end
+
+        return with_verdict(self._scene, summary, find, out)

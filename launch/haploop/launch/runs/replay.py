@@ -144,6 +144,6 @@ def _compare(recorded: Recording, repeated: Recording, failed: bool) -> list[str
 
 
 def _compare_summaries(before: Summary, after: Summary) -> list[str]:
-    keys = ("ticks", "verdict", "trajectory_sha256", "final", "extremes", "window", "energy", "lost")
+    keys = ("ticks", "verdict", "stability", "trajectory_sha256", "final", "extremes", "window", "energy", "lost")
     of_effects = ("actuator", "accelerometer")
     return [f"{key} of the summary differs." for key in (*keys, *of_effects) if before.get(key) != after.get(key)]

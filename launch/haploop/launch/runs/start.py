@@ -15,6 +15,13 @@ from haploop.protocol.scene.scene import Scene
 
 if TYPE_CHECKING:
     from haploop.logger.summary import Summary
+    from haploop.protocol.changes import Event
+
+# Runs of processes that are longer, in simulated seconds, are not gone through again for their verdict.
+REPEATED_S = 60.0
+_NOT_REPEATED = (
+    f"By its window alone, since the run is longer than {REPEATED_S:g} s (haploop judge goes through it again)."
+)
 
 
 def prepare(
@@ -71,7 +78,7 @@ def run(spec: RunSpec, *, in_process: bool = False, **options: Any) -> Summary:
     if not in_process:
         from haploop.launch.processes.supervisor import run_processes
 
-        return run_processes(spec)
+        return _judged(spec, *run_processes(spec))
     from haploop.launch.processes.children import interrupts
     from haploop.launch.runs.in_process import run_in_process
 
@@ -84,3 +91,20 @@ def run(spec: RunSpec, *, in_process: bool = False, **options: Any) -> Summary:
             on_progress=spec.on_progress,
             stop=lambda: bool(received),
         )
+
+
+def _judged(spec: RunSpec, summary: Summary, events: list[tuple[int, Event]]) -> Summary:
+    """Returns the summary of a run of processes with the verdict it asks for: it is gone through again, without books.
+
+    One that is longer than ``REPEATED_S`` keeps the verdict of its window.
+    """
+    if spec.scene.run.verdict == "window":
+        return summary
+    from haploop.launch.stability.judge import LOOKS_S, judge_scene, with_verdict
+    from haploop.logger.session import write_summary
+
+    if summary["duration_s"] > REPEATED_S:
+        summary["verdict_rule"] = f"{_NOT_REPEATED} {summary['verdict_rule']}"
+        write_summary(summary, spec.out)
+        return summary
+    return with_verdict(spec.scene, summary, lambda: judge_scene(spec.scene, spec.kinds, events, LOOKS_S), spec.out)

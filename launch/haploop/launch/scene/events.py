@@ -12,6 +12,7 @@ from haploop.launch.scene.layers import KeyPath, Layers
 from haploop.launch.scene.mistakes import counted, nearest
 from haploop.launch.scene.models import number_of
 from haploop.launch.scene.number import Number
+from haploop.protocol.changes import Event
 from haploop.protocol.scene.scene import NO_ELEMENT, Clock, ElementTable, EventTable, Scene, Wall
 from haploop.protocol.scene.table import Tables
 from haploop.protocol.ticks import DELAY, Timebase, whole_count
@@ -148,3 +149,8 @@ def try_out(tables: Iterable[ElementTable], kinds: Mapping[str, type[Element]]) 
     """Makes each element once, since its own code may refuse what its declaration allows, with an ElementError."""
     for table in tables:
         make_element(table, kinds)
+
+
+def scene_events(scene: Scene, time: Timebase) -> list[tuple[int, Event]]:
+    """Returns the events of a scene with their ticks, in order."""
+    return [(time.first_tick_at(event.at), event.as_dict()) for event in scene.event]

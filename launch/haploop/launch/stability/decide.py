@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -77,6 +77,11 @@ class Finding:
     chaotic: bool | None = None
     needs_s: float | None = None
     detail: str = ""
+
+    def entries(self) -> dict[str, Any]:
+        """Returns what a summary tells of it: the word, why as a sentence, and the numbers as its ``stability``."""
+        numbers = {name: value for name, value in vars(self).items() if name not in ("word", "detail")}
+        return {"verdict": self.word, "verdict_rule": self.sentence(), "stability": numbers}
 
     def sentence(self) -> str:
         """Returns why, with its numbers."""

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
@@ -11,10 +12,12 @@ from haploop.controller.controller import Controller
 from haploop.controller.dissipation import Element, ElementError
 from haploop.controller.tick import Wall
 from haploop.launch.batch.batch import BatchEnd
-from haploop.launch.runs.in_process import scene_events
+from haploop.launch.scene.events import scene_events
 from haploop.launch.stability.decide import Finding, Pushed, decide, measure
 from haploop.launch.stability.still_batch import StillBatch
 from haploop.launch.stability.still_hand import End, StillHand, hold_of
+from haploop.logger.session import write_summary
+from haploop.logger.summary import Summary, finite
 from haploop.plant.plant import Plant
 from haploop.protocol.changes import Event, is_change
 from haploop.protocol.scene.scene import Scene
@@ -92,6 +95,32 @@ def end_at(scene: Scene, plant: Plant, controller: Controller, inside: np.ndarra
         return Finding("no-contact", "no contact")
     time = Timebase.from_scene(scene)
     return End(scene, time, plant, controller, hold_of(scene, time, plant.reached, inside))
+
+
+def is_watched(scene: Scene, summary: Summary) -> bool:
+    """Tells whether a run is judged by pushing it: its scene asks for that, and it came to an end by itself."""
+    return scene.run.verdict == "pushed" and summary["ended"] in ("done", "stopped") and summary["ticks"] > 0
+
+
+def with_verdict(scene: Scene, summary: Summary, find: Callable[[], Finding], out: Path | None = None) -> Summary:
+    """Returns the summary of a run with the verdict that its scene asks for, and writes it into the run's directory.
+
+    Args:
+        find: returns what is found of the end of the run; not called for one that failed or diverged.
+
+    Raises:
+        LogError: it could not be written.
+    """
+    if is_watched(scene, summary):
+        finding = find()
+    elif scene.run.verdict == "pushed" and summary["ended"] == "diverged":
+        finding = Finding("diverged", "diverged", detail=summary["why"])
+    else:
+        return summary
+    summary = finite(summary | finding.entries())
+    if out:
+        write_summary(summary, out)
+    return summary
 
 
 def judge(end: End, looks_s: Sequence[float] = PATIENT_S) -> Finding:

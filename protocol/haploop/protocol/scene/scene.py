@@ -57,13 +57,18 @@ class Wall(Table):
 
 
 class Run(Table):
-    """How a run is carried out; nothing here changes a bit of its result."""
+    """How a run is carried out and judged; nothing here changes a bit of its motion.
+
+    ``verdict``: "pushed" holds the hand still at the end of the run and pushes it; "window", far cheaper, looks at the
+    last half second alone.
+    """
 
     log: Literal["steps", "ticks", "none"] = "steps"
     pin: bool = True
     block_ticks: Annotated[int, si("", "most ticks in a block of telemetry", whole=True, at_least=1)] = 1000
     window_blocks: Annotated[int, si("", "blocks the clock grants ahead", whole=True, at_least=1, at_most=100)] = 2
     deadline: Annotated[float, si("s", "wall time a node may stay silent", above=0)] = 5.0
+    verdict: Literal["pushed", "window"] = "pushed"
 
 
 # The kind of a swap that takes an element out.

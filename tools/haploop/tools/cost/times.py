@@ -24,8 +24,9 @@ from typing import Any, Self, TypeVar
 import numpy as np
 
 from haploop.controller.dissipation import ElementError, registry
-from haploop.launch.runs.in_process import Loop, scene_events
+from haploop.launch.runs.in_process import Loop
 from haploop.launch.runs.start import prepare, run
+from haploop.launch.scene.events import scene_events
 from haploop.launch.spec import RunFailed
 from haploop.logger.session import open_session
 from haploop.protocol.scene.scene import Scene

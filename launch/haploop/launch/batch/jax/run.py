@@ -7,7 +7,7 @@ from importlib import import_module
 from typing import Any
 
 from haploop.controller.dissipation import ElementError
-from haploop.launch.batch.run import FEWEST, Kinds, batch_results, groups
+from haploop.launch.batch.run import FEWEST, Kinds, batch_results, groups, with_verdicts
 from haploop.launch.batch.stacking import structure
 from haploop.logger.summary import Summary
 from haploop.plant.choose import needs_chain
@@ -93,9 +93,9 @@ def _together(scenes: list[Scene], kinds: Kinds, energy: bool, most: int) -> lis
         with programs.in_double():
             batch = CompiledBatch(scenes, kinds, energy=energy, size=size, programs=programs.PROGRAMS)
             batch.run()
+        return with_verdicts(batch, scenes)
     except (ElementError, NotCompilable):
         return [None] * len(scenes)
-    return batch.results[: len(scenes)]
 
 
 def _programs() -> Any:
