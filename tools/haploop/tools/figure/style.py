@@ -19,7 +19,14 @@ ELEMENTS = ("#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#8C564B")
 PRESSING, RELEASING, EARLY = "#332288", "#DDAA33", "#C8C8C8"
 # What the plant adds of its own: bodies beyond the device, forces beyond the commands.
 OF_THE_PLANT = {"tip": "#117733", "hand": "#AA4499", "actuator": "#882255", "friction": "#999933"}
-VERDICTS = {"steady": "#007A5A", "limit-cycle": "#B35900", "diverged": "#8B1A1A", "no-contact": "#555555"}
+VERDICTS = {
+    "steady": "#007A5A",
+    "limit-cycle": "#B35900",
+    "growing": "#8B1A1A",
+    "diverged": "#8B1A1A",
+    "no-contact": "#555555",
+    "undecided": "#555555",
+}
 TEXT, SMALL, LARGE = 9.0, 8.0, 15.0
 # What fits into a legend beside the title, and what the handle of an entry takes of it.
 _ROOM_LETTERS, _HANDLE_LETTERS = 76, 9

@@ -68,13 +68,11 @@ def summary_table(summary: Summary) -> RenderableType:
 
 def _key_figures(summary: Summary) -> list[tuple[str, str]]:
     window = summary["window"]
-    # Nothing is said where swings grow as little as a limit cycle's.
-    rate = window.get("growth_1_s") or 0.0
-    growth = f", {'growing' if rate > 0 else 'dying away'} as e^({rate:+.2g} t/s)" if abs(rate) >= 0.5 else ""
     ran = f"{summary['duration_s']:g} s, {summary['ticks']} ticks"
     if summary["wall_s"]:
         ran += f", in {amount(summary['wall_s'], 's')} ({fixed(summary['real_time_factor'])} times real time)"
-    figures = [("ran", ran), ("oscillation", f"{amount(window['oscillation_m'], 'm')} peak to peak{growth}")]
+    figures = [("ran", ran), ("oscillation", f"{amount(window['oscillation_m'], 'm')} peak to peak at its end")]
+    figures += _stability(summary.get("stability", {}))
     if window["penetration_mean_m"] is not None:
         depth = f"{amount(window['penetration_mean_m'], 'm')} on average"
         outside = 100 * window["outside_fraction"]
@@ -120,20 +118,24 @@ def finding_table(finding: Finding) -> RenderableType:
     from rich.text import Text
 
     parts: list[RenderableType] = [Text(finding.word, style=verdict_style(finding.word)), Text(finding.sentence())]
-    if finding.word in ("steady", "limit-cycle", "growing", "undecided") and finding.watched_s:
-        felt = "felt" if finding.felt else "not felt"
-        swing = f"{amount(finding.width_m, 'm')} +- {amount(finding.spread_m, 'm', 2)} peak to peak, {felt}"
-        rows = [
-            ("swing", swing),
-            ("frequency", amount(finding.frequency_Hz, "Hz")),
-            ("force ripple above 30 Hz", f"{amount(finding.force_ripple_N, 'N')} peak to peak"),
-            ("growth", f"{finding.rate_1_s:.3g} +- {finding.error_1_s:.1g} 1/s" if finding.rate_1_s else "none"),
-            ("watched", amount(finding.watched_s, "s")),
-        ]
-        if finding.chaotic is not None:
-            rows.append(("chaotic", "yes" if finding.chaotic else "no"))
+    if rows := _stability(finding.entries()["stability"]):
         parts.append(make_facts(rows))
     return Group(*parts)
+
+
+def _stability(found: Summary) -> list[tuple[str, str]]:
+    """Returns what a loop does, held still and pushed at its end; nothing where it was not watched to an answer."""
+    if found.get("rate_1_s") is None:
+        return []
+    felt = "felt" if found["felt"] else "not felt"
+    frequency = f"at {amount(found['frequency_Hz'], 'Hz')}, " if found["frequency_Hz"] else ""
+    chaotic = ", chaotic" if found["chaotic"] else ""
+    size = f"{amount(found['width_m'], 'm')} +- {amount(found['spread_m'], 'm', 2)} peak to peak"
+    return [
+        ("pushed, it swings", f"{size}, {frequency}{felt}{chaotic}"),
+        ("force ripple > 30 Hz", f"{amount(found['force_ripple_N'], 'N')} peak to peak"),
+        ("growth", f"{found['rate_1_s']:.3g} +- {found['error_1_s']:.1g} 1/s, watched for {found['watched_s']:g} s"),
+    ]
 
 
 def status_table(data: Message) -> RenderableType:

@@ -10,7 +10,14 @@ if TYPE_CHECKING:
     from rich.table import Table
     from rich.text import Text
 
-VERDICT_STYLES = {"steady": "bold green", "limit-cycle": "bold yellow", "diverged": "bold red", "no-contact": "bold"}
+VERDICT_STYLES = {
+    "steady": "bold green",
+    "limit-cycle": "bold yellow",
+    "growing": "bold red",
+    "diverged": "bold red",
+    "no-contact": "bold",
+    "undecided": "bold",
+}
 _WIDTH_OF_A_PIPE = 100
 
 

@@ -16,6 +16,7 @@ from haploop.tools.search.bisect import Bracket, Tolerance, bisect_many, rungs_h
 from haploop.tools.sweep.table import Row
 
 Holds = Callable[[Row], bool | None]
+_UNDECIDED = "the run at {0:g} is undecided; what is {1} may reach farther"
 # A candidate: the row, and the value on the axis.
 Candidate = tuple[int, float]
 Run = Callable[[Sequence[Candidate]], Iterable[tuple[int, Row]]]
@@ -62,12 +63,15 @@ def find_boundaries(
     if {(b > a) - (b < a) for a, b in pairwise(points)} not in ({1}, {-1}):
         raise ValueError("A boundary is sought between at least two points that increase, or that decrease.")
     failures: dict[Candidate, str] = {}
+    undecided: set[Candidate] = set()
     why: dict[int, str] = {}
 
     def answers(candidates: Sequence[Candidate]) -> list[bool | None]:
         found: list[bool | None] = [None] * len(candidates)
         for place, result in run(candidates):
             found[place] = holds(result)
+            if result.get("verdict") == "undecided":
+                undecided.add(candidates[place])
             if found[place] is None:
                 failures[candidates[place]] = result.get("why", "")
         return found
@@ -97,11 +101,15 @@ def find_boundaries(
         else:
             brackets[row] = points[count - 1], points[count]
     brackets = bisect_many(brackets, at_middles, tolerance)
+    why |= {row: _UNDECIDED.format(far, property) for row, (_, far) in brackets.items() if (row, far) in undecided}
     changes = [sum(bool(a) != bool(b) for a, b in pairwise(row)) for row in held]
     none = math.nan, math.nan
     return [Boundary(*brackets.get(row, none), changes[row], why.get(row, "")) for row in range(rows)]
 
 
 def verdict_is(word: str = "steady") -> Holds:
-    """Makes the test of a row for this verdict; it gives None for a run that failed."""
+    """Makes the test of a row for this verdict; it gives None for a run that failed.
+
+    One that is undecided does not hold: a boundary of what is steady errs on the safe side, and says so.
+    """
     return lambda row: row["verdict"] == word if row.get("verdict") else None

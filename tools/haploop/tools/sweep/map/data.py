@@ -17,8 +17,8 @@ from haploop.tools.sweep.table import ResolvedSweep
 
 AMPLITUDE, STIFFNESS = "window.oscillation_m", "wall.stiffness"
 # The worse later: of several seeds a cell shows the worst. A failed run says nothing, a swinging one that it swings.
-VERDICTS = ("steady", "no-contact", "failed", "limit-cycle", "diverged")
-STEADY, NO_CONTACT, FAILED, LIMIT_CYCLE, DIVERGED = range(len(VERDICTS))
+VERDICTS = ("steady", "no-contact", "failed", "undecided", "limit-cycle", "growing", "diverged")
+STEADY, NO_CONTACT, FAILED, UNDECIDED, LIMIT_CYCLE, GROWING, DIVERGED = range(len(VERDICTS))
 NOT_RUN = -1
 # By name, equally long: lists or NumPy arrays.
 Columns = Mapping[str, Any]
