@@ -38,7 +38,7 @@ def main() -> None:
     parser.add_argument("--seconds", type=float, default=2.0)
     options = parser.parse_args()
     kinds = registry()
-    everything = load(SCENE, [f"duration={options.seconds}", "diverged_beyond=1e9"], kinds)
+    everything = load(SCENE, [f"duration={options.seconds}", "diverged_beyond=1e9", "run.verdict=window"], kinds)
     scenes = ablations(everything)
     seen: dict[str, list[float]] = {name: [] for name in scenes}
     for _ in range(options.repeats):

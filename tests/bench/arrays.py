@@ -30,7 +30,7 @@ SCENE = Path(__file__).parents[2] / "launch" / "scenes" / "fig6b.toml"
 
 def paper_scenes(count: int, duration_s: float | None = None) -> list[Scene]:
     """Figure 6(b) over a square of stiffness and damping, from steady contacts to wide limit cycles."""
-    base = load(SCENE, [f"duration={duration_s}"] if duration_s else [])
+    base = load(SCENE, ["run.verdict=window", *([f"duration={duration_s}"] if duration_s else [])])
     side = round(count**0.5)
     return [
         with_value(with_value(base, "wall.stiffness", stiffness), "dissipation.0.damping", damping)

@@ -35,6 +35,7 @@ def _loop_us(delay_s: float, log: str, seconds: float) -> Callable[[], float]:
                 f"clock.round_trip_delay={delay_s}",
                 f"duration={seconds}",
                 f"run.log={log}",
+                "run.verdict=window",
                 "diverged_beyond=1e9",
             ]
             summary = run(prepare(SCENE, settings, out=Path(folder, "out")))
@@ -45,7 +46,7 @@ def _loop_us(delay_s: float, log: str, seconds: float) -> Callable[[], float]:
 
 def _in_process_us(seconds: float) -> float:
     """Wall time per tick of figure 6c in one process with the books, nothing logged."""
-    scene = load(SCENE, [f"duration={seconds}", "run.log=none", "diverged_beyond=1e9"])
+    scene = load(SCENE, [f"duration={seconds}", "run.log=none", "run.verdict=window", "diverged_beyond=1e9"])
     kinds = registry()
     began = time.perf_counter()
     summary = run_in_process(scene, kinds)
@@ -55,7 +56,17 @@ def _in_process_us(seconds: float) -> float:
 def _first_tick_s() -> float:
     """From the command line to the first tick: a run of one tick, less nothing."""
     with tempfile.TemporaryDirectory() as folder:
-        command = [sys.executable, "-m", "haploop.tools.cli", "run", str(SCENE), "--set", "duration=0.001"]
+        command = [
+            sys.executable,
+            "-m",
+            "haploop.tools.cli",
+            "run",
+            str(SCENE),
+            "--set",
+            "duration=0.001",
+            "--set",
+            "run.verdict=window",
+        ]
         began = time.perf_counter()
         subprocess.run([*command, "--out", f"{folder}/out"], check=True, capture_output=True)
         return time.perf_counter() - began

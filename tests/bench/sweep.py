@@ -30,6 +30,7 @@ def sweep_file(folder: Path, cells: int, duration: float) -> Path:
         f"""scene = "{SCENE}"
 [set]
 duration = {duration}
+"run.verdict" = "window"
 [axes]
 "wall.stiffness" = {{ from = 20, to = 400, count = {side} }}
 "dissipation.0.damping" = {{ from = 0.02, to = 2, count = {side} }}

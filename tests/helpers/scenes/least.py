@@ -16,7 +16,10 @@ WALL = {"position": -0.06, "stiffness": 150.0}
 
 
 def scene(**tables: Any) -> Scene:
-    """The least scene with these tables, resolved."""
+    """The least scene with these tables, resolved; judged the cheap way where its tables do not say how."""
+    given = tables.get("run", {})
+    if isinstance(given, dict):
+        tables = {**tables, "run": {"verdict": "window", **given}}
     return resolve(Layers(Path("scene.toml"), {**LEAST, **tables}), KINDS)
 
 

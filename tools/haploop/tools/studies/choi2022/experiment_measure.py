@@ -11,7 +11,7 @@ import numpy as np
 from haploop.controller.dissipation import registry
 from haploop.launch.batch.run import run_batch
 from haploop.logger.summary import Summary
-from haploop.protocol.scene.scene import Scene
+from haploop.protocol.scene.scene import Scene, by_window
 from haploop.tools.search.bisect import climb, rungs_held
 from haploop.tools.search.random import Row
 from haploop.tools.studies.choi2022.claims import words_of
@@ -62,7 +62,7 @@ def is_steady(result: Summary) -> bool:
 
 
 def _run_all(scenes: Sequence[Scene], *, energy: bool = False) -> list[Summary]:
-    return run_batch(scenes, registry(), energy=energy, fewest=_FEWEST)
+    return run_batch([*map(by_window, scenes)], registry(), energy=energy, fewest=_FEWEST)
 
 
 def stiffness_ladder(setups: Sequence[Setup], stiffnesses: np.ndarray = STIFFNESSES) -> list[Steady]:

@@ -14,7 +14,7 @@ from haploop.launch.batch.run import run_batch
 from haploop.launch.spec import RunFailed
 from haploop.logger.log.recording import Recording
 from haploop.logger.summary import Summary
-from haploop.protocol.scene.scene import Scene
+from haploop.protocol.scene.scene import Scene, by_window
 from haploop.tools.render.units import amount
 from haploop.tools.search.random import Effort, Point, Row, evaluated
 from haploop.tools.studies.choi2022.claims import Claim, Finding, words_of
@@ -60,7 +60,8 @@ def measure(interpretations: Sequence[Point]) -> list[Row]:
     """
     variants = [_variants(interpretation) for interpretation in interpretations]
     names, count = list(variants[0]), len(interpretations)
-    results = run_batch([of_one[name] for name in names for of_one in variants], registry(), energy=False)
+    scenes = [by_window(of_one[name]) for name in names for of_one in variants]
+    results = run_batch(scenes, registry(), energy=False)
     return [
         _row(interpretation, dict(zip(names, results[i::count], strict=True)), _books(variants[i]["c"]))
         for i, interpretation in enumerate(interpretations)
