@@ -16,14 +16,15 @@ from helpers.scenes.least import KINDS, LEAST, WALL, mistakes, scene
 
 
 def test_defaults_are_filled_in_and_absent_tables_stay_absent():
-    assert scene().as_dict() == {
+    assert scene(run={"verdict": "pushed"}).as_dict() == {
         "title": "least",
         "duration": 1.0,
         "seed": 0,
         "diverged_beyond": 1.0,
         "clock": {"plant_rate": 10_000, "control_rate": 1_000, "round_trip_delay": 0.0, "integrator": "exact"},
         "device": {"mass": 0.01, "damping": 0.1, "position": 0.0, "velocity": 0.0},
-        "run": {"log": "steps", "pin": True, "block_ticks": 1000, "window_blocks": 2, "deadline": 5.0},
+        "run": {"log": "steps", "pin": True, "block_ticks": 1000, "window_blocks": 2, "deadline": 5.0}
+        | {"verdict": "pushed"},
     }
     assert scene(wall=WALL).wall == Wall(position=-0.06, stiffness=150.0, occupies="below")
     assert scene(encoder={"resolution": 1e-5}).encoder == Encoder(resolution=1e-5, rounding="nearest")
