@@ -173,10 +173,16 @@ def test_amounts_that_no_prefix_suits_or_that_are_none() -> None:
     assert [fixed(value) for value in (12345.6, 1.0, -0.5, 0.0)] == ["12346", "1.00", "−0.500", "0"]
 
 
-@pytest.mark.parametrize(
-    ("rate", "words"), [(2.34, "growing as e^(+2.3 t/s)"), (-1.5, "dying away as e^(-1.5 t/s)"), (0.1, ""), (None, "")]
-)
-def test_swings_that_grow_or_die_away_say_how_fast(swap: dict[str, Any], rate: float | None, words: str) -> None:
-    window = {**swap["window"], "growth_1_s": rate}
-    [line] = [line for line in shown(summary_table({**swap, "window": window}), 200).splitlines() if "peak to" in line]
-    assert line.partition("peak to peak")[2].strip(" ,") == words
+def test_the_report_of_a_run_says_what_it_does_when_pushed_and_nothing_of_that_by_its_window(
+    swap: dict[str, Any],
+) -> None:
+    found = {
+        "rate_1_s": -1.5, "error_1_s": 0.02, "frequency_Hz": 40.0, "width_m": 2e-3, "spread_m": 1e-4, "felt": True,
+        "chaotic": True, "force_ripple_N": 0.4, "watched_s": 2.0,
+    }  # fmt: skip
+    told = shown(summary_table({**swap, "stability": found}), 200)
+    assert "2.00 mm +- 100 µm peak to peak, at 40.0 Hz, felt, chaotic" in told
+    assert "400 mN peak to peak" in told
+    assert "-1.5 +- 0.02 1/s, watched for 2 s" in told
+    without = {name: value for name, value in swap.items() if name != "stability"}
+    assert "pushed, it swings" not in shown(summary_table(without), 200)

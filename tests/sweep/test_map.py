@@ -104,12 +104,12 @@ def test_cells_lie_around_their_values_on_a_logarithmic_axis_too(figure: Any) ->
 
 
 def test_verdicts_are_told_apart_without_colour(figure: Any) -> None:
-    """Each but steady and limit cycle has a hatching; the lightest limit cycle is darker than steady, and outlined."""
+    """Each but steady and limit cycle has a hatching of its own; the lightest limit cycle is darker than steady, and outlined."""
     for verdict in ("no-contact", "failed", "diverged"):
         (patch,) = artists(figure, f"hatch {verdict}")
         assert patch.get_hatch() == LOOKS[VERDICTS.index(verdict)].hatch
     hatches = [look.hatch for look in LOOKS.values() if look.hatch]
-    assert len(set(hatches)) == len(hatches) == 3
+    assert len(set(hatches)) == len(hatches) == 5
     (mesh,) = artists(figure, "amplitudes")
     lightest = max(lightness(mesh.cmap(share)) for share in np.linspace(0.0, 1.0, 9))
     assert lightness(LOOKS[0].fill) - lightest > 0.15

@@ -48,7 +48,7 @@ LOOKS = {
     FAILED: Look("#BFBFBF", "xxx", "#666666", "x", "#222222"),
     UNDECIDED: Look("#E6E6E6", "\\\\\\", "#8C8C8C", "P", COLOURS["undecided"]),
     LIMIT_CYCLE: Look("#E0A030", "", "", "D", COLOURS["limit-cycle"]),
-    GROWING: Look("#7A2430", "...", "#D0A0A8", "v", COLOURS["growing"]),
+    GROWING: Look("#7A2430", "+++", "#D0A0A8", "v", COLOURS["growing"]),
     DIVERGED: Look("#3B0F1E", "///", "#A58090", "^", COLOURS["diverged"]),
 }
 # Of amplitudes that have colours of their own, the least over the greatest.
