@@ -173,7 +173,7 @@ def test_amounts_that_no_prefix_suits_or_that_are_none() -> None:
     assert [fixed(value) for value in (12345.6, 1.0, -0.5, 0.0)] == ["12346", "1.00", "−0.500", "0"]
 
 
-def test_the_report_of_a_run_says_what_it_does_when_pushed_and_nothing_of_that_by_its_window(
+def test_the_report_of_a_run_says_what_it_does_when_it_is_pushed(
     swap: dict[str, Any],
 ) -> None:
     found = {

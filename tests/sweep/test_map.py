@@ -104,7 +104,7 @@ def test_cells_lie_around_their_values_on_a_logarithmic_axis_too(figure: Any) ->
 
 
 def test_verdicts_are_told_apart_without_colour(figure: Any) -> None:
-    """Each but steady and limit cycle has a hatching of its own; the lightest limit cycle is darker than steady, and outlined."""
+    """Each but steady and limit cycle has a hatching; the lightest limit cycle is darker than steady, and outlined."""
     for verdict in ("no-contact", "failed", "diverged"):
         (patch,) = artists(figure, f"hatch {verdict}")
         assert patch.get_hatch() == LOOKS[VERDICTS.index(verdict)].hatch

@@ -41,7 +41,7 @@ class BatchEnd(NamedTuple):
     """The end of some members of a batch; trees have the members on the last axis of their arrays.
 
     Attributes:
-        index: of their scenes among those of the batch, shape (members,).
+        numbers: of their scenes among those of the batch, shape (members,).
         tick: at which they ended.
         controller: of the whole batch.
         params, state: of the controller, for these members.
@@ -50,7 +50,7 @@ class BatchEnd(NamedTuple):
             shape (members, ticks).
     """
 
-    index: np.ndarray
+    numbers: np.ndarray
     scenes: list[Scene]
     time: Timebase
     tick: int

@@ -113,7 +113,7 @@ def with_verdicts(batch: Batch, scenes: Sequence[Scene]) -> list[Summary | None]
         results[watched[0]] = None
         watched = []
     end = batch.end(watched) if watched else None
-    found = dict(zip(end.index.tolist(), judge_batch(end), strict=True)) if end else {}
+    found = dict(zip(end.numbers.tolist(), judge_batch(end), strict=True)) if end else {}
     return [
         result and with_verdict(scene, result, lambda index=index: found[index])
         for index, (scene, result) in enumerate(zip(scenes, results, strict=True))

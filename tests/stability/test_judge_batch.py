@@ -1,0 +1,76 @@
+"""Judgements of many loops at once: each is what is found of the loop alone, to the last bit."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from haploop.controller.dissipation import registry
+from haploop.launch.batch.batch import Batch
+from haploop.launch.batch.run import run_batch, with_verdicts
+from haploop.launch.runs.in_process import run_in_process
+from haploop.launch.scene.file import load
+from haploop.protocol.scene.effects import Friction, Noise
+from haploop.protocol.scene.hand_force import Sine
+from haploop.protocol.scene.paths import with_value
+from haploop.protocol.scene.scene import Hand, Scene, by_window
+
+WORDS = ("verdict", "verdict_rule", "stability")
+
+
+def shipped(name: str, stiffnesses: Sequence[float], **tables) -> list[Scene]:
+    base = replace(load(f"launch/scenes/{name}.toml"), duration=1.0, **tables)
+    return [replace(with_value(base, "wall.stiffness", k), seed=seed) for seed, k in enumerate(stiffnesses)]
+
+
+def trembling() -> list[Scene]:
+    """Hands that tremble, each at its force, at noisy walls of every kind."""
+    sine = Sine(amplitude=0.1, frequency=4.0, offset=-0.65)
+    noise = Noise(deviation=1e-6, cutoff=200.0)
+    scenes = shipped("fig6b", np.geomspace(30.0, 2000.0, 8).tolist(), noise=noise)
+    return [with_value(replace(each, hand=Hand(force=sine)), "hand.force.amplitude", 0.02 * i + 0.01)
+            for i, each in enumerate(scenes)]  # fmt: skip
+
+
+def rubbing() -> list[Scene]:
+    return shipped("fig6a", [60.0, 400.0, 4000.0], friction=Friction(kinetic=0.02))
+
+
+FAMILIES: dict[str, Callable[[], list[Scene]]] = {
+    "plain": lambda: shipped("fig6a", [20.0, 80.0, 200.0, 3000.0]),
+    "inertia": lambda: shipped("fig6c", [20.0, 60.0, 150.0]),
+    "trembling": trembling,
+    "friction": rubbing,
+}
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_a_loop_judged_among_others_has_the_words_and_bits_it_has_alone(family):
+    scenes, kinds = FAMILIES[family](), registry()
+    batch = Batch(scenes, kinds)
+    batch.run()
+    together = with_verdicts(batch, scenes)
+    alone = [run_in_process(scene, kinds) for scene in scenes]
+    assert [{key: result and result[key] for key in WORDS} for result in together] == [
+        {key: result[key] for key in WORDS} for result in alone
+    ]
+    assert len({result["verdict"] for result in alone}) > 1
+
+
+def test_a_scene_may_ask_for_the_cheap_verdict_and_others_of_its_batch_are_judged_all_the_same():
+    pushed = shipped("fig6a", [20.0, 80.0, 200.0, 300.0])
+    mixed = [by_window(scene) if index % 2 else scene for index, scene in enumerate(pushed)]
+    results = run_batch(mixed, registry(), fewest=2)
+    assert ["stability" in result for result in results] == [True, False, True, False]
+    assert results[::2] == run_batch(pushed, registry(), fewest=2)[::2]
+
+
+def test_one_loop_that_is_left_of_its_batch_is_judged_alone():
+    """All others leave the limit."""
+    scenes = [replace(scene, diverged_beyond=0.05) for scene in shipped("fig6a", [20.0, 3000.0, 4000.0])]
+    results = run_batch(scenes, registry(), fewest=2)
+    assert [result["verdict"] for result in results][1:] == ["diverged", "diverged"]
+    assert results[0]["stability"] == run_in_process(scenes[0], registry())["stability"]
