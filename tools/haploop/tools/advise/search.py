@@ -90,14 +90,15 @@ def search(loop: Scene, trial: Trial, stage: Callable[[str], object] = lambda na
     stage("one element")
     rungs = ladder(alone / 2.0, alone * 8.0, 1.4)
     known |= nominal([(family, values) for family in SINGLE for values in first_choices(family, loop)], rungs)
-    more = [(family, values) for family in SINGLE for values in beside(_best(known, family))]
+    more = [(family, values) for family in SINGLE for values in beside(_equals(known, family)[0])]
     known |= nominal([choice for choice in more if choice not in known], rungs)
     stage("two elements")
-    pairs = together(_best(known, DAMPING), _best(known, UNIDIRECTIONAL))
+    pairs = together(_equals(known, DAMPING)[-1], _equals(known, UNIDIRECTIONAL)[-1])
     known |= nominal([(BOTH, values) for values in pairs], rungs)
     stage("every corner")
     bests = _in_corners(loop, trial, known)
-    advised = _advised(bests)
+    advised = _refined(loop, trial, _advised(bests))
+    bests = [advised if best.family is advised.family else best for best in bests]
     stage("softer walls")
     top = _softer(loop, trial, advised)
     stage("the attack")
@@ -112,31 +113,26 @@ def every_case(loop: Scene, holds: Sequence[float] = HOLDS) -> tuple[Case, ...]:
     return tuple(Case(hold, corner) for corner in ((), *corners(loop)) for hold in holds)
 
 
-def _best(known: dict[Choice, Limit], family: Family) -> Values:
-    """Returns the parameters with the largest limit; of equals the smallest."""
+def _equals(known: dict[Choice, Limit], family: Family) -> list[Values]:
+    """Returns the parameters whose limits are, as closely as they are known, the largest, from small to large."""
     tried = {values: limit.stiffness_N_m for (other, values), limit in known.items() if other is family}
     most = max(tried.values())
-    return min(values for values, stiffness in tried.items() if stiffness >= most / (1.0 + _ROUGH))
+    return sorted(values for values, stiffness in tried.items() if stiffness >= most / (1.0 + _ROUGH))
 
 
 def _in_corners(loop: Scene, trial: Trial, known: dict[Choice, Limit]) -> list[Best]:
     """Returns the best of each family; those worth it with their limit in every corner, at the holds tried first.
 
-    The parameter with the stiffest nominal wall often bears less change than a gentler one: half of it is tried, too.
+    Of parameters that bear as much in the loop as described the smallest, a middle one and the largest are tried.
     """
     bests: list[Best] = []
     candidates: list[Choice] = []
-    most_so_far = 0.0
     for family in FAMILIES:
-        values = _best(known, family)
-        limit = known[family, values]
-        bests.append(Best(family, values, limit))
-        if limit.stiffness_N_m > most_so_far * (WORTH if family.parts else 0.0):
-            gentler = [choice for choice in known if choice[0] is family and all(
-                2.5 * a > b > 1.5 * a for a, b in zip(choice[1], values, strict=True))] if values else []  # fmt: skip
-            candidates += [(family, values), *gentler]
-        if not family.parts:
-            most_so_far = limit.stiffness_N_m
+        equals = _equals(known, family)
+        bests.append(Best(family, equals[0], known[family, equals[0]]))
+        if not family.parts or bests[-1].nominal.stiffness_N_m > WORTH * bests[0].nominal.stiffness_N_m:
+            some = dict.fromkeys((equals[0], equals[len(equals) // 2], equals[-1]))
+            candidates += [(family, values) for values in some]
     cases = every_case(loop, FIRST_HOLDS)
     queries = []
     for family, values in candidates:
@@ -159,6 +155,28 @@ def _advised(bests: Sequence[Best]) -> Best:
         if best.safe and best.safe.stiffness_N_m > WORTH * less:
             advised = best
     return advised
+
+
+def _refined(loop: Scene, trial: Trial, best: Best) -> Best:
+    """Returns the best with its parameter moved half a step up or down, as often as that bears more in every corner."""
+    tried = {best.values}
+    while True:
+        near = best.safe.stiffness_N_m if best.safe else 0.0
+        new = [values for values in beside(best.values) if values not in tried] if near else []
+        rungs, cases = ladder(near, near * 1.5, 1.07), every_case(loop, FIRST_HOLDS)
+        found = limits(trial, [Query(loop, best.family.elements(values), cases, rungs) for values in new], _ROUGH / 2.0)
+        tried |= set(new)
+        values, limit = max(zip(new, found, strict=True), key=lambda each: each[1].stiffness_N_m, default=((), None))
+        if not limit or limit.stiffness_N_m <= near * 1.01:
+            return best
+        best = Best(best.family, values, _described(loop, trial, best.family, values, limit), limit)
+
+
+def _described(loop: Scene, trial: Trial, family: Family, values: Values, safe: Limit) -> Limit:
+    """Returns the limit of the loop as described, which bears what it bears in every corner."""
+    first = tuple(Case(hold) for hold in FIRST_HOLDS)
+    rungs = ladder(safe.stiffness_N_m, safe.stiffness_N_m * 3.0, 1.4)
+    return limits(trial, [Query(loop, family.elements(values), first, rungs)], _ROUGH)[0]
 
 
 def _softer(loop: Scene, trial: Trial, advised: Best) -> Limit:

@@ -23,7 +23,7 @@ from haploop.tools.linear.linearity import installed_kinds
 STRETCH_S, FROM_S = 0.25, 0.75
 # A stretch of a swing that dies is this share of the one before at most; what then still dies is watched so many times
 # as long.
-_DYING, _LONGER = 0.95, 4
+_DYING, _LONGER = 0.8, 4
 # Members that are worth a worker of their own.
 _PART = 150
 
