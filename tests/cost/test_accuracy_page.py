@@ -13,37 +13,40 @@ from pathlib import Path
 import pytest
 
 from haploop.tools.cost import findings as findings_module
-from haploop.tools.cost.data import Cost, CostFileError, Point, PriceGroup, Spread, price, save
-from haploop.tools.cost.findings import FindingTable, findings, length
+from haploop.tools.cost.data import Cost, CostFileError, Point, Price, PriceGroup, Spread, save
+from haploop.tools.cost.findings import AGAIN, alike_sentence, effects_sentence, findings, sum_sentence, takes_away
 from haploop.tools.cost.page import page, write
 from haploop.tools.linear.stiffness_limit import StiffnessLimit
-from haploop.tools.operations import AGAIN, NONE, WHOLE
-from helpers.data.costs import METHODS, RATES, fake_cost
+from haploop.tools.operations import NONE, WHOLE
+from helpers.data.costs import METHODS, fake_cost
 
 HOUSE = Path(__file__).parents[2]
 
 
-def group(
-    name: str, times: dict[str, float], limits: dict[str, float] | None = None, confirmed: bool = True
-) -> PriceGroup:
+def price(what: str, time: float, adds: Spread | None, limit: StiffnessLimit | None = None) -> Price:
+    return Price(what, Spread(time, 0.9 * time, 1.1 * time), adds, f"what {what} buys", 1e-4, stiffness=limit)
+
+
+def group(name: str, times: dict[str, float], limits: dict[str, float] | None = None) -> PriceGroup:
+    """Prices whose intervals are 1 to either side of what they add to the first."""
+    base = next(iter(times.values()))
     prices = []
-    for what, us in times.items():
-        above = "limit-cycle" if confirmed else "steady"
-        limit = StiffnessLimit(limits[what], "steady", above) if limits else None
-        base = prices[0].time if prices else None
-        prices.append(price(what, [us], base, f"what {what} buys", is_left_out=name == "effects", stiffness=limit))
-    return PriceGroup(name, f"About {name}", "µs per tick", 7, f"how {name} was measured", prices)
+    for what, time in times.items():
+        limit = StiffnessLimit(limits[what], "steady", "limit-cycle") if limits else None
+        adds = Spread(time - base, time - base - 1.0, time - base + 1.0) if prices else None
+        prices.append(price(what, time, adds, limit))
+    return PriceGroup(name, f"About {name}", "a tick", 7, f"how {name} was measured", prices)
 
 
-def priced(delay_us: float = 20.0, confirmed: bool = True) -> list[PriceGroup]:
+def priced(friction: float = 16.0) -> list[PriceGroup]:
     limits = {"1 kHz": 220.0, "5 kHz": 1100.0}
     return [
         group("books", {"without": 4.0, "with": 6.0}),
         group("log", {"none": 40.0, "ticks": 44.0, "steps": 50.0}),
-        group("effects", {WHOLE: 400.0, AGAIN: 404.0, "friction": 150.0, "noise": 398.0, NONE: 8.0}),
+        group("effects", {NONE: 1.0, AGAIN: 1.1, "friction": friction, "noise": 1.2, WHOLE: 41.0}),
         group("processes", {"one process": 6.0, "three processes": 42.0}),
-        group("delay", {"0 ms": 50.0, "10 ms": delay_us}, {"0 ms": 220.0, "10 ms": 11.0}),
-        group("control rate", {"1 kHz": 6.0, "5 kHz": 24.0}, limits, confirmed),
+        group("delay", {"0 ms": 50.0, "10 ms": 20.0}, {"0 ms": 220.0, "10 ms": 11.0}),
+        group("control rate", {"1 kHz": 6.0, "5 kHz": 24.0}, limits),
     ]
 
 
@@ -57,26 +60,19 @@ def changed(cost: Cost, change: Callable[[Point], Point]) -> Cost:
     return dataclasses.replace(cost, scenes=scenes)
 
 
-def tables(cost: Cost) -> dict[str, FindingTable]:
-    """The tables of findings by what they are about."""
-    names = ("The cheapest setting", "Methods", "The other prices")
-    return {name: table for table in findings(cost) for name in names if table.title.startswith(name)}
-
-
-def rows(cost: Cost, table: str) -> dict[str, list[str]]:
-    """The rows of a table of findings by their first cell."""
-    return {cells[0]: cells[1:] for cells in tables(cost)[table].rows}
+def rows(cost: Cost, title: str) -> dict[str, list[str]]:
+    """The rows of the one table of findings whose title holds these words, by their first cell."""
+    (table,) = [table for table in findings(cost) if title in table.title]
+    return {cells[0]: cells[1:] for cells in table.rows}
 
 
 def test_the_page_holds_every_table_of_findings_with_and_without_prices(cost: Cost) -> None:
-    assert len(findings(cost)) == len(tables(cost)) == 3
-    assert list(tables(fake_cost())) == ["The cheapest setting", "Methods"]
+    assert [table.title.split()[0] for table in findings(cost)] == ["What", "A", "A"]
     for made in (cost, fake_cost()):
         text = page(made)
         for table in findings(made):
-            assert f"### {table.title}" in text
+            assert f"## {table.title}" in text
             assert all(f"| {' | '.join(cells)} |" in text for cells in table.rows)
-            assert all(note in text for note in table.notes)
 
 
 def test_no_number_of_a_finding_is_typed() -> None:
@@ -100,106 +96,89 @@ def test_no_number_of_a_finding_is_typed() -> None:
         assert [word for word in words if re.search(r"\d", word)] == []
 
 
-def test_numbers_are_those_of_the_data(cost: Cost) -> None:
-    settings = rows(cost, "The cheapest setting")
-    assert {cells[0] for cells in settings.values()} == {"exact at 1 kHz"}
-    steady = next(scene for scene in cost.scenes if scene.title == "A wall that steadies")
-    times = {p.plant_rate: p.us_per_tick.median for p in steady.points if p.method == "exact" and p.us_per_tick}
-    own_us, best_us = times[10_000], times[1_000]
-    assert settings[steady.title][1:] == [
-        f"{best_us:.1f}",
-        "exact at 10 kHz",
-        f"{own_us:.1f}",
-        f"{own_us / best_us:.2f}",
-    ]
-    assert "A wall in a limit cycle" not in settings
-    (note,) = tables(cost)["The cheapest setting"].notes
-    assert note == "Left out, since the reference itself is not known that well: A wall in a limit cycle."
-    methods = rows(cost, "Methods")
-    assert methods["exact"][:3] == ["4 of 4", "1 kHz", "1.0"]
-    # rk4 needs 5 kHz everywhere (55 us against 26): its error at 2 kHz is 1.25 um even in the easiest scene.
-    assert methods["rk4"][2].startswith("2.1")
-    for place, count in ((-2, lambda p: p.error is None), (-1, lambda p: p.error and not p.error.verdict_right)):
-        counted = [sum(bool(count(p)) for s in cost.scenes for p in s.points if p.method == m) for m in methods]
-        assert [cells[place] for cells in methods.values()] == [f"{number} of 35" for number in counted]
-        assert any(counted)
-    errors = [
-        p.error.size_m
-        for s in cost.scenes
-        if s.reference.pointwise
-        for p in s.points
-        if p.method == "euler" and p.error
-    ]
-    assert methods["euler"][3] == length(max(errors))
-    prices = rows(cost, "The other prices")
-    assert [(cells[0].split()[0], cells[2]) for cells in tables(cost)["The other prices"].rows] == [
-        ("all", "50.0"), ("three", "7.00"), ("the", "1.50"), ("every", "1.25"),
-    ]  # fmt: skip
-    assert prices["all effects at once"][0] == "the same scene without any"
-    (note,) = tables(cost)["The other prices"].notes
-    assert note == "The dearest effect is friction: without it a tick with all effects would save 250 of 400 µs."
+def test_the_next_digit_costs_what_the_cheapest_setting_within_it_takes(cost: Cost) -> None:
+    """rk4 reaches 2e-5 (n)^-4 m in 25 + 6 n, exact any error in 26: nothing is cheaper than that at any error."""
+    steady = rows(cost, "next digit")["A wall that steadies"]
+    assert steady[-1] == "any error"
+    assert all(cell.startswith("exact at 1 kHz, 26 (25–28)") or "exact at 1 kHz" in cell for cell in steady[:-1])
+
+    def rk4_at_half_the_time(point: Point) -> Point:
+        time = point.time
+        assert time
+        half = Spread(0.5 * time.median, 0.5 * time.low, 0.5 * time.high)
+        return dataclasses.replace(point, time=half) if point.method == "rk4" else point
+
+    steady = rows(changed(cost, rk4_at_half_the_time), "next digit")["A wall that steadies"]
+    # 2e-5, 1.25e-6, 3.2e-8 m at 1, 2, 5 kHz in 15.5, 18.5, 27.5: the last is dearer than exact.
+    either = "exact at 1 kHz or rk4 at 5 kHz"
+    settings = [cell.split(",")[0] for cell in steady]
+    assert settings == ["rk4 at 1 kHz", "rk4 at 2 kHz", "rk4 at 2 kHz", either, either, "1.3 µm"]
 
 
-def test_on_a_machine_twice_as_slow_the_findings_about_methods_are_the_same(cost: Cost) -> None:
-    def slower(point: Point) -> Point:
-        time = point.us_per_tick
-        assert time is not None
-        return dataclasses.replace(point, us_per_tick=Spread(2 * time.median, 2 * time.q1, 2 * time.q3))
-
-    assert tables(changed(cost, slower))["Methods"] == tables(cost)["Methods"]
+def test_where_the_reference_is_not_known_well_enough_no_setting_is_named(cost: Cost) -> None:
+    swings = rows(cost, "next digit")["A wall in a limit cycle"]
+    assert swings[3:5] == ["reference not known"] * 2
 
 
-def test_where_another_method_is_cheaper_it_is_named(cost: Cost) -> None:
+def test_operations_a_tick_are_those_of_a_step_times_the_steps_that_a_tolerance_asks_for(cost: Cost) -> None:
+    """In the steady wall rk4 is within 1 um from 5 kHz on: 5 steps of 50; the exact flow in one step of 17."""
+    alike = rows(cost, "written alike")
+    assert alike["exact"][-2] == "17"
+    assert alike["rk4"][-2] == "250"
+    assert alike["euler"][-2] == "–"
+    assert alike["rk4"][:2] == ["50", "100"]
+
+
+def test_a_sentence_tells_what_comes_of_how_a_method_is_written(cost: Cost) -> None:
+    said = alike_sentence(cost)
+    assert said
+    assert "euler takes 1.0 times as long as the exact flow" in said
+    assert "takes 0.59 (0.58–0.61) times as long" in said
+    assert alike_sentence(dataclasses.replace(cost, alike=[])) is None
+
+
+def test_a_swing_is_off_by_a_number_with_its_interval_or_by_some_at_most(cost: Cost) -> None:
+    swings = rows(cost, "error of the mean swing")
+    assert swings["euler"][0] == "3.0 mm ± 100 µm"
+    assert swings["exact"][0] == "at most 109 µm"
+    assert set(swings) == set(METHODS)
+
+
+def test_on_a_machine_twice_as_slow_the_page_is_the_same_but_for_the_yardstick(cost: Cost) -> None:
+    """Times are over the yardstick's, so another machine shows in its one sentence alone."""
+    load = cost.load
+    assert load
+    slower = dataclasses.replace(cost, load=dataclasses.replace(load, yardstick_us=2.0 * load.yardstick_us))
+    one, other = page(cost).splitlines(), page(slower).splitlines()
+    assert [(a, b) for a, b in zip(one, other, strict=True) if a != b] == [(one[-1], other[-1])]
+
+
+def test_the_dearest_effect_and_those_that_cost_nothing_are_told(cost: Cost) -> None:
+    (effects,) = [group for group in cost.prices if group.name == "effects"]
+    assert effects_sentence(effects) == (
+        "Alone, friction costs most, 15 (14–16) yardsticks a tick; 1 of 2 effects cannot be told from nothing."
+    )
+    assert sum_sentence(effects) == "Added up they come to 15, all at once to 40 (39–41)."
+
+
+def test_the_one_sentence_says_where_nothing_beats_the_exact_flow(cost: Cost) -> None:
+    assert takes_away(cost).startswith("In all 5 scenes no method is cheaper than the exact flow")
+
     def rk4_for_nothing(point: Point) -> Point:
-        return dataclasses.replace(point, us_per_tick=Spread(1.0, 1.0, 1.0)) if point.method == "rk4" else point
+        return dataclasses.replace(point, time=Spread(1.0, 1.0, 1.0)) if point.method == "rk4" else point
 
-    made = changed(cost, rk4_for_nothing)
-    assert all(cells[0].startswith("rk4 at") for cells in rows(made, "The cheapest setting").values())
-    assert rows(made, "Methods")["exact"][2] == "26"
-
-
-def test_where_nothing_failed_no_failure_is_counted(cost: Cost) -> None:
-    good = cost.scenes[0].points[0].error
-
-    def right(point: Point) -> Point:
-        return dataclasses.replace(point, error=good, failure=None)
-
-    assert all(cells[-2:] == ["0 of 35", "0 of 35"] for cells in rows(changed(cost, right), "Methods").values())
+    freed = dataclasses.replace(cost, scenes=changed(cost, rk4_for_nothing).scenes[:1] + cost.scenes[1:])
+    assert takes_away(freed).startswith("In 4 of 5 scenes nothing beats the exact flow at any error; elsewhere another")
 
 
-def test_where_no_setting_meets_the_tolerance_that_is_said(cost: Cost) -> None:
-    strict = dataclasses.replace(cost, tolerance_m=1e-12, scenes=cost.scenes[:1])
-    assert next(iter(rows(strict, "The cheapest setting").values()))[0].startswith("exact")
-    coarse = dataclasses.replace(cost.scenes[0], points=[p for p in cost.scenes[0].points if p.method == "euler"])
-    none = dataclasses.replace(cost, scenes=[coarse])
-    assert next(iter(rows(none, "The cheapest setting").values()))[0] == "none"
-    assert rows(none, "Methods")["euler"][:3] == ["0 of 1", "–", "–"]
-
-
-def test_an_effect_that_chance_could_explain_is_not_called_dear(cost: Cost) -> None:
-    groups = priced()
-    groups[2] = group("effects", {WHOLE: 400.0, AGAIN: 380.0, "friction": 395.0, NONE: 8.0})
-    prices = tables(dataclasses.replace(cost, prices=groups))["The other prices"]
-    assert prices.rows[0][0] == "all effects at once"
-    assert prices.notes == ()
-
-
-def test_the_page_shows_every_scene_point_price_and_what_it_was_measured_on(cost: Cost) -> None:
+def test_the_page_is_short_and_shows_what_it_was_measured_on(cost: Cost) -> None:
     text = page(cost)
-    for scene in cost.scenes:
-        for words in (f"### {scene.title}", scene.reference.how, scene.advice):
-            assert words in text
-    points = text.partition("## Error against time")[2]
-    rows = [line for line in points.splitlines() if line.startswith(tuple(f"| {method} |" for method in METHODS))]
-    assert len(rows) == len(METHODS) * len(cost.scenes)
-    assert all(row.count("|") == len(RATES) + 2 and ", " in row for row in rows)
-    assert sum(row.count("failed") for row in rows) == sum(p.error is None for s in cost.scenes for p in s.points)
-    assert sum(row.count("**") for row in rows) == 2 * len(cost.scenes)
     for one in priced():
-        assert f"### {one.title}" in text
-        assert all(one.how in text and p.buys in text for p in one.prices)
-    assert all(words in text for words in (cost.machine, cost.commit, "numpy 2.1.0", "The machine was quiet"))
+        shown = [p.what in text for p in one.prices]
+        assert all(shown) or one.name in ("delay", "control rate")
+    assert all(words in text for words in (cost.machine, cost.commit, "numpy 2.1.0", cost.yardstick))
     assert re.findall(r"\]\((\w+\.png)\)", text) == ["accuracy.png", "accuracy_prices.png"]
+    assert len(text.split()) < 1700
 
 
 @pytest.mark.slow

@@ -130,11 +130,11 @@ def test_ctrl_c_leaves_what_was_measured_and_the_same_command_goes_on(smooth, tm
     assert "the same command takes it up again" in stopped.stderr
     [half] = load(tmp_path / "out").scenes[0].points
     assert half.error
-    assert half.us_per_tick is None
+    assert half.time is None
     done = CliRunner().invoke(app, command)
     assert done.exit_code == 0
     assert "errors" not in done.stderr
-    assert load(tmp_path / "out").scenes[0].points[0].us_per_tick
+    assert load(tmp_path / "out").scenes[0].points[0].time
 
 
 @pytest.mark.parametrize(

@@ -13,10 +13,11 @@ import pytest
 
 from haploop.tools.cost.data import Cost, Point, Spread
 from haploop.tools.cost.figure import LOOKS, drawn_m, figure_of
+from haploop.tools.cost.findings import is_told_apart, takes_away
 from haploop.tools.figure.data import FigureError
 from haploop.tools.figure.labels import Label, place_labels
 from haploop.tools.figure.style import write_figure
-from helpers.data.costs import METHODS, RATES, SCENES, fake_cost, fake_point
+from helpers.data.costs import DOUBT_M, METHODS, RATES, SCENES, fake_cost, fake_point
 from helpers.shown import artists
 
 
@@ -55,15 +56,26 @@ def test_every_scene_has_a_panel_and_every_method_a_line_of_its_own_look(figure:
 
 def test_every_point_stands_at_its_median_time_and_its_error(figure: Any, cost: Cost) -> None:
     for ax, scene in panels(figure, cost):
-        good = {
-            (point.us_per_tick.median, drawn_m(point, scene))
-            for point in scene.points
-            if point.error and point.us_per_tick
-        }
-        assert xy(of(ax, "point") + of(ax, "wrong verdict")) == good
-        wrong = [point for point in scene.points if point.error and not point.error.verdict_right]
-        assert len(of(ax, "wrong verdict")) == len(wrong)
-        assert len(of(ax, "quartiles")) == len(scene.points)
+        good = {(point.time.median, drawn_m(point, scene)) for point in scene.points if point.error and point.time}
+        assert xy(of(ax, "point") + of(ax, "at most")) == good
+        in_doubt = [p for p in scene.points if p.error and p.error.doubt_m and not is_told_apart(p.error)]
+        assert len(of(ax, "at most")) == len(in_doubt)
+        assert bool(in_doubt) != scene.reference.pointwise
+        assert len(of(ax, "interval of time")) == len(scene.points)
+
+
+def test_an_error_of_means_has_its_interval_or_is_drawn_at_the_most_that_it_may_be(figure: Any, cost: Cost) -> None:
+    (panel,) = [(ax, scene) for ax, scene in panels(figure, cost) if not scene.reference.pointwise]
+    ax, scene = panel
+    told = [point.error for point in scene.points if point.error and is_told_apart(point.error)]
+    bars = [bar.get_ydata() for bar in of(ax, "interval of error")]
+    assert len(bars) == len(told) > 0
+    assert {(round(b - a, 12)) for a, b in bars} == {round(2 * DOUBT_M, 12)}
+    assert all(y == pytest.approx(1e-4, rel=1.0) and y > DOUBT_M for _, y in xy(of(ax, "at most")))
+
+
+def test_one_sentence_says_what_to_take_from_it(figure: Any, cost: Cost) -> None:
+    assert figure.get_suptitle() == takes_away(cost)
 
 
 def test_failures_are_crosses_at_the_top_edge_at_the_time_they_took(figure: Any, cost: Cost) -> None:
@@ -72,7 +84,7 @@ def test_failures_are_crosses_at_the_top_edge_at_the_time_they_took(figure: Any,
         failed = [point for point in scene.points if point.error is None]
         crosses = of(ax, "failure")
         assert {cross.get_marker() for cross in crosses} <= {"x"}
-        assert sorted(x for x, _ in xy(crosses)) == sorted(p.us_per_tick.median for p in failed if p.us_per_tick)
+        assert sorted(x for x, _ in xy(crosses)) == sorted(p.time.median for p in failed if p.time)
         highest = max(drawn_m(point, scene) for point in scene.points if point.error)
         assert all(highest < y < ax.get_ylim()[1] for _, y in xy(crosses))
         assert all(tick <= max(highest * 100, 1e-6) for tick in ax.get_yticks()) or not crosses
@@ -105,7 +117,7 @@ def test_an_error_below_the_references_uncertainty_is_drawn_within_the_shade(cos
 
 def test_10_kHz_is_marked_for_every_method(figure: Any, cost: Cost) -> None:
     for ax, scene in panels(figure, cost):
-        marked = {p.us_per_tick.median for p in scene.points if p.plant_rate == 10_000 and p.us_per_tick}
+        marked = {p.time.median for p in scene.points if p.plant_rate == 10_000 and p.time}
         assert {x for x, _ in xy(of(ax, "10 kHz"))} == marked
         assert len(of(ax, "10 kHz")) == len(METHODS)
 
@@ -130,7 +142,7 @@ def test_the_tolerance_is_drawn_and_the_signs_are_explained(figure: Any, cost: C
         assert set(line.get_ydata()) == {cost.tolerance_m}
     legend = figure.axes[len(cost.scenes)].get_legend()
     words = {text.get_text() for text in legend.get_texts()}
-    assert words >= {*METHODS, "at 10 kHz", "wrong verdict", "the reference's own uncertainty"}
+    assert words >= {*METHODS, "at 10 kHz", "at most: not told apart from no error", "the reference's own uncertainty"}
     assert cost.machine in artists(figure, "words")[0].get_text()
 
 
@@ -144,7 +156,7 @@ def test_one_scene_or_an_unknown_method_draws_too(cost: Cost, tmp_path: Path) ->
 def test_what_cannot_be_drawn_says_why(
     figure: Any, cost: Cost, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    points = [dataclasses.replace(point, us_per_tick=None) for point in cost.scenes[0].points]
+    points = [dataclasses.replace(point, time=None) for point in cost.scenes[0].points]
     untimed = dataclasses.replace(cost, scenes=[dataclasses.replace(cost.scenes[0], points=points)])
     with pytest.raises(FigureError, match="nothing to draw"):
         figure_of(untimed)

@@ -1,12 +1,15 @@
 """A measurement of ``haploop cost`` that is stopped and taken up again, and what is timed; never how long it took."""
 
 import json
+import math
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from haploop.launch.scene.file import load as load_scene
+from haploop.tools.cost import grid as grid_module
 from haploop.tools.cost import measure, times
 from haploop.tools.cost.data import CostFileError, Spread, load, save
 from haploop.tools.cost.grid import grid
@@ -34,18 +37,21 @@ def test_a_finished_measurement_is_not_made_again(smooth, tmp_path, monkeypatch)
             costs = measurement.cost(1e-6)
         monkeypatch.setattr(measure, "outcome", None)
         monkeypatch.setattr(times, "loop_us", None)
-    assert [stage["made"] for stage in first.values()] == [5, 10]
+    assert [stage["made"] for stage in first.values()] == [5, 10, 1]
     assert again == {}
     assert len(costs.scenes[0].points) == 5
-    assert all(point.us_per_tick for point in costs.scenes[0].points)
+    assert all(point.time for point in costs.scenes[0].points)
     assert costs.scenes[0].advice.startswith("Cheapest within 1.00 µm of the reference: ")
 
 
 def test_what_was_stopped_goes_on_where_it_was_and_gives_a_cost_meanwhile(smooth, tmp_path, monkeypatch):
     grids = [grid(smooth, ["exact", "rk4"], [5_000])]
     timed = []
+    plain = times.yardstick()
 
     def interrupted(scene):
+        if scene == plain:
+            return 1.0
         if len(timed) == 4:
             raise KeyboardInterrupt
         timed.append(scene.clock)
@@ -61,7 +67,7 @@ def test_what_was_stopped_goes_on_where_it_was_and_gives_a_cost_meanwhile(smooth
         partial = measurement.cost(1e-6)
     assert len(partial.scenes[0].points) == 3
     assert partial.scenes[0].advice == ""
-    monkeypatch.setattr(times, "loop_us", lambda scene: timed.append(scene.clock) or 1.0)
+    monkeypatch.setattr(times, "loop_us", lambda scene: ((scene == plain or timed.append(scene.clock)) and 1.0) or 1.0)
     with Measurement(grids, tmp_path, 3, 0, exact_reference) as measurement:
         measurement.times(count_stages({}))
         assert measurement.cost(1e-6).scenes[0].advice
@@ -70,7 +76,8 @@ def test_what_was_stopped_goes_on_where_it_was_and_gives_a_cost_meanwhile(smooth
 
 def test_every_round_times_every_candidate_once_in_an_order_of_its_own(smooth, tmp_path, monkeypatch):
     order = []
-    monkeypatch.setattr(times, "loop_us", lambda scene: order.append(scene.clock) or 1.0)
+    plain = times.yardstick()
+    monkeypatch.setattr(times, "loop_us", lambda scene: ((scene == plain or order.append(scene.clock)) and 1.0) or 1.0)
     monkeypatch.setattr(times, "_warm", lambda *_: None)
     with Measurement([grid(smooth, ["euler"], [1_000, 2_000, 5_000, 10_000])], tmp_path, 5, 0, exact_reference) as made:
         made.errors(count_stages({}))
@@ -90,7 +97,7 @@ def test_another_scene_or_another_source_is_measured_anew(smooth, tmp_path, monk
     assert [made(), made()] == [1, 0]
     smooth.write_text(SMOOTH.replace("damping = 0.4", "damping = 0.5"))
     assert [made(), made()] == [1, 0]
-    monkeypatch.setattr(measure, "made_with", lambda: ["edited"])
+    monkeypatch.setattr(measure, "errors_made_with", lambda: ["edited"])
     assert [made(), made()] == [1, 0]
 
 
@@ -125,17 +132,7 @@ def test_a_store_passes_over_what_was_cut_off_and_what_is_no_record(tmp_path):
         assert store.all("us", "a", 2) == [1.0]
 
 
-def test_runs_as_processes_are_timed_too(smooth, tmp_path):
-    with Measurement([grid(smooth, ["euler"], [5_000])], tmp_path, 1, 1, exact_reference) as measurement:
-        measurement.errors(count_stages({}))
-        measurement.times(count_stages({}))
-        point: Any = measurement.cost(1e-6).scenes[0].points[0]
-    assert point.us_per_tick.median > 0
-    assert point.processes_us_per_tick.median > 0
-    assert point.instructions_per_tick > 100
-
-
-def test_a_failure_is_timed_in_one_process_but_not_as_processes(smooth, tmp_path):
+def test_a_failure_has_a_time_and_a_refusal_has_none(smooth, tmp_path):
     """It is let go on far beyond where it failed; one that the check refuses has no time."""
     smooth.write_text(SMOOTH.replace("stiffness = 400.0", "stiffness = 400000.0"))
     with Measurement([grid(smooth, ["euler"], [1_000, 1_500])], tmp_path, 1, 1, exact_reference) as measurement:
@@ -143,10 +140,28 @@ def test_a_failure_is_timed_in_one_process_but_not_as_processes(smooth, tmp_path
         measurement.times(count_stages({}))
         points: dict[int, Any] = {p.plant_rate: p for p in measurement.cost(1e-6).scenes[0].points}
     assert points[1_000].failure
-    assert points[1_000].us_per_tick.median > 0
-    assert points[1_000].processes_us_per_tick is None
-    assert points[1_500].us_per_tick is None
-    assert points[1_500].instructions_per_tick is None
+    assert points[1_000].time.median > 0
+    assert points[1_500].time is None
+
+
+def test_errors_do_not_depend_on_the_machine_and_times_do(monkeypatch):
+    before = grid_module.errors_made_with(), grid_module.times_made_with()
+    monkeypatch.setattr(grid_module, "machine", lambda: "another")
+    assert grid_module.errors_made_with() == before[0]
+    assert grid_module.times_made_with() != before[1]
+
+
+def test_each_time_is_over_the_yardstick_before_and_after_it(smooth, tmp_path, monkeypatch):
+    """On a machine that gets slower all the time, a loop that takes thrice the yardstick still takes thrice."""
+    clock = iter(range(10, 10_000))
+    monkeypatch.setattr(times, "_warm", lambda *_: None)
+    plain = times.yardstick()
+    monkeypatch.setattr(times, "loop_us", lambda scene: next(clock) * (1.0 if scene == plain else 3.0))
+    with Measurement([grid(smooth, ["euler"], [1_000, 5_000])], tmp_path, 3, 0, exact_reference) as made:
+        made.errors(count_stages({}))
+        made.times(count_stages({}))
+        seen = [point.time for point in made.cost(1e-6).scenes[0].points]
+    assert all((time.low, time.median, time.high) == pytest.approx((3.0, 3.0, 3.0), rel=1e-12) for time in seen)
 
 
 @pytest.mark.parametrize(("ticks", "beyond_m", "timed"), [(300, 1.0, 200), (80, 1.0, 80), (300, 1e-6, 2)])
@@ -171,6 +186,17 @@ def test_cost_json_is_read_back_as_it_was_and_another_file_is_refused(tmp_path):
         load(tmp_path / "nowhere")
 
 
-def test_median_and_quartiles_of_few_and_many():
+def test_an_interval_leaves_out_as_many_values_as_it_may():
+    """Of 9 values one on either side: 2 (1 + 9) / 2^9 = 3.9 % is below 5 %; of 6 to 8 none, and of fewer neither."""
     assert Spread.from_values([3.0]) == Spread(3.0, 3.0, 3.0)
-    assert Spread.from_values([1.0, 2.0, 3.0, 4.0, 100.0]) == Spread(3.0, 2.0, 4.0)
+    assert Spread.from_values([1.0, 2.0, 3.0, 4.0, 100.0]) == Spread(3.0, 1.0, 100.0)
+    assert Spread.from_values([float(i) for i in range(8)]) == Spread(3.5, 0.0, 7.0)
+    assert Spread.from_values([float(i) for i in range(9)]) == Spread(4.0, 1.0, 7.0)
+
+
+@pytest.mark.parametrize("count", [6, 7, 9, 15, 30])
+def test_an_interval_holds_the_median_of_endless_repeats_at_least_19_times_in_20(count):
+    rng = np.random.default_rng(count)
+    spreads = [Spread.from_values(values) for values in rng.exponential(size=(2000, count)).tolist()]
+    held = sum(spread.low <= math.log(2.0) <= spread.high for spread in spreads) / len(spreads)
+    assert held > 0.94

@@ -8,22 +8,28 @@ from __future__ import annotations
 import json
 import math
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 
 from haploop.controller.controller import Controller
 from haploop.launch.plan.effects import effects_of
 from haploop.launch.runs.in_process import run_in_process
 from haploop.launch.scene.file import load
-from haploop.tools.cost import prices, prices_figure
-from haploop.tools.cost.data import PriceGroup, chance_in, price, save
+from haploop.protocol.scene.paths import value_at
+from haploop.tools.cost import prices, prices_figure, times
+from haploop.tools.cost.data import Price, PriceGroup, Spread, save
 from haploop.tools.cost.data import load as load_cost
+from haploop.tools.cost.findings import AGAIN, effects_sentence
 from haploop.tools.cost.times import IN_PROCESS, PROCESSES, Store
 from haploop.tools.figure.data import FigureError
 from haploop.tools.linear.one_tick import OneTickMap
 from haploop.tools.linear.stiffness_limit import StiffnessLimit
-from haploop.tools.operations import AGAIN, NONE, WHOLE, Operations, ablations
+from haploop.tools.operations import AGAIN as ABLATED_AGAIN
+from haploop.tools.operations import NONE, WHOLE, Operations, ablations
+from haploop.tools.trajectory import trajectory
 from helpers.data.costs import fake_cost
 from helpers.scenes.least import KINDS, scene
 from helpers.shown import artists
@@ -31,36 +37,53 @@ from helpers.shown import artists
 SCENES = Path(__file__).parents[2] / "launch/scenes"
 
 
+def price(what: str, time: float, adds: float | None = None, doubt: float = 0.5, **more: Any) -> Price:
+    """A price whose intervals reach as far as this to either side."""
+    added = None if adds is None else Spread(adds, adds - doubt, adds + doubt)
+    return Price(what, Spread(time, time - doubt, time + doubt), added, "something", **more)
+
+
 def test_an_ablation_leaves_out_each_effect_once_and_in_the_end_all() -> None:
     everything = load(SCENES / "all_effects.toml")
     named = [effect.name for effect in effects_of(everything)]
     parts = ablations(everything)
-    assert list(parts) == [WHOLE, AGAIN, *named, NONE]
-    assert parts[WHOLE] == parts[AGAIN] == everything
+    assert list(parts) == [WHOLE, ABLATED_AGAIN, *named, NONE]
+    assert parts[WHOLE] == parts[ABLATED_AGAIN] == everything
     for name in named:
         assert name not in {effect.name for effect in effects_of(parts[name])}
     assert not effects_of(parts[NONE])
 
 
-def test_ratio_and_cost_are_against_the_baseline_and_of_an_effect_what_it_saves() -> None:
-    base = price("none", [9.0, 10.0, 11.0], None, "")
-    assert (base.ratio, base.costs, base.time.median) == (1.0, 0.0, 10.0)
-    assert (base.time.q1, base.time.q3) == (9.5, 10.5)
-    dear, left_out = (price("x", [4.0], base.time, "", is_left_out=out) for out in (False, True))
-    assert (dear.ratio, dear.costs) == (0.4, -6.0)
-    assert (left_out.ratio, left_out.costs) == (0.4, 6.0)
+def test_each_effect_stands_alone_but_for_what_it_is_read_through_with_its_own_values() -> None:
+    everything = load(SCENES / "all_effects.toml")
+    read = "acceleration.source = accelerometer"
+    for effect in effects_of(everything):
+        scene = prices.alone(everything, effect.name)
+        through = {read} if effect.key.startswith("accelerometer") else set()
+        # The table of the accelerometer is there for its bandwidth, delay or range, and ideal otherwise.
+        assert {each.name for each in effects_of(scene)} - {"accelerometer"} == {effect.name} - {
+            "accelerometer"
+        } | through
+        for key in effect.left_out or (effect.key,):
+            assert value_at(scene, key) == value_at(everything, key)
+    assert not effects_of(prices.alone(everything))
 
 
-def test_chance_is_the_distance_of_two_equal_runs_or_of_the_quartiles() -> None:
-    base = price(WHOLE, [9.0, 10.0, 11.0], None, "")
-    for again, expected in ((10.1, 1.0), (13.0, 3.0)):
-        both = [base, price(AGAIN, [again], base.time, "", is_left_out=True)]
-        assert chance_in(PriceGroup("effects", "", "", 3, "", both)) == expected
+def test_an_effect_alone_moves_the_led_device_by_little_of_its_way(jobs: prices.Jobs) -> None:
+    """30 mm, in and out of the wall; what the controller only reads moves it not at all."""
+    runs = {name: trajectory(job.scene).x_m for name, job in jobs["effects"].items()}
+    plain = runs[NONE]
+    assert np.ptp(plain) == pytest.approx(0.03, rel=0.02)
+    assert -0.018 < plain.min() < -0.015
+    moved = {name: np.abs(x - plain).max() for name, x in runs.items()}
+    assert max(moved.values()) < 1e-3
+    assert all(way < 1e-12 for name, way in moved.items() if name.startswith("acceler"))
+    assert moved["friction"] > 1e-5
 
 
 def test_groups_survive_cost_json(tmp_path: Path) -> None:
     limit = StiffnessLimit(220.0, "steady", "limit-cycle")
-    group = PriceGroup("delay", "Delay", "µs per tick", 3, "how", [price("0 ms", [1.0], None, "", stiffness=limit)])
+    group = PriceGroup("delay", "Delay", "a tick", 3, "how", [price("0 ms", 1.0, stiffness=limit)])
     made = fake_cost()
     made.prices.append(group)
     save(made, tmp_path)
@@ -77,7 +100,7 @@ def test_each_group_has_its_jobs_baseline_first(jobs: prices.Jobs) -> None:
     assert {group: list(members) for group, members in jobs.items()} == {
         "books": ["without", "with"],
         "log": ["none", "ticks", "steps"],
-        "effects": [WHOLE, AGAIN, *effects, NONE],
+        "effects": [NONE, AGAIN, *sorted(effects, key=lambda name: "=" not in name), WHOLE],
         "processes": ["one process", "three processes"],
         "delay": ["0 ms", "1 ms", "2 ms", "5 ms", "10 ms"],
         "control rate": ["1 kHz", "0.5 kHz", "2 kHz", "5 kHz", "10 kHz"],
@@ -140,6 +163,8 @@ class Measuring:
         monkeypatch.setattr(prices, "loop_us", lambda scene: self.clock(5.0))
         monkeypatch.setattr(prices, "bare_us", lambda scene: self.clock(4.0))
         monkeypatch.setattr(prices, "run_us", lambda path, overrides, ticks: self.clock(40.0))
+        monkeypatch.setattr(prices, "trajectory", lambda scene: SimpleNamespace(x_m=np.zeros(3)))
+        monkeypatch.setattr(times, "loop_us", lambda scene: 2.0)  # the yardstick
 
     def clock(self, us: float) -> float | None:
         if self.runs >= self.stop_after:
@@ -163,15 +188,17 @@ def test_all_groups_are_measured_and_a_second_time_nothing_is(measuring: Measuri
     groups = measuring.measure()
     assert [group.name for group in groups] == ["books", "log", "effects", "processes", "delay", "control rate"]
     books = groups[0]
-    assert [p.ratio for p in books.prices] == [1.0, 1.25]
+    assert [p.time.median for p in books.prices] == [2.0, 2.5]
+    assert [p.adds for p in books.prices] == [None, Spread(0.5, 0.5, 0.5)]
     assert [group.repeats for group in groups] == [3, 2, 3, 2, 2, 3]
     assert all(p.buys for group in groups for p in group.prices)
     counted = {g.name for g in groups if all(p.instructions_per_tick for p in g.prices)}
-    assert counted == {"effects", "delay", "control rate"}
+    assert counted == {"effects"}
+    assert {g.name for g in groups if all(p.moves_m == 0.0 for p in g.prices)} == {"effects"}
     limited = {group.name for group in groups if all(p.stiffness for p in group.prices)}
     assert limited == {"delay", "control rate"}
     five_kHz = next(p for p in groups[5].prices if p.what == "5 kHz")
-    assert five_kHz.time.median == 25.0  # ms for a second of 5000 ticks at 5 us
+    assert five_kHz.time.median == 12.5  # of 5 ticks in a ms
     runs = measuring.runs
     assert measuring.measure() == groups
     assert measuring.runs == runs
@@ -220,34 +247,28 @@ def test_without_processes_their_prices_are_left_out(measuring: Measuring) -> No
 
 def drawn() -> tuple[Any, list[PriceGroup]]:
     steady, odd = StiffnessLimit(200.0, "steady", "limit-cycle"), StiffnessLimit(90.0, "limit-cycle", "limit-cycle")
-    base = price("1 kHz", [5.0, 6.0, 7.0], None, "", stiffness=steady)
-    slow = price("0.5 kHz", [3.0], base.time, "", stiffness=odd)
-    whole = price(WHOLE, [99.0, 100.0, 101.0], None, "", instructions_per_tick=500.0)
-    times = {AGAIN: 97.0, "loss": 98.0, "friction": 20.0, NONE: 10.0}
-    effects = [
-        price(what, [us], whole.time, "", is_left_out=True, instructions_per_tick=us) for what, us in times.items()
-    ]
-    logs = [price("none", [40.0], None, "")]
-    logs.append(price("steps", [80.0], logs[0].time, ""))
+    rates = [price("1 kHz", 6.0, stiffness=steady), price("0.5 kHz", 3.0, -3.0, stiffness=odd)]
+    adds = {AGAIN: -0.2, "loss": 0.3, "friction": 20.0, WHOLE: 40.0}
+    effects = [price(NONE, 2.0), *(price(what, 2.0 + added, added) for what, added in adds.items())]
     groups = [
-        PriceGroup("log", "What is logged", "µs per tick", 3, "how", logs),
-        PriceGroup("effects", "Each effect", "µs per tick", 3, "how", [whole, *effects]),
-        PriceGroup("control rate", "Control rate", "ms", 3, "how", [base, slow]),
+        PriceGroup("log", "What is logged", "a tick", 3, "how", [price("none", 40.0), price("steps", 80.0, 40.0)]),
+        PriceGroup("effects", "Each effect", "a tick", 3, "how", effects),
+        PriceGroup("control rate", "Control rate", "a simulated ms", 3, "how", rates),
     ]
     return prices_figure.figure_of(groups), groups
 
 
-def test_the_figure_has_a_bar_for_each_price_the_dearest_effect_first_and_chance_shaded() -> None:
-    figure, _ = drawn()
+def test_the_figure_has_a_bar_for_each_price_the_dearest_effect_first_and_what_may_be_nothing_in_grey() -> None:
+    figure, groups = drawn()
     log, effects, _ = figure.axes
     assert [bar.get_width() for bar in log.patches] == [40.0, 80.0]
-    assert [text.get_text() for text in artists(log, "value")] == ["40.0, 1.00 ×", "80.0, 2.00 ×"]
-    assert [label.get_text() for label in effects.get_yticklabels()] == ["friction", "loss"]
-    (band,) = artists(effects, "chance")
-    assert band.get_extents().transformed(effects.transData.inverted()).intervalx.tolist() == pytest.approx([-3.0, 3.0])
-    bars = [bar for bar in effects.patches if bar is not band]
-    assert [bar.get_width() for bar in bars] == [80.0, 2.0]
-    assert bars[0].get_facecolor() != bars[1].get_facecolor()
+    assert [text.get_text() for text in artists(log, "value")] == ["40 (40–40)", "80 (80–80)"]
+    assert [label.get_text() for label in effects.get_yticklabels()] == ["friction", "loss", AGAIN]
+    bars = effects.patches
+    assert [bar.get_width() for bar in bars] == [20.0, 0.3, -0.2]
+    assert bars[0].get_facecolor() != bars[1].get_facecolor() == bars[2].get_facecolor()
+    assert all(text.get_position()[0] > 0.0 for text in artists(effects, "value"))
+    assert figure.get_suptitle() == effects_sentence(groups[1])
 
 
 def test_the_figure_draws_stiffness_against_time_and_what_runs_did_not_confirm_hollow() -> None:

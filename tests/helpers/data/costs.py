@@ -1,9 +1,9 @@
 """A cost.json as it might be, made up from the theory of each method, for tests of what shows it."""
 
-from haploop.tools.cost.data import Cost, Errors, Load, Point, ReferenceNote, SceneCost, Spread
+from haploop.tools.cost.data import AlikeScene, Cost, Errors, Load, Point, ReferenceNote, SceneCost, Spread, Step
 
 RATES = (1_000, 2_000, 5_000, 10_000, 20_000, 50_000, 100_000)
-# method -> order, error at 1 kHz in m (0: at the rounding level), µs per tick, µs per plant step
+# method -> order, error at 1 kHz in m (0: at the rounding level), yardsticks per tick, and per plant step
 METHODS = {
     "exact": (0, 0.0, 25.0, 1.0),
     "semi-implicit-euler": (1, 3e-4, 25.0, 1.6),
@@ -20,16 +20,20 @@ SCENES = {
     "stiff_cable": ("A stiff cable", True, 1e-14, 20.0),
     "all_effects": ("All effects at once", True, 4e-13, 10.0),
 }
+# Half of the interval of the mean swing, which the errors of some methods exceed.
+DOUBT_M = 1e-4
 FAILS = {("stiff_cable", "euler"): 20_000, ("stiff_cable", "rk4"): 5_000, ("stiff_cable", "semi-implicit-euler"): 5_000}
 
 
-def fake_error(size_m: float, pointwise: bool, verdict: str = "steady", right: bool = True) -> Errors:
+def fake_error(
+    size_m: float, pointwise: bool, verdict: str = "steady", right: bool = True, doubt_m: float = 0.0
+) -> Errors:
     """Errors of one size."""
     judged = {"residual": size_m * 1e2, "verdict": verdict, "verdict_right": right}
     if pointwise:
         return Errors(final_m=0.5 * size_m, rms_m=size_m, max_m=3 * size_m, **judged)
     relative = {"amplitude": size_m / 1e-3, "frequency": size_m / 3e-3, "energy_per_cycle": size_m / 5e-4}
-    return Errors(**relative, amplitude_m=size_m, **judged)
+    return Errors(**relative, amplitude_m=size_m, doubt_m=doubt_m, **judged)
 
 
 def fake_point(scene: str, method: str, rate: int) -> Point:
@@ -37,18 +41,29 @@ def fake_point(scene: str, method: str, rate: int) -> Point:
     _, pointwise, floor_m, harder = SCENES[scene]
     order, at_1_kHz, tick_us, step_us = METHODS[method]
     steps = rate / 1000
-    us = tick_us + step_us * steps * (1.0 if pointwise else 0.8)
-    times = Spread(us, 0.97 * us, 1.06 * us), Spread(2 * us + 30, 1.9 * us + 30, 2.3 * us + 30)
+    ratio = tick_us + step_us * steps * (1.0 if pointwise else 0.8)
+    time = Spread(ratio, 0.97 * ratio, 1.06 * ratio)
     if rate < FAILS.get((scene, method), 0):
         tick = 3 + rate // 1000
         return Point(
-            method, rate, None, f"Diverged: the device was at 3.2 m, beyond the limit of 1 m, at tick {tick}.", *times
+            method, rate, None, f"Diverged: the device was at 3.2 m, beyond the limit of 1 m, at tick {tick}.", time
         )
     size = max(at_1_kHz * harder * steps**-order, 3 * floor_m)
     verdict = "steady" if pointwise else "limit-cycle"
     wrong = size > 1e-3 and pointwise
-    error = fake_error(size, pointwise, "limit-cycle" if wrong else verdict, not wrong)
-    return Point(method, rate, error, None, *times, 1200.0 + 60.0 * step_us * steps)
+    error = fake_error(size, pointwise, "limit-cycle" if wrong else verdict, not wrong, 0.0 if pointwise else DOUBT_M)
+    return Point(method, rate, error, None, time)
+
+
+def fake_alike(scene: str, states: int) -> AlikeScene:
+    """Steps of the one-step methods, as dear as they may be."""
+    steps = {"exact": 17, "semi-implicit-euler": 12, "euler": 10, "rk4": 50, "implicit-midpoint": 15}
+    of_exact = {method: Spread(count / 17, 0.98 * count / 17, 1.03 * count / 17) for method, count in steps.items()}
+    return AlikeScene(
+        scene,
+        states,
+        [Step(method, count * states // 2, of_exact[method], of_exact[method]) for method, count in steps.items()],
+    )
 
 
 def fake_cost() -> Cost:
@@ -59,6 +74,7 @@ def fake_cost() -> Cost:
             title,
             "exact",
             10_000,
+            1_000,
             500,
             ReferenceNote(
                 "Solved with 50 digits (mpmath), switching instants found exactly; DOP853 at 1e-13 agrees."
@@ -74,4 +90,6 @@ def fake_cost() -> Cost:
         for name, (title, pointwise, floor_m, _) in SCENES.items()
     ]
     versions = {"haploop": "0.1.0", "numpy": "2.1.0", "scipy": "1.14.1", "python": "3.12.3"}
-    return Cost("A fast processor, 2 cores, Linux", versions, "0123456789ab", 20, 3, 1e-6, Load(0.9, 0.02), scenes)
+    alike = [fake_alike("wall_steady", 2), fake_alike("stiff_cable", 4)]
+    machine = "A fast processor, 2 cores, Linux", versions, "0123456789ab"
+    return Cost(*machine, 20, 3, 1e-6, "a tick of a plain wall", Load(4.3, 0.02, 0.9), scenes, [], alike)

@@ -18,12 +18,12 @@ def cost(
     scenes: Annotated[
         list[Path] | None, typer.Argument(metavar="[SCENE]...", help="scene files [the accuracy scenes]")
     ] = None,
-    rates: Annotated[str, typer.Option(help="plant rates, Hz")] = "1k,2k,5k,10k,20k,50k,100k",
+    rates: Annotated[str, typer.Option(help="plant rates, Hz")] = "1k,2k,5k,10k,20k,100k",
     methods: Annotated[str | None, typer.Option(help="integrators, comma-separated [all]")] = None,
     out: Annotated[Path, typer.Option(help="directory; what it holds is not measured again")] = Path("runs/cost"),
     tolerance: Annotated[float, typer.Option(help="RMS error the advice is for, m")] = 1e-6,
-    repeats: Annotated[int, typer.Option(help="of each time")] = 20,
-    processes: Annotated[bool, typer.Option("--processes/--no-processes", help="time runs as processes too")] = True,
+    repeats: Annotated[int, typer.Option(help="of each time")] = 7,
+    processes: Annotated[bool, typer.Option("--processes/--no-processes", help="time what processes cost too")] = True,
     json: Json = False,
 ) -> None:
     """Measure what accuracy costs in time: error and time of every method at every plant rate, and advice.

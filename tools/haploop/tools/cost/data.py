@@ -9,14 +9,10 @@ import statistics
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 from haploop.tools.linear.stiffness_limit import StiffnessLimit
-from haploop.tools.operations import AGAIN
 
 COST_FILE = "cost.json"
-# A machine on which nothing else runs: the calibration loop varies less, and no second process waits for a core.
-QUIET_SPREAD, QUIET_LOAD = 0.05, 1.5
 
 
 class CostFileError(ValueError):
@@ -25,18 +21,27 @@ class CostFileError(ValueError):
 
 @dataclass(frozen=True)
 class Spread:
-    """Repeated measurements of one time: median and quartiles, in the unit that the name of the entry gives."""
+    """Repeated measurements of one quantity: their median, and an interval for the median of endlessly many.
+
+    The interval lies between two order statistics, chosen so that it misses with 5 % at most whatever the distribution;
+    with fewer than six values it is all of them, and misses more often.
+    """
 
     median: float
-    q1: float
-    q3: float
+    low: float
+    high: float
 
     @classmethod
     def from_values(cls, values: Sequence[float]) -> Spread:
-        if len(values) == 1:
-            return cls(values[0], values[0], values[0])
-        q1, median, q3 = statistics.quantiles(values, n=4, method="inclusive")
-        return cls(median, q1, q3)
+        ranked, n = sorted(values), len(values)
+        beyond = 0  # values left out on either side: P(fewer than that many below the median) is at most 2.5 %
+        while sum(math.comb(n, k) for k in range(beyond + 1)) <= 0.025 * 2**n:
+            beyond += 1
+        beyond = max(0, beyond - 1)
+        return cls(statistics.median(ranked), ranked[beyond], ranked[n - 1 - beyond])
+
+    def overlaps(self, other: Spread) -> bool:
+        return self.low <= other.high and other.low <= self.high
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,7 +50,9 @@ class Errors:
 
     Attributes:
         final_m, rms_m, max_m: of x - x_ref: at the end, root mean square over the ticks, largest.
-        amplitude, frequency, energy_per_cycle: relative errors of the swings, >= 0; ``amplitude_m`` is absolute.
+        amplitude, frequency, energy_per_cycle: relative errors of the swings, >= 0, of their means over many starts;
+            ``amplitude_m`` is absolute.
+        doubt_m: half of the 95 % interval of ``amplitude_m``; 0 where positions are compared.
         residual: energy residual over the energy moved in total.
         verdict, verdict_right: the run's own, and whether it is the reference's.
     """
@@ -57,15 +64,21 @@ class Errors:
     frequency: float | None = None
     energy_per_cycle: float | None = None
     amplitude_m: float | None = None
+    doubt_m: float = 0.0
     residual: float | None = None
     verdict: str
     verdict_right: bool
 
     @property
     def size_m(self) -> float:
-        """The one number in metres that is drawn and held against a tolerance: rms_m, else amplitude_m; inf if none."""
+        """The one number in metres that is drawn: rms_m, else amplitude_m; inf if none."""
         size = self.rms_m if self.rms_m is not None else self.amplitude_m
         return math.inf if size is None else size
+
+    @property
+    def at_most_m(self) -> float:
+        """What is held against a tolerance: the upper end of the interval."""
+        return self.size_m + self.doubt_m
 
 
 @dataclass(frozen=True)
@@ -74,24 +87,25 @@ class Point:
 
     Attributes:
         error, failure: one of them is None; a failure is a sentence.
-        us_per_tick: time of a simulated tick in one process, books on, no log; of a run that diverged, of the ticks it
-            has until its numbers are too large. None for a scene refused by the check.
-        processes_us_per_tick: end to end as processes, every plant step logged; None where not measured.
-        instructions_per_tick: bytecode instructions of plant and controller.
+        time: of a simulated tick in one process, books on, no log, over that of the yardstick; of a run that diverged,
+            of the ticks it has until its numbers are too large. None for a scene refused by the check.
     """
 
     method: str
     plant_rate: int
     error: Errors | None
     failure: str | None
-    us_per_tick: Spread | None = None
-    processes_us_per_tick: Spread | None = None
-    instructions_per_tick: float | None = None
+    time: Spread | None = None
 
     @property
     def size_m(self) -> float:
         """Inf where the run failed."""
         return self.error.size_m if self.error else math.inf
+
+    @property
+    def at_most_m(self) -> float:
+        """Inf where the run failed."""
+        return self.error.at_most_m if self.error else math.inf
 
     @property
     def is_right(self) -> bool:
@@ -114,12 +128,13 @@ class ReferenceNote:
 
 @dataclass(frozen=True)
 class SceneCost:
-    """Every point of one scene, the method and rate that the scene itself names, the ticks of a run, and the advice."""
+    """Every point of one scene, its own method and rates in Hz, the ticks of a run, and the advice."""
 
     name: str
     title: str
     own_method: str
     own_rate: int
+    control_rate: int
     ticks: int
     reference: ReferenceNote
     points: list[Point]
@@ -141,23 +156,14 @@ class SceneCost:
 
 @dataclass(frozen=True)
 class Load:
-    """The load of the machine while times were taken: the median of one-minute load averages, and a spread.
+    """The yardstick while times were taken: the median of its tick, µs, and (q3 - q1) / median; the load average.
 
-    The average counts this program too, and is None if unknown; the spread is (q3 - q1) / median of a fixed loop.
+    The average counts this program too, and is None if unknown.
     """
 
+    yardstick_us: float
+    variation: float
     average: float | None
-    calibration_spread: float
-
-    @property
-    def busy(self) -> bool:
-        """True where something else seems to have run meanwhile."""
-        return self.calibration_spread > QUIET_SPREAD or (self.average or 0.0) > QUIET_LOAD
-
-    def __str__(self) -> str:
-        seen = f"a fixed loop timed once a round varied by {100 * self.calibration_spread:.1f} %"
-        average = f" and the load average was {self.average:.1f}" if self.average is not None else ""
-        return f"The machine was {'busy meanwhile' if self.busy else 'quiet'}: {seen}{average}."
 
 
 @dataclass(frozen=True)
@@ -166,8 +172,8 @@ class Price:
 
     Attributes:
         time: measured, in the unit of its group.
-        ratio: the median over that of the group's baseline.
-        costs: the median less the baseline's, in the unit of its group; of an effect, which is left out, the negative.
+        adds: the time less the baseline's, from repeat to repeat; None for the baseline.
+        moves_m: how far the motion is from the baseline's, at most; None where that was not asked for.
         buys: the gain, in words.
         instructions_per_tick: bytecode instructions of plant and controller; None where they were not counted.
         stiffness: up to where a wall stays steady; None where that was not asked for.
@@ -175,9 +181,9 @@ class Price:
 
     what: str
     time: Spread
-    ratio: float
-    costs: float
+    adds: Spread | None
     buys: str
+    moves_m: float | None = None
     instructions_per_tick: float | None = None
     stiffness: StiffnessLimit | None = None
 
@@ -197,25 +203,36 @@ class PriceGroup:
     prices: list[Price]
 
 
-def price(
-    what: str, times: Sequence[float], baseline: Spread | None, buys: str, is_left_out: bool = False, **more: Any
-) -> Price:
-    """Makes a price from repeated times; ``baseline`` is None for the baseline itself."""
-    time = Spread.from_values(times)
-    base = baseline or time
-    added = time.median - base.median
-    return Price(what, time, time.median / base.median, -added if is_left_out else added, buys, **more)
+@dataclass(frozen=True)
+class Step:
+    """A plant step of one method, no friction acting, all methods written and run alike.
+
+    Attributes:
+        operations: additions and multiplications of numbers.
+        alone, arrays: time over that of the exact flow's step, step by step in Python, and in arrays of many motions.
+    """
+
+    method: str
+    operations: int
+    alone: Spread
+    arrays: Spread
 
 
-def chance_in(group: PriceGroup) -> float:
-    """Returns the distance of the group's baseline measured twice, at least that of its quartiles: less is chance."""
-    again = [abs(price.costs) for price in group.prices if price.what == AGAIN]
-    return max([*again, group.prices[0].time.q3 - group.prices[0].time.q1])
+@dataclass(frozen=True)
+class AlikeScene:
+    """Steps of every method on the bodies of one scene of this name."""
+
+    scene: str
+    states: int
+    steps: list[Step]
 
 
 @dataclass(frozen=True)
 class Cost:
-    """All of cost.json; ``load`` is None where no time was measured."""
+    """All of cost.json; ``load`` is None where no time was measured.
+
+    Times are over that of ``yardstick``, a sentence, taken before and after each of them.
+    """
 
     machine: str
     versions: dict[str, str]
@@ -223,9 +240,11 @@ class Cost:
     repeats: int
     processes_repeats: int
     tolerance_m: float
+    yardstick: str
     load: Load | None
     scenes: list[SceneCost]
     prices: list[PriceGroup] = field(default_factory=list)
+    alike: list[AlikeScene] = field(default_factory=list)
 
 
 def save(cost: Cost, directory: Path) -> Path:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from haploop.tools.cost.data import Cost, Point, SceneCost
+from haploop.tools.cost.findings import is_told_apart, takes_away
 from haploop.tools.figure import style
 from haploop.tools.figure.data import FigureError
 from haploop.tools.figure.labels import Label, place_labels
@@ -44,7 +45,7 @@ def figure_of(cost: Cost) -> Figure:
 
     Raises FigureError where matplotlib is missing, or no scene has a point with a time.
     """
-    scenes = [scene for scene in cost.scenes if any(point.us_per_tick for point in scene.points)]
+    scenes = [scene for scene in cost.scenes if any(point.time for point in scene.points)]
     if not scenes:
         raise FigureError("No scene has a point with a time, so there is nothing to draw.")
     columns = min(3, len(scenes) + 1)
@@ -56,6 +57,7 @@ def figure_of(cost: Cost) -> Figure:
     _how_to_read(panels[len(scenes)], cost, scenes)
     for ax in panels[len(scenes) + 1 :]:
         ax.set_axis_off()
+    figure.suptitle(takes_away(cost), x=0.01, ha="left", fontsize=style.TEXT + 2, color=style.INK, gid="takes away")
     style.fix_layout(figure)
     for ax, scene in zip(panels, scenes, strict=False):
         label_points(ax, scene)
@@ -75,7 +77,7 @@ def _how_to_read(ax: Axes, cost: Cost, scenes: list[SceneCost]) -> None:
     sign = partial(Line2D, [], [], linestyle="none")
     handles += [
         sign(marker="o", markersize=11, markerfacecolor="none", color=style.INK, label="at 10 kHz"),
-        sign(marker="o", markerfacecolor="white", color=style.GREY, label="wrong verdict"),
+        sign(marker="o", markerfacecolor="white", color=style.GREY, label="at most: not told apart from no error"),
         sign(marker="x", markersize=7, markeredgewidth=1.8, color=style.GREY, label="failed: no error to draw"),
         Line2D(
             [], [], color=style.GREY, dashes=(4, 3), linewidth=0.9, label=f"tolerance {amount(cost.tolerance_m, 'm')}"
@@ -85,8 +87,9 @@ def _how_to_read(ax: Axes, cost: Cost, scenes: list[SceneCost]) -> None:
     ax.legend(handles=handles, loc="upper left", bbox_to_anchor=(0.0, 1.0), frameon=False, fontsize=style.TEXT, ncols=1)
     words = [
         "Numbers: plant rate in kHz. Lower is more exact, further left is cheaper.",
-        f"Times: medians of {cost.repeats} repeats, interleaved in random order; bars: quartiles.",
-        cost.machine + (", which was busy meanwhile" if cost.load and cost.load.busy else ""),
+        f"Times: medians of {cost.repeats} repeats in random order; bars: 95 % intervals.",
+        *wrap(f"Yardstick: {cost.yardstick}", 76),
+        cost.machine,
     ]
     ax.text(
         0.02,
@@ -103,10 +106,8 @@ def _how_to_read(ax: Axes, cost: Cost, scenes: list[SceneCost]) -> None:
 def draw_panel(ax: Axes, scene: SceneCost, tolerance_m: float) -> None:
     """Draws every point of a scene that has a time; labels come once the panel has its place."""
     reference = scene.reference
-    what = "RMS error of the position (m)" if reference.pointwise else "error of the amplitude (m)"
-    style.dress(
-        ax, "\n".join(wrap(scene.short_title, _TITLE_LETTERS)), "time per simulated tick, in one process (µs)", what
-    )
+    what = "RMS error of the position (m)" if reference.pointwise else "error of the mean amplitude (m)"
+    style.dress(ax, "\n".join(wrap(scene.short_title, _TITLE_LETTERS)), "time of a tick, over the yardstick's", what)
     ax.loglog()
     style.plain_numbers(ax.xaxis)
     low, edge, high = _limits(scene, tolerance_m)
@@ -115,12 +116,12 @@ def draw_panel(ax: Axes, scene: SceneCost, tolerance_m: float) -> None:
     ax.axhline(tolerance_m, color=style.GREY, linewidth=0.9, dashes=(4, 3), zorder=1, gid="tolerance")
     for method in methods_of([scene]):
         _curve(ax, [point for point in scene.points if point.method == method], scene)
-    if any(point.us_per_tick and _failed(point) for point in scene.points):
+    if any(point.time and _failed(point) for point in scene.points):
         ax.axhline(edge, color=style.FAINT, linewidth=0.8, zorder=1)
         ax.set_yticks([tick for tick in ax.get_yticks() if low <= tick < edge])
         place = {"ha": "right", "va": "center", "transform": ax.transAxes}
         ax.text(0.995, 1.0 - _TOP / 2.0, "failed", fontsize=style.SMALL, color=style.GREY, **place)
-    times = [end for p in scene.points if (t := p.us_per_tick) for end in (t.q1, t.median, t.q3)]
+    times = [end for p in scene.points if (t := p.time) for end in (t.low, t.median, t.high)]
     ax.set_xlim(min(times) / 1.25, max(times) * 1.25)
 
 
@@ -132,8 +133,9 @@ def _limits(scene: SceneCost, tolerance_m: float) -> tuple[float, float, float]:
 
 
 def drawn_m(point: Point, scene: SceneCost) -> float:
-    """Returns the error of a point as drawn: no less than a share of the reference's uncertainty."""
-    return max(point.size_m, _WITHIN * scene.reference.error_m, 1e-18)
+    """Returns the error of a point as drawn: no less than a share of the reference's uncertainty, or what is sure."""
+    told = point.error is None or not point.error.doubt_m or is_told_apart(point.error)
+    return max(point.size_m if told else point.at_most_m, _WITHIN * scene.reference.error_m, 1e-18)
 
 
 def _failed(point: Point) -> bool:
@@ -142,14 +144,14 @@ def _failed(point: Point) -> bool:
 
 def _position(ax: Axes, point: Point, scene: SceneCost) -> tuple[float, float]:
     """Returns where a point is drawn: its time and its error; without one, at the top edge."""
-    assert point.us_per_tick is not None
+    assert point.time is not None
     low, high = np.log10(ax.get_ylim())
     top = float(10.0 ** (high - _TOP / 2.0 * (high - low)))
-    return point.us_per_tick.median, top if _failed(point) else drawn_m(point, scene)
+    return point.time.median, top if _failed(point) else drawn_m(point, scene)
 
 
 def _curve(ax: Axes, points: list[Point], scene: SceneCost) -> None:
-    points = sorted((point for point in points if point.us_per_tick), key=lambda point: point.plant_rate)
+    points = sorted((point for point in points if point.time), key=lambda point: point.plant_rate)
     if not points:
         return
     method = points[0].method
@@ -162,13 +164,16 @@ def _curve(ax: Axes, points: list[Point], scene: SceneCost) -> None:
         mark = partial(ax.plot, [x], [y], color=colour, zorder=4, linestyle="none")
         if _failed(point):
             mark(marker="x", markersize=7.0, markeredgewidth=1.8, clip_on=False, gid="failure")
-        elif not point.is_right:
-            mark(marker=marker, markersize=5.5, markerfacecolor="white", gid="wrong verdict")
+        elif point.error and point.error.doubt_m and not is_told_apart(point.error):
+            mark(marker=marker, markersize=5.5, markerfacecolor="white", gid="at most")
         else:
             mark(marker=marker, markersize=5.5, gid="point")
-        spread = point.us_per_tick
+        spread = point.time
         assert spread is not None
-        ax.plot([spread.q1, spread.q3], [y, y], color=colour, linewidth=0.9, alpha=0.7, zorder=2, gid="quartiles")
+        bar = partial(ax.plot, color=colour, linewidth=0.9, alpha=0.7, zorder=2)
+        bar([spread.low, spread.high], [y, y], gid="interval of time")
+        if point.error and is_told_apart(point.error) and (doubt_m := point.error.doubt_m):
+            bar([x, x], [y - doubt_m, y + doubt_m], gid="interval of error")
         if point.plant_rate == _MARKED_HZ:
             ax.plot(
                 [x], [y], marker="o", markersize=11, markerfacecolor="none", markeredgecolor=style.INK, gid="10 kHz"
@@ -177,7 +182,7 @@ def _curve(ax: Axes, points: list[Point], scene: SceneCost) -> None:
 
 def label_points(ax: Axes, scene: SceneCost) -> None:
     """Writes the plant rate in kHz beside the points: of the scene's own method first, then where there is room."""
-    timed = [point for point in scene.points if point.us_per_tick]
+    timed = [point for point in scene.points if point.time]
     labels = []
     for point in sorted(timed, key=lambda point: (point.method != scene.own_method, _failed(point))):
         in_kHz, colour = f"{point.plant_rate / 1000:g}", LOOKS.get(point.method, _OTHER)[0]

@@ -1,21 +1,21 @@
-"""Findings about what accuracy costs: advice for a scene in a sentence, tables of scenes, methods and other prices."""
+"""Findings about what accuracy costs: the price of the next digit, methods written alike, chaotic swings, advice."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+import math
 from dataclasses import dataclass
 
-from haploop.tools.cost.data import Cost, Point, SceneCost, chance_in
-from haploop.tools.operations import NONE
+from haploop.tools.cost.data import AlikeScene, Cost, Errors, Point, PriceGroup, SceneCost, Spread, Step
+from haploop.tools.operations import WHOLE
 from haploop.tools.render.units import amount, fixed
 
-_NONE = "–"
-# Group and price -> the price in words, and what its ratio is against.
-_PRICES = {
-    ("processes", "three processes"): ("three processes without delay", "one process"),
-    ("books", "with"): ("the exact energy books of every plant step", "plant and controller alone"),
-    ("log", "steps"): ("every plant step logged", "a run as processes without a log"),
-}
+# The second run of the scene without effects: what it adds is chance.
+AGAIN = "no effect again"
+_NONE, EXACT, _RIVAL = "–", "exact", "euler"
+# An error that nobody asks after, of which the last digits may differ from machine to machine.
+_NOTHING_M = 1e-9
+# Errors that are asked for, m.
+DIGITS_M = (30e-6, 10e-6, 3e-6, 1e-6, 1e-7)
 
 
 @dataclass(frozen=True)
@@ -31,44 +31,46 @@ class FindingTable:
 def cheapest(scene: SceneCost, tolerance_m: float, method: str | None = None) -> Point | None:
     """Returns the point of least time in one process among those that meet the tolerance, of one method or of all."""
     points = [point for point in scene.points if method in (None, point.method)]
-    return min((p for p in points if p.us_per_tick and meets(p, tolerance_m)), key=_us, default=None)
+    return min((p for p in points if p.time and meets(p, tolerance_m)), key=_median, default=None)
+
+
+def as_cheap(scene: SceneCost, tolerance_m: float) -> list[Point]:
+    """Returns of every method as cheap as the cheapest the point of the lowest plant rate: intervals overlap."""
+    best, found = cheapest(scene, tolerance_m), {}
+    for point in sorted(scene.points, key=lambda point: point.plant_rate):
+        if best and point.time and meets(point, tolerance_m) and point.time.overlaps(_time(best)):
+            found.setdefault(point.method, point)
+    return sorted(found.values(), key=_median)
 
 
 def meets(point: Point, tolerance_m: float) -> bool:
-    """Tells whether a run is within the tolerance and its verdict is that of the reference."""
-    return point.is_right and point.size_m <= tolerance_m
+    """Tells whether a run is within the tolerance, interval and all, and its verdict is that of the reference."""
+    return point.is_right and point.at_most_m <= tolerance_m
+
+
+def exact_below_m(scene: SceneCost) -> float | None:
+    """Returns the error below which no method is cheaper than the exact flow; None where it has no time."""
+    exact = cheapest(scene, math.inf, EXACT)
+    if exact is None:
+        return None
+    rivals = [p for p in scene.points if p.time and p.method != EXACT and p.time.high < _time(exact).low and p.is_right]
+    return min((point.at_most_m for point in rivals), default=math.inf)
 
 
 def advice(scene: SceneCost, tolerance_m: float) -> str:
-    """Makes the sentence for a scene: the cheapest setting that is accurate enough, and the scene's own beside it."""
+    """Makes the sentence for a scene: the cheapest setting that is accurate enough, and what is as cheap."""
     measure = "" if scene.reference.pointwise else " in amplitude"
     within = f"within {amount(tolerance_m, 'm')} of the reference{measure}"
     if scene.reference.error_m > tolerance_m:
         known = amount(scene.reference.error_m, "m")
         return f"No setting can be said to be {within}: the reference itself is only known to {known}."
-    if best := cheapest(scene, tolerance_m):
-        time = f"{_median(best)} µs a tick"
-        return f"Cheapest {within}: {setting(best)}, {time}; {_own_setting(scene, best, tolerance_m)}."
-    nearest = min((p for p in scene.points if p.is_right), key=lambda point: point.size_m, default=None)
+    if found := as_cheap(scene, tolerance_m):
+        others = f"; not told apart: {', '.join(map(setting, found[1:]))}" if found[1:] else ""
+        return f"Cheapest {within}: {setting(found[0])}, {interval(_time(found[0]))} times the yardstick{others}."
+    nearest = min((p for p in scene.points if p.is_right), key=lambda point: point.at_most_m, default=None)
     if nearest is None:
         return f"No setting is {within}: none ran to the end with the right verdict."
-    return f"No setting is {within}; {setting(nearest)} comes nearest, {amount(nearest.size_m, 'm')}."
-
-
-def _own_setting(scene: SceneCost, best: Point, tolerance_m: float) -> str:
-    own = scene.own
-    if own is best:
-        return "it is the scene's own setting"
-    name = f"the scene's own, {scene.own_method} at {rate(scene.own_rate)},"
-    if own is None or own.error is None or not (own.us_per_tick and best.us_per_tick):
-        return f"{name} fails"
-    takes = f"{name} takes {_median(own)} µs"
-    if not meets(own, tolerance_m):
-        wrong = "" if own.is_right else f", {own.error.verdict} instead of {scene.reference.verdict}"
-        return f"{takes} and is off by {amount(own.size_m, 'm')}{wrong}"
-    apart = own.us_per_tick.q1 > best.us_per_tick.q3
-    doubt = "" if apart else ", which these measurements cannot tell apart"
-    return f"{takes}, {fixed(_us(own) / _us(best))} times as long{doubt}"
+    return f"No setting is {within}; {setting(nearest)} comes nearest, {amount(nearest.at_most_m, 'm')}."
 
 
 def setting(point: Point) -> str:
@@ -81,97 +83,150 @@ def rate(plant_rate: float) -> str:
     return f"{plant_rate / 1000:g} kHz" if plant_rate >= 1000 else f"{plant_rate:g} Hz"
 
 
-def length(metres: float) -> str:
-    """Formats a length in m with a prefix, below 1 nm with a power of ten."""
-    return amount(metres, "m") if metres == 0.0 or metres >= 1e-9 else power(metres)
-
-
-def power(metres: float) -> str:
-    """Formats a length in m with a power of ten."""
-    return f"{metres:.1e} m".replace("-", "−") if metres else amount(metres, "m")
+def interval(spread: Spread, digits: int = 2) -> str:
+    """Formats a median with its interval: ``4.2 (4.0–4.5)``."""
+    return f"{fixed(spread.median, digits)} ({fixed(spread.low, digits)}–{fixed(spread.high, digits)})"
 
 
 def findings(cost: Cost) -> list[FindingTable]:
-    return [table for table in (_scene_table(cost), _method_table(cost), _price_table(cost)) if table.rows]
+    swings = [_swing_table(scene) for scene in cost.scenes if not scene.reference.pointwise]
+    return [table for table in (_digit_table(cost), _alike_table(cost), *swings) if table.rows]
 
 
-def _comparable(cost: Cost) -> list[SceneCost]:
-    """Returns the scenes whose reference is known to within the tolerance, and of which times are known."""
-    known = [scene for scene in cost.scenes if scene.reference.error_m <= cost.tolerance_m]
-    return [scene for scene in known if any(point.us_per_tick for point in scene.points)]
-
-
-def _scene_table(cost: Cost) -> FindingTable:
+def _digit_table(cost: Cost) -> FindingTable:
+    """Makes a row a scene: the cheapest setting at every error asked for, and where the exact flow takes over."""
     rows = []
-    for scene in _comparable(cost):
-        best, own = cheapest(scene, cost.tolerance_m), scene.own
+    for scene in cost.scenes:
+        if not any(point.time for point in scene.points):
+            continue
+        below = exact_below_m(scene)
         rows.append([
             scene.short_title,
-            setting(best) if best else "none",
-            _median(best),
-            setting(own) if own else _NONE,
-            _median(own) + ("" if own and meets(own, cost.tolerance_m) else ", too far off"),
-            fixed(_us(own) / _us(best)) if own and own.us_per_tick and best else _NONE,
+            *(_cell(scene, digit) for digit in DIGITS_M),
+            _NONE if below is None else "any error" if math.isinf(below) else amount(below, "m", 2),
         ])  # fmt: skip
-    left_out = [scene.short_title for scene in cost.scenes if scene.reference.error_m > cost.tolerance_m]
-    note = f"Left out, since the reference itself is not known that well: {'; '.join(left_out)}."
-    return FindingTable(
-        f"The cheapest setting within {amount(cost.tolerance_m, 'm')} of the reference",
-        ("scene", "cheapest setting", "µs a tick", "the scene's own", "µs a tick", "own over cheapest"),
-        rows,
-        (note,) if left_out else (),
-    )
+    heads = ("scene", *(amount(digit, "m", 2) for digit in DIGITS_M), "nothing beats exact below")
+    return FindingTable("What the next digit costs", heads, rows)
 
 
-def _method_table(cost: Cost) -> FindingTable:
-    """Makes a row a method: where it meets the tolerance and in what time, its largest error, and its failures."""
-    scenes, tolerance_m = _comparable(cost), cost.tolerance_m
+def _cell(scene: SceneCost, digit_m: float) -> str:
+    if scene.reference.error_m > digit_m:
+        return "reference not known"
+    found = as_cheap(scene, digit_m)
+    return f"{' or '.join(map(setting, found))}, {interval(_time(found[0]))}" if found else _NONE
+
+
+def _alike_table(cost: Cost) -> FindingTable:
+    """Makes a row a method: operations of its step, its time over that of the exact flow, and operations a tick."""
+    by_states = {of.states: of for of in reversed(cost.alike)}
+    sizes = sorted(by_states)
+    pairs = _alike_pairs(cost)
     rows = []
-    for method in dict.fromkeys(point.method for scene in cost.scenes for point in scene.points):
-        every = [point for scene in cost.scenes for point in scene.points if point.method == method]
-        pairs = [(cheapest(scene, tolerance_m, method), cheapest(scene, tolerance_m)) for scene in scenes]
-        met = [(found, best) for found, best in pairs if found and best]
-        errors = [p.size_m for scene in scenes for p in scene.points if p.error and p.method == method]
-        rows.append([
-            method,
-            f"{len(met)} of {len(scenes)}",
-            _span((found.plant_rate for found, _ in met), rate),
-            _span((_us(found) / _us(best) for found, best in met), lambda ratio: fixed(ratio, 2)),
-            length(max(errors)) if errors else _NONE,
-            f"{sum(point.error is None for point in every)} of {len(every)}",
-            f"{sum(bool(point.error and not point.is_right) for point in every)} of {len(every)}",
-        ])  # fmt: skip
-    heads = "method", "scenes within", "at a plant rate of", "time over cheapest", "largest error", "failed"
-    note = (
-        "Times are those of a method's cheapest setting within the tolerance over the cheapest of all, in each scene."
+    for method in dict.fromkeys(step.method for of in cost.alike for step in of.steps):
+        steps = [_step(by_states[states], method) for states in sizes]
+        counted = [str(step.operations) for step in steps]
+        timed = [interval(step.arrays) for step in steps]
+        needed = (operations_a_tick(scene, of, method, cost.tolerance_m) for scene, of in pairs)
+        rows.append([method, *counted, *timed, *(_NONE if count is None else str(count) for count in needed)])
+    within = amount(cost.tolerance_m, "m", 2)
+    heads = (
+        "method",
+        *(f"operations, {states} states" for states in sizes),
+        *(f"time in arrays over exact, {states} states" for states in sizes),
+        *(f"operations a tick within {within}, {scene.name.replace('_', ' ')}" for scene, _ in pairs),
     )
-    return FindingTable("Methods", (*heads, "wrong verdict"), rows, (note,))
+    return FindingTable("A plant step of every method, written alike", heads, rows)
 
 
-def _price_table(cost: Cost) -> FindingTable:
-    known = {(group.name, price.what): price.ratio for group in cost.prices for price in group.prices}
-    found = [(known[key], *words) for key, words in _PRICES.items() if key in known]
-    notes: tuple[str, ...] = ()
-    for effects in (group for group in cost.prices if group.name == "effects"):
-        found.append((1.0 / known["effects", NONE], "all effects at once", "the same scene without any"))
-        dearest = max((price for price in effects.prices[1:] if price.what != NONE), key=lambda price: price.costs)
-        if dearest.costs > chance_in(effects):
-            note = "The dearest effect is {}: without it a tick with all effects would save {} of {} µs."
-            notes = (note.format(dearest.what, fixed(dearest.costs), fixed(effects.prices[0].time.median)),)
-    rows = [[words, against, fixed(ratio)] for ratio, words, against in sorted(found, reverse=True)]
-    return FindingTable("The other prices", ("", "against", "ratio of times"), rows, notes)
+def _alike_pairs(cost: Cost) -> list[tuple[SceneCost, AlikeScene]]:
+    return [(s, of) for s in cost.scenes for of in cost.alike if of.scene == s.name and s.reference.pointwise]
 
 
-def _span(values: Iterable[float], formatted: Callable[[float], str]) -> str:
-    """Formats the least and the largest value: ``1.2 to 6.9``; one number where they are the same, a dash for none."""
-    found = sorted(values)
-    return " to ".join(dict.fromkeys(formatted(value) for value in (*found[:1], *found[-1:]))) or _NONE
+def _step(of: AlikeScene, method: str) -> Step:
+    return next(step for step in of.steps if step.method == method)
 
 
-def _us(point: Point) -> float:
-    assert point.us_per_tick is not None
-    return point.us_per_tick.median
+def alike_sentence(cost: Cost) -> str | None:
+    """Makes a sentence of how much of a method's time in a run comes of how it is written; None without such times."""
+    for scene, of in sorted(_alike_pairs(cost), key=lambda pair: pair[1].states):
+        exact, rival = (scene.point(method, min(p.plant_rate for p in scene.points)) for method in (EXACT, _RIVAL))
+        if exact and rival and exact.time and rival.time and any(step.method == _RIVAL for step in of.steps):
+            in_run, alike = rival.time.median / exact.time.median, _step(of, _RIVAL).arrays
+            return (
+                f"In a run of {scene.name.replace('_', ' ')}, both at {rate(exact.plant_rate)}, {_RIVAL} takes "
+                f"{fixed(in_run, 2)} times as long as the exact flow, which has code of its own; written alike its "
+                f"step takes {interval(alike)} times as long."
+            )
+    return None
 
 
-def _median(point: Point | None) -> str:
-    return fixed(_us(point)) if point and point.us_per_tick else _NONE
+def operations_a_tick(scene: SceneCost, of: AlikeScene, method: str, tolerance_m: float) -> int | None:
+    """Returns the operations of the motion in a tick at the lowest plant rate that meets a tolerance; None for none."""
+    rates = [point.plant_rate for point in scene.points if point.method == method and meets(point, tolerance_m)]
+    return _step(of, method).operations * min(rates) // scene.control_rate if rates else None
+
+
+def _swing_table(scene: SceneCost) -> FindingTable:
+    """Makes a row a method of a chaotic scene: how far the mean swing is off, with its interval, at every rate."""
+    rates = sorted({point.plant_rate for point in scene.points})
+    methods = dict.fromkeys(point.method for point in scene.points)
+    rows = [[method, *(_swing(scene.point(method, hertz)) for hertz in rates)] for method in methods]
+    return FindingTable(f"{scene.short_title}: error of the mean swing", ("method", *map(rate, rates)), rows)
+
+
+def _swing(point: Point | None) -> str:
+    if point is None:
+        return _NONE
+    if (error := point.error) is None:
+        return "failed"
+    if error.at_most_m < _NOTHING_M:
+        return f"below {amount(_NOTHING_M, 'm', 1)}"
+    if is_told_apart(error):
+        return f"{amount(error.size_m, 'm', 2)} ± {amount(error.doubt_m, 'm', 2)}"
+    return f"at most {amount(error.at_most_m, 'm', 2)}"
+
+
+def is_told_apart(error: Errors) -> bool:
+    """Tells whether the interval of an error leaves out 0."""
+    return error.size_m > error.doubt_m
+
+
+def takes_away(cost: Cost) -> str:
+    """Makes the one sentence of the figure of methods: down to which error another method than the exact flow pays."""
+    known = [(scene, below) for scene in cost.scenes if (below := exact_below_m(scene)) is not None]
+    pays = [(below, scene) for scene, below in known if math.isfinite(below)]
+    always = len(known) - len(pays)
+    if not pays:
+        return f"In all {always} scenes no method is cheaper than the exact flow, however large the error may be."
+    below = min(below for below, _ in pays)
+    where = f"{always} of {len(known)} scenes nothing beats the exact flow at any error"
+    return f"In {where}; elsewhere another method pays only above {amount(below, 'm', 2)}, or more."
+
+
+def effects_sentence(group: PriceGroup) -> str:
+    """Makes the one sentence of the figure of prices: the dearest effect alone, and which cost next to nothing."""
+    named = [price for price in group.prices if price.adds and price.what not in (AGAIN, WHOLE)]
+    dearest = max(named, key=lambda price: price.adds.median if price.adds else 0.0)
+    assert dearest.adds
+    free = sum(price.adds is not None and price.adds.low <= 0.0 for price in named)
+    return (
+        f"Alone, {dearest.what} costs most, {interval(dearest.adds)} yardsticks a tick; "
+        f"{free} of {len(named)} effects cannot be told from nothing."
+    )
+
+
+def sum_sentence(group: PriceGroup) -> str:
+    """Makes a sentence that holds what effects add alone, added up, against what they add together."""
+    together = next(price.adds for price in group.prices if price.what == WHOLE)
+    alone = sum(price.adds.median for price in group.prices if price.adds and price.what not in (AGAIN, WHOLE))
+    assert together
+    return f"Added up they come to {fixed(alone, 2)}, all at once to {interval(together)}."
+
+
+def _median(point: Point) -> float:
+    return _time(point).median
+
+
+def _time(point: Point) -> Spread:
+    assert point.time is not None
+    return point.time

@@ -3,34 +3,35 @@
 from __future__ import annotations
 
 import hashlib
-import itertools
 import json
 import math
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from haploop.controller.dissipation import ElementError, registry
+from haploop.controller.dissipation import ElementError
 from haploop.launch.scene.file import load
 from haploop.launch.scene.mistakes import COMMAND_LINE, SceneError
 from haploop.plant.integrators.registry import INTEGRATORS
 from haploop.protocol.scene.scene import Scene
 from haploop.tools.cost.data import Errors
 from haploop.tools.machine import machine, source_digest, versions
-from haploop.tools.operations import operations
-from haploop.tools.reference.nearest import Reference, statistics
+from haploop.tools.reference.nearest import Reference, exactly, statistics
 from haploop.tools.trajectory import Trajectory, trajectory
 
 METHODS = tuple(INTEGRATORS)
-# Measurements depend on these packages whole, and of this one on these files.
+# Starts of a chaotic scene, their distance, and the 97.5 % quantile of Student's t with one degree of freedom less.
+STARTS, _APART_M, _T = 30, 1e-6, 2.045
+# Errors depend on these packages whole, and of this one on these files; times on more of them.
 _PACKAGES = ("haploop.protocol", "haploop.plant", "haploop.controller", "haploop.logger", "haploop.launch")
-_FILES = (
-    *("cost/grid.py", "cost/times.py", "cost/prices.py", "linear/one_tick.py", "linear/stiffness_limit.py"),
-    *("operations.py", "trajectory.py", "reference/nearest.py"),
+_OF_ERRORS = ("cost/grid.py", "trajectory.py", "reference/nearest.py")
+_OF_TIMES = (
+    *("cost/times.py", "cost/prices.py", "cost/alike.py"),
+    *("operations.py", "linear/one_tick.py", "linear/stiffness_limit.py"),
 )
 
 
@@ -70,10 +71,14 @@ class Grid:
 
 
 def grid(path: Path, methods: Sequence[str], rates: Sequence[int]) -> Grid:
-    """Makes every candidate of a scene file; SceneError where the scene cannot be run as it is."""
+    """Makes every candidate of a scene file; SceneError where the scene cannot be run as it is.
+
+    A method that chooses its own steps has nothing from another plant rate: it is one candidate, at the lowest.
+    """
     made = Grid(path, load(path), [])
     order = [*methods, made.own[0]]
-    settings = {*itertools.product(methods, rates), made.own}
+    at = {method: [min(rates)] if INTEGRATORS[method].chooses_steps else rates for method in methods}
+    settings = {made.own, *((method, rate) for method in methods for rate in at[method])}
     for method, rate in sorted(settings, key=lambda setting: (order.index(setting[0]), setting[1])):
         made.candidates.append(_candidate(path, method, rate))
     return made
@@ -94,11 +99,17 @@ def digest(data: Any) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:20]
 
 
-def made_with() -> list[Any]:
-    """Returns what measurements depend on beside the scenes: machine, versions and the source of what is measured."""
+def errors_made_with() -> list[Any]:
+    """Returns what errors depend on beside the scenes: versions and the source of what is run; not the machine."""
     tools = Path(__file__).parents[1]
-    files = [*(tools / name for name in _FILES), *sorted((tools / "reference/stored").glob("*"))]
-    return [machine(), versions(), source_digest(_PACKAGES, files)]
+    files = [*(tools / name for name in _OF_ERRORS), *sorted((tools / "reference/stored").glob("*"))]
+    return [versions(), source_digest(_PACKAGES, files)]
+
+
+def times_made_with() -> list[Any]:
+    """Returns what times depend on beside the scenes: the machine, and the source of what is timed."""
+    tools = Path(__file__).parents[1]
+    return [machine(), *errors_made_with(), source_digest((), [tools / name for name in _OF_TIMES])]
 
 
 def scenes_folder() -> Path:
@@ -116,30 +127,52 @@ def accuracy_scenes() -> list[Path]:
 
 @dataclass(frozen=True)
 class Outcome:
-    """The outcome of one candidate in one run that is not timed: an error or a failure, and the ticks that it had."""
+    """The outcome of one candidate in runs that are not timed: an error or a failure, and the ticks that it had."""
 
     error: Errors | None
     failure: str | None
     ticks: int
-    instructions_per_tick: float | None
 
 
-def outcome(candidate: Candidate, reference: Reference) -> Outcome:
-    """Runs a candidate and compares it; a failure is an outcome like any other."""
+Swings = dict[str, float | None]
+
+
+def starts(scene: Scene) -> list[Scene]:
+    """Returns the scene from so many starts, 1 µm apart, the first its own."""
+    device = scene.device
+    moved = (replace(device, position=device.position + start * _APART_M) for start in range(STARTS))
+    return [replace(scene, device=each) for each in moved]
+
+
+def true_swings(scene: Scene) -> list[Swings]:
+    """Returns the swings of the exact flow from every start, with which those of a chaotic scene are compared."""
+    return [_swings(each, trajectory(each)) for each in starts(exactly(scene, scene.clock.plant_rate))]
+
+
+def _swings(scene: Scene, ran: Trajectory) -> Swings:
+    return statistics(scene, ran.x_m, ran.v_m_s)
+
+
+def outcome(candidate: Candidate, reference: Reference, swings: Sequence[Swings] = ()) -> Outcome:
+    """Runs a candidate and compares it; a failure is an outcome like any other.
+
+    Args:
+        swings: those of the exact flow from all ``starts``, for a reference that cannot be compared point by point.
+    """
     if candidate.scene is None:
-        return Outcome(None, candidate.refusal, 0, None)
+        return Outcome(None, candidate.refusal, 0)
     try:
         # A method that blows up overflows on the way; that is said once, as the reason of the failure.
         with warnings.catch_warnings(), np.errstate(all="ignore"):
             warnings.simplefilter("ignore", RuntimeWarning)
             ran = trajectory(candidate.scene)
+            others = [] if reference.pointwise else [trajectory(each) for each in starts(candidate.scene)[1:]]
     except (ElementError, ArithmeticError, np.linalg.LinAlgError) as error:
-        return Outcome(None, f"Could not go on: {error}", 0, None)
+        return Outcome(None, f"Could not go on: {error}", 0)
     ticks = ran.summary["ticks"]
-    if failure := _failure(ran, reference):
-        return Outcome(None, failure, ticks, None)
-    counted = operations(candidate.scene, registry()).per_tick
-    return Outcome(_errors(ran, candidate.scene, reference), None, ticks, counted)
+    if failure := next(filter(None, (_failure(each, reference) for each in [ran, *others])), None):
+        return Outcome(None, failure, ticks)
+    return Outcome(_errors([ran, *others], candidate.scene, reference, swings), None, ticks)
 
 
 def _failure(ran: Trajectory, reference: Reference) -> str | None:
@@ -152,26 +185,41 @@ def _failure(ran: Trajectory, reference: Reference) -> str | None:
     return None
 
 
-def _errors(ran: Trajectory, scene: Scene, reference: Reference) -> Errors:
+def _errors(runs: list[Trajectory], scene: Scene, reference: Reference, swings: Sequence[Swings]) -> Errors:
     """Compares positions at the ticks after the start: sqrt(mean((x - x_ref)^2)) and the like.
 
-    Where a chaotic reference forbids that, the swings in the verdict's window are: |a - a_ref| / |a_ref|.
+    Where a chaotic reference forbids that, the swings in the verdict's window are: of the differences to those of the
+    exact flow from the same start the mean, and half of its 95 % interval, by Student's t.
     """
+    ran = runs[0]
     verdict, energy = ran.summary["verdict"], ran.summary["energy"]
     residual = _share(energy["residual_J"], energy["moved_J"])
     common = {"residual": residual, "verdict": verdict, "verdict_right": verdict == reference.verdict}
     if reference.pointwise:
         off = np.abs(ran.x_m - np.asarray(reference.x_m))[1:]
         return Errors(final_m=float(off[-1]), rms_m=math.sqrt(np.mean(off**2)), max_m=float(off.max()), **common)
-    theirs, ours = reference.statistics, statistics(scene, ran.x_m, ran.v_m_s)
-    off_by = {name: _apart(ours[name], theirs[name]) for name in theirs}
+    ours = [_swings(scene, each) for each in runs]
     names = {"amplitude": "amplitude_m", "frequency": "frequency_Hz", "energy_per_cycle": "energy_per_cycle_J"}
-    relative = {entry: _share(off_by[name], theirs[name]) for entry, name in names.items()}
-    return Errors(**relative, amplitude_m=off_by["amplitude_m"], **common)
+    relative = {entry: _relative(ours, swings, name) for entry, name in names.items()}
+    sizes = ([each["amplitude_m"] or 0.0 for each in each_run] for each_run in (ours, swings))
+    mine, true = map(np.array, sizes)
+    off = mine - true
+    doubt_m = _T * float(off.std(ddof=1)) / math.sqrt(len(off))
+    return Errors(**relative, amplitude_m=abs(float(off.mean())), doubt_m=doubt_m, **common)
 
 
-def _apart(value: float | None, reference: float | None) -> float | None:
-    return None if value is None or reference is None else abs(value - reference)
+def _pairs(ours: Sequence[Swings], theirs: Sequence[Swings]) -> Iterator[tuple[Swings, Swings]]:
+    return zip(ours, theirs, strict=True)
+
+
+def _relative(ours: Sequence[Swings], theirs: Sequence[Swings], name: str) -> float | None:
+    """Returns the relative error of a mean over all starts; None where one of them has no such number."""
+    pairs = [(mine[name], true[name]) for mine, true in _pairs(ours, theirs)]
+    known = [(mine, true) for mine, true in pairs if mine is not None and true is not None]
+    if len(known) < len(pairs):
+        return None
+    mean, true = (sum(column) for column in zip(*known, strict=True))
+    return _share(mean - true, true)
 
 
 def _share(off_by: float | None, reference: float | None) -> float | None:

@@ -7,14 +7,25 @@ from collections.abc import Callable
 from dataclasses import asdict, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Self
+from typing import Any, Self
 
+from haploop.plant.chain.chain import Chain
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
 from haploop.tools.cost import times
-from haploop.tools.cost.data import Cost, Errors, Point, ReferenceNote, SceneCost, Spread
+from haploop.tools.cost.alike import timed_alike
+from haploop.tools.cost.data import AlikeScene, Cost, Errors, Point, ReferenceNote, SceneCost, Spread, Step
 from haploop.tools.cost.findings import advice
-from haploop.tools.cost.grid import Candidate, Grid, Outcome, digest, made_with, outcome
+from haploop.tools.cost.grid import (
+    Candidate,
+    Grid,
+    Outcome,
+    digest,
+    errors_made_with,
+    outcome,
+    times_made_with,
+    true_swings,
+)
 from haploop.tools.cost.prices import Prices
 from haploop.tools.cost.times import IN_PROCESS, PROCESSES, Job, Store
 from haploop.tools.machine import commit, machine, versions
@@ -25,14 +36,14 @@ from haploop.tools.render.progress import Stage
 _FAR_M = 1e40
 # Shorter blocks cost more than what is in them.
 _LEAST_BLOCK = 20
-_OUTCOME, _REFERENCE = "outcome", "reference"
+_OUTCOME, _REFERENCE, _ALIKE = "outcome", "reference", "steps alike"
 
 
 class Measurement:
     """The measurements of some grids, kept in a directory that is there; a context manager.
 
-    Repeats are of each time in one process and as processes, 0 for not at all. ``find_reference`` makes or finds what
-    the runs of a scene, given by its file and resolved, are compared with.
+    Repeats are of each time in one process, and of the other prices as processes, 0 for not at all. ``find_reference``
+    makes or finds what the runs of a scene, given by its file and resolved, are compared with.
     """
 
     def __init__(
@@ -46,7 +57,7 @@ class Measurement:
         self._grids = grids
         self._repeats = {IN_PROCESS: repeats, PROCESSES: processes_repeats}
         self._find_reference = find_reference
-        self._made_with = made_with()
+        self._errors_made_with, self._times_made_with = errors_made_with(), times_made_with()
         self._store = Store(out)
 
     def __enter__(self) -> Self:
@@ -57,10 +68,13 @@ class Measurement:
         self._store.__exit__()
 
     def _key(self, candidate: Candidate) -> str:
-        return candidate.key(*self._made_with)
+        return candidate.key(*self._errors_made_with)
 
     def _reference_key(self, grid: Grid) -> str:
-        return digest([grid.scene, *self._made_with])
+        return digest([grid.scene, *self._errors_made_with])
+
+    def _alike_key(self, grid: Grid) -> str:
+        return digest([grid.scene, *self._times_made_with])
 
     def errors(self, stage: Stage) -> None:
         """Runs and compares every candidate of which nothing is known, in random order, to tell the time left well."""
@@ -72,50 +86,51 @@ class Measurement:
             reference = self._find_reference(grid.path, grid.scene)
             note = ReferenceNote(reference.how, reference.error_m, reference.pointwise, reference.verdict)
             self._store.add(_REFERENCE, self._reference_key(grid), asdict(note))
+            swings = () if reference.pointwise else true_swings(grid.scene)
             for candidate in random.Random(0).sample(left, len(left)):
-                came = outcome(candidate, reference)
+                came = outcome(candidate, reference, swings)
                 self._store.add(_OUTCOME, self._key(candidate), asdict(came))
                 advance()
 
     def times(self, stage: Stage) -> None:
         """Makes every measurement of time that is missing; errors come first."""
-        for way, repeats in self._repeats.items():
-            times.measure(self._store, self._jobs(way), repeats, f"times, {way}", stage)
+        times.measure(self._store, self._jobs(), self._repeats[IN_PROCESS], f"times, {IN_PROCESS}", stage)
+        for grid in self._grids:
+            if not (grid.scene.friction or self._store.has(_ALIKE, self._alike_key(grid))):
+                advance = stage(f"{grid.path.stem}: steps alike", 1)
+                steps = timed_alike(grid.scene, self._repeats[IN_PROCESS])
+                self._store.add(_ALIKE, self._alike_key(grid), [asdict(step) for step in steps])
+                advance()
 
     @cached_property
     def other_prices(self) -> Prices:
         """The prices of books, log, effects, processes, delay and control rate."""
         return Prices(self._store, self._repeats)
 
-    def _jobs(self, way: str) -> list[Job]:
-        return [job for grid in self._grids for candidate in grid.candidates if (job := self._job(candidate, way))]
+    def _jobs(self) -> list[Job]:
+        return [job for grid in self._grids for candidate in grid.candidates if (job := self._job(candidate))]
 
-    def _job(self, candidate: Candidate, way: str) -> Job | None:
-        """Makes a job of a candidate whose run had a tick; as processes, logging every step, only if it had no failure.
+    def _job(self, candidate: Candidate) -> Job | None:
+        """Makes a job of a candidate whose run had a tick.
 
         A run that diverges has but a few ticks: it is let go on far beyond where it is stopped otherwise, in blocks so
         short that there is more than the first one where it can be.
         """
-        came, scene, key = self._outcome(candidate), candidate.scene, self._key(candidate)
+        came, scene = self._outcome(candidate), candidate.scene
+        key = candidate.key(*self._times_made_with)
         if scene is None or came is None or not (ticks := came.ticks):
             return None
-        if way == PROCESSES:
-            overrides = [*candidate.overrides, "run.log=steps"]
-            job = Job(way, "", key, scene, lambda: times.run_us(candidate.path, overrides, ticks))
-            return job if came.error else None
         measured = scene
         if came.error is None:
             short = replace(scene.run, block_ticks=max(_LEAST_BLOCK, ticks // 2))
             measured = replace(scene, diverged_beyond=_FAR_M, run=short)
-        return Job(way, (candidate.path, candidate.method), key, measured, lambda: times.loop_us(measured))
+        return Job(IN_PROCESS, (candidate.path, candidate.method), key, measured, lambda: times.loop_us(measured))
 
     def _outcome(self, candidate: Candidate) -> Outcome | None:
         record = self._store.get(_OUTCOME, self._key(candidate))
         return record and Outcome(**{**record, "error": record["error"] and Errors(**record["error"])})
 
     def cost(self, tolerance_m: float) -> Cost:
-        loads = [times.quiet(self._store, self._jobs(way), n) for way, n in self._repeats.items()]
-        busiest = max(filter(None, loads), key=lambda load: (load.busy, load.calibration_spread), default=None)
         return Cost(
             machine=machine(),
             versions=versions(),
@@ -123,10 +138,17 @@ class Measurement:
             repeats=self._repeats[IN_PROCESS],
             processes_repeats=self._repeats[PROCESSES],
             tolerance_m=tolerance_m,
-            load=busiest,
+            yardstick=times.YARDSTICK,
+            load=times.quiet(self._store, self._jobs(), self._repeats[IN_PROCESS]),
             scenes=[made for grid in self._grids if (made := self._scene_cost(grid, tolerance_m))],
             prices=self.other_prices.groups(),
+            alike=[made for grid in self._grids if (made := self._alike(grid))],
         )
+
+    def _alike(self, grid: Grid) -> AlikeScene | None:
+        found = self._store.get(_ALIKE, self._alike_key(grid))
+        states = len(Chain.from_scene(grid.scene).states)
+        return found and AlikeScene(grid.path.stem, states, [_step(**entries) for entries in found])
 
     def _scene_cost(self, grid: Grid, tolerance_m: float) -> SceneCost | None:
         """Returns what is known of a scene, with advice once that is all; None before its reference is there."""
@@ -134,18 +156,27 @@ class Measurement:
             return None
         points = [point for candidate in grid.candidates if (point := self._point(candidate))]
         ticks = Timebase.from_scene(grid.scene).ticks
-        made = SceneCost(grid.path.stem, grid.scene.title, *grid.own, ticks, ReferenceNote(**note), points)
-        untimed = times.missing(self._store, self._jobs(IN_PROCESS), self._repeats[IN_PROCESS])
+        made = SceneCost(
+            grid.path.stem,
+            grid.scene.title,
+            *grid.own,
+            grid.scene.clock.control_rate,
+            ticks,
+            ReferenceNote(**note),
+            points,
+        )
+        untimed = times.missing(self._store, self._jobs(), self._repeats[IN_PROCESS])
         complete = len(points) == len(grid.candidates) and not untimed
         return replace(made, advice=advice(made, tolerance_m)) if complete else made
 
     def _point(self, candidate: Candidate) -> Point | None:
         if (came := self._outcome(candidate)) is None:
             return None
-        one, processes = (self._spread(way, self._key(candidate)) for way in (IN_PROCESS, PROCESSES))
-        setting = candidate.method, candidate.plant_rate
-        return Point(*setting, came.error, came.failure, one, processes, came.instructions_per_tick)
+        values = self._store.all(IN_PROCESS, candidate.key(*self._times_made_with), self._repeats[IN_PROCESS])
+        known = [value for value in values if value is not None]
+        time = Spread.from_values(known) if known else None
+        return Point(candidate.method, candidate.plant_rate, came.error, came.failure, time)
 
-    def _spread(self, what: str, key: str) -> Spread | None:
-        values = [value for value in self._store.all(what, key, self._repeats[what]) if value is not None]
-        return Spread.from_values(values) if values else None
+
+def _step(alone: dict[str, float], arrays: dict[str, float], **entries: Any) -> Step:
+    return Step(**entries, alone=Spread(**alone), arrays=Spread(**arrays))

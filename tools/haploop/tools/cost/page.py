@@ -7,21 +7,41 @@ from pathlib import Path
 
 from haploop.tools.cli.options import WRONG_USE, leave
 from haploop.tools.cost import figure, prices_figure
-from haploop.tools.cost.data import Cost, CostFileError, Point, PriceGroup, SceneCost, load
-from haploop.tools.cost.findings import findings, length, power, rate, setting
-from haploop.tools.cost.report import PRICE_HEADS, made_with, price_row
+from haploop.tools.cost.data import Cost, CostFileError, PriceGroup, load
+from haploop.tools.cost.findings import alike_sentence, effects_sentence, findings, interval, sum_sentence, takes_away
+from haploop.tools.cost.report import made_with, price_rows, yardstick
 from haploop.tools.figure.data import FigureError
 from haploop.tools.figure.style import write_figure
 from haploop.tools.render.terminal import markdown_table
-from haploop.tools.render.units import amount, fixed
+from haploop.tools.render.units import amount
 
+# Groups that are told in a table; the others are curves of the figure.
+_TABLED = ("books", "log", "processes")
 PAGE, FIGURE, PRICES_FIGURE = "accuracy.md", "accuracy.png", "accuracy_prices.png"
 _INTRO = """\
-How much time a run takes depends on how accurate it is to be. Every number here was measured by `haploop cost` and
-written by `make accuracy`; none was typed. An *error* is the root mean square, over the ticks of a run, of the
-position's distance from a reference solved far more accurately; in a chaotic limit cycle, where positions cannot be
-compared, it is that of the amplitude. A *time* is the median of a simulated tick in one process, all energy books kept;
-in bold, the scene's own setting."""
+Which method, what the next digit costs, what each effect costs. Every number was measured by `haploop cost` and
+written by `make accuracy`; the command prints all of them. An *error* is the root mean square, over the ticks of a
+run, of the position's distance from a reference in 50 digits. A *time* is that of a simulated tick with all energy
+books, over that of a yardstick timed before and after it: a median, and in brackets its 95 % interval. Times whose
+intervals overlap are not ranked."""
+_DIGITS = """\
+Each cell names the cheapest setting, or all that are as cheap, and the time of the first. Below the error in the last
+column no method takes less time than the exact flow. Friction is what makes a tick dear: the exact flow finds each
+stop and start to the last digit, the one-step methods let them fall on plant steps and have an error of first order,
+whatever their own order is."""
+_ALIKE = """\
+Without friction a step of any of these methods is a small linear map. Operations are additions and multiplications,
+counted; times are of steps of 4096 motions in arrays, every method by the same kind of formula. Operations a tick are
+those at the lowest plant rate that is exact enough; a dash where none was."""
+_SWINGS = """\
+Here a start moved by 1 µm ends somewhere else, so neither positions nor single swings can be compared. The error is
+that of the mean amplitude over 30 starts 1 µm apart, each against the exact flow from the same start, with its 95 %
+interval; *at most* where that reaches 0. Methods whose intervals overlap are not ranked."""
+_EFFECTS = """\
+Each effect by itself, with its values of `all_effects.toml`, is added to a mass in a hand of 10 kg that swings by 30
+mm through a soft wall; so the motion stays what it was, within the last column. Effects of the accelerometer are
+added to an ideal one. Whatever needs bodies in a row (cable, grip, bandwidths, friction, jitter, loss) pays for them
+alone, and shares them with others."""
 
 
 def write(directory: Path, docs: Path) -> Path:
@@ -40,60 +60,48 @@ def write(directory: Path, docs: Path) -> Path:
 
 
 def page(cost: Cost) -> str:
-    tolerance = amount(cost.tolerance_m, "m")
-    parts = [
-        "# What accuracy costs",
-        _INTRO,
-        "## Findings",
-        *(
-            part
-            for table in findings(cost)
-            for part in (f"### {table.title}", markdown_table(table.heads, table.rows), *table.notes)
-        ),
-        "## Error against time",
-        f"![Error of each method against the time of a tick, scene by scene]({FIGURE})",
-        *(part for scene in cost.scenes for part in _scene(scene)),
-        *_prices(cost.prices),
-        "## Measured on",
-        " ".join([made_with(cost), *([str(cost.load)] if cost.load else []), f"The tolerance is {tolerance}."]),
-    ]
+    digits, *others = findings(cost)
+    alike = [table for table in others if table.heads[1].startswith("operations")]
+    swings = [table for table in others if table not in alike]
+    parts = ["# What accuracy costs", _INTRO, f"## {digits.title}", takes_away(cost)]
+    parts += [markdown_table(digits.heads, digits.rows), _DIGITS]
+    parts += [f"![Error of each method against the time of a tick, scene by scene]({FIGURE})"]
+    for table in alike:
+        parts += [
+            f"## {table.title}",
+            *filter(None, [alike_sentence(cost)]),
+            markdown_table(table.heads, table.rows),
+            _ALIKE,
+        ]
+    for table in swings:
+        parts += [f"## {table.title}", markdown_table(table.heads, table.rows), _SWINGS]
+    parts += _prices(cost.prices)
+    parts += ["## Measured on", f"{yardstick(cost)} {made_with(cost)}"]
     return "\n\n".join(parts) + "\n"
 
 
-def _scene(scene: SceneCost) -> list[str]:
-    reference = scene.reference
-    rates = sorted({point.plant_rate for point in scene.points})
-    methods = dict.fromkeys(point.method for point in scene.points)
-    rows = [[method, *(_cell(scene, method, hertz) for hertz in rates)] for method in methods]
-    swings = "" if reference.pointwise else " It is chaotic: compared by its swings, not by positions."
-    about = f"*Reference:* {reference.how} It is known to {length(reference.error_m)}.{swings}"
-    # Of the failures of a method the reason is told once, that of its highest rate.
-    failed: dict[str, Point] = {point.method: point for point in scene.points if point.failure}
-    reasons = [f"- Failed: {setting(point)}: {point.failure}" for point in failed.values()]
-    table = markdown_table(["error, µs", *map(rate, rates)], rows, numbers=range(1, len(rates) + 1))
-    return [f"### {scene.short_title}", about, table, *(["\n".join(reasons)] if reasons else []), scene.advice]
-
-
-def _cell(scene: SceneCost, method: str, hertz: int) -> str:
-    if (point := scene.point(method, hertz)) is None:
-        return ""
-    words = power(point.size_m) if point.error else "failed"
-    if point.error and not point.is_right:
-        words += f" ({point.error.verdict})"
-    words += f", {fixed(point.us_per_tick.median)}" if point.us_per_tick else ""
-    return f"**{words}**" if point is scene.own else words
-
-
 def _prices(groups: list[PriceGroup]) -> list[str]:
-    if not groups:
-        return []
-    parts = ["## The other prices", f"![What books, log, effects, processes, delay and rate cost]({PRICES_FIGURE})"]
+    parts = []
     for group in groups:
-        about = f"Medians of {group.repeats} repeats, {group.unit}: {group.how}. The first row is the baseline."
-        heads = ["left out" if group.name == "effects" else "", *PRICE_HEADS[1:]]
-        table = markdown_table(heads, map(price_row, group.prices), numbers=range(1, len(heads) - 1))
-        parts += [f"### {group.title}", about, table]
-    return parts
+        if group.name == "effects":
+            dearest = sorted(group.prices[1:], key=lambda price: -price.adds.median if price.adds else 0.0)
+            rows = [[p.what, interval(p.adds), _moved(p.moves_m)] for p in dearest if p.adds]
+            table = markdown_table(("", "adds", "motion moved"), rows, numbers=(1, 2))
+            sentences = f"{effects_sentence(group)} {sum_sentence(group)}"
+            parts += ["## What each effect costs, alone", sentences, table, _EFFECTS]
+    rows = [
+        [f"{group.title}: {what}", *cells]
+        for group in groups
+        if group.name in _TABLED
+        for what, *cells in price_rows(group)[1]
+    ]
+    figure = [f"![What books, log, effects, processes, delay and rate cost]({PRICES_FIGURE})"] * bool(groups)
+    table = [markdown_table(("", "time", "adds", "buys"), rows)] * bool(rows)
+    return [*parts, *figure, *["## The other prices"] * bool(rows), *table]
+
+
+def _moved(moves_m: float | None) -> str:
+    return "below 1 nm" if moves_m is not None and moves_m < 1e-9 else amount(moves_m, "m", 2)
 
 
 def main() -> None:

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from haploop.tools.cost.data import Price, PriceGroup, chance_in
-from haploop.tools.cost.figure import UNCERTAIN
+from haploop.tools.cost.data import Price, PriceGroup, Spread
+from haploop.tools.cost.findings import effects_sentence, interval
 from haploop.tools.figure import style
 from haploop.tools.figure.data import FigureError
 from haploop.tools.figure.labels import Label, place_labels
 from haploop.tools.linear.stiffness_limit import StiffnessLimit
-from haploop.tools.operations import AGAIN, NONE
+from haploop.tools.operations import NONE, WHOLE
 from haploop.tools.render.units import fixed
 
 if TYPE_CHECKING:
@@ -35,6 +35,8 @@ def figure_of(groups: list[PriceGroup]) -> Figure:
     for group in groups:
         row, rows, column = _PLACES[group.name]
         special.get(group.name, _bars)(figure.add_subplot(grid[row : row + rows, column]), group)
+    if sentences := [effects_sentence(group) for group in groups if group.name == "effects"]:
+        figure.suptitle(sentences[0], x=0.01, ha="left", fontsize=style.TEXT + 2, color=style.INK, gid="takes away")
     style.fix_layout(figure)
     for ax, group in zip(figure.axes, groups, strict=True):
         _label(ax, group)
@@ -43,43 +45,35 @@ def figure_of(groups: list[PriceGroup]) -> Figure:
 
 def _bars(ax: Axes, group: PriceGroup) -> None:
     prices = group.prices
-    style.dress(ax, group.title, f"{group.unit}\n{group.how}", "")
+    style.dress(ax, group.title, f"yardsticks {group.unit}\n{group.how}", "")
     colours = [style.GREY, *[style.WALL] * (len(prices) - 1)]
-    words = [f"{fixed(price.time.median)}, {fixed(price.ratio)} ×" for price in prices]
-    _rows(ax, prices, [price.time.median for price in prices], colours, words, xerr=_quartiles(prices))
+    times = [price.time for price in prices]
+    _rows(ax, prices, times, colours, [interval(time) for time in times])
 
 
 def _effects(ax: Axes, group: PriceGroup) -> None:
-    """Draws the time that each effect adds, the dearest first; the shaded band is chance."""
-    whole = f"{group.unit}, of {fixed(group.prices[0].time.median)} with all effects"
-    bare = next((f" and {fixed(p.time.median)} with none" for p in group.prices if p.what == NONE), "")
-    style.dress(ax, "What each effect adds", f"{whole}{bare}; shaded: chance\n{group.how}", "")
-    chance = chance_in(group)
-    named = [price for price in group.prices[1:] if price.what not in (AGAIN, NONE)]
-    named.sort(key=lambda price: -price.costs)
-    ax.axvspan(-chance, chance, color=UNCERTAIN, zorder=0, linewidth=0, gid="chance")
-    colours = [style.WALL if abs(price.costs) > chance else style.FAINT for price in named]
-    _rows(ax, named, [price.costs for price in named], colours, [_counted(price, group) for price in named])
+    """Draws the time that each effect adds by itself, the dearest first; grey: its interval reaches 0."""
+    bare = next((f"; {fixed(p.time.median, 2)} without any" for p in group.prices if p.what == NONE), "")
+    style.dress(ax, "What each effect adds, alone", f"yardsticks {group.unit}{bare}\n{group.how}", "")
+    named = [price for price in group.prices if price.adds and price.what != WHOLE]
+    named.sort(key=lambda price: -price.adds.median if price.adds else 0.0)
+    adds = [price.adds for price in named if price.adds]
+    _rows(ax, named, adds, [style.WALL if add.low > 0.0 else style.FAINT for add in adds], list(map(interval, adds)))
 
 
-def _counted(price: Price, group: PriceGroup) -> str:
-    words = fixed(price.costs, 2)
-    whole, without = group.prices[0].instructions_per_tick, price.instructions_per_tick
-    return words if whole is None or without is None else f"{words}; {fixed(whole - without)} instructions"
+def _errors(spreads: list[Spread]) -> np.ndarray:
+    """Returns how far the ends of the intervals lie below and above the medians; shape (2, prices)."""
+    return np.array([[each.median - each.low, each.high - each.median] for each in spreads]).T
 
 
-def _quartiles(prices: list[Price]) -> np.ndarray:
-    """Returns how far the quartiles lie below and above the medians; shape (2, prices)."""
-    times = [price.time for price in prices]
-    return np.array([[time.median - time.q1, time.q3 - time.median] for time in times]).T
-
-
-def _rows(
-    ax: Axes, prices: list[Price], values: list[float], colours: list[str], words: list[str], **look: Any
-) -> None:
-    bars = ax.barh(range(len(values)), values, color=colours, height=0.62, zorder=2, ecolor=style.INK, **look)
-    ax.bar_label(bars, words, padding=4, fontsize=style.SMALL, color=style.INK, gid="value")
+def _rows(ax: Axes, prices: list[Price], spreads: list[Spread], colours: list[str], words: list[str]) -> None:
+    medians = [each.median for each in spreads]
+    look = {"color": colours, "height": 0.62, "zorder": 2, "ecolor": style.INK}
+    ax.barh(range(len(medians)), medians, xerr=_errors(spreads), **look)
     low, high = ax.get_xlim()
+    for row, (each, text) in enumerate(zip(spreads, words, strict=True)):
+        beside = max(each.high, 0.0) + 0.012 * (high - low)
+        ax.text(beside, row, text, va="center", fontsize=style.SMALL, color=style.INK, gid="value")
     ax.set_xlim(min(low, 0.0), high + 0.42 * (high - low))
     ax.set_yticks(range(len(prices)), [price.what for price in prices], fontsize=style.TEXT)
     ax.tick_params(axis="y", length=0)
@@ -89,16 +83,15 @@ def _rows(
 
 
 def _curve(ax: Axes, group: PriceGroup) -> None:
-    style.dress(ax, group.title, f"{group.unit}\n{group.how}", "largest steady stiffness (N/m)")
+    style.dress(ax, group.title, f"yardsticks {group.unit}\n{group.how}", "largest steady stiffness (N/m)")
     ax.loglog()
     style.plain_numbers(ax.xaxis)
     style.plain_numbers(ax.yaxis)
     colour = style.ELEMENTS[0] if group.name == "delay" else style.ELEMENTS[1]
     if not (limits := _limits(group)):
         return
-    quartiles = _quartiles([price for price, _ in limits])
     xy = np.array([(price.time.median, limit.stiffness_N_m) for price, limit in limits])
-    ax.errorbar(*xy.T, xerr=quartiles, color=colour, linewidth=1.4, elinewidth=1.0)
+    ax.errorbar(*xy.T, xerr=_errors([price.time for price, _ in limits]), color=colour, linewidth=1.4, elinewidth=1.0)
     for (_, limit), (x, y) in zip(limits, xy, strict=True):
         face, gid = (colour, "confirmed") if limit.confirmed else ("white", "not confirmed")
         ax.plot([x], [y], marker="o", color=colour, markerfacecolor=face, linestyle="none", zorder=4, gid=gid)

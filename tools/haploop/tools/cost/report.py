@@ -8,35 +8,32 @@ from typing import TYPE_CHECKING
 from rich.console import Group
 from rich.text import Text
 
-from haploop.tools.cost.data import Cost, Errors, Point, Price, PriceGroup, SceneCost, Spread
-from haploop.tools.cost.findings import rate, setting
+from haploop.tools.cost.data import Cost, Errors, Point, Price, PriceGroup, SceneCost
+from haploop.tools.cost.findings import interval, rate, setting
 from haploop.tools.render.terminal import make_table
 from haploop.tools.render.units import amount, fixed
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
-PRICE_HEADS = ("", "median", "quartiles", "ratio", "costs", "instructions", "buys")
 _POINTWISE, _SWINGS = ("end m", "RMS m", "max m"), ("swing", "freq.", "energy")
 _READING = (
-    "Errors are x - x_ref at the end, RMS and largest over the ticks; or relative ones of the swings' amplitude, "
-    "frequency and energy per cycle. Residual: of the energy moved. µs/tick: median in one process, books, no log; "
-    "spread: the middle half over the median; procs: µs/tick as processes that log every step. Starting up is left "
-    "out; in brackets: of the few ticks before a method failed. Bytecode: instructions a tick. "
-    "Bold: the scene's own setting."
+    "Errors are x - x_ref at the end, RMS and largest over the ticks; or relative ones of the mean swing's amplitude, "
+    "frequency and energy a cycle. Residual: of the energy moved. Time: of a tick in one process, books, no log, over "
+    "the yardstick; interval: 95 %, of the median. Starting up is left out; in brackets: of the few ticks before a "
+    "failure. Bold: the scene's own setting."
 )
 
 
 def report(cost: Cost) -> RenderableType:
     lines = [Text.assemble((f"{scene.name}: ", "bold"), scene.advice) for scene in cost.scenes]
-    small = [Text(words, style="dim") for words in (_READING, made_with(cost))]
-    busy = [Text(f"{cost.load} Errors stand.", style="bold yellow")] if cost.load and cost.load.busy else []
-    return Group(*map(scene_table, cost.scenes), *map(price_table, cost.prices), *small, *busy, *lines)
+    small = [Text(words, style="dim") for words in (_READING, yardstick(cost), made_with(cost))]
+    return Group(*map(scene_table, cost.scenes), *map(price_table, cost.prices), *small, *lines)
 
 
 def scene_table(scene: SceneCost) -> RenderableType:
     names = _POINTWISE if scene.reference.pointwise else _SWINGS
-    numbers = (*names, "residual", "µs/tick", "spread", "procs", "bytecode")
+    numbers = (*names, "residual", "time", "interval")
     unbroken = ("method", "verdict")
     table = make_table("method", *numbers, "verdict", numbers=numbers, unbroken=unbroken, padding=(0, 0, 0, 0))
     for method, points in groupby(scene.points, key=lambda point: point.method):
@@ -53,15 +50,14 @@ def scene_table(scene: SceneCost) -> RenderableType:
 
 def _row(point: Point) -> list[str | Text]:
     """Makes the cells of a point; the time is in brackets where only the few ticks of a failure could be timed."""
-    error, times, count = point.error, point.us_per_tick, point.instructions_per_tick
+    error, time = point.error, point.time
     verdict = error.verdict if error else "failed"
+    median = fixed(time.median) if time else "–"
     return [
         f"{rate(point.plant_rate):>11}",
         *(f"{value:.1e}" if value is not None else "–" for value in _figures(error)),
-        _median(times) if error or not times else f"({_median(times)})",
-        f"{100 * (times.q3 - times.q1) / times.median:.0f} %" if times else "–",
-        _median(point.processes_us_per_tick),
-        "–" if count is None else f"{count:.0f}",
+        median if error or not time else f"({median})",
+        f"{fixed(time.low)}–{fixed(time.high)}" if time else "–",
         Text(verdict) if point.is_right else Text(f"✗ {verdict}", "red"),
     ]
 
@@ -74,24 +70,44 @@ def _figures(error: Errors | None) -> tuple[float | None, ...]:
     return error.amplitude, error.frequency, error.energy_per_cycle, error.residual
 
 
-def _median(times: Spread | None) -> str:
-    return fixed(times.median) if times else "–"
-
-
 def price_table(group: PriceGroup) -> RenderableType:
-    """Makes the table of a group of prices; ratios are over its first row."""
-    table = make_table(*PRICE_HEADS, numbers=PRICE_HEADS[1:-1], unbroken=("",), padding=(0, 1, 0, 0))
-    for price in group.prices:
-        table.add_row(*price_row(price))
-    return Group(Text(group.title, style="bold"), Text(f"{group.unit}; {group.how}.", style="dim"), table)
+    """Makes the table of a group of prices; what each adds is against its first row."""
+    heads, rows = price_rows(group)
+    table = make_table(*heads, numbers=heads[1:-1], unbroken=("",), padding=(0, 1, 0, 0))
+    for row in rows:
+        table.add_row(*row)
+    return Group(Text(group.title, style="bold"), Text(f"Yardsticks {group.unit}; {group.how}.", style="dim"), table)
 
 
-def price_row(price: Price) -> list[str]:
-    """Returns the cells in the order of ``PRICE_HEADS``."""
-    count, time = price.instructions_per_tick, price.time
-    quartiles = f"{fixed(time.q1)}–{fixed(time.q3)}"
-    instructions = "" if count is None else f"{count:.0f}"
-    return [price.what, fixed(time.median), quartiles, fixed(price.ratio), fixed(price.costs), instructions, price.buys]
+def price_rows(group: PriceGroup) -> tuple[tuple[str, ...], list[list[str]]]:
+    """Returns the heads and the cells of a group's table."""
+    moves, counted = (
+        any(getattr(price, name) is not None for price in group.prices) for name in ("moves_m", "instructions_per_tick")
+    )
+    heads = ("", "time", "adds", *["motion moved"] * moves, *["instructions"] * counted, "buys")
+    return heads, [_price_row(price, moves, counted) for price in group.prices]
+
+
+def _price_row(price: Price, moves: bool, counted: bool) -> list[str]:
+    count = price.instructions_per_tick
+    return [
+        price.what,
+        interval(price.time, 3),
+        interval(price.adds) if price.adds else "",
+        *[amount(price.moves_m, "m", 2)] * moves,
+        *["" if count is None else f"{count:.0f}"] * counted,
+        price.buys,
+    ]
+
+
+def yardstick(cost: Cost) -> str:
+    """Returns what a time is over, and how steady it was, as sentences."""
+    words = f"The yardstick is {cost.yardstick}"
+    if not (load := cost.load):
+        return f"{words}."
+    average = "" if load.average is None else f", under a load average of {load.average:.1f}"
+    varied = f"its middle half lay within {100 * load.variation:.0f} %{average}"
+    return f"{words}; here it took {fixed(load.yardstick_us)} µs ({varied})."
 
 
 def made_with(cost: Cost) -> str:

@@ -1,7 +1,8 @@
-"""Times of a simulated tick: warm, interleaved in random order, repeated, with the garbage collector off.
+"""Times of a simulated tick over that of a yardstick: warm, in random order, repeated, without garbage collection.
 
-A round times every candidate once, in an order drawn anew for each round from a fixed seed: what drifts or disturbs
-meets all of them alike. Each time is stored at once, so that a command that was stopped goes on where it was.
+A round times every candidate once, in an order drawn anew for each round from a fixed seed, and the yardstick before
+and after it: what drifts or disturbs meets all of them alike. In one process the time is that of the processor, which
+stands still while another program has it. Each ratio is stored at once, so that a command that was stopped goes on.
 """
 
 from __future__ import annotations
@@ -27,18 +28,23 @@ from haploop.controller.dissipation import ElementError, registry
 from haploop.launch.runs.in_process import Loop
 from haploop.launch.runs.start import prepare, run
 from haploop.launch.scene.events import scene_events
+from haploop.launch.scene.file import load
 from haploop.launch.spec import RunFailed
 from haploop.logger.session import open_session
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
-from haploop.tools.cost.data import Load, Spread
+from haploop.tools.cost.data import Load
+from haploop.tools.cost.grid import scenes_folder
 from haploop.tools.render.progress import Stage
 
 T = TypeVar("T")
-IN_PROCESS, PROCESSES = "us in one process", "us as processes"
+IN_PROCESS, PROCESSES = "in one process", "as processes"
+YARDSTICK = (
+    "a tick of fig6a.toml without delay in one process: one mass, a wall, the exact flow at 10 kHz, all energy books"
+)
 _SEED = 20_220_711
 _QUIET = "quiet for "
-_STEPS = 100_000
+_YARDSTICK_S = 1.5
 
 
 class Store:
@@ -129,13 +135,13 @@ def tick_us(block: Callable[[], bool], tick: Callable[[], int]) -> float | None:
 
 
 def timed(work: Callable[[], T]) -> tuple[float, T]:
-    """Returns how long some work takes, s, with the garbage collector off, and its result."""
+    """Returns the processor time of some work, s, with the garbage collector off, and its result."""
     gc.collect()
     gc.disable()
     try:
-        began = time.perf_counter()
+        began = time.process_time()
         result = work()
-        return time.perf_counter() - began, result
+        return time.process_time() - began, result
     finally:
         gc.enable()
 
@@ -162,22 +168,34 @@ def missing(store: Store, jobs: Sequence[Job], repeats: int) -> int:
 def measure(store: Store, jobs: Sequence[Job], repeats: int, name: str, stage: Stage) -> None:
     """Makes every measurement of jobs of one way that is missing; where there are any, they are a stage of this name.
 
-    With each goes into the store the load of the machine in its round.
+    With each ratio goes into the store the yardstick of its time, µs, and the load of the machine.
     """
     if not (count := missing(store, jobs, repeats)):
         return
     way, advance = jobs[0].way, stage(name, count)
+    plain = yardstick()
     with _still():
         if way == IN_PROCESS:
             _warm(store, jobs, repeats)
+        loop_us(plain)
         for repeat in range(repeats):
-            seen = _observe_machine(alone=way == IN_PROCESS)
+            before = loop_us(plain)
             for job in random.Random(_SEED + repeat).sample(jobs, len(jobs)):
                 if not store.has(way, job.key, repeat):
-                    took = job.clock()
+                    took, after = job.clock(), loop_us(plain)
+                    assert before
+                    assert after
+                    mean = (before + after) / 2.0
+                    seen = {"yardstick_us": mean, "load": _load_average() if way == IN_PROCESS else None}
                     store.add(_QUIET + way, job.key, seen, repeat)
-                    store.add(way, job.key, took, repeat)
+                    store.add(way, job.key, took and took / mean, repeat)
+                    before = after
                     advance()
+
+
+def yardstick() -> Scene:
+    overrides = [f"duration={_YARDSTICK_S}", "diverged_beyond=1e9", "clock.round_trip_delay=0.0", "run.log=none"]
+    return load(scenes_folder() / "fig6a.toml", overrides)
 
 
 @contextmanager
@@ -194,29 +212,21 @@ def _still() -> Iterator[None]:
 
 
 def _warm(store: Store, jobs: Sequence[Job], repeats: int) -> None:
-    """Runs one of every family once untimed: imports, first calls, the interpreter's adaptive code."""
-    for job in {job.family: job for job in jobs if missing(store, [job], repeats)}.values():
+    """Runs the first of every family once untimed: imports, first calls, the interpreter's adaptive code."""
+    for job in {job.family: job for job in reversed(jobs) if missing(store, [job], repeats)}.values():
         job.clock()
 
 
 def quiet(store: Store, jobs: Sequence[Job], repeats: int) -> Load | None:
-    """Returns the load of the machine in the rounds of these jobs; None where nothing was measured."""
+    """Returns the yardstick and the load of the machine beside these jobs; None where nothing was measured."""
     seen = [one for job in jobs for one in store.all(_QUIET + job.way, job.key, repeats)]
-    if not seen:
+    if len(seen) < 2:
         return None
-    loops = Spread.from_values([one["loop_s"] for one in seen])
+    q1, median, q3 = statistics.quantiles([one["yardstick_us"] for one in seen], n=4, method="inclusive")
     loads = [one["load"] for one in seen if one["load"] is not None]
-    return Load(statistics.median(loads) if loads else None, (loops.q3 - loops.q1) / loops.median)
+    return Load(median, (q3 - q1) / median, statistics.median(loads) if loads else None)
 
 
-def _observe_machine(alone: bool) -> dict[str, float | None]:
-    """Returns the time of a fixed calibration loop, s, and the load average, None where it cannot be known.
-
-    The load average counts processes that run or wait for a core: it tells something only where this one is alone.
-    """
-    value = 1.0
-    began = time.perf_counter()
-    for _ in range(_STEPS):
-        value = 0.5 * value + 0.25
-    took_s = time.perf_counter() - began
-    return {"loop_s": took_s, "load": os.getloadavg()[0] if alone and hasattr(os, "getloadavg") else None}
+def _load_average() -> float | None:
+    """Returns how many processes run or wait for a core, of the last minute; None where that cannot be known."""
+    return os.getloadavg()[0] if hasattr(os, "getloadavg") else None
