@@ -160,7 +160,7 @@ def test_each_time_is_over_the_yardstick_before_and_after_it(smooth, tmp_path, m
     with Measurement([grid(smooth, ["euler"], [1_000, 5_000])], tmp_path, 3, 0, exact_reference) as made:
         made.errors(count_stages({}))
         made.times(count_stages({}))
-        seen = [point.time for point in made.cost(1e-6).scenes[0].points]
+        seen: list[Any] = [point.time for point in made.cost(1e-6).scenes[0].points]
     assert all((time.low, time.median, time.high) == pytest.approx((3.0, 3.0, 3.0), rel=1e-12) for time in seen)
 
 

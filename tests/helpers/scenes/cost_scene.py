@@ -5,7 +5,7 @@ from typing import Any
 
 from haploop.launch.scene.file import load as load_scene
 from haploop.protocol.scene.scene import Scene
-from haploop.tools.cost.grid import grid, outcome
+from haploop.tools.cost.grid import grid, outcome, true_swings
 from haploop.tools.reference.nearest import Reference, statistics
 from haploop.tools.trajectory import trajectory
 
@@ -39,7 +39,9 @@ def exact_reference(path: Path, _scene: Scene | None = None) -> Reference:
 def outcomes(path: Path, methods: list[str], rates: list[int], reference: Reference | None = None) -> dict[Any, Any]:
     """(method, rate) -> outcome, without a store."""
     reference = reference or exact_reference(path)
-    return {(c.method, c.plant_rate): outcome(c, reference) for c in grid(path, methods, rates).candidates}
+    made = grid(path, methods, rates)
+    swings = () if reference.pointwise else true_swings(made.scene)
+    return {(c.method, c.plant_rate): outcome(c, reference, swings) for c in made.candidates}
 
 
 def count_stages(counts):

@@ -102,11 +102,17 @@ def _digit_table(cost: Cost) -> FindingTable:
         below = exact_below_m(scene)
         rows.append([
             scene.short_title,
-            *(_cell(scene, digit) for digit in DIGITS_M),
+            *_cells(scene),
             _NONE if below is None else "any error" if math.isinf(below) else amount(below, "m", 2),
         ])  # fmt: skip
     heads = ("scene", *(amount(digit, "m", 2) for digit in DIGITS_M), "nothing beats exact below")
     return FindingTable("What the next digit costs", heads, rows)
+
+
+def _cells(scene: SceneCost) -> list[str]:
+    """Returns the cells of all errors asked for; one that says what that to its left does is told so."""
+    said = [_cell(scene, digit) for digit in DIGITS_M]
+    return ["same" if i and cell == said[i - 1] else cell for i, cell in enumerate(said)]
 
 
 def _cell(scene: SceneCost, digit_m: float) -> str:
@@ -194,13 +200,13 @@ def is_told_apart(error: Errors) -> bool:
 def takes_away(cost: Cost) -> str:
     """Makes the one sentence of the figure of methods: down to which error another method than the exact flow pays."""
     known = [(scene, below) for scene in cost.scenes if (below := exact_below_m(scene)) is not None]
-    pays = [(below, scene) for scene, below in known if math.isfinite(below)]
+    pays = sorted(below for _, below in known if math.isfinite(below))
     always = len(known) - len(pays)
     if not pays:
         return f"In all {always} scenes no method is cheaper than the exact flow, however large the error may be."
-    below = min(below for below, _ in pays)
+    ends = " to ".join(dict.fromkeys(amount(below, "m", 2) for below in (pays[0], pays[-1])))
     where = f"{always} of {len(known)} scenes nothing beats the exact flow at any error"
-    return f"In {where}; elsewhere another method pays only above {amount(below, 'm', 2)}, or more."
+    return f"In {where}; elsewhere another method pays only above {ends}."
 
 
 def effects_sentence(group: PriceGroup) -> str:

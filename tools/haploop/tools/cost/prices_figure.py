@@ -109,4 +109,6 @@ def _label(ax: Axes, group: PriceGroup) -> None:
         Label(price.time.median, limit.stiffness_N_m, price.what, style.INK, price.what) for price, limit in limits
     ]
     lines = [np.asarray(line.get_xydata()) for line in ax.lines if line.get_marker() == "None"]
-    place_labels(ax, labels, lines)
+    ends = [(price.time.low, price.time.high, limit.stiffness_N_m) for price, limit in limits]
+    bars = [np.array([[low, y], [high, y]]) for low, high, y in ends]
+    place_labels(ax, labels, [*lines, *bars])

@@ -107,7 +107,8 @@ def yardstick(cost: Cost) -> str:
         return f"{words}."
     average = "" if load.average is None else f", under a load average of {load.average:.1f}"
     varied = f"its middle half lay within {100 * load.variation:.0f} %{average}"
-    return f"{words}; here it took {fixed(load.yardstick_us)} µs ({varied})."
+    clocks = "Times in one process are the processor's, those as processes the clock's."
+    return f"{words}; here it took {fixed(load.yardstick_us)} µs ({varied}). {clocks}"
 
 
 def made_with(cost: Cost) -> str:
