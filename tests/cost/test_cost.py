@@ -101,14 +101,6 @@ def test_the_residual_of_a_method_that_gains_energy_is_told(smooth):
     assert seen["euler", 5_000].error.residual > 1e-6
 
 
-def test_a_wrong_verdict_is_told(smooth):
-    reference = exact_reference(smooth)
-    swinging = replace(reference, verdict="limit-cycle")
-    right, wrong = (outcomes(smooth, ["exact"], [5_000], r)["exact", 5_000].error for r in (reference, swinging))
-    assert (right.verdict, right.verdict_right) == ("no-contact", True)
-    assert (wrong.verdict, wrong.verdict_right) == ("no-contact", False)
-
-
 def test_failures_are_points_with_their_reason(smooth):
     """Refused by the check; blown up (h omega of 4.5 and more for the spring made stiff); another length."""
     smooth.write_text(SMOOTH.replace("stiffness = 400.0", "stiffness = 400000.0"))

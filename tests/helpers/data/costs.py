@@ -25,11 +25,9 @@ DOUBT_M = 1e-4
 FAILS = {("stiff_cable", "euler"): 20_000, ("stiff_cable", "rk4"): 5_000, ("stiff_cable", "semi-implicit-euler"): 5_000}
 
 
-def fake_error(
-    size_m: float, pointwise: bool, verdict: str = "steady", right: bool = True, doubt_m: float = 0.0
-) -> Errors:
+def fake_error(size_m: float, pointwise: bool, doubt_m: float = 0.0) -> Errors:
     """Errors of one size."""
-    judged = {"residual": size_m * 1e2, "verdict": verdict, "verdict_right": right}
+    judged = {"residual": size_m * 1e2}
     if pointwise:
         return Errors(final_m=0.5 * size_m, rms_m=size_m, max_m=3 * size_m, **judged)
     relative = {"amplitude": size_m / 1e-3, "frequency": size_m / 3e-3, "energy_per_cycle": size_m / 5e-4}
@@ -49,9 +47,7 @@ def fake_point(scene: str, method: str, rate: int) -> Point:
             method, rate, None, f"Diverged: the device was at 3.2 m, beyond the limit of 1 m, at tick {tick}.", time
         )
     size = max(at_1_kHz * harder * steps**-order, 3 * floor_m)
-    verdict = "steady" if pointwise else "limit-cycle"
-    wrong = size > 1e-3 and pointwise
-    error = fake_error(size, pointwise, "limit-cycle" if wrong else verdict, not wrong, 0.0 if pointwise else DOUBT_M)
+    error = fake_error(size, pointwise, 0.0 if pointwise else DOUBT_M)
     return Point(method, rate, error, None, time)
 
 
@@ -82,7 +78,6 @@ def fake_cost() -> Cost:
                 else "Chaotic: compared by its swings; solved with 50 digits (mpmath).",
                 floor_m,
                 pointwise,
-                "steady" if pointwise else "limit-cycle",
             ),
             [fake_point(name, method, rate) for method in METHODS for rate in RATES],
             "Cheapest within 1 µm: exact at 1 kHz.",

@@ -12,7 +12,7 @@ from haploop.launch.scene.events import scene_events
 from haploop.logger.logger import Logger
 from haploop.logger.session import LogSession
 from haploop.logger.summary import Summary
-from haploop.protocol.scene.scene import Scene
+from haploop.protocol.scene.scene import Scene, by_window
 from haploop.protocol.ticks import Timebase
 from haploop.protocol.transport.telemetry import Block
 
@@ -41,13 +41,13 @@ class _Remembering(Logger):
 
 
 def trajectory(scene: Scene) -> Trajectory:
-    """Runs a resolved scene of installed elements to its end; nothing is written.
+    """Runs a resolved scene of installed elements to its end; nothing is written, and the verdict is the cheap one.
 
     Raises:
         ElementError: an element raised, or gave something that is no number.
         ArithmeticError: friction switched too often for the plant rate.
     """
-    time = Timebase.from_scene(scene)
+    scene, time = by_window(scene), Timebase.from_scene(scene)
     logger = _Remembering(scene, time)
     loop = Loop(scene, time, registry(), LogSession(logger, None, None))
     loop.schedule(scene_events(scene, time))

@@ -54,7 +54,6 @@ class Errors:
             ``amplitude_m`` is absolute.
         doubt_m: half of the 95 % interval of ``amplitude_m``; 0 where positions are compared.
         residual: energy residual over the energy moved in total.
-        verdict, verdict_right: the run's own, and whether it is the reference's.
     """
 
     final_m: float | None = None
@@ -66,8 +65,6 @@ class Errors:
     amplitude_m: float | None = None
     doubt_m: float = 0.0
     residual: float | None = None
-    verdict: str
-    verdict_right: bool
 
     @property
     def size_m(self) -> float:
@@ -107,15 +104,10 @@ class Point:
         """Inf where the run failed."""
         return self.error.at_most_m if self.error else math.inf
 
-    @property
-    def is_right(self) -> bool:
-        """Whether the run went to its end with the reference's verdict."""
-        return self.error is not None and self.error.verdict_right
-
 
 @dataclass(frozen=True)
 class ReferenceNote:
-    """The reference that errors are against: how it was made, as a sentence; its own uncertainty; its verdict.
+    """The reference that errors are against: how it was made, as a sentence; its own uncertainty.
 
     ``pointwise`` tells whether positions can be compared, or amplitudes only.
     """
@@ -123,7 +115,6 @@ class ReferenceNote:
     how: str
     error_m: float
     pointwise: bool
-    verdict: str
 
 
 @dataclass(frozen=True)

@@ -44,8 +44,8 @@ def as_cheap(scene: SceneCost, tolerance_m: float) -> list[Point]:
 
 
 def meets(point: Point, tolerance_m: float) -> bool:
-    """Tells whether a run is within the tolerance, interval and all, and its verdict is that of the reference."""
-    return point.is_right and point.at_most_m <= tolerance_m
+    """Tells whether a run went to its end within the tolerance, interval and all."""
+    return point.error is not None and point.at_most_m <= tolerance_m
 
 
 def exact_below_m(scene: SceneCost) -> float | None:
@@ -53,7 +53,7 @@ def exact_below_m(scene: SceneCost) -> float | None:
     exact = cheapest(scene, math.inf, EXACT)
     if exact is None:
         return None
-    rivals = [p for p in scene.points if p.time and p.method != EXACT and p.time.high < _time(exact).low and p.is_right]
+    rivals = [p for p in scene.points if p.time and p.method != EXACT and p.time.high < _time(exact).low and p.error]
     return min((point.at_most_m for point in rivals), default=math.inf)
 
 
@@ -67,9 +67,9 @@ def advice(scene: SceneCost, tolerance_m: float) -> str:
     if found := as_cheap(scene, tolerance_m):
         others = f"; not told apart: {', '.join(map(setting, found[1:]))}" if found[1:] else ""
         return f"Cheapest {within}: {setting(found[0])}, {interval(_time(found[0]))} times the yardstick{others}."
-    nearest = min((p for p in scene.points if p.is_right), key=lambda point: point.at_most_m, default=None)
+    nearest = min((p for p in scene.points if p.error), key=lambda point: point.at_most_m, default=None)
     if nearest is None:
-        return f"No setting is {within}: none ran to the end with the right verdict."
+        return f"No setting is {within}: none ran to its end."
     return f"No setting is {within}; {setting(nearest)} comes nearest, {amount(nearest.at_most_m, 'm')}."
 
 

@@ -188,16 +188,17 @@ def _failure(ran: Trajectory, reference: Reference) -> str | None:
 def _errors(runs: list[Trajectory], scene: Scene, reference: Reference, swings: Sequence[Swings]) -> Errors:
     """Compares positions at the ticks after the start: sqrt(mean((x - x_ref)^2)) and the like.
 
-    Where a chaotic reference forbids that, the swings in the verdict's window are: of the differences to those of the
+    Where a chaotic reference forbids that, the swings at the end are: of the differences to those of the
     exact flow from the same start the mean, and half of its 95 % interval, by Student's t.
     """
     ran = runs[0]
-    verdict, energy = ran.summary["verdict"], ran.summary["energy"]
+    energy = ran.summary["energy"]
     residual = _share(energy["residual_J"], energy["moved_J"])
-    common = {"residual": residual, "verdict": verdict, "verdict_right": verdict == reference.verdict}
     if reference.pointwise:
         off = np.abs(ran.x_m - np.asarray(reference.x_m))[1:]
-        return Errors(final_m=float(off[-1]), rms_m=math.sqrt(np.mean(off**2)), max_m=float(off.max()), **common)
+        return Errors(
+            final_m=float(off[-1]), rms_m=math.sqrt(np.mean(off**2)), max_m=float(off.max()), residual=residual
+        )
     ours = [_swings(scene, each) for each in runs]
     names = {"amplitude": "amplitude_m", "frequency": "frequency_Hz", "energy_per_cycle": "energy_per_cycle_J"}
     relative = {entry: _relative(ours, swings, name) for entry, name in names.items()}
@@ -205,7 +206,7 @@ def _errors(runs: list[Trajectory], scene: Scene, reference: Reference, swings: 
     mine, true = map(np.array, sizes)
     off = mine - true
     doubt_m = _T * float(off.std(ddof=1)) / math.sqrt(len(off))
-    return Errors(**relative, amplitude_m=abs(float(off.mean())), doubt_m=doubt_m, **common)
+    return Errors(**relative, amplitude_m=abs(float(off.mean())), doubt_m=doubt_m, residual=residual)
 
 
 def _pairs(ours: Sequence[Swings], theirs: Sequence[Swings]) -> Iterator[tuple[Swings, Swings]]:

@@ -84,7 +84,7 @@ class Measurement:
                 continue
             advance = stage(f"{grid.path.stem}: errors", len(left))
             reference = self._find_reference(grid.path, grid.scene)
-            note = ReferenceNote(reference.how, reference.error_m, reference.pointwise, reference.verdict)
+            note = ReferenceNote(reference.how, reference.error_m, reference.pointwise)
             self._store.add(_REFERENCE, self._reference_key(grid), asdict(note))
             swings = () if reference.pointwise else true_swings(grid.scene)
             for candidate in random.Random(0).sample(left, len(left)):

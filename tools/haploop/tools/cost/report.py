@@ -34,8 +34,7 @@ def report(cost: Cost) -> RenderableType:
 def scene_table(scene: SceneCost) -> RenderableType:
     names = _POINTWISE if scene.reference.pointwise else _SWINGS
     numbers = (*names, "residual", "time", "interval")
-    unbroken = ("method", "verdict")
-    table = make_table("method", *numbers, "verdict", numbers=numbers, unbroken=unbroken, padding=(0, 0, 0, 0))
+    table = make_table("method", *numbers, numbers=numbers, unbroken=("method",), padding=(0, 0, 0, 0))
     for method, points in groupby(scene.points, key=lambda point: point.method):
         table.add_section()
         table.add_row(method)
@@ -51,14 +50,12 @@ def scene_table(scene: SceneCost) -> RenderableType:
 def _row(point: Point) -> list[str | Text]:
     """Makes the cells of a point; the time is in brackets where only the few ticks of a failure could be timed."""
     error, time = point.error, point.time
-    verdict = error.verdict if error else "failed"
     median = fixed(time.median) if time else "–"
     return [
-        f"{rate(point.plant_rate):>11}",
+        Text(f"{rate(point.plant_rate):>11}") if error else Text(f"✗ {rate(point.plant_rate):>9}", "red"),
         *(f"{value:.1e}" if value is not None else "–" for value in _figures(error)),
         median if error or not time else f"({median})",
         f"{fixed(time.low)}–{fixed(time.high)}" if time else "–",
-        Text(verdict) if point.is_right else Text(f"✗ {verdict}", "red"),
     ]
 
 
