@@ -6,9 +6,11 @@ from pathlib import Path
 import pytest
 
 from haploop.launch.scene.file import load
+from haploop.launch.scene.models import scene_model
 from haploop.protocol.scene.effects import GammaJitter, UniformJitter
 from haploop.protocol.scene.hand_force import MinimumJerk
 from haploop.protocol.scene.scene import Scene
+from helpers.scenes.least import KINDS
 
 SCENES = Path(__file__).parents[2] / "launch/scenes"
 SHIPPED = sorted(SCENES.rglob("*.toml"))
@@ -21,6 +23,15 @@ def test_a_shipped_scene_comes_back_from_its_tables_with_every_key_value_and_ord
     assert Scene.from_dict(tables) == resolved
     assert repr(Scene.from_dict(tables).as_dict()) == repr(tables)
     assert list(tables) == [field.name for field in Scene.fields() if field.name in tables]
+
+
+@pytest.mark.parametrize("file", SHIPPED, ids=lambda file: file.stem)
+def test_the_model_of_the_keys_that_are_there_reads_what_that_of_the_whole_scene_reads(file: Path):
+    tables = {key: value for key, value in load(file).as_dict().items() if key not in ("clock", "run", "seed")}
+    models = scene_model(KINDS, tables), scene_model(KINDS)
+    few, all_ = (Scene.from_dict(model.model_validate(tables).model_dump(exclude_none=True)) for model in models)
+    assert few == all_
+    assert len(models[0].model_fields) < len(models[1].model_fields)
 
 
 def test_an_absent_table_is_none_and_a_given_one_is_typed():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -16,7 +17,7 @@ from haploop.launch.scene.estimator_keys import check_estimators, check_filter
 from haploop.launch.scene.events import check_events
 from haploop.launch.scene.layers import KeyPath, Layers
 from haploop.launch.scene.mistakes import SceneError, nearest
-from haploop.launch.scene.models import number_of, read_table, scene_model
+from haploop.launch.scene.models import Model, number_of, read_table, scene_model
 from haploop.launch.scene.schema import Schema, alternatives, schema_at, whole_schema
 from haploop.launch.scene.toml_writer import inline
 from haploop.protocol.scene.scene import Clock, EventTable, Scene
@@ -49,14 +50,20 @@ def resolve(layers: Layers, kinds: Mapping[str, type[Element]]) -> Scene:
 
 def validated(layers: Layers, tables: Tables, kinds: Mapping[str, type[Element]]) -> Scene | None:
     """Returns a scene of some tables of ``layers``; None where values are not in order, which it complains of."""
+    with suppress(ValidationError):  # what is wrong, the model of the whole scene says
+        return _read(tables, scene_model(kinds, tables))
     try:
-        return Scene.from_dict(scene_model(kinds).model_validate(tables).model_dump(exclude_none=True))
+        return _read(tables, scene_model(kinds))
     except ValidationError as error:
         schema = whole_schema(kinds)
         tagged = _TAGGED if len(kinds) > 1 else _TAGGED - {("dissipation", 0)}  # one kind alone is no choice
         for detail in error.errors(include_url=False):
             complain(layers, detail["type"], detail["msg"], _plain(detail["loc"], tagged), schema)
     return None
+
+
+def _read(tables: Tables, model: type[Model]) -> Scene:
+    return Scene.from_dict(model.model_validate(tables).model_dump(exclude_none=True))
 
 
 def with_rules(layers: Layers, scene: Scene | None, kinds: Mapping[str, type[Element]]) -> Scene:

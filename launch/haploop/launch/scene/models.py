@@ -58,13 +58,14 @@ def model_of(table: type[Table]) -> type[Model]:
     return _model(table.__name__, table.__doc__, _keys_of(table, _registered(table)), _BASES.get(table, Model))
 
 
-def _keys_of(table: type[Table], others: Keys) -> Keys:
+def _keys_of(table: type[Table], others: Keys, named: frozenset[str] | None = None) -> Keys:
+    """Makes the keys of a table, those that have a default only where they are named, if any are."""
     keys: Keys = {"kind": (Literal[table.kind], ...)} if table.kind else {}
     hints = get_type_hints(table, include_extras=True)
     for field in table.fields():
         if field.name in others:
             keys[field.name] = others[field.name]
-        elif field.name != "others":
+        elif field.name != "others" and (named is None or field.name in named or field.default is dataclasses.MISSING):
             keys[field.name] = _validated(hints[field.name]), _default(field)
     return keys | others
 
@@ -118,31 +119,35 @@ def number_of(table: type[Table], key: str) -> Number:
 
 def read_table(table: type[TableType], data: Any) -> TableType | None:
     """Returns a table validated by itself; None where it is absent or wrong."""
+    if data is None:
+        return None
     try:
         return table.from_dict(model_of(table).model_validate(data).model_dump(exclude_none=True))
     except ValidationError:
         return None
 
 
-def scene_model(kinds: Mapping[str, type[Element]]) -> type[Model]:
-    """Makes the model of the whole scene, with the kinds of dissipation element that are at hand."""
-    return _scene_model(tuple(kinds.items()))
+def scene_model(kinds: Mapping[str, type[Element]], named: Iterable[str] | None = None) -> type[Model]:
+    """Makes the model of the scene, with the kinds of dissipation element that are at hand.
+
+    Args:
+        named: the keys that are there: the model takes what that of the whole scene would take, and is made sooner.
+    """
+    return _scene_model(tuple(kinds.items()), None if named is None else frozenset(named))
 
 
 @cache
-def _scene_model(kinds: tuple[tuple[str, type[Element]], ...]) -> type[Model]:
+def _scene_model(kinds: tuple[tuple[str, type[Element]], ...], named: frozenset[str] | None) -> type[Model]:
     nothing = _model(NO_ELEMENT, "Removes the element.", {"kind": (Literal["none"], ...)})
     elements = [_element_model(kind, element) for kind, element in kinds]
-    changes: Keys = {
-        "swap": (_one_of([*elements, nothing]) | None, None),
-        "set": (dict[str, Any] | None, Field(None, description='new values: { "wall.stiffness" = 200.0 }')),
-    }
-    event = _model("Event", EventTable.__doc__, _keys_of(EventTable, changes))
-    lists: Keys = {
-        "dissipation": (list[_one_of(elements or [nothing])] | None, None),
-        "event": (list[event] | None, None),
-    }
-    return _model("Scene", Scene.__doc__, _keys_of(Scene, lists | _registered(Scene)))
+    others: Keys = {"dissipation": (list[_one_of(elements or [nothing])] | None, None), "event": (None, None)}
+    if named is None or "event" in named:
+        changes: Keys = {
+            "swap": (_one_of([*elements, nothing]) | None, None),
+            "set": (dict[str, Any] | None, Field(None, description='new values: { "wall.stiffness" = 200.0 }')),
+        }
+        others["event"] = list[_model("Event", EventTable.__doc__, _keys_of(EventTable, changes))] | None, None
+    return _model("Scene", Scene.__doc__, _keys_of(Scene, others | _registered(Scene), named))
 
 
 def _element_model(kind: str, element: type[Element]) -> type[Model]:
