@@ -138,3 +138,14 @@ def buzzes(x: np.ndarray, counts: np.ndarray, begins_s: float = 1.0, stretch_s: 
             points = np.log([10.0, 20.0, 320.0]), np.log([52e-6, 17e-6, 0.12e-6])
             found[member] |= len(to_and_fro) > 3 and to_and_fro[-3] > np.exp(np.interp(np.log(frequency), *points))
     return found
+
+
+def turns(counts: np.ndarray, begins_s: float = 1.0, stretch_s: float = 0.25) -> np.ndarray:
+    """Counts of each member the most turns of its counts in any stretch: chatter, however narrow."""
+    size, most = round(stretch_s / PERIOD_S), np.zeros(counts.shape[1], int)
+    for begin in range(round(begins_s / PERIOD_S), len(counts) - size + 1, size // 2):
+        for member in range(counts.shape[1]):
+            steps = np.diff(counts[begin : begin + size, member])
+            steps = steps[steps != 0]
+            most[member] = max(most[member], np.sum(steps[1:] * steps[:-1] < 0))
+    return most

@@ -26,6 +26,7 @@ UPPER_BOUND = (
     "as no device is. Give --delay and a [transmission]."
 )
 ADVICE = "Advice on {name}, as described and 20 % off."
+_RIGID = "There is no [transmission]: what a resonance of the structure takes is not in it."
 SAFE_MEANS = (
     "at rest, or swinging by less than a hand feels, in position (Israr, Choi and Tan 2006) and in force (what would "
     "move device and hand by as much)"
@@ -97,7 +98,7 @@ def advice(subject: Subject, trial: Trial, stage: Callable[[str], object] = lamb
         own = wall.stiffness_N_m, trial.failures(loop, [wall], every_case(loop))[0]
     return Advice(
         name=subject.name,
-        notes=subject.notes,
+        notes=subject.notes if is_ideal(loop) or loop.transmission else (*subject.notes, _RIGID),
         is_ideal=is_ideal(loop),
         tried_by=task_words(loop),
         uncertain=tuple(uncertain_quantities(loop)),

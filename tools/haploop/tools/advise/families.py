@@ -6,7 +6,7 @@ import itertools
 from dataclasses import dataclass
 
 from haploop.protocol.scene.scene import ElementTable, Hand, Scene
-from haploop.tools.render.units import amount
+from haploop.tools.render.units import fixed
 
 Values = tuple[float, ...]
 # Parameters of one element, from the most that a loop can bear down, each the one before by this factor; about the best
@@ -39,7 +39,7 @@ class Family:
         def words(value: float, key: str) -> str:
             if key == "damping":
                 return f"{value:.2g} N s/m"
-            return amount(value * 1e3, "g", 2) if value < 1.0 else amount(value, "kg", 2)
+            return f"{fixed(value * 1e3, 2)} g" if value < 1.0 else f"{fixed(value, 2)} kg"
 
         return [words(value, key) for (_, key), value in zip(self.parts, values, strict=True)]
 

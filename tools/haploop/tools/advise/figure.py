@@ -58,11 +58,11 @@ def _walls(ax: Axes, told: Advice, lines: list[str]) -> None:
         ax.barh(row, safe / 1e3, _BAR, color=style.WALL, label=labels[1])
         words = f"{format_limit(best.nominal)} {best.family.words(best.values) if best.values else ''}"
         if is_advised:
-            words += f"   safe: {format_stiffness(safe)}"
+            words += f"   {'at most' if told.is_ideal else 'safe'}: {format_stiffness(safe)}"
         _beside(ax, max(end, safe), row, words, is_advised)
         names.append(best.family.name)
     known = [(f"{row.formula} ({row.source})", row.stiffness_N_m) for row in told.formulas]
-    known += [(value.what, value.stiffness_N_m) for value in told.published]
+    known += [(f"published: {value.by}", value.stiffness_N_m) for value in told.published]
     for row, (name, stiffness) in enumerate(known, len(found.bests)):
         colour = style.ELEMENTS[0] if row < len(found.bests) + len(told.formulas) else style.ELEMENTS[1]
         names.append(name)

@@ -6,28 +6,33 @@ from typing import NamedTuple
 
 
 class Published(NamedTuple):
-    """A stiffness in N/m that somebody states or shows, what it is, and where."""
+    """A stiffness in N/m that somebody states or shows, by whom, and what it is.
+
+    Attributes:
+        by: in a word or two.
+        source: in full.
+    """
 
     stiffness_N_m: float
-    what: str
+    by: str
     source: str
 
 
-_CHAI3D = "CHAI3D, the largest stiffness its driver states for the device"
+def _driver(stiffness_N_m: float, of: str = "the device") -> Published:
+    return Published(stiffness_N_m, "CHAI3D", f"the largest stiffness that CHAI3D's driver states for {of}")
+
+
 _PREMIUM = (
-    Published(800.0, "the driver's limit", _CHAI3D),
-    Published(3500.0, "the maker's data sheet", "SensAble, data sheet of the PHANToM Premium 1.5"),
-    Published(6300.0, "shown, with damping and unidirectional inertia", "Choi et al. 2022"),
-    Published(10_000.0, "shown, with successive force augmentation",
-              "Singh, Janetzko, Jafari, Weber, Lee, Ryu, IEEE Trans. Industrial Electronics, 2019"),
+    _driver(800.0),
+    Published(3500.0, "its maker", "SensAble, data sheet of the PHANToM Premium 1.5"),
+    Published(6300.0, "Choi et al. 2022", "shown with damping and unidirectional inertia together"),
+    Published(10_000.0, "Singh et al. 2019", "shown with successive force augmentation (Singh, Janetzko, Jafari, "
+              "Weber, Lee, Ryu, IEEE Trans. Industrial Electronics)"),
 )  # fmt: skip
 PUBLISHED: dict[str, tuple[Published, ...]] = {
     "premium15": _PREMIUM,
     "premium15_cable": _PREMIUM,
-    "touch": (
-        Published(400.0, "the driver's limit", _CHAI3D),
-        Published(700.0, "the driver's limit for the Omni, its predecessor", _CHAI3D),
-    ),
-    "omega3": (Published(5000.0, "the driver's limit", _CHAI3D),),
-    "falcon": (Published(3000.0, "the driver's limit", _CHAI3D),),
+    "touch": (_driver(400.0), _driver(700.0, "the Omni, its predecessor")),
+    "omega3": (_driver(5000.0),),
+    "falcon": (_driver(3000.0),),
 }

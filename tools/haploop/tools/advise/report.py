@@ -47,17 +47,16 @@ def report(told: Advice) -> RenderableType:
 def answer(told: Advice) -> list[tuple[str, str]]:
     """Returns the lines that a builder reads first, each with its name."""
     found, best = told.found, told.found.advised
-    wall = format_stiffness(found.stiffness_N_m)
-    lines = [("safe up to", f"{wall} with {best.family.phrase(best.values)}" if found.stiffness_N_m else _NO_WALL)]
+    safe = f"{format_stiffness(found.stiffness_N_m)} with {best.family.phrase(best.values)}"
+    lines = [("at most" if told.is_ideal else "safe up to", safe if found.stiffness_N_m else _NO_WALL)]
     broken = found.breaks
-    lines.append(
-        ("breaks first", f"{format_stiffness(broken[0])}: {describe(broken[1])}" if broken else _NOTHING_BREAKS)
-    )
+    breaks = f"{format_stiffness(broken[0])}: {describe(broken[1])}" if broken else _NOTHING_BREAKS
+    lines.append(("breaks first", breaks))
     gains = [f"{words}: {fixed(factor, 2)} times" for words, _, factor in told.changed if factor >= _TELLS]
     lines.append(("gains most", "; ".join(gains[:3]) or _NO_CHANGE))
     if told.published:
-        values = [f"{format_stiffness(value.stiffness_N_m)} ({value.what})" for value in told.published]
-        lines.append(("published", "; ".join(values)))
+        values = [f"{format_stiffness(value.stiffness_N_m)} ({value.by})" for value in told.published]
+        lines.append(("published", ", ".join(values)))
     moving = [
         f"{of.key} halved: {format_limit(half)}, doubled: {format_limit(double)}"
         for of, half, double in told.assumed
@@ -114,7 +113,7 @@ def _limits(told: Advice) -> Table:
         value = format_stiffness(row.stiffness_N_m)
         table.add_row(f"{row.formula}\n{row.source}", f"{row.numbers}; beyond, it {row.means}", value)
     for value in told.published:
-        table.add_row(value.what, value.source, format_stiffness(value.stiffness_N_m))
+        table.add_row(value.by, value.source, format_stiffness(value.stiffness_N_m))
     return table
 
 

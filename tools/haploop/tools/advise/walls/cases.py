@@ -65,10 +65,10 @@ class Case:
 
     @property
     def words(self) -> str:
-        """The case in words: ``a hold of 3 times the task's, 20 % less device mass``."""
-        changed = [f"{abs(factor - 1.0) * 100:.0f} % {'more' if factor > 1.0 else 'less'} {name}"
+        """The case in words: ``hold x 3, device mass -20 %``."""
+        changed = [f"{name} {'+' if factor > 1.0 else '−'}{abs(factor - 1.0) * 100:.0f} %"
                    for name, factor in self.corner if factor != 1.0]  # fmt: skip
-        return ", ".join([f"hold {self.hold:g} x the task's", *changed])
+        return ", ".join([f"hold x {self.hold:.2g}", *changed])
 
     def scene(self, loop: Scene) -> Scene:
         """Returns the scene of this case, with a wall of 1 N/m, made of a loop of ``make_loop``."""
