@@ -1,4 +1,4 @@
-"""What a running loop lets people choose, and that each choice takes effect, is on record and can be replayed."""
+"""Choices of a running loop: each takes effect, is on record and can be replayed."""
 
 import math
 

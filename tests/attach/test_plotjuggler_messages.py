@@ -1,4 +1,4 @@
-"""What goes to PlotJuggler is msgpack as its parser takes it: arrays of maps, each with its time, and only floats."""
+"""Messages to PlotJuggler: msgpack as its parser takes it, arrays of maps, each with its time, and only floats."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What every effect costs: the loop in one process with all effects, with all but one, with none, in random order.
+"""Cost of every effect: the loop in one process with all effects, with all but one, with none, in random order.
 
 All effects stand in the table twice: how far these two rows differ is how much a difference of others means.
 """

@@ -1,4 +1,4 @@
-"""What a second worker is worth to a sweep, and what its memory is proportional to; a part of ``make bench``."""
+"""Gain of a sweep by a second worker, and what its memory is proportional to; a part of ``make bench``."""
 
 from __future__ import annotations
 

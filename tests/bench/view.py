@@ -1,4 +1,4 @@
-"""What the live page costs its server in real time: share of a core, snapshots and bytes a second."""
+"""Cost of the live page to its server in real time: share of a core, snapshots and bytes a second."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What speed is measured against: the bare ping-pong of the transport, and the bare loop of the arithmetic."""
+"""Yardsticks of speed: the bare ping-pong of the transport, and the bare loop of the arithmetic."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the page answers at once: verdict, state and numbers, with and without a run, with and without a server."""
+"""Answers of the page at once: verdict, state and numbers, with and without a run, with and without a server."""
 
 from playwright.sync_api import expect
 

@@ -1,4 +1,4 @@
-"""What the charts show: the numbers that came, broken where none came, the wall on its side, marks at their ticks."""
+"""Charts of the page: the numbers that came, broken where none came, the wall on its side, marks at their ticks."""
 
 import math
 import re

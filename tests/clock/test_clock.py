@@ -1,4 +1,4 @@
-"""How far the pure clock grants, standing still and ending included. Time is a number the tests give."""
+"""Grants of the pure clock, standing still and ending included. Time is a number the tests give."""
 
 import math
 from typing import Any

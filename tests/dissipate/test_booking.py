@@ -1,4 +1,4 @@
-"""What elements take out of a recorded motion: against closed forms, against a run's own books, however it is cut."""
+"""Energy that elements take out of a recorded motion: closed forms, a run's own books, any cut of the recording."""
 
 from __future__ import annotations
 

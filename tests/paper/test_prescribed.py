@@ -1,4 +1,4 @@
-"""What sections II to IV of Choi et al. 2022 say of energy on sampled motion, by closed forms and by the program."""
+"""Energy on sampled motion (Choi et al. 2022, sections II to IV), by closed forms and by the program."""
 
 from __future__ import annotations
 

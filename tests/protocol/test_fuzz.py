@@ -1,4 +1,4 @@
-"""Whatever is sent to the sockets of a run, the run goes on, to the same bits."""
+"""Rubbish at the sockets of a run: the run goes on, to the same bits."""
 
 import hashlib
 import subprocess

@@ -1,4 +1,4 @@
-"""What a scene comes to: the plan says what runs, and only what is named is imported and executed."""
+"""The plan of a scene: it says what runs, and only what is named is imported and executed."""
 
 import importlib.util
 import json

@@ -1,4 +1,4 @@
-"""What a scene may say of its estimates: defaults, mistakes, and one file over another."""
+"""The estimates of a scene: defaults, mistakes, and one file over another."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""What the effects of a scene do is in the log, on the terminal and in the figure; of a scene without, nothing is."""
+"""Effects of a scene in the log, on the terminal and in the figure; of a scene without, nothing is there."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a scene costs, counted in instructions, and what ``haploop explain`` shows of it."""
+"""The cost of a scene, counted in instructions, and what ``haploop explain`` shows of it."""
 
 import json
 import sys

@@ -1,4 +1,4 @@
-"""What the terminal shows of a run holds its numbers, in units, at any width."""
+"""The report of a run on the terminal: its numbers, in units, at any width."""
 
 from __future__ import annotations
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import tomllib
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pyarrow.parquet
@@ -13,55 +12,19 @@ import pytest
 
 from haploop.launch.runs.in_process import run_in_process
 from haploop.launch.scene.file import load as load_scene
-from haploop.protocol.scene.paths import value_at, with_value
+from haploop.protocol.scene.paths import value_at
 from haploop.protocol.scene.scene import Scene
-from haploop.tools.executor.pool import Pool
-from haploop.tools.linear.one_tick import OneTickMap
-from haploop.tools.sweep.boundary import Boundary
 from haploop.tools.sweep.command import Request, sweep
-from haploop.tools.sweep.engine import Engine, Stopped
 from haploop.tools.sweep.progress import SweepProgress
-from haploop.tools.sweep.store import Store
-from haploop.tools.sweep.table import TableError, make_schema, read
+from haploop.tools.sweep.table import TableError, read
+from helpers.runs.sweep_runs import engine_run, rows
 from helpers.scenes.least import KINDS
-from helpers.scenes.sweep_files import GRID, PRESS, loaded, sweep_file, swept
+from helpers.scenes.sweep_files import GRID, loaded, sweep_file, swept
 
 RECORD = 'record = ["trajectory_sha256", "energy.residual_J", "window.oscillation_m", "ticks", "final.x_m"]\n'
 BISECT = '[bisect]\naxis = "wall.stiffness"\ntolerance = "8 N/m"\nholds = "no-contact"\n'
 # A hand that ends at a place that depends on its stiffness: in contact only with a soft one.
 REACHING = '[axes]\n"wall.stiffness" = [100, 200]\n'
-
-
-class Quiet(SweepProgress):
-    """Keeps what it is told."""
-
-    def __init__(self) -> None:
-        super().__init__("quiet")
-        self.expected, self.cells, self.stored = 0, [], 0
-
-    def expect(self, cells: int) -> None:
-        self.expected += cells
-
-    def add_rows(self, rows: Any, stored: bool = False) -> None:
-        self.stored += len(rows) if stored else 0
-        self.cells += [] if stored else [row["cell"] for row in rows]
-
-
-def engine_run(made: Any, out: Path, stop_after: int | None = None, workers: int = 1) -> tuple[Quiet, list[Boundary]]:
-    """Run a sweep into a directory, stopped after so many cells; what was told, and the boundaries."""
-    out.mkdir(exist_ok=True)
-    (out / "sweep.toml").write_text(made.toml())
-    told = Quiet()
-    with Store(out, make_schema(made.columns(), made.toml())) as store, Pool(workers) as pool:
-        stop = lambda: stop_after is not None and len(told.cells) >= stop_after  # noqa: E731
-        try:
-            return told, Engine(made, store, pool, told, stop).run()
-        except Stopped:
-            return told, []
-
-
-def rows(directory: Path) -> list[dict[str, Any]]:
-    return pyarrow.parquet.read_table(directory / "table.parquet").to_pylist()
 
 
 def test_every_row_has_the_bits_of_its_scene_run_alone(tmp_path: Path) -> None:
@@ -222,81 +185,6 @@ def test_other_plugin_files_are_refused_for_a_sweep_that_goes_on(
     with pytest.raises(SystemExit):
         swept(tmp_path, text, plugins=[plugin])
     assert "other --plugin files" in capsys.readouterr().err
-
-
-# Gently into the wall, so that what swings in the end has grown there.
-PRESSED = (
-    PRESS.replace("duration = 0.05", "duration = 12.0").replace("rise_time = 0.02", "rise_time = 2.0")
-    .replace("[encoder]\nresolution = 1e-5\n", "").replace("-0.001", "0.0")
-)  # fmt: skip
-EXACT = """
-[axes]
-"dissipation.0.damping" = [0.5, 1.5]
-"clock.round_trip_delay" = ["0.5 ms"]
-"wall.stiffness" = { from = 50, to = 12800, count = 9, scale = "log" }
-[bisect]
-axis = "wall.stiffness"
-relative = 0.005
-"""
-
-
-def test_bisect_finds_where_the_spectral_radius_of_a_linear_loop_is_one(tmp_path: Path) -> None:
-    """The verdict follows it as closely as twelve seconds can tell growth from decay."""
-    table = swept(tmp_path, EXACT, PRESSED)
-    found, made = table.boundary, loaded(tmp_path, EXACT, press=PRESSED)
-    assert len(found["boundary"]) == 2
-    for k in range(2):
-        scene = made.scene(0)
-        for key in ("dissipation.0.damping", "clock.round_trip_delay"):
-            scene = with_value(scene, key, found[key][k])
-        limit = OneTickMap.from_scene(scene).stiffness_limit()
-        assert found["boundary"][k] == pytest.approx(limit, rel=0.03)
-        assert found["high"][k] - found["low"][k] <= 0.005 * found["high"][k]
-    assert (found["changes"] == 1).all()
-    assert table.units["wall.stiffness"] == "N/m"
-
-
-SHORT_BISECT = """
-repeat = 2
-[axes]
-"wall.position" = [-0.001, -0.002, -0.1]
-"hand.force.value" = { from = 0, to = -2, count = 5 }
-[bisect]
-axis = "hand.force.value"
-tolerance = 0.01
-holds = "no-contact"
-"""
-
-
-def test_a_row_without_a_change_says_on_which_side_it_is_and_the_candidates_are_rows_of_the_table(
-    tmp_path: Path,
-) -> None:
-    table = swept(tmp_path, SHORT_BISECT)
-    found = table.boundary
-    assert found["seed"].tolist() == [7, 8] * 3
-    assert [bool(why) for why in found["why"]] == [False] * 4 + [True] * 2
-    assert found["why"][5] == "no-contact at all 5 points, 0 to -2"
-    known = found["why"] == ""
-    assert (found["low"][known] < found["boundary"][known]).all()
-    assert np.isnan(found["boundary"][~known]).all()
-    # Six halvings from 0.5 N to 0.01 N of each of the four rows that change.
-    assert len(table) == 3 * 5 * 2 + 6 * 4
-    near = table["hand.force.value"][table["verdict"] == "no-contact"]
-    for low, high in zip(found["low"][known], found["high"][known], strict=True):
-        assert {low, high} <= set(table["hand.force.value"])
-        assert high in near
-
-
-@pytest.mark.parametrize("stop_after", [3, 30, 37])
-def test_a_bisection_that_was_stopped_goes_on_without_running_a_cell_twice(stop_after: int, tmp_path: Path) -> None:
-    made = loaded(tmp_path, SHORT_BISECT)
-    whole, found = engine_run(made, tmp_path / "whole")
-    first, _ = engine_run(made, tmp_path / "cut", stop_after)
-    second, again = engine_run(made, tmp_path / "cut")
-    assert 0 < len(first.cells) < len(whole.cells)
-    assert sorted(first.cells + second.cells) == sorted(whole.cells)
-    assert repr(again) == repr(found)
-    assert rows(tmp_path / "cut") == rows(tmp_path / "whole")
 
 
 def test_a_sweep_of_nothing_that_can_run_ends_with_rows_that_say_so(tmp_path: Path) -> None:

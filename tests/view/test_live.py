@@ -11,56 +11,8 @@ import pytest
 from haploop.launch.spec import RunFailed
 from haploop.logger import read
 from helpers.live.browsing import site, to_its_end
+from helpers.live.followed import follow, has_logged, same, stands, whole
 from helpers.live.live_run import going, undisturbed
-
-TOUCHING = ("wall.position=-0.001", "duration=600", "run.deadline=30")
-
-
-def follow(play, tmp_path, *overrides, options=None, **how):
-    """A run, a server, and a page that plays its part: ``play(run, tab, site)``."""
-
-    async def scenario(run):
-        async with site(**(options or {})) as here:
-            return await play(run, await here.tab(), here)
-
-    with going(tmp_path, *(overrides or TOUCHING), **how) as run:
-        return to_its_end(scenario(run))
-
-
-async def stands(run, tick):
-    """Wait until the run stands still at a tick."""
-    await asyncio.to_thread(run.stands_at, tick)
-
-
-async def has_logged(run, ticks):
-    """Wait until so many ticks can be read from the log."""
-    for _ in range(400):
-        log = read(run.prepared.out)
-        if len(log.get("/energy", {}).get("timestamp", ())) >= ticks:
-            return log
-        await asyncio.sleep(0.05)
-    raise AssertionError(f"the log does not get to {ticks} ticks")
-
-
-def same(column, truth):
-    """Every float32 that is nearest to a logged number, and nothing else."""
-    np.testing.assert_array_equal(column, np.asarray(truth, np.float32))
-
-
-async def whole(tab, run, ticks, **watch):
-    """A snapshot of everything since the start, once all three streams of it are there."""
-    begins = {"position": "x", "force": "total", "energy": "residual"}
-    await tab.until("the end", lambda: tab.state and tab.state.get("tick", 0) >= ticks)
-    await tab.watch(**{"span_s": None, "points": 8000} | watch)
-
-    def is_whole():
-        tables, from_start = tab.snapshot["tables"], "span_s" in watch or tab.snapshot["from_s"] == 0.0
-        return (from_start and tables.keys() >= begins.keys()) and all(
-            np.isfinite(tables[name]["values"][column][0]) for name, column in begins.items()
-        )
-
-    await tab.until("the start", is_whole)
-    return tab.snapshot
 
 
 def test_every_sample_of_the_snapshot_is_the_logs(tmp_path):
@@ -158,98 +110,6 @@ def test_since_now_shows_nothing_older(tmp_path):
             assert snapshot["tables"]["position"]["rows"] == 500
 
     follow(play, tmp_path, pauses=(500,))
-
-
-def test_commands_of_the_page_reach_the_run_and_what_took_effect_is_told_with_its_tick(tmp_path):
-    async def play(run, tab, here):
-        await stands(run, 500)
-        state = await tab.phase("paused")
-        assert await tab.ask("swap", swap={"kind": "damping", "damping": "0.8 N s/m"}, element=0) == (
-            True,
-            "element 0 becomes damping at tick 500 (0.5 s)",
-        )
-        assert (await tab.ask("set", set={"wall.stiffness": 200, "clock.round_trip_delay": "1 ms"}))[0]
-        assert (await tab.ask("step", ticks=7))[0]
-        await stands(run, 507)
-        assert (await tab.ask("pace", pace=0.5))[0]
-        assert (await tab.ask("resume"))[0]
-        state = await tab.phase("running")
-        assert (await tab.ask("pause"))[0]
-        state = await tab.phase("paused")
-        await tab.until("the delay", lambda: tab.state["delay_s"] == 0.001)
-        await tab.until("the wall", lambda: tab.state["wall"]["stiffness"] == 200.0)
-        state = tab.state
-        assert state["pace"] == 0.5
-        assert [element["kind"] for element in state["elements"]] == ["damping"]
-        await tab.until("all events", lambda: [event["kind"] for event in tab.events][-1:] == ["pause"])
-        told = [(event["tick"], event["kind"], event["text"]) for event in tab.events]
-        assert told[:4] == [
-            (500, "pause", "paused"),
-            (500, "swap", "element 0 becomes damping (damping 0.8 N s/m)"),
-            (500, "set", "set wall.stiffness = 200 N/m, clock.round_trip_delay = 0.001 s"),
-            (500, "step", "7 ticks on"),
-        ]
-        assert tuple(kind for _, kind, _ in told[4:6]) == ("pace", "resume")
-
-        tick = state["tick"]
-        log = await has_logged(run, min(tick, 600))
-        await whole(tab, run, 507, span_s=0.02, end_s=0.507)
-        await tab.until("all 20 ticks", lambda: len(tab.snapshot["tables"]["force"]["values"]["total"]) == 20)
-        snapshot = tab.snapshot
-        force = snapshot["tables"]["force"]["values"]
-        assert np.isnan(force["element.0.damping"][:13]).all()
-        assert np.isnan(force["element.0.unidirectional-inertia"][13:]).all()
-        same(force["element.0.damping"][13:], log["/controller"]["dissipation.0"][500:507])
-        assert {"damping", "unidirectional-inertia"} <= snapshot["tables"]["energy"]["values"].keys()
-        assert (await tab.ask("stop"))[0]
-        await tab.phase("ended")
-
-    follow(play, tmp_path, pauses=(500,))
-
-
-def at_work(state):
-    """The one element with its mass, and the stiffness of the wall."""
-    (element,) = state["elements"]
-    return element["kind"], element["parameters"]["mass"], state["wall"]["stiffness"]
-
-
-REFUSED = [
-    ("swap", {"swap": {"kind": "dampng", "damping": 0.8}}, "damping"),
-    ("swap", {"swap": {"kind": "damping", "damping": -1}}, "at least 0"),
-    ("swap", {"swap": {"kind": "damping", "damping": "0.8 N/m"}}, "N/m"),
-    ("swap", {"swap": {"kind": "damping", "damping": 1}, "element": 9}, "element"),
-    ("swap", {"swap": 5}, "must be a table"),
-    ("swap", {"surprise": 1}, "cannot be used"),
-    ("set", {"set": {"wall.stiffness": -1}}, "wall.stiffness"),
-    ("set", {"set": {"clock.round_trip_delay": 0.00015}}, "whole number"),
-    ("step", {"ticks": 0}, "at least one tick"),
-    ("pace", {"pace": -1}, "pace"),
-    ("pace", {"pace": 10**30}, "cannot be used"),
-    ("pause", {"verb": "stop"}, "cannot be used"),
-    ("pause", {"run": 1}, "cannot be used"),
-]
-
-
-def test_what_is_refused_comes_back_as_a_sentence_and_changes_nothing(tmp_path):
-    async def play(run, tab, here):
-        await stands(run, 300)
-        before = await tab.phase("paused")
-        for verb, arguments, reason in REFUSED:
-            ok, text = await tab.send(verb, arguments, tab.token)
-            assert not ok, text
-            assert reason in text
-        assert not (await tab.send("stop", {}, "guess"))[0]
-        await stands(run, 300)
-        assert [at_work(tab.state), at_work(before)] == [("unidirectional-inertia", 0.01, 150.0)] * 2
-        assert [event["kind"] for event in tab.events] == ["pause"]
-        assert (await tab.ask("resume"))[0]
-        await asyncio.to_thread(run.result)
-
-    with_events = ("wall.position=-0.001", "duration=0.5", "run.deadline=30")
-    follow(play, tmp_path, *with_events, pauses=(300,))
-    summary = json.loads((tmp_path / "out" / "summary.json").read_text())
-    assert summary["ended"] == "done"
-    assert [element["kind"] for element in summary["energy"]["elements"]] == ["unidirectional-inertia"]
 
 
 def test_the_end_is_told_with_the_summary_and_what_was_seen_can_still_be_looked_at(tmp_path):

@@ -1,4 +1,4 @@
-"""What a snapshot of a history holds, and the form in which it travels."""
+"""Snapshots of a history: their content, and the form in which they travel."""
 
 import asyncio
 import math

@@ -1,4 +1,4 @@
-"""What a spring, a damper and an inertia take out of a sinusoidal motion every sample, held and delayed."""
+"""Energy that spring, damper and inertia take out of a sinusoidal motion every sample, held and delayed."""
 
 from __future__ import annotations
 

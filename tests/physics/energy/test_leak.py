@@ -1,4 +1,4 @@
-"""What a virtual spring gives back beyond what it took: closed forms of the leak and of its parts."""
+"""The leak of a virtual spring, which gives back more than it took: closed forms of the whole and of its parts."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How a run is cut into blocks, and whether one process or four work on it, changes no bit of it."""
+"""Blocks and processes of a run: how it is cut, and whether one process or four work on it, changes no bit of it."""
 
 from __future__ import annotations
 

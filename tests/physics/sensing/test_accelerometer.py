@@ -1,4 +1,4 @@
-"""What an accelerometer reads: bias, noise, range and resolution, one after the other."""
+"""Readings of an accelerometer: bias, noise, range and resolution, one after the other."""
 
 from __future__ import annotations
 

@@ -1,0 +1,58 @@
+"""Real runs that a page of a server follows, and what the page comes to hold of them."""
+
+import asyncio
+
+import numpy as np
+
+from haploop.logger import read
+from helpers.live.browsing import site, to_its_end
+from helpers.live.live_run import going
+
+TOUCHING = ("wall.position=-0.001", "duration=600", "run.deadline=30")
+
+
+def follow(play, tmp_path, *overrides, options=None, **how):
+    """A run, a server, and a page that plays its part: ``play(run, tab, site)``."""
+
+    async def scenario(run):
+        async with site(**(options or {})) as here:
+            return await play(run, await here.tab(), here)
+
+    with going(tmp_path, *(overrides or TOUCHING), **how) as run:
+        return to_its_end(scenario(run))
+
+
+async def stands(run, tick):
+    """Wait until the run stands still at a tick."""
+    await asyncio.to_thread(run.stands_at, tick)
+
+
+async def has_logged(run, ticks):
+    """Wait until so many ticks can be read from the log."""
+    for _ in range(400):
+        log = read(run.prepared.out)
+        if len(log.get("/energy", {}).get("timestamp", ())) >= ticks:
+            return log
+        await asyncio.sleep(0.05)
+    raise AssertionError(f"the log does not get to {ticks} ticks")
+
+
+def same(column, truth):
+    """Every float32 that is nearest to a logged number, and nothing else."""
+    np.testing.assert_array_equal(column, np.asarray(truth, np.float32))
+
+
+async def whole(tab, run, ticks, **watch):
+    """A snapshot of everything since the start, once all three streams of it are there."""
+    begins = {"position": "x", "force": "total", "energy": "residual"}
+    await tab.until("the end", lambda: tab.state and tab.state.get("tick", 0) >= ticks)
+    await tab.watch(**{"span_s": None, "points": 8000} | watch)
+
+    def is_whole():
+        tables, from_start = tab.snapshot["tables"], "span_s" in watch or tab.snapshot["from_s"] == 0.0
+        return (from_start and tables.keys() >= begins.keys()) and all(
+            np.isfinite(tables[name]["values"][column][0]) for name, column in begins.items()
+        )
+
+    await tab.until("the start", is_whole)
+    return tab.snapshot
