@@ -152,7 +152,7 @@ acts = "always"
 def test_blocks_processes_and_a_replay_give_the_same_bits_and_counts(tmp_path):
     file = tmp_path / "noisy.toml"
     file.write_text(NOISY, encoding="utf-8")
-    alone = prepare(file, [], out=tmp_path / "one")
+    alone = prepare(file, ["run.verdict=window"], out=tmp_path / "one")
     usual = of_the_scene(run_prepared(alone, in_process=True))
     assert usual["actuator"]["saturated_commands"] > 0
     assert usual["accelerometer"]["clipped_ticks"] > 0
@@ -161,6 +161,6 @@ def test_blocks_processes_and_a_replay_give_the_same_bits_and_counts(tmp_path):
     assert usual["energy"]["residual_J"] < 1e-12 * usual["energy"]["moved_J"]
     for block_ticks in (1, 7, 1000):
         assert in_blocks(alone.scene, block_ticks) == usual
-    cut = ["run.block_ticks=7", "run.window_blocks=1"]
+    cut = ["run.verdict=window", "run.block_ticks=7", "run.window_blocks=1"]
     assert of_the_scene(run_prepared(prepare(file, cut, out=tmp_path / "many"), in_process=False)) == usual
     assert replay(tmp_path / "many").differences == []

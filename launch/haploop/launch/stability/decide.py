@@ -30,15 +30,15 @@ WHY = {
     "rest": "After a push of {push_N:.3g} N it came to rest.",
     "unfelt": "After a push of {push_N:.3g} N it came to rest but for {width_um:.3g} um peak to peak at "
     "{frequency_Hz:.3g} Hz, less than a hand feels ({felt_um:.3g} um).",
-    "forgets": "Pushes of {push_N:.3g} N and a tenth of it end in the same swing, {width_um:.4g} um peak to peak at "
+    "forgets": "Pushes of {push_N:.3g} N and a tenth of it end in the same swing, {width_mm:.3g} mm peak to peak at "
     "{frequency_Hz:.3g} Hz.",
-    "lasts": "A swing of {width_um:.4g} um peak to peak at {frequency_Hz:.3g} Hz lasted for {watched_s:g} s, its width "
+    "lasts": "A swing of {width_mm:.3g} mm peak to peak at {frequency_Hz:.3g} Hz lasted for {watched_s:g} s, its width "
     "changing by less than 2 %.",
     "grows": "Its swing grew by {rate_1_s:.3g} +- {error_1_s:.2g} 1/s, at {frequency_Hz:.3g} Hz.",
     "leaves the limit": "Its swing grew until the device was beyond its limit.",
     "failed": "The loop failed while it was watched: {detail}",
     "leaves the wall": "Held still, the hand does not keep the device at the wall.",
-    "too slow": "Its swing of {width_um:.4g} um peak to peak at {frequency_Hz:.3g} Hz changes by {rate_1_s:.2g} +- "
+    "too slow": "Its swing of {width_mm:.3g} mm peak to peak at {frequency_Hz:.3g} Hz changes by {rate_1_s:.2g} +- "
     "{error_1_s:.1g} 1/s, too slowly to tell within {watched_s:g} s; {needs_s:.3g} s would tell.",
 }
 
@@ -87,7 +87,9 @@ class Finding:
         """Returns why, with its numbers."""
         numbers = {name: math.nan if value is None else value for name, value in vars(self).items()}
         felt_um = 2e6 * smallest_felt_m(self.frequency_Hz)
-        return WHY[self.why].format(**numbers, width_um=1e6 * self.width_m, felt_um=felt_um)
+        return WHY[self.why].format(
+            **numbers, width_mm=1e3 * self.width_m, width_um=1e6 * self.width_m, felt_um=felt_um
+        )
 
 
 class Pushed(NamedTuple):

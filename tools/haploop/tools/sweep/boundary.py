@@ -16,7 +16,7 @@ from haploop.tools.search.bisect import Bracket, Tolerance, bisect_many, rungs_h
 from haploop.tools.sweep.table import Row
 
 Holds = Callable[[Row], bool | None]
-_UNDECIDED = "the run at {0:g} is undecided; what is {1} may reach farther"
+_UNDECIDED = "undecided from {:g} to {:g}: too slow to tell in the time watched"
 # A candidate: the row, and the value on the axis.
 Candidate = tuple[int, float]
 Run = Callable[[Sequence[Candidate]], Iterable[tuple[int, Row]]]
@@ -63,15 +63,14 @@ def find_boundaries(
     if {(b > a) - (b < a) for a, b in pairwise(points)} not in ({1}, {-1}):
         raise ValueError("A boundary is sought between at least two points that increase, or that decrease.")
     failures: dict[Candidate, str] = {}
-    undecided: set[Candidate] = set()
+    answered: dict[Candidate, bool | None] = {}
     why: dict[int, str] = {}
 
     def answers(candidates: Sequence[Candidate]) -> list[bool | None]:
         found: list[bool | None] = [None] * len(candidates)
         for place, result in run(candidates):
             found[place] = holds(result)
-            if result.get("verdict") == "undecided":
-                undecided.add(candidates[place])
+            answered[candidates[place]] = None if result.get("verdict") == "undecided" else found[place]
             if found[place] is None:
                 failures[candidates[place]] = result.get("why", "")
         return found
@@ -101,15 +100,44 @@ def find_boundaries(
         else:
             brackets[row] = points[count - 1], points[count]
     brackets = bisect_many(brackets, at_middles, tolerance)
-    why |= {row: _UNDECIDED.format(far, property) for row, (_, far) in brackets.items() if (row, far) in undecided}
+    for row, (near, far) in _beyond_undecided(brackets, points, answered, answers, tolerance).items():
+        why[row] = _UNDECIDED.format(brackets[row][1], near)
+        brackets[row] = brackets[row][0], far
     changes = [sum(bool(a) != bool(b) for a, b in pairwise(row)) for row in held]
     none = math.nan, math.nan
     return [Boundary(*brackets.get(row, none), changes[row], why.get(row, "")) for row in range(rows)]
 
 
+def _beyond_undecided(
+    brackets: Mapping[int, Bracket],
+    points: Sequence[float],
+    answered: Mapping[Candidate, bool | None],
+    answers: Callable[[Sequence[Candidate]], object],
+    tolerance: Tolerance,
+) -> dict[int, Bracket]:
+    """Returns, of each row whose far side is undecided, where that ends: its last value known, and the next one.
+
+    What no search has decided up to the last point stays undecided to there.
+    """
+    ahead = 1.0 if points[-1] > points[0] else -1.0
+    ends: dict[int, Bracket] = {}
+    for row, (_, far) in brackets.items():
+        if answered.get((row, far), False) is not None:
+            continue
+        decided = [value for (of, value), told in answered.items() if of == row and told is False]
+        beyond = [value for value in decided if (value - far) * ahead > 0.0]
+        ends[row] = far, min(beyond, key=lambda value: abs(value - far), default=points[-1])
+
+    def is_undecided(middles: Mapping[int, float]) -> dict[int, bool | None]:
+        answers([*middles.items()])
+        return {row: answered.get((row, middle), False) is not False for row, middle in middles.items()}
+
+    return bisect_many(ends, is_undecided, tolerance)
+
+
 def verdict_is(word: str = "steady") -> Holds:
     """Makes the test of a row for this verdict; it gives None for a run that failed.
 
-    One that is undecided does not hold: a boundary of what is steady errs on the safe side, and says so.
+    One that is undecided does not hold, so that nothing is called steady that may not be.
     """
     return lambda row: row["verdict"] == word if row.get("verdict") else None
