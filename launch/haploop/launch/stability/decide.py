@@ -86,10 +86,8 @@ class Finding:
     def sentence(self) -> str:
         """Returns why, with its numbers."""
         numbers = {name: math.nan if value is None else value for name, value in vars(self).items()}
-        felt_um = 2e6 * smallest_felt_m(self.frequency_Hz)
-        return WHY[self.why].format(
-            **numbers, width_mm=1e3 * self.width_m, width_um=1e6 * self.width_m, felt_um=felt_um
-        )
+        sizes = {"width_mm": 1e3 * self.width_m, "width_um": 1e6 * self.width_m}
+        return WHY[self.why].format(**numbers, **sizes, felt_um=2e6 * smallest_felt_m(self.frequency_Hz))
 
 
 class Pushed(NamedTuple):
