@@ -125,6 +125,15 @@ def test_a_force_at_work_where_the_recording_begins_may_have_stored_energy(tmp_p
     assert -force.books.true_J > -whole.books.true_J
 
 
+def test_a_force_that_gives_before_it_takes_may_have_the_other_sign(tmp_path: Path) -> None:
+    x = np.tile(pressed(), 5)
+    force = booked(tmp_path / "wrong.csv", {"x": x, "F": -spring(x)})
+    assert force.passivity == "other sign"
+    right = booked(tmp_path / "wrong.csv", {"x": x, "F": -spring(x)}, Layout(force="F", force_unit="-1"))
+    assert right.passivity == "generated"
+    assert right.books.true_J == -force.books.true_J
+
+
 def test_nothing_is_booked_over_a_gap_and_a_contact_before_it_counts(tmp_path: Path) -> None:
     x = np.r_[pressed(), pressed()]
     t, columns = np.arange(len(x)) * T, {"x": x, "F": spring(x)}

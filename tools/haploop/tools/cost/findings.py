@@ -105,7 +105,7 @@ def _digit_table(cost: Cost) -> FindingTable:
             *_cells(scene),
             _NONE if below is None else "any error" if math.isinf(below) else amount(below, "m", 2),
         ])  # fmt: skip
-    heads = ("scene", *(amount(digit, "m", 2) for digit in DIGITS_M), "nothing beats exact below")
+    heads = ("scene", *(amount(digit, "m", 2) for digit in DIGITS_M), "none cheaper than exact below")
     return FindingTable("What the next digit costs", heads, rows)
 
 
@@ -203,10 +203,12 @@ def takes_away(cost: Cost) -> str:
     pays = sorted(below for _, below in known if math.isfinite(below))
     always = len(known) - len(pays)
     if not pays:
-        return f"In all {always} scenes no method is cheaper than the exact flow, however large the error may be."
+        return (
+            f"In all {always} scenes no method was found cheaper than the exact flow, however large the error may be."
+        )
     ends = " to ".join(dict.fromkeys(amount(below, "m", 2) for below in (pays[0], pays[-1])))
-    where = f"{always} of {len(known)} scenes nothing beats the exact flow at any error"
-    return f"In {where}; elsewhere another method pays only above {ends}."
+    where = f"{always} of {len(known)} scenes no method was found cheaper than the exact flow at any error"
+    return f"In {where}; elsewhere one was above {ends}."
 
 
 def effects_sentence(group: PriceGroup) -> str:

@@ -8,9 +8,11 @@ import numpy as np
 
 from haploop.tools.dissipate.samples import Floats, Samples
 
-Passivity = Literal["passive", "generated", "unresolved", "begins loaded"]
+Passivity = Literal["passive", "generated", "other sign", "unresolved", "begins loaded"]
 # The terms of a sum that cancel leave so much of them.
 _ROUNDING = 1e-12
+# A wall takes energy before it gives any; of a force that took less than this share of what it gave, ask for the sign.
+_TOOK_FIRST = 0.01
 
 
 class ForceRows(NamedTuple):
@@ -43,6 +45,7 @@ class ForceBook:
     def __init__(self, period_s: float, delay_s: float) -> None:
         self._period_s, self._is_late = period_s, delay_s > 0.0
         self.naive_J = self.excess_J = self._beyond_doubt_J = self._magnitude_J = 0.0
+        self._most_J = self._most_before_J = 0.0
         self._is_first, self._any_loaded, self._resolution_m = True, False, np.inf
 
     def add(self, piece: Samples, v_m_s: Floats, added_J: Floats, true_J: Floats) -> ForceRows:
@@ -78,7 +81,7 @@ class ForceBook:
         """Whether it generated energy, or why that cannot be told."""
         least_J = _ROUNDING * self._magnitude_J
         if self._beyond_doubt_J > least_J:
-            return "generated"
+            return "generated" if self._most_before_J > _TOOK_FIRST * self.excess_J else "other sign"
         if self._any_loaded:
             return "begins loaded"
         return "unresolved" if self.excess_J > least_J else "passive"
@@ -90,7 +93,11 @@ class ForceBook:
         travel = self._travel_N + np.cumsum(np.abs(np.diff(force, prepend=self._last_N)))
         doubt = 0.0 if exact else 0.5 * np.where(np.isfinite(seen), seen, 0.0) * (travel + np.abs(force))
         if not self._loaded:
-            self.excess_J = max(self.excess_J, -float(energy.min()))
+            worst = int(np.argmin(energy))
+            if -energy[worst] > self.excess_J:
+                self.excess_J = -float(energy[worst])
+                self._most_before_J = max(self._most_J, float(energy[: worst + 1].max()))
+            self._most_J = max(self._most_J, float(energy.max()))
             self._beyond_doubt_J = max(self._beyond_doubt_J, -float((energy + doubt).min()))
         self._magnitude_J += float(np.abs(added_J).sum())
         self._since_J, self._travel_N = float(energy[-1]), float(travel[-1])

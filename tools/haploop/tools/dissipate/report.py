@@ -15,6 +15,10 @@ from haploop.tools.render.units import amount, fixed
 _PASSIVITY: dict[Passivity, str] = {
     "passive": "it never gave out more than it had taken: passive on this recording",
     "generated": "it gave out up to {excess} more than it had taken: not passive",
+    "other sign": (
+        "it gave out up to {excess} and took next to nothing before: not passive, or recorded with the other sign "
+        "(then --force-unit -1)"
+    ),
     "unresolved": (
         "it gave out up to {excess} more than it had taken, as rounded positions alone can: "
         "whether it is passive cannot be said"
@@ -122,8 +126,9 @@ def _naive(force: ForceOutcome) -> str:
     true_J, off_J = force.books.true_J, abs(force.naive_J - force.books.true_J)
     share = f" ({100.0 * off_J / abs(true_J):.3g} % of it)" if true_J else ""
     return (
-        f"That is the work of a force on the device, positive along the position, held to the next sample; the "
-        f"sum F v T would make it {amount(-force.naive_J, 'J')}, off by {amount(off_J, 'J')}{share}."
+        "That is the work of a force on the device, positive along the position, held to the next sample; a sensor's, or one "
+        f"of a thinned-out recording, is not. The sum F v T would make it {amount(-force.naive_J, 'J')}, off by "
+        f"{amount(off_J, 'J')}{share}."
     )
 
 
