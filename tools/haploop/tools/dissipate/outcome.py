@@ -181,7 +181,9 @@ def make_outcome(
     force = None
     if of := booking.force:
         own = ElementOutcome("recorded-force", {}, "recorded force", *books[-1])
-        force = ForceOutcome(own, of.naive_J, of.passivity, of.excess_J)
+        # The sign of a force in a log is known.
+        is_signed = of.passivity == "other sign" and isinstance(recording, LogRecording)
+        force = ForceOutcome(own, of.naive_J, "generated" if is_signed else of.passivity, of.excess_J)
     return Outcome(recording, elements, trace, scene, force)
 
 

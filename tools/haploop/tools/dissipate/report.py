@@ -126,9 +126,9 @@ def _naive(force: ForceOutcome) -> str:
     true_J, off_J = force.books.true_J, abs(force.naive_J - force.books.true_J)
     share = f" ({100.0 * off_J / abs(true_J):.3g} % of it)" if true_J else ""
     return (
-        "That is the work of a force on the device, positive along the position, held to the next sample; a sensor's, or one "
-        f"of a thinned-out recording, is not. The sum F v T would make it {amount(-force.naive_J, 'J')}, off by "
-        f"{amount(off_J, 'J')}{share}."
+        "That is the work of a force on the device, positive along the position, held to the next sample; a sensor's, "
+        f"or one of a thinned-out recording, is not. The sum F v T would make it {amount(-force.naive_J, 'J')}, "
+        f"off by {amount(off_J, 'J')}{share}."
     )
 
 
