@@ -13,6 +13,7 @@ import pytest
 
 from haploop.controller.dissipation import PluginError
 from haploop.launch.batch.run import run_batch
+from haploop.launch.processes.one_thread import THREADS, ask_for_one_thread
 from haploop.protocol.scene.scene import ElementTable, Scene
 from haploop.tools.executor.executors import make_executor, map_parallel
 from haploop.tools.executor.parts import Group, Sizes, cut, grouped
@@ -209,3 +210,10 @@ def test_an_error_in_a_call_is_raised_where_the_answers_are_waited_for(workers: 
         pytest.raises(ValueError, match=r"math domain error|expected a nonnegative"),
     ):
         map_parallel(executor, math.sqrt, [1.0, -1.0])
+
+
+def test_one_thread_is_asked_for_unless_the_user_asked_for_another_number() -> None:
+    environment = {"OMP_NUM_THREADS": "4", "HOME": "here"}
+    new = ask_for_one_thread(environment)
+    assert environment == {"OMP_NUM_THREADS": "4", "HOME": "here"} | dict.fromkeys(new, "1")
+    assert {*new, "OMP_NUM_THREADS"} == set(THREADS)

@@ -22,9 +22,6 @@ from helpers.scenes.least import KINDS
 from helpers.scenes.sweep_files import GRID, loaded, sweep_file, swept
 
 RECORD = 'record = ["trajectory_sha256", "energy.residual_J", "window.oscillation_m", "ticks", "final.x_m"]\n'
-BISECT = '[bisect]\naxis = "wall.stiffness"\ntolerance = "8 N/m"\nholds = "no-contact"\n'
-# A hand that ends at a place that depends on its stiffness: in contact only with a soft one.
-REACHING = '[axes]\n"wall.stiffness" = [100, 200]\n'
 
 
 def test_every_row_has_the_bits_of_its_scene_run_alone(tmp_path: Path) -> None:

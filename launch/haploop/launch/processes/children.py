@@ -12,11 +12,9 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from haploop.launch.processes.one_thread import ask_for_one_thread
 from haploop.protocol.transport.messages import PROCESSES
 from haploop.protocol.transport.wire import Message
-
-# NumPy's linear algebra would start a thread a core in every process, which takes longer than NumPy itself.
-THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
 
 
 class Child:
@@ -28,6 +26,8 @@ class Child:
 
     def __init__(self, role: str, sockets: Path, start: Message) -> None:
         self.role = role
+        environment = {**os.environ}
+        ask_for_one_thread(environment)
         command = [sys.executable, "-m", PROCESSES[role].module, str(sockets)]
         self._process = subprocess.Popen(
             command,
@@ -36,7 +36,7 @@ class Child:
             # A group of its own, since Ctrl-C is for the launcher, which ends the run in order; but the same session:
             # the kernel schedules sessions as groups, and two of them preempt each other at every message.
             process_group=0,
-            env=dict.fromkeys(THREADS, "1") | os.environ,
+            env=environment,
         )
         assert self._process.stdin
         assert self._process.stdout

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import os
+
 import typer
 
+from haploop.launch.processes.one_thread import ask_for_one_thread
 from haploop.tools.cli.explain import explain
 from haploop.tools.cli.live_commands import attach, pace, pause, resume, set_, status, step, stop, swap
 from haploop.tools.cli.scenes import check, export, judge, plot, plugins, replay, run
@@ -28,4 +31,5 @@ for command in (
 
 def main() -> None:
     """Runs the command line. Exit status: 0 done, 1 the run failed, 2 wrong usage or scene."""
+    ask_for_one_thread(os.environ)
     app()

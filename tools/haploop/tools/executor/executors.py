@@ -13,7 +13,7 @@ from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from typing import Any, Self, TypeVar
 
-from haploop.launch.processes.children import THREADS
+from haploop.launch.processes.one_thread import ask_for_one_thread
 from haploop.tools.machine import cores
 
 Item = TypeVar("Item")
@@ -190,8 +190,7 @@ def _begin(held: Connection) -> None:
 @contextlib.contextmanager
 def _one_thread_each() -> Iterator[None]:
     """Gives processes started in here one thread each, unless the user asked for another number."""
-    ours = [name for name in THREADS if name not in os.environ]
-    os.environ.update(dict.fromkeys(ours, "1"))
+    ours = ask_for_one_thread(os.environ)
     try:
         yield
     finally:
