@@ -6,7 +6,7 @@ import pytest
 from haploop.tools.advise.formulas import formulas
 from haploop.tools.advise.search import Found, search
 from haploop.tools.advise.subject import make_subject
-from haploop.tools.advise.walls.cases import make_loop
+from haploop.tools.advise.walls.cases import hold_N, make_loop
 from haploop.tools.advise.walls.store import Store
 from haploop.tools.advise.walls.trial import Trial
 from helpers.scenes.least import KINDS
@@ -20,7 +20,7 @@ def advised(device: str) -> tuple[Found, float]:
     asked = make_subject(device, None, None, None, [], KINDS)
     loop = make_loop(asked.scene, asked.has_task)
     with Trial(Store(), workers=1) as trial:
-        return search(loop, trial), loop.hand.force.value
+        return search(loop, trial), hold_N(loop)
 
 
 def pressed(device: str, found: Found, hold_N: float, stiffness_N_m: float, **how: float):

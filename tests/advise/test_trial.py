@@ -12,7 +12,7 @@ from haploop.tools.advise.subject import make_subject
 from haploop.tools.advise.walls.cases import Case, make_loop
 from haploop.tools.advise.walls.loops import LoneLoop, Loops, make_loops
 from haploop.tools.advise.walls.store import Store, Tried
-from haploop.tools.advise.walls.trial import Trial
+from haploop.tools.advise.walls.trial import Job, Trial
 from haploop.tools.linear.one_tick import OneTickMap
 from helpers.scenes.least import KINDS, scene
 
@@ -113,3 +113,20 @@ def test_the_hands_share_of_a_corner_reaches_the_bodies():
     loop = loop_of("premium15")
     changed = Case(1.0, (("hand mass", 0.8),)).scene(loop)
     assert Chain.from_scene(changed).masses_kg[-1] == pytest.approx(0.8 * 0.269)
+
+
+def test_loops_of_other_bodies_and_friction_are_tried_in_one_array_each_by_its_own_threshold():
+    loop = loop_of("premium15")
+    others = [with_value(loop, "friction.kinetic", 0.024), with_value(loop, "encoder.resolution", 57.4e-6)]
+    cases = (Case(0.3), Case(1.0))
+    jobs = [Job(each, (Tried(1500.0), Tried(2500.0)), cases) for each in (loop, *others)]
+    with Trial(Store()) as trial:
+        together = trial.of_jobs(jobs)
+    alone = []
+    for job in jobs:
+        with Trial(Store()) as trial:
+            alone += trial.of_jobs([job])
+    assert together == alone
+    assert [[failure is None for failure in of_job] for of_job in together] == [
+        [True, True], [True, False], [True, False]
+    ]  # fmt: skip

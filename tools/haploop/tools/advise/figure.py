@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from haploop.tools.advise.advice import Advice
-from haploop.tools.advise.report import answer, format_limit, format_stiffness
+from haploop.tools.advise.report import answer, format_limit, format_stiffness, moves
 from haploop.tools.figure import style
 
 if TYPE_CHECKING:
@@ -30,7 +30,8 @@ def figure_of(told: Advice) -> Figure:
     Raises FigureError where matplotlib is missing.
     """
     others = [(words, limit.stiffness_N_m, format_limit(limit)) for words, limit, _ in (*told.changed, *told.without)]
-    for of, half, double in told.assumed:
+    nominal = told.found.advised.nominal
+    for of, half, double in (row for row in told.assumed if moves(row[1], row[2], nominal)):
         others += [(f"{of.key} halved (assumed)", half.stiffness_N_m, format_limit(half))]
         others += [(f"{of.key} doubled (assumed)", double.stiffness_N_m, format_limit(double))]
     lines = [line for name, words in answer(told) for line in textwrap.wrap(f"{name}: {words}", _LETTERS)]
@@ -92,6 +93,7 @@ def _beside(ax: Axes, right: float, row: int, words: str, bold: bool = False) ->
         words, (right / 1e3, row) if right else (0.0, row), (6, 0),
         xycoords="data" if right else ax.get_yaxis_transform(), textcoords="offset points",
         va="center", fontsize=style.SMALL, color=style.INK, fontweight="bold" if bold else "normal",
+        bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.5, "alpha": 0.85},
     )  # fmt: skip
 
 

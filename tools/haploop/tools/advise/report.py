@@ -60,7 +60,7 @@ def answer(told: Advice) -> list[tuple[str, str]]:
     moving = [
         f"{of.key} halved: {format_limit(half)}, doubled: {format_limit(double)}"
         for of, half, double in told.assumed
-        if _moves(half, double, best.nominal)
+        if moves(half, double, best.nominal)
     ]
     if told.assumed:
         names = ", ".join(of.key for of, _, _ in told.assumed)
@@ -88,7 +88,8 @@ def describe(failure: Failure) -> str:
     return f"{swing} at {failure.frequency_Hz:.0f} Hz, felt as {felt}; {failure.case}"
 
 
-def _moves(half: Limit, double: Limit, nominal: Limit) -> bool:
+def moves(half: Limit, double: Limit, nominal: Limit) -> bool:
+    """Tells whether half or double of an assumed number moves the limit by more than how closely it is known."""
     ends = [limit.stiffness_N_m for limit in (half, double)]
     return min(ends) * _TELLS < nominal.stiffness_N_m or max(ends) > _TELLS * nominal.stiffness_N_m
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Self
 
@@ -11,7 +11,6 @@ import numpy as np
 
 from haploop.controller.dissipation import ElementError
 from haploop.protocol.scene.scene import Scene, Wall
-from haploop.protocol.ticks import Timebase
 from haploop.tools.advise.walls.cases import LASTS_S, Case, slowness
 from haploop.tools.advise.walls.felt import Buzz, Threshold, buzz, felt_force_N
 from haploop.tools.advise.walls.loops import LoneLoop, Loops, make_loops
@@ -68,57 +67,74 @@ class Trial:
     def of_jobs(self, jobs: Sequence[Job]) -> list[list[Failure | None]]:
         """Returns the failures of each job's walls, in order."""
         keys = [[self._store.key(job.loop, wall, job.cases) for wall in job.walls] for job in jobs]
-        parts = self._parts(jobs, keys)
+        new = {
+            key: Job(job.loop, (wall,), job.cases)
+            for job, of_job in zip(jobs, keys, strict=True)
+            for key, wall in zip(of_job, job.walls, strict=True)
+            if key not in self._store.known
+        }
+        parts = self._parts(new)
         executor: Executor = self._there if len(parts) > 1 else self._here
-        for (some, job), found in zip(parts, map_parallel(executor, run_job, [job for _, job in parts]), strict=True):
-            self._store.add(dict(zip(some, found, strict=True)))
-            self.runs += len(job.walls) * len(job.cases)
+        work = [[new[key] for key in part] for part in parts]
+        for part, found in zip(parts, map_parallel(executor, run_jobs, work), strict=True):
+            self._store.add(dict(zip(part, found, strict=True)))
+            self.runs += sum(len(new[key].cases) for key in part)
             self._told(self.runs)
         return [[self._store.known[key] for key in of_job] for of_job in keys]
 
-    def _parts(self, jobs: Sequence[Job], keys: list[list[str]]) -> list[tuple[list[str], Job]]:
-        """Returns what is not known yet, walls that run in one array together; a large one is shared by the workers."""
-        together: dict[tuple[object, ...], tuple[Job, dict[str, Tried]]] = {}
-        for job, of_job in zip(jobs, keys, strict=True):
-            for wall, key in zip(job.walls, of_job, strict=True):
-                if key not in self._store.known:
-                    kinds = tuple(element.name for element in wall.elements)
-                    together.setdefault((id(job.loop), job.cases, kinds), (job, {}))[1][key] = wall
-        parts: list[tuple[list[str], Job]] = []
-        for job, new in together.values():
-            members = len(new) * len(job.cases)
-            count = min(max(1, members // _PART), self._there.count, len(new))
-            for part in range(count):
-                some = [*new][part::count]
-                parts.append((some, replace(job, walls=tuple(new[key] for key in some))))
+    def _parts(self, new: Mapping[str, Job]) -> list[list[str]]:
+        """Returns the keys of walls that run in one array together; a large array is shared by the workers."""
+        together: dict[str, list[str]] = {}
+        late = {id(loop): slowness(loop) for loop in {id(job.loop): job.loop for job in new.values()}.values()}
+        for key, job in new.items():
+            kinds = [element.name for element in job.walls[0].elements]
+            together.setdefault(repr((kinds, job.loop.clock, late[id(job.loop)])), []).append(key)
+        parts: list[list[str]] = []
+        for keys in together.values():
+            members = sum(len(new[key].cases) for key in keys)
+            count = min(max(1, members // _PART), self._there.count, len(keys))
+            parts += [keys[part::count] for part in range(count)]
         return parts
 
 
-def run_job(job: Job) -> list[Failure | None]:
-    """Tries every wall of a job in all its cases; a wall that fails leaves the arrays with the rest of them."""
-    base = [case.scene(job.loop) for case in job.cases]
-    members = [(wall, case) for wall in range(len(job.walls)) for case in range(len(job.cases))]
-    scenes = [
-        replace(
-            base[case],
-            seed=job.loop.seed + case,
-            wall=Wall(position=0.0, stiffness=float(job.walls[wall].stiffness_N_m)),
-            dissipation=job.walls[wall].elements,
-        )
-        for wall, case in members
-    ]
+def run_jobs(jobs: Sequence[Job]) -> list[Failure | None]:
+    """Tries one wall of each job in all its cases, with loops that last equally long.
+
+    A wall that fails leaves the arrays with all its cases.
+    """
+    made: dict[tuple[int, Case], Scene] = {}
+    members = [(index, place) for index, job in enumerate(jobs) for place in range(len(job.cases))]
+    scenes: list[Scene] = []
+    for index, place in members:
+        job = jobs[index]
+        [wall], case = job.walls, job.cases[place]
+        if (id(job.loop), case) not in made:
+            made[id(job.loop), case] = case.scene(job.loop)
+        held = Wall(position=0.0, stiffness=float(wall.stiffness_N_m))
+        seed = job.loop.seed + place
+        scenes.append(replace(made[id(job.loop), case], seed=seed, wall=held, dissipation=wall.elements))
     failed: dict[int, Failure] = {}
-    felt_N, kinds = felt_force_N(job.loop), installed_kinds()
-    for group, loops in make_loops(scenes, kinds):
-        _watch(job, loops, [members[index] for index in group], failed, felt_N)
-    return [failed.get(index) for index in range(len(job.walls))]
+    felt = {id(job.loop): job.loop for job in jobs}
+    thresholds = {of: felt_force_N(loop) for of, loop in felt.items()}
+    for group, loops in make_loops(scenes, installed_kinds()):
+        _watch(jobs, loops, [members[index] for index in group], failed, thresholds)
+    return [failed.get(index) for index in range(len(jobs))]
 
 
 def _watch(
-    job: Job, loops: Loops | LoneLoop, members: list[tuple[int, int]], failed: dict[int, Failure], felt_N: Threshold
-) -> None:
+    jobs: Sequence[Job], loops: Loops | LoneLoop, members: list[tuple[int, int]], failed: dict[int, Failure],
+    thresholds: Mapping[int, Threshold],
+) -> None:  # fmt: skip
     """Follows loops to their end, or until every wall among them has failed."""
-    rate, late = Timebase.from_scene(job.loop).control_rate, slowness(job.loop)
+    rate, late = jobs[0].loop.clock.control_rate, slowness(jobs[0].loop)
+
+    def felt_N(frequency_Hz: np.ndarray) -> np.ndarray:
+        of_loop = np.array([id(jobs[index].loop) for index, _ in members])
+        found = np.empty(len(members))
+        for loop, threshold in thresholds.items():
+            found[of_loop == loop] = threshold(frequency_Hz[of_loop == loop])
+        return found
+
     usual, first = round(LASTS_S / STRETCH_S), round(FROM_S / STRETCH_S)
     before = np.full(len(members), math.inf)
     for stretch in range(_LONGER * usual):
@@ -133,7 +149,7 @@ def _watch(
         try:
             seen = loops.go_on(round(STRETCH_S * late * rate))
         except (ArithmeticError, ElementError):
-            failed.update((wall, Failure(job.cases[case].words, 0.0, gone=True)) for wall, case in members)
+            failed.update((wall, Failure(jobs[wall].cases[case].words, 0.0, gone=True)) for wall, case in members)
             return
         bad, found = seen.gone, None
         if stretch >= first and not bad.all():
@@ -143,7 +159,9 @@ def _watch(
             before = np.where(felt, found.times_felt, 0.0)
         for place in np.flatnonzero(bad).tolist():
             wall, case = members[place]
-            failure = _failure(job.cases[case].words, (stretch + 1) * STRETCH_S * late, seen.gone[place], found, place)
+            failure = _failure(
+                jobs[wall].cases[case].words, (stretch + 1) * STRETCH_S * late, seen.gone[place], found, place
+            )
             worst = failed.setdefault(wall, failure)
             if worst.at_s == failure.at_s and worst.times_felt < failure.times_felt:
                 failed[wall] = failure
