@@ -70,7 +70,7 @@ def test_the_table_holds_the_last_value_of_everything(width: int) -> None:
     text = shown(live_status(), width)
     assert text.splitlines()[0].startswith("a1b2c3  a tap on a wall [of 0.15 N/mm]")
     assert "1.250 s of 3 s, tick 1250" in text
-    assert row(text, "so far").startswith("limit-cycle oscillation 4.70 mm")
+    assert row(text, "so far").startswith("swinging oscillation 4.70 mm")
     assert row(text, "position") == "−61.2 mm 1.20 mm inside the wall"
     assert row(text, "velocity") == "12.0 mm/s"
     assert row(text, "damping") == "600 µJ 500 µJ"
@@ -113,7 +113,7 @@ def test_a_run_that_stands_still_is_shown_from_what_its_publishers_say_on_joinin
     text = shown(subject)
     assert row(text, "paused").endswith("0.500 s of 3 s, tick 500")
     assert row(text, "position") == "−61.0 mm 1.00 mm inside the wall"
-    assert row(text, "so far").startswith("limit-cycle")
+    assert row(text, "so far").startswith("swinging")
     subject.note_event(500, {"resume": True})
     assert "paused" not in shown(subject)
 
@@ -162,7 +162,7 @@ def test_every_kind_of_event_has_its_words(event: dict[str, Any], words: str) ->
 
 
 def summary(**changes: Any) -> dict[str, Any]:
-    ran = {"ended": "done", "why": "", "verdict": "steady", "window": {"oscillation_m": 1e-6}}
+    ran = {"ended": "done", "why": "", "verdict": "steady", "stability": {}, "window": {"oscillation_m": 1e-6}}
     return ran | {"energy": {"residual_J": 4e-18}} | changes
 
 
@@ -190,7 +190,7 @@ def test_how_it_ended_is_a_sentence(failure: str, its_summary: dict[str, Any] | 
 
 def test_the_line_for_a_pipe_has_numbers_and_units_and_what_was_skipped() -> None:
     subject = live_status()
-    words = "1.250 s  x −61.2 mm  force 180 mN  limit-cycle  4.70 mm p-p  residual 3.00e−18 J"
+    words = "1.250 s  x −61.2 mm  force 180 mN  swinging  4.70 mm p-p  residual 3.00e−18 J"
     assert live_line(subject).startswith(words)
     assert "skipped" not in live_line(subject)
     subject.skipped_ticks = 400

@@ -87,7 +87,7 @@ def test_the_progress_line_shows_time_verdict_oscillation_and_residual_on_a_term
         line.announce("a1b2c3")
         line.update({})
         line.update(STATUS)
-    for words in ("a1b2c3", "1.25/3 s", "limit-cycle", "1.23 mm", "residual 3e-18 J"):
+    for words in ("a1b2c3", "1.25/3 s", "swinging", "1.23 mm", "residual 3e-18 J"):
         assert words in screen.getvalue()
 
 
@@ -124,7 +124,7 @@ def test_the_status_table_tells_of_every_node_its_tick_its_lag_whom_it_waits_for
     }  # fmt: skip
     text = shown(status_table(data), width)
     assert "paused  1.2 s of 3 s, tick 1200 of 3000, at pace 0.5" in text
-    assert "limit-cycle so far, oscillation 1.23 mm" in text
+    assert "swinging so far, oscillation 1.23 mm" in text
     assert row(text, "plant") == ["11", "1210", "–", "–", "–"]
     assert row(text, "controller") == ["11", "1209", "1 tick, 1.00 ms", "–", "–"]
     assert row(text, "logger") == ["11", "1200", "10 ticks, 10.0 ms", "plant", "–"]

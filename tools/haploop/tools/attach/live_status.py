@@ -26,6 +26,7 @@ class LiveStatus:
         changes: every event so far, (tick, event) in order.
         skipped_ticks: telemetry that never came.
         figures: verdict, oscillation_m and residual_J so far, in the end those of the summary; empty before any.
+        is_judged: whether the verdict is that of the ended run, held still and pushed.
         ended: how the run ended, in a word; "" while it goes on.
         why: a sentence on that; "" for none.
     """
@@ -42,6 +43,7 @@ class LiveStatus:
         self.ended = self.why = ""
         self._newest: dict[str, Block] = {}
         self.figures: Message = {}
+        self.is_judged = False
         self._motion_at_start: dict[str, float] = {}
         self._marks: deque[tuple[float, int]] = deque()
 
@@ -89,6 +91,7 @@ class LiveStatus:
             self.ended, self.why = ("failed" if failure else "ended"), failure
             return
         self.ended, self.why = summary["ended"], summary["why"] or failure
+        self.is_judged = "stability" in summary
         verdict, window = summary["verdict"], summary["window"]
         residual_J = summary["energy"]["residual_J"]
         self.figures = {"verdict": verdict, "oscillation_m": window["oscillation_m"], "residual_J": residual_J}

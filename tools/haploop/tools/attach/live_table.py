@@ -14,7 +14,7 @@ from haploop.protocol.transport.clock_client import Refused
 from haploop.tools.attach.live_status import LiveStatus
 from haploop.tools.attach.observed_run import ObservedRun, read_summary
 from haploop.tools.cli.options import FAILED, WRONG_USE, leave
-from haploop.tools.render.terminal import console, make_facts, make_table, verdict_style
+from haploop.tools.render.terminal import console, make_facts, make_table, seen, verdict_style
 from haploop.tools.render.units import amount, fixed
 
 if TYPE_CHECKING:
@@ -48,6 +48,11 @@ def live_table(run: LiveStatus) -> RenderableType:
     return Group(head, progress, _figures(run), _books(run))
 
 
+def _word(run: LiveStatus) -> str:
+    verdict = run.figures["verdict"]
+    return verdict if run.is_judged else seen(verdict)
+
+
 def live_line(run: LiveStatus) -> str:
     """Returns the state of a run as one line, for a pipe."""
     motion, figures = run.motion(), run.figures
@@ -55,7 +60,7 @@ def live_line(run: LiveStatus) -> str:
     if motion:
         words += [f"x {amount(motion['x'], 'm')}", f"force {amount(motion['force'], 'N')}"]
     if figures:
-        words += [figures["verdict"], f"{amount(figures['oscillation_m'], 'm')} p-p"]
+        words += [_word(run), f"{amount(figures['oscillation_m'], 'm')} p-p"]
         words.append(f"residual {amount(figures['residual_J'], 'J')}")
     if run.factor is not None:
         words.append(f"{fixed(run.factor)}x real time")
@@ -76,8 +81,11 @@ def _figures(run: LiveStatus) -> Table:
     grid = make_facts([], least_width=12)
     figures, motion = run.figures, run.motion()
     if figures:
-        word, swing = figures["verdict"], f"  oscillation {amount(figures['oscillation_m'], 'm')} peak to peak"
-        grid.add_row("verdict" if run.ended else "so far", Text.assemble((word, verdict_style(word)), swing))
+        word, swing = _word(run), f"  oscillation {amount(figures['oscillation_m'], 'm')} peak to peak"
+        grid.add_row(
+            "verdict" if run.ended else "so far",
+            Text.assemble((word, verdict_style(figures["verdict"])), swing),
+        )
     depth_m = run.penetration_m()
     side = "" if depth_m is None else f"  {amount(abs(depth_m), 'm')} {'inside' if depth_m > 0 else 'outside'} the wall"
     grid.add_row("position", amount(motion.get("x"), "m") + side)

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Self
 
-from haploop.tools.render.terminal import console, verdict_style
+from haploop.tools.render.terminal import console, seen, verdict_style
 from haploop.tools.render.units import amount, fixed
 
 if TYPE_CHECKING:
@@ -86,7 +86,7 @@ class ProgressLine:
             ("━" * done, "green"), ("─" * (bar - done), "dim"),
             f" {status['t_s']:.2f}/{self._duration_s:g} s",
             f" {fixed(factor)}×" if factor else "",
-            "  ", (verdict, verdict_style(verdict)),
+            "  ", (seen(verdict), verdict_style(verdict)),
             f"  {amount(status['oscillation_m'], 'm')} p-p",
             f"  residual {status['residual_J']:.0e} J",
             (f"  {self._title}", "dim"),

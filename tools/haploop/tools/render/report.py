@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from typing import TYPE_CHECKING, Any
 
-from haploop.tools.render.terminal import console, make_facts, make_table, verdict_style
+from haploop.tools.render.terminal import console, make_facts, make_table, seen, verdict_style
 from haploop.tools.render.units import amount, fixed, parameters, spring
 
 if TYPE_CHECKING:
@@ -152,7 +152,7 @@ def status_table(data: Message) -> RenderableType:
     if status := data.get("status"):
         word = status["verdict"]
         looks = f" so far, oscillation {amount(status['oscillation_m'], 'm')} peak to peak"
-        parts.append(Text.assemble((word, verdict_style(word)), looks))
+        parts.append(Text.assemble((seen(word), verdict_style(word)), looks))
     return Group(*parts, _nodes(data["nodes"], rate))
 
 

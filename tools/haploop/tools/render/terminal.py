@@ -31,6 +31,11 @@ def console(stderr: bool = False) -> Console:
     return made
 
 
+def seen(verdict: str) -> str:
+    """Returns the word for what the last half second shows, which says nothing yet of stability."""
+    return {"steady": "at rest", "limit-cycle": "swinging"}.get(verdict, verdict)
+
+
 def verdict_style(verdict: str) -> str:
     """Returns the style of a verdict; bold for one that has no colour."""
     return VERDICT_STYLES.get(verdict, "bold")

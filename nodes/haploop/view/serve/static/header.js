@@ -5,6 +5,11 @@ import { byId, put, sign } from "./dom.js";
 
 const WORDS = { lost: "not connected" };
 const VERDICTS = new Set(["steady", "limit-cycle", "diverged", "no-contact"]);
+// What is seen in the last half second says nothing of stability: that is judged when the run has ended.
+const SEEN = { steady: "at rest", "limit-cycle": "swinging" };
+
+/** The word for what the last half second shows. */
+export const seen = (verdict) => SEEN[verdict] ?? verdict;
 
 /** Show a state; `phase` is its phase, or "lost" without a connection. */
 export function showHeader(state, phase) {
@@ -14,7 +19,7 @@ export function showHeader(state, phase) {
   sign(sought, `phase-${phase}`, WORDS[phase] ?? phase);
   put(byId("title"), state.title || "haploop");
   byId("title").title = state.title || "";
-  put(document.querySelector("title"), state.title ? `${state.verdict || phase}: ${state.title}` : "haploop");
+  put(document.querySelector("title"), state.title ? `${seen(state.verdict) || phase}: ${state.title}` : "haploop");
   showVerdict(state);
   put(byId("oscillation"), amount(state.oscillation_m, "m"));
   put(byId("stiffness"), stiffness(state));
@@ -29,7 +34,7 @@ function showVerdict({ verdict, verdict_rule: rule }) {
   const sought = byId("verdict");
   sought.dataset.verdict = known;
   sought.title = rule || "";
-  sign(sought, `verdict-${known}`, verdict || "no verdict");
+  sign(sought, `verdict-${known}`, seen(verdict) || "no verdict");
 }
 
 /** A number of at most six digits, in powers of ten beyond. */

@@ -2,6 +2,7 @@
 
 import { amount, fixed, isNumber, NONE } from "./amounts.js";
 import { byId, make } from "./dom.js";
+import { seen } from "./header.js";
 
 const CAUSES = { sampling_and_hold_J: "sampling and hold", quantisation_J: "quantisation", delay_J: "delay" };
 const HOW = { done: "to its end", stopped: "stopped early", diverged: "ended by divergence", failed: "failed" };
@@ -14,7 +15,7 @@ export function showSummary(summary, out) {
   if (!summary || panel.dataset.known === known) return;
   panel.dataset.known = known;
   panel.replaceChildren(
-    make("h2", { id: "summary-title" }, `Ended: ${summary.verdict}`),
+    make("h2", { id: "summary-title" }, `Ended: ${summary.stability ? summary.verdict : seen(summary.verdict)}`),
     make("p", { class: "about" }, summary.verdict_rule ?? ""),
     figures(summary),
     books(summary.energy ?? {}),
