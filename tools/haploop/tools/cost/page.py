@@ -32,7 +32,7 @@ whatever their own order is."""
 _ALIKE = """\
 Without friction a step of any of these methods is a small linear map. Operations are additions and multiplications,
 counted; times are of steps of 4096 motions in arrays, every method by the same kind of formula. Operations a tick are
-those at the lowest plant rate that is exact enough; a dash where none was."""
+those at the lowest of the plant rates compared that is exact enough; a dash where none was."""
 _SWINGS = """\
 Here a start moved by 1 µm ends somewhere else, so neither positions nor single swings can be compared. The error is
 that of the mean amplitude over 30 starts 1 µm apart, each against the exact flow from the same start, with its 95 %
