@@ -26,9 +26,9 @@ books, over that of a yardstick timed before and after it: a median, and in brac
 intervals overlap are not ranked."""
 _DIGITS = """\
 Each cell names the cheapest setting, or all that are as cheap, and the time of the first. Below the error in the last
-column no method takes less time than the exact flow. Friction is what makes a tick dear: the exact flow finds each
-stop and start to the last digit, the one-step methods let them fall on plant steps and have an error of first order,
-whatever their own order is."""
+column no method was found that takes less time than the exact flow. Friction is what makes a tick dear: the exact
+flow finds each stop and start to the last digit, the one-step methods let them fall on plant steps and have an error
+of first order, whatever their own order is."""
 _ALIKE = """\
 Without friction a step of any of these methods is a small linear map. Operations are additions and multiplications,
 counted; times are of steps of 4096 motions in arrays, every method by the same kind of formula. Operations a tick are
