@@ -208,7 +208,7 @@ def takes_away(cost: Cost) -> str:
         )
     ends = " to ".join(dict.fromkeys(amount(below, "m", 2) for below in (pays[0], pays[-1])))
     where = f"{always} of {len(known)} scenes no method was found cheaper than the exact flow at any error"
-    return f"In {where}; elsewhere one was above {ends}."
+    return f"In {where}; in the others one is, where an error above {ends} will do."
 
 
 def effects_sentence(group: PriceGroup) -> str:
