@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Sequence
+from contextlib import redirect_stdout
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from haploop.controller.dissipation import Element, load_plugin, registry
+from haploop.controller.dissipation import Element, ElementError, load_plugin, registry
 from haploop.launch.scene.events import elements_of, try_out
 from haploop.launch.scene.file import load
 from haploop.launch.spec import RunSpec, keep_plugin, make_output, write_scene
@@ -100,11 +102,19 @@ def _judged(spec: RunSpec, summary: Summary, events: list[tuple[int, Event]]) ->
     """
     if spec.scene.run.verdict == "window":
         return summary
+    from haploop.launch.stability.decide import Finding
     from haploop.launch.stability.judge import LOOKS_S, judge_scene, with_verdict
     from haploop.logger.session import write_summary
+
+    def find() -> Finding:
+        try:
+            return judge_scene(spec.scene, spec.kinds, events, LOOKS_S)
+        except (ElementError, ArithmeticError) as error:
+            return Finding("undecided", "failed", detail=str(error))
 
     if summary["duration_s"] > REPEATED_S:
         summary["verdict_rule"] = f"{_NOT_REPEATED} {summary['verdict_rule']}"
         write_summary(summary, spec.out)
         return summary
-    return with_verdict(spec.scene, summary, lambda: judge_scene(spec.scene, spec.kinds, events, LOOKS_S), spec.out)
+    with redirect_stdout(sys.stderr):  # what a plugin prints is no part of what the command says
+        return with_verdict(spec.scene, summary, find, spec.out)
