@@ -23,6 +23,10 @@ _LASTING, _LASTING_LONG = 0.05, 0.02
 _SAME = (0.7, 1.43)
 # After so long a slow change counts as none, and a steady growth as one.
 _LONG_S = 8.0
+# After so long, swings of both sizes that grow alike grow for good.
+_ALIKE_S = 4.0
+# Behind an encoder a swing that decays may end as a chatter of so many counts, peak to peak, at the most.
+_COUNTS = 10
 
 WHY = {
     "diverged": "The run ended by itself: {detail}.",
@@ -34,6 +38,8 @@ WHY = {
     "{frequency_Hz:.3g} Hz.",
     "lasts": "A swing of {width_mm:.3g} mm peak to peak at {frequency_Hz:.3g} Hz lasted for {watched_s:g} s, its width "
     "changing by less than 2 %.",
+    "decays": "Its swing of {width_mm:.3g} mm peak to peak at {frequency_Hz:.3g} Hz still decays, by {rate_1_s:.3g} +- "
+    "{error_1_s:.1g} 1/s, and nothing in the loop makes small swings other than large ones.",
     "grows": "Its swing grew by {rate_1_s:.3g} +- {error_1_s:.2g} 1/s, at {frequency_Hz:.3g} Hz.",
     "leaves the limit": "Its swing grew until the device was beyond its limit.",
     "failed": "The loop failed while it was watched: {detail}",
@@ -100,6 +106,8 @@ class Pushed(NamedTuple):
         push_N: the larger push, shape (members,).
         count_m: one count of the encoder, shape (members,); 0 without.
         inside: whether a tick in the last quarter of both was in contact, shape (members,).
+        stays_inside: whether all ticks in the last half of both were.
+        smooth: whether the loop treats small swings as large ones, but for the counts of its encoder, shape (members,).
     """
 
     small: np.ndarray
@@ -109,6 +117,8 @@ class Pushed(NamedTuple):
     push_N: np.ndarray
     count_m: np.ndarray
     inside: np.ndarray
+    stays_inside: np.ndarray
+    smooth: np.ndarray
 
 
 class Swing(NamedTuple):
@@ -128,6 +138,8 @@ class Swing(NamedTuple):
     push_N: float
     count_m: float
     inside: bool
+    stays_inside: bool
+    smooth: bool
     changes: tuple[float, float]
     errors: tuple[float, float]
     rate_1_s: float
@@ -145,6 +157,12 @@ class Swing(NamedTuple):
         """Tells whether both swings neither grow nor decay, as far as their scatter lets one say."""
         pairs = zip(self.changes, self.errors, strict=True)
         return all(abs(change) < max(within, 2 * error) and error < 0.1 for change, error in pairs)
+
+    def is_alike(self) -> bool:
+        """Tells whether swings of other sizes go as these: never off the wall, or the larger as the smaller one."""
+        rate = abs(self.changes[1] - self.changes[0]) < 0.1 * abs(self.changes[1]) + 3 * math.hypot(*self.errors)
+        kept_ratio = self.at_first > 2.0 and _SAME[0] < self.at_last / self.at_first < _SAME[1]
+        return rate and (self.stays_inside or kept_ratio)
 
     def finding(self, word: str, why: str) -> Finding:
         felt_m = 2.0 * smallest_felt_m(self.frequency_Hz)
@@ -193,7 +211,8 @@ def measure(pushed: Pushed) -> list[Swing]:
 def decide(swing: Swing, *, last: bool) -> Finding:
     """Returns the finding; ``undecided`` asks for a longer time unless it is the ``last`` one.
 
-    *steady*: the swing died, or dies and what is left of it no hand feels. *limit-cycle*: it forgets how hard it was
+    *steady*: the swing died, or dies and what is left of it no hand feels, or at the last look both swings still decay
+    alike. *limit-cycle*: it forgets how hard it was
     pushed, yet remains, and is felt. *growing*: both swings grow.
     """
     if not swing.inside:
@@ -213,6 +232,10 @@ def decide(swing: Swing, *, last: bool) -> Finding:
     kept_ratio = swing.at_first > 2.0 and _SAME[0] < swing.at_last / swing.at_first < _SAME[1]
     if swing.lasts(_LASTING_LONG) and is_long and not kept_ratio:
         return swing.finding("limit-cycle", "lasts")
-    if is_long and all(change > 4 * error for change, error in changes):
+    grows = all(change > 4 * error for change, error in changes)
+    if grows and (is_long or (swing.watched_s >= _ALIKE_S and min(swing.changes) > _LASTING and swing.is_alike())):
         return swing.finding("growing", "grows")
+    decays = last and all(change < -3 * error for change, error in changes) and swing.is_alike()
+    if decays and swing.smooth and not is_felt(_COUNTS * swing.count_m, swing.frequency_Hz):
+        return swing.finding("steady", "decays")
     return swing.finding("undecided", "too slow")

@@ -250,10 +250,10 @@ def _wall_of(end: BatchEnd, place: int | np.ndarray) -> Wall:
     return tree_take(end.params.wall, np.atleast_1d(place))
 
 
-def _is_inside(wall: Wall, x: np.ndarray) -> np.ndarray:
-    """Tells which loops touched their wall at any of the ticks at which they were at x (m), shape (loops, ticks)."""
+def _is_inside(wall: Wall, x: np.ndarray, reduce: Callable[..., np.ndarray] = np.any) -> np.ndarray:
+    """Tells which loops touched their wall at any (or all) of the ticks where they were at x (m), (loops, ticks)."""
     position = np.reshape(wall.position, (-1, 1))
-    return np.any(wall.inward * (x - position) > 0.0, axis=1)
+    return reduce(wall.inward * (x - position) > 0.0, axis=1)
 
 
 def _found(
@@ -262,7 +262,20 @@ def _found(
     """Returns what is found so far, of traces of position after both pushes and of the command, (loops, ticks)."""
     small, large, command = traces
     quarter = -(-large.shape[1] // 4)
+    half = large.shape[1] // 2
     inside = _is_inside(wall, small[:, -quarter:]) & _is_inside(wall, large[:, -quarter:])
+    stays = _is_inside(wall, small[:, half:], np.all) & _is_inside(wall, large[:, half:], np.all)
     count_m = np.array([scene.encoder.resolution if scene.encoder else 0.0 for scene in scenes])
-    swings = measure(Pushed(small, large, command, time.control_rate, np.abs(push_N), count_m, inside))
+    smooth = np.array([_is_smooth(scene) for scene in scenes])
+    swings = measure(Pushed(small, large, command, time.control_rate, np.abs(push_N), count_m, inside, stays, smooth))
     return [decide(swing, last=last) for swing in swings]
+
+
+def _is_smooth(scene: Scene) -> bool:
+    """Tells whether nothing but the encoder rounds, nothing saturates, and no estimator filters small swings more."""
+    limits = [
+        (table.resolution, getattr(table, "saturation", None))
+        for table in (scene.actuator, scene.accelerometer)
+        if table
+    ]
+    return not any(map(any, limits)) and scene.estimate("velocity").estimator != "foaw"
