@@ -64,3 +64,14 @@ def stand_in() -> Iterator[StandIn]:
     server = StandIn()
     yield server
     server.close()
+
+
+@pytest.fixture
+def page(stand_in: StandIn, open_page: Callable[..., Page]) -> Page:
+    """The page of a run that can be steered."""
+    from playwright.sync_api import expect
+
+    stand_in.state()
+    page = open_page(stand_in.url)
+    expect(page.locator("#pause")).to_be_enabled()
+    return page

@@ -1,26 +1,10 @@
 """Steering from the page: orders that go out as they were meant, and what is refused is told and changes nothing."""
 
-import pytest
 from playwright.sync_api import expect
 
+from helpers.live.browser import order
 from helpers.live.stand_in import OPTIONS, RUNNING, TOKEN
 from oracles.snapshots import contact
-
-
-@pytest.fixture
-def page(stand_in, open_page):
-    stand_in.state()
-    page = open_page(stand_in.url)
-    expect(page.locator("#pause")).to_be_enabled()
-    return page
-
-
-def order(stand_in, page, act):
-    """What is ordered by ``act``; the page has heard the answer."""
-    page.evaluate("document.querySelector('#said').textContent = ''")
-    act()
-    expect(page.locator("#said")).not_to_be_empty()
-    return [(command["verb"], command["arguments"]) for command in stand_in.commands()][-1]
 
 
 def test_every_order_carries_the_token_of_the_link(stand_in, page):
@@ -49,15 +33,6 @@ BUTTONS = [
     ("label:has([name=pace][value='0.1'])", ("pace", {"pace": 0.1})),
     ("label:has([name=pace][value='free'])", ("pace", {"pace": "free"})),
 ]
-KEYS = [
-    (" ", ("pause", {})),
-    (".", ("step", {"ticks": 1})),
-    ("2", ("step", {"ticks": 10})),
-    ("3", ("step", {"ticks": 100})),
-    ("-", ("pace", {"pace": 0.1})),
-    ("=", ("pace", {"pace": 1})),
-    ("+", ("pace", {"pace": "free"})),
-]
 
 
 def test_every_button_orders_what_it_says(stand_in, page):
@@ -65,26 +40,11 @@ def test_every_button_orders_what_it_says(stand_in, page):
         assert order(stand_in, page, lambda what=selector: page.click(what)) == expected
 
 
-def test_every_key_orders_what_the_help_says(stand_in, page):
-    for key, expected in KEYS:
-        assert order(stand_in, page, lambda what=key: page.keyboard.press(what)) == expected
-
-
 def test_a_paused_run_is_resumed_by_the_same_button_and_key(stand_in, page):
     stand_in.state(phase="paused")
     expect(page.locator("#pause")).to_have_text("Resume")
     assert order(stand_in, page, lambda: page.keyboard.press(" "))[0] == "resume"
     assert order(stand_in, page, lambda: page.click("#pause"))[0] == "resume"
-
-
-def test_a_key_that_is_typed_into_a_field_steers_nothing(stand_in, page):
-    page.fill("#swap-fields input", "")
-    page.locator("#swap-fields input").press_sequentially("0.123 kg")
-    page.focus("#freeze")
-    page.keyboard.press(" ")
-    expect(page.locator("#freeze")).to_have_text("Go live")
-    assert stand_in.commands() == []
-    assert page.input_value("#swap-fields input") == "0.123 kg"
 
 
 def test_to_stop_is_asked_first_and_may_be_taken_back(stand_in, page):
@@ -265,33 +225,6 @@ def test_an_order_whose_answer_never_comes_is_told(stand_in, page):
     expect(page.locator("#said")).to_contain_text("lost before the answer came")
 
 
-def test_with_the_keyboard_alone_an_element_is_swapped(stand_in, page):
-    """s goes to the form; arrows, tab and digits do the rest."""
-    page.keyboard.press("s")
-    expect(page.locator("#swap-kind")).to_be_focused()
-    page.keyboard.press("ArrowDown")
-    page.keyboard.press("Tab")
-    expect(page.locator("#swap-mass")).to_be_focused()
-    page.keyboard.press("Control+a")
-    page.keyboard.type("0.02")
-    swapped = order(stand_in, page, lambda: page.keyboard.press("Enter"))
-    assert swapped == (
-        "swap",
-        {"swap": {"kind": "unidirectional-inertia", "acts": "in-contact", "mass": 0.02}, "element": 0},
-    )
-
-
-def test_every_control_can_be_reached_by_tab(stand_in, page):
-    """From the top to the last button, none left out: a group of radio buttons counts as one."""
-    reached = set()
-    for _ in range(80):
-        page.keyboard.press("Tab")
-        reached.add(page.evaluate("document.activeElement.id || document.activeElement.getAttribute('name') || ''"))
-    wanted = {"pause", "pace", "stop", "span", "earlier", "freeze", "help", "swap-element", "swap-kind", "swap-damping"}
-    wanted |= {"swap-acts", "swap-do", "set-wall.stiffness", "events"}
-    assert wanted - reached == set()
-
-
 def test_spans_freezing_and_scrolling_ask_for_that_stretch_of_time(stand_in, page):
     stand_in.show(contact(1.0, 3.0))
     expect(page.locator("#force .legend")).to_contain_text("total")
@@ -321,12 +254,3 @@ def test_a_link_of_an_earlier_server_is_told_apart(stand_in, page):
     stand_in.answer = lambda command: (False, "This link is of an earlier haploop view; open the one it printed last.")
     page.click("#pause")
     expect(page.locator("#said")).to_contain_text("open the one it printed last")
-
-
-def test_the_help_names_every_key(page):
-    page.keyboard.press("?")
-    expect(page.locator("#keys")).to_be_visible()
-    names = page.locator("#key-list kbd").all_inner_texts()
-    assert {"Space", "s", "e", "f", "[", "]", "x", "?"} <= set(names)
-    page.keyboard.press("Escape")
-    expect(page.locator("#keys")).to_be_hidden()

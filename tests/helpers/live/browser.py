@@ -1,8 +1,14 @@
-"""The browser that the tests of the live page drive: its names, arguments and sizes of its window."""
+"""The browser that the tests of the live page drive: names, arguments, sizes of its window, and orders given in it."""
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Page
+
+    from helpers.live.stand_in import StandIn
 
 NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 # Nothing is fetched, synchronised or reported: what the page asks for is all that is asked for.
@@ -19,3 +25,13 @@ PHONE = {"width": 390, "height": 844}
 def is_complaint(said: Any) -> bool:
     """Tells whether a message on the console is a complaint of the page."""
     return said.type in ("error", "warning") and not any(word in said.text for word in OF_THE_TEST)
+
+
+def order(stand_in: StandIn, page: Page, act: Callable[[], object]) -> tuple[str, dict[str, Any]]:
+    """Returns verb and arguments of what is ordered by ``act``; the page has heard the answer."""
+    from playwright.sync_api import expect
+
+    page.evaluate("document.querySelector('#said').textContent = ''")
+    act()
+    expect(page.locator("#said")).not_to_be_empty()
+    return [(command["verb"], command["arguments"]) for command in stand_in.commands()][-1]
