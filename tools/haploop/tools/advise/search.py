@@ -192,12 +192,13 @@ def _softer(loop: Scene, trial: Trial, advised: Best) -> Limit:
 
 def attack(loop: Scene) -> tuple[Case, ...]:
     """Returns cases that the search has not seen: other holds and sways, a hand held still, another approach."""
-    holds = [0.3 * 10.0 ** (i / 10.0) for i in range(11)]
+    apart, evenly = [0.3 * 10.0 ** (i / 10.0) for i in range(11)], [0.3 + 0.27 * i for i in range(1, 10)]
     found: list[Case] = []
     for corner in ((), *corners(loop)):
-        found += [Case(hold, corner, sway_Hz=0.8) for hold in holds]
-        found += [Case(hold, corner, sway=0.0) for hold in holds]
-        found += [Case(hold, corner, sway=0.2, sway_Hz=0.4, tap_m_s=speed) for hold in holds[::5] for speed in _SPEEDS]
+        found += [Case(hold, corner) for hold in evenly]
+        found += [Case(hold, corner, sway_Hz=0.8) for hold in apart]
+        found += [Case(hold, corner, sway=0.0) for hold in (*apart, *evenly)]
+        found += [Case(hold, corner, sway=0.2, sway_Hz=0.4, tap_m_s=speed) for hold in apart[::5] for speed in _SPEEDS]
     return tuple(found)
 
 
