@@ -23,7 +23,7 @@ _LASTING, _LASTING_LONG = 0.05, 0.02
 _SAME = (0.7, 1.43)
 # After so long a slow change counts as none, and a steady growth as one.
 _LONG_S = 8.0
-# After so long, swings of both sizes that grow alike grow for good.
+# After so long, swings of both sizes that grow alike grow for good, and what is known not to change lasts.
 _ALIKE_S = 4.0
 # Behind an encoder a swing that decays may end as a chatter of so many counts, peak to peak, at the most.
 _COUNTS = 10
@@ -31,7 +31,7 @@ _COUNTS = 10
 WHY = {
     "diverged": "The run ended by itself: {detail}.",
     "no contact": "No tick of the last half second, or of the second half of a shorter run, was in contact.",
-    "rest": "After a push of {push_N:.3g} N it came to rest.",
+    "rest": "After a push of {push_N:.3g} N it came to rest; what else moved was the hand or noise.",
     "unfelt": "After a push of {push_N:.3g} N it came to rest but for {width_um:.3g} um peak to peak at "
     "{frequency_Hz:.3g} Hz, less than a hand feels ({felt_um:.3g} um).",
     "forgets": "Pushes of {push_N:.3g} N and a tenth of it end in the same swing, {width_mm:.3g} mm peak to peak at "
@@ -230,7 +230,8 @@ def decide(swing: Swing, *, last: bool) -> Finding:
     if swing.lasts(_LASTING) and _SAME[0] < swing.at_last < _SAME[1] and not 0.5 < swing.at_first < 2.0:
         return swing.finding("limit-cycle", "forgets")
     kept_ratio = swing.at_first > 2.0 and _SAME[0] < swing.at_last / swing.at_first < _SAME[1]
-    if swing.lasts(_LASTING_LONG) and is_long and not kept_ratio:
+    clearly = swing.watched_s >= _ALIKE_S and all(abs(change) + 2 * error < _LASTING_LONG for change, error in changes)
+    if (clearly or (is_long and swing.lasts(_LASTING_LONG))) and not kept_ratio:
         return swing.finding("limit-cycle", "lasts")
     grows = all(change > 4 * error for change, error in changes)
     if grows and (is_long or (swing.watched_s >= _ALIKE_S and min(swing.changes) > _LASTING and swing.is_alike())):
