@@ -48,7 +48,7 @@ accuracy: $(READY) ## measure what accuracy costs and write docs/accuracy.md (a 
 	@$(BIN)/haploop cost --out runs/accuracy
 	@$(BIN)/python -m haploop.tools.cost.page runs/accuracy docs
 
-paper: $(READY) ## make every figure of the paper and write docs/paper.md (within 20 minutes on two cores)
+paper: $(READY) ## make every figure of the paper, write docs/paper.md and paper_claims.md (some 20 minutes on two cores)
 	@$(BIN)/haploop paper --out runs/paper
 	@$(BIN)/python -m haploop.tools.studies.choi2022.command runs/paper docs
 	@cp runs/paper/fig6?_nearest.toml launch/scenes/paper/

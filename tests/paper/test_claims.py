@@ -6,8 +6,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from haploop.tools.studies.choi2022.claims import ASSUMING, FAILS, HOLDS, VERDICTS, Claim, Finding, claims_of, texts_of
-from haploop.tools.studies.choi2022.command import made, page, paper
+from haploop.tools.studies.choi2022.claims import (
+    ASSUMING,
+    FAILS,
+    HOLDS,
+    RARE,
+    RARE_BELOW,
+    VERDICTS,
+    Claim,
+    Finding,
+    claims_of,
+    texts_of,
+)
+from haploop.tools.studies.choi2022.command import claims_page, made, page, paper
 from haploop.tools.studies.choi2022.figures import figure, numbers
 from haploop.tools.studies.choi2022.work import Work
 
@@ -15,11 +26,11 @@ DOCS = Path(__file__).parents[2] / "docs"
 CLAIM = Claim("III, Fig. 4", "inertia dissipates | stores", "dissipates")
 
 
-def test_an_assumption_belongs_to_one_verdict_alone() -> None:
-    assert VERDICTS == ("holds", "holds under a stated assumption", "does not hold here")
-    for verdict, assumption in zip(VERDICTS, ("", "slow", ""), strict=True):
+def test_an_assumption_belongs_to_two_verdicts_alone() -> None:
+    assert VERDICTS == ("holds", "holds under a stated assumption", "rare", "does not hold here")
+    for verdict, assumption in zip(VERDICTS, ("", "slow", "slow", ""), strict=True):
         assert Finding(CLAIM, verdict, "1 J", assumption).verdict == verdict
-    for verdict, assumption in [(VERDICTS[0], "slow"), (VERDICTS[1], ""), (VERDICTS[2], "slow"), ("perhaps", "")]:
+    for verdict, assumption in [(HOLDS, "slow"), (ASSUMING, ""), (RARE, ""), (FAILS, "slow"), ("perhaps", "")]:
         with pytest.raises(ValueError, match="verdict"):
             Finding(CLAIM, verdict, "1 J", assumption)  # pyright: ignore[reportArgumentType]
 
@@ -30,6 +41,12 @@ def test_a_claim_holds_or_holds_under_its_assumption_or_fails_with_the_numbers_i
     assert claim.holds_if(True, True, **computed) == Finding(claim, HOLDS, "2 J")
     assert claim.holds_if(False, True, **computed) == Finding(claim, ASSUMING, "2 J", "slower than 80 Hz")
     assert claim.holds_if(False, **computed) == Finding(claim, FAILS, "2 J")
+
+
+def test_a_claim_that_holds_in_fewer_than_one_of_twenty_interpretations_is_rare_and_no_holds() -> None:
+    found = [Finding.by_share(CLAIM, "1 J", share, "slow").verdict for share in (RARE_BELOW, 0.049, 0.0)]
+    assert found == [ASSUMING, RARE, RARE]
+    assert Finding.by_share(CLAIM, "1 J", 0.0, "").verdict == FAILS
 
 
 def test_what_is_kept_of_a_finding_reads_back_to_it() -> None:
@@ -44,18 +61,23 @@ def test_the_page_tells_every_finding_by_section_and_what_was_not_made() -> None
         kept[number] = {
             "title": f"title {number}", "small": False, "caption": "seen", "notes": ["#### Note"],
             "files": [f"figure_{number}.png", f"figure_{number}.npz"], "findings": [finding.as_dict()],
-            "answer": f"answer {number}", "seen": {f"figure_{number}.png": f"seen on {number}"},
+            "answer": f"answer {number}", "supports": number != 6,
+            "seen": {f"figure_{number}.png": f"seen on {number}"},
         }  # fmt: skip
-    text = page(kept, "paper/")
+    text, first = claims_page(kept, "paper/"), page(kept, "paper/")
     rows = [line for line in text.splitlines() if line.startswith("| “")]
     assert [row.split("#figure-")[1][0] for row in rows] == ["3", "5", "6"]
     assert all(row.replace("\\|", "").count("|") == 5 for row in rows)  # a bar within a cell is escaped
     assert "![title 3](paper/figure_3.png)" in text
     assert "`figure_3.npz`" in text
     assert "#### Note" in text
-    assert max(text.index(f"answer {number}") for number in kept) < text.index(rows[0]) < text.index("seen on 3")
+    assert text.index(rows[0]) < text.index("seen on 3")
+    # What holds is said before what does not, on the first page alone.
+    assert first.index("answer 3") < first.index("answer 5") < first.index("What hangs") < first.index("answer 6")
+    assert "answer" not in text
+    assert "Of 3 claims 3 hold" in first
     assert "4 (" in next(line for line in text.splitlines() if line.startswith("Not made here"))
-    assert "trial" not in text
+    assert "trial" not in text + first
     assert "trial" in page({3: kept[3] | {"small": True}})
 
 
@@ -88,19 +110,26 @@ def test_data_of_a_figure_reads_back(tmp_path: Path) -> None:
     assert np.load(tmp_path / "some.npz")["x_m"].tolist() == [1.0, 2.0]
 
 
-def test_the_page_in_the_documentation_is_that_of_the_findings_beside_its_pictures() -> None:
+def test_the_pages_in_the_documentation_are_those_of_the_findings_beside_their_pictures() -> None:
     """After a change of words: python -m haploop.tools.studies.choi2022.command docs/paper docs."""
-    assert (DOCS / "paper.md").read_text(encoding="utf-8") == page(made(DOCS / "paper"), "paper/")
+    kept = made(DOCS / "paper")
+    assert (DOCS / "paper.md").read_text(encoding="utf-8") == page(kept, "paper/")
+    assert (DOCS / "paper_claims.md").read_text(encoding="utf-8") == claims_page(kept, "paper/")
 
 
-def test_the_page_in_the_documentation_tells_every_claim_of_its_figures_and_shows_their_pictures() -> None:
-    text = (DOCS / "paper.md").read_text(encoding="utf-8")
+def test_the_first_page_is_read_in_five_minutes() -> None:
+    """1200 words at 240 a minute; links and pictures count as words here."""
+    assert len((DOCS / "paper.md").read_text(encoding="utf-8").split()) <= 1200
+
+
+def test_the_pages_in_the_documentation_tell_every_claim_of_their_figures_and_show_their_pictures() -> None:
+    text = (DOCS / "paper_claims.md").read_text(encoding="utf-8")
     told = [int(number) for number in re.findall(r'id="figure-(\d+)"', text)]
     assert {3, 4, 5, 6} <= set(told)
     for number in told:
         missing = [claim.quote for claim in figure(number).CLAIMS.values() if claim.quote not in text]
         assert missing == []
-    pictures = re.findall(r"!\[.*?\]\((.*?)\)", text)
+    pictures = re.findall(r"!\[.*?\]\((.*?)\)", text + (DOCS / "paper.md").read_text(encoding="utf-8"))
     assert len(pictures) >= len(told)
     assert all((DOCS / picture).is_file() for picture in pictures)
     assert "--small" not in text

@@ -9,9 +9,16 @@ from functools import cache
 from pathlib import Path
 from typing import Any, Literal, cast
 
-Verdict = Literal["holds", "holds under a stated assumption", "does not hold here"]
-VERDICTS: tuple[Verdict, Verdict, Verdict] = ("holds", "holds under a stated assumption", "does not hold here")
-HOLDS, ASSUMING, FAILS = VERDICTS
+Verdict = Literal["holds", "holds under a stated assumption", "rare", "does not hold here"]
+VERDICTS: tuple[Verdict, Verdict, Verdict, Verdict] = (
+    "holds",
+    "holds under a stated assumption",
+    "rare",
+    "does not hold here",
+)
+HOLDS, ASSUMING, RARE, FAILS = VERDICTS
+# Of random interpretations a claim holds in fewer than this share where it is rare.
+RARE_BELOW = 0.05
 
 
 @dataclass(frozen=True)
@@ -48,7 +55,7 @@ class Finding:
     """The outcome of a test of a claim.
 
     Attributes:
-        assumption: what has to be assumed for it to hold; empty for the other verdicts.
+        assumption: what has to be assumed for it to hold, or where it does if it is rare; empty for the other verdicts.
 
     Raises:
         ValueError: there is no such verdict, or an assumption does not belong to it.
@@ -62,8 +69,15 @@ class Finding:
     def __post_init__(self) -> None:
         if self.verdict not in VERDICTS:
             raise ValueError(f"A verdict is one of {', '.join(VERDICTS)}, but {self.verdict!r} was given.")
-        if bool(self.assumption) != (self.verdict == ASSUMING):
-            raise ValueError(f"An assumption belongs to the verdict {ASSUMING!r} and to no other.")
+        if bool(self.assumption) != (self.verdict in (ASSUMING, RARE)):
+            raise ValueError(f"An assumption belongs to the verdicts {ASSUMING!r} and {RARE!r}, and to no other.")
+
+    @classmethod
+    def by_share(cls, claim: Claim, numbers: str, share: float, where: str) -> Finding:
+        """Finds by the share of random interpretations in which a claim holds, and one of any kind ("" for none)."""
+        if not where:
+            return cls(claim, FAILS, numbers)
+        return cls(claim, ASSUMING if share >= RARE_BELOW else RARE, numbers, where)
 
     def as_dict(self) -> dict[str, str]:
         """Returns it as it is kept beside the figure: with the name of the claim, whose words stay in their table."""

@@ -1,4 +1,4 @@
-"""``haploop paper``: makes the figures of the paper and the page of its claims; ``make paper``: docs/paper.md."""
+"""``haploop paper``: makes the figures of the paper and its two pages; ``make paper``: those in docs/."""
 
 from __future__ import annotations
 
@@ -13,15 +13,28 @@ from haploop.tools.cli.options import WRONG_USE, leave, plain_errors
 from haploop.tools.figure.data import FigureError
 from haploop.tools.render.progress import Stage, bars, silent
 from haploop.tools.render.terminal import markdown_table
-from haploop.tools.studies.choi2022.claims import ASSUMING, VERDICTS, Finding, claims_of, texts_of, words_of
+from haploop.tools.studies.choi2022.claims import (
+    ASSUMING,
+    HOLDS,
+    RARE,
+    RARE_BELOW,
+    VERDICTS,
+    Finding,
+    claims_of,
+    texts_of,
+    words_of,
+)
 from haploop.tools.studies.choi2022.figures import figure, numbers
 from haploop.tools.studies.choi2022.work import Kept, Work
 
-PAGE = "paper.md"
+# The page that is read in five minutes, and that with every claim and figure.
+PAGE, CLAIMS_PAGE = "paper.md", "paper_claims.md"
+# What the first page shows: the ranges of the elements, and which of them wins.
+_SHOWN = (10, 14)
 
 
 def paper(wanted: Sequence[int], out: Path, small: bool, workers: int | None) -> None:
-    """Makes some figures, all when none is named, and writes the page of what the directory then holds."""
+    """Makes some figures, all when none is named, and writes the pages of what the directory then holds."""
     there = numbers()
     for number in wanted:
         if number not in there:
@@ -36,8 +49,17 @@ def paper(wanted: Sequence[int], out: Path, small: bool, workers: int | None) ->
                 make_figure(number, out, small=small, workers=workers, stage=stage)
             except FigureError as error:
                 leave(str(error), WRONG_USE)
-    (out / PAGE).write_text(page(made(out)), encoding="utf-8")
-    print(out / PAGE)
+    write_pages(made(out), out)
+
+
+def write_pages(kept: Mapping[int, Kept], folder: Path, pictures: str = "") -> None:
+    """Writes both pages of what was made, and prints where the first is.
+
+    ``pictures`` is where the pictures lie, seen from the pages, with a slash at the end.
+    """
+    (folder / CLAIMS_PAGE).write_text(claims_page(kept, pictures), encoding="utf-8")
+    (folder / PAGE).write_text(page(kept, pictures), encoding="utf-8")
+    print(folder / PAGE)
 
 
 def make_figure(
@@ -58,25 +80,50 @@ def made(directory: Path) -> dict[int, Kept]:
 
 
 def page(kept: Mapping[int, Kept], pictures: str = "") -> str:
-    """Returns the page in Markdown: answers, the finding of every claim, then the figures.
+    """Returns the first page in Markdown: how many claims hold, what a builder can take from it, and how sure it is."""
+    texts, rows = texts_of("page"), _rows(kept)
+    count = Counter(finding.verdict for _, finding in rows)
+    words = {verdict.split()[-1]: count[verdict] for verdict in VERDICTS}
+    mathematics = [finding.verdict for _, finding in rows if finding.claim.place.startswith(("II", "IV"))]
+    parts = ["# Choi et al. 2022 for builders of haptic devices", texts["intro"], *_trial(kept)]
+    parts.append(texts["count"].format(claims=len(rows), rare_below=f"{100 * RARE_BELOW:g} %", **words))
+    parts.append(
+        texts["mathematics"].format(all=len(mathematics), so=sum(one in (HOLDS, ASSUMING) for one in mathematics))
+    )
+    for supports, heading in ((True, texts["holds"]), (False, texts["hangs"])):
+        answers = [
+            f"- {one['answer']} ([{number}]({CLAIMS_PAGE}#figure-{number}))"
+            for number, one in sorted(kept.items())
+            if one["answer"] and one["supports"] == supports
+        ]
+        # The last figures are nearest to a device that is to be built.
+        parts += [f"## {heading}", "\n".join(answers if supports else reversed(answers))] if answers else []
+    parts += [f"## {texts['sure_title']}", texts["sure"], texts["fair"]]
+    for number in _SHOWN:
+        if number in kept:
+            parts += [f"![{kept[number]['title']}]({pictures}figure_{number}.png)", texts[f"shown_{number}"]]
+    return "\n\n".join(parts) + "\n"
 
-    ``pictures`` is where they lie, seen from the page, with a slash at the end.
-    """
-    claims = {number: claims_of(number) for number in kept}
-    rows = [(number, Finding.from_dict(one, claims[number])) for number in kept for one in kept[number]["findings"]]
-    texts = texts_of("page")
-    parts = ["# The paper, claim by claim", texts["intro"]]
-    parts += [texts["small"]] if any(one["small"] for one in kept.values()) else []
-    # The last figures are nearest to a device that is to be built.
-    answers = [f"- {one['answer']} ([{number}](#figure-{number}))" for number, one in kept.items() if one.get("answer")]
-    parts += ["## What a builder can take from it", "\n".join(reversed(answers))] if answers else []
-    parts += ["## Claims", *_tables(rows)]
+
+def claims_page(kept: Mapping[int, Kept], pictures: str = "") -> str:
+    """Returns the page behind it: the finding of every claim, then all figures."""
+    texts, rows = texts_of("page"), _rows(kept)
+    parts = ["# The paper, claim by claim", texts["claims_intro"], *_trial(kept), "## Claims", *_tables(rows)]
     if missing := [f"{number} ({len(figure(number).CLAIMS)} claims)" for number in numbers() if number not in kept]:
         parts.append(f"Not made here: figure {', '.join(missing)}.")
     parts.append("## Figures")
     for number, one in kept.items():
         parts += _figure(number, one, pictures)
     return "\n\n".join(parts) + "\n"
+
+
+def _rows(kept: Mapping[int, Kept]) -> list[tuple[int, Finding]]:
+    claims = {number: claims_of(number) for number in kept}
+    return [(number, Finding.from_dict(one, claims[number])) for number in kept for one in kept[number]["findings"]]
+
+
+def _trial(kept: Mapping[int, Kept]) -> list[str]:
+    return [texts_of("page")["small"]] if any(one["small"] for one in kept.values()) else []
 
 
 def _tables(rows: list[tuple[int, Finding]]) -> list[str]:
@@ -90,7 +137,8 @@ def _tables(rows: list[tuple[int, Finding]]) -> list[str]:
     cells: dict[str, list[list[str]]] = {section: [] for section in words_of("page", "sections")}
     for number, finding in rows:
         claim = f"“{finding.claim.quote}” ({finding.claim.place})"
-        is_so = f"**holds assuming** {finding.assumption}" if finding.verdict == ASSUMING else f"**{finding.verdict}**"
+        is_so = {ASSUMING: "**holds assuming**", RARE: "**rare**:"}.get(finding.verdict, f"**{finding.verdict}**")
+        is_so = f"{is_so} {finding.assumption}".rstrip()
         section = ".".join(finding.claim.place.partition(",")[0].split(".")[:2])
         cells[section].append([claim, is_so, finding.numbers, f"[{number}](#figure-{number})"])
     for section, title in words_of("page", "sections").items():
@@ -115,8 +163,8 @@ def _figure(number: int, one: Kept, pictures: str) -> list[str]:
 def main() -> None:
     """``python -m haploop.tools.studies.choi2022.command RUN DOCS``: takes a run into the documentation.
 
-    Pictures and findings are copied to DOCS/paper, and the page is written. With DOCS/paper itself for RUN only the
-    page is written anew, from its findings and the words in ``figures.toml``: in a second.
+    Pictures and findings are copied to DOCS/paper, and the pages are written. With DOCS/paper itself for RUN only the
+    pages are written anew, from its findings and the words in ``figures.toml``: in a second.
     """
     if len(sys.argv) != 3:
         leave("Two directories were expected: that of a haploop paper, and where the page goes.", WRONG_USE)
@@ -131,8 +179,7 @@ def main() -> None:
         for number, one in kept.items():
             for name in (f"figure_{number}.json", *(name for name in one["files"] if name.endswith(".png"))):
                 shutil.copyfile(directory / name, pictures / name)
-    (docs / PAGE).write_text(page(kept, "paper/"), encoding="utf-8")
-    print(docs / PAGE)
+    write_pages(kept, docs, "paper/")
 
 
 if __name__ == "__main__":

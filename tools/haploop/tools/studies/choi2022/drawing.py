@@ -17,6 +17,8 @@ from haploop.tools.studies.choi2022.interpretations import (
     InterpretationSpace,
     Option,
     decider,
+    interval,
+    often,
     percent,
     share,
     yes,
@@ -78,23 +80,27 @@ def draw_momentum(ax: Axes, v_m_s: np.ndarray, mass_kg: float, title: str) -> No
 
 def claims_table(
     claims: Mapping[str, str],
+    space: InterpretationSpace,
     alone: Mapping[str, Row],
-    shares: Mapping[str, Sequence[Row]],
+    around: Sequence[Row],
+    random: Sequence[Row],
     found: Sequence[Option],
-    decided: str,
 ) -> str:
     """Returns a table with a row a claim: where it holds, how often, and what decides it.
 
     Args:
         alone: interpretations with a column of yes or no, by heading.
-        shares: sets of interpretations with a column of shares, by heading.
+        around, random: interpretations with a column of shares; the latter with its interval of confidence.
     """
     rows = []
     for name, about in claims.items():
         decides = decider(found, name)
-        held, often = (yes(row, name) for row in alone.values()), (percent(share(s, name)) for s in shares.values())
-        rows.append([f"*{name}*", about, *held, *often, decides.describe(name) if decides else ""])
-    heads = ["claim", "as tested", *alone, *shares, decided]
+        held, shares = (
+            (yes(row, name) for row in alone.values()),
+            (percent(share(around, name)), often(interval(random, name, space))),
+        )
+        rows.append([f"*{name}*", about, *held, *shares, decides.describe(name) if decides else ""])
+    heads = ["claim", "as tested", *alone, "its neighbours", "at random [95 %]", "most with, least with"]
     return markdown_table(heads, rows, numbers=range(2 + len(alone), len(heads) - 1))
 
 

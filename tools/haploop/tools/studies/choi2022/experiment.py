@@ -6,13 +6,12 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from typing import Any, TypedDict
 
 from haploop.launch.scene.file import load
 from haploop.tools.search.random import Effort, Point, Row, Scale
 from haploop.tools.studies.choi2022.claims import ASSUMING, FAILS, Claim, Finding
-from haploop.tools.studies.choi2022.device import FRICTION_N, Setup
+from haploop.tools.studies.choi2022.device import Setup
 from haploop.tools.studies.choi2022.device import nearest as nearest_of_scene_file
 from haploop.tools.studies.choi2022.experiment_measure import gap_N_m, measure
 from haploop.tools.studies.choi2022.interpretations import (
@@ -21,7 +20,8 @@ from haploop.tools.studies.choi2022.interpretations import (
     Option,
     decider,
     holds,
-    percent,
+    interval,
+    often,
     searched,
     share,
 )
@@ -52,16 +52,13 @@ def evaluate(points: Sequence[Point]) -> list[Row]:
 
 
 def search(work: Work) -> Found[Setup]:
-    """Searches for the nearest; stages are those of the search, "nearest" and "friction".
+    """Searches for the nearest; stages are those of the search, and "nearest".
 
-    All are without friction, which takes some forty times as long to run; the nearest alone is run with it, too.
+    All are without friction, which takes some forty times as long to run.
     """
     found = searched(work, SPACE, evaluate, SMALL if work.small else WHOLE, tie=gap_N_m)
-    nearest = setup_of(found.best.point)
-    rough = replace(nearest, friction_N=0.0 if work.small else FRICTION_N)
-    [[with_friction]] = work.map_parallel("the nearest with friction", measure, [[rough]])
-    ends = [found.best.row | {"stage": "nearest"}, with_friction | {"stage": "friction"}]
-    return Found([*(trial.row for trial in [*found.trials, *found.neighbours]), *ends], nearest)
+    rows = [trial.row for trial in [*found.trials, *found.neighbours]]
+    return Found([*rows, found.best.row | {"stage": "nearest"}], setup_of(found.best.point))
 
 
 def describe(setup: Setup) -> str:
@@ -69,9 +66,13 @@ def describe(setup: Setup) -> str:
 
 
 class _Share(TypedDict):
-    """How often a claim holds, what it is likeliest with ("" for nothing), and the nearest setup where it does."""
+    """How often a claim holds, and in words with its interval; what it is likeliest with, and the nearest setup where.
+
+    What it is likeliest with is "" for nothing.
+    """
 
     share: float
+    often: str
     likeliest: str
     nearest: Row | None
 
@@ -95,6 +96,7 @@ def keep_shares(work: Work, claims: Sequence[str], rows: Sequence[Row], options:
         best = min((row for row in rows if holds(row, name)), key=lambda row: row["distance"], default=None)
         kept["claims"][name] = {
             "share": share(rows, name),
+            "often": often(interval(rows, name, SPACE)),
             "likeliest": str(decides.best) if decides else "",
             "nearest": Setup.from_row(best).as_dict() if best else None,
         }
@@ -119,26 +121,34 @@ def nearest_with(work: Work, tested: str) -> Setup | None:
     return Setup.from_row(values) if values else None
 
 
+def often_of(work: Work, tested: str) -> str:
+    """Returns how often a claim holds at random, with its interval; "an unknown share" where no search was run."""
+    kept = _shares(work)
+    return kept["claims"][tested]["often"] if kept else "an unknown share"
+
+
 def findings(work: Work, claims: Mapping[str, Claim], holding: Mapping[str, bool], /, **computed: Any) -> list[Finding]:
     """Finds of some claims, given whether they hold under the nearest interpretation (``finding``)."""
     return [finding(work, claims[name], is_so, **computed) for name, is_so in holding.items()]
 
 
 def finding(work: Work, claim: Claim, is_so: bool, /, **computed: Any) -> Finding:
-    """Finds that a claim holds under the nearest interpretation, else under others, else not at all.
+    """Finds that a claim holds under the nearest interpretation, else under others, often or rarely, else not at all.
 
     Args:
         claim: its assumption is what is assumed besides the nearest interpretation.
         is_so: whether it holds under the nearest.
         computed: what the claim's words name, for the nearest.
     """
-    kept, likeliest, numbers = _shares(work), "", claim.numbers.format(**computed)
-    if claim.tested and kept:
-        found = kept["claims"][claim.tested]
-        numbers += f". In {percent(found['share'])} of {kept['interpretations']} random interpretations"
-        likeliest = found["likeliest"] if found["share"] else ""
-    if is_so:
-        return Finding(claim, ASSUMING, numbers, NEAREST + claim.assumption.format(**computed))
-    if likeliest:
-        return Finding(claim, ASSUMING, numbers, f"another interpretation, likeliest with {likeliest}")
-    return Finding(claim, FAILS, numbers)
+    kept, numbers = _shares(work), claim.numbers.format(**computed)
+    here = NEAREST + claim.assumption.format(**computed) if is_so else ""
+    if not (claim.tested and kept):
+        return (
+            Finding(claim, ASSUMING, numbers, f"{here}, the only one tested")
+            if is_so
+            else Finding(claim, FAILS, numbers)
+        )
+    found = kept["claims"][claim.tested]
+    numbers += f". In {found['often']} of {kept['interpretations']} random interpretations"
+    another = f"another interpretation, likeliest with {found['likeliest']}" if found["likeliest"] else ""
+    return Finding.by_share(claim, numbers, found["share"], here or another)

@@ -8,18 +8,23 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from haploop.controller.dissipation import registry
-from haploop.launch.batch.run import run_batch
 from haploop.logger.summary import Summary
-from haploop.protocol.scene.scene import Scene, by_window
-from haploop.tools.search.bisect import climb, rungs_held
+from haploop.protocol.scene.scene import Scene
+from haploop.tools.search.bisect import climb
 from haploop.tools.search.random import Row
 from haploop.tools.studies.choi2022.claims import words_of
 from haploop.tools.studies.choi2022.device import KINDS, Setup, elements_of
 from haploop.tools.studies.choi2022.interpretations import summed_up
+from haploop.tools.studies.choi2022.steadiness import (
+    BRIEFLY_S,
+    STEP_N_M,
+    STIFFNESSES,
+    is_steady,
+    largest,
+    pressed,
+    run_all,
+)
 
-# From 2.5 N/mm in steps of 0.5 (Choi et al. 2022, V.B.3).
-STIFFNESSES = np.arange(2500.0, 7501.0, 500.0)
 NAMES = (*KINDS, "both")
 _MASSES = (0.0009, 0.0018, 0.0035, 0.006, 0.009, 0.014, 0.02, 0.03)
 # Sizes in N s/m and kg; the paper's own are among them: 2.7 N s/m, 1.8 g, and 2.15 N s/m with 9 g.
@@ -30,15 +35,9 @@ SIZES: dict[str, tuple[tuple[float, ...], ...]] = {
     KINDS[3]: tuple((m,) for m in _MASSES),
     "both": tuple((b, m) for b in (0.8, 2.15, 4.0, 7.0) for m in (0.0035, 0.009, 0.02)),
 }
-# Finer sizes, of the order of the paper's 2.7 N s/m and 9 g: to tune an element, and for the ranges of Fig. 10.
-DAMPINGS = np.geomspace(0.2, 10.0, 24)
-MASSES = np.geomspace(5e-4, 0.04, 30)
-# With friction no two setups run in one batch, so that batches are small.
-_FEWEST = 4
 # For each element of NAMES the steady sizes, shape (stiffnesses, sizes).
 Steady = dict[str, np.ndarray]
 
-STEP_N_M = 500.0
 # The largest stiffness in N/m that the paper steadied: Fig. 10 (damping and bidirectional inertia "also 4.5 N/mm"),
 # Fig. 9 (5.5), and section V.B.4 (6.3). Between grid points every 500 N/m, so that a step away is no disagreement.
 PAPER = {"damping": 4500.0, "bidirectional-inertia": 4500.0, "unidirectional-inertia": 5500.0, "both": 6300.0}
@@ -53,19 +52,9 @@ _UNFELT = 1e-6
 CLAIMS: dict[str, str] = words_of(7, "tested")
 
 
-def is_steady(result: Summary) -> bool:
-    """Tells whether a run has "no unwanted vibration" (Choi et al. 2022, V.B.3): by the verdict over the last 0.5 s.
-
-    Less than an encoder step to either side is none.
-    """
-    return result.get("verdict") == "steady"
-
-
-def _run_all(scenes: Sequence[Scene], *, energy: bool = False) -> list[Summary]:
-    return run_batch([*map(by_window, scenes)], registry(), energy=energy, fewest=_FEWEST)
-
-
-def stiffness_ladder(setups: Sequence[Setup], stiffnesses: np.ndarray = STIFFNESSES) -> list[Steady]:
+def stiffness_ladder(
+    setups: Sequence[Setup], stiffnesses: np.ndarray = STIFFNESSES, names: Sequence[str] = NAMES
+) -> list[Steady]:
     """Returns for each setup and element which sizes leave which walls steady, up to the first wall that none does.
 
     The setups are best of one structure, so that they run in one batch; the stiffnesses in N/m go upwards.
@@ -73,20 +62,21 @@ def stiffness_ladder(setups: Sequence[Setup], stiffnesses: np.ndarray = STIFFNES
 
     def ask(stiffness: float, going: Sequence[tuple[int, str]]) -> list[list[bool]]:
         scenes = [setups[i].scene(stiffness, elements_of(name, *size)) for i, name in going for size in SIZES[name]]
-        steady = iter(map(is_steady, _run_all(scenes)))
+        steady = iter(map(is_steady, run_all([pressed(scene, BRIEFLY_S) for scene in scenes])))
         return [[next(steady) for _ in SIZES[name]] for _, name in going]
 
-    members = [(i, name) for i in range(len(setups)) for name in NAMES]
-    found = [{name: np.zeros((len(stiffnesses), len(SIZES[name])), bool) for name in NAMES} for _ in setups]
+    members = [(i, name) for i in range(len(setups)) for name in names]
+    found = [{name: np.zeros((len(stiffnesses), len(SIZES[name])), bool) for name in names} for _ in setups]
     for (i, name), rows in climb(members, stiffnesses.tolist(), ask, passes=any).items():
         found[i][name][: len(rows)] = rows
     return found
 
 
-def largest(steady: np.ndarray, stiffnesses: np.ndarray = STIFFNESSES) -> float:
-    """Returns the largest stiffness that some size leaves steady, as all softer ones do; N/m, 0 where none is."""
-    count = rungs_held(sizes.any() for sizes in steady)
-    return float(stiffnesses[count - 1]) if count else 0.0
+def largest_of(one: tuple[Setup, str]) -> float:
+    """Returns the largest stiffness in N/m that an element steadies, of the sizes that the search tries."""
+    setup, name = one
+    [steady] = stiffness_ladder([setup], names=[name])
+    return largest(steady[name])
 
 
 def measure(setups: Sequence[Setup]) -> list[Row]:
@@ -95,10 +85,10 @@ def measure(setups: Sequence[Setup]) -> list[Row]:
     The setups are best of one structure, so that they run in one batch.
     """
     ladders = stiffness_ladder(setups)
-    booked = _run_all([_booked(setup, k) for setup in setups for k in BOOKED_AT_N_M], energy=True)
-    pairs = _run_all([setup.scene(PAIR_AT_N_M, elements_of("both", *PAIR)) for setup in setups])
+    booked = run_all([_booked(setup, k) for setup in setups for k in BOOKED_AT_N_M], energy=True)
+    pairs = run_all([pressed(setup.scene(PAIR_AT_N_M, elements_of("both", *PAIR)), BRIEFLY_S) for setup in setups])
     hardest = [_stiffest(setup, steady["both"]) for setup, steady in zip(setups, ladders, strict=True)]
-    stiffest = _run_all(hardest, energy=True)
+    stiffest = run_all(hardest, energy=True)
     found = zip(setups, ladders, booked[::2], booked[1::2], pairs, stiffest, strict=True)
     return [_row(setup, steady, two, pair, most) for setup, steady, *two, pair, most in found]
 
@@ -138,6 +128,7 @@ def _row(setup: Setup, steady: Steady, booked: Sequence[Summary], pair: Summary,
         "10 narrows": len(counts) > 1 and bool(counts[-1] < counts[0]),
         "10 damping 4.5": abs(damping - 4500.0) <= STEP_N_M,
         "10 bidirectional 4.5": abs(two_way - 4500.0) <= STEP_N_M,
+        "10 helps": min(damping, two_way, one_way) > of[KINDS[0]],
         "10 larger": one_way > max(damping, two_way),
         "10 wider": bool(steady[KINDS[3]].sum() > steady[KINDS[2]].sum()),
         "10 exclusive": bool((two & ~one).any() and (one & ~two).any() and not (one & two).any()),

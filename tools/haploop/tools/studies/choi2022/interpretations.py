@@ -18,6 +18,7 @@ import numpy as np
 
 from haploop.tools.render.units import amount
 from haploop.tools.search import random
+from haploop.tools.search.intervals import Interval, share_interval
 from haploop.tools.search.random import Effort, Evaluate, Group, Point, Row, Space, random_search
 from haploop.tools.studies.choi2022.claims import words_of
 from haploop.tools.studies.choi2022.work import Work
@@ -121,6 +122,17 @@ def holds(row: Row, claim: str) -> bool:
 def share(rows: Sequence[Row], claim: str) -> float:
     """Returns the share of interpretations under which a claim holds; NaN of none."""
     return float(np.mean([holds(row, claim) for row in rows])) if rows else math.nan
+
+
+def interval(rows: Sequence[Row], claim: str, space: Space) -> Interval:
+    """Returns that share with its interval of confidence; interpretations of the same choices were drawn together."""
+    return share_interval([holds(row, claim) for row in rows], [[row[key] for key in space.choices] for row in rows])
+
+
+def often(of: Interval) -> str:
+    """Returns a share in percent with its interval of confidence: ``"1.6 % [0.7, 3.4]"``."""
+    low, high = (percent(end).removesuffix(" %") for end in (of.low, of.high))
+    return percent(of.value) if math.isnan(of.value) else f"{percent(of.value)} [{low}, {high}]"
 
 
 def percent(value: float) -> str:

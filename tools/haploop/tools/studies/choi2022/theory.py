@@ -27,11 +27,12 @@ FREQUENCIES_HZ = np.linspace(2.0, 498.0, 249)
 # Age of a reading of an MPU-9250 at its setting of 420 Hz.
 OLD_S = 1.38e-3
 DELAYS_S = np.linspace(0.0, 3e-3, 121)
-# Sizes tried for every element: from next to nothing to beyond what any loop here bears. N s/m, and kg.
-DAMPINGS = np.geomspace(0.1, 40.0, 10)
-MASSES = np.geomspace(3e-4, 0.08, 10)
+# Sizes tried first for every element: from next to nothing to beyond what any loop here bears. N s/m, and kg.
+DAMPINGS = np.geomspace(0.1, 40.0, 16)
+MASSES = np.geomspace(3e-4, 0.08, 16)
 _SOFTEST, _STIFFEST, _COARSE, _HALVINGS = 50.0, 60e3, 30, 4
-_REFINED = 3
+# Around so many of the best sizes, so many more on either side, so often.
+_PEAKS, _FINER, _ZOOMS = 2, 2, 3
 # A mass that adds nothing but keeps its place in the map, and one to take the map's slope from; kg.
 _NO_MASS, _SOME_MASS = 1e-15, 1e-3
 _STARTS, _TICKS, _SETTLED, _RESCALED_EVERY = 3, 1200, 400, 50
@@ -132,11 +133,13 @@ def limits(setup: Setup) -> dict[str, Best]:
     def exact(kind: str, sizes: np.ndarray) -> np.ndarray:
         return np.array([first_end(setup, kind, size) for size in sizes])
 
+    nothing = first_end(setup, KINDS[0], 0.0)
+    gated = GatedMap.from_scene(setup.linear_scene())
     return {
-        KINDS[0]: Best(first_end(setup, KINDS[0], 0.0), 0.0),
-        KINDS[1]: _best(partial(exact, KINDS[1]), DAMPINGS),
-        KINDS[2]: _best(partial(exact, KINDS[2]), MASSES),
-        KINDS[3]: _best(partial(gated_ends, GatedMap.from_scene(setup.linear_scene())), MASSES),
+        KINDS[0]: Best(nothing, 0.0),
+        KINDS[1]: best_size(partial(exact, KINDS[1]), DAMPINGS, nothing),
+        KINDS[2]: best_size(partial(exact, KINDS[2]), MASSES, nothing),
+        KINDS[3]: best_size(partial(gated_ends, gated), MASSES, nothing),
     }
 
 
@@ -168,13 +171,31 @@ def gated_ends(gated: GatedMap, masses: np.ndarray) -> np.ndarray:
     return np.array([found[i][0] for i in range(len(masses))])
 
 
-def _best(ends: Callable[[np.ndarray], np.ndarray], sizes: np.ndarray) -> Best:
+def best_size(ends: Callable[[np.ndarray], np.ndarray], sizes: np.ndarray, nothing: float) -> Best:
+    """Returns the size that bears the most, 0 among them, searched between the neighbours of the best in rounds.
+
+    The steps between neighbours, in the logarithm, shrink threefold a round. Around two peaks of what was tried, since
+    what is borne may have several in the size.
+
+    Args:
+        ends: from sizes to the stiffnesses that they bear.
+        sizes: tried first, rising.
+        nothing: what is borne without the element.
+    """
     found = ends(sizes)
+    for _ in range(_ZOOMS):
+        # Beyond the ends is nothing better.
+        around = np.concatenate([[-1.0], found, [-1.0]])
+        peaks = np.flatnonzero((found >= around[:-2]) & (found >= around[2:]))
+        peaks = peaks[np.argsort(found[peaks])][-_PEAKS:]
+        pairs = {(max(i + side, 0), min(i + side + 1, len(sizes) - 1)) for i in peaks.tolist() for side in (-1, 0)}
+        finer = [np.geomspace(sizes[i], sizes[j], _FINER + 2)[1:-1] for i, j in pairs if i < j]
+        more = np.concatenate(finer)
+        sizes, found = np.append(sizes, more), np.append(found, ends(more))
+        order = np.argsort(sizes)
+        sizes, found = sizes[order], found[order]
     i = int(found.argmax())
-    finer = np.geomspace(sizes[max(i - 1, 0)], sizes[min(i + 1, len(sizes) - 1)], _REFINED + 2)[1:-1]
-    sizes, found = np.append(sizes, finer), np.append(found, ends(finer))
-    i = int(found.argmax())
-    return Best(float(found[i]), float(sizes[i]))
+    return Best(float(found[i]), float(sizes[i])) if found[i] > nothing else Best(nothing, 0.0)
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ from haploop.launch.scene.file import load
 from haploop.launch.scene.toml_writer import to_toml
 from haploop.logger.log.recording import MemoryLog, Recording
 from haploop.logger.summary import Summary
-from haploop.protocol.scene.scene import Hand, Scene, Wall
+from haploop.protocol.scene.scene import Hand, Scene, Wall, by_window
 from haploop.tools.cost.grid import scenes_folder
 from haploop.tools.executor.executors import make_executor, map_parallel
 from haploop.tools.executor.pool import Pool
@@ -40,6 +40,7 @@ class Kept(TypedDict):
     number: int
     title: str
     answer: str
+    supports: bool
     caption: str
     seen: dict[str, str]
     small: bool
@@ -58,6 +59,7 @@ class Work:
     Attributes:
         texts: of the figure, by name: its title among them.
         answer: what a builder of devices can take from it, in a sentence or two; empty for what has none.
+        supports: whether the answer says that what the paper claims holds.
         caption: what is to be seen, in a sentence or two; that of the texts unless set.
         notes: whole sections in Markdown that go below the figure on the page.
     """
@@ -68,7 +70,7 @@ class Work:
         self.out, self.number, self.small, self.workers, self.stage = out, number, small, workers, stage
         self.kinds = registry()
         self.texts = texts_of(number)
-        self.answer, self.caption = "", self.texts.get("caption", "")
+        self.answer, self.supports, self.caption = "", False, self.texts.get("caption", "")
         self.notes: list[str] = []
         self._files: list[str] = []
         self._seen: dict[str, str] = {}
@@ -97,6 +99,10 @@ class Work:
     def tell(self, name: str, /, **computed: Any) -> str:
         """Returns one of the texts with what was computed in the place of names in braces."""
         return self.texts[name].format(**computed)
+
+    def conclude(self, name: str = "", /, *, supports: bool, **computed: Any) -> None:
+        """Sets the answer: the text ``answer``, or ``answer_NAME`` of several, which the caller chooses by a rule."""
+        self.answer, self.supports = self.tell(f"answer_{name}" if name else "answer", **computed), bool(supports)
 
     def text(self, name: str, text: str) -> None:
         self.path(name).write_text(text, encoding="utf-8")
@@ -129,6 +135,7 @@ class Work:
             "number": self.number,
             "title": self.texts["title"],
             "answer": self.answer,
+            "supports": self.supports,
             "caption": self.caption,
             "seen": self._seen,
             "small": self.small,
@@ -172,8 +179,9 @@ class Run(NamedTuple):
 
 
 def run(scene: Scene) -> Run:
+    """Runs a scene; its verdict is the cheap one, of the last half second alone."""
     memory = MemoryLog()
-    summary = run_in_process(scene, registry(), memory=memory)
+    summary = run_in_process(by_window(scene), registry(), memory=memory)
     return Run(scene, summary, memory.recording())
 
 

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from haploop.tools.figure.style import ELEMENTS, FAINT, GREY, dress, empty_figure, legend, plain_numbers
+from haploop.tools.render.terminal import markdown_table
 from haploop.tools.render.units import amount
 from haploop.tools.studies.choi2022.claims import Finding, claims_of
 from haploop.tools.studies.choi2022.device import KINDS, Setup, elements_of
 from haploop.tools.studies.choi2022.drawing import COLOURS, INSIDE, SHORT, UPPER_LEFT, legend_of_colours
 from haploop.tools.studies.choi2022.experiment import findings, nearest
-from haploop.tools.studies.choi2022.experiment_measure import DAMPINGS, LOW_KG, MASSES, is_steady, largest
+from haploop.tools.studies.choi2022.experiment_measure import LOW_KG
+from haploop.tools.studies.choi2022.steadiness import STEP_N_M, STIFFNESSES
 from haploop.tools.studies.choi2022.theory import (
     DELAYS_S,
     FREQUENCIES_HZ,
@@ -22,6 +24,7 @@ from haploop.tools.studies.choi2022.theory import (
     felt_with,
     swings_at_Hz,
 )
+from haploop.tools.studies.choi2022.tuning import Range, Reached, beats, reached, sizes_of, tried
 from haploop.tools.studies.choi2022.work import Work
 
 if TYPE_CHECKING:
@@ -29,8 +32,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 CLAIMS = claims_of(10)
-# From 2.5 N/mm in steps of 0.5 (Choi et al. 2022, V.B.3), to where nothing is steady any more.
-STIFFNESSES = np.arange(2500.0, 8001.0, 500.0)
 # Felt by a hand at 100 Hz, between 8.5 um at 20 Hz and 0.06 um at 320 Hz in logarithms (Israr, Choi and Tan 2006).
 FELT_M = 0.5e-6
 _DAMPS = {
@@ -44,68 +45,63 @@ _DAMPS = {
 def make(work: Work) -> list[Finding]:
     """Draws the ranges, and the gate of eq. 9."""
     setup = nearest(work)
-    stiffnesses = STIFFNESSES[::4] if work.small else STIFFNESSES
-    found = _ranges(work, setup, stiffnesses)
-    work.figure(_draw(found, stiffnesses), "figure_10", work.tell("seen"))
+    grids = {kind: tried(work, setup, kind, sizes_of(kind, work.small)) for kind in KINDS}
+    most = {kind: reached(work, setup, kind, grid) for kind, grid in grids.items()}
+    work.figure(_draw(grids, most), "figure_10", work.tell("seen", starts=grids[KINDS[0]].swings_m.shape[-1]))
     work.figure(_gate(setup), "figure_10_gate", work.tell("seen_gate"))
-    columns = {"stiffness_N_m": stiffnesses}
-    for kind, one in found.items():
-        columns |= {f"{kind}_size_N_s_m_or_kg": one.sizes, f"{kind}_steady": one.steady}
+    columns: dict[str, np.ndarray] = {"stiffness_N_m": STIFFNESSES}
+    for kind, one in grids.items():
+        columns |= {f"{kind}_size_N_s_m_or_kg": one.sizes[:, 0], f"{kind}_swing_m": one.swings_m}
     work.data("figure_10", columns)
     work.scene("figure_10", setup.scene(4500.0, elements_of(KINDS[3], 0.009)))
-    work.notes = [_why(work, setup), _felt(work, found)]
-    most = {kind: largest(one.steady, stiffnesses) for kind, one in found.items()}
-    reached = ", ".join(f"{SHORT[kind]} {stiffness / 1e3:.1f}" for kind, stiffness in most.items())
-    work.answer = work.tell("answer", sizes=len(found[KINDS[1]].sizes), largest=reached)
-    return _findings(work, found, stiffnesses, most, reached)
+    bears = ", ".join(f"{SHORT[kind]} {one.describe()}" for kind, one in most.items())
+    least, uni = (max((most[kind] for kind in of), key=lambda one: one.mean.value) for of in (KINDS[1:3], KINDS[3:]))
+    computed = {"starts": len(uni.steady), "bears": bears, "uni": uni.describe(), "others": least.describe()}
+    is_first = all(beats(uni, most[kind]) for kind in KINDS[1:3])
+    work.conclude("first" if is_first else "not_first", supports=is_first, **computed)
+    work.notes = [_words(work, most, bears), _why(work, setup), _felt(work, grids)]
+    return _findings(work, grids, most, bears)
 
 
-class Range(NamedTuple):
-    """The range of one element.
-
-    Attributes:
-        sizes: N s/m or kg, shape (sizes,).
-        steady: shape (stiffnesses, sizes).
-        swings_m: peak to peak of the position over the last half second; infinite where the run broke off.
-    """
-
-    sizes: np.ndarray
-    steady: np.ndarray
-    swings_m: np.ndarray
-
-
-def _ranges(work: Work, setup: Setup, stiffnesses: np.ndarray) -> dict[str, Range]:
-    step = 6 if work.small else 1
-    of_kinds = dict(zip(KINDS, (np.zeros(1), DAMPINGS[::step], MASSES[::step], MASSES[::step]), strict=True))
-    cells = [(kind, k, float(size)) for kind in KINDS for k in stiffnesses for size in of_kinds[kind]]
-    results = iter(work.run_all("stable ranges", [setup.scene(k, elements_of(kind, size)) for kind, k, size in cells]))
-    found = {}
-    for kind, sizes in of_kinds.items():
-        here = [[next(results) for _ in sizes] for _ in stiffnesses]
-        swings_m = [[one["window"]["oscillation_m"] if "window" in one else np.inf for one in row] for row in here]
-        found[kind] = Range(sizes, np.array([list(map(is_steady, row)) for row in here]), np.array(swings_m))
-    return found
+def _words(work: Work, most: dict[str, Reached], bears: str) -> str:
+    rows = [
+        [
+            SHORT[kind],
+            ", ".join(f"{size:.3g} N s/m" if kind == KINDS[1] else f"{1e3 * size:.3g} g" for size in one.sizes),
+            one.describe(),
+            f"{min(one.steady) / 1e3:.1f} to {max(one.steady) / 1e3:.1f}",
+            f"{one.unfelt} of {len(one.steady)}",
+            f"{one.twice / 1e3:.1f}",
+        ]
+        for kind, one in most.items()
+    ]
+    heads = ["element", "best size", "N/mm, mean [95 %]", "least to most", "nothing felt there", "swings twice as wide"]
+    return work.tell("words", table=markdown_table(heads, rows, numbers=(2, 3, 4, 5)), bears=bears)
 
 
-def _draw(found: dict[str, Range], stiffnesses: np.ndarray) -> Figure:
+def _draw(found: dict[str, Range], most: dict[str, Reached]) -> Figure:
     """Draws full marks for what is steady, faint ones for what was tried besides; right, which inertia is."""
 
     def marks(ax: Axes, sizes: np.ndarray, there: np.ndarray, colour: str, label: str = "") -> None:
         rows, columns = np.nonzero(there)
         style, size = (".", 2.5) if colour == FAINT else ("s", 4.5)
-        ax.plot(sizes[columns], stiffnesses[rows] / 1e3, style, color=colour, markersize=size, label=label)
+        ax.plot(sizes[columns], STIFFNESSES[rows] / 1e3, style, color=colour, markersize=size, label=label)
 
     figure = empty_figure(13.0, 4.6)
     axes = figure.subplots(1, 4, sharey=True)
     for ax, kind in zip(axes, KINDS[1:], strict=False):
         unit, label = (1.0, "damping (N s/m)") if kind == "damping" else (1e3, "inertia (g)")
-        sizes, steady, _ = found[kind]
+        sizes, steady = found[kind].sizes[:, 0], found[kind].steady
         marks(ax, unit * sizes, ~steady, FAINT)
         marks(ax, unit * sizes, steady, COLOURS[kind])
-        most = largest(steady, stiffnesses) / 1e3
-        dress(ax, f"{SHORT[kind]}: up to {most:.1f} N/mm", label, "wall stiffness (N/mm)" * (kind == KINDS[1]))
+        dress(
+            ax,
+            f"{SHORT[kind]}: up to {most[kind].describe()} N/mm",
+            label,
+            "wall stiffness (N/mm)" * (kind == KINDS[1]),
+        )
     two, one = (found[kind].steady for kind in KINDS[2:])
-    sizes_g = found[KINDS[2]].sizes * 1e3
+    sizes_g = found[KINDS[2]].sizes[:, 0] * 1e3
     marks(axes[3], sizes_g, two & one, GREY, "both")
     marks(axes[3], sizes_g, two & ~one, COLOURS[KINDS[2]], "bidirectional only")
     marks(axes[3], sizes_g, one & ~two, COLOURS[KINDS[3]], "unidirectional only")
@@ -119,7 +115,7 @@ def _draw(found: dict[str, Range], stiffnesses: np.ndarray) -> Figure:
 
 
 def _felt(work: Work, found: dict[str, Range]) -> str:
-    left = np.concatenate([one.swings_m[one.steady] for one in found.values()])
+    left = np.concatenate([one.swings_m[one.steady].ravel() for one in found.values()])
     if not len(left):
         return ""
     median, moving = amount(float(np.median(left)), "m", 2), np.sum(left > FELT_M)
@@ -155,29 +151,28 @@ def _bands(codes: np.ndarray, code: int) -> str:
     return f"{' and '.join(bands)} Hz" if bands else "no frequency"
 
 
-def _findings(
-    work: Work, found: dict[str, Range], stiffnesses: np.ndarray, most: dict[str, float], reached: str
-) -> list[Finding]:
+def _findings(work: Work, found: dict[str, Range], most: dict[str, Reached], bears: str) -> list[Finding]:
     damping, two, one = (found[kind].steady for kind in KINDS[1:])
     sizes = damping.sum(axis=1)
-    widths = ", ".join(f"{n} at {k / 1e3:g}" for k, n in zip(stiffnesses, sizes, strict=True) if n)
+    widths = ", ".join(f"{n} at {k / 1e3:g}" for k, n in zip(STIFFNESSES, sizes, strict=True) if n)
     cells = np.array([two & ~one, one & ~two, two & one])
-    low = cells[:, :, found[KINDS[2]].sizes <= LOW_KG].sum(axis=(1, 2))
+    low = cells[:, :, found[KINDS[2]].sizes[:, 0] <= LOW_KG].sum(axis=(1, 2))
     computed = {
         "sizes": damping.shape[1],
         "widths": widths or "none",
-        "largest": reached,
+        "largest": bears,
         "one": one.sum(),
         "two": two.sum(),
-        "all": "{}, {}, {} runs".format(*cells.sum(axis=(1, 2))),
+        "all": "{}, {}, {} walls".format(*cells.sum(axis=(1, 2))),
         "low_g": 1e3 * LOW_KG,
         "low": "{}, {}, {}".format(*low),
     }
+    near = {kind: abs(1e3 * most[kind].mean.value - 4500.0) <= STEP_N_M for kind in KINDS[1:3]}
     holding = {
         "wide": bool(sizes[0] > 0 and (np.diff(sizes) <= 1).all() and sizes[-1] < sizes[0]),
-        "damping": abs(most[KINDS[1]] - 4500.0) <= 500.0,
-        "similar": abs(most[KINDS[2]] - 4500.0) <= 500.0,
-        "larger": bool(one.sum() > two.sum() and most[KINDS[3]] > most[KINDS[2]]),
+        "damping": near[KINDS[1]],
+        "similar": near[KINDS[2]],
+        "larger": bool(one.sum() > two.sum()) and beats(most[KINDS[3]], most[KINDS[2]]),
         "exclusive": bool((low[:2] > 0).all() and low[2] == 0),
     }
     return findings(work, CLAIMS, holding, **computed)

@@ -23,7 +23,11 @@ if TYPE_CHECKING:
 
 CLAIMS = claims_of(14)
 
-_MODES_HZ = (60.0, 90.0, 125.0, 170.0, 225.0, 300.0, 400.0, 600.0)
+_MODES_HZ = (60.0, 80.0, 105.0, 140.0, 185.0, 245.0, 325.0, 430.0, 570.0)
+# Of the row that is looked at more closely.
+_FINE_HZ = tuple(np.geomspace(45.0, 700.0, 20).tolist())
+# In so many of the rows a rule has to hold to be told as one.
+_RULE = 0.9
 _DELAYS_S = (0.0, 0.0005, 0.001, 0.0015, 0.002)
 _BASE = Setup(
     mode_Hz=225.0, near_share=0.3, mode_damping=0.02, push_N=3.0, entry_m_s=0.2, hand=1.0, delay_s=0.0005,
@@ -55,11 +59,39 @@ def make(work: Work) -> list[Finding]:
     grid = {"mode_Hz": modes, "delay_s": delays}
     work.data("figure_14", grid | {"stiffness_N_m": stiffness, "size_N_s_m_or_kg": sizes})
     work.scene("figure_14", setups[len(setups) // 2].scene(2000.0, elements_of(KINDS[3], 0.009)))
-    soft, note = _drives(work)
+    band, table = _band(work)
     finding, winners = _higher(stiffness)
-    work.notes.append(note)
-    work.answer = work.tell("answer", cells=len(setups), winners=winners, **soft)
+    rows = soft_and_stiff(stiffness)
+    count, follow, against = len(rows), int(np.sum(rows > 0)), int(np.sum(rows < 0))
+    computed = {"band": band, "rows": count, "follow": follow, "against": against, "cells": len(setups)}
+    computed |= {
+        "scan": f"{_FINE_HZ[0]:.0f} to {_FINE_HZ[-1]:.0f}",
+        "winners": winners,
+        "soft_Hz": modes[0],
+        "stiff_Hz": modes[-1],
+    }
+    work.notes.append(work.tell("rows", table=table, **computed))
+    work.conclude("rule" if follow >= _RULE * count else "no_rule", supports=False, **computed)
     return [finding]
+
+
+def soft_and_stiff(stiffness: np.ndarray) -> np.ndarray:
+    """Returns for each row of modes whether the softest drive asks for an inertia and the stiffest for damping.
+
+    Args:
+        stiffness: shape (..., modes, kinds).
+
+    Returns:
+        1 where it is so, -1 where it is the other way round, 0 where one of the two is not clear.
+    """
+    ahead = _ahead(stiffness)[..., [0, -1]].reshape(-1, 2)
+    clear = np.where(ahead >= DRAW, 1, np.where(ahead <= 1.0 / DRAW, -1, 0))
+    return np.where(clear[:, 0] == -clear[:, 1], clear[:, 0], 0)
+
+
+def _ahead(stiffness: np.ndarray) -> np.ndarray:
+    """Returns the stiffness that the better inertia bears over what damping does."""
+    return stiffness[..., 2:].max(axis=-1) / np.maximum(stiffness[..., 1], 1.0)
 
 
 def winner(stiffness: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -117,17 +149,29 @@ def _higher(stiffness: np.ndarray) -> tuple[Finding, str]:
     return finding, winners
 
 
-def _drives(work: Work) -> tuple[dict[str, float | str], str]:
-    """Returns how the softness of a drive decides: what the texts name, and a note with a table."""
-    modes = (125.0, 450.0) if work.small else (100.0, 125.0, 170.0, 225.0, 300.0, 450.0, 600.0)
-    found = work.map_parallel("soft and stiff drives", limits, [replace(_BASE, mode_Hz=mode) for mode in modes])
+def _band(work: Work) -> tuple[str, str]:
+    """Returns where on one row an inertia bears more than damping, in words, and that row as a table."""
+    modes = np.array(_FINE_HZ[::6] if work.small else _FINE_HZ)
+    found = work.map_parallel("one row, finely", limits, [replace(_BASE, mode_Hz=float(mode)) for mode in modes])
     heads = ["mode (Hz)", *(SHORT[kind] for kind in KINDS)]
-    rows = [[f"{mode:g}", *(_describe(one[kind]) for kind in KINDS)] for mode, one in zip(modes, found, strict=True)]
-    ahead = [max(one[kind].stiffness for kind in KINDS[2:]) / max(one[KINDS[1]].stiffness, 1.0) for one in found]
-    first = next((mode for mode, times in zip(modes, ahead, strict=True) if times < 1.0), None)
-    turns = f"up to {modes[modes.index(first) - 1]:g} Hz; from {first:g} Hz on damping does" if first else "throughout"
-    soft = {"soft": ahead[0], "soft_Hz": modes[0], "stiff": ahead[-1], "stiff_Hz": modes[-1], "turns": turns}
-    return soft, work.tell("drives", table=markdown_table(heads, rows, numbers=range(len(heads))), **soft)
+    rows = [[f"{mode:.0f}", *(_describe(one[kind]) for kind in KINDS)] for mode, one in zip(modes, found, strict=True)]
+    ahead = _ahead(np.array([[one[kind].stiffness for kind in KINDS] for one in found]))
+    most = int(ahead.argmax())
+    band = ", ".join(f"{low:.0f} to {high:.0f} Hz" for low, high in bands_Hz(modes, ahead))
+    words = f"{band or 'no frequency'} (at most ×{ahead[most]:.1f}, at {modes[most]:.0f} Hz)"
+    return words, markdown_table(heads, rows, numbers=range(len(heads)))
+
+
+def bands_Hz(modes_Hz: np.ndarray, ahead: np.ndarray) -> list[tuple[float, float]]:
+    """Returns the bands of modes in which a ratio is above 1, their ends where its logarithm passes through 0."""
+    logs, places = np.log(np.maximum(ahead, 1e-6)), np.log(modes_Hz)
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], logs > 0.0, [False]])))
+    bands = []
+    for first, end in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
+        low = places[0] if first == 0 else np.interp(0.0, logs[[first - 1, first]], places[[first - 1, first]])
+        high = places[-1] if end == len(logs) else np.interp(0.0, logs[[end, end - 1]], places[[end, end - 1]])
+        bands.append((float(np.exp(low)), float(np.exp(high))))
+    return bands
 
 
 def _describe(best: Best) -> str:

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from haploop.controller.dissipation import registry
+from haploop.launch.batch.run import run_batch
 from haploop.logger.summary import Summary
 from haploop.protocol.scene.paths import without
 from haploop.protocol.scene.scene import Encoder, Scene
@@ -26,6 +28,7 @@ CLAIMS = claims_of(3)
 # Coarse enough to be seen.
 _RESOLUTION_M = 1e-4
 _SPEED_M_S = 0.1
+_PHASES, _GOLDEN = 256, 0.5 * (5.0**0.5 - 1.0)
 _FILL = "#E8A0A0"
 
 
@@ -54,9 +57,12 @@ def make(work: Work) -> list[Finding]:
         _draw(ax, name, curve, walls[name])
     work.figure(figure, "figure_3")
     work.data("figure_3", columns)
-    sampled, quantised, delayed = (_J(-wall["true_J"]) for wall in walls.values())
-    work.answer = work.tell("answer", sampled=sampled, quantised=quantised, delayed=delayed)
-    return _findings(curves, walls)
+    leaks_J = {name: leaks_of_phases_J(scene, 16 if work.small else _PHASES) for name, scene in scenes.items()}
+    work.data("figure_3_phases", {f"leak_{number}_J": leak for number, leak in enumerate(leaks_J.values())})
+    sampled, quantised, delayed = map(_spread, leaks_J.values())
+    supports = min(map(np.min, leaks_J.values())) > 0.0
+    work.conclude(supports=supports, sampled=sampled, quantised=quantised, delayed=delayed)
+    return _findings(curves, walls, leaks_J)
 
 
 def single_contact(title: str, *, delay_s: float = 0.0, **tables: Any) -> Scene:
@@ -70,6 +76,26 @@ def single_contact(title: str, *, delay_s: float = 0.0, **tables: Any) -> Scene:
     device = replace(scene.device, position=start, velocity=-_SPEED_M_S, damping=0.0)
     clock = replace(scene.clock, round_trip_delay=delay_s)
     return replace(scene, title=title, duration=0.1, clock=clock, device=device, **tables)
+
+
+def leaks_of_phases_J(scene: Scene, count: int) -> np.ndarray:
+    """Returns the wall's leak in J, whatever the phase: for entries spread over the tick, and walls over a count.
+
+    In the scene as drawn the device covers just one count in a tick, and meets the wall at a tie of the rounding.
+    """
+    wall, way_m = wall_of(scene), _SPEED_M_S * PERIOD_S
+    scenes = []
+    for i in range(count):
+        # Both phases are even together (Korobov's lattice by the golden ratio).
+        shift, start = _RESOLUTION_M * (i * _GOLDEN % 1.0), way_m * (i + 0.5) / count
+        device = replace(scene.device, position=scene.device.position + shift + start)
+        scenes.append(replace(scene, device=device, wall=replace(wall, position=wall.position + shift)))
+    return np.array([-one["energy"]["wall"]["true_J"] for one in run_batch(scenes, registry())])
+
+
+def _spread(values_J: np.ndarray) -> str:
+    """Returns mean and standard deviation: ``"95.1 ± 5.4 µJ"``."""
+    return f"{1e6 * values_J.mean():.1f} ± {1e6 * values_J.std(ddof=1):.1f} µJ"
 
 
 def _draw(ax: Axes, name: str, curve: Curve, wall: Summary) -> None:
@@ -95,7 +121,9 @@ def _taken_and_given_J(depth: np.ndarray, force: np.ndarray) -> tuple[float, flo
     return float(np.maximum(work, 0.0).sum()), float(np.maximum(-work, 0.0).sum())
 
 
-def _findings(curves: Mapping[str, Curve], walls: Mapping[str, Summary]) -> list[Finding]:
+def _findings(
+    curves: Mapping[str, Curve], walls: Mapping[str, Summary], leaks_J: Mapping[str, np.ndarray]
+) -> list[Finding]:
     energies = {name: _taken_and_given_J(*one) for name, one in curves.items()}
     # -sum f dx: the force points out, so what it gives on the way out is counted positive: counter-clockwise.
     areas = [float(-np.sum(force[:-1] * np.diff(depth))) for depth, force in curves.values()]
@@ -113,8 +141,10 @@ def _findings(curves: Mapping[str, Curve], walls: Mapping[str, Summary]) -> list
     summed, formula = _telescoped()
     return [
         CLAIMS["generates"].holds_if(
-            all(gave > took for took, gave in energies.values()),
+            all(gave > took for took, gave in energies.values()) and min(map(np.min, leaks_J.values())) > 0.0,
             energies="; ".join(f"{name}: took {_J(took)}, gave {_J(gave)}" for name, (took, gave) in energies.items()),
+            leaks="; ".join(f"{name} {_spread(leak)}" for name, leak in leaks_J.items()),
+            count=len(leaks_J["sampled and held"]),
             exact=_J(exact),
             closed=_J(closed),
         ),

@@ -43,7 +43,8 @@ def make(work: Work) -> list[Finding]:
     work.data("figure_5", {"frequency_Hz": frequencies, **named, **books})
     ends = {(kind, late): _first_negative(frequencies, measured[kind, late]) for kind, late in measured}
     both = (f"{kind.replace('-', ' ')} {_hertz(ends[kind, 0])} and {_hertz(ends[kind, 2])}" for kind in KINDS[1:])
-    work.answer = work.tell("answer", ends=", ".join(both))
+    supports = all(min(ends[BI, late], ends[UNI, late]) > ends["damping", late] for late in (0, 2))
+    work.conclude(supports=supports, ends=", ".join(both))
     return [*_on_alternation(), *_on_unidirectional(frequencies, measured, ends)]
 
 

@@ -26,14 +26,16 @@ from haploop.tools.linear.one_tick import OneTickMap
 from haploop.tools.render.terminal import markdown_table
 from haploop.tools.render.units import amount
 from haploop.tools.search.random import Point, Row
-from haploop.tools.studies.choi2022.claims import ASSUMING, FAILS, HOLDS, Finding, claims_of
+from haploop.tools.studies.choi2022.claims import HOLDS, RARE_BELOW, Finding, claims_of
 from haploop.tools.studies.choi2022.drawing import claims_table, search_words, share_map
 from haploop.tools.studies.choi2022.interpretations import (
     Found,
     Option,
     decider,
     holds,
+    interval,
     never_together,
+    often,
     options,
     percent,
     share,
@@ -79,13 +81,14 @@ def make(work: Work) -> list[Finding]:
     work.table("figure_6_interpretations", found.rows)
     work.notes = [_notes(work, found, there)]
     decides = decider(there, "c beats bidirectional")
-    work.answer = work.tell(
-        "answer",
-        smaller=percent(share(rows, "c smaller")),
+    smaller, beats = (interval(rows, name, SPACE) for name in ("c smaller", "c beats bidirectional"))
+    work.conclude(
+        supports=smaller.value >= RARE_BELOW,
+        smaller=often(smaller),
         count=len(rows),
         holding=found.of("nearest")[0]["holding"],
         claims=len(COUNTED),
-        beats=percent(share(rows, "c beats bidirectional")),
+        beats=often(beats),
         decided=f", decided most by the {decides.describe('c beats bidirectional')}" if decides else "",
     )
     return [*(_verdict(name, found) for name in TESTED), *findings_on_logs(CLAIMS, runs), _together(found)]
@@ -107,31 +110,28 @@ def _verdict(name: str, found: Found[Point]) -> Finding:
     That is the nearest interpretation, or what the claim is likeliest with.
     """
     rows, [base], [nearest] = found.of("random"), found.of("base"), found.of("nearest")
-    claim, often = CLAIMS[name], share(rows, name)
+    claim, shared = CLAIMS[name], interval(rows, name, SPACE)
     numbers = (
-        f"{TESTED[name]}: in {percent(often)} of {len(rows)} random interpretations; ours: {yes(base, name)}, the "
-        f"nearest: {yes(nearest, name)}"
+        f"{TESTED[name]}: in {often(shared)} of {len(rows)} random interpretations; ours: {yes(base, name)}, the "
+        f"nearest, searched for by these claims: {yes(nearest, name)}"
     )
     if name == "wall unstable":
         growth = OneTickMap.from_scene(replace(scene_of(BASE, "b"), dissipation=())).growth(150.0)
         numbers += f". In contact the loop is linear and grows by a factor of {growth:.4f} a tick"
-    if often >= _ALWAYS and holds(base, name):
+    if shared.value >= _ALWAYS and holds(base, name):
         return Finding(claim, HOLDS, numbers)
-    if holds(nearest, name):
-        return Finding(claim, ASSUMING, numbers, NEAREST)
-    if not any(holds(row, name) for row in found.rows):
-        return Finding(claim, FAILS, numbers)
-    decides = decider(options(rows, SPACE), name)
-    return Finding(claim, ASSUMING, numbers, f"an interpretation with {decides.best}" if decides else _ANOTHER)
+    where = NEAREST if holds(nearest, name) else ""
+    if not where and any(holds(row, name) for row in found.rows):
+        decides = decider(options(rows, SPACE), name)
+        where = f"an interpretation with {decides.best}" if decides else _ANOTHER
+    return Finding.by_share(claim, numbers, shared.value, where)
 
 
 def _together(found: Found[Point]) -> Finding:
     rows, held = found.of("random"), [row for row in found.rows if holds(row, "all")]
     most = _fullest(found)
     lacks = ", ".join(name for name in COUNTED if not holds(most, name))
-    return CLAIMS["together"].holds_if(
-        False,
-        bool(held),
+    numbers = CLAIMS["together"].numbers.format(
         claims=len(COUNTED),
         held=len(held),
         count=len(found.rows),
@@ -141,6 +141,8 @@ def _together(found: Found[Point]) -> Finding:
         nearest=found.of("nearest")[0]["holding"],
         ours=found.of("base")[0]["holding"],
     )
+    where = CLAIMS["together"].assumption if held else ""
+    return Finding.by_share(CLAIMS["together"], numbers, share(rows, "all"), where)
 
 
 def _notes(work: Work, found: Found[Point], there: Sequence[Option]) -> str:
@@ -156,10 +158,11 @@ def _notes(work: Work, found: Found[Point], there: Sequence[Option]) -> str:
     ]
     alone = claims_table(
         COUNTED | {"all": "all of the above"} | ASIDE,
-        {"our interpretation": base, "nearest": nearest},
-        {"its neighbours": around, "random interpretations": rows},
+        SPACE,
+        {"ours": base, "nearest": nearest},
+        around,
+        rows,
         there,
-        "decided most by",
     )
     return work.tell(
         "notes",

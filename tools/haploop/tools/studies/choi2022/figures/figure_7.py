@@ -3,17 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from haploop.tools.figure.style import GREY, INK, SMALL, dress, empty_figure
 from haploop.tools.render.terminal import markdown_table
-from haploop.tools.studies.choi2022.claims import Finding, claims_of
+from haploop.tools.studies.choi2022.claims import RARE_BELOW, Finding, claims_of
 from haploop.tools.studies.choi2022.device import FRICTION_N, KINDS, SCENE_FILE, Setup, file_text
 from haploop.tools.studies.choi2022.drawing import SHORT, claims_table, search_words, share_map
 from haploop.tools.studies.choi2022.experiment import NEAREST, SCENE, SPACE, WHOLE, describe, keep_shares, search
 from haploop.tools.studies.choi2022.experiment_measure import CLAIMS as TESTED
-from haploop.tools.studies.choi2022.experiment_measure import NAMES, PAPER, largest, stiffness_ladder
-from haploop.tools.studies.choi2022.interpretations import Found, Option, holds, never_together, options, percent, share
+from haploop.tools.studies.choi2022.experiment_measure import NAMES, PAPER, largest_of, stiffness_ladder
+from haploop.tools.studies.choi2022.interpretations import (
+    Found,
+    Option,
+    holds,
+    interval,
+    never_together,
+    often,
+    options,
+    percent,
+    share,
+)
+from haploop.tools.studies.choi2022.steadiness import largest
 from haploop.tools.studies.choi2022.work import Work
 
 if TYPE_CHECKING:
@@ -34,18 +46,18 @@ _OFTEN = 0.05
 def make(work: Work) -> list[Finding]:
     """Searches, varies each value by itself, and writes the nearest interpretation as a scene."""
     found = search(work)
-    rows, [row], [rough] = (found.of(stage) for stage in ("random", "nearest", "friction"))
+    rows, [row] = (found.of(stage) for stage in ("random", "nearest"))
     there = options(rows, SPACE)
     if there:
         work.figure(share_map(there, list(TESTED), len(rows)), "figure_7", work.tell("seen_search"))
     keep_shares(work, list(TESTED), rows, there)
     varied = _varied(found.nearest, work.small)
     ends = [Setup.from_row(found.nearest.as_dict() | {key: value}) for key, pair in varied.items() for value in pair]
-    groups = [[setup] for setup in (found.nearest, *ends)]
-    ladders = work.map_parallel("what each value changes", stiffness_ladder, groups)
-    base, *rest = ({name: largest(steady[name]) for name in NAMES} for [steady] in ladders)
+    base, *rest = _largest(work, [found.nearest, *ends])
     influences = {key: (rest[2 * i], rest[2 * i + 1]) for i, key in enumerate(varied)}
-    influences["friction_N"] = base, {name: rough[f"{name}_N_m"] for name in NAMES}
+    rough = replace(found.nearest, friction_N=0.0 if work.small else FRICTION_N)
+    with_friction = work.map_parallel("the nearest with friction", largest_of, [(rough, name) for name in NAMES])
+    influences["friction_N"] = base, dict(zip(NAMES, with_friction, strict=True))
     drawn = _draw(base, influences, varied | {"friction_N": (0.0, FRICTION_N)})
     work.figure(drawn, "figure_7_influence", work.tell("seen_influence", factor=_FACTOR))
     # That of the nearest is among the rows once already.
@@ -53,14 +65,21 @@ def make(work: Work) -> list[Finding]:
     work.data("figure_7_interpretations", {key.replace(" ", "_"): [one[key] for one in kept] for key in kept[0]})
     work.scene(SCENE.removesuffix(".toml"), found.nearest.scene(5000.0))
     work.text(SCENE_FILE, file_text(found.nearest))
-    work.notes = [_notes(work, found, there)]
-    work.answer = work.tell(
-        "answer",
-        larger=percent(share(rows, "10 larger")),
+    work.notes = [_notes(work, found, there, influences["friction_N"])]
+    larger = interval(rows, "10 larger", SPACE)
+    work.conclude(
+        "often" if larger.value >= RARE_BELOW else "rare",
+        supports=larger.value >= RARE_BELOW,
+        larger=often(larger),
+        more=often(interval(rows, "11 more", SPACE)),
         count=len(rows),
-        here=", ".join(f"{SHORT[name]} {row[f'{name}_N_m'] / 1e3:.1f}" for name in PAPER),
-        papers=", ".join(f"{stiffness / 1e3:.1f}" for stiffness in PAPER.values()),
+        holding=row["holding"],
+        claims=len(TESTED),
         neighbours=percent(share(found.of("neighbour"), "10 larger")),
+        friction_mN=1e3 * FRICTION_N,
+        friction=", ".join(
+            f"{SHORT[name]} {stiffness / 1e3:.1f}" for name, stiffness in influences["friction_N"][1].items()
+        ),
     )
     # Inertia may steady stiffer walls with the unit than with the encoder's second differences.
     unit, encoder = influences["acceleration"]
@@ -68,6 +87,21 @@ def make(work: Work) -> list[Finding]:
     of_unit, of_encoder = (" and ".join(f"{of[kind] / 1e3:.1f}" for kind in KINDS[2:]) for of in (unit, encoder))
     words = {"velocity": found.nearest.velocity, "nearest": NEAREST}
     return [CLAIMS["unit"].holds_if(False, better, unit=of_unit, encoder=of_encoder, **words)]
+
+
+def _largest(work: Work, setups: Sequence[Setup]) -> list[Largest]:
+    """Returns the largest steady stiffness of each element in each setup; those of one structure run together."""
+    groups: dict[tuple[object, ...], list[Setup]] = {}
+    for setup in dict.fromkeys(setups):
+        structure = (setup.delay_s, setup.unit, setup.mount, setup.velocity, setup.acceleration)
+        groups.setdefault(structure, []).append(setup)
+    ladders = work.map_parallel("what each value changes", stiffness_ladder, [*groups.values()])
+    found = {
+        setup: {name: largest(steady[name]) for name in NAMES}
+        for group, of_group in zip(groups.values(), ladders, strict=True)
+        for setup, steady in zip(group, of_group, strict=True)
+    }
+    return [found[setup] for setup in setups]
 
 
 def _varied(setup: Setup, small: bool) -> dict[str, Pair]:
@@ -104,20 +138,21 @@ def _draw(base: Largest, influences: Influences, varied: Mapping[str, Pair]) -> 
     return figure
 
 
-def _notes(work: Work, found: Found[Setup], there: Sequence[Option]) -> str:
-    rows, [row], [with_friction] = found.of("random"), found.of("nearest"), found.of("friction")
+def _notes(work: Work, found: Found[Setup], there: Sequence[Option], friction: tuple[Largest, Largest]) -> str:
+    rows, [row] = found.of("random"), found.of("nearest")
     described = describe(found.nearest)
-    measured = {"nearest interpretation": row, "with friction of 48 mN": with_friction}
+    measured = zip(("nearest interpretation", "with friction of 48 mN"), friction, strict=True)
     bears = [["the paper", "", *(f"{stiffness / 1e3:.1f}" for stiffness in PAPER.values())]]
-    bears += [[name, *(f"{one[f'{kind}_N_m'] / 1e3:.1f}" for kind in NAMES)] for name, one in measured.items()]
+    bears += [[name, *(f"{one[kind] / 1e3:.1f}" for kind in NAMES)] for name, one in measured]
     kinds = [*(SHORT[kind] for kind in KINDS), "damping with unidirectional"]
     never = never_together(rows, [name for name in TESTED if share(rows, name) >= _OFTEN])
     alone = claims_table(
         TESTED,
+        SPACE,
         {"nearest": row},
-        {"its neighbours": found.of("neighbour"), "random interpretations": rows},
+        found.of("neighbour"),
+        rows,
         there,
-        "likeliest with, and least with",
     )
     bounds = (
         f"- {SPACE.label(key)}: {SPACE.value(key, low)} to {SPACE.value(key, high)}"

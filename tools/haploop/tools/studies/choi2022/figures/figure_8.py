@@ -11,7 +11,7 @@ from haploop.tools.dissipate.booking import Booked, Booking
 from haploop.tools.dissipate.samples import Samples
 from haploop.tools.figure.style import GREY, dress, empty_figure, legend
 from haploop.tools.render.units import amount
-from haploop.tools.studies.choi2022.claims import Finding, claims_of
+from haploop.tools.studies.choi2022.claims import ASSUMING, Finding, claims_of
 from haploop.tools.studies.choi2022.device import FRICTION_N, KINDS, Setup, elements_of
 from haploop.tools.studies.choi2022.drawing import COLOURS, INSIDE, UPPER_LEFT
 from haploop.tools.studies.choi2022.experiment import describe, findings, nearest, nearest_with
@@ -58,8 +58,10 @@ def make(work: Work) -> list[Finding]:
         needed_g = 1e3 * max(BOOKED_KG * end[0] / end[1:].min() for end in ends)
         work.notes = [work.tell("tried", labels=", ".join(LABELS), ends=_by_wall(rough, ends), needed_g=needed_g)]
     first = first_ahead_Hz(bidirectional_J(_FREQUENCIES_HZ, None))
-    work.answer = work.tell("answer", first=first, swings=found[0].swings_Hz, **sizes)
-    return _findings(found, work)
+    results = _findings(found, work)
+    supports = any(one.claim.name == "more" and one.verdict == ASSUMING for one in results)
+    work.conclude(supports=supports, first=first, swings=found[0].swings_Hz, **sizes)
+    return results
 
 
 def contacts(setup: Setup, work: Work) -> list[Contact]:
@@ -92,12 +94,12 @@ def _picture(work: Work, contacts: list[Contact], name: str, seen: str) -> None:
     axes = figure.subplots(1, len(contacts))
     columns: dict[str, np.ndarray] = {}
     for ax, contact, key in zip(axes, contacts, ("lower", "higher"), strict=True):
-        booked, verdict = contact.booked, contact.ran.summary["verdict"]
+        booked = contact.booked
         for i, label in enumerate(LABELS):
             colour = COLOURS[KINDS[i + 1]]
             ax.plot(booked.t_s, 1e3 * booked.sampled_J[i], color=colour, linewidth=1.3, label=label)
             ax.plot(booked.t_s, 1e3 * booked.true_J[i], color=colour, linewidth=0.9, linestyle="--")
-        dress(ax, f"{contact.stiffness_N_m / 1e3:.1f} N/mm: {verdict}", "time (s)", "energy taken (mJ)")
+        dress(ax, f"{contact.stiffness_N_m / 1e3:.1f} N/mm", "time (s)", "energy taken (mJ)")
         columns |= {f"{key}_t_s": booked.t_s, f"{key}_sampled_J": booked.sampled_J, f"{key}_true_J": booked.true_J}
         work.scene(f"{name}_{key}", contact.ran.scene)
     legend(axes[0], **UPPER_LEFT, **INSIDE)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, Self
 
 import numpy as np
 
@@ -12,44 +12,49 @@ from haploop.protocol.scene.scene import Scene
 from haploop.tools.figure.style import ELEMENTS, INK, WALL, dress, empty_figure, legend
 from haploop.tools.render.units import amount
 from haploop.tools.studies.choi2022.claims import Finding, claims_of
-from haploop.tools.studies.choi2022.device import Elements, elements_of
+from haploop.tools.studies.choi2022.device import KINDS, Elements, elements_of
 from haploop.tools.studies.choi2022.drawing import INSIDE
 from haploop.tools.studies.choi2022.experiment import findings, nearest
-from haploop.tools.studies.choi2022.experiment_measure import DAMPINGS, MASSES, is_steady
+from haploop.tools.studies.choi2022.steadiness import STIFFNESSES, is_steady, pressed, run_all, swing_m
+from haploop.tools.studies.choi2022.tuning import reached, sizes_of
 from haploop.tools.studies.choi2022.work import Run, Work, run, wall_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 CLAIMS = claims_of(9)
-# An encoder's step to either side; what is steady and swings wider is dying down.
-_STEPS_M = 2.0 * 28.7e-6
 
 
 def make(work: Work) -> list[Finding]:
-    """Tunes each on a grid of sizes, and runs the best of them."""
-    # The next stiffness beyond those that are drawn is for "larger than 5.0".
+    """Tunes each on a grid of sizes, runs the best of them, and inertia at the largest stiffness that it steadies."""
+    setup = nearest(work)
+    here, ours = _tuned(work, KINDS[1], 5000.0), _tuned(work, KINDS[3], 5500.0)
     cases = {
-        "damping": ("damping at 5.0 N/mm", _tuned(work, "damping", 5000.0, DAMPINGS).scene),
-        "unidirectional": (
-            "unidirectional inertia at 5.5 N/mm",
-            _tuned(work, "unidirectional-inertia", 5500.0, MASSES).scene,
-        ),
+        "damping": ("damping at 5.0 N/mm", here.scene),
+        "unidirectional": ("unidirectional inertia at 5.5 N/mm", ours.scene),
     }
-    damping, inertia = presses(work, "figure_9", cases)
-    beyond = _tuned(work, "damping", 5500.0, DAMPINGS)
-    shown = inertia.summary["window"]["displayed_stiffness_N_m"]
-    off = abs(shown / 5500.0 - 1.0)
-    here, ours = (Tuned(ran.scene, ran.summary) for ran in (damping, inertia))
+    presses(work, "figure_9", cases)
+    beyond = _tuned(work, KINDS[1], 5500.0)
+    most = reached(work, setup, KINDS[3])
+    # What all starts leave at rest.
+    rest_N_m = min(most.steady)
+    rests = Tuned.from_run(setup.scene(max(rest_N_m, STIFFNESSES[0]), elements_of(KINDS[3], *most.sizes)))
+    shown, is_near = rests.displayed_N_m, abs(rests.displayed_N_m / rests.stiffness_N_m - 1.0) < 0.01
+    holding = {"damping": not beyond.steady, "inertia": ours.steady, "displayed": rests.steady and is_near}
     return findings(
         work,
         CLAIMS,
-        {"damping": not beyond.steady, "inertia": ours.steady, "displayed": ours.steady and off < 0.01},
+        holding,
         inertia=f"{1e3 * ours.size('mass'):.3g} g: {ours.ended}",
-        here=f"{here.size('damping'):.2g} N s/m, {here.ended}",
-        beyond=f"{beyond.size('damping'):.2g} N s/m, {beyond.ended}",
+        here=f"{here.size('damping'):.2g} N s/m: {here.ended}",
+        beyond=f"{beyond.size('damping'):.2g} N s/m: {beyond.ended}",
         shown=shown / 1e3,
-        off=100 * off,
+        there=ours.displayed_N_m / 1e3,
+        off=100.0 * abs(shown / rests.stiffness_N_m - 1.0),
+        rest=rests.stiffness_N_m / 1e3,
+        rest_g=1e3 * rests.size("mass"),
+        rest_ended=rests.ended,
+        most=most.describe(),
     )
 
 
@@ -59,8 +64,23 @@ class Tuned(NamedTuple):
     scene: Scene
     result: Summary
 
+    @classmethod
+    def from_run(cls, scene: Scene) -> Self:
+        """Runs a press for as long as it takes to be looked at."""
+        scene = pressed(scene)
+        return cls(scene, run_all([scene])[0])
+
     def size(self, parameter: str) -> float:
         return next(e.parameters[parameter] for e in self.scene.dissipation if parameter in e.parameters)
+
+    @property
+    def stiffness_N_m(self) -> float:
+        return wall_of(self.scene).stiffness
+
+    @property
+    def displayed_N_m(self) -> float:
+        """Mean of the force over the penetration, over the last 0.5 s."""
+        return self.result["window"]["displayed_stiffness_N_m"]
 
     @property
     def steady(self) -> bool:
@@ -68,27 +88,20 @@ class Tuned(NamedTuple):
 
     @property
     def ended(self) -> str:
-        if not self.swing_m:
-            return f"{self.result['verdict']}, comes to rest"
-        dying = ", dying down" if self.steady and self.swing_m > _STEPS_M else ""
-        return f"{self.result['verdict']}, swings {amount(self.swing_m, 'm')} peak to peak{dying}"
-
-    @property
-    def swing_m(self) -> float:
-        """Peak to peak over the last 0.5 s."""
-        return self.result["window"]["oscillation_m"]
+        word = "steady" if self.steady else "not steady"
+        return f"{word}, swings {amount(swing_m(self.result), 'm')} peak to peak"
 
 
 def tuned(work: Work, name: str, stiffness: float, choices: Sequence[Elements]) -> Tuned:
-    """Returns of some elements those that are steady and swing least ("best tuned", Choi et al. 2022, V.B.1)."""
-    scenes = [nearest(work).scene(stiffness, elements) for elements in choices]
-    results = work.run_all(f"tuning {name}", scenes)
-    tried = [Tuned(scene, result) for scene, result in zip(scenes, results, strict=True) if "window" in result]
-    return min(tried, key=lambda one: (not one.steady, one.swing_m))
+    """Returns of some elements those with which a press swings least ("best tuned", Choi et al. 2022, V.B.1)."""
+    scenes = [pressed(nearest(work).scene(stiffness, elements)) for elements in choices]
+    results = run_all(scenes)
+    return min((Tuned(*one) for one in zip(scenes, results, strict=True)), key=lambda one: swing_m(one.result))
 
 
-def _tuned(work: Work, kind: str, stiffness: float, sizes: np.ndarray) -> Tuned:
-    return tuned(work, kind, stiffness, [elements_of(kind, float(one)) for one in sizes[:: 8 if work.small else 1]])
+def _tuned(work: Work, kind: str, stiffness: float) -> Tuned:
+    sizes = sizes_of(kind, work.small)[:, 0]
+    return tuned(work, kind, stiffness, [elements_of(kind, float(one)) for one in sizes])
 
 
 def presses(work: Work, name: str, cases: Mapping[str, tuple[str, Scene]]) -> list[Run]:
@@ -99,7 +112,8 @@ def presses(work: Work, name: str, cases: Mapping[str, tuple[str, Scene]]) -> li
     for column, (key, (heading, scene)) in zip(axes.T, cases.items(), strict=True):
         runs.append(run(scene))
         press = Press.from_run(runs[-1])
-        _draw(column[0], column[1], press, f"{heading}: {runs[-1].summary['verdict']}", wall_of(scene).stiffness)
+        word = "steady" if is_steady(runs[-1].summary) else "not steady"
+        _draw(column[0], column[1], press, f"{heading}: {word}", wall_of(scene).stiffness)
         # Outside the wall the displayed stiffness is 0 there.
         columns |= {f"{key}_{name}": np.nan_to_num(column) for name, column in press._asdict().items()}
         work.scene(f"{name}_{key}", scene)
