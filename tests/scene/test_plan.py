@@ -123,7 +123,8 @@ GOLDEN = {
     "premium_tap": (["device", "hand"], 4, ["hand.grip", "friction", "encoder", "actuator.saturation"]),
     "premium_press": (
         ["motor", "tip", "hand"],
-        11,  # three positions, three velocities, accelerometer, its noise, three steps of delay
+        # Three positions, three velocities, accelerometer, its noise, ten steps of delay, low-pass of the velocity.
+        19,
         [
             "transmission",
             "hand.grip",
@@ -132,6 +133,7 @@ GOLDEN = {
             "encoder",
             "accelerometer",
             "accelerometer.range",
+            "velocity.cutoff",
             "acceleration.source = accelerometer",
             "actuator.saturation",
         ],
