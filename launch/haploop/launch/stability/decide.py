@@ -11,7 +11,7 @@ import numpy as np
 from haploop.launch.stability.traces import frequency_Hz, is_felt, ripple, smallest_felt_m, trend, widths
 
 # Pieces in which the width of a swing is measured, and the periods that one covers at least.
-PIECES = 24
+PIECES, FEW_PIECES = 24, 8
 _LEAST_PERIODS = 1.5
 # A swing this small is rounding: a thousand atoms would be wider.
 _REST_M = 1e-9
@@ -129,6 +129,7 @@ class Swing(NamedTuple):
         changes, errors: of the logarithm of the width over the second half, small and large, and their standard errors.
         rate_1_s, error_1_s: growth of the one that changes less, and its standard error.
         width_m, spread_m, most_m: mean, half range and maximum of the widths in the last quarter of both.
+        moved_m: peak to peak over the last half of either, with its trend.
         at_first, at_last: width after the larger push over that after the smaller, in the first piece and at the last.
         frequency_Hz: of the end.
         covers_periods: periods that a piece covers.
@@ -147,6 +148,7 @@ class Swing(NamedTuple):
     width_m: float
     spread_m: float
     most_m: float
+    moved_m: float
     at_first: float
     at_last: float
     frequency_Hz: float
@@ -169,7 +171,8 @@ class Swing(NamedTuple):
         needs_s = None
         if word == "undecided":
             slower = min(zip(self.changes, self.errors, strict=True), key=lambda each: abs(each[0]))
-            needs_s = self.watched_s * max(2.0, 4.0 * slower[1] / max(abs(slower[0]), 1e-12))
+            needs_s = FEW_PIECES * _LEAST_PERIODS / self.frequency_Hz if self.frequency_Hz else 0.0
+            needs_s = max(needs_s, self.watched_s * max(2.0, 4.0 * slower[1] / max(abs(slower[0]), 1e-12)))
             if self.rate_1_s < 0.0:
                 needs_s = max(needs_s, self.watched_s + math.log(max(self.width_m / felt_m, 1.0)) / -self.rate_1_s)
         return Finding(
@@ -179,17 +182,29 @@ class Swing(NamedTuple):
 
 
 def measure(pushed: Pushed) -> list[Swing]:
-    """Returns the measures of each loop, worked out as if it were alone."""
+    """Returns the measures of each loop, worked out as if it were alone; slow swings in fewer, longer pieces."""
+    ticks = pushed.large.shape[-1]
+    frequency = frequency_Hz(pushed.large[:, ticks // 2 :], pushed.rate)
+    is_slow = frequency * ticks / pushed.rate < _LEAST_PERIODS * PIECES
+    found: dict[int, Swing] = {}
+    for pieces, which in ((PIECES, ~is_slow), (FEW_PIECES, is_slow)):
+        places = np.flatnonzero(which)
+        if len(places):
+            some = Pushed(*(part[places] if isinstance(part, np.ndarray) else part for part in pushed))
+            found |= zip(places.tolist(), _measured(some, frequency[places], pieces), strict=True)
+    return [found[place] for place in range(len(frequency))]
+
+
+def _measured(pushed: Pushed, frequency: np.ndarray, pieces: int) -> list[Swing]:
     small_x, large_x, command, rate, *of_each = pushed
     ticks = large_x.shape[-1]
-    size, quarter_ticks = ticks // PIECES, -(-ticks // 4)
+    size, last_half, last_quarter = ticks // pieces, slice(ticks // 2, None), slice(-(-ticks // 4), None)
     small, large = widths(small_x, size), widths(large_x, size)
     half, quarter = small.shape[-1] // 2, small.shape[-1] // 4
     small_trend, large_trend = (trend(width[:, half:], size / rate) for width in (small, large))
     slower = np.where(np.abs(large_trend.rate_1_s) < np.abs(small_trend.rate_1_s), large_trend[:2], small_trend[:2])
     tail = np.concatenate([small[:, -quarter:], large[:, -quarter:]], axis=1)
     ends = [width[:, -quarter:].mean(axis=1) for width in (small, large)]
-    frequency = frequency_Hz(large_x[:, -quarter_ticks:], rate)
     columns = [
         *of_each,
         np.stack([small_trend.change, large_trend.change], axis=-1),
@@ -198,10 +213,11 @@ def measure(pushed: Pushed) -> list[Swing]:
         tail.mean(axis=1),
         np.ptp(tail, axis=1) / 2.0,
         tail.max(axis=1),
+        np.maximum(*(np.ptp(x[:, last_half], axis=1) for x in (small_x, large_x))),
         large[:, 0] / np.maximum(small[:, 0], _REST_M),
         ends[1] / np.maximum(ends[0], _REST_M),
         frequency,
-        ripple(command[:, -quarter_ticks:], rate),
+        ripple(command[:, last_quarter], rate),
         size * frequency / rate,
     ]
     rows = zip(*(column.tolist() for column in columns), strict=True)
@@ -212,8 +228,8 @@ def decide(swing: Swing, *, last: bool) -> Finding:
     """Returns the finding; ``undecided`` asks for a longer time unless it is the ``last`` one.
 
     *steady*: the swing died, or dies and what is left of it no hand feels, or at the last look both swings still decay
-    alike. *limit-cycle*: it forgets how hard it was
-    pushed, yet remains, and is felt. *growing*: both swings grow.
+    alike. *limit-cycle*: it forgets how hard it was pushed, yet remains, and is felt. *growing*: both swings grow. Of
+    swings so slow that a piece covers less than one and a half nothing is said.
     """
     if not swing.inside:
         return Finding("undecided", "leaves the wall", swing.push_N, swing.watched_s)
@@ -223,9 +239,11 @@ def decide(swing: Swing, *, last: bool) -> Finding:
     rising = any(change > max(_LASTING, 3 * error) for change, error in changes)
     falling = max(swing.changes) < -_LASTING and (swing.width_m < _SMALL_M or is_long)
     unfelt = not is_felt(swing.width_m, swing.frequency_Hz)
-    if unfelt and not rising and (falling or swing.width_m <= 2.0 * swing.count_m):
+    # What is too slow for its frequency to be seen is judged by all of its way.
+    seen = swing.frequency_Hz * swing.watched_s >= 4 * _LEAST_PERIODS or not is_felt(swing.moved_m, swing.frequency_Hz)
+    if unfelt and seen and not rising and (falling or swing.width_m <= 2.0 * swing.count_m):
         return swing.finding("steady", "unfelt")
-    if swing.covers_periods < _LEAST_PERIODS and not last:
+    if swing.covers_periods < _LEAST_PERIODS:
         return swing.finding("undecided", "too slow")
     if swing.lasts(_LASTING) and _SAME[0] < swing.at_last < _SAME[1] and not 0.5 < swing.at_first < 2.0:
         return swing.finding("limit-cycle", "forgets")

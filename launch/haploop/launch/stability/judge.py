@@ -30,6 +30,8 @@ PUSH, SMALLER = 0.3, 0.1
 LOOKS_S = (1.0, 2.0, 4.0, 8.0, 16.0)
 PATIENT_S = (*LOOKS_S, 32.0, 64.0)
 _LEAST_LOAD_N = 1e-3
+# A loop is watched for so many ticks at least.
+_LEAST_TICKS = 240
 # Members of a batch that are judged together.
 MOST = 1024
 # A third copy, pushed harder by this share, shows whether the swing is chaotic: whether it ends apart from the second
@@ -123,6 +125,12 @@ def with_verdict(scene: Scene, summary: Summary, find: Callable[[], Finding], ou
     return summary
 
 
+def watch_times(time: Timebase, delay_steps: int, looks_s: Sequence[float]) -> list[float]:
+    """Returns when to look, s: not before what is commanded has gone round eight times, and at ticks enough to tell."""
+    least_s = max(8.0 * delay_steps / time.plant_rate, _LEAST_TICKS / time.control_rate)
+    return sorted({max(least_s, look_s) for look_s in looks_s})
+
+
 def judge(end: End, looks_s: Sequence[float] = PATIENT_S) -> Finding:
     """Returns whether a loop forgets its start, from the end of a run in contact on.
 
@@ -133,7 +141,9 @@ def judge(end: End, looks_s: Sequence[float] = PATIENT_S) -> Finding:
     push_N = _push_N(end.hold_N)
     small, large = StillHand(end, push_N * SMALLER), StillHand(end, push_N)
     wall, found = end.controller.params.wall, _failed(push_N, 0.0, "")
-    for seconds in looks_s:
+    delay_steps = end.plant.checkpoint().delay_steps
+    times_s = watch_times(end.time, end.time.delay_steps if delay_steps is None else delay_steps, looks_s)
+    for seconds in times_s:
         try:
             small.go_to(seconds)
             large.go_to(seconds)
@@ -143,7 +153,7 @@ def judge(end: End, looks_s: Sequence[float] = PATIENT_S) -> Finding:
         if gone:
             return _left(push_N, seconds, wall, min((each.x for each in gone), key=len))
         pushed = (each[None] for each in (small.x, large.x, large.command))
-        [found] = _found([*pushed], end.time, wall, [end.scene], np.array([push_N]), last=seconds == looks_s[-1])
+        [found] = _found([*pushed], end.time, wall, [end.scene], np.array([push_N]), last=seconds == times_s[-1])
         if found.word != "undecided":
             break
     if found.word == "limit-cycle":
@@ -175,7 +185,8 @@ def _judge_some(end: BatchEnd, members: np.ndarray, hold_N: np.ndarray, looks_s:
     found = [_failed(push, 0.0, "") for push in push_N.tolist()]
     copies = StillBatch(end, np.tile(members, 2), np.tile(hold_N, 2), np.append(push_N * SMALLER, push_N))
     asked: list[tuple[int, np.ndarray]] = []
-    for seconds in looks_s:
+    times_s = watch_times(end.time, end.time.delay_steps, looks_s)
+    for seconds in times_s:
         for copy, x in copies.go_to(seconds):
             place = copy % count
             if found[place].word == "undecided":
@@ -188,7 +199,7 @@ def _judge_some(end: BatchEnd, members: np.ndarray, hold_N: np.ndarray, looks_s:
         pushed = [x[: len(here)], x[len(here) :], command[len(here) :]]
         scenes = [end.scenes[place] for place in members[here]]
         wall = _wall_of(end, members[here])
-        findings = _found(pushed, end.time, wall, scenes, push_N[here], last=seconds == looks_s[-1])
+        findings = _found(pushed, end.time, wall, scenes, push_N[here], last=seconds == times_s[-1])
         for at, (place, finding) in enumerate(zip(here.tolist(), findings, strict=True)):
             found[place] = finding
             if finding.word == "limit-cycle":
