@@ -21,8 +21,9 @@ _SMALL_M = 20e-6
 _LASTING, _LASTING_LONG = 0.05, 0.02
 # Sizes whose ratio lies between these are the same; those of the pushes differ by ten.
 _SAME = (0.7, 1.43)
-# After so long a slow change counts as none, and a steady growth as one.
+# After so long, and so many periods, a slow change counts as none, and a steady growth as one.
 _LONG_S = 8.0
+_COUNTED_PERIODS = 60.0
 # After so long, swings of both sizes that grow alike grow for good, and what is known not to change lasts.
 _ALIKE_S = 4.0
 # Behind an encoder a swing that decays may end as a chatter of so many counts, peak to peak, at the most.
@@ -249,7 +250,8 @@ def decide(swing: Swing, *, last: bool) -> Finding:
         return swing.finding("limit-cycle", "forgets")
     kept_ratio = swing.at_first > 2.0 and _SAME[0] < swing.at_last / swing.at_first < _SAME[1]
     clearly = swing.watched_s >= _ALIKE_S and all(abs(change) + 2 * error < _LASTING_LONG for change, error in changes)
-    if (clearly or (is_long and swing.lasts(_LASTING_LONG))) and not kept_ratio:
+    counted = swing.frequency_Hz * swing.watched_s >= _COUNTED_PERIODS
+    if (clearly or (is_long and counted and swing.lasts(_LASTING_LONG))) and not kept_ratio:
         return swing.finding("limit-cycle", "lasts")
     grows = all(change > 4 * error for change, error in changes)
     if grows and (is_long or (swing.watched_s >= _ALIKE_S and min(swing.changes) > _LASTING and swing.is_alike())):
