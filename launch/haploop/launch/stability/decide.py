@@ -103,7 +103,6 @@ class Pushed(NamedTuple):
     Attributes:
         small, large: position at the ticks after the smaller and the larger push, shape (members, ticks), m.
         command: command at the ticks after the larger one, shape (members, ticks), N.
-        rate: ticks a second.
         push_N: the larger push, shape (members,).
         count_m: one count of the encoder, shape (members,); 0 without.
         inside: whether a tick in the last quarter of both was in contact, shape (members,).
@@ -114,7 +113,6 @@ class Pushed(NamedTuple):
     small: np.ndarray
     large: np.ndarray
     command: np.ndarray
-    rate: float
     push_N: np.ndarray
     count_m: np.ndarray
     inside: np.ndarray
@@ -182,22 +180,25 @@ class Swing(NamedTuple):
         )  # fmt: skip
 
 
-def measure(pushed: Pushed) -> list[Swing]:
-    """Returns the measures of each loop, worked out as if it were alone; slow swings in fewer, longer pieces."""
+def measure(pushed: Pushed, rate: float) -> list[Swing]:
+    """Returns the measures of each loop, worked out as if it were alone; slow swings in fewer, longer pieces.
+
+    ``rate``: ticks a second.
+    """
     ticks = pushed.large.shape[-1]
-    frequency = frequency_Hz(pushed.large[:, ticks // 2 :], pushed.rate)
-    is_slow = frequency * ticks / pushed.rate < _LEAST_PERIODS * PIECES
+    frequency = frequency_Hz(pushed.large[:, ticks // 2 :], rate)
+    is_slow = frequency * ticks / rate < _LEAST_PERIODS * PIECES
     found: dict[int, Swing] = {}
     for pieces, which in ((PIECES, ~is_slow), (FEW_PIECES, is_slow)):
         places = np.flatnonzero(which)
         if len(places):
-            some = Pushed(*(part[places] if isinstance(part, np.ndarray) else part for part in pushed))
-            found |= zip(places.tolist(), _measured(some, frequency[places], pieces), strict=True)
+            some = Pushed(*(part[places] for part in pushed))
+            found |= zip(places.tolist(), _measured(some, rate, frequency[places], pieces), strict=True)
     return [found[place] for place in range(len(frequency))]
 
 
-def _measured(pushed: Pushed, frequency: np.ndarray, pieces: int) -> list[Swing]:
-    small_x, large_x, command, rate, *of_each = pushed
+def _measured(pushed: Pushed, rate: float, frequency: np.ndarray, pieces: int) -> list[Swing]:
+    small_x, large_x, command, *of_each = pushed
     ticks = large_x.shape[-1]
     size, last_half, last_quarter = ticks // pieces, slice(ticks // 2, None), slice(-(-ticks // 4), None)
     small, large = widths(small_x, size), widths(large_x, size)

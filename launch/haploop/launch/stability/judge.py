@@ -278,7 +278,8 @@ def _found(
     stays = _is_inside(wall, small[:, half:], np.all) & _is_inside(wall, large[:, half:], np.all)
     count_m = np.array([scene.encoder.resolution if scene.encoder else 0.0 for scene in scenes])
     smooth = np.array([_is_smooth(scene) for scene in scenes])
-    swings = measure(Pushed(small, large, command, time.control_rate, np.abs(push_N), count_m, inside, stays, smooth))
+    pushed = Pushed(small, large, command, np.abs(push_N), count_m, inside, stays, smooth)
+    swings = measure(pushed, time.control_rate)
     return [decide(swing, last=last) for swing in swings]
 
 
