@@ -7,7 +7,7 @@ from collections import Counter
 
 import pytest
 
-from haploop.launch.stability.judge import PUSH
+from haploop.launch.stability.looks import PUSH
 from haploop.launch.stability.still_hand import StillHand
 from haploop.launch.stability.traces import widths
 from helpers.runs.judged import ended, found

@@ -11,7 +11,8 @@ from haploop.launch.batch.batch import Batch
 from haploop.launch.batch.stacking import is_batchable, structures
 from haploop.launch.runs.in_process import run_in_process
 from haploop.launch.spec import RunFailed
-from haploop.launch.stability.judge import is_watched, judge_batch, with_verdict
+from haploop.launch.stability.judge import is_watched, with_verdict
+from haploop.launch.stability.judge_batch import judge_batch
 from haploop.logger.summary import OF_THE_MACHINE, Summary
 from haploop.plant.choose import needs_chain
 from haploop.protocol.scene.scene import Scene

@@ -103,7 +103,8 @@ def _judged(spec: RunSpec, summary: Summary, events: list[tuple[int, Event]]) ->
     if spec.scene.run.verdict == "window":
         return summary
     from haploop.launch.stability.decide import Finding
-    from haploop.launch.stability.judge import LOOKS_S, judge_scene, with_verdict
+    from haploop.launch.stability.judge import judge_scene, with_verdict
+    from haploop.launch.stability.looks import LOOKS_S
     from haploop.logger.session import write_summary
 
     def find() -> Finding:

@@ -1,5 +1,5 @@
-"""Judging a run by what stability means: held still and pushed once, does the loop forget the push and come to rest?
+"""Judging a run by what stability means: held still and pushed at its end, does the loop forget the push and rest?
 
-``judge.judge_scene`` is what others call. ``still_hand`` goes on from the end of a run, ``traces`` measures what it
-does, ``decide`` finds the word for it.
+``judge`` and ``judge_batch`` are what others call. ``still_hand`` and ``still_batch`` go on from the end of a run,
+``looks`` says when to look, ``traces`` measures what is seen, ``decide`` finds the word for it.
 """

@@ -1,0 +1,100 @@
+"""``judge`` of many: the members of a batch are pushed and watched together."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from haploop.controller.tick import Wall
+from haploop.launch.batch.batch import BatchEnd
+from haploop.launch.stability.decide import Finding
+from haploop.launch.stability.looks import (
+    BESIDE,
+    LOOKS_S,
+    SMALLER,
+    failed,
+    findings,
+    left_limit,
+    parts,
+    push_of,
+    watch_times,
+)
+from haploop.launch.stability.still_batch import StillBatch
+from haploop.launch.stability.still_hand import hold_of
+from haploop.protocol.trees import tree_take
+
+# Members of a batch that are judged together.
+MOST = 1024
+
+
+def judge_batch(end: BatchEnd, looks_s: Sequence[float] = LOOKS_S) -> list[Finding]:
+    """Returns what ``judge`` finds of each member at the end of a batch, two members at least.
+
+    Raises:
+        ElementError: an element raised; it is not known for which member.
+    """
+    found = [Finding("no-contact", "no contact") for _ in end.scenes]
+    touching = np.flatnonzero(end.inside.any(axis=1))
+    hold_N = np.array([hold_of(end.scenes[i], end.time, end.tick, end.inside[i]) for i in touching])
+    for first in range(0, len(touching), MOST):
+        some = touching[first : first + MOST]
+        for place, finding in zip(some, _judge_some(end, some, hold_N[first : first + MOST], looks_s), strict=True):
+            found[place] = finding
+    return found
+
+
+def _judge_some(end: BatchEnd, members: np.ndarray, hold_N: np.ndarray, looks_s: Sequence[float]) -> list[Finding]:
+    """Judges members that touch the wall; copy i is of member i pushed little, copy count + i the same pushed hard."""
+    count, push_N = len(members), np.array([push_of(hold) for hold in hold_N])
+    found = [failed(push, 0.0, "") for push in push_N.tolist()]
+    copies = StillBatch(end, np.tile(members, 2), np.tile(hold_N, 2), np.append(push_N * SMALLER, push_N))
+    asked: list[tuple[int, np.ndarray]] = []
+    times_s = watch_times(end.time, end.time.delay_steps, looks_s)
+    for seconds in times_s:
+        for copy, x in copies.go_to(seconds):
+            place = copy % count
+            if found[place].word == "undecided":
+                found[place] = left_limit(push_N[place], seconds, _wall_of(end, members[place]), x)
+        _keep(copies, found, count)
+        here = copies.copy[: len(copies.copy) // 2]
+        if not len(here):
+            break
+        x, command = copies.positions(), copies.commands()
+        pushed = [x[: len(here)], x[len(here) :], command[len(here) :]]
+        scenes = [end.scenes[place] for place in members[here]]
+        wall = _wall_of(end, members[here])
+        told = findings(pushed, end.time, wall, scenes, push_N[here], last=seconds == times_s[-1])
+        for at, (place, finding) in enumerate(zip(here.tolist(), told, strict=True)):
+            found[place] = finding
+            if finding.word == "limit-cycle":
+                asked.append((place, pushed[1][at]))
+        _keep(copies, found, count)
+    return _with_chaos(end, members, hold_N, push_N, found, asked)
+
+
+def _keep(copies: StillBatch, found: list[Finding], count: int) -> None:
+    copies.keep(np.array([found[copy % count].word == "undecided" for copy in copies.copy], bool))
+
+
+def _with_chaos(
+    end: BatchEnd, members: np.ndarray, hold_N: np.ndarray, push_N: np.ndarray, found: list[Finding],
+    asked: Sequence[tuple[int, np.ndarray]],
+) -> list[Finding]:  # fmt: skip
+    """Returns the findings; of each limit cycle, given by its place and large trace, also whether it is chaotic."""
+    for watched_s in sorted({found[place].watched_s for place, _ in asked}):
+        some = [(place, x) for place, x in asked if found[place].watched_s == watched_s]
+        places = np.array([place for place, _ in some])
+        beside = StillBatch(end, members[places], hold_N[places], push_N[places] * (1.0 + BESIDE))
+        gone = dict(beside.go_to(watched_s))
+        traces = dict(zip(beside.copy.tolist(), beside.positions(), strict=True)) if len(beside.copy) else {}
+        for copy, (place, x) in enumerate(some):
+            other = traces.get(copy, gone.get(copy, x[:0]))
+            found[place] = replace(found[place], chaotic=parts(x, other, found[place].width_m))
+    return found
+
+
+def _wall_of(end: BatchEnd, place: int | np.ndarray) -> Wall:
+    """Returns the wall of a member, or of some."""
+    return tree_take(end.params.wall, np.atleast_1d(place))

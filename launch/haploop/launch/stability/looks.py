@@ -1,0 +1,89 @@
+"""What is common to judging one loop and many: the pushes, the times of looking, and what a look finds."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from haploop.controller.tick import Wall
+from haploop.launch.stability.decide import Finding, Pushed, decide, measure
+from haploop.protocol.scene.scene import Scene
+from haploop.protocol.ticks import Timebase
+
+# The larger push, as a share of what the hand holds the wall with, and the smaller one, as a share of it.
+PUSH, SMALLER = 0.3, 0.1
+# Times since the push at which the loop is looked at, in s: of a run as part of it, and where somebody asks.
+LOOKS_S = (1.0, 2.0, 4.0, 8.0, 16.0)
+PATIENT_S = (*LOOKS_S, 32.0, 64.0)
+_LEAST_LOAD_N = 1e-3
+# A loop is watched for so many ticks at least.
+_LEAST_TICKS = 240
+# A third copy, pushed harder by this share, shows whether the swing is chaotic: whether it ends apart from the second
+# by this share of the width.
+BESIDE, _APART = 1e-3, 0.2
+
+
+def watch_times(time: Timebase, delay_steps: int, looks_s: Sequence[float]) -> list[float]:
+    """Returns when to look, s: not before what is commanded has gone round eight times, and at ticks enough to tell."""
+    least_s = max(8.0 * delay_steps / time.plant_rate, _LEAST_TICKS / time.control_rate)
+    return sorted({max(least_s, look_s) for look_s in looks_s})
+
+
+def parts(one: np.ndarray, other: np.ndarray, width_m: float) -> bool:
+    """Tells whether two copies that began together end apart by a fifth of their swing or more.
+
+    One that is shorter left the limit, and has parted.
+    """
+    if len(one) != len(other):
+        return True
+    apart = np.abs(one - other)
+    eighth = len(apart) // 8
+    return bool(apart[:eighth].min() < 0.01 * width_m and apart[-2 * eighth :].max() > _APART * width_m)
+
+
+def push_of(hold_N: float) -> float:
+    return PUSH * max(abs(hold_N), _LEAST_LOAD_N) * (1.0 if hold_N > 0.0 else -1.0)
+
+
+def failed(push_N: float, seconds: float, detail: str) -> Finding:
+    return Finding("undecided", "failed", abs(push_N), seconds, detail=detail)
+
+
+def left_limit(push_N: float, seconds: float, wall: Wall, x: np.ndarray) -> Finding:
+    """Returns what is found of a loop of which a copy left the limit, at whose ticks it was at x (m)."""
+    if not _is_inside(wall, x[None, len(x) // 2 :])[0]:
+        return Finding("undecided", "leaves the wall", abs(push_N))
+    return Finding("growing", "leaves the limit", abs(push_N), seconds)
+
+
+def _is_inside(wall: Wall, x: np.ndarray, reduce: Callable[..., np.ndarray] = np.any) -> np.ndarray:
+    """Tells which loops touched their wall at any (or all) of the ticks where they were at x (m), (loops, ticks)."""
+    position = np.reshape(wall.position, (-1, 1))
+    return reduce(wall.inward * (x - position) > 0.0, axis=1)
+
+
+def findings(
+    traces: list[np.ndarray], time: Timebase, wall: Wall, scenes: Sequence[Scene], push_N: np.ndarray, *, last: bool
+) -> list[Finding]:
+    """Returns what is found so far, of traces of position after both pushes and of the command, (loops, ticks)."""
+    small, large, command = traces
+    quarter = -(-large.shape[1] // 4)
+    half = large.shape[1] // 2
+    inside = _is_inside(wall, small[:, -quarter:]) & _is_inside(wall, large[:, -quarter:])
+    stays = _is_inside(wall, small[:, half:], np.all) & _is_inside(wall, large[:, half:], np.all)
+    count_m = np.array([scene.encoder.resolution if scene.encoder else 0.0 for scene in scenes])
+    smooth = np.array([_is_smooth(scene) for scene in scenes])
+    pushed = Pushed(small, large, command, np.abs(push_N), count_m, inside, stays, smooth)
+    swings = measure(pushed, time.control_rate)
+    return [decide(swing, last=last) for swing in swings]
+
+
+def _is_smooth(scene: Scene) -> bool:
+    """Tells whether nothing but the encoder rounds, nothing saturates, and no estimator filters small swings more."""
+    limits = [
+        (table.resolution, getattr(table, "saturation", None))
+        for table in (scene.actuator, scene.accelerometer)
+        if table
+    ]
+    return not any(map(any, limits)) and scene.estimate("velocity").estimator != "foaw"
