@@ -43,7 +43,7 @@ EXTRA = ["tip_x", "tip_v", "hand_x", "hand_v", "actuator", "friction"]
 def made(directory: Path, text: str, *overrides: str, in_process: bool = True) -> dict[str, Any]:
     scene = directory.parent / f"{directory.name}.toml"
     scene.write_text(text, encoding="utf-8")
-    return run(prepare(scene, overrides, out=directory), in_process=in_process)
+    return run(prepare(scene, ("run.verdict=window", *overrides), out=directory), in_process=in_process)
 
 
 @pytest.fixture(scope="module")

@@ -136,6 +136,7 @@ title = "A sweep of the program's own"
 scene = "{scenes}/fig6b.toml"
 [set]
 duration = 0.6
+"run.verdict" = "window"
 "hand.force.rise_time" = 0.1
 [axes]
 "dissipation.0.damping" = [0.05, 0.2, 0.8]

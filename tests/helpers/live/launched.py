@@ -173,6 +173,7 @@ class Run(Launched):
         pace: Sequence[str] = PACE,
         **more: Any,
     ) -> None:
+        sets = ("run.verdict=window", *sets)
         options = [word for assignment in sets for word in ("--set", assignment)]
         super().__init__("run", str(scene), *options, *pace, *arguments, "--json", out=out, **more)
 

@@ -100,7 +100,7 @@ def going(
     """A run of figure 6(c) with overrides, standing still at the ticks ``pauses``."""
     with tempfile.TemporaryDirectory(prefix="hl", dir="/tmp") as base, pytest.MonkeyPatch.context() as patch:
         patch.setenv("XDG_RUNTIME_DIR", base)
-        prepared = prepare(SCENE, overrides, out=tmp_path / "out")
+        prepared = prepare(SCENE, ("run.verdict=window", *overrides), out=tmp_path / "out")
         standing = tuple(EventTable(at=tick / 1000, pause=True) for tick in pauses)
         scene = replace(prepared.scene, event=standing)
         subject = Going(replace(prepared, scene=scene), announced, options)

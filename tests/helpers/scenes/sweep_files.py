@@ -34,6 +34,8 @@ stiffness = 150.0
 [[dissipation]]
 kind = "damping"
 damping = 0.5
+[run]
+verdict = "window"
 """
 GRID = """
 [axes]
