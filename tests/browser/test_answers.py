@@ -35,7 +35,7 @@ def test_without_a_run_it_says_how_to_start_one_and_offers_nothing_that_steers(s
 def test_a_verdict_is_a_word_a_shape_of_its_own_and_a_colour(stand_in, open_page):
     page = open_page(stand_in.url)
     grounds = set()
-    shown = {"steady": "at rest", "limit-cycle": "swinging", "diverged": "diverged", "no-contact": "no-contact"}
+    shown = {"steady": "no swing seen", "limit-cycle": "swinging", "diverged": "diverged", "no-contact": "no-contact"}
     for word, told in shown.items():
         stand_in.state(verdict=word)
         expect(page.locator("#verdict")).to_have_text(told)
@@ -80,7 +80,7 @@ def test_after_the_end_it_shows_what_came_of_the_run_and_its_last_snapshot(stand
     page = open_page(stand_in.url)
     expect(page.locator("#phase")).to_have_text("ended")
     summary = page.locator("#summary")
-    expect(summary).to_contain_text("Ended: at rest")
+    expect(summary).to_contain_text("Ended: no swing seen")
     expect(summary).to_contain_text("leak by delay")
     expect(summary).to_contain_text("−1.10 mJ")
     expect(summary).to_contain_text("runs/fig6c")

@@ -33,7 +33,7 @@ def console(stderr: bool = False) -> Console:
 
 def seen(verdict: str) -> str:
     """Returns the word for what the last half second shows, which says nothing yet of stability."""
-    return {"steady": "at rest", "limit-cycle": "swinging"}.get(verdict, verdict)
+    return {"steady": "no swing seen", "limit-cycle": "swinging"}.get(verdict, verdict)
 
 
 def verdict_style(verdict: str) -> str:

@@ -6,7 +6,7 @@ import { byId, put, sign } from "./dom.js";
 const WORDS = { lost: "not connected" };
 const VERDICTS = new Set(["steady", "limit-cycle", "diverged", "no-contact"]);
 // What is seen in the last half second says nothing of stability: that is judged when the run has ended.
-const SEEN = { steady: "at rest", "limit-cycle": "swinging" };
+const SEEN = { steady: "no swing seen", "limit-cycle": "swinging" };
 
 /** The word for what the last half second shows. */
 export const seen = (verdict) => SEEN[verdict] ?? verdict;
