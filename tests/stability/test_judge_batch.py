@@ -47,7 +47,9 @@ FAMILIES: dict[str, Callable[[], list[Scene]]] = {
 }
 
 
-@pytest.mark.parametrize("family", FAMILIES)
+@pytest.mark.parametrize(
+    "family", [pytest.param(name, marks=pytest.mark.slow) if name == "trembling" else name for name in FAMILIES]
+)
 def test_a_loop_judged_among_others_has_the_words_and_bits_it_has_alone(family):
     scenes, kinds = FAMILIES[family](), registry()
     batch = Batch(scenes, kinds)

@@ -28,6 +28,7 @@ relative = 0.005
 """
 
 
+@pytest.mark.slow
 def test_bisect_finds_where_the_spectral_radius_of_a_linear_loop_is_one(tmp_path: Path) -> None:
     """The verdict follows it as closely as twelve seconds can tell growth from decay."""
     table = swept(tmp_path, EXACT, PRESSED)
@@ -75,7 +76,7 @@ def test_a_row_without_a_change_says_on_which_side_it_is_and_the_candidates_are_
         assert high in near
 
 
-@pytest.mark.parametrize("stop_after", [3, 30, 37])
+@pytest.mark.parametrize("stop_after", [30, *(pytest.param(n, marks=pytest.mark.slow) for n in (3, 37))])
 def test_a_bisection_that_was_stopped_goes_on_without_running_a_cell_twice(stop_after: int, tmp_path: Path) -> None:
     made = loaded(tmp_path, SHORT_BISECT)
     whole, found = engine_run(made, tmp_path / "whole")

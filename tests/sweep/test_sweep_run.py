@@ -63,7 +63,7 @@ def test_the_columns_are_the_same_whatever_the_number_of_workers(tmp_path: Path)
     assert rows(tmp_path / "one") == rows(tmp_path / "two")
 
 
-@pytest.mark.parametrize("stop_after", [1, 17])
+@pytest.mark.parametrize("stop_after", [17, pytest.param(1, marks=pytest.mark.slow)])
 def test_a_sweep_that_was_stopped_goes_on_without_running_a_cell_twice(stop_after: int, tmp_path: Path) -> None:
     made = loaded(tmp_path, RECORD + "repeat = 12\n" + GRID)
     whole, _ = engine_run(made, tmp_path / "whole")
