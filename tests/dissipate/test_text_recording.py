@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 from haploop.controller.dissipation import ElementError
@@ -216,6 +216,7 @@ def test_what_is_wrong_is_said(tmp_path: Path, text: str | bytes, layout: Layout
     st.sampled_from([",", ";", "\t", " "]),
     st.booleans(),
 )
+@example([["0.5", "1e308"], ["1", "1e308"], ["1", "0"]], ",", False)
 @settings(max_examples=300, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_whatever_stands_in_a_file_it_is_booked_or_refused(
     tmp_path: Path, rows: list[list[str]], mark: str, has_header: bool

@@ -187,7 +187,9 @@ class TextRecording:
         steps = np.diff(columns["time"])
         at = np.flatnonzero((steps > _GAP * self.period_s) & (steps < _ONE_MISSING * self.period_s)) + 1
         self.notes.bridged += len(at)
-        whole = {name: np.insert(column, at, (column[at - 1] + column[at]) / 2.0) for name, column in columns.items()}
+        whole = {
+            name: np.insert(column, at, column[at - 1] / 2.0 + column[at] / 2.0) for name, column in columns.items()
+        }
         return whole, np.insert(lines, at, lines[at])
 
     def _note_repeats(self, x: Floats) -> None:
