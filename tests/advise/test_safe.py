@@ -1,4 +1,4 @@
-"""What is called safe rests, or is not felt, in independent loops at other holds in every corner."""
+"""Safe walls: each rests, or is not felt, in independent loops at other holds in every corner."""
 
 import numpy as np
 import pytest

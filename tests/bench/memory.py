@@ -1,4 +1,4 @@
-"""Whether the memory of every process stays flat from one to ten simulated minutes; part two of ``make bench``."""
+"""Memory of every process, which is to stay flat from one to ten simulated minutes; part two of ``make bench``."""
 
 from __future__ import annotations
 

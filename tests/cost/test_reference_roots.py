@@ -1,4 +1,4 @@
-"""Where a power series changes its sign: every such place, and nothing else."""
+"""Changes of the sign of a power series: every one, and nothing else."""
 
 from fractions import Fraction
 

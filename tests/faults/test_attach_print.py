@@ -1,4 +1,4 @@
-"""Whoever prints a run shows it to its end and says how it ended; the run does not mind."""
+"""Printing of a run: shown to its end, with how it ended; the run does not mind."""
 
 from __future__ import annotations
 

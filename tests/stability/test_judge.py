@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from haploop.launch.scene.file import load
+from haploop.launch.stability.decide import Pushed, measure
 from haploop.launch.stability.judge import judge
 from haploop.launch.stability.traces import frequency_Hz, is_felt, ripple, smallest_felt_m, trend, widths
 from helpers.runs.judged import ended, found
@@ -126,6 +127,16 @@ def test_growth_frequency_and_ripple_of_a_sine_are_its_own():
     assert frequency_Hz(x - 5e-3 * t, rate) == pytest.approx(40.0, abs=0.3)
     force = 2.0 * np.sin(2 * np.pi * 97.0 * t) + 7.0 * np.sin(2 * np.pi * 5.0 * t)
     assert ripple(force, rate) == pytest.approx(4.0, rel=0.02)
+
+
+def test_the_force_ripple_is_that_of_the_last_quarter():
+    """A buzz of the command that ends before it leaves none, though the swing of the device goes on."""
+    t = np.arange(4000) / 1000.0
+    x, one = 1e-4 * np.sin(2 * np.pi * 40.0 * t)[None], np.ones(1)
+    command = np.where(t < 2.9, np.sin(2 * np.pi * 100.0 * t), 0.0)[None]
+    [swing] = measure(Pushed(0.1 * x, x, command, one, 0.0 * one, one > 0, one > 0, one > 0), 1000.0)
+    assert swing.ripple_N == 0.0
+    assert swing.frequency_Hz == pytest.approx(40.0)
 
 
 def test_a_scene_without_noise_is_judged_the_same_with_its_noise_off():

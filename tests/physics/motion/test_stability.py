@@ -1,4 +1,4 @@
-"""Where a wall turns unstable, how fast it grows there, and where a steady contact rests."""
+"""Stability of a wall: its limit, the growth beyond it, and the place where a steady contact rests."""
 
 from __future__ import annotations
 

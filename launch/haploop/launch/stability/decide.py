@@ -200,7 +200,7 @@ def measure(pushed: Pushed, rate: float) -> list[Swing]:
 def _measured(pushed: Pushed, rate: float, frequency: np.ndarray, pieces: int) -> list[Swing]:
     small_x, large_x, command, *of_each = pushed
     ticks = large_x.shape[-1]
-    size, last_half, last_quarter = ticks // pieces, slice(ticks // 2, None), slice(-(-ticks // 4), None)
+    size, last_half, last_quarter = ticks // pieces, slice(ticks // 2, None), slice(-ticks // 4, None)
     small, large = widths(small_x, size), widths(large_x, size)
     half, quarter = small.shape[-1] // 2, small.shape[-1] // 4
     small_trend, large_trend = (trend(width[:, half:], size / rate) for width in (small, large))

@@ -1,4 +1,4 @@
-"""What is common to judging one loop and many: the pushes, the times of looking, and what a look finds."""
+"""The pushes, the times of looking and the finding of a look, common to judging one loop and many."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Whether a stretch of a run buzzes: it goes to and fro, and a hand feels that, by its motion or by its force."""
+"""The test of a buzz: a stretch of a run goes to and fro, and a hand feels that, by its motion or by its force."""
 
 from __future__ import annotations
 

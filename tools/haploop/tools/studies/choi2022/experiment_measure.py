@@ -1,4 +1,4 @@
-"""How stiff a wall each element steadies under an interpretation of the experiments, which of the paper's claims of
+"""The walls that each element steadies under an interpretation of the experiments, which of the paper's claims of
 section V.B hold then, and how far it is from the paper.
 """
 

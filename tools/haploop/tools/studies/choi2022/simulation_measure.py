@@ -1,4 +1,4 @@
-"""How far each claim of section V.A is from holding in runs of Fig. 6 under an interpretation, and the nearest one."""
+"""The shortfall of each claim of section V.A in runs of Fig. 6 under an interpretation, and the nearest one."""
 
 from __future__ import annotations
 
