@@ -44,7 +44,7 @@ bench: $(READY) ## measure speed, memory, what each effect and the live page cos
 	@$(BIN)/python tests/bench/arrays.py
 	@$(BIN)/python tests/bench/sweep.py
 
-accuracy: $(READY) ## measure what accuracy costs and write docs/accuracy.md (a quarter of an hour; stopped, it goes on where it was)
+accuracy: $(READY) ## measure what accuracy costs and write docs/accuracy.md (four minutes on two idle cores; stopped, it goes on where it was)
 	@$(BIN)/haploop cost --out runs/accuracy
 	@$(BIN)/python -m haploop.tools.cost.page runs/accuracy docs
 
