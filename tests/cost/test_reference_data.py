@@ -12,7 +12,6 @@ from mpmath import mpf
 from haploop.launch.scene.file import load
 from haploop.protocol.scene.paths import with_value
 from haploop.protocol.scene.scene import Scene
-from haploop.tools.reference.make import SCENES, close_loop, in_digits, make_timebase
 from haploop.tools.reference.nearest import (
     MOST_GROWTH,
     REFERENCES,
@@ -24,9 +23,10 @@ from haploop.tools.reference.nearest import (
     reference_for,
     statistics,
 )
-from haploop.tools.reference.plant import ContinuousPlant
 from haploop.tools.trajectory import trajectory
 from helpers.scenes.least import scene
+from oracles.continuous.make import SCENES, close_loop, in_digits, make_timebase
+from oracles.continuous.plant import ContinuousPlant
 from oracles.effects_reference import Bodies
 
 RATES = (1_000, 2_000, 5_000, 10_000, 20_000, 50_000, 100_000)

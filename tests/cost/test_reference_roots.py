@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from mpmath import mp, mpf
 
-from haploop.tools.reference.bodies import sign_changes
+from oracles.continuous.bodies import sign_changes
 
 
 def series_of(places: list[Fraction]) -> list:

@@ -1,1 +1,1 @@
-"""Reference motions of scenes, in as many digits as asked for, and where they are stored."""
+"""Reference motions of scenes, stored or made on the spot; ``tests/oracles/continuous`` makes the stored ones."""

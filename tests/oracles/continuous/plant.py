@@ -11,7 +11,7 @@ from mpmath import mp, mpf
 from scipy.integrate import solve_ivp
 
 from haploop.protocol.scene.scene import Scene
-from haploop.tools.reference.bodies import (
+from oracles.continuous.bodies import (
     COMMAND,
     FRICTION,
     LOAD,

@@ -1,4 +1,6 @@
-"""Makes the stored references of the accuracy scenes anew: python -m haploop.tools.reference.make [SCENE...]
+"""Makes the stored references of the accuracy scenes anew.
+
+PYTHONPATH=tests python -m oracles.continuous.make [SCENE...]
 
 The sampled loop with the program's own controller, sensors and line, closed around a continuous plant in 50 decimal
 digits. Needs mpmath, of the dev extra.
@@ -40,11 +42,11 @@ from haploop.tools.reference.nearest import (
     problem_hash,
     statistics,
 )
-from haploop.tools.reference.plant import ContinuousPlant, IntegratedPlant
 from haploop.tools.render.progress import Stage, bars
 from haploop.tools.trajectory import trajectory
+from oracles.continuous.plant import ContinuousPlant, IntegratedPlant
 
-SCENES = Path(__file__).parents[4] / "launch/scenes/accuracy"
+SCENES = Path(__file__).parents[3] / "launch/scenes/accuracy"
 DIGITS, FEWER_DIGITS = 50, 30
 _CHECK_RATE = 100_000
 
