@@ -14,6 +14,7 @@ from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import BlockLength, Timebase
 from haploop.protocol.transport.clock_client import ClockClient
 from haploop.protocol.transport.loop import ControllerEnd
+from haploop.protocol.transport.machine import machine_of
 from haploop.protocol.transport.messages import PROCESSES
 from haploop.protocol.transport.node import NodeError, run_node
 from haploop.protocol.transport.sockets import bind
@@ -35,7 +36,7 @@ class ControllerNode:
         told = welcome["context"]
         kinds = registry([Path(path) for path in told["plugins"]], told["elements"])
         self._controller = Controller(scene, Timebase(**welcome["timebase"]), kinds)
-        self._block = BlockLength(scene.run.block_ticks)
+        self._block = BlockLength(scene.run.block_ticks, machine_of(context).now)
         self._reported = 0
         self._secret = told["secret"]
         self._loop = ControllerEnd(context, welcome["endpoints"]["plant"]["loop"], lambda: self._wait("plant"))

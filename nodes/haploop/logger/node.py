@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import time as wall_clock
 from collections.abc import Callable
 from pathlib import Path
 
@@ -17,6 +16,7 @@ from haploop.logger.summary import Summary
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
 from haploop.protocol.transport.clock_client import REPORT_MS, Aborted, ClockClient
+from haploop.protocol.transport.machine import machine_of
 from haploop.protocol.transport.messages import PROCESSES
 from haploop.protocol.transport.node import NodeError, run_node
 from haploop.protocol.transport.sockets import bind
@@ -46,6 +46,7 @@ class LoggerNode:
         leave: Callable[[], str | None] = lambda: None,
     ) -> None:
         self._client, self._context, self._publisher, self._leave = client, context, publisher, leave
+        self._machine = machine_of(context)
         self._ended: dict[str, tuple[int, str, str | None]] = {}
         self._status: Message = {}
         self._status_due = 0.0
@@ -63,7 +64,7 @@ class LoggerNode:
         self._streams = Subscriber(self._context, addresses)
         attachments = welcome["context"].get("attachments", {})
         scene, time = Scene.from_dict(welcome["scene"]), Timebase(**welcome["timebase"])
-        self.session = open_session(scene, time, out, attachments)
+        self.session = open_session(scene, time, out, attachments, machine=self._machine)
         self.session.logger.booked = self._publish_energy
         states: dict[str, Message] = {}
         early: list[tuple[str, Frame]] = []
@@ -87,7 +88,7 @@ class LoggerNode:
 
     def run(self) -> tuple[int, Summary]:
         """Takes blocks until plant and controller have ended, then closes the log and writes the summary."""
-        poller = zmq.Poller()
+        poller = self._machine.poller()
         poller.register(self._client.socket, zmq.POLLIN)
         self._streams.register(poller)
         reported = -1
@@ -128,7 +129,7 @@ class LoggerNode:
             self.session.logger.event(tick, event)
 
     def _report(self, tick: int) -> None:
-        now = wall_clock.monotonic()
+        now = self._machine.now()
         if now < self._status_due:
             self._client.progress(tick)
             return

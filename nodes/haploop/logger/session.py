@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time as wall_clock
 from pathlib import Path
 
 from haploop.logger.log import LogError
@@ -13,6 +12,7 @@ from haploop.logger.logger import Logger
 from haploop.logger.summary import Summary, finite, write
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
+from haploop.protocol.transport.machine import MACHINE, Machine
 
 LOG, SUMMARY = "log.mcap", "summary.json"
 # The log is at most this far behind on disk, in wall time.
@@ -22,14 +22,14 @@ _FLUSH_S = 0.4
 class LogSession:
     """Keeps a logger's log flushed and closes everything in order."""
 
-    def __init__(self, logger: Logger, log: Log | None, out: Path | None) -> None:
+    def __init__(self, logger: Logger, log: Log | None, out: Path | None, machine: Machine = MACHINE) -> None:
         self.logger = logger
-        self._log, self._out = log, out
-        self._flush_due = wall_clock.monotonic() + _FLUSH_S
+        self._log, self._out, self._machine = log, out, machine
+        self._flush_due = self._machine.now() + _FLUSH_S
 
     def flush_when_due(self) -> None:
         """Hands the log to the operating system if the last time is too long ago."""
-        now = wall_clock.monotonic()
+        now = self._machine.now()
         if self._log and now >= self._flush_due:
             self._log.flush()
             self._flush_due = now + _FLUSH_S
@@ -41,20 +41,25 @@ class LogSession:
             self._log.close()
         summary = finite(self.logger.summary(failed, reason, trouble, telemetry_gaps))
         if self._out:
-            write_summary(summary, self._out)
+            write_summary(summary, self._out, self._machine)
         return summary
 
 
-def write_summary(summary: Summary, out: Path) -> None:
+def write_summary(summary: Summary, out: Path, machine: Machine = MACHINE) -> None:
     """Writes the summary into the directory of its run; LogError where that fails."""
     try:
-        write(summary, out / SUMMARY)
+        write(summary, out / SUMMARY, machine)
     except OSError as error:
         raise LogError(f"The summary {out / SUMMARY} could not be written: {error.strerror}.") from error
 
 
 def open_session(
-    scene: Scene, time: Timebase, out: Path | None, attachments: dict[str, str], memory: MemoryLog | None = None
+    scene: Scene,
+    time: Timebase,
+    out: Path | None,
+    attachments: dict[str, str],
+    memory: MemoryLog | None = None,
+    machine: Machine = MACHINE,
 ) -> LogSession:
     """Makes a logger with its files in directory ``out``, or without any when None.
 
@@ -67,10 +72,11 @@ def open_session(
         LogError: the log cannot be made.
     """
     detail = scene.run.log
-    file = Log(out / LOG) if out and detail != "none" else None
+    file = Log(out / LOG, machine=machine) if out and detail != "none" else None
     log = file or memory
     if log is None or detail == "none":
-        return LogSession(Logger(scene, time, None), None, out)
+        return LogSession(Logger(scene, time, None), None, out, machine)
     for name, text in attachments.items():
         log.attach(name, "text/plain", text.encode())
-    return LogSession(Logger(scene, time, Channels(log, time, every_step=detail == "steps")), file, out)
+    channels = Channels(log, time, every_step=detail == "steps")
+    return LogSession(Logger(scene, time, channels), file, out, machine)

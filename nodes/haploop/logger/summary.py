@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from haploop.logger.books.books import BooksState, moved_J, residual_J, stored_J, total_J
 from haploop.logger.verdict.measures import RunMeasures
 from haploop.protocol.scene.scene import Scene
+from haploop.protocol.transport.machine import MACHINE, Machine
 
 if TYPE_CHECKING:
     from haploop.controller.active_elements import Description
@@ -100,12 +101,12 @@ def outcome(scene: Scene, ran: Summary, measures: RunMeasures, diverged: str | N
     }
 
 
-def write(summary: Summary, path: Path) -> None:
+def write(summary: Summary, path: Path, machine: Machine = MACHINE) -> None:
     """Writes as JSON, in one piece: a reader never sees half a file. Numbers that are not finite become null."""
     temporary = path.with_suffix(".part")
     try:
-        temporary.write_text(json.dumps(finite(summary), indent=2) + "\n", encoding="utf-8")
-        temporary.replace(path)
+        machine.write(temporary, (json.dumps(finite(summary), indent=2) + "\n").encode())
+        machine.rename(temporary, path)
     except OSError:
         with contextlib.suppress(OSError):
             temporary.unlink()

@@ -11,6 +11,7 @@ from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import BlockLength, Timebase
 from haploop.protocol.transport.clock_client import ClockClient
 from haploop.protocol.transport.loop import PlantEnd
+from haploop.protocol.transport.machine import machine_of
 from haploop.protocol.transport.messages import PROCESSES
 from haploop.protocol.transport.node import NodeError, run_node
 from haploop.protocol.transport.sockets import bind
@@ -33,7 +34,7 @@ class PlantNode:
         welcome = client.join(endpoints)
         scene = Scene.from_dict(welcome["scene"])
         self._plant = Plant(scene, Timebase(**welcome["timebase"]))
-        self._block = BlockLength(scene.run.block_ticks)
+        self._block = BlockLength(scene.run.block_ticks, machine_of(context).now)
         self._secret = welcome["context"]["secret"]
 
     def _state(self) -> tuple[int, Message]:

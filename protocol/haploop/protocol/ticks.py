@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Callable
 from dataclasses import asdict, dataclass
 
 from haploop.protocol.scene.scene import Clock, Scene
@@ -131,14 +132,15 @@ class BlockLength:
     No bit of a run depends on it.
     """
 
-    def __init__(self, most_ticks: int) -> None:
+    def __init__(self, most_ticks: int, wall_clock: Callable[[], float] = time.perf_counter) -> None:
         self._most = most_ticks
         self.ticks = min(most_ticks, _FIRST_TICKS)
-        self._began = time.perf_counter()
+        self._wall_clock = wall_clock
+        self._began = wall_clock()
 
     def next(self) -> None:
         """Ends a block; doubles the length after a fast one, halves it after a slow one."""
-        now = time.perf_counter()
+        now = self._wall_clock()
         took_s, self._began = now - self._began, now
         if took_s < AT_MOST_S / 2:
             self.ticks = min(2 * self.ticks, self._most)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import math
-import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -39,8 +38,8 @@ class Commands:
     Whatever is refused leaves the run as it was.
     """
 
-    def __init__(self, clock: Clock, spec: RunSpec, roster: Callable[[], Roster]) -> None:
-        self._clock, self._spec, self._roster = clock, spec, roster
+    def __init__(self, clock: Clock, spec: RunSpec, roster: Callable[[], Roster], now: Callable[[], float]) -> None:
+        self._clock, self._spec, self._roster, self._now = clock, spec, roster, now
         self._rate = spec.scene.clock.control_rate
         self._verbs = {
             "status": self._status,
@@ -98,7 +97,7 @@ class Commands:
         return f"paused at {self._at(tick)}", {"tick": tick}
 
     def _resume(self) -> tuple[str, Message]:
-        tick = self._clock.resume(time.monotonic())
+        tick = self._clock.resume(self._now())
         self._clock.note({"resume": True})
         return f"resumed at {self._at(tick)}", {"tick": tick}
 
@@ -106,14 +105,14 @@ class Commands:
         if not isinstance(ticks, int) or ticks < 1:
             raise ClockError(f"A step goes on for at least one tick, but {ticks} was asked for.")
         self._clock.note({"step": ticks})
-        tick = self._clock.step(ticks, time.monotonic())
+        tick = self._clock.step(ticks, self._now())
         return f"stepping to {self._at(tick)}", {"tick": tick}
 
     def _pace(self, pace: float | str) -> tuple[str, Message]:
         rate = math.inf if pace == "free" else pace
         if isinstance(rate, bool) or not isinstance(rate, int | float):
             raise ClockError(f"A pace is a number above 0, or free, but {pace!r} was asked for.")
-        tick = self._clock.run_at(rate, time.monotonic())
+        tick = self._clock.run_at(rate, self._now())
         self._clock.note({"pace": in_words(rate)})
         return f"pace {in_words(rate)} from {self._at(tick)} on", {"tick": tick}
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -13,6 +12,7 @@ from haploop.launch.clock.clock import Clock
 from haploop.launch.clock.roster import Node, Roster
 from haploop.launch.spec import RunFailed
 from haploop.protocol.changes import refusals_of
+from haploop.protocol.transport.machine import machine_of
 from haploop.protocol.transport.messages import PROCESSES
 from haploop.protocol.transport.sockets import bind, has_message, open_socket
 from haploop.protocol.transport.wire import Frame, Message, WireError, decode, encode
@@ -43,6 +43,7 @@ class ClockServer:
         start_gate: Callable[[set[int]], bool],
     ) -> None:
         self.socket = open_socket(context, zmq.ROUTER)
+        self._machine = machine_of(context)
         self.address = bind(self.socket, sockets, "clock")
         self._secret, self._clock, self._welcome, self._command = secret, clock, welcome, command
         self.roster = Roster()
@@ -81,7 +82,7 @@ class ClockServer:
     def grant(self) -> None:
         """Sends every node how far it may go and what changes on the way, if that is news."""
         clock = self._clock
-        until = clock.grant(self.roster.slowest(), time.monotonic())
+        until = clock.grant(self.roster.slowest(), self._machine.now())
         events = clock.take_events()
         if until == self._granted and clock.is_last == self._last_sent and not events:
             return
@@ -118,7 +119,7 @@ class ClockServer:
         if frame.name in ("READY", "PROGRESS") and not 0 <= frame.fields[0] <= self._clock.until:
             self._refuse(sender, f"{frame.name} must name a tick from 0 to {self._clock.until}, which is granted.")
             return
-        node.heard = time.monotonic()
+        node.heard = self._machine.now()
         node.waits_for = ""
         handler = getattr(self, f"_on_{frame.name.lower()}", None)
         if handler is None:
@@ -150,7 +151,7 @@ class ClockServer:
             self._send(sender, "REFUSED", reason)
             return
         lossless = request["lossless"] and role not in ("plant", "controller")
-        node = Node(sender, role, request["pid"], lossless, request["endpoints"], time.monotonic())
+        node = Node(sender, role, request["pid"], lossless, request["endpoints"], self._machine.now())
         node.tick = 0 if known else self._clock.until
         self.roster.nodes[sender] = node
         if not known:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import secrets
-import time
+from collections.abc import Callable
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -18,10 +19,15 @@ from haploop.launch.processes.children import Child, interrupts, start_children
 from haploop.launch.spec import RunFailed, RunSpec
 from haploop.protocol.changes import Event
 from haploop.protocol.ticks import Timebase
-from haploop.protocol.transport.sockets import SecureContext
+from haploop.protocol.transport.machine import machine_of
+from haploop.protocol.transport.sockets import SecureContext, Transport
+from haploop.protocol.transport.wire import Message
 
 if TYPE_CHECKING:
     from haploop.logger.summary import Summary
+
+# From directory of sockets, what a node is told at its start, whether cores are pinned and the number of the run.
+Start = Callable[[Path, Message, bool, int], dict[str, Child]]
 
 _START_DEADLINE_S = 20.0
 # What the logger is given to save its files after another node has failed.
@@ -36,7 +42,12 @@ _PROBE_S = 0.2
 _HELD_UP_S = 1.0
 
 
-def run_processes(spec: RunSpec) -> tuple[Summary, list[tuple[int, Event]]]:
+def run_processes(
+    spec: RunSpec,
+    make_context: Callable[[Transport], SecureContext] = SecureContext.from_transport,
+    start_nodes: Start = start_children,
+    interrupts: Callable[..., AbstractContextManager[list[int]]] = interrupts,
+) -> tuple[Summary, list[tuple[int, Event]]]:
     """Runs to the end; returns the summary, and every event with its tick.
 
     The first SIGINT or SIGTERM ends the run in order, with a summary of what ran; the second at once.
@@ -48,7 +59,7 @@ def run_processes(spec: RunSpec) -> tuple[Summary, list[tuple[int, Event]]]:
     sockets = run_directory.create()
     try:
         with interrupts(usual_from=3) as received:
-            supervisor = Supervisor(spec, sockets, received)
+            supervisor = Supervisor(spec, sockets, received, make_context(spec.transport), start_nodes)
             return supervisor.run(), supervisor.events
     finally:
         run_directory.remove(sockets)
@@ -57,29 +68,31 @@ def run_processes(spec: RunSpec) -> tuple[Summary, list[tuple[int, Event]]]:
 class Supervisor:
     """One run's processes and its clock."""
 
-    def __init__(self, spec: RunSpec, sockets: Path, received: list[int]) -> None:
+    def __init__(
+        self, spec: RunSpec, sockets: Path, received: list[int], context: SecureContext, start_nodes: Start
+    ) -> None:
         self._spec, self._sockets, self._interrupts = spec, sockets, received
         scene = spec.scene
         timebase = Timebase.from_scene(scene)
         self._clock = Clock(scene, timebase, spec.kinds, spec.pace)
         self._deadline_s = scene.run.deadline
-        self._context = SecureContext.from_transport(spec.transport)
+        self._context, self._machine = context, machine_of(context)
         secret = secrets.token_hex(16)
-        context = {
+        told = {
             "out": str(spec.out.resolve()),
             "plugins": [str(path.resolve()) for path in spec.plugins],
             "elements": installed(),
             "attachments": spec.attachments,
         }
-        welcome = sockets.name, scene.as_dict(), timebase.as_dict(), context
-        commands = Commands(self._clock, spec, lambda: self._server.roster)
+        welcome = sockets.name, scene.as_dict(), timebase.as_dict(), told
+        commands = Commands(self._clock, spec, lambda: self._server.roster, self._machine.now)
         self._server = ClockServer(self._context, sockets, secret, self._clock, welcome, commands, spec.start_gate)
         keys = spec.transport.as_dict()["keys"]
         run_directory.announce(sockets, self._server.address, scene.title, str(spec.out), keys)
         run_number = len(run_directory.live_runs()) - 1
         start = {"address": self._server.address, "secret": secret, "transport": spec.transport.as_dict()}
-        self._children = start_children(sockets, start, scene.run.pin, run_number)
-        self._started = self._looked = time.monotonic()
+        self._children = start_nodes(sockets, start, scene.run.pin, run_number)
+        self._started = self._looked = self._machine.now()
         self._probe_due = 0.0
         self._stopping = False
 
@@ -103,12 +116,12 @@ class Supervisor:
         return self._clock.events
 
     def _lead(self) -> None:
-        poller = zmq.Poller()
+        poller = self._machine.poller()
         poller.register(self._server.socket, zmq.POLLIN)
         for child in self._children.values():
             poller.register(child.died, zmq.POLLIN)
         while not self._server.roster.all_own("done"):
-            wait_s = self._clock.wait_s(time.monotonic())
+            wait_s = self._clock.wait_s(self._machine.now())
             ready = dict(poller.poll(_LOOK_MS if wait_s is None else max(1, int(wait_s * 1000))))
             self._server.serve()
             self._heed_signals()
@@ -125,16 +138,16 @@ class Supervisor:
     def _look_at(self, child: Child) -> None:
         """Takes note that a process has ended: in order after DONE, otherwise the run fails."""
         ended = child.exit_description()
-        given_up = time.monotonic() + (_LAST_WORDS_S if child.exited() else 0.0)
+        given_up = self._machine.now() + (_LAST_WORDS_S if child.exited() else 0.0)
         self._server.serve()
         while not ((node := self._server.roster.own(child.role)) and node.done):
-            if time.monotonic() > given_up:
+            if self._machine.now() > given_up:
                 raise RunFailed(f"The {child.role} {ended}; {self._where()}")
             self._server.socket.poll(20)
             self._server.serve()
 
     def _check_deadlines(self) -> None:
-        now, roster = time.monotonic(), self._server.roster
+        now, roster = self._machine.now(), self._server.roster
         held_up_s, self._looked = now - self._looked, now
         if held_up_s > _HELD_UP_S:
             self._started += held_up_s

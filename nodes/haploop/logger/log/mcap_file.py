@@ -16,6 +16,7 @@ from mcap.data_stream import RecordBuilder
 from mcap.opcode import Opcode
 
 from haploop.logger.log import LogError
+from haploop.protocol.transport.machine import MACHINE, Machine
 
 MAGIC = b"\x89MCAP0\r\n"
 _CRC_BYTES = 4
@@ -29,7 +30,7 @@ class McapFile:
         schemas, channels, chunks, attachments, message_counts: what its summary will tell of it.
     """
 
-    def __init__(self, path: str | Path) -> None:
+    def __init__(self, path: str | Path, machine: Machine = MACHINE) -> None:
         """Makes the file and begins it; raises LogError where the operating system refuses."""
         self.path = Path(path)
         self.size = 0
@@ -41,7 +42,7 @@ class McapFile:
         self._failure: LogError | None = None
         try:
             # Unbuffered: pieces are large, and an error then belongs to the piece that met it.
-            self._file = self.path.open("wb", buffering=0)
+            self._file = machine.create(self.path)
         except OSError as error:
             raise LogError(
                 f"The log {self.path} cannot be made ({error.strerror}); name a directory that exists and is writable."

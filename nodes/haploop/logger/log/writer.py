@@ -19,6 +19,7 @@ from haploop.logger.log.chunk import Compression, FreeRows, TableRows, chunk
 from haploop.logger.log.mcap_file import McapFile, bytes_of
 from haploop.logger.log.table import Floats, TableLayout, pack
 from haploop.protocol.changes import Event
+from haploop.protocol.transport.machine import MACHINE, Machine
 
 # Bytes of messages after which a chunk is closed: what a reader must at least unpack to reach one message.
 _CHUNK_BYTES = 1 << 20
@@ -32,13 +33,13 @@ class Log:
     bring them into the order of log time. Log time and publish time are the simulated time in ns.
     """
 
-    def __init__(self, path: str | Path, *, compression: Compression = "lz4") -> None:
+    def __init__(self, path: str | Path, *, compression: Compression = "lz4", machine: Machine = MACHINE) -> None:
         """Begins the file, over any file of that name."""
         self._compression: Compression = compression
         self._tables: dict[int, TableLayout] = {}
         self._known: dict[Hashable, int] = {}
         self._rows: dict[int, TableRows | FreeRows] = {}
-        self._file = McapFile(path)
+        self._file = McapFile(path, machine)
 
     def channel(
         self, topic: str, columns: Mapping[str, str], *, samples_per_message: int | None = None, title: str

@@ -45,6 +45,15 @@ def run_node(role: str, work: Work) -> None:
     threading.Thread(target=_end_with_parent, daemon=True).start()
     gc.freeze()
     context = SecureContext.from_transport(Transport.from_dict(start["transport"]))
+    sys.exit(take_part(context, role, work, start, directory))
+
+
+def take_part(context: zmq.Context[zmq.Socket[bytes]], role: str, work: Work, start: Message, directory: Path) -> int:
+    """Works, reports to the clock how that ended, ends the context, and returns the exit status: 0 after DONE, else 1.
+
+    Args:
+        start: address of the clock and secret of the run.
+    """
     client = ClockClient(context, role, start["address"], start["secret"])
     try:
         tick, result = work(client, context, directory)
@@ -62,7 +71,7 @@ def run_node(role: str, work: Work) -> None:
         client.leave("FAILED", -1, f"{type(error).__name__}: {error}")
         status = 1
     context.destroy(linger=1000)
-    sys.exit(status)
+    return status
 
 
 def _end_with_parent() -> None:

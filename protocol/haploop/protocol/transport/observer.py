@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Sequence
 
 import zmq
 
 from haploop.protocol.changes import Event
 from haploop.protocol.transport.clock_client import ClockClient
+from haploop.protocol.transport.machine import machine_of
 from haploop.protocol.transport.telemetry import Subscriber
 from haploop.protocol.transport.wire import Frame
 
@@ -36,6 +36,7 @@ class Observer:
 
     def __init__(self, context: zmq.Context[zmq.Socket[bytes]], role: str, clock: str, listens: Sequence[str]) -> None:
         self._context, self._role, self._clock = context, role, clock
+        self._machine = machine_of(context)
         self._taken = 0
         self._events: list[tuple[int, Event]] = []
         self.client = self._join()
@@ -77,7 +78,7 @@ class Observer:
             self.client.close()
             self.client = self._join()
         self._note_events()
-        now = time.monotonic()
+        now = self._machine.now()
         if now >= self._report_due:
             self._report_due = now + _REPORT_S
             status = {"skipped_ticks": sum(self.skipped.values()), "garbled": self._streams.malformed}
@@ -99,7 +100,7 @@ class Observer:
 
     def wait(self, timeout_ms: int) -> None:
         """Waits until a message comes, at most ``timeout_ms``."""
-        poller = zmq.Poller()
+        poller = self._machine.poller()
         poller.register(self.client.socket, zmq.POLLIN)
         self._streams.register(poller)
         poller.poll(timeout_ms)

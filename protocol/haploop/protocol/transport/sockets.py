@@ -133,7 +133,7 @@ def open_socket(context: zmq.Context[zmq.Socket[bytes]], kind: int) -> zmq.Socke
 
 def bare_send(socket: zmq.Socket[bytes]) -> Callable[..., Any]:
     """Returns ``socket.send`` without pyzmq's checks of options that the loop does not use, a third of its time."""
-    return super(zmq.Socket, socket).send
+    return super(zmq.Socket, socket).send if isinstance(socket, zmq.Socket) else socket.send
 
 
 def _transport(context: zmq.Context[zmq.Socket[bytes]]) -> Transport:

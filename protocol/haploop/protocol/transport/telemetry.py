@@ -7,6 +7,7 @@ from typing import Any
 
 import zmq
 
+from haploop.protocol.transport.machine import machine_of
 from haploop.protocol.transport.sockets import has_message, open_socket
 from haploop.protocol.transport.wire import Frame, Message, WireError, decode, encode
 
@@ -70,6 +71,7 @@ class Subscriber:
     """
 
     def __init__(self, context: zmq.Context[zmq.Socket[bytes]], addresses: dict[str, str]) -> None:
+        self._machine = machine_of(context)
         self._sockets: dict[zmq.Socket[bytes], str] = {}
         for role, address in addresses.items():
             socket = open_socket(context, zmq.SUB)
@@ -91,7 +93,7 @@ class Subscriber:
 
     def receive(self, timeout_ms: int) -> list[tuple[str, Frame]]:
         """Waits at most ``timeout_ms`` for a message; returns all there are, (role, message)."""
-        poller = zmq.Poller()
+        poller = self._machine.poller()
         self.register(poller)
         poller.poll(timeout_ms)
         return self.drain()

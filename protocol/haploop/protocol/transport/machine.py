@@ -1,0 +1,42 @@
+"""The machine that a node runs on: wall clock, waiting on several sockets, and files.
+
+It comes with the context of the sockets, so that a simulation can stand in for all that a node meets of the world.
+"""
+
+from __future__ import annotations
+
+import time
+from io import RawIOBase
+from pathlib import Path
+from typing import Any, cast
+
+import zmq
+
+
+class Machine:
+    """The machine of this process."""
+
+    def now(self) -> float:
+        """Returns the wall clock, s, which never goes back."""
+        return time.monotonic()
+
+    def poller(self) -> zmq.Poller:
+        return zmq.Poller()
+
+    def create(self, path: Path) -> RawIOBase:
+        """Opens a new file for writing, over any of that name; every write goes to the operating system at once."""
+        return cast(RawIOBase, path.open("wb", buffering=0))
+
+    def write(self, path: Path, data: bytes) -> None:
+        path.write_bytes(data)
+
+    def rename(self, path: Path, target: Path) -> None:
+        path.replace(target)
+
+
+MACHINE = Machine()
+
+
+def machine_of(context: Any) -> Machine:
+    """Returns the machine of a context: this process's own, unless the context brings another."""
+    return getattr(context, "machine", MACHINE)
