@@ -13,9 +13,10 @@ from haploop.protocol.changes import describe
 from haploop.protocol.transport.wire import Frame
 from haploop.tools.attach.live_status import LiveStatus
 from haploop.tools.attach.live_table import LinePrinter, end_sentence, live_line, live_table
+from helpers.scenes.least import typed
 
 WELCOME = {
-    "scene": {"title": "a tap on a wall [of 0.15 N/mm]"},
+    "scene": typed(title="a tap on a wall [of 0.15 N/mm]").as_dict(),
     "timebase": {"plant_rate": 10_000, "control_rate": 1_000, "delay_steps": 0, "ticks": 3000},
     "context": {"out": "/nowhere"},
 }
@@ -163,7 +164,11 @@ def test_every_kind_of_event_has_its_words(event: dict[str, Any], words: str) ->
 
 def summary(**changes: Any) -> dict[str, Any]:
     ran = {"ended": "done", "why": "", "verdict": "steady", "stability": {}, "window": {"oscillation_m": 1e-6}}
-    return ran | {"energy": {"residual_J": 4e-18}} | changes
+    return ran | {"duration_s": 3.0, "energy": {"residual_J": 4e-18}} | changes
+
+
+def window_alone(**changes: Any) -> dict[str, Any]:
+    return {key: value for key, value in summary(**changes).items() if key != "stability"}
 
 
 def test_at_the_end_the_verdict_is_that_of_the_summary() -> None:
@@ -171,6 +176,21 @@ def test_at_the_end_the_verdict_is_that_of_the_summary() -> None:
     subject.end("", summary())
     assert row(shown(subject), "verdict").startswith("steady oscillation 1.00 µm")
     assert end_sentence(subject) == "Run a1b2c3 ended at tick 3000, 3 s."
+
+
+@pytest.mark.parametrize(
+    ("its_summary", "what", "word"),
+    [
+        (window_alone(), "verdict", "being judged"),
+        (window_alone(duration_s=61.0), "seen", "no swing seen"),
+        (window_alone(ended="failed"), "seen", "no swing seen"),
+        (None, "seen", "swinging"),
+    ],
+)
+def test_what_the_window_saw_of_a_run_that_has_ended_is_no_verdict(its_summary: Any, what: str, word: str) -> None:
+    subject = live_status(to=3000)
+    subject.end("", its_summary)
+    assert row(shown(subject), what).startswith(f"{word} oscillation")
 
 
 @pytest.mark.parametrize(

@@ -7,8 +7,12 @@ from oracles.snapshots import contact
 
 LEAK = {"total_J": -1.2e-3, "sampling_and_hold_J": -1e-4, "quantisation_J": 2e-6, "delay_J": -1.1e-3}
 SUMMARY = {
-    "title": RUNNING["title"], "duration_s": 3.0, "ended": "done", "verdict": "steady",
-    "verdict_rule": "In the last 0.5 s x crossed its trend line 0 times.", "trajectory_sha256": "ab" * 32,
+    "title": RUNNING["title"], "duration_s": 3.0, "ended": "done", "verdict": "limit-cycle",
+    "verdict_rule": "Pushes of 0.195 N and a tenth of it end in the same swing.", "trajectory_sha256": "ab" * 32,
+    "stability": {
+        "rate_1_s": -0.0123, "error_1_s": 0.02, "frequency_Hz": 7.1, "width_m": 5.35e-3, "spread_m": 4.2e-4,
+        "force_ripple_N": 0.41, "felt": True, "chaotic": True, "own_share": 0.93,
+    },
     "extremes": {"x_min_m": -0.0642, "x_max_m": 0.0, "force_max_N": 0.81}, "real_time_factor": 21.0,
     "lost": {"commands_dropped": 3, "commands_lost": 0, "telemetry_gaps": 0},
     "energy": {
@@ -17,7 +21,10 @@ SUMMARY = {
         "moved_J": 6e-3, "residual_J": 2e-18,
     },
 }  # fmt: skip
-ENDED = {"phase": "ended", "tick": 3000, "verdict": "steady", "options": None, "summary": SUMMARY, "nodes": []}
+ENDED = {
+    "phase": "ended", "tick": 3000, "verdict": "limit-cycle", "verdict_is": "judged", "options": None,
+    "summary": SUMMARY, "nodes": [],
+}  # fmt: skip
 
 
 def test_without_a_run_it_says_how_to_start_one_and_offers_nothing_that_steers(stand_in, open_page):
@@ -35,18 +42,41 @@ def test_without_a_run_it_says_how_to_start_one_and_offers_nothing_that_steers(s
 def test_a_verdict_is_a_word_a_shape_of_its_own_and_a_colour(stand_in, open_page):
     page = open_page(stand_in.url)
     grounds = set()
+    words = ("steady", "limit-cycle", "growing", "diverged", "no-contact", "undecided")
+    for word in words:
+        stand_in.state(**ENDED | {"verdict": word})
+        expect(page.locator("#verdict")).to_have_text(word)
+        assert page.get_attribute("#verdict use", "href") == f"#verdict-{word}"
+        page.wait_for_timeout(200)
+        grounds.add(style(page, "backgroundColor"))
+    assert len(grounds) == len(words)
+    shapes = page.evaluate("[...document.querySelectorAll('.shapes symbol')].map(s => s.innerHTML)")
+    assert len(set(shapes)) == len(shapes)
+    assert style(page, "color") == "rgb(255, 255, 255)"
+
+
+def style(page, name):
+    return page.evaluate("name => getComputedStyle(document.querySelector('#verdict'))[name]", name)
+
+
+def test_what_the_window_sees_is_an_outline_and_says_that_nothing_is_known_of_stability(stand_in, open_page):
+    page = open_page(stand_in.url)
     shown = {"steady": "no swing seen", "limit-cycle": "swinging", "diverged": "diverged", "no-contact": "no-contact"}
     for word, told in shown.items():
         stand_in.state(verdict=word)
         expect(page.locator("#verdict")).to_have_text(told)
-        assert page.get_attribute("#verdict use", "href") == f"#verdict-{word}"
+        assert style(page, "borderTopStyle") == "dashed"
         page.wait_for_timeout(200)
-        grounds.add(page.evaluate("getComputedStyle(document.querySelector('#verdict')).backgroundColor"))
-    assert len(grounds) == 4
-    shapes = page.evaluate("[...document.querySelectorAll('.shapes symbol')].map(s => s.innerHTML)")
-    assert len(set(shapes)) == len(shapes)
-    white = page.evaluate("getComputedStyle(document.querySelector('#verdict')).color")
-    assert white == "rgb(255, 255, 255)"
+        assert style(page, "backgroundColor") == "rgba(0, 0, 0, 0)"
+    by_window = {key: value for key, value in SUMMARY.items() if key != "stability"}
+    for verdict_is, told in {"awaited": "being judged", "abandoned": "no swing seen", "seen": "no swing seen"}.items():
+        stand_in.state(**ENDED | {"summary": by_window, "verdict": "steady", "verdict_is": verdict_is})
+        expect(page.locator("#verdict")).to_have_text(told)
+        expect(page.locator("#summary-title")).to_have_text(f"Ended: {told}")
+        assert style(page, "borderTopStyle") != "none"
+    stand_in.state(**ENDED | {"summary": None, "verdict_is": "unknown", "why": "Its summary cannot be read."})
+    expect(page.locator("#verdict")).to_have_text("not known")
+    expect(page.locator("#notice")).to_contain_text("Its summary cannot be read.")
 
 
 def test_the_header_has_the_numbers_with_their_units(stand_in, open_page):
@@ -80,7 +110,9 @@ def test_after_the_end_it_shows_what_came_of_the_run_and_its_last_snapshot(stand
     page = open_page(stand_in.url)
     expect(page.locator("#phase")).to_have_text("ended")
     summary = page.locator("#summary")
-    expect(summary).to_contain_text("Ended: no swing seen")
+    expect(summary).to_contain_text("Ended: limit-cycle")
+    for words in ("5.35 mm ± 420 µm", "at 7.10 Hz, felt, chaotic", "410 mN", "−0.0123 1/s ± 0.02 1/s", "93 %"):
+        expect(summary).to_contain_text(words)
     expect(summary).to_contain_text("leak by delay")
     expect(summary).to_contain_text("−1.10 mJ")
     expect(summary).to_contain_text("runs/fig6c")

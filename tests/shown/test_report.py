@@ -178,11 +178,14 @@ def test_the_report_of_a_run_says_what_it_does_when_it_is_pushed(
 ) -> None:
     found = {
         "rate_1_s": -1.5, "error_1_s": 0.02, "frequency_Hz": 40.0, "width_m": 2e-3, "spread_m": 1e-4, "felt": True,
-        "chaotic": True, "force_ripple_N": 0.4, "watched_s": 2.0,
+        "chaotic": True, "force_ripple_N": 0.4, "watched_s": 2.0, "own_share": 0.93,
     }  # fmt: skip
     told = shown(summary_table({**swap, "stability": found}), 200)
     assert "2.00 mm +- 100 µm peak to peak, at 40.0 Hz, felt, chaotic" in told
     assert "400 mN peak to peak" in told
     assert "-1.5 +- 0.02 1/s, watched for 2 s" in told
+    assert "93 % its own" in told
+    unknown = shown(summary_table({**swap, "stability": {**found, "own_share": None}}), 200)
+    assert "its own" not in unknown
     without = {name: value for name, value in swap.items() if name != "stability"}
     assert "pushed, it swings" not in shown(summary_table(without), 200)

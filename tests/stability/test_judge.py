@@ -7,8 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from haploop.controller.dissipation import registry
+from haploop.launch.runs.in_process import run_in_process
 from haploop.launch.scene.file import load
-from haploop.launch.stability.decide import Pushed, measure
+from haploop.launch.stability.decide import Finding, Pushed, measure
 from haploop.launch.stability.judge import judge
 from haploop.launch.stability.traces import frequency_Hz, is_felt, ripple, smallest_felt_m, trend, widths
 from helpers.runs.judged import ended, found
@@ -78,6 +80,23 @@ def test_the_limit_cycles_of_the_paper_are_found_and_the_chaotic_one_is_told():
     regular, chaotic = (found(load(f"launch/scenes/fig6{letter}.toml")) for letter in "ac")
     assert (regular.word, regular.chaotic, chaotic.word, chaotic.chaotic) == ("limit-cycle", False, "limit-cycle", True)
     assert chaotic.spread_m > 0.05 * chaotic.width_m
+
+
+@pytest.mark.parametrize(("stiffness", "least", "most"), [(500.0, 0.0, 0.1), (1100.0, 0.8, 1.0)])
+def test_the_share_of_a_swing_that_is_the_loops_own_is_what_remains_of_it(stiffness, least, most):
+    """A hand that trembles on a wall that rests but for its encoder's counts, and on one that buzzes."""
+    force = {"kind": "sine", "amplitude": 0.05, "frequency": 5.0, "offset": -1.0}
+    tables = {**pressed(), "hand": {"force": force}, "wall": {"position": 0.0, "stiffness": stiffness}}
+    summary = run_in_process(scene(**tables, encoder={"resolution": 2e-5}, run={"verdict": "pushed"}), registry())
+    assert least <= summary["stability"]["own_share"] <= most
+
+
+def test_no_share_is_told_of_a_run_that_swung_less_than_its_loop_does():
+    finding = Finding("limit-cycle", "lasts", width_m=1e-3)
+    assert finding.own_share(2e-3) == 0.5
+    assert finding.own_share(5e-4) is None
+    assert finding.own_share(0.0) is None
+    assert Finding("growing", "grows", width_m=1e-3).own_share(2e-3) is None
 
 
 def test_judging_leaves_the_run_as_it_was():

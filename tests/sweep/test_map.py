@@ -19,7 +19,7 @@ from haploop.tools.figure.data import FigureError
 from haploop.tools.figure.style import write_figure
 from haploop.tools.linear.one_tick import OneTickMap
 from haploop.tools.linear.stiffness_limit import pressed_deep
-from haploop.tools.sweep.map.data import AMPLITUDE, NOT_RUN, VERDICTS, MapData, make_map_data
+from haploop.tools.sweep.map.data import AMPLITUDE, NOT_RUN, VERDICTS, WIDTH, MapData, make_map_data
 from haploop.tools.sweep.map.edges import stiffest_steady
 from haploop.tools.sweep.map.figure import make_figure
 from haploop.tools.sweep.map.legend import LOOKS
@@ -90,6 +90,15 @@ def test_limit_cycles_alone_have_the_colour_of_their_amplitude(figure: Any) -> N
         else:
             assert np.ma.is_masked(shown[j, i])
     assert mesh.norm.vmin <= 1.5e-3 < 3e-3 <= mesh.norm.vmax
+
+
+def test_a_limit_cycle_is_as_wide_as_it_swings_on_after_its_push_and_all_else_as_it_ended(data: MapData) -> None:
+    width_m = [1e-6 * k for k in data.columns[K]]
+    judged = dataclasses.replace(data, columns={**data.columns, WIDTH: width_m})
+    cycles = data.verdicts == VERDICTS.index("limit-cycle")
+    np.testing.assert_array_equal(judged.amplitudes_m(), np.where(cycles, width_m, data.amplitudes_m()))
+    assert cycles.any()
+    assert not cycles.all()
 
 
 def test_cells_lie_around_their_values_on_a_logarithmic_axis_too(figure: Any) -> None:

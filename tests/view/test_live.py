@@ -4,12 +4,16 @@ import asyncio
 import json
 import os
 import signal
+import threading
 
 import numpy as np
 import pytest
 
 from haploop.launch.spec import RunFailed
+from haploop.launch.stability.decide import Finding
 from haploop.logger import read
+from haploop.tools.cli.view import LiveRuns
+from haploop.view.receive.run_session import RunSession
 from helpers.live.browsing import site, to_its_end
 from helpers.live.followed import follow, has_logged, same, stands, whole
 from helpers.live.live_run import going, undisturbed
@@ -129,6 +133,58 @@ def test_the_end_is_told_with_the_summary_and_what_was_seen_can_still_be_looked_
         later = await here.tab()
         await later.phase("ended")
         assert (await later.ask("pause"))[1].endswith("is over; nothing about it can change any more.")
+
+    follow(play, tmp_path, "duration=0.5", "wall.position=-0.001", pauses=(200,))
+
+
+@pytest.mark.parametrize("is_judged", [True, False], ids=["judged", "abandoned"])
+def test_the_verdict_comes_when_the_launcher_has_judged_the_run_and_until_then_it_is_awaited(
+    tmp_path, monkeypatch, is_judged
+):
+    may_judge, launcher = threading.Event(), [True]
+
+    def waits(*given):
+        assert may_judge.wait(20)
+        return Finding("steady", "rest", push_N=0.2)
+
+    class Launched(LiveRuns):
+        def has_launcher(self, run):
+            return launcher[0] and super().has_launcher(run)
+
+    async def play(run, tab, here):
+        await tab.phase("paused")
+        assert tab.state["verdict_is"] == "seen"
+        await tab.ask("resume")
+        state = await tab.until("the end", lambda: tab.state if tab.state["verdict_is"] == "awaited" else None)
+        assert state["phase"] == "ended"
+        assert "stability" not in state["summary"]
+        if is_judged:
+            may_judge.set()
+            state = await tab.until("the verdict", lambda: tab.state if tab.state["verdict_is"] == "judged" else None)
+            assert state["summary"] == await asyncio.to_thread(run.result)
+            assert (state["verdict"], state["why"]) == ("steady", "")
+            assert "stability" in state["summary"]
+        else:
+            launcher[0] = False
+            state = await tab.until("its word", lambda: tab.state if tab.state["verdict_is"] == "abandoned" else None)
+            assert "without judging it" in state["why"]
+            may_judge.set()
+
+    monkeypatch.setattr("haploop.launch.stability.judge.judge_scene", waits)
+    sets = ("duration=0.5", "wall.position=-0.001", "run.verdict=pushed")
+    follow(play, tmp_path, *sets, pauses=(200,), options={"runs": Launched()})
+
+
+def test_the_verdict_of_a_run_whose_summary_cannot_be_read_is_not_known(tmp_path, monkeypatch):
+    """As on another machine."""
+    monkeypatch.setattr(RunSession, "read_summary", lambda self: None)
+
+    async def play(run, tab, here):
+        await tab.phase("paused")
+        await tab.ask("resume")
+        state = await tab.phase("ended")
+        assert (state["verdict_is"], state["summary"]) == ("unknown", None)
+        assert "cannot be read from here" in state["why"]
 
     follow(play, tmp_path, "duration=0.5", "wall.position=-0.001", pauses=(200,))
 

@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 Summary = dict[str, Any]
 # Entries that differ between two runs of the same scene.
 OF_THE_MACHINE = ("wall_s", "real_time_factor", "versions")
+# Runs of processes that are longer, in simulated seconds, are not gone through again for their verdict.
+REPEATED_S = 60.0
 _FINITE = (str, int, bool)
 
 
@@ -99,6 +101,15 @@ def outcome(scene: Scene, ran: Summary, measures: RunMeasures, diverged: str | N
         "extremes": measures.extremes._asdict(),
         "window": measures.window.figures._asdict(),
     }
+
+
+def awaits_verdict(scene: Scene, summary: Summary) -> bool:
+    """Tells whether the summary of a run of processes has the word of its window only until its launcher has judged it.
+
+    A loop is judged where its scene asks for that, and its run ended by itself and was not too long to be repeated.
+    """
+    by_itself = summary["ended"] in ("done", "stopped", "diverged") and 0.0 < summary["duration_s"] <= REPEATED_S
+    return scene.run.verdict == "pushed" and by_itself and "stability" not in summary
 
 
 def write(summary: Summary, path: Path, machine: Machine = MACHINE) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import time as wall_clock
+from collections.abc import Sequence
 
 from haploop.logger.log import LogError
 from haploop.protocol.transport.clock_client import Aborted, Refused
@@ -67,12 +68,15 @@ class Viewer:
         """Waits for the run that was asked for first, or the newest of those that were not there at the last choice."""
         while True:
             live = self._runs.live()
-            fresh = [run for run in live if run.id not in self._known]
+            fresh = self._fresh(live)
             asked_for = [run for run in fresh if self._first and run.id.startswith(self._first)]
             if fresh:
                 self._known, self._first = {run.id for run in live}, None
                 return [*fresh, *asked_for][-1]
             await self._idle(_LOOK_S)
+
+    def _fresh(self, live: Sequence[Run]) -> list[Run]:
+        return [run for run in live if run.id not in self._known]
 
     async def _idle(self, seconds: float) -> None:
         """Updates pages while no telemetry comes: one may have changed its viewport."""
@@ -108,7 +112,10 @@ class Viewer:
         self._notify_pages()
 
     async def _complete(self, session: RunSession) -> None:
-        """Reads what is there only when a run is over: its summary, and from its log whatever was not received."""
+        """Reads what is there only when a run is over: from its log whatever was not received, and its summary.
+
+        The verdict comes last, when the launcher has judged the run; a new run is not kept waiting for it.
+        """
         for _ in range(_LOOKS):
             if session.summary:
                 break
@@ -116,6 +123,10 @@ class Viewer:
             session.read_summary()
         if self._from_start and not session.is_complete:
             await self._backfill(session)
+        while session.verdict_is == "awaited" and not self._fresh(self._runs.live()):
+            session.given_up = not self._runs.has_launcher(session.run)
+            session.read_summary()
+            await self._idle(_LOOK_S)
 
     async def _backfill(self, session: RunSession) -> None:
         """Puts what was logged before joining in front of what was received."""

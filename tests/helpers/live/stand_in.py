@@ -44,7 +44,8 @@ RUNNING = {
     "type": "state", "phase": "running", "why": "", "run": "abc123", "out": "runs/fig6c",
     "title": "Fig. 6(c): a 0.15 N/mm wall with unidirectional inertia",
     "tick": 1500, "end_tick": 3000, "control_rate": 1000, "plant_rate": 10000, "pace": 1.0, "real_time_factor": 0.98,
-    "verdict": "limit-cycle", "verdict_rule": "In the last 0.5 s x crossed its trend line 24 times.",
+    "verdict": "limit-cycle", "verdict_is": "seen",
+    "verdict_rule": "In the last 0.5 s x crossed its trend line 24 times.",
     "oscillation_m": 0.00535, "displayed_stiffness_N_m": 137.2, "residual_J": 2.1e-18, "moved_J": 6.2e-3,
     "nodes": [
         {"role": "plant", "pid": 11, "tick": 1500, "behind_ticks": 0, "waits_for": "controller", "lossless": True,

@@ -19,11 +19,7 @@ if TYPE_CHECKING:
     from haploop.logger.summary import Summary
     from haploop.protocol.changes import Event
 
-# Runs of processes that are longer, in simulated seconds, are not gone through again for their verdict.
-REPEATED_S = 60.0
-_NOT_REPEATED = (
-    f"By its window alone, since the run is longer than {REPEATED_S:g} s (haploop judge goes through it again)."
-)
+_NOT_REPEATED = "By its window alone, since the run is longer than {:g} s (haploop judge goes through it again)."
 
 
 def prepare(
@@ -102,10 +98,16 @@ def _judged(spec: RunSpec, summary: Summary, events: list[tuple[int, Event]]) ->
     """
     if spec.scene.run.verdict == "window":
         return summary
+    from haploop.logger.session import write_summary
+    from haploop.logger.summary import REPEATED_S
+
+    if summary["duration_s"] > REPEATED_S:
+        summary["verdict_rule"] = f"{_NOT_REPEATED.format(REPEATED_S)} {summary['verdict_rule']}"
+        write_summary(summary, spec.out)
+        return summary
     from haploop.launch.stability.decide import Finding
     from haploop.launch.stability.judge import judge_scene, with_verdict
     from haploop.launch.stability.looks import LOOKS_S
-    from haploop.logger.session import write_summary
 
     def find() -> Finding:
         try:
@@ -113,9 +115,5 @@ def _judged(spec: RunSpec, summary: Summary, events: list[tuple[int, Event]]) ->
         except (ElementError, ArithmeticError) as error:
             return Finding("undecided", "failed", detail=str(error))
 
-    if summary["duration_s"] > REPEATED_S:
-        summary["verdict_rule"] = f"{_NOT_REPEATED} {summary['verdict_rule']}"
-        write_summary(summary, spec.out)
-        return summary
     with redirect_stdout(sys.stderr):  # what a plugin prints is no part of what the command says
         return with_verdict(spec.scene, summary, find, spec.out)

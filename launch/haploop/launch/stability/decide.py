@@ -26,6 +26,8 @@ _LONG_S = 8.0
 _COUNTED_PERIODS = 60.0
 # After so long, swings of both sizes that grow alike grow for good, and what is known not to change lasts.
 _ALIKE_S = 4.0
+# A swing of the loop that is wider than that of its run by more than this has not been seen in it.
+_WIDER = 1.2
 # Behind an encoder a swing that decays may end as a chatter of so many counts, peak to peak, at the most.
 _COUNTS = 10
 
@@ -85,10 +87,25 @@ class Finding:
     needs_s: float | None = None
     detail: str = ""
 
-    def entries(self) -> dict[str, Any]:
-        """Returns what a summary tells of it: the word, why as a sentence, and the numbers as its ``stability``."""
+    def entries(self, seen_m: float | None = None) -> dict[str, Any]:
+        """Returns what a summary tells of it: the word, why as a sentence, and the numbers as its ``stability``.
+
+        ``seen_m`` is how far the run itself swung at its end, peak to peak.
+        """
         numbers = {name: value for name, value in vars(self).items() if name not in ("word", "detail")}
+        numbers["own_share"] = self.own_share(seen_m)
         return {"verdict": self.word, "verdict_rule": self.sentence(), "stability": numbers}
+
+    def own_share(self, seen_m: float | None) -> float | None:
+        """Returns which share of the swing seen in the run the loop keeps up by itself, with a still hand and no noise.
+
+        What is left is the hand's own motion, the noise, or dies away. None where it cannot be told: of a loop that
+        does not settle, of a run that did not swing, and where the loop swings wider than the run did.
+        """
+        if self.word not in ("steady", "limit-cycle") or not seen_m or seen_m < _REST_M:
+            return None
+        own_m = 0.0 if self.why == "decays" else self.width_m
+        return min(own_m / seen_m, 1.0) if own_m < _WIDER * seen_m else None
 
     def sentence(self) -> str:
         """Returns why, with its numbers."""

@@ -112,7 +112,7 @@ def with_verdict(scene: Scene, summary: Summary, find: Callable[[], Finding], ou
         finding = Finding("diverged", "diverged", detail=summary["why"])
     else:
         return summary
-    summary = finite(summary | finding.entries())
+    summary = finite(summary | finding.entries(summary["window"]["oscillation_m"]))
     if out:
         write_summary(summary, out)
     return summary

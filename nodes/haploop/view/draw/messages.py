@@ -17,6 +17,12 @@ from haploop.view.receive.run_session import RunSession
 # A page lists no more events than these, the newest.
 _MOST_EVENTS = 1000
 WAITING = {"type": "state", "phase": "waiting", "why": "", "run": None, "options": None, "summary": None, "nodes": []}
+# What the page says where a run has ended without a verdict.
+_NO_VERDICT = {
+    "awaited": "It is gone through again, held still and pushed at its end, for its verdict.",
+    "abandoned": "Its launcher has ended without judging it: haploop judge does.",
+    "unknown": "Its summary cannot be read from here, so that its verdict is not known.",
+}
 # Entries of the summary, of its window and of its energy; the logger's status has them side by side.
 _JUDGED = ("verdict", "verdict_rule"), ("oscillation_m", "displayed_stiffness_N_m"), ("residual_J", "moved_J")
 
@@ -85,7 +91,8 @@ def state(session: RunSession) -> Message:
     message: Message = {
         "type": "state",
         "phase": session.outcome or ("paused" if status.get("paused") else "running"),
-        "why": session.why,
+        "why": session.why or _NO_VERDICT.get(session.verdict_is, ""),
+        "verdict_is": session.verdict_is,
         "run": session.run.id,
         "title": session.scene.title,
         "out": str(session.out),

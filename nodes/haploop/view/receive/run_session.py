@@ -10,7 +10,7 @@ from pathlib import Path
 
 import zmq
 
-from haploop.logger.summary import Summary
+from haploop.logger.summary import Summary, awaits_verdict
 from haploop.protocol.changes import Event, at_work, changes_of
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import DELAY, Timebase
@@ -35,6 +35,7 @@ class RunSession:
         history: telemetry received, and what was logged before once ``prepend`` has been called.
         status: newest status of the logger.
         outcome: "" while the run goes on, then "ended" or "failed"; ``why`` is a sentence, if there is one.
+        given_up: whether nobody is there any more who could judge the run.
 
     Raises:
         Refused, Aborted: the run did not let this viewer in.
@@ -59,6 +60,7 @@ class RunSession:
         self.clock = ClockAnswers(runs, run, self.events)
         self.delay_s = self.scene.clock.round_trip_delay
         self.outcome = self.why = ""
+        self.given_up = False
         self.summary: Summary | None = None
         self._seen: deque[tuple[float, int]] = deque()
 
@@ -130,10 +132,23 @@ class RunSession:
             self.why = self.why or summary.get("why", "")
 
     @property
+    def verdict_is(self) -> str:
+        """Returns what there is of a verdict.
+
+        ``seen`` in the last half second, ``judged`` once the run has ended; between the two ``awaited``, or
+        ``abandoned`` where its launcher has gone; ``unknown`` where no summary can be read.
+        """
+        if not self.summary:
+            return "unknown" if self.outcome == "ended" else "seen"
+        if awaits_verdict(self.scene, self.summary):
+            return "abandoned" if self.given_up else "awaited"
+        return "judged" if "stability" in self.summary else "seen"
+
+    @property
     def version(self) -> tuple[object, ...]:
         """Returns a tuple that differs whenever something but the tick has changed."""
         status, at_work = self.clock.status, self.history.at_work
-        return self.outcome, self.summary is None, status.get("paused"), status.get("pace"), at_work, self.delay_s
+        return self.outcome, self.verdict_is, status.get("paused"), status.get("pace"), at_work, self.delay_s
 
     @property
     def is_complete(self) -> bool:

@@ -46,6 +46,10 @@ class Runs(Protocol):
         """Returns the runs that live now, the oldest first."""
         ...
 
+    def has_launcher(self, run: Any) -> bool:
+        """Returns whether the launcher of a run is there; it judges the run after the processes have ended."""
+        ...
+
     def ask(self, run: Any, verb: str, arguments: Message) -> tuple[str, Message]:
         """Sends a command to a run; returns its answer, a sentence and data, or raises CommandFailed."""
         ...

@@ -7,8 +7,9 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from haploop.logger.summary import Summary
+from haploop.logger.summary import Summary, awaits_verdict
 from haploop.protocol.changes import Event
+from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
 from haploop.protocol.transport.telemetry import Block
 from haploop.protocol.transport.wire import Frame, Message
@@ -27,6 +28,7 @@ class LiveStatus:
         skipped_ticks: telemetry that never came.
         figures: verdict, oscillation_m and residual_J so far, in the end those of the summary; empty before any.
         is_judged: whether the verdict is that of the ended run, held still and pushed.
+        is_awaited: whether its launcher still is to judge it.
         ended: how the run ended, in a word; "" while it goes on.
         why: a sentence on that; "" for none.
     """
@@ -34,7 +36,8 @@ class LiveStatus:
     def __init__(self, run_id: str, welcome: Message) -> None:
         self.run_id = run_id
         self.time = Timebase(**welcome["timebase"])
-        self.title: str = welcome["scene"]["title"]
+        self._scene = Scene.from_dict(welcome["scene"])
+        self.title = self._scene.title
         self.tick = 0
         self.paused = False
         self.factor: float | None = None
@@ -43,7 +46,7 @@ class LiveStatus:
         self.ended = self.why = ""
         self._newest: dict[str, Block] = {}
         self.figures: Message = {}
-        self.is_judged = False
+        self.is_judged = self.is_awaited = False
         self._motion_at_start: dict[str, float] = {}
         self._marks: deque[tuple[float, int]] = deque()
 
@@ -91,7 +94,7 @@ class LiveStatus:
             self.ended, self.why = ("failed" if failure else "ended"), failure
             return
         self.ended, self.why = summary["ended"], summary["why"] or failure
-        self.is_judged = "stability" in summary
+        self.is_judged, self.is_awaited = "stability" in summary, awaits_verdict(self._scene, summary)
         verdict, window = summary["verdict"], summary["window"]
         residual_J = summary["energy"]["residual_J"]
         self.figures = {"verdict": verdict, "oscillation_m": window["oscillation_m"], "residual_J": residual_J}

@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING
 
 from haploop.launch.processes import run_directory
+from haploop.launch.processes.run_directory import LiveRun
 from haploop.protocol.changes import describe
 from haploop.protocol.transport.clock_client import Refused
 from haploop.tools.attach.live_status import LiveStatus
@@ -50,7 +51,7 @@ def live_table(run: LiveStatus) -> RenderableType:
 
 def _word(run: LiveStatus) -> str:
     verdict = run.figures["verdict"]
-    return verdict if run.is_judged else seen(verdict)
+    return "being judged" if run.is_awaited else verdict if run.is_judged else seen(verdict)
 
 
 def live_line(run: LiveStatus) -> str:
@@ -82,10 +83,8 @@ def _figures(run: LiveStatus) -> Table:
     figures, motion = run.figures, run.motion()
     if figures:
         word, swing = _word(run), f"  oscillation {amount(figures['oscillation_m'], 'm')} peak to peak"
-        grid.add_row(
-            "verdict" if run.ended else "so far",
-            Text.assemble((word, verdict_style(figures["verdict"])), swing),
-        )
+        what = "verdict" if run.is_judged or run.is_awaited else "seen" if run.ended else "so far"
+        grid.add_row(what, Text.assemble((word, verdict_style(word)), swing))
     depth_m = run.penetration_m()
     side = "" if depth_m is None else f"  {amount(abs(depth_m), 'm')} {'inside' if depth_m > 0 else 'outside'} the wall"
     grid.add_row("position", amount(motion.get("x"), "m") + side)
@@ -129,6 +128,9 @@ def attach_print(run_id: str | None) -> None:
                 show(run)
             run.end(observed.failure, read_summary(observer.welcome))
             show(run)
+            if run.is_awaited:
+                _await_verdict(run, live_run, observed)
+                show(run)
     except Refused as error:
         leave(str(error), WRONG_USE)
     except KeyboardInterrupt:
@@ -136,6 +138,16 @@ def attach_print(run_id: str | None) -> None:
     print(end_sentence(run), file=sys.stderr)
     if run.ended == "failed":
         raise SystemExit(FAILED)
+
+
+def _await_verdict(run: LiveStatus, live_run: LiveRun, observed: ObservedRun) -> None:
+    """Waits until the launcher of a run that has ended has judged it; where it goes without, what was seen stands."""
+    is_there = True
+    while run.is_awaited and is_there:
+        time.sleep(_DRAWN_S)
+        is_there = run_directory.is_live(live_run)
+        run.end(observed.failure, read_summary(observed.observer.welcome))
+    run.is_awaited = False
 
 
 @contextlib.contextmanager

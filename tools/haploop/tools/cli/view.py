@@ -37,6 +37,12 @@ class LiveRuns:
 
         return run_directory.live_runs()
 
+    def has_launcher(self, run: LiveRun) -> bool:
+        """Returns whether the process that started a run is there, which judges it in the end."""
+        from haploop.launch.processes import run_directory
+
+        return run_directory.is_live(run)
+
     def ask(self, run: LiveRun, verb: str, arguments: Message) -> tuple[str, Message]:
         """Has a run carry out a command."""
         from haploop.launch.processes.run_directory import CommandRefused, RunNotFound, ask

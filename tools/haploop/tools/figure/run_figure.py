@@ -28,6 +28,7 @@ from haploop.tools.figure.style import (
 )
 from haploop.tools.figure.time import energy_panel, force_panel, mark_events, position_panel
 from haploop.tools.render.report import LEAK_CAUSES, count_losses, plant_books
+from haploop.tools.render.terminal import told
 from haploop.tools.render.units import amount, parameters, spring
 
 if TYPE_CHECKING:
@@ -88,7 +89,7 @@ def make_figure(run: RunData) -> Figure:
 
 
 def _draw_header(figure: Figure | SubFigure, run: RunData) -> None:
-    word = run.summary.get("verdict", "no verdict")
+    word = told(run.summary) if run.summary else "no verdict"
     sign = figure.text(
         0.012, 0.66, word, fontsize=LARGE, fontweight="bold", color="white", va="center", gid="verdict",
         bbox={"boxstyle": "round,pad=0.35", "facecolor": VERDICTS.get(word, GREY), "linewidth": 0},

@@ -80,13 +80,13 @@ class ProgressLine:
 
         bar = max(_LEAST_BAR, min(_MOST_BAR, width - _WORDS))
         done = round(min(1.0, status["t_s"] / self._duration_s) * bar)
-        verdict = status["verdict"]
+        word = seen(status["verdict"])
         text = Text.assemble(
             (f"{self._run_id} " if self._run_id else "", "bold"),
             ("━" * done, "green"), ("─" * (bar - done), "dim"),
             f" {status['t_s']:.2f}/{self._duration_s:g} s",
             f" {fixed(factor)}×" if factor else "",
-            "  ", (seen(verdict), verdict_style(verdict)),
+            "  ", (word, verdict_style(word)),
             f"  {amount(status['oscillation_m'], 'm')} p-p",
             f"  residual {status['residual_J']:.0e} J",
             (f"  {self._title}", "dim"),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from typing import TYPE_CHECKING, Any
 
-from haploop.tools.render.terminal import console, make_facts, make_table, seen, verdict_style
+from haploop.tools.render.terminal import console, make_facts, make_table, seen, told, verdict_style
 from haploop.tools.render.units import amount, fixed, parameters, spring
 
 if TYPE_CHECKING:
@@ -55,11 +55,11 @@ def summary_table(summary: Summary) -> RenderableType:
     from rich.console import Group
     from rich.text import Text
 
-    word = summary["verdict"]
+    word = told(summary)
     head = Text.assemble((word, verdict_style(word)), "  ", (summary["title"], "bold"))
     # Of the rule the measures alone, without the limits they were held against.
-    seen = summary["verdict_rule"].partition("; ")[0].rstrip(".")
-    parts: list[RenderableType] = [head, Text(f"{seen[:1].upper()}{seen[1:]}.", style="dim")]
+    rule = summary["verdict_rule"].partition("; ")[0].rstrip(".")
+    parts: list[RenderableType] = [head, Text(f"{rule[:1].upper()}{rule[1:]}.", style="dim")]
     if summary["ended"] not in ("done", "diverged"):
         parts.append(Text(f"ended early: {summary['ended']}", style="bold red"))
     control_rate = summary["ticks"] / summary["duration_s"] if summary["duration_s"] else 1.0
@@ -131,11 +131,15 @@ def _stability(found: Summary) -> list[tuple[str, str]]:
     frequency = f"at {amount(found['frequency_Hz'], 'Hz')}, " if found["frequency_Hz"] else ""
     chaotic = ", chaotic" if found["chaotic"] else ""
     size = f"{amount(found['width_m'], 'm')} +- {amount(found['spread_m'], 'm', 2)} peak to peak"
-    return [
+    rows = [
         ("pushed, it swings", f"{size}, {frequency}{felt}{chaotic}"),
         ("force ripple > 30 Hz", f"{amount(found['force_ripple_N'], 'N')} peak to peak"),
         ("growth", f"{found['rate_1_s']:.3g} +- {found['error_1_s']:.1g} 1/s, watched for {found['watched_s']:g} s"),
     ]
+    if (share := found.get("own_share")) is not None:
+        own = f"{100 * share:.0f} %" if share >= 0.01 else "less than 1 %"
+        rows.append(("of the oscillation", f"{own} its own; else the hand's motion, noise, or dying away"))
+    return rows
 
 
 def status_table(data: Message) -> RenderableType:
@@ -150,9 +154,9 @@ def status_table(data: Message) -> RenderableType:
     head = Text.assemble((data.get("run", ""), "bold"), "  " if data.get("run") else "", data["title"])
     parts: list[RenderableType] = [head, Text.assemble(state, where)]
     if status := data.get("status"):
-        word = status["verdict"]
+        word = seen(status["verdict"])
         looks = f" so far, oscillation {amount(status['oscillation_m'], 'm')} peak to peak"
-        parts.append(Text.assemble((seen(word), verdict_style(word)), looks))
+        parts.append(Text.assemble((word, verdict_style(word)), looks))
     return Group(*parts, _nodes(data["nodes"], rate))
 
 

@@ -10,6 +10,8 @@ if TYPE_CHECKING:
     from rich.table import Table
     from rich.text import Text
 
+    from haploop.logger.summary import Summary
+
 VERDICT_STYLES = {
     "steady": "bold green",
     "limit-cycle": "bold yellow",
@@ -34,6 +36,11 @@ def console(stderr: bool = False) -> Console:
 def seen(verdict: str) -> str:
     """Returns the word for what the last half second shows, which says nothing yet of stability."""
     return {"steady": "no swing seen", "limit-cycle": "swinging"}.get(verdict, verdict)
+
+
+def told(summary: Summary) -> str:
+    """Returns the verdict of a run, or the word for what was seen of one that was not judged."""
+    return summary["verdict"] if "stability" in summary else seen(summary["verdict"])
 
 
 def verdict_style(verdict: str) -> str:

@@ -21,9 +21,14 @@ if TYPE_CHECKING:
 
 VERDICT = "verdict"
 # Without the books, which take most of the time of a run.
-USUAL = (VERDICT, "window.oscillation_m", "window.displayed_stiffness_N_m", "extremes.force_max_N")
+_USUAL = (VERDICT, "window.oscillation_m", "window.displayed_stiffness_N_m", "extremes.force_max_N")
 TICKS = 2
 Complain = Callable[[int, str, str | None], None]
+
+
+def usual(base: Scene) -> list[str]:
+    """Returns the keys that are recorded unless others are asked for."""
+    return [*_USUAL, *(["stability.width_m"] if base.run.verdict == "pushed" else [])]
 
 
 def make_columns(

@@ -26,7 +26,7 @@ from haploop.tools.search.bisect import Tolerance
 from haploop.tools.sweep.cell_scene import Refused, Values, resolved
 from haploop.tools.sweep.cells import Axis, Bisect, Sweep
 from haploop.tools.sweep.points import NoSuchKey, PointsError, Span, listed, make_points, number_at
-from haploop.tools.sweep.record import USUAL, make_columns
+from haploop.tools.sweep.record import make_columns, usual
 from haploop.tools.sweep.table import Column
 
 if TYPE_CHECKING:
@@ -210,9 +210,9 @@ class _Reader:
 
     def _record(self, base: Scene | None, axes: Sequence[Axis]) -> list[Column]:
         given = self._data.get("record")
-        names = given if isinstance(given, list) and all(isinstance(name, str) for name in given) else list(USUAL)
         if base is None:
             return []  # what can be recorded depends on what runs
+        names = given if isinstance(given, list) and all(isinstance(name, str) for name in given) else usual(base)
 
         def complain(place: int, sentence: str, hint: str | None) -> None:
             self._layers.complain(("record", place), sentence, None, hint)

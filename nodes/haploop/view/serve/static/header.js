@@ -4,12 +4,14 @@ import { amount, fixed, isNumber, NONE, power, steady } from "./amounts.js";
 import { byId, put, sign } from "./dom.js";
 
 const WORDS = { lost: "not connected" };
-const VERDICTS = new Set(["steady", "limit-cycle", "diverged", "no-contact"]);
+const VERDICTS = new Set(["steady", "limit-cycle", "growing", "diverged", "no-contact", "undecided"]);
 // What is seen in the last half second says nothing of stability: that is judged when the run has ended.
 const SEEN = { steady: "no swing seen", "limit-cycle": "swinging" };
+const NOT_YET = { awaited: "being judged", unknown: "not known" };
 
-/** The word for what the last half second shows. */
-export const seen = (verdict) => SEEN[verdict] ?? verdict;
+/** What there is of a verdict, in a word. */
+export const told = ({ verdict, verdict_is: is }) =>
+  NOT_YET[is] ?? (is === "judged" ? verdict : SEEN[verdict] ?? verdict);
 
 /** Show a state; `phase` is its phase, or "lost" without a connection. */
 export function showHeader(state, phase) {
@@ -19,7 +21,7 @@ export function showHeader(state, phase) {
   sign(sought, `phase-${phase}`, WORDS[phase] ?? phase);
   put(byId("title"), state.title || "haploop");
   byId("title").title = state.title || "";
-  put(document.querySelector("title"), state.title ? `${seen(state.verdict) || phase}: ${state.title}` : "haploop");
+  put(document.querySelector("title"), state.title ? `${told(state) || phase}: ${state.title}` : "haploop");
   showVerdict(state);
   put(byId("oscillation"), amount(state.oscillation_m, "m"));
   put(byId("stiffness"), stiffness(state));
@@ -29,12 +31,13 @@ export function showHeader(state, phase) {
   showTime(state);
 }
 
-function showVerdict({ verdict, verdict_rule: rule }) {
-  const known = VERDICTS.has(verdict) ? verdict : "none";
+function showVerdict(state) {
+  const known = VERDICTS.has(state.verdict) && !(state.verdict_is in NOT_YET) ? state.verdict : "none";
   const sought = byId("verdict");
   sought.dataset.verdict = known;
-  sought.title = rule || "";
-  sign(sought, `verdict-${known}`, seen(verdict) || "no verdict");
+  sought.dataset.is = state.verdict_is ?? "seen";
+  sought.title = state.verdict_rule || "";
+  sign(sought, `verdict-${known}`, told(state) || "no verdict");
 }
 
 /** A number of at most six digits, in powers of ten beyond. */

@@ -62,7 +62,7 @@ function newRun() {
 function showState() {
   showHeader(state, phase());
   showNodes(state.nodes ?? []);
-  showSummary(state.summary, state.out);
+  showSummary(state);
   time.update(state);
   const goesOn = Boolean(state.options) && !state.summary;
   byId("swap").hidden = byId("set").hidden = !goesOn;

@@ -2,36 +2,53 @@
 
 import { amount, fixed, isNumber, NONE } from "./amounts.js";
 import { byId, make } from "./dom.js";
-import { seen } from "./header.js";
+import { told } from "./header.js";
 
 const CAUSES = { sampling_and_hold_J: "sampling and hold", quantisation_J: "quantisation", delay_J: "delay" };
 const HOW = { done: "to its end", stopped: "stopped early", diverged: "ended by divergence", failed: "failed" };
 
-/** Show a summary and where it lies; hidden while there is none. */
-export function showSummary(summary, out) {
+/** Show the summary of a state and where it lies; hidden while there is none. */
+export function showSummary(state) {
+  const { summary, out } = state;
   const panel = byId("summary");
   panel.hidden = !summary;
-  const known = summary ? `${summary.trajectory_sha256} ${out}` : "";
+  const known = summary ? `${summary.trajectory_sha256} ${out} ${state.verdict_is}` : "";
   if (!summary || panel.dataset.known === known) return;
   panel.dataset.known = known;
   panel.replaceChildren(
-    make("h2", { id: "summary-title" }, `Ended: ${summary.stability ? summary.verdict : seen(summary.verdict)}`),
+    make("h2", { id: "summary-title" }, `Ended: ${told(state)}`),
     make("p", { class: "about" }, summary.verdict_rule ?? ""),
-    figures(summary),
+    rows({ ...pushed(summary.stability ?? {}), ...figures(summary) }),
     books(summary.energy ?? {}),
     make("p", { class: "about" }, "In ", make("code", {}, out)),
   );
 }
 
+/** What the loop did, held still and pushed; nothing where it was not watched to an answer. */
+function pushed({ rate_1_s: rate, error_1_s: error, ...found }) {
+  if (!isNumber(rate)) return {};
+  const how = [found.frequency_Hz && `at ${amount(found.frequency_Hz, "Hz")}`, found.felt ? "felt" : "not felt"];
+  return {
+    "pushed, it swings": `${amount(found.width_m, "m")} ± ${amount(found.spread_m, "m", 2)}`,
+    "that is": [...how, found.chaotic && "chaotic"].filter(Boolean).join(", "),
+    "force ripple > 30 Hz": amount(found.force_ripple_N, "N"),
+    growth: `${amount(rate, "1/s")} ± ${amount(error, "1/s", 1)}`,
+    "its own in the run's swing": isNumber(found.own_share) ? `${Math.round(100 * found.own_share)} %` : NONE,
+  };
+}
+
 function figures({ duration_s, ended, extremes = {}, real_time_factor: factor, lost = {} }) {
-  const rows = {
+  return {
     ran: `${isNumber(duration_s) ? fixed(duration_s, 4) : NONE} s, ${HOW[ended] ?? ended}`,
     "position from": `${amount(extremes.x_min_m, "m")} to ${amount(extremes.x_max_m, "m")}`,
     "largest force": amount(extremes.force_max_N, "N"),
     "real time": isNumber(factor) ? `${fixed(factor)}×` : NONE,
     "commands lost, dropped": `${lost.commands_lost ?? 0}, ${lost.commands_dropped ?? 0}`,
   };
-  const entries = Object.entries(rows).map(([name, text]) => make("div", {}, make("dt", {}, name), make("dd", {}, text)));
+}
+
+function rows(texts) {
+  const entries = Object.entries(texts).map(([name, text]) => make("div", {}, make("dt", {}, name), make("dd", {}, text)));
   return make("dl", { class: "rows" }, ...entries);
 }
 

@@ -15,7 +15,7 @@ from haploop.tools.figure.data import FigureError
 from haploop.tools.render.units import prefix_for
 from haploop.tools.sweep.table import ResolvedSweep
 
-AMPLITUDE, STIFFNESS = "window.oscillation_m", "wall.stiffness"
+AMPLITUDE, WIDTH, STIFFNESS = "window.oscillation_m", "stability.width_m", "wall.stiffness"
 # The worse later: of several seeds a cell shows the worst. A failed run says nothing, a swinging one that it swings.
 VERDICTS = ("steady", "no-contact", "failed", "undecided", "limit-cycle", "growing", "diverged")
 STEADY, NO_CONTACT, FAILED, UNDECIDED, LIMIT_CYCLE, GROWING, DIVERGED = range(len(VERDICTS))
@@ -77,8 +77,8 @@ class Cells:
 
     Attributes:
         verdict: number of the worst verdict in ``VERDICTS``; NOT_RUN where there is none yet.
-        amplitude_m: the widest oscillation among the seeds with that verdict; NaN where unknown.
-        least_m: the least oscillation among all seeds.
+        amplitude_m: the widest swing among the seeds with that verdict; NaN where unknown.
+        least_m: the least swing among all seeds.
         agree, seeds: how many seeds came to that verdict, and how many ran.
         row: a row of the table with that verdict; -1 for none.
     """
@@ -117,7 +117,7 @@ class MapData:
 
     @property
     def has_amplitudes(self) -> bool:
-        return AMPLITUDE in self.columns
+        return AMPLITUDE in self.columns or WIDTH in self.columns
 
     def cells(self) -> Cells:
         """Returns all cells, the seeds of each taken together."""
@@ -138,10 +138,16 @@ class MapData:
         return Cells(worst, amplitude, np.where(np.isinf(least), math.nan, least), agree, seeds, first)
 
     def amplitudes_m(self) -> np.ndarray:
-        """Returns the oscillation of every row; NaN where it is not known."""
-        if not self.has_amplitudes:
-            return np.full(len(self.columns["verdict"]), math.nan)
-        return np.array([math.nan if value is None else value for value in self.columns[AMPLITUDE]], dtype=float)
+        """Returns how far every row swings: a limit cycle by what remains of it after a push, where that is recorded.
+
+        All else by the oscillation at the end of its run; NaN where it is not known.
+        """
+        width_m = self._numbers(WIDTH)
+        return np.where((self.verdicts == LIMIT_CYCLE) & (width_m > 0.0), width_m, self._numbers(AMPLITUDE))
+
+    def _numbers(self, name: str) -> np.ndarray:
+        column = self.columns.get(name, [None] * len(self.columns["verdict"]))
+        return np.array([math.nan if value is None else value for value in column], dtype=float)
 
 
 def short(value: float) -> str:

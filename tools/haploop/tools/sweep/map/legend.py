@@ -123,7 +123,7 @@ class Legend:
         """Draws the colours of the limit cycles."""
         from matplotlib.cm import ScalarMappable
 
-        self._heading(f"{verdict_words(LIMIT_CYCLE)}: oscillation, peak to peak")
+        self._heading(f"{verdict_words(LIMIT_CYCLE)}: swing, peak to peak")
         bottom = self._height - self._y - 0.14
         bar = self._side.add_axes((0.05, bottom / self._height, 0.86, 0.14 / self._height))
         shown = ScalarMappable(scale, amplitude_colours())

@@ -1,4 +1,4 @@
-"""The panels of a map: a cell for every pair of values, or the oscillation along one axis."""
+"""The panels of a map: a cell for every pair of values, or the swing along one axis."""
 
 from __future__ import annotations
 
@@ -104,7 +104,7 @@ _BELOW, _ABOVE = 3.0, 6.0
 
 
 class SwingScale:
-    """One logarithmic scale of oscillations for all panels, with a shelf above for cells that have no number."""
+    """One logarithmic scale of swings for all panels, with a shelf above for cells that have no number."""
 
     def __init__(self, cells: Cells) -> None:
         known = np.concatenate([cells.amplitude_m.ravel(), cells.least_m.ravel()])
@@ -148,7 +148,7 @@ def draw_swings(ax: Axes, x: Ruler, cells: Cells, scale: SwingScale, label: bool
     ax.tick_params(axis="y", labelsize=SMALL, colors=GREY, labelcolor=INK)
     ax.tick_params(axis="y", which="both", labelleft=label)
     if label:
-        ax.set_ylabel("oscillation, peak to peak", fontsize=TEXT, color=INK)
+        ax.set_ylabel("swing, peak to peak", fontsize=TEXT, color=INK)
     ax.grid(axis="y", color="#E6E6E6", linewidth=0.6, zorder=0.5)
 
 

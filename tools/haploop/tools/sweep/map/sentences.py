@@ -14,6 +14,7 @@ from haploop.tools.sweep.map.data import (
     NOT_RUN,
     STIFFNESS,
     VERDICTS,
+    WIDTH,
     Axis,
     Cells,
     MapData,
@@ -134,6 +135,10 @@ def map_notes(data: MapData, cells: Cells, layout: Layout, lines: Sequence[Panel
             "came to it, the others to milder ones.",
         ),
         (layout.y is None and len(data.seeds) > 1, "Upright lines reach down to the seed that swings least."),
+        (
+            layout.y is None and WIDTH in data.columns,
+            "Limit cycles as they swing on after a push, all else at the end of its run.",
+        ),
         (
             (cells.verdict == LIMIT_CYCLE).any() and not data.has_amplitudes,
             "How far limit cycles swing was not recorded.",
