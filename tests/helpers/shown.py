@@ -23,3 +23,8 @@ def row(text: str, begins: str) -> list[str]:
     """The cells of the line that begins with some words."""
     (line,) = [line for line in text.splitlines() if line.strip().startswith(begins)]
     return [cell.strip() for cell in line.strip().removeprefix(begins).split("  ") if cell.strip()]
+
+
+def words(figure: Any, name: str) -> list[str]:
+    """The texts drawn under a name, each on one line."""
+    return [" ".join(text.get_text().split()) for text in artists(figure, name)]

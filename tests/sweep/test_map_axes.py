@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from haploop.launch.scene.toml_writer import inline
-from haploop.tools.sweep.map.axis import Ruler
-from haploop.tools.sweep.map.data import Axis
+from haploop.tools.sweep.map.axis import Axis
 
 K = "wall.stiffness"
 
@@ -24,17 +23,17 @@ K = "wall.stiffness"
     ],
 )
 def test_the_scale_follows_the_values(values: list[float], scale: str) -> None:
-    ruler = Ruler.from_axis(Axis.from_column("wall.stiffness", "N/m", values))
-    assert ruler.scale == scale
-    assert (np.diff(ruler.edges) > 0).all()
-    assert all(low < at < high for low, at, high in zip(ruler.edges, ruler.coordinates, ruler.edges[1:], strict=False))
+    axis = Axis.from_column("wall.stiffness", "N/m", values)
+    assert axis.scale == scale
+    assert (np.diff(axis.edges) > 0).all()
+    assert all(low < at < high for low, at, high in zip(axis.edges, axis.coordinates, axis.edges[1:], strict=False))
 
 
 def test_short_times_are_written_in_milliseconds_where_they_belong() -> None:
-    ruler = Ruler.from_axis(Axis.from_column("clock.round_trip_delay", "s", [0.0, 0.001, 0.002]))
-    assert ruler.label == "clock.round_trip_delay (ms)"
-    assert ruler.coordinates.tolist() == pytest.approx([0.0, 1.0, 2.0])
-    assert ruler.axis.word(2) == "2 ms"
+    axis = Axis.from_column("clock.round_trip_delay", "s", [0.0, 0.001, 0.002])
+    assert axis.label == "clock.round_trip_delay (ms)"
+    assert axis.coordinates.tolist() == pytest.approx([0.0, 1.0, 2.0])
+    assert axis.word(2) == "2 ms"
 
 
 def test_lists_of_elements_make_panels_with_names_that_can_be_read() -> None:

@@ -14,11 +14,11 @@ from typer.testing import CliRunner
 
 from haploop.tools.cli.main import app
 from haploop.tools.figure.data import FigureError
-from haploop.tools.sweep.map.bisect_figure import MOST_LINES, bisect_figure
 from haploop.tools.sweep.map.data import AMPLITUDE, MapData, make_map_data
 from haploop.tools.sweep.map.edges import ALL_HOLD, FOUND, NONE_HOLDS, UNKNOWN, find_edges
-from haploop.tools.sweep.map.figure import draw_map
+from haploop.tools.sweep.map.figure import MOST_LINES, bisect_figure, draw_map
 from haploop.tools.sweep.table import read
+from helpers import shown
 from helpers.data.sweep_tables import UNITS, said
 from helpers.shown import artists
 
@@ -58,7 +58,7 @@ def bisected(others: dict[str, list[Any]], boundary: Ends, points: list[float] |
 
 
 def words(drawn: Any, gid: str) -> str:
-    return " ".join(text.get_text() for text in artists(drawn, gid))
+    return " ".join(shown.words(drawn, gid))
 
 
 def test_every_boundary_stands_at_its_place_with_its_bracket() -> None:

@@ -13,14 +13,13 @@ from haploop.protocol.scene.paths import with_value, without
 from haploop.protocol.scene.scene import ElementTable, Scene
 from haploop.tools.linear.bounds import bounds_of
 from haploop.tools.linear.one_tick import NotLinear, OneTickMap
-from haploop.tools.sweep.map.axis import Ruler
-from haploop.tools.sweep.map.data import Axis
+from haploop.tools.sweep.map.axis import Axis
 from haploop.tools.sweep.map.figure import make_figure
 from haploop.tools.sweep.map.lines import EXACT, bound_lines, exact_limit
 from haploop.tools.sweep.map.plane import Plane, zero_lines
 from helpers.data.sweep_tables import UNITS, cells_of, said, table
 from helpers.scenes.least import scene
-from helpers.shown import artists
+from helpers.shown import artists, words
 
 K, B, M, DELAY = "wall.stiffness", "dissipation.0.damping", "dissipation.0.mass", "clock.round_trip_delay"
 WALL = {"position": -0.001, "stiffness": 100.0}
@@ -32,13 +31,13 @@ def loop(**tables: Any) -> Scene:
     return scene(**{"device": DEVICE, "wall": WALL, "dissipation": [{"kind": "damping", "damping": 0.1}], **tables})
 
 
-def ruler(key: str, values: list[float]) -> Ruler:
-    return Ruler.from_axis(Axis.from_column(key, UNITS.get(key, ""), values))
+def axis(key: str, values: list[float]) -> Axis:
+    return Axis.from_column(key, UNITS.get(key, ""), values)
 
 
 def plane(made: Scene, **axes: list[float]) -> Plane:
     names = {"k": K, "b": B, "m": M, "delay": DELAY, "rate": "clock.control_rate"}
-    return Plane(made, [ruler(names[name], values) for name, values in axes.items()])
+    return Plane(made, [axis(names[name], values) for name, values in axes.items()])
 
 
 def points(lines: list[np.ndarray]) -> np.ndarray:
@@ -150,7 +149,7 @@ def figure_over(made: Scene, axes: dict[str, list[float]]) -> Any:
 
 
 def legend(drawn: Any) -> str:
-    return " ".join(text.get_text() for text in artists(drawn, "legend"))
+    return " ".join(words(drawn, "legend"))
 
 
 def test_bounds_are_drawn_where_they_apply_at_the_stiffness_they_allow() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
@@ -10,7 +11,7 @@ from haploop.launch.batch.run import run_batch
 from haploop.launch.scene.toml_writer import to_toml
 from haploop.protocol.scene.scene import Scene
 from haploop.tools.sweep.map.data import AMPLITUDE, MapData, make_map_data
-from helpers.scenes.least import KINDS
+from helpers.scenes.least import KINDS, scene
 
 UNITS = {
     "wall.stiffness": "N/m",
@@ -63,3 +64,29 @@ def said(verdict: str | None, oscillation_m: float | None = None) -> Result:
     if verdict is None:
         return {"ended": "failed", "why": "A plugin raised."}
     return {"verdict": verdict, "window": {"oscillation_m": oscillation_m}}
+
+
+# A sweep with a result of every kind.
+K, B = "wall.stiffness", "dissipation.0.damping"
+STIFFNESSES, DAMPINGS = [100.0, 200.0, 300.0, 400.0], [0.1, 0.2, 0.5, 1.0, 2.0]
+WITH_DAMPING = scene(
+    title="a base", wall={"position": -0.001, "stiffness": 100.0}, dissipation=[{"kind": "damping", "damping": 0.1}]
+)
+
+
+def result_of(cell: dict[str, Any]) -> dict[str, Any]:
+    """A result of every kind, by place."""
+    k, b = cell[K], cell[B]
+    if b == 2.0:
+        return said(None)
+    if k == 400.0:
+        return said("diverged", math.inf)
+    if k / b > 1000.0:
+        return said("limit-cycle", 1e-6 * k / b)
+    return said("no-contact" if k == 100.0 else "steady", 1e-7)
+
+
+def with_all_kinds(title: str = "a sweep") -> MapData:
+    axes = {K: STIFFNESSES, B: DAMPINGS}
+    cells = cells_of(axes)
+    return table(axes, cells, [result_of(cell) for cell in cells], [WITH_DAMPING] * len(cells), title)

@@ -1,19 +1,24 @@
-"""An axis of a map: where its values stand, how far their cells reach, and what is written along it."""
+"""An axis of a map: its values, where they stand, how far their cells reach, and what is written along it."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+import tomllib
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from haploop.launch.scene.toml_writer import inline
 from haploop.tools.figure.style import FAINT, GREY, INK, SMALL, TEXT, plain_numbers
-from haploop.tools.sweep.map.data import Axis, short, with_prefix
+from haploop.tools.render.units import prefix_for
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+# Units that take a prefix; stiffness, damping and mass stay as scene files have them.
+_WITH_PREFIX = ("m", "s", "N", "Hz")
 # Steps as different as this are even neither in size nor in ratio; such values stand side by side in even cells.
 _UNEVEN = 4.0
 # Ratios of a logarithmic axis differ by no more than this, and reach over this range at least.
@@ -25,35 +30,61 @@ _DECADES = 1000.0
 
 
 @dataclass(frozen=True)
-class Ruler:
-    """Converts the values of an axis to coordinates: values over a factor, in the unit that is left.
+class Axis:
+    """An axis of a sweep as a map shows it.
 
     Attributes:
-        scale: ``"linear"``, ``"log"``, or ``"even"``: cells of one width in the order of the values.
+        values: ascending; the numbers 0, 1, ... where they stand for ``names``.
+        names: of the values where they are no numbers, in the order of the sweep; else empty.
+        planned: the values that the sweep asks for, ascending; a search runs others in between.
     """
 
-    axis: Axis
-    scale: str
-    factor: float
+    key: str
     unit: str
+    values: np.ndarray
+    names: tuple[str, ...] = ()
+    planned: np.ndarray = field(default_factory=lambda: np.empty(0))
 
     @classmethod
-    def from_axis(cls, axis: Axis) -> Ruler:
-        if axis.names:
-            return cls(axis, "even", 1.0, "")
-        return cls(axis, _scale(axis.planned), *with_prefix(axis.values, axis.unit))
+    def from_column(cls, key: str, unit: str, column: Sequence[Any], planned: Sequence[Any] = ()) -> Axis:
+        """Makes the axis of a column of the table; ``planned`` are values the sweep has, run or not."""
+        given = [*planned, *column]
+        if any(isinstance(value, str | bool | np.bool_ | list | dict) for value in given):
+            names = tuple(dict.fromkeys(_name(value) for value in given))
+            return cls(key, "", np.arange(len(names), dtype=float), names)
+        values = np.unique(np.asarray(given, dtype=float))
+        return cls(key, unit, values, (), np.unique(np.asarray(planned, dtype=float)) if len(planned) else values)
+
+    def indices(self, column: Sequence[Any]) -> np.ndarray:
+        """Returns the place of each entry of a column among the values."""
+        if self.names:
+            return np.array([self.names.index(_name(value)) for value in column], dtype=int)
+        return np.searchsorted(self.values, np.asarray(column, dtype=float))
+
+    def word(self, index: int) -> str:
+        """Returns a value as people read it, with its unit."""
+        return _short_name(self.names[index]) if self.names else with_unit(self.values[index], self.unit)
+
+    @cached_property
+    def scale(self) -> str:
+        """``"linear"``, ``"log"``, or ``"even"``: cells of one width in the order of the values."""
+        return "even" if self.names else _scale(self.planned)
+
+    @cached_property
+    def factor_and_unit(self) -> tuple[float, str]:
+        """What the values are divided by along a panel, and the unit of what is left."""
+        return with_prefix(self.values, self.unit)
 
     def place(self, values: Iterable[float]) -> np.ndarray:
         """Returns the coordinates of some values; between the values of an even axis, in proportion."""
         given = np.asarray(list(values), dtype=float)
         if self.scale == "even":
-            return np.interp(given, self.axis.values, np.arange(len(self.axis.values), dtype=float))
-        return given / self.factor
+            return np.interp(given, self.values, np.arange(len(self.values), dtype=float))
+        return given / self.factor_and_unit[0]
 
     @property
     def coordinates(self) -> np.ndarray:
-        """Those of the axis' own values."""
-        return self.place(self.axis.values)
+        return self.place(self.values)
 
     @property
     def edges(self) -> np.ndarray:
@@ -66,10 +97,11 @@ class Ruler:
     @property
     def label(self) -> str:
         """The scene's own key, and the unit of the numbers along the axis."""
-        return f"{self.axis.key} ({self.unit})" if self.unit else self.axis.key
+        unit = self.factor_and_unit[1]
+        return f"{self.key} ({unit})" if unit else self.key
 
     def dress(self, ax: Axes, which: Literal["x", "y"], label: bool = True) -> None:
-        """Sets scale, limits, numbers and label along one side of a panel; ``which`` is "x" or "y"."""
+        """Sets scale, limits, numbers and label along one side of a panel."""
         axis = ax.xaxis if which == "x" else ax.yaxis
         edges = self.edges
         if self.scale == "log":
@@ -81,7 +113,7 @@ class Ruler:
                 axis.set_major_locator(LogLocator(subs=(1.0,)))
         elif self.scale == "even":
             axis.set_ticks(*self._names())
-        elif len(self.axis.values) == 1:
+        elif len(self.values) == 1:
             axis.set_ticks(self.coordinates.tolist(), [short(self.coordinates[0])])
         else:
             ax.ticklabel_format(axis=which, useOffset=False, style="plain")
@@ -94,13 +126,48 @@ class Ruler:
             spine.set_color(FAINT)
 
     def _names(self) -> tuple[list[float], list[str]]:
-        words = [self.axis.word(i) for i in range(len(self.axis.names))] or [
-            short(value / self.factor) for value in self.axis.values
-        ]
-        every = -(-len(words) // 12)
-        most = max(_LEAST_LETTERS, _LETTERS // len(words))
+        """Returns where words stand along an even axis, twelve at most, and the words, cut to what has room."""
+        factor, _ = self.factor_and_unit
+        words = [self.word(i) if self.names else short(value / factor) for i, value in enumerate(self.values)]
+        every, most = -(-len(words) // 12), max(_LEAST_LETTERS, _LETTERS // len(words))
         cut = [word if len(word) <= most else f"{word[: most - 1]}…" for word in words]
         return [float(place) for place in range(0, len(words), every)], cut[::every]
+
+
+def with_prefix(values: Iterable[float], unit: str) -> tuple[float, str]:
+    """Returns the factor that suits some values, and the unit of what is left of them."""
+    factor, letter = prefix_for(values) if unit in _WITH_PREFIX else (1.0, "")
+    return factor, f"{letter}{unit}"
+
+
+def with_unit(value: float, unit: str) -> str:
+    factor, prefixed = with_prefix([value], unit)
+    return f"{short(value / factor)} {prefixed}".strip()
+
+
+def short(value: float) -> str:
+    """Returns four digits or more, as many as a number has before its point."""
+    return f"{value:.4g}" if abs(value) < 1e4 else f"{value:.7g}"
+
+
+def _name(value: Any) -> str:
+    """Returns a value that is no number as the table has it: text as it is, all else as TOML writes it."""
+    if isinstance(value, str):
+        return value
+    return inline(bool(value) if isinstance(value, np.bool_) else value)
+
+
+def _short_name(name: str) -> str:
+    """Returns a list of elements without its punctuation, ``"damping 0.8 + brake 0.1"``; any other name as it is."""
+    if not name.startswith("["):
+        return name
+    try:
+        elements = tomllib.loads(f"list = {name}")["list"]
+        numbers = [[f"{v:g}" for v in table.values() if isinstance(v, int | float)] for table in elements]
+        words = [" ".join([table["kind"], *given]) for table, given in zip(elements, numbers, strict=True)]
+    except (ValueError, TypeError, KeyError, AttributeError):
+        return name
+    return " + ".join(words) or "none"
 
 
 def _scale(values: np.ndarray) -> str:

@@ -1,18 +1,17 @@
-"""The data of a map: the axes of a sweep, and the verdict of every cell over all seeds."""
+"""The data of a map: the verdict of every cell over all seeds, and which cells make a panel."""
 
 from __future__ import annotations
 
 import math
-import tomllib
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import islice, product
 from typing import Any
 
 import numpy as np
 
-from haploop.launch.scene.toml_writer import inline
 from haploop.tools.figure.data import FigureError
-from haploop.tools.render.units import prefix_for
+from haploop.tools.sweep.map.axis import Axis
 from haploop.tools.sweep.table import ResolvedSweep
 
 AMPLITUDE, WIDTH, STIFFNESS = "window.oscillation_m", "stability.width_m", "wall.stiffness"
@@ -20,55 +19,9 @@ AMPLITUDE, WIDTH, STIFFNESS = "window.oscillation_m", "stability.width_m", "wall
 VERDICTS = ("steady", "no-contact", "failed", "undecided", "limit-cycle", "growing", "diverged")
 STEADY, NO_CONTACT, FAILED, UNDECIDED, LIMIT_CYCLE, GROWING, DIVERGED = range(len(VERDICTS))
 NOT_RUN = -1
+MOST_PANELS = 12
 # By name, equally long: lists or NumPy arrays.
 Columns = Mapping[str, Any]
-# Units that take a prefix; stiffness, damping and mass stay as scene files have them.
-_WITH_PREFIX = ("m", "s", "N", "Hz")
-
-
-def with_prefix(values: Iterable[float], unit: str) -> tuple[float, str]:
-    """Returns the factor that suits some values, and the unit of what is left of them."""
-    factor, letter = prefix_for(values) if unit in _WITH_PREFIX else (1.0, "")
-    return factor, f"{letter}{unit}"
-
-
-@dataclass(frozen=True)
-class Axis:
-    """An axis of a map.
-
-    Attributes:
-        values: ascending; the numbers 0, 1, ... where they stand for ``names``.
-        names: of the values where they are no numbers, in the order of the sweep; else empty.
-        planned: the values that the sweep asks for, ascending; a search runs others in between.
-    """
-
-    key: str
-    unit: str
-    values: np.ndarray
-    names: tuple[str, ...] = ()
-    planned: np.ndarray = field(default_factory=lambda: np.empty(0))
-
-    @classmethod
-    def from_column(cls, key: str, unit: str, column: Sequence[Any], planned: Sequence[Any] = ()) -> Axis:
-        """Makes the axis of a column of the table; ``planned`` are values the sweep has, run or not."""
-        given = [*planned, *column]
-        if any(isinstance(value, str | bool | np.bool_ | list | dict) for value in given):
-            names = tuple(dict.fromkeys(_name(value) for value in given))
-            return cls(key, "", np.arange(len(names), dtype=float), names)
-        values = np.unique(np.asarray(given, dtype=float))
-        return cls(key, unit, values, (), np.unique(np.asarray(planned, dtype=float)) if len(planned) else values)
-
-    def indices(self, column: Sequence[Any]) -> np.ndarray:
-        """Returns the place of each entry of a column among the values."""
-        if self.names:
-            return np.array([self.names.index(_name(value)) for value in column], dtype=int)
-        return np.searchsorted(self.values, np.asarray(column, dtype=float))
-
-    def word(self, index: int) -> str:
-        if self.names:
-            return _short_name(self.names[index])
-        factor, unit = with_prefix([self.values[index]], self.unit)
-        return f"{short(self.values[index] / factor)} {unit}".strip()
 
 
 @dataclass(frozen=True)
@@ -89,6 +42,64 @@ class Cells:
     agree: np.ndarray
     seeds: np.ndarray
     row: np.ndarray
+
+    def count(self) -> dict[int, int]:
+        """Counts the cells of each verdict that any came to, the mildest first."""
+        numbers, counts = np.unique(self.verdict[self.verdict != NOT_RUN], return_counts=True)
+        return dict(zip(numbers.tolist(), counts.tolist(), strict=True))
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Numbers of the axes: of those along x and y of a panel (y is None where the amplitude is), and of the others."""
+
+    x: int
+    y: int | None
+    others: tuple[int, ...]
+
+    @classmethod
+    def from_axes(cls, axes: Sequence[Axis]) -> Layout:
+        """Lays numbers along the map, the wall's stiffness upwards; names, or the shortest of three, make panels."""
+        numeric = [number for number, axis in enumerate(axes) if not axis.names]
+        if len(numeric) == 3:
+            free = [number for number in numeric if axes[number].key != STIFFNESS]
+            numeric.remove(min(free, key=lambda number: (len(axes[number].values), -number)))
+        along = numeric or [*range(len(axes))][:2]
+        if len(along) == 2 and axes[along[0]].key == STIFFNESS:
+            along.reverse()
+        others = tuple(number for number in range(len(axes)) if number not in along)
+        return cls(along[0], along[1] if len(along) == 2 else None, others)
+
+    def count(self, axes: Sequence[Axis]) -> int:
+        """Counts the panels."""
+        return math.prod(len(axes[number].values) for number in self.others)
+
+    def panels(self, axes: Sequence[Axis], cells: Cells) -> Iterator[Panel]:
+        """Yields the first panels, as many as are drawn."""
+        turned = self.y is not None and self.y < self.x
+        lengths = [range(len(axes[number].values)) for number in self.others]
+        for fixed in islice(product(*lengths), MOST_PANELS):
+            at = dict(zip(self.others, fixed, strict=True))
+            where = tuple(at.get(number, slice(None)) for number in range(len(axes)))
+            taken = [array[where] for array in vars(cells).values()]
+            words = {axes[number].key: axes[number].word(index) for number, index in at.items()}
+            full = ", ".join(f"{key} = {word}" for key, word in words.items())
+            short = ", ".join(f"{key.rpartition('.')[2]} = {word}" for key, word in words.items())
+            titles = full, short, ", ".join(words.values())
+            yield Panel(titles, Cells(*(np.ascontiguousarray(array.T) if turned else array for array in taken)))
+
+
+@dataclass(frozen=True)
+class Panel:
+    """A part of a sweep whose cells have the values of all axes but those along it in common.
+
+    Attributes:
+        titles: these values in words, in full and ever shorter; empty words where there are none.
+        cells: of shape (x values, y values) or (x values,).
+    """
+
+    titles: tuple[str, ...]
+    cells: Cells
 
 
 @dataclass(frozen=True)
@@ -125,7 +136,7 @@ class MapData:
         worst = np.full(shape, NOT_RUN)
         amplitude, least = np.full(shape, math.nan), np.full(shape, math.inf)
         agree, seeds, first = np.zeros(shape, int), np.zeros(shape, int), np.full(shape, -1)
-        verdicts, oscillations = self.verdicts, self.amplitudes_m()
+        verdicts, swings_m = self.verdicts, self.amplitudes_m()
         at = tuple(axis.indices(self.columns[axis.key]) for axis in self.axes)
         np.maximum.at(worst, at, verdicts)
         np.add.at(seeds, at, 1)
@@ -133,8 +144,8 @@ class MapData:
         at_shown = tuple(index[shown] for index in at)
         np.add.at(agree, at_shown, 1)
         first[at_shown] = shown
-        np.fmax.at(amplitude, at_shown, oscillations[shown])
-        np.fmin.at(least, at, oscillations)
+        np.fmax.at(amplitude, at_shown, swings_m[shown])
+        np.fmin.at(least, at, swings_m)
         return Cells(worst, amplitude, np.where(np.isinf(least), math.nan, least), agree, seeds, first)
 
     def amplitudes_m(self) -> np.ndarray:
@@ -148,33 +159,6 @@ class MapData:
     def _numbers(self, name: str) -> np.ndarray:
         column = self.columns.get(name, [None] * len(self.columns["verdict"]))
         return np.array([math.nan if value is None else value for value in column], dtype=float)
-
-
-def short(value: float) -> str:
-    """Returns four digits or more, as many as a number has before its point."""
-    return f"{value:.4g}" if abs(value) < 1e4 else f"{value:.7g}"
-
-
-def _name(value: Any) -> str:
-    """Returns a value that is no number as the table has it: text as it is, all else as TOML writes it."""
-    if isinstance(value, str):
-        return value
-    return inline(bool(value) if isinstance(value, np.bool_) else value)
-
-
-def _short_name(name: str) -> str:
-    """Returns a name as people read it: a list of elements without its punctuation, ``"damping 0.8 + brake 0.1"``."""
-    if not name.startswith("["):
-        return name
-    try:
-        elements = tomllib.loads(f"list = {name}")["list"]
-        words = [
-            " ".join([table["kind"], *(f"{v:g}" for v in table.values() if isinstance(v, int | float))])
-            for table in elements
-        ]
-    except (ValueError, TypeError, KeyError):
-        return name
-    return " + ".join(words) or "none"
 
 
 def verdict_number(word: str | None) -> int:

@@ -8,18 +8,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from haploop.tools.sweep.map.axis import Axis, with_unit
 from haploop.tools.sweep.map.data import (
     FAILED,
     NO_CONTACT,
     STEADY,
     STIFFNESS,
-    Axis,
     Cells,
     Columns,
     MapData,
-    short,
     verdict_number,
-    with_prefix,
 )
 
 # What is known of a combination of the other axes' values.
@@ -126,8 +124,7 @@ def furthest(edges: Edges) -> Furthest | None:
     far = np.where(found, edges.nearest if edges.rising else -edges.nearest, -np.inf)
     index = tuple(int(i) for i in np.unravel_index(int(far.argmax()), far.shape))
     value = float(edges.nearest[index])
-    factor, unit = with_prefix([value], edges.along.unit)
-    return Furthest(index, value, f"{edges.holds} up to {short(value / factor)} {unit}".strip())
+    return Furthest(index, value, f"{edges.holds} up to {with_unit(value, edges.along.unit)}")
 
 
 @dataclass(frozen=True)

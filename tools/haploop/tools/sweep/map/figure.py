@@ -1,80 +1,53 @@
-"""The figure of a sweep: a map of its cells, a panel for each combination of the axes beyond two."""
+"""The figure of a sweep: a map of its cells in panels, or the boundaries that a search found, line by line."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
 
 from haploop.tools.figure.data import FigureError
-from haploop.tools.figure.style import fix_layout, write_figure
-from haploop.tools.sweep.map.axis import Ruler
-from haploop.tools.sweep.map.bisect_figure import bisect_figure
-from haploop.tools.sweep.map.data import LIMIT_CYCLE, MapData, make_map_data
-from haploop.tools.sweep.map.edges import stiffest_steady
-from haploop.tools.sweep.map.legend import Legend, amplitude_scale
-from haploop.tools.sweep.map.lines import Star, draw_line, find_lines, line_styles, write_names
-from haploop.tools.sweep.map.panels import (
-    SwingScale,
-    count_disagreement,
-    draw_cells,
-    draw_swings,
-    mark_disagreement,
+from haploop.tools.figure.style import ELEMENTS, FAINT, INK, WALL, fix_layout, write_figure
+from haploop.tools.sweep.map.axis import Axis
+from haploop.tools.sweep.map.data import LIMIT_CYCLE, STEADY, Layout, MapData, make_map_data
+from haploop.tools.sweep.map.edges import (
+    ALL_HOLD,
+    FOUND,
+    NONE_HOLDS,
+    UNKNOWN,
+    Edges,
+    find_edges,
+    furthest,
+    stiffest_steady,
 )
-from haploop.tools.sweep.map.sentences import count_verdicts, description, map_notes, star_words
-from haploop.tools.sweep.map.sheet import Layout, Sheet, fit_title, panel_title
+from haploop.tools.sweep.map.lines import (
+    LineStyle,
+    PanelLines,
+    Star,
+    draw_line,
+    find_lines,
+    line_signs,
+    line_styles,
+    write_names,
+)
+from haploop.tools.sweep.map.looks import LOOKS, amplitude_scale, verdict_signs
+from haploop.tools.sweep.map.panels import SwingScale, count_disagreement, draw_cells, draw_swings, mark_disagreement
+from haploop.tools.sweep.map.sentences import description, edge_description, edge_notes, map_notes, star_words
+from haploop.tools.sweep.map.sheet import Sheet, fit_title, panel_title
 from haploop.tools.sweep.table import NeedsPyarrow, TableError, read
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 _SIDES: tuple[Literal["x", "y"], ...] = ("x", "y")
-
-
-def make_figure(data: MapData) -> Figure:
-    """Makes the map of a sweep's cells, a panel for each combination of the axes that do not lie along it.
-
-    Raises FigureError where matplotlib is missing.
-    """
-    cells, layout = data.cells(), Layout.from_axes(data.axes)
-    along = [data.axes[layout.x]] + ([] if layout.y is None else [data.axes[layout.y]])
-    rulers = [Ruler.from_axis(axis) for axis in along]
-    panels = list(layout.panels(data.axes, cells))
-    scenes = data.columns["scene"]
-    overs = [find_lines((scenes[row] for row in panel.cells.row.flat if row >= 0), rulers) for panel in panels]
-    words = {line.name: line.words for over in overs for line in over.lines if line.pieces}
-    styles = line_styles(list(words))
-    swinging = cells.amplitude_m[cells.verdict == LIMIT_CYCLE]
-    swings, scale = SwingScale(cells), amplitude_scale(swinging) if layout.y is not None else None
-    sheet = Sheet(len(panels), data.title, description(data, cells))
-    for number, (ax, panel, over) in enumerate(zip(sheet.axes, panels, overs, strict=True)):
-        if layout.y is None:
-            draw_swings(ax, rulers[0], panel.cells, swings, sheet.is_left(number))
-        else:
-            draw_cells(ax, rulers[0], rulers[1], panel.cells, scale)
-        for ruler, which in zip(rulers, _SIDES, strict=False):
-            ruler.dress(ax, which, sheet.is_low(number) if which == "x" else sheet.is_left(number))
-        panel_title(ax, panel.titles[0])
-        over.drawn = {it.name: draw_line(ax, it, rulers, styles[it.name]) for it in over.lines if it.pieces}
-    legend = Legend(sheet.side, *sheet.side_in)
-    legend.verdicts(count_verdicts(cells), as_points=layout.y is None)
-    if scale:
-        legend.amplitudes(scale)
-    legend.map_lines(styles, words)
-    legend.notes(map_notes(data, cells, layout, overs))
-    fix_layout(sheet.figure)
-    for ax, panel, over in zip(sheet.axes, panels, overs, strict=True):
-        fit_title(ax, panel.titles)
-        if layout.y is None:
-            count_disagreement(ax, rulers[0], panel.cells, swings)
-        else:
-            mark_disagreement(ax, rulers[0], rulers[1], panel.cells)
-        star = None
-        if found := stiffest_steady(along, panel.cells):
-            x, *rest = (ruler.coordinates[index] for ruler, index in zip(rulers, found.index, strict=True))
-            y = rest[0] if rest else float(swings.place(panel.cells.amplitude_m)[found.index])
-            star = Star(x, y, star_words(found))
-        write_names(ax, [over], styles, star, avoid_markers=layout.y is None)
-    return sheet.figure
+MOST_LINES = 8
+_COLOURS = (WALL, *ELEMENTS, "#332288")
+_MARKERS = "osD^vP*X"
+# Signs of several lines at an edge stand above one another; of the height of a panel, what one of them takes.
+_STACK_PT, _STRIP = 9.0, 0.024
 
 
 def draw_map(directory: Path, target: Path | None = None) -> Path:
@@ -93,3 +66,150 @@ def draw_map(directory: Path, target: Path | None = None) -> Path:
     data = make_map_data(table.columns, table.units, table.sweep, table.boundary)
     figure = bisect_figure(data) if data.has_edges else make_figure(data)
     return write_figure(figure, target or directory / "figure.png")
+
+
+def make_figure(data: MapData) -> Figure:
+    """Makes the map of a sweep's cells, a panel for each combination of the axes that do not lie along it.
+
+    Raises FigureError where matplotlib is missing.
+    """
+    cells, layout = data.cells(), Layout.from_axes(data.axes)
+    along = [data.axes[layout.x]] + ([] if layout.y is None else [data.axes[layout.y]])
+    panels = list(layout.panels(data.axes, cells))
+    scenes = data.columns["scene"]
+    overs = [find_lines((scenes[row] for row in panel.cells.row.flat if row >= 0), along) for panel in panels]
+    styles = line_styles(list(dict.fromkeys(line.name for over in overs for line in over.lines if line.pieces)))
+    swings = SwingScale(cells)
+    scale = amplitude_scale(cells.amplitude_m[cells.verdict == LIMIT_CYCLE]) if layout.y is not None else None
+    sheet = Sheet(len(panels), data.title, description(data, cells))
+    for number, (ax, panel, over) in enumerate(zip(sheet.axes, panels, overs, strict=True)):
+        if layout.y is None:
+            draw_swings(ax, along[0], panel.cells, swings, sheet.is_left(number))
+        else:
+            draw_cells(ax, along[0], along[1], panel.cells, scale)
+        for axis, which in zip(along, _SIDES, strict=False):
+            axis.dress(ax, which, sheet.is_low(number) if which == "x" else sheet.is_left(number))
+        panel_title(ax, panel.titles[0])
+        over.drawn = {it.name: draw_line(ax, it, along, styles[it.name]) for it in over.lines if it.pieces}
+    sheet.column.signs(verdict_signs(cells.count(), as_points=layout.y is None))
+    if scale:
+        sheet.column.amplitudes(scale)
+    sheet.column.signs(line_signs(styles, overs))
+    sheet.column.notes(map_notes(data, cells, layout, overs))
+    fix_layout(sheet.figure)
+    for ax, panel, over in zip(sheet.axes, panels, overs, strict=True):
+        fit_title(ax, panel.titles)
+        if layout.y is None:
+            count_disagreement(ax, along[0], panel.cells, swings)
+        else:
+            mark_disagreement(ax, along[0], along[1], panel.cells)
+        star = None
+        if found := stiffest_steady(along, panel.cells):
+            x, *rest = (axis.coordinates[index] for axis, index in zip(along, found.index, strict=True))
+            y = rest[0] if rest else float(swings.place(panel.cells.amplitude_m)[found.index])
+            star = Star(x, y, star_words(found))
+        write_names(ax, [over], styles, star, avoid_markers=layout.y is None)
+    return sheet.figure
+
+
+def bisect_figure(data: MapData) -> Figure:
+    """Makes the figure of the boundaries of a finished bisecting sweep with two or three axes.
+
+    How far the near side reaches over the first of the other axes, a line for every value of the second. Raises
+    FigureError where matplotlib is missing.
+    """
+    from matplotlib.lines import Line2D
+
+    edges, best = find_edges(data), None
+    x, y = along = edges.others[0], edges.along
+    second = edges.others[1] if len(edges.others) > 1 else None
+    count = min(MOST_LINES, len(second.values)) if second else 1
+    overs = []
+    for number in range(count):
+        at_row = second.indices(data.columns[second.key]) if second else np.zeros(len(data.verdicts))
+        rows = np.flatnonzero(at_row == number)
+        overs.append(find_lines((data.columns["scene"][row] for row in rows), along, bounds=second is None))
+    sheet = Sheet(1, data.title, edge_description(data, edges))
+    [ax] = sheet.axes
+    styles = _draw_over(ax, overs, along)
+    x.dress(ax, "x")
+    y.dress(ax, "y")
+    _make_room(ax, y, edges, count)
+    if not second:
+        _fill(ax, x, y, edges)
+    signs = []
+    for number in range(count):
+        look: dict[str, Any] = {"color": _COLOURS[number] if second else INK, "marker": _MARKERS[number]}
+        _draw_boundary(ax, edges, (slice(None), number) if second else (slice(None),), number, **look)
+        signs.append(Line2D([], [], **look, label=second.word(number) if second else "boundary"))
+    if best := furthest(edges):
+        star = Star(x.coordinates[best.index[0]], float(y.place([best.value])[0]), [best.words])
+    else:
+        star = None
+    sheet.column.signs(signs, second.key if second else "")
+    sheet.column.signs(line_signs(styles, overs))
+    sheet.column.notes(edge_notes(data, edges, best, overs))
+    fix_layout(sheet.figure)
+    write_names(ax, overs, styles, star, avoid_markers=True)
+    return sheet.figure
+
+
+def _draw_over(ax: Axes, overs: Sequence[PanelLines], along: Sequence[Axis]) -> dict[str, LineStyle]:
+    """Draws the exact limit of every line in its colour, and the bounds where there is one line; returns the styles."""
+    styles = line_styles(list(dict.fromkeys(line.name for over in overs for line in over.lines if line.pieces)))
+    for number, over in enumerate(overs):
+        for line in over.lines:
+            if line.pieces:
+                style = styles[line.name]
+                if len(overs) > 1:
+                    style: LineStyle = {**style, "color": _COLOURS[number], "linewidth": 1.5}
+                over.drawn[line.name] = draw_line(ax, line, along, style)
+    return styles
+
+
+def _draw_boundary(ax: Axes, edges: Edges, part: tuple[Any, ...], number: int, color: str, marker: str) -> None:
+    """Draws the boundaries of one line with their brackets; signs at the edge of the panel where there is none."""
+    from matplotlib.transforms import offset_copy
+
+    x, y, state = edges.others[0], edges.along, edges.state[part]
+    at, found = x.coordinates, state == FOUND
+    ax.plot(
+        at, np.where(found, y.place(edges.nearest[part]), np.nan), color=color, marker=marker, markersize=5.5,
+        linestyle="none" if x.names else "-", linewidth=0.8, markeredgecolor="white", markeredgewidth=0.6, zorder=4.5,
+        gid="boundary",
+    )  # fmt: skip
+    ends = y.place(edges.low[part][found]), y.place(edges.high[part][found])
+    ax.vlines(at[found], *ends, color=color, linewidth=2.4, alpha=0.5, zorder=4.4, gid="brackets")
+    bottom, top = ax.get_ylim()
+    far, near = (top, bottom) if edges.rising else (bottom, top)
+    arrow = "^" if edges.rising else "v"
+    for kind, where, sign in ((ALL_HOLD, far, arrow), (NONE_HOLDS, near, "x"), (UNKNOWN, near, "$?$")):
+        here = at[state == kind]
+        inwards = (1.0 if where == bottom else -1.0) * (_STACK_PT * (number + 0.6))
+        shifted = offset_copy(ax.transData, ax.get_figure(root=True), y=inwards, units="points")
+        look = {"color": color, "marker": sign, "markersize": 6, "linestyle": "none", "zorder": 6}
+        ax.plot(here, np.full(len(here), where), **look, gid=f"state {kind}", transform=shifted)
+
+
+def _make_room(ax: Axes, y: Axis, edges: Edges, lines: int) -> None:
+    """Adds a strip at either end for the signs of combinations without a boundary, one line's above the other's."""
+    none, throughout = np.isin(edges.state, (NONE_HOLDS, UNKNOWN)).any(), (edges.state == ALL_HOLD).any()
+    below, above = (none, throughout) if edges.rising else (throughout, none)
+    bottom, top = y.edges[0], y.edges[-1]
+    low, high = np.log((bottom, top)) if y.scale == "log" else (bottom, top)
+    strip = (high - low) * _STRIP * (lines + 0.5)
+    low, high = low - strip * below, high + strip * above
+    ax.set_ylim(*(np.exp((low, high)) if y.scale == "log" else (low, high)))
+    for drawn, at in ((below, bottom), (above, top)):
+        if drawn:
+            ax.axhline(at, color=FAINT, linewidth=0.8, zorder=0.8, gid="strip")
+
+
+def _fill(ax: Axes, x: Axis, y: Axis, edges: Edges) -> None:
+    """Fills what holds: from where the search begins to the boundary, or to the end where none was found."""
+    near, far = y.edges[[0, -1]] if edges.rising else y.edges[[-1, 0]]
+    borders = x.edges
+    for i in np.flatnonzero(np.isin(edges.state, (FOUND, ALL_HOLD))):
+        end = float(y.place([edges.nearest[i]])[0]) if edges.state[i] == FOUND else far
+        look = {"color": LOOKS[STEADY].fill, "linewidth": 0, "zorder": 0.5, "gid": "holds"}
+        ax.fill_between(borders[i : i + 2], [near] * 2, [end] * 2, **look)

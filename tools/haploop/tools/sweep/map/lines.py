@@ -6,6 +6,7 @@ import math
 import tomllib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from textwrap import fill
 from typing import TYPE_CHECKING, NamedTuple, NotRequired, TypedDict
 
 import numpy as np
@@ -16,10 +17,11 @@ from haploop.tools.figure.style import INK
 from haploop.tools.linear.bounds import Bound, bounds_of
 from haploop.tools.linear.linearity import installed_kinds, left_out, why_not_linear
 from haploop.tools.linear.one_tick import NotLinear, OneTickMap
-from haploop.tools.sweep.map.axis import Ruler
+from haploop.tools.sweep.map.axis import Axis
 from haploop.tools.sweep.map.plane import Level, Plane
 
 if TYPE_CHECKING:
+    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
 
 EXACT = "ρ(M) = 1"
@@ -55,18 +57,18 @@ class PanelLines:
     drawn: dict[str, list[np.ndarray]] = field(default_factory=dict)
 
 
-def find_lines(texts: Iterable[str | None], rulers: Sequence[Ruler], bounds: bool = True) -> PanelLines:
+def find_lines(texts: Iterable[str | None], axes: Sequence[Axis], bounds: bool = True) -> PanelLines:
     """Finds the lines for the first scene there is among some of a panel, as TOML; none over names."""
     text = next((text for text in texts if text), None)
     if text is None:
         return PanelLines(why_none="none of its cells has a scene")
-    if any(ruler.axis.names for ruler in rulers):
+    if any(axis.names for axis in axes):
         return PanelLines()
     scene = Scene.from_dict(tomllib.loads(text))
     elements = {element.name for element in scene.dissipation}
     if foreign := sorted(elements - set(installed_kinds())):
         return PanelLines(why_none=f"the element {foreign[0]} comes from a plugin")
-    plane = Plane(scene, rulers)
+    plane = Plane(scene, axes)
     known = bound_lines(plane) if bounds else []
     try:
         return PanelLines([exact_limit(plane), *known])
@@ -149,7 +151,15 @@ def line_styles(names: Sequence[str]) -> dict[str, LineStyle]:
     return styles
 
 
-def draw_line(ax: Axes, line: MapLine, rulers: Sequence[Ruler], style: LineStyle) -> list[np.ndarray]:
+def line_signs(styles: Mapping[str, LineStyle], panels: Iterable[PanelLines]) -> list[Artist]:
+    """Makes the sign of every line, labelled with its name and what it says."""
+    from matplotlib.lines import Line2D
+
+    words = {line.name: line.words for panel in panels for line in panel.lines}
+    return [Line2D([], [], **style, label=fill(f"{name}: {words[name]}", 32)) for name, style in styles.items()]
+
+
+def draw_line(ax: Axes, line: MapLine, axes: Sequence[Axis], style: LineStyle) -> list[np.ndarray]:
     """Draws all pieces of a line, and returns them in the coordinates of the panel.
 
     A piece that is one value of the only axis stands upright.
@@ -158,15 +168,15 @@ def draw_line(ax: Axes, line: MapLine, rulers: Sequence[Ruler], style: LineStyle
 
     look = {
         **style,
-        "zorder": 4 if len(rulers) == 2 else 1.5,
+        "zorder": 4 if len(axes) == 2 else 1.5,
         "path_effects": [withStroke(linewidth=style["linewidth"] + 1.8, foreground="white"), Normal()],
         "gid": f"boundary {line.name}",
         "solid_capstyle": "round",
     }
     drawn = []
     for piece in line.pieces:
-        places = np.column_stack([ruler.place(piece[:, number]) for number, ruler in enumerate(rulers)])
-        if len(rulers) == 1:
+        places = np.column_stack([axis.place(piece[:, number]) for number, axis in enumerate(axes)])
+        if len(axes) == 1:
             for (x,) in places:
                 ax.axvline(x, **look)
             low, high = np.log(ax.get_ylim())
@@ -174,18 +184,18 @@ def draw_line(ax: Axes, line: MapLine, rulers: Sequence[Ruler], style: LineStyle
             places = np.column_stack([np.full(_POINTS, places[0, 0]), upper])
         else:
             if len(places) == 1:
-                places = _across(places[0], rulers)
+                places = _across(places[0], axes)
             ax.plot(places[:, 0], places[:, 1], **look)
         drawn.append(places)
     return drawn
 
 
-def _across(place: np.ndarray, rulers: Sequence[Ruler]) -> np.ndarray:
+def _across(place: np.ndarray, axes: Sequence[Axis]) -> np.ndarray:
     """Returns a point as a line across the only cell there is along an axis."""
     points = np.tile(place, (_POINTS, 1))
-    for number, ruler in enumerate(rulers):
-        if len(ruler.axis.values) == 1:
-            points[:, number] = np.linspace(ruler.edges[0], ruler.edges[-1], _POINTS)
+    for number, axis in enumerate(axes):
+        if len(axis.values) == 1:
+            points[:, number] = np.linspace(axis.edges[0], axis.edges[-1], _POINTS)
     return points
 
 

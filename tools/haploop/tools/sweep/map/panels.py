@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from haploop.tools.figure.style import FAINT, GREY, INK, SMALL, TEXT
-from haploop.tools.sweep.map.axis import Ruler
+from haploop.tools.sweep.map.axis import Axis
 from haploop.tools.sweep.map.data import LIMIT_CYCLE, NOT_RUN, STEADY, VERDICTS, Cells
-from haploop.tools.sweep.map.legend import LOOKS, Look, amplitude_colours, metres_along
+from haploop.tools.sweep.map.looks import LOOKS, Look, amplitude_colours, metres_along
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 _COUNT_PX, _DOT_PX = (26.0, 15.0), 4.0
 
 
-def draw_cells(ax: Axes, x: Ruler, y: Ruler, cells: Cells, scale: LogNorm | None) -> None:
+def draw_cells(ax: Axes, x: Axis, y: Axis, cells: Cells, scale: LogNorm | None) -> None:
     """Fills the panel; ``cells`` have the shape (values of x, values of y)."""
     from matplotlib.colors import BoundaryNorm, ListedColormap
 
@@ -71,7 +71,7 @@ def _outline(ax: Axes, edges: tuple[np.ndarray, np.ndarray], verdict: np.ndarray
     )
 
 
-def mark_disagreement(ax: Axes, x: Ruler, y: Ruler, cells: Cells) -> None:
+def mark_disagreement(ax: Axes, x: Axis, y: Axis, cells: Cells) -> None:
     """Marks where not all seeds came to the verdict shown: by their count, or by a dot in a small cell.
 
     Call when the panel has its place and limits.
@@ -79,7 +79,7 @@ def mark_disagreement(ax: Axes, x: Ruler, y: Ruler, cells: Cells) -> None:
     from matplotlib.patheffects import withStroke
 
     frame = ax.get_window_extent()
-    width, height = frame.width / len(x.axis.values), frame.height / len(y.axis.values)
+    width, height = frame.width / len(x.values), frame.height / len(y.values)
     split = np.argwhere((cells.agree < cells.seeds) & (cells.verdict != NOT_RUN))
     if not len(split) or min(width, height) < _DOT_PX:
         return
@@ -123,7 +123,7 @@ class SwingScale:
         return np.where(np.isfinite(at), at, self.shelf)
 
 
-def draw_swings(ax: Axes, x: Ruler, cells: Cells, scale: SwingScale, label: bool) -> None:
+def draw_swings(ax: Axes, x: Axis, cells: Cells, scale: SwingScale, label: bool) -> None:
     """Draws a panel; ``cells`` have the shape (values of x,). The first panel of a row has the label along y."""
     ran = cells.verdict != NOT_RUN
     at, places, edges = x.coordinates, scale.place(cells.amplitude_m), x.edges
@@ -152,7 +152,7 @@ def draw_swings(ax: Axes, x: Ruler, cells: Cells, scale: SwingScale, label: bool
     ax.grid(axis="y", color="#E6E6E6", linewidth=0.6, zorder=0.5)
 
 
-def count_disagreement(ax: Axes, x: Ruler, cells: Cells, scale: SwingScale) -> None:
+def count_disagreement(ax: Axes, x: Axis, cells: Cells, scale: SwingScale) -> None:
     """Writes how many seeds came to the verdict shown, above the marker, where not all did."""
     split = np.flatnonzero((cells.agree < cells.seeds) & (cells.verdict != NOT_RUN))
     at, places = x.coordinates, scale.place(cells.amplitude_m)

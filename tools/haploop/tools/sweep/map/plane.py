@@ -14,14 +14,12 @@ import numpy as np
 from haploop.protocol.scene.paths import value_at, with_value
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import DELAY, TimebaseError
-from haploop.tools.sweep.map.axis import Ruler
+from haploop.tools.sweep.map.axis import Axis
 from haploop.tools.sweep.map.data import STIFFNESS
 
 # Points along an axis between which a line is looked for; windows narrower than that are not seen. Few where every
 # point takes a map of its own.
 POINTS, FEW_POINTS = 41, 21
-# Bends of a line, in rad where every cell of the grid is a square, that ask for another point.
-_SHARP = 0.15
 Level = Callable[[float, float], float]
 
 
@@ -30,32 +28,32 @@ class Plane:
     """All scenes of a panel, those between its cells included.
 
     Attributes:
-        rulers: of its axes, x first; one of them where there is one axis, whose y is of no account.
+        axes: x first; where there is one alone, y is of no account.
     """
 
     scene: Scene
-    rulers: Sequence[Ruler]
+    axes: Sequence[Axis]
 
     def at(self, x: float, y: float) -> Scene:
         """Returns the scene at a place; a whole number stays whole."""
         scene = self.scene
-        for ruler, value in zip(self.rulers, (x, y), strict=False):
-            number = type(value_at(scene, ruler.axis.key))
-            scene = with_value(scene, ruler.axis.key, number(value))
+        for axis, value in zip(self.axes, (x, y), strict=False):
+            number = type(value_at(scene, axis.key))
+            scene = with_value(scene, axis.key, number(value))
         return scene
 
     def but_for_stiffness(self, x: float, y: float) -> tuple[float, ...]:
         """Returns the values at a place without the wall's stiffness."""
-        return tuple(v for r, v in zip(self.rulers, (x, y), strict=False) if r.axis.key != STIFFNESS)
+        return tuple(v for axis, v in zip(self.axes, (x, y), strict=False) if axis.key != STIFFNESS)
 
     def stiffness(self, x: float, y: float) -> float:
         """Returns the wall's stiffness at a place, in N/m."""
-        here = [v for r, v in zip(self.rulers, (x, y), strict=False) if r.axis.key == STIFFNESS]
+        here = [v for axis, v in zip(self.axes, (x, y), strict=False) if axis.key == STIFFNESS]
         return here[0] if here else value_at(self.scene, STIFFNESS)
 
     def own_scenes(self) -> list[Scene]:
         """Returns the scenes along the axes' own values, one axis after the other: all that may differ in kind."""
-        ends = [ruler.axis.values for ruler in self.rulers] + [np.zeros(1)]
+        ends = [axis.values for axis in self.axes] + [np.zeros(1)]
         along_x = [self.at(x, ends[1][0]) for x in ends[0]]
         return along_x + [self.at(ends[0][-1], y) for y in ends[1]]
 
@@ -77,21 +75,21 @@ class Plane:
         (xs, x_exact), (ys, y_exact) = self._grid(0), self._grid(1)
         clock = self.scene.clock
         between = self._between(where_it_runs, clock.control_rate if whole_ticks else clock.plant_rate)
-        return [line[:, : len(self.rulers)] for line in zero_lines(between, xs, ys, (x_exact, y_exact))]
+        return [line[:, : len(self.axes)] for line in zero_lines(between, xs, ys, (x_exact, y_exact))]
 
     def _grid(self, which: int) -> tuple[np.ndarray, bool]:
         """Returns values along an axis, and whether those between them are scenes as well."""
-        if which >= len(self.rulers):
+        if which >= len(self.axes):
             return np.zeros(1), False
-        ruler = self.rulers[which]
-        if ruler.axis.names or isinstance(value_at(self.scene, ruler.axis.key), int):
-            return ruler.axis.values, False
-        swept = any(other.axis.key == STIFFNESS for other in self.rulers)
-        return _fine_values(ruler, POINTS if swept else FEW_POINTS), True
+        axis = self.axes[which]
+        if axis.names or isinstance(value_at(self.scene, axis.key), int):
+            return axis.values, False
+        swept = any(other.key == STIFFNESS for other in self.axes)
+        return _fine_values(axis, POINTS if swept else FEW_POINTS), True
 
     def _between(self, level: Level, rate: float) -> Level:
         """Returns the level, interpolated between delays that are whole multiples of 1/rate, where delay is an axis."""
-        keys = [ruler.axis.key for ruler in self.rulers]
+        keys = [axis.key for axis in self.axes]
         if DELAY not in keys:
             return level
         delay = keys.index(DELAY)
@@ -108,18 +106,18 @@ class Plane:
         return between
 
 
-def _fine_values(ruler: Ruler, points: int) -> np.ndarray:
+def _fine_values(axis: Axis, points: int) -> np.ndarray:
     """Returns about so many values along an axis between its cells' outermost edges, even in its scale."""
-    values = ruler.axis.values
+    values = axis.values
     if len(values) < 2:
         return values
-    if ruler.scale == "even":
+    if axis.scale == "even":
         between = max(2, points // len(values))
         places = np.arange((len(values) - 1) * between + 1) / between
         found = np.interp(places, np.arange(len(values)), values)
     else:
-        space = np.geomspace if ruler.scale == "log" else np.linspace
-        found = space(ruler.edges[0], ruler.edges[-1], points) * ruler.factor
+        space = np.geomspace if axis.scale == "log" else np.linspace
+        found = space(axis.edges[0], axis.edges[-1], points) * axis.factor_and_unit[0]
         found = found[found >= 0.0] if values[0] >= 0.0 else found
     return np.unique([values[0], *found, values[-1]])
 
@@ -147,8 +145,8 @@ def zero_lines(level: Level, xs: np.ndarray, ys: np.ndarray, exact: tuple[bool, 
     contour = contour_generator(x_places, y_places, np.ma.masked_invalid(heights))
     lines = []
     for line in contour.lines(0.0):
-        points = [_exact(level, place, grid, exact) for place in _at_scenes(np.asarray(line), exact)]
-        lines.append(_rounded(level, np.array(points), grid, exact))
+        places = _at_scenes(np.asarray(line), exact)
+        lines.append(np.array([_exact(level, place, grid, exact) for place in places]))
     return lines
 
 
@@ -173,51 +171,25 @@ def _along_one(level: Level, heights: np.ndarray, grid: Grid, exact: tuple[bool,
 
 
 def _exact(level: Level, place: np.ndarray, grid: Grid, exact: tuple[bool, bool]) -> np.ndarray:
-    """Returns the zero on the edge of the grid on which ``place`` (counted in grid lines) lies."""
+    """Returns the zero on the edge of the grid on which ``place`` (counted in grid lines) lies, by Brent's method.
+
+    Where the ends of the edge do not enclose one, that is the place itself.
+    """
+    from scipy.optimize import brentq
+
     whole = np.rint(place)
     off = np.abs(place - whole)
     moving = int(off[1] > off[0])
-    point = np.array([np.interp(place[i], np.arange(len(grid[i])), grid[i]) for i in (0, 1)])
+    point: Any = np.array([np.interp(place[i], np.arange(len(grid[i])), grid[i]) for i in (0, 1)])
     if not exact[moving] or off[moving] == 0.0:
         return point
     point[1 - moving] = grid[1 - moving][int(whole[1 - moving])]
-    low, high = (grid[moving][int(end(place[moving]))] for end in (np.floor, np.ceil))
-    return _root(level, point, moving, float(low), float(high))
-
-
-def _rounded(level: Level, line: np.ndarray, grid: Grid, exact: tuple[bool, bool]) -> np.ndarray:
-    """Returns the line with a point more on either side of each sharp bend, looked for across the line."""
-    cells = np.column_stack([np.interp(line[:, i], values, np.arange(len(values))) for i, values in enumerate(grid)])
-    steps = np.diff(cells, axis=0)
-    angles = np.abs(np.diff(np.unwrap(np.arctan2(steps[:, 1], steps[:, 0]))))
-    sharp = np.flatnonzero(angles > _SHARP)
-    points = [line[:1]]
-    for number, step in enumerate(steps):
-        across = int(abs(step[0]) >= abs(step[1]))
-        if exact[across] and (number in sharp or number - 1 in sharp):
-            points.append(_across(level, line[number : number + 2], across, grid[across])[None, :])
-        points.append(line[number + 1 : number + 2])
-    return np.concatenate(points)
-
-
-def _across(level: Level, ends: np.ndarray, moving: int, values: np.ndarray) -> np.ndarray:
-    """Returns the zero half way between two points, moved along one axis within a cell of the grid."""
-    point = ends.mean(axis=0)
-    place = int(np.clip(np.searchsorted(values, point[moving]), 1, len(values) - 1))
-    reach = values[place] - values[place - 1]
-    low, high = max(point[moving] - reach, values[0]), min(point[moving] + reach, values[-1])
-    return _root(level, point, moving, float(low), float(high))
-
-
-def _root(level: Level, point: np.ndarray, moving: int, low: float, high: float) -> np.ndarray:
-    """Moves a point along one axis to the zero by Brent's method; leaves it where the ends do not enclose one."""
-    from scipy.optimize import brentq
+    low, high = (float(grid[moving][int(end(place[moving]))]) for end in (np.floor, np.ceil))
 
     def along(value: float) -> float:
         return level(value, float(point[1])) if moving == 0 else level(float(point[0]), value)
 
-    moved: Any = point.copy()
     if along(low) * along(high) < 0.0:
         with suppress(ValueError):  # the level is not a number somewhere in between
-            moved[moving] = brentq(along, low, high, xtol=1e-11 * max(abs(low), abs(high)))
-    return moved
+            point[moving] = brentq(along, low, high, xtol=1e-11 * max(abs(low), abs(high)))
+    return point

@@ -1,94 +1,34 @@
-"""The sheet of a map: which axis goes where, its title, and the room for panels and a column of signs."""
+"""The sheet of a map: its title, the room for its panels, and a column of signs and notes beside them."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from itertools import islice, product
-from math import prod
+from collections.abc import Sequence
+from textwrap import fill
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from haploop.tools.figure.style import GREY, INK, LARGE, SMALL, TEXT, empty_figure, fit_text
-from haploop.tools.sweep.map.data import STIFFNESS, Axis, Cells
+from haploop.tools.sweep.map.looks import AMPLITUDES, amplitude_colours, metres_along
 
 if TYPE_CHECKING:
+    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
+    from matplotlib.colors import LogNorm
     from matplotlib.figure import Figure, SubFigure
     from matplotlib.text import Text
 
-MOST_PANELS = 12
-
-
-@dataclass(frozen=True)
-class Layout:
-    """Numbers of the axes: of those along x and y of a panel (y is None where the amplitude is), and of the others."""
-
-    x: int
-    y: int | None
-    others: tuple[int, ...]
-
-    @classmethod
-    def from_axes(cls, axes: Sequence[Axis]) -> Layout:
-        """Lays numbers along the map, the wall's stiffness upwards; names, or the shortest of three, make panels."""
-        numeric = [number for number, axis in enumerate(axes) if not axis.names]
-        if len(numeric) == 3:
-            free = [number for number in numeric if axes[number].key != STIFFNESS]
-            numeric.remove(min(free, key=lambda number: (len(axes[number].values), -number)))
-        along = numeric or [*range(len(axes))][:2]
-        if len(along) == 2 and axes[along[0]].key == STIFFNESS:
-            along.reverse()
-        others = tuple(number for number in range(len(axes)) if number not in along)
-        return cls(along[0], along[1] if len(along) == 2 else None, others)
-
-    def count(self, axes: Sequence[Axis]) -> int:
-        """Counts the panels."""
-        return prod(len(axes[number].values) for number in self.others)
-
-    def panels(self, axes: Sequence[Axis], cells: Cells) -> Iterator[Panel]:
-        """Yields the first panels, as many as are drawn."""
-        turned = self.y is not None and self.y < self.x
-        lengths = [range(len(axes[number].values)) for number in self.others]
-        for fixed in islice(product(*lengths), MOST_PANELS):
-            at = dict(zip(self.others, fixed, strict=True))
-            where = tuple(at.get(number, slice(None)) for number in range(len(axes)))
-            taken = [array[where] for array in vars(cells).values()]
-            words = {axes[number].key: axes[number].word(index) for number, index in at.items()}
-            full = ", ".join(f"{key} = {word}" for key, word in words.items())
-            short = ", ".join(f"{key.rpartition('.')[2]} = {word}" for key, word in words.items())
-            titles = full, short, ", ".join(words.values())
-            yield Panel(titles, Cells(*(np.ascontiguousarray(array.T) if turned else array for array in taken)))
-
-
-@dataclass(frozen=True)
-class Panel:
-    """A part of a sweep whose cells have the values of all axes but those along it in common.
-
-    Attributes:
-        titles: these values in words, in full and ever shorter; empty words where there are none.
-        cells: of shape (x values, y values) or (x values,).
-    """
-
-    titles: tuple[str, ...]
-    cells: Cells
-
-
 # A screen's 1280 pixels wide.
-WIDTH_IN, SIDE_IN, _HEADER_IN = 11.64, 2.75, 0.8
+WIDTH_IN, _SIDE_IN, _HEADER_IN = 11.64, 2.75, 0.8
 # Height of a row of panels, by how many rows there are.
 _HEIGHTS_IN = {1: 6.0, 2: 3.6}
 _LEAST_HEIGHT_IN = 2.7
 # How far a panel's title may reach into the gap beside it, as a multiple of the panel's width.
 _BEYOND = 1.05
+# Of the column: the room above it and between its parts, the height of the scale of amplitudes; letters of a line.
+_ABOVE_IN, _GAP_IN, _BAR_IN, _LETTERS = 0.36, 0.16, 0.14, 44
 
 
 class Sheet:
-    """A figure with a header, so many panels in rows, and a column beside them; FigureError without matplotlib.
-
-    Attributes:
-        side, side_in: the column beside them and its size.
-    """
+    """A figure with a header, so many panels in rows, and a column beside them; FigureError without matplotlib."""
 
     def __init__(self, panels: int, title: str, line: str) -> None:
         self.columns = panels if panels <= 3 else 2 if panels == 4 else 3 if panels <= 9 else 4
@@ -96,13 +36,12 @@ class Sheet:
         body_in = rows * _HEIGHTS_IN.get(rows, _LEAST_HEIGHT_IN)
         self.figure: Figure = empty_figure(WIDTH_IN, _HEADER_IN + body_in)
         header, body = self.figure.subfigures(2, 1, squeeze=False, height_ratios=(_HEADER_IN, body_in))[:, 0]
-        widths = WIDTH_IN - SIDE_IN, SIDE_IN
-        left, self.side = body.subfigures(1, 2, squeeze=False, width_ratios=widths)[0]
-        self.side_in = SIDE_IN, body_in
-        grid = left.add_gridspec(rows, self.columns)
-        self.axes: list[Axes] = [
-            left.add_subplot(grid[number // self.columns, number % self.columns]) for number in range(panels)
-        ]
+        left, side = body.subfigures(1, 2, squeeze=False, width_ratios=(WIDTH_IN - _SIDE_IN, _SIDE_IN))[0]
+        self.axes: list[Axes] = list(left.subplots(rows, self.columns, squeeze=False).ravel())
+        for spare in self.axes[panels:]:
+            spare.remove()
+        del self.axes[panels:]
+        self.column = Column(side, body_in)
         _write(header, title, 0.70, LARGE, INK, "title", bold=True)
         _write(header, line, 0.24, SMALL, GREY, "description")
 
@@ -113,6 +52,58 @@ class Sheet:
     def is_low(self, number: int) -> bool:
         """Tells whether there is no panel below a panel."""
         return number + self.columns >= len(self.axes)
+
+
+class Column:
+    """Writes beside a map from the top down, in a part of the figure that is so high."""
+
+    def __init__(self, side: SubFigure, height_in: float) -> None:
+        self._side, self._height_in = side, height_in
+        self._ax: Axes = side.add_axes((0.0, 0.0, 1.0, 1.0))
+        self._ax.set_axis_off()
+        self._top = 1.0 - _ABOVE_IN / height_in
+
+    def signs(self, signs: Sequence[Artist], heading: str = "") -> None:
+        """Draws signs beside their labels."""
+        from matplotlib.legend import Legend
+
+        if not signs:
+            return
+        made = Legend(
+            self._ax, signs, [str(sign.get_label()) for sign in signs], title=heading or None, loc="upper left",
+            bbox_to_anchor=(0.0, self._top), borderaxespad=0.0, borderpad=0.0, frameon=False, alignment="left",
+            fontsize=TEXT, title_fontsize=TEXT, labelcolor=INK, handlelength=2.6, handleheight=1.3, labelspacing=0.6,
+        )  # fmt: skip
+        self._ax.add_artist(made)
+        for text in (*made.get_texts(), *[made.get_title()] * bool(heading)):
+            text.set_gid("legend")
+        self._go_below(made)
+
+    def amplitudes(self, scale: LogNorm) -> None:
+        """Draws the colours of the limit cycles."""
+        from matplotlib.cm import ScalarMappable
+
+        self._write(AMPLITUDES, TEXT, INK)
+        bottom = self._top - _BAR_IN / self._height_in
+        bar = self._side.add_axes((0.02, bottom, 0.86, _BAR_IN / self._height_in))
+        self._side.figure.colorbar(ScalarMappable(scale, amplitude_colours()), cax=bar, orientation="horizontal")
+        metres_along(bar.xaxis, float(scale.vmax or 1.0) / float(scale.vmin or 1.0))
+        bar.tick_params(labelsize=SMALL, colors=GREY, labelcolor=INK)
+        bar.set_gid("amplitude scale")
+        self._top = bottom - (_BAR_IN + _GAP_IN) / self._height_in - _GAP_IN / self._height_in
+
+    def notes(self, sentences: Sequence[str]) -> None:
+        """Writes sentences, a paragraph each, the first darker than the others."""
+        for number, sentence in enumerate(sentences):
+            self._write(fill(sentence, _LETTERS, break_on_hyphens=False), SMALL, GREY if number else INK)
+
+    def _write(self, words: str, size: float, colour: str) -> None:
+        look = {"fontsize": size, "color": colour, "transform": self._ax.transAxes, "gid": "legend"}
+        self._go_below(self._ax.text(0.0, self._top, words, va="top", **look))
+
+    def _go_below(self, part: Artist) -> None:
+        low = self._ax.transAxes.inverted().transform((0.0, part.get_window_extent().y0))[1]
+        self._top = float(low) - 0.6 * _GAP_IN / self._height_in
 
 
 def _write(header: SubFigure, words: str, y: float, size: float, colour: str, gid: str, bold: bool = False) -> None:
