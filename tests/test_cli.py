@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from haploop.tools.cli.main import app
+from haploop.tools.cli.app import app
 
 SCENES = Path(__file__).parents[1] / "launch" / "scenes"
 FIG6C = str(SCENES / "fig6c.toml")
@@ -141,6 +141,6 @@ def test_wrong_use_is_answered_with_a_sentence_and_exit_status_2(arguments, word
 
 def test_help_imports_none_of_the_heavy_packages():
     """It has to answer at once: no NumPy, pydantic, ZeroMQ or matplotlib for a list of commands."""
-    code = "import sys, haploop.tools.cli.main; print(*sys.modules)"
+    code = "import sys, haploop.tools.cli.app; print(*sys.modules)"
     loaded = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True).stdout.split()
     assert not {"numpy", "scipy", "pydantic", "pint", "zmq", "msgpack", "matplotlib", "mcap"} & set(loaded)

@@ -15,7 +15,7 @@ from haploop.tools.advise.published import PUBLISHED
 from haploop.tools.advise.search import attack, every_case, rounded_down
 from haploop.tools.advise.subject import DEFAULT_HAND, InvalidRequest, apply_events, make_subject, presets
 from haploop.tools.advise.walls.cases import Case, corners, hold_N, make_loop, scale_quantities, slowness
-from haploop.tools.cli.main import app
+from haploop.tools.cli.app import app
 from helpers.scenes.least import KINDS, scene
 
 SCENES = Path(__file__).parents[2] / "launch" / "scenes"

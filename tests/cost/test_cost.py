@@ -10,7 +10,7 @@ import pytest
 from typer.testing import CliRunner
 
 from haploop.launch.scene.file import load as load_scene
-from haploop.tools.cli.main import app
+from haploop.tools.cli.app import app
 from haploop.tools.cost.data import load
 from haploop.tools.cost.findings import is_told_apart
 from haploop.tools.cost.grid import METHODS, accuracy_scenes, grid, outcome, starts, true_swings

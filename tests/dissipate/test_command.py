@@ -11,7 +11,7 @@ from typer.testing import CliRunner, Result
 
 from haploop.launch.runs.in_process import run_in_process
 from haploop.launch.scene.toml_writer import to_toml
-from haploop.tools.cli.main import app
+from haploop.tools.cli.app import app
 from haploop.tools.dissipate.figure import make_figure
 from haploop.tools.dissipate.report import conclusion
 from helpers.data.recordings import outcome, write

@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 
 from haploop.launch.runs.in_process import run_in_process
 from haploop.launch.scene.toml_writer import to_toml
-from haploop.tools.cli.main import app
+from haploop.tools.cli.app import app
 from haploop.tools.dissipate.figure import make_figure
 from haploop.tools.dissipate.outcome import ForceOutcome
 from haploop.tools.dissipate.report import conclusion, note_sentences

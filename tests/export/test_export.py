@@ -16,7 +16,7 @@ from typer.testing import CliRunner
 
 from haploop.logger import read
 from haploop.logger.log.recording import Recording
-from haploop.tools.cli.main import app
+from haploop.tools.cli.app import app
 from helpers.data.logs import AFTER, PLANT, SCENE, same_bits, swapped_run
 
 TABLES = {"/plant": PLANT, "/controller": AFTER}

@@ -13,7 +13,7 @@ from typer.testing import CliRunner, Result
 
 from haploop.logger import read
 from haploop.logger.log.writer import Log
-from haploop.tools.cli.main import app
+from haploop.tools.cli.app import app
 from helpers.data.logs import cut, swapped_run
 from helpers.live.launched import on_a_disk_of
 
@@ -136,7 +136,7 @@ def test_channels_of_any_name_get_files_of_their_own(tmp_path: Path) -> None:
 PEAK = Path("/proc/self/status")
 MEASURED = """
 import sys
-from haploop.tools.cli.main import app
+from haploop.tools.cli.app import app
 try:
     app(["export", sys.argv[1], "--to", sys.argv[2], "--out", sys.argv[3]])
 except SystemExit as end:

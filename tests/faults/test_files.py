@@ -1,15 +1,13 @@
-"""The files of a run: a full disk, a directory that vanishes or holds something already, traces of dead runs."""
+"""The files of a run: a full disk, a directory that vanishes or holds something already."""
 
 import json
-import os
 import shutil
 import signal
 
 import pytest
 
 import haploop.logger
-from haploop.launch.processes import run_directory
-from helpers.live.launched import LONG, SCENE, command, processes, same_bits, wait_for
+from helpers.live.launched import SCENE, command, same_bits
 
 LIMIT_BYTES = 4_000_000
 
@@ -78,28 +76,6 @@ def test_a_file_where_the_directory_should_be_is_refused(launched, tmp_path):
     assert out.read_text() == "a file"
 
 
-def test_a_directory_that_never_became_a_run_is_cleared_away_after_a_while():
-    """Its launcher was killed before it could say who it was."""
-    sockets = run_directory.create()
-    assert run_directory.live_runs() == []
-    assert sockets.exists()
-    os.utime(sockets, (0, 0))
-    assert run_directory.live_runs() == []
-    assert not sockets.exists()
-
-
-def test_status_clears_away_what_a_dead_run_has_left():
-    dead = max(pid for pid, *_ in processes()) + 100_000
-    sockets = run_directory.base_directory() / "abcdef"
-    sockets.mkdir()
-    (sockets / "clock.sock").touch()
-    entry = {"pid": dead, "clock": f"ipc://{sockets}/clock.sock", "title": "dead", "out": "nowhere"}
-    (sockets / "run.json").write_text(json.dumps(entry))
-    answer = command("status")
-    assert (answer.returncode, answer.stdout.strip()) == (0, "No run is live.")
-    assert not sockets.exists()
-
-
 @pytest.mark.slow
 def test_a_live_run_whose_launcher_hangs_does_not_hide_the_others_from_status(running):
     hanging, going = running(), running()
@@ -112,12 +88,3 @@ def test_a_live_run_whose_launcher_hangs_does_not_hide_the_others_from_status(ru
     assert answer.returncode == 0
     assert json.loads(answer.stdout).keys() == {second}
     assert f"Run {first}" in answer.stderr
-
-
-def test_a_run_in_the_midst_of_starting_is_no_dead_one(running):
-    """Another run that starts at that moment must not clear its directory away."""
-    early = run_directory.create()
-    run = running(sets=(*LONG, "duration=0.1"), pace=())
-    assert run.summary()["ended"] == "done"
-    assert early.exists()
-    wait_for("only the early one", lambda: [path.name for path in early.parent.iterdir()] == [early.name])

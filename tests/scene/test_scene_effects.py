@@ -14,7 +14,7 @@ from haploop.launch.scene.schema import json_schema
 from haploop.launch.scene.toml_writer import to_toml
 from haploop.protocol.scene.effects import Accelerometer, Friction, GammaJitter, Grip
 from haploop.protocol.scene.scene import Hand
-from haploop.tools.cli.main import app
+from haploop.tools.cli.app import app
 from helpers.scenes.least import KINDS, LEAST, mistakes, scene
 
 LEAST_OF_EACH: dict[str, Any] = {

@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 from haploop.controller.dissipation.damping import Damping
 from haploop.launch.plan.effect import Effect
 from haploop.launch.plan.effects import EFFECTS, effects_of
-from haploop.tools.cli.main import app
+from haploop.tools.cli.app import app
 from haploop.tools.operations import bill, operations
 from helpers.scenes.every_effect import BESIDE, EVERYTHING, NAMING
 from helpers.scenes.least import KINDS, scene

@@ -9,7 +9,7 @@ from typer.testing import CliRunner
 
 from haploop.launch.runs.replay import repeatable
 from haploop.launch.stability.judge import judge_scene
-from haploop.tools.cli.main import app
+from haploop.tools.cli.app import app
 
 
 def haploop(*arguments: str):

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from haploop.tools.cli.main import app
+from haploop.tools.cli.app import app
 from haploop.tools.figure.data import FigureError
 from haploop.tools.sweep.map.data import AMPLITUDE, MapData, make_map_data
 from haploop.tools.sweep.map.edges import ALL_HOLD, FOUND, NONE_HOLDS, UNKNOWN, find_edges

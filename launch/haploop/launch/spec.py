@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from itertools import chain, count
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -36,7 +38,7 @@ class RunSpec:
 
     Attributes:
         kinds: element kinds by name; a plugin reloaded in mid-run adds its kinds.
-        out: the run's directory, made.
+        out: the run's directory, made; ``is_new``: it was not there before.
         attachments: text files for the log, by name.
         plugins: plugin files within ``out`` that the controller loads.
         plugin_sources: kind -> the user's file it came from, for reloading.
@@ -60,24 +62,60 @@ class RunSpec:
     on_progress: Callable[[Message], None] = lambda status: None
     on_started: Callable[[str], None] = lambda run_id: None
     start_gate: Callable[[set[int]], bool] = lambda ready: True
+    is_new: bool = False
 
 
-def make_output(out: Path | None, scene_path: Path) -> Path:
+def make_output(out: Path | None, scene_path: Path, first: str = SCENE) -> Path:
     """Makes the run's directory: ``out``, or a new one below ``runs/`` named by scene and time.
+
+    It is claimed by making the file ``first``, empty, which its owner writes: of many who start at one instant only one
+    can.
 
     Raises OutputError where ``out`` holds something already, or cannot be made.
     """
-    if out is None:
-        stem = f"{scene_path.stem}-{time.strftime('%Y%m%d-%H%M%S')}"
-        candidates = (Path("runs") / (stem + suffix) for suffix in ("", *(f"-{n}" for n in range(2, 1000))))
-        out = next(path for path in candidates if not path.exists())
     try:
-        out.mkdir(parents=True, exist_ok=True)
-        if any(out.iterdir()):
+        if out is None:
+            stem = f"{scene_path.stem}-{time.strftime('%Y%m%d-%H%M%S')}"
+            names = (stem + suffix for suffix in chain([""], map("-{}".format, count(2))))
+            return next(path for name in names if _claimed(path := Path("runs") / name, first))
+        if not _claimed(out, first):
             raise OutputError(f"{out} must be new or empty, so that no earlier run is lost; name another with --out.")
     except OSError as error:
-        raise OutputError(f"The run's directory {out} cannot be made: {error.strerror}.") from error
+        place = "runs" if out is None else out
+        raise OutputError(f"The run's directory {place} cannot be made: {error.strerror}.") from error
     return out
+
+
+def _claimed(out: Path, first: str) -> bool:
+    is_new = not out.exists()
+    out.mkdir(parents=True, exist_ok=True)
+    try:
+        if any(out.iterdir()):
+            return False
+        (out / first).touch(exist_ok=False)
+    except FileExistsError:
+        return False
+    except OSError:
+        if is_new:
+            out.rmdir()
+        raise
+    return True
+
+
+def discard(out: Path, is_new: bool) -> None:
+    """Removes what a run that never began has put into its directory, and the directory where it was made for it.
+
+    A directory that holds anything else stays as it is.
+    """
+    with contextlib.suppress(OSError):
+        kept = list((out / PLUGINS).glob("*-????????????.py"))
+        if {path.name for path in out.iterdir()} <= {SCENE, PLUGINS}:
+            for path in (out / SCENE, *kept):
+                path.unlink(missing_ok=True)
+            if (out / PLUGINS).is_dir():
+                (out / PLUGINS).rmdir()
+            if is_new:
+                out.rmdir()
 
 
 def write_scene(scene: Scene, out: Path) -> str:

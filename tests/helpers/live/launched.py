@@ -15,7 +15,7 @@ from typing import Any
 
 import pytest
 
-from haploop.launch.processes import run_directory
+from haploop.launch.processes import private_directory, run_directory
 from haploop.logger import read
 from haploop.logger.log.recording import Recording
 from haploop.protocol.transport.messages import PROCESSES
@@ -251,4 +251,4 @@ class Run(Launched):
         """No process of the run is left, and none of its sockets."""
         pids = [self.pid, *self.nodes.values()]
         wait_for("the end of all processes", lambda: not alive(pids))
-        assert list(run_directory.base_directory().iterdir()) == []
+        assert list(private_directory.base_directory().iterdir()) == []

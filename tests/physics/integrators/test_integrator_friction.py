@@ -13,7 +13,7 @@ import haploop.launch.runs.start as start
 from haploop.launch.plan.effects import notes
 from haploop.plant.integrators.stepwise import growth
 from haploop.protocol.scene.scene import Scene
-from haploop.tools.cli.main import app
+from haploop.tools.cli.app import app
 from helpers.runs.captured import in_blocks, run, summarise
 from helpers.scenes.effect_tables import EFFECTS, tap
 from helpers.scenes.every_effect import EVERYTHING, METHODS

@@ -1,26 +1,27 @@
-"""The live runs: the private directory of each, in which other terminals find it, and the commands they send it."""
+"""The live runs: the entry by which other terminals find each, and the commands they send it."""
 
 from __future__ import annotations
 
 import json
 import os
-import secrets
-import shutil
-import tempfile
-import time
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import zmq
 
+from haploop.launch.processes.private_directory import (
+    ENTRY,
+    PART,
+    clear_dead,
+    directories,
+    is_held,
+    read_entry,
+)
+from haploop.launch.spec import OutputError
 from haploop.protocol.transport.sockets import SecureContext, Transport, open_socket
 from haploop.protocol.transport.wire import Message, WireError, decode, encode
 
-# A socket's path must stay below the kernel's 107 bytes; this leaves room for the run and the socket's name.
-_LONGEST_BASE = 70
-# A directory that is older and tells of no run belonged to a launcher that was killed as it started.
-_ANNOUNCED_WITHIN_S = 60.0
 _ANSWER_MS = 5000
 _LOOK_MS = 250
 
@@ -31,26 +32,6 @@ class RunNotFound(Exception):
 
 class CommandRefused(Exception):
     """The run did not do what was asked; the message says why."""
-
-
-def base_directory() -> Path:
-    """Returns the user's directory of live runs, mode 0700, below XDG_RUNTIME_DIR or the temporary directory.
-
-    Raises PermissionError where a directory of that name belongs to somebody else.
-    """
-    candidate = Path(os.environ.get("XDG_RUNTIME_DIR") or "/nonexistent") / "haploop"
-    if not candidate.parent.is_dir() or len(os.fsencode(candidate)) > _LONGEST_BASE:
-        candidate = Path(tempfile.gettempdir()) / f"haploop-{os.getuid()}"
-    if len(os.fsencode(candidate)) > _LONGEST_BASE:
-        candidate = Path("/tmp") / f"haploop-{os.getuid()}"
-    candidate.mkdir(mode=0o700, exist_ok=True)
-    status = candidate.stat()
-    if status.st_uid != os.getuid() or status.st_mode & 0o077:
-        raise PermissionError(
-            f"{candidate} must belong to you alone (mode 0700), but it belongs to user {status.st_uid} with mode "
-            f"{status.st_mode & 0o777:o}; remove it or set XDG_RUNTIME_DIR."
-        )
-    return candidate
 
 
 @dataclass(frozen=True)
@@ -69,44 +50,31 @@ class LiveRun:
         return SecureContext.from_transport(Transport(keys=Path(self.keys) if self.keys else None))
 
 
-def create() -> Path:
-    """Makes a directory of sockets, named by the run's id; clears away what dead runs left."""
-    live_runs()
-    while True:
-        path = base_directory() / secrets.token_hex(3)
-        try:
-            path.mkdir(mode=0o700)
-            return path
-        except FileExistsError:
-            continue
-
-
 def announce(sockets: Path, clock: str, title: str, out: str, keys: str | None = None) -> None:
-    """Writes the entry by which other terminals find the run."""
+    """Writes the entry by which other terminals find the run; raises OutputError where that fails."""
     entry = {"pid": os.getpid(), "clock": clock, "title": title, "out": out, "keys": keys}
-    temporary = sockets / "run.part"
-    temporary.write_text(json.dumps(entry), encoding="utf-8")
-    temporary.replace(sockets / "run.json")
-
-
-def remove(sockets: Path) -> None:
-    shutil.rmtree(sockets, ignore_errors=True)
+    temporary = sockets / PART
+    try:
+        temporary.write_text(json.dumps(entry), encoding="utf-8")
+        temporary.replace(sockets / ENTRY)
+    except OSError as error:
+        raise OutputError(f"{temporary} cannot be written: {error.strerror}.") from error
 
 
 def live_runs() -> list[LiveRun]:
     """Returns all runs of this user, oldest first; the directories of dead ones are cleared away."""
     runs = []
-    for path in sorted(base_directory().iterdir(), key=_made):
+    for path in directories():
         run = _read(path)
-        if run and _is_alive(run.pid):
+        if not is_held(path):
+            clear_dead(path)
+        elif run:
             runs.append(run)
-        elif run or time.time() - _made(path) > _ANNOUNCED_WITHIN_S:
-            remove(path)
     return runs
 
 
 def is_live(run: LiveRun) -> bool:
-    return _is_alive(run.pid)
+    return is_held(run.sockets)
 
 
 def find(run_id: str | None) -> LiveRun:
@@ -145,6 +113,8 @@ def ask(run: LiveRun, verb: str, **arguments: Any) -> tuple[str, Message]:
         frame = decode(socket.recv())
     except WireError as error:
         raise RunNotFound(f"Run {run.id} answered with something else: {error}") from error
+    except zmq.ZMQError as error:
+        raise RunNotFound(f"Run {run.id} cannot be reached at {run.clock}: {error.strerror}.") from error
     finally:
         context.destroy(linger=0)
     if frame.name == "REFUSED":
@@ -155,26 +125,11 @@ def ask(run: LiveRun, verb: str, **arguments: Any) -> tuple[str, Message]:
     return text, data
 
 
-def _made(path: Path) -> float:
-    """Returns the time at which a run's directory was made; 0 for one that its run has just removed."""
-    try:
-        return path.stat().st_mtime
-    except FileNotFoundError:
-        return 0.0
-
-
 def _read(path: Path) -> LiveRun | None:
     try:
-        return LiveRun(path.name, path, **json.loads((path / "run.json").read_text(encoding="utf-8")))
-    except (OSError, ValueError, TypeError):  # not announced yet, removed, or no entry of ours
+        entry = json.loads(read_entry(path))
+        run = LiveRun(path.name, path, **entry)
+    except (OSError, ValueError, TypeError, RecursionError):  # not announced yet, removed, or no entry of ours
         return None
-
-
-def _is_alive(pid: int) -> bool:
-    try:
-        os.kill(pid, 0)
-    except ProcessLookupError:
-        return False
-    except PermissionError:
-        return True
-    return True
+    texts = (run.clock, run.title, run.out, run.keys or "")
+    return run if isinstance(run.pid, int) and all(isinstance(text, str) for text in texts) else None

@@ -14,7 +14,7 @@ from haploop.controller.dissipation.registry import installed
 from haploop.launch.clock.clock import Clock
 from haploop.launch.clock.commands import Commands
 from haploop.launch.clock.server import ClockServer
-from haploop.launch.processes import run_directory
+from haploop.launch.processes import private_directory, run_directory
 from haploop.launch.processes.children import Child, interrupts, start_children
 from haploop.launch.spec import RunFailed, RunSpec
 from haploop.protocol.changes import Event
@@ -54,15 +54,12 @@ def run_processes(
 
     Raises:
         RunFailed: a process was killed, hung or could not go on; nothing of the run is left but its files.
+        OutputError: the private directory of its sockets cannot be made.
         KeyboardInterrupt: the second signal came.
     """
-    sockets = run_directory.create()
-    try:
-        with interrupts(usual_from=3) as received:
-            supervisor = Supervisor(spec, sockets, received, make_context(spec.transport), start_nodes)
-            return supervisor.run(), supervisor.events
-    finally:
-        run_directory.remove(sockets)
+    with interrupts(usual_from=3) as received, private_directory.made() as sockets:
+        supervisor = Supervisor(spec, sockets, received, make_context(spec.transport), start_nodes)
+        return supervisor.run(), supervisor.events
 
 
 class Supervisor:

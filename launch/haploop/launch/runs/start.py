@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from haploop.controller.dissipation import Element, ElementError, load_plugin, registry
 from haploop.launch.scene.events import elements_of, try_out
 from haploop.launch.scene.file import load
-from haploop.launch.spec import RunSpec, keep_plugin, make_output, write_scene
+from haploop.launch.spec import OutputError, RunSpec, discard, keep_plugin, make_output, write_scene
 from haploop.protocol.scene.scene import Scene
 
 if TYPE_CHECKING:
@@ -40,7 +40,8 @@ def prepare(
             kinds[kind], sources[kind] = element, plugin
     scene = load(scene_path, overrides, kinds)
     try_out(elements_of(scene), kinds)
-    return lay_out(scene, kinds, make_output(out, scene_path), plugins, sources)
+    is_new = out is None or not out.exists()
+    return lay_out(scene, kinds, make_output(out, scene_path), plugins, sources, is_new)
 
 
 def lay_out(
@@ -49,12 +50,20 @@ def lay_out(
     directory: Path,
     plugins: Sequence[Path] = (),
     sources: dict[str, Path] | None = None,
+    is_new: bool = False,
 ) -> RunSpec:
-    """Puts a resolved scene and its plugin files into the directory of its run; OutputError where that fails."""
-    attachments = {"scene.toml": write_scene(scene, directory)}
-    kept = [keep_plugin(plugin, directory) for plugin in plugins]
-    attachments |= {f"plugins/{path.name}": path.read_text(encoding="utf-8") for path in kept}
-    return RunSpec(scene, kinds, directory, attachments, kept, sources or {})
+    """Puts a resolved scene and its plugin files into the directory of its run.
+
+    Raises OutputError where that fails; nothing is left in the directory, nor itself if it ``is_new``.
+    """
+    try:
+        attachments = {"scene.toml": write_scene(scene, directory)}
+        kept = [keep_plugin(plugin, directory) for plugin in plugins]
+        attachments |= {f"plugins/{path.name}": path.read_text(encoding="utf-8") for path in kept}
+    except BaseException:
+        discard(directory, is_new)
+        raise
+    return RunSpec(scene, kinds, directory, attachments, kept, sources or {}, is_new=is_new)
 
 
 def run(spec: RunSpec, *, in_process: bool = False, **options: Any) -> Summary:
@@ -69,14 +78,20 @@ def run(spec: RunSpec, *, in_process: bool = False, **options: Any) -> Summary:
 
     Raises:
         RunFailed: a process was killed, hung or could not go on, or an element raised.
+        OutputError: the run's sockets cannot be made.
         LogError: the log could not be written (in one process).
         KeyboardInterrupt: the second signal came.
     """
     spec = replace(spec, **options)
     if not in_process:
-        from haploop.launch.processes.supervisor import run_processes
+        try:
+            from haploop.launch.processes.supervisor import run_processes
 
-        return _judged(spec, *run_processes(spec))
+            made = run_processes(spec)
+        except (OutputError, KeyboardInterrupt):
+            discard(spec.out, spec.is_new)  # where it never began
+            raise
+        return _judged(spec, *made)
     from haploop.launch.processes.children import interrupts
     from haploop.launch.runs.in_process import run_in_process
 

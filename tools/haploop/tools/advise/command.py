@@ -78,7 +78,7 @@ def _output(out: Path | None, name: str) -> Path:
     """Returns a new directory, or one with the walls of an advice, which then goes on; OutputError for any other."""
     if out is not None and (out / WALLS).exists():
         return out
-    return make_output(out, Path(f"advice-{name}"))
+    return make_output(out, Path(f"advice-{name}"), first=WALLS)
 
 
 def _write(found: Advice, out: Path) -> AdviceData:

@@ -1,35 +1,25 @@
-"""The command line: every command in the order of the help; what a command works with is imported when it is called."""
+"""The start of the command line: light, so that Ctrl-C is a sentence from the first moment on."""
 
 from __future__ import annotations
 
 import os
+import sys
 
-import typer
-
-from haploop.launch.processes.one_thread import ask_for_one_thread
-from haploop.tools.cli.explain import explain
-from haploop.tools.cli.live_commands import attach, pace, pause, resume, set_, status, step, stop, swap
-from haploop.tools.cli.scenes import check, export, judge, plot, plugins, replay, run
-from haploop.tools.cli.study_commands import advise, dissipate, paper, sweep
-from haploop.tools.cli.view import view
-from haploop.tools.cost.command import cost
-
-app = typer.Typer(
-    help="Simulate a haptic loop: a device in a hand, a sampled controller with a virtual wall, a line with delay.",
-    no_args_is_help=True,
-    add_completion=False,
-    rich_markup_mode=None,
-    pretty_exceptions_enable=False,
-)
-# In the order in which the help lists them.
-for command in (
-    run, check, explain, plugins, status, pause, resume, step, pace, stop, swap, set_, attach, view,
-    plot, replay, judge, export, cost, sweep, dissipate, paper, advise,
-):  # fmt: skip
-    app.command(command.__name__.rstrip("_"))(command)
+# The status with which typer leaves at Ctrl-C, without a word.
+_OF_TYPER = 130
 
 
 def main() -> None:
-    """Runs the command line. Exit status: 0 done, 1 the run failed, 2 wrong usage or scene."""
-    ask_for_one_thread(os.environ)
-    app()
+    """Runs the command line. Exit status: 0 done, 1 the run failed or was interrupted, 2 wrong usage or scene."""
+    try:
+        from haploop.launch.processes.one_thread import ask_for_one_thread
+
+        ask_for_one_thread(os.environ)
+        from haploop.tools.cli.app import app
+
+        app()
+    except (KeyboardInterrupt, SystemExit) as error:
+        if isinstance(error, SystemExit) and error.code != _OF_TYPER:
+            raise
+        print("Interrupted.", file=sys.stderr)
+        sys.exit(1)

@@ -83,7 +83,13 @@ def run(
         except RunFailed as error:
             leave(f"{error}\nWhat was logged is in {prepared.out}.", FAILED)
         except KeyboardInterrupt:
-            leave(f"Interrupted at once; what was logged is in {prepared.out}.", FAILED)
+            begun = prepared.out.exists()
+            leave(
+                f"Interrupted at once; what was logged is in {prepared.out}."
+                if begun
+                else "Interrupted before the run began; nothing is left of it.",
+                FAILED,
+            )
         if json:
             print_json({**summary, "directory": str(prepared.out)})
         else:

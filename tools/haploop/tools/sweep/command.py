@@ -139,7 +139,7 @@ def _directory(request: Request, made: Sweep) -> Path:
         if kept != {kept_name(plugin) for plugin in request.plugins}:
             raise OutputError(f"{out} holds a sweep with other --plugin files, kept in {out / PLUGINS}; use those.")
         return out
-    directory = make_output(out, request.path)
+    directory = make_output(out, request.path, first=SWEEP)
     for plugin in request.plugins:
         keep_plugin(plugin, directory)
     part = directory / f"{SWEEP}.part"

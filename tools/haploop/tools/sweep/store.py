@@ -6,7 +6,6 @@ import contextlib
 import fcntl
 import io
 import os
-import shutil
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, Self
@@ -15,6 +14,8 @@ from haploop.launch.spec import OutputError
 from haploop.tools.sweep.table import BOUNDARY, CELL, PARTS, TABLE, Row, make_table, pyarrow
 
 LOCK = ".lock"
+# The parts that a sweep writes, by their first cell; nothing else is ever removed.
+_PART = f"{'[0-9]' * 12}.parquet"
 # Rows that are merged into a group of the table, which a reader can read by itself.
 _GROUP_ROWS = 8192
 
@@ -39,8 +40,9 @@ class Store:
         self._lock = lock(self.directory)
         try:
             self._parts.mkdir(exist_ok=True)
-            for left in self.directory.rglob("*.part"):
-                left.unlink()
+            ours = (self.directory / f"{name}.part" for name in (TABLE, BOUNDARY))
+            for left in (*ours, *self._parts.glob(f"{_PART}.part")):
+                left.unlink(missing_ok=True)
         except OSError as error:
             os.close(self._lock)
             raise OutputError(f"The directory {self.directory} cannot be used: {error.strerror}.") from error
@@ -83,7 +85,10 @@ class Store:
                 for table in self._in_order():
                     writer.write_table(table)
             temporary.replace(self.directory / TABLE)
-        shutil.rmtree(self._parts, ignore_errors=True)
+        with contextlib.suppress(OSError):  # the table is there; what is not a part of ours stays
+            for part in self._files():
+                part.unlink()
+            self._parts.rmdir()
 
     def _in_order(self) -> Iterator[Any]:
         """Yields all rows in groups in the order of their cells, with no more parts in memory than overlap."""
@@ -100,7 +105,7 @@ class Store:
             yield arrow.concat_tables(held).sort_by(CELL)
 
     def _files(self) -> list[Path]:
-        return sorted(self._parts.glob("*.parquet"))
+        return sorted(self._parts.glob(_PART))
 
     def _write(self, path: Path, write: Callable[[io.BytesIO], object]) -> None:
         data = io.BytesIO()

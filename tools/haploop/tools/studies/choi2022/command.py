@@ -174,12 +174,18 @@ def main() -> None:
         leave(f"There is no figure in {directory}; make them with haploop paper --out {directory}.", WRONG_USE)
     pictures = docs / "paper"
     if directory.resolve() != pictures.resolve():
-        shutil.rmtree(pictures, ignore_errors=True)
-        pictures.mkdir(parents=True)
-        for number, one in kept.items():
-            for name in (f"figure_{number}.json", *(name for name in one["files"] if name.endswith(".png"))):
-                shutil.copyfile(directory / name, pictures / name)
+        for name in _taken(made(pictures)):
+            (pictures / Path(name).name).unlink(missing_ok=True)
+        pictures.mkdir(parents=True, exist_ok=True)
+        for name in _taken(kept):
+            shutil.copyfile(directory / name, pictures / name)
     write_pages(kept, docs, "paper/")
+
+
+def _taken(kept: Mapping[int, Kept]) -> list[str]:
+    """Returns the files of a run that the documentation takes: findings and pictures."""
+    shown = [name for one in kept.values() for name in one["files"] if name.endswith(".png")]
+    return [*(f"figure_{number}.json" for number in kept), *shown]
 
 
 if __name__ == "__main__":
