@@ -32,7 +32,9 @@ export function showHeader(state, phase) {
 }
 
 function showVerdict(state) {
-  const known = VERDICTS.has(state.verdict) && !(state.verdict_is in NOT_YET) ? state.verdict : "none";
+  // The sign of a steady loop is for one that was judged.
+  const isTold = state.verdict_is === "judged" || (state.verdict !== "steady" && !(state.verdict_is in NOT_YET));
+  const known = isTold && VERDICTS.has(state.verdict) ? state.verdict : "none";
   const sought = byId("verdict");
   sought.dataset.verdict = known;
   sought.dataset.is = state.verdict_is ?? "seen";
