@@ -13,8 +13,7 @@ import time
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-from haploop.tools.executor.parts import MOST, Group
-from haploop.tools.executor.pool import Pool
+from haploop.tools.executor.pool import MOST, Group, Pool
 from haploop.tools.executor.work import Work
 from haploop.tools.machine import machine
 from haploop.tools.sweep.sweep_file import load

@@ -8,7 +8,7 @@ from rich.console import Console
 
 from haploop.tools.cost.data import Load, Point, ReferenceNote, SceneCost, Spread
 from haploop.tools.cost.findings import advice, cheapest, exact_below_m, meets
-from haploop.tools.cost.report import report
+from haploop.tools.cost.page import report
 from helpers.data.costs import fake_cost, fake_error
 
 

@@ -16,8 +16,7 @@ from haploop.launch.batch.run import run_batch
 from haploop.launch.processes.one_thread import THREADS, ask_for_one_thread
 from haploop.protocol.scene.scene import ElementTable, Scene
 from haploop.tools.executor.executors import make_executor, map_parallel
-from haploop.tools.executor.parts import Group, Sizes, cut, grouped
-from haploop.tools.executor.pool import DIED, Pool
+from haploop.tools.executor.pool import DIED, Group, Pool, Sizes, cut, grouped
 from haploop.tools.executor.work import Work, load_kinds
 from helpers.runs.workers import of_stiffness, pressed, threads
 from helpers.scenes.least import KINDS

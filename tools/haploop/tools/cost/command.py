@@ -34,7 +34,7 @@ def cost(
     from haploop.tools.cost.data import COST_FILE, save
     from haploop.tools.cost.grid import accuracy_scenes, grid
     from haploop.tools.cost.measure import Measurement
-    from haploop.tools.cost.report import report
+    from haploop.tools.cost.page import report
     from haploop.tools.figure.data import FigureError
     from haploop.tools.figure.style import write_figure
     from haploop.tools.render.terminal import console

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Literal
 
 from haploop.tools.cost.data import AlikeScene, Cost, Errors, Point, PriceGroup, SceneCost, Spread, Step
 from haploop.tools.operations import WHOLE
@@ -17,21 +18,28 @@ _NOTHING_M = 1e-9
 # Errors that are asked for, m.
 DIGITS_M = (30e-6, 10e-6, 3e-6, 1e-6, 1e-7)
 
+_ALIKE = (
+    "In a run of {scene}, both at {rate}, {rival} takes {in_run} times as long as the exact flow, which has code of "
+    "its own; written alike its step takes {alike} times as long."
+)
+
 
 @dataclass(frozen=True)
 class FindingTable:
-    """A table of findings, its cells as text, with the sentences that belong below it."""
+    """A table of findings, its cells as text."""
 
+    kind: Literal["digits", "alike", "swings"]
     title: str
     heads: tuple[str, ...]
     rows: list[list[str]]
-    notes: tuple[str, ...] = ()
 
 
 def cheapest(scene: SceneCost, tolerance_m: float, method: str | None = None) -> Point | None:
     """Returns the point of least time in one process among those that meet the tolerance, of one method or of all."""
     points = [point for point in scene.points if method in (None, point.method)]
-    return min((p for p in points if p.time and meets(p, tolerance_m)), key=_median, default=None)
+    return min(
+        (p for p in points if p.time and meets(p, tolerance_m)), key=lambda point: _time(point).median, default=None
+    )
 
 
 def as_cheap(scene: SceneCost, tolerance_m: float) -> list[Point]:
@@ -40,7 +48,7 @@ def as_cheap(scene: SceneCost, tolerance_m: float) -> list[Point]:
     for point in sorted(scene.points, key=lambda point: point.plant_rate):
         if best and point.time and meets(point, tolerance_m) and point.time.overlaps(_time(best)):
             found.setdefault(point.method, point)
-    return sorted(found.values(), key=_median)
+    return sorted(found.values(), key=lambda point: _time(point).median)
 
 
 def meets(point: Point, tolerance_m: float) -> bool:
@@ -97,22 +105,13 @@ def _digit_table(cost: Cost) -> FindingTable:
     """Makes a row a scene: the cheapest setting at every error asked for, and where the exact flow takes over."""
     rows = []
     for scene in cost.scenes:
-        if not any(point.time for point in scene.points):
-            continue
-        below = exact_below_m(scene)
-        rows.append([
-            scene.short_title,
-            *_cells(scene),
-            _NONE if below is None else "any error" if math.isinf(below) else amount(below, "m", 2),
-        ])  # fmt: skip
+        if any(point.time for point in scene.points):
+            below, cells = exact_below_m(scene), [_cell(scene, digit) for digit in DIGITS_M]
+            shown = ["same" if i and cell == cells[i - 1] else cell for i, cell in enumerate(cells)]
+            last = _NONE if below is None else "any error" if math.isinf(below) else amount(below, "m", 2)
+            rows.append([scene.short_title, *shown, last])
     heads = ("scene", *(amount(digit, "m", 2) for digit in DIGITS_M), "none cheaper than exact below")
-    return FindingTable("What the next digit costs", heads, rows)
-
-
-def _cells(scene: SceneCost) -> list[str]:
-    """Returns the cells of all errors asked for; one that says what that to its left does is told so."""
-    said = [_cell(scene, digit) for digit in DIGITS_M]
-    return ["same" if i and cell == said[i - 1] else cell for i, cell in enumerate(said)]
+    return FindingTable("digits", "What the next digit costs", heads, rows)
 
 
 def _cell(scene: SceneCost, digit_m: float) -> str:
@@ -141,7 +140,7 @@ def _alike_table(cost: Cost) -> FindingTable:
         *(f"time in arrays over exact, {states} states" for states in sizes),
         *(f"operations a tick within {within}, {scene.name.replace('_', ' ')}" for scene, _ in pairs),
     )
-    return FindingTable("A plant step of every method, written alike", heads, rows)
+    return FindingTable("alike", "A plant step of every method, written alike", heads, rows)
 
 
 def _alike_pairs(cost: Cost) -> list[tuple[SceneCost, AlikeScene]]:
@@ -157,11 +156,12 @@ def alike_sentence(cost: Cost) -> str | None:
     for scene, of in sorted(_alike_pairs(cost), key=lambda pair: pair[1].states):
         exact, rival = (scene.point(method, min(p.plant_rate for p in scene.points)) for method in (EXACT, _RIVAL))
         if exact and rival and exact.time and rival.time and any(step.method == _RIVAL for step in of.steps):
-            in_run, alike = rival.time.median / exact.time.median, _step(of, _RIVAL).arrays
-            return (
-                f"In a run of {scene.name.replace('_', ' ')}, both at {rate(exact.plant_rate)}, {_RIVAL} takes "
-                f"{fixed(in_run, 2)} times as long as the exact flow, which has code of its own; written alike its "
-                f"step takes {interval(alike)} times as long."
+            return _ALIKE.format(
+                scene=scene.name.replace("_", " "),
+                rate=rate(exact.plant_rate),
+                rival=_RIVAL,
+                in_run=fixed(rival.time.median / exact.time.median, 2),
+                alike=interval(_step(of, _RIVAL).arrays),
             )
     return None
 
@@ -177,14 +177,13 @@ def _swing_table(scene: SceneCost) -> FindingTable:
     rates = sorted({point.plant_rate for point in scene.points})
     methods = dict.fromkeys(point.method for point in scene.points)
     rows = [[method, *(_swing(scene.point(method, hertz)) for hertz in rates)] for method in methods]
-    return FindingTable(f"{scene.short_title}: error of the mean swing", ("method", *map(rate, rates)), rows)
+    return FindingTable("swings", f"{scene.short_title}: error of the mean swing", ("method", *map(rate, rates)), rows)
 
 
 def _swing(point: Point | None) -> str:
-    if point is None:
-        return _NONE
-    if (error := point.error) is None:
-        return "failed"
+    error = point.error if point else None
+    if error is None:
+        return "failed" if point else _NONE
     if error.at_most_m < _NOTHING_M:
         return f"below {amount(_NOTHING_M, 'm', 1)}"
     if is_told_apart(error):
@@ -213,26 +212,24 @@ def takes_away(cost: Cost) -> str:
 
 def effects_sentence(group: PriceGroup) -> str:
     """Makes the one sentence of the figure of prices: the dearest effect alone, and which cost next to nothing."""
-    named = [price for price in group.prices if price.adds and price.what not in (AGAIN, WHOLE)]
-    dearest = max(named, key=lambda price: price.adds.median if price.adds else 0.0)
-    assert dearest.adds
-    free = sum(price.adds is not None and price.adds.low <= 0.0 for price in named)
+    alone = _alone(group)
+    dearest = max(alone, key=lambda what: alone[what].median)
+    free = sum(adds.low <= 0.0 for adds in alone.values())
     return (
-        f"Alone, {dearest.what} costs most, {interval(dearest.adds)} yardsticks a tick; "
-        f"{free} of {len(named)} effects cannot be told from nothing."
+        f"Alone, {dearest} costs most, {interval(alone[dearest])} yardsticks a tick; "
+        f"{free} of {len(alone)} effects cannot be told from nothing."
     )
 
 
 def sum_sentence(group: PriceGroup) -> str:
     """Makes a sentence that holds what effects add alone, added up, against what they add together."""
-    together = next(price.adds for price in group.prices if price.what == WHOLE)
-    alone = sum(price.adds.median for price in group.prices if price.adds and price.what not in (AGAIN, WHOLE))
-    assert together
-    return f"Added up they come to {fixed(alone, 2)}, all at once to {interval(together)}."
+    together = next(price.adds for price in group.prices if price.adds and price.what == WHOLE)
+    added = fixed(sum(adds.median for adds in _alone(group).values()), 2)
+    return f"Added up they come to {added}, all at once to {interval(together)}."
 
 
-def _median(point: Point) -> float:
-    return _time(point).median
+def _alone(group: PriceGroup) -> dict[str, Spread]:
+    return {price.what: price.adds for price in group.prices if price.adds and price.what not in (AGAIN, WHOLE)}
 
 
 def _time(point: Point) -> Spread:

@@ -2,21 +2,99 @@
 
 from __future__ import annotations
 
+import itertools
+import math
+import time
 from collections.abc import Callable, Generator, Hashable, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, NamedTuple, Self
 
 from haploop.controller.dissipation import load_plugin
+from haploop.launch.batch.run import FEWEST
 from haploop.launch.batch.stacking import is_batchable, structure
 from haploop.logger.summary import Summary
 from haploop.protocol.scene.scene import Scene
 from haploop.tools.executor.executors import make_executor
-from haploop.tools.executor.parts import Group, Sizes, cut, grouped
 from haploop.tools.executor.work import Work
 
 _POLL_S = 0.3
 DIED = "The process that ran it died: it was killed, ran out of memory or crashed in compiled code."
+# Most items in a part, and how much longer the next may be than any before.
+MOST, GROWTH = 1024, 8
+# An array costs much the same for one scene and for some two hundred: the first part, and the least later on.
+FIRST, LEAST = 64, 256
+# Seconds that a part should take: at least, at most at the beginning, and at most ever.
+LEAST_S, SHORT_S, LONG_S = 0.2, 2.0, 60.0
+# A part may take this fraction of the time gone by, so that a long sweep does not leave a heap of small files.
+FRACTION = 0.02
+
+
+class Group(NamedTuple):
+    """Items that are run together where that can be, or that are known to be run one by one; a range will do."""
+
+    items: Sequence[Any]
+    together: bool
+
+
+class Sizes:
+    """Finds how many items the next part should have: few first, so that progress shows, then what their time allows.
+
+    Args:
+        count: of all items, so that no worker has to wait long for another in the end; None where it is not known.
+        most: items of a part, which memory is proportional to.
+    """
+
+    def __init__(self, workers: int, count: int | None = None, most: int = MOST) -> None:
+        self._workers, self._left, self._most = workers, count, most
+        # Of parts that are run together, and one by one: the most the next may have, and the seconds an item took.
+        self._largest, self._each_s = {True: FIRST, False: 1}, {True: 0.0, False: 0.0}
+        self._began = time.monotonic()
+
+    def next(self, together: bool) -> int:
+        """Returns the size of the next part, at least 1."""
+        each_s = self._each_s[together]
+        size = min(self._most, self._largest[together])
+        if each_s:
+            target_s = min(LONG_S, max(SHORT_S, FRACTION * (time.monotonic() - self._began)))
+            size = min(size, int(target_s / each_s))
+        if self._left is not None:
+            worthwhile = int(LEAST_S / each_s) if each_s else 0
+            share = math.ceil(self._left / (2 * self._workers))
+            size = min(size, max(share, worthwhile, LEAST if together else 1))
+        return max(1, size)
+
+    def taken(self, items: int) -> None:
+        if self._left is not None:
+            self._left = max(0, self._left - items)
+
+    def took(self, part: Group, seconds: float) -> None:
+        """Notes the seconds a part took; the next may be longer."""
+        self._each_s[part.together] = seconds / len(part.items)
+        self._largest[part.together] = max(self._largest[part.together], len(part.items) * GROWTH)
+
+
+def cut(groups: Iterable[Group], sizes: Sizes) -> Iterator[Group]:
+    for items, together in groups:
+        together = together and len(items) >= FEWEST
+        first = 0
+        while first < len(items):
+            part = items[first : first + sizes.next(together)]
+            sizes.taken(len(part))
+            yield Group(part, together)
+            first += len(part)
+
+
+def grouped(
+    items: Iterable[Any], key: Callable[[Any], Hashable], window: int = 4 * MOST
+) -> Iterator[tuple[Any, list[Any]]]:
+    """Yields each key with its items, looking so many items ahead."""
+    source = iter(items)
+    while block := list(itertools.islice(source, window)):
+        groups: dict[Hashable, list[Any]] = {}
+        for item in block:
+            groups.setdefault(key(item), []).append(item)
+        yield from groups.items()
 
 
 class Pool:
@@ -48,8 +126,8 @@ class Pool:
         """
         work = Work(make=_second, sources=read_sources(plugins), energy=energy, trajectories=trajectories)
         count = len(scenes) if isinstance(scenes, Sequence) else None
-        by_structure = grouped(enumerate(scenes), _structure)
-        groups = (Group(items, together=shape is not None) for shape, items in by_structure)
+        shapes = grouped(enumerate(scenes), lambda item: structure(item[1]) if is_batchable(item[1]) else None)
+        groups = (Group(items, together=shape is not None) for shape, items in shapes)
         for part in self.parts(work, groups, count):
             for (index, _), result in part:
                 yield index, result
@@ -136,8 +214,3 @@ def read_sources(plugins: Iterable[Path]) -> tuple[tuple[str, str], ...]:
 
 def _second(item: tuple[int, Scene]) -> Scene:
     return item[1]
-
-
-def _structure(item: tuple[int, Scene]) -> Hashable:
-    """Returns the structure that scenes in one array share; None for all that run alone."""
-    return structure(item[1]) if is_batchable(item[1]) else None

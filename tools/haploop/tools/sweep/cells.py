@@ -17,7 +17,7 @@ from haploop.launch.scene.toml_writer import inline, to_toml
 from haploop.logger.summary import Summary
 from haploop.protocol.scene.paths import value_at
 from haploop.protocol.scene.scene import Scene
-from haploop.tools.executor.parts import Group
+from haploop.tools.executor.pool import Group
 from haploop.tools.executor.work import Sources, load_kinds
 from haploop.tools.search.bisect import Tolerance
 from haploop.tools.sweep.cell_scene import Base, Values

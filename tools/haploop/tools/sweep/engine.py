@@ -7,8 +7,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import product
 from typing import Any
 
-from haploop.tools.executor.parts import Group
-from haploop.tools.executor.pool import Pool
+from haploop.tools.executor.pool import Group, Pool
 from haploop.tools.executor.work import Work
 from haploop.tools.sweep.boundary import Boundary, Candidate, find_boundaries, verdict_is
 from haploop.tools.sweep.cells import Axis, Bisect, Extra, Item, Sweep
