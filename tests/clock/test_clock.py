@@ -6,7 +6,7 @@ from typing import Any
 from hypothesis import given
 from hypothesis import strategies as st
 
-from haploop.launch.clock.clock import AHEAD_S, ClockError
+from haploop.launch.clock.clock import ClockError
 from haploop.launch.scene.mistakes import SceneError
 from helpers.runs.clocks import DAMPING, SWAP, TICKS, WINDOW, clock, granted, sent
 
@@ -56,9 +56,9 @@ def test_whatever_is_asked_the_grant_is_monotone_bounded_and_no_event_comes_late
             case "pause":
                 assert subject.pause() == stood_at
             case "resume":
-                subject.resume(now)
+                subject.resume()
             case "step":
-                assert subject.step(argument, now) <= subject.end
+                assert subject.step(argument) <= subject.end
             case "stop":
                 assert subject.stop() == subject.end <= subject.until
             case "ended":
@@ -90,7 +90,7 @@ def test_a_pause_stands_at_what_is_granted_until_resumed() -> None:
     granted(subject, 0)
     assert subject.pause() == 400
     assert granted(subject, 400) == 400
-    assert subject.resume(0.0) == 400
+    assert subject.resume() == 400
     assert granted(subject, 400) == 800
 
 
@@ -98,7 +98,7 @@ def test_a_pause_of_the_scene_stands_at_its_tick_once() -> None:
     subject = clock(event=[{"at": 0.25, "pause": True}])
     assert [granted(subject), granted(subject)] == [250, 250]
     assert subject.paused
-    subject.resume(0.0)
+    subject.resume()
     assert granted(subject) == 1000
 
 
@@ -112,8 +112,8 @@ def test_a_step_goes_on_from_where_the_last_step_leads_and_stands_there() -> Non
     subject = clock()
     granted(subject, 0)
     subject.pause()
-    assert subject.step(3, 0.0) == 403
-    assert subject.step(2, 0.0) == 405
+    assert subject.step(3) == 403
+    assert subject.step(2) == 405
     assert [granted(subject), granted(subject)] == [405, 405]
     assert subject.paused
 
@@ -121,7 +121,7 @@ def test_a_step_goes_on_from_where_the_last_step_leads_and_stands_there() -> Non
 def test_a_step_also_keeps_within_the_window_and_the_end() -> None:
     subject = clock()
     subject.pause()
-    assert subject.step(5000, 0.0) == 1000
+    assert subject.step(5000) == 1000
     assert granted(subject, 0) == 400
 
 
@@ -129,12 +129,12 @@ def test_a_pause_that_was_stepped_over_does_not_stop_the_run_a_second_time() -> 
     subject = clock(event=[{"at": 0.1, "pause": True}, {"at": 0.6, "pause": True}])
     assert granted(subject) == 100
     granted(subject)
-    subject.step(50, 0.0)
+    subject.step(50)
     assert granted(subject) == 150
     subject.pause()
-    subject.step(500, 0.0)
+    subject.step(500)
     assert granted(subject) == 650
-    subject.resume(0.0)
+    subject.resume()
     assert granted(subject) == 1000
 
 
@@ -169,35 +169,3 @@ def test_the_plant_may_end_the_run_early() -> None:
     subject.end_at(123)
     assert granted(subject, 123) == 400
     assert subject.is_last
-
-
-# Pace
-
-
-@given(start=st.floats(0, 1e7), pace=st.sampled_from([0.1, 1.0, 3.0]))
-def test_at_a_pace_time_is_granted_no_faster_than_that_from_the_first_grant_on(start: float, pace: float) -> None:
-    subject = clock(pace)
-    ahead = AHEAD_S * min(pace, 1.0)
-    for passed in (0.0, 0.01, 0.1, 0.2):
-        allowed = (passed * pace + ahead) * 1000
-        until = granted(subject, now=start + passed)
-        assert max(1, allowed - 1) <= until + 1e-3 * pace
-        assert until <= allowed + 1
-
-
-def test_what_was_waited_is_not_made_up_for() -> None:
-    subject = clock(1.0)
-    assert granted(subject, now=100.0) == 20
-    subject.pause()
-    assert granted(subject, now=200.0) == 20
-    subject.resume(200.0)
-    assert granted(subject, now=200.0) == 40
-    assert granted(subject, now=200.1001) == 140
-
-
-def test_only_a_pace_makes_the_clock_look_at_the_time() -> None:
-    assert clock().wait_s(0.0) is None
-    paced = clock(1.0)
-    assert (paced.wait_s(0.0) or 0.0) > 0.0
-    paced.pause()
-    assert paced.wait_s(0.0) is None

@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from haploop.launch.clock.clock import ClockError
+from haploop.launch.clock.clock import MOST_CHANGES, Clock, ClockError
 from haploop.launch.scene.mistakes import SceneError
 from helpers.runs.clocks import DAMPING, SWAP, clock, granted, sent
 
@@ -51,12 +51,59 @@ def test_a_change_in_the_past_or_after_the_end_is_refused_and_leaves_no_trace(at
     assert subject.events == []
 
 
-@pytest.mark.parametrize("at", [math.inf, -math.inf, math.nan])
-def test_a_time_that_is_no_number_is_refused(at: float) -> None:
+@pytest.mark.parametrize("at", [math.inf, -math.inf, math.nan, 1e308, 10**400, -0.001, True, "0.5", [0.5]])
+def test_a_time_that_no_run_can_reach_is_refused_with_those_that_one_can(at: Any) -> None:
     subject = clock()
-    with pytest.raises((ValueError, OverflowError)):
+    with pytest.raises(ClockError, match=r"a time from 0 to 1e\+09 s"):
         subject.change(SWAP, at)
     assert subject.events == []
+
+
+def stiffness(subject: Clock, tick: int) -> float:
+    wall = subject.scene_at(tick).wall
+    assert wall
+    return wall.stiffness
+
+
+def test_changes_that_were_made_are_settled_and_further_ones_are_checked_against_what_they_left() -> None:
+    subject = clock(event=[{"at": 0.9, "set": {"wall.stiffness": 300.0}}])
+    subject.change({"swap": {"kind": "none"}, "element": 0}, 0.1)
+    subject.change({"set": {"wall.stiffness": 200.0}}, 0.2)
+    granted(subject, 0)
+    subject.settle(150)
+    assert subject.scene_at(150).dissipation == ()
+    assert [stiffness(subject, tick) for tick in (199, 200, 899, 900)] == [150.0, 200.0, 200.0, 300.0]
+    with pytest.raises(SceneError, match=r"dissipation\.0\.damping"):
+        subject.change({"set": {"dissipation.0.damping": 0.1}})
+    subject.settle(400)
+    assert stiffness(subject, subject.until) == 200.0
+    assert subject.change(SWAP) == 400
+    assert [element.name for element in subject.scene_at(400).dissipation] == ["damping"]
+
+
+def test_a_change_that_was_refused_is_not_settled_as_made() -> None:
+    subject = clock()
+    subject.change({"set": {"wall.stiffness": 200.0}})
+    granted(subject, 0)
+    subject.note({"refused": "why", "change": {"tick": 0, "set": {"wall.stiffness": 200.0}}})
+    subject.settle(400)
+    assert stiffness(subject, subject.until) == 150.0
+
+
+def test_what_changed_before_costs_a_further_change_nothing_and_what_waits_is_limited() -> None:
+    subject = clock()
+    for tick in range(300):
+        subject.until = tick
+        subject.change({"set": {"wall.stiffness": 100.0 + tick}})
+        subject.settle(tick)
+    assert len(subject._scene.event) == 1
+    for _ in range(MOST_CHANGES - 1):
+        subject.change({"set": {"wall.stiffness": 100.0}})
+    with pytest.raises(ClockError, match="100 changes wait"):
+        subject.change({"set": {"wall.stiffness": 100.0}})
+    subject.settle(300)
+    subject.until = 301
+    assert subject.change({"set": {"wall.stiffness": 100.0}}) == 301
 
 
 @pytest.mark.parametrize(

@@ -94,17 +94,6 @@ def test_a_node_that_hangs_for_less_than_the_deadline_costs_time_but_not_one_tic
     assert same_bits(run.log(), undisturbed) == summary["ticks"] >= done
 
 
-@pytest.mark.parametrize("role", first_and_slowly("controller", "plant"))
-def test_a_node_that_hangs_before_the_run_begins_is_named_and_not_those_that_wait_for_it(role, running):
-    """The logger waits for the others' first word and is not to blame."""
-    run = running(sets=("duration=600", "run.deadline=1"))
-    run.nodes_started(role)
-    wait_for("its joining", lambda: any(n["role"] == role for n in run.ask("status")["nodes"]))
-    run.send(role, signal.SIGSTOP)
-    assert run.end(1) == ""
-    assert f"The {role} has not answered" in run.stderr
-
-
 def test_when_the_launcher_is_killed_the_nodes_end_by_themselves_and_the_next_command_clears_up(running, undisturbed):
     run = running()
     flushed = run.has_logged(200)

@@ -3,13 +3,15 @@
 import math
 import subprocess
 import sys
+from decimal import Decimal
 
+import pint
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from pydantic_core import PydanticCustomError
 
-from haploop.launch.scene.number import si
+from haploop.launch.scene.number import _UNITS, _exact, is_exotic, si
 from helpers.scenes.least import mistakes, scene
 
 
@@ -85,10 +87,30 @@ def test_any_text_is_a_number_or_a_sentence(text):
     assert said.endswith(".") if isinstance(said, str) else math.isfinite(said)
 
 
-def test_units_are_loaded_only_when_text_carries_one():
+def test_units_of_the_table_are_those_of_pint_to_the_last_digit():
+    units = pint.UnitRegistry(non_int_type=Decimal)
+    compound = ["N/mm", "mN s/m", "kg*m**2/s^2", "m s⁻²", "cm²/ms", "m/s^2/Hz^0.5"]
+    for name in [*_UNITS, *compound]:
+        exact = _exact(name)
+        assert exact, name
+        base = units.Quantity(Decimal(1), units.parse_units(name)).to_base_units()
+        powers = dict(base.unit_items())
+        assert exact[0] == tuple(powers.get(of, 0) for of in ("kilogram", "meter", "second", "radian")), name
+        assert exact[1] == base.magnitude, name
+
+
+@pytest.mark.parametrize("text", ["3 furlong/fortnight", "5 inch/s", "1 km/hour", "2 kHz^0.5"])
+def test_what_the_table_does_not_have_is_told_to_need_the_library_of_units(text):
+    assert is_exotic(text)
+    assert not is_exotic("0.15 N/mm")
+    assert not is_exotic("five N/m")
+    assert not is_exotic("damping")
+
+
+def test_the_library_of_units_is_loaded_only_for_a_unit_that_the_table_does_not_have():
     code = (
-        "import sys; from haploop.launch.scene.number import si; si('m').read(1.0);"
+        "import sys; from haploop.launch.scene.number import si; si('m').read(1.0); si('m').read('1 mm');"
         "assert 'pint' not in sys.modules;"
-        "si('m').read('1 mm'); assert 'pint' in sys.modules"
+        "si('m').read('1 inch'); assert 'pint' in sys.modules"
     )
     subprocess.run([sys.executable, "-c", code], check=True)

@@ -91,7 +91,7 @@ def impossible_commands() -> Iterator[tuple[Any, Any]]:
     odd = (None, "x", math.nan, math.inf, [], deep)
     changes = (*odd, 1, {}, {1: 2}, {None: 1}, {"": 1}, {"kind": deep}, {"kind": None}, {**damping, 5: 6})
     settings = ({"wall.stiffness": None}, {"wall.stiffness": deep}, {"device.mass": 1.0}, {"wall": {"stiffness": 1.0}})
-    for verb in ("", "Stop", "x" * 100_000, "__class__", "swap", "set"):
+    for verb in ("", "Stop", "x" * 20_000, "__class__", "swap", "set"):
         yield verb, {}
     for key in ("self", "ticks", "", 5, None, b"x", True):
         yield "stop", {key: 1}

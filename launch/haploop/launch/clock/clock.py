@@ -5,11 +5,14 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
+from haploop.launch.clock.pace import Pace
 from haploop.launch.scene.check import resolve_event
 from haploop.launch.scene.events import swapped_in, try_out
+from haploop.launch.scene.mistakes import SceneError
 from haploop.protocol.changes import Event, at_work, changes_of
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
@@ -17,11 +20,13 @@ from haploop.protocol.ticks import Timebase
 if TYPE_CHECKING:
     from haploop.controller.dissipation import Element
 
-# At a given pace, time is granted this far ahead of the wall clock.
-AHEAD_S = 0.02
 # Grants that the slowest lossless node has not worked through. Each may end in a block of its own, however short; with
 # those of the window they must stay below what telemetry keeps for a subscriber.
 MOST_GRANTS = 100
+# Changes that may wait for their tick at a time: every further one is checked against all of them.
+MOST_CHANGES = 100
+# No run goes on for longer, s of simulated time.
+LATEST_S = 1e9
 
 
 class ClockError(Exception):
@@ -34,9 +39,6 @@ class Clock:
     A tick may be worked on once it is granted; a change takes effect at a tick not yet granted, so every node knows
     of it in time. The grant is the least of: the end, the next pause, the target of a step, the pace, and the
     progress of the slowest lossless node plus the window; and no more than ``MOST_GRANTS`` lie ahead of that node.
-
-    Attributes:
-        pace: simulated seconds per wall second.
     """
 
     def __init__(
@@ -50,29 +52,26 @@ class Clock:
         self.paused = False
         self._step_target: int | None = None
         self.events: list[tuple[int, Event]] = []
-        self._sent = 0
+        self._sent = self._settled = 0
         for event in scene.event:
             self._insert(time.first_tick_at(event.at), event.as_dict())
+        self._most_changes = len(scene.event) + MOST_CHANGES
         self._pauses = [tick for tick, event in self.events if event.get("pause")]
-        self._pace_from: float | None = None  # the first grant starts the pace
-        self._pace_tick = 0
-        self._set_pace(pace)
+        self.pace = Pace(time.control_rate, pace)
+        self._held = False
         self._ahead: deque[int] = deque()
-
-    def _set_pace(self, pace: float) -> None:
-        self.pace = pace
-        # Less than this is not worth a message.
-        self._least_ticks = 0 if math.isinf(pace) else math.floor(pace * AHEAD_S / 4 * self._time.control_rate)
-
-    def _pace_anew(self, now: float) -> None:
-        """Counts the pace from wall time ``now`` (s) and the present tick on; time spent waiting is not made up for."""
-        self._pace_from, self._pace_tick = now, self.until
 
     # Time
 
-    def grant(self, slowest: int, now: float) -> int:
-        """Returns the tick the nodes may go up to, given the slowest lossless node's tick and the wall time in s."""
-        limit = min(self.end, slowest + self._window, self._paced(now))
+    def grant(self, slowest: int, now: float, plant: int | None = None) -> int:
+        """Returns the tick the nodes may go up to.
+
+        Args:
+            slowest: tick of the slowest lossless node.
+            now: wall time, s.
+            plant: tick of the plant, beyond which a pace grants no more than is made up for at once; None for any.
+        """
+        limit = min(self.end, slowest + self._window)
         if self._pauses and not self.paused and self.until >= self._pauses[0]:
             del self._pauses[0]
             self.paused = True
@@ -82,25 +81,20 @@ class Clock:
             limit = min(limit, self._pauses[0])
         while self._ahead and self._ahead[0] <= slowest:
             self._ahead.popleft()
-        if limit > self.until and len(self._ahead) < MOST_GRANTS:
+        is_paced = not math.isinf(self.pace.rate)
+        if is_paced and plant is not None:
+            limit = min(limit, plant + self.pace.most_at_once)
+        self._held = limit <= self.until or len(self._ahead) >= MOST_GRANTS
+        if not self._held and is_paced:
+            limit = self.pace.grant(self.until, limit, now)
+        if limit > self.until and not self._held:
             self.until = limit
             self._ahead.append(limit)
         return self.until
 
-    def _paced(self, now: float) -> int:
-        if math.isinf(self.pace):
-            return self.end
-        if self._pace_from is None:
-            self._pace_from = now
-        ahead = (now - self._pace_from) * self.pace + AHEAD_S * min(self.pace, 1.0)
-        allowed = self._pace_tick + max(1, math.floor(ahead * self._time.control_rate))
-        return allowed if allowed >= self.until + self._least_ticks else self.until
-
     def wait_s(self, now: float) -> float | None:
         """Returns the time in s until the pace lets time go on; None when the run waits for something else."""
-        if math.isinf(self.pace) or self.paused or self.until >= self.end:
-            return None
-        return AHEAD_S / 4
+        return None if self._held or math.isinf(self.pace.rate) else self.pace.wait_s(self.until, now)
 
     @property
     def is_last(self) -> bool:
@@ -142,13 +136,31 @@ class Clock:
             ElementError: the new element's own code does not take its parameters; nothing happens.
             ClockError: the time is past or after the end.
         """
-        tick = self.until if at_s is None else self._time.first_tick_at(at_s)
+        tick = self.tick_at(at_s)
         self._check_ahead(tick)
+        if len(self._scene.event) >= self._most_changes:
+            raise ClockError(f"{MOST_CHANGES} changes wait for their tick already; let time go on, then ask again.")
         event = resolve_event({**change, "at": tick / self._time.control_rate}, self._scene, self._kinds)
         try_out(swapped_in([event]), self._kinds)
         self._scene = replace(self._scene, event=(*self._scene.event, event))
         self._insert(tick, event.as_dict() | extra)
         return tick
+
+    def prepare(self) -> None:
+        """Makes what the check of a first change would make, and a first mistake, while nobody waits for it."""
+        with suppress(SceneError):
+            resolve_event({"swap": {"kind": ""}, "at": 0.0}, self._scene, self._kinds)
+
+    def tick_at(self, at_s: float | None) -> int:
+        """Returns the first tick at or after a time in s, the next for None; raises ClockError where it is no time."""
+        if at_s is None:
+            return self.until
+        if isinstance(at_s, bool) or not isinstance(at_s, int | float) or not 0.0 <= at_s <= LATEST_S:
+            given = repr(at_s)[:40]
+            raise ClockError(
+                f"A change is made at a time from 0 to {LATEST_S:g} s, or at once, but {given} was asked for."
+            )
+        return self._time.first_tick_at(at_s)
 
     def _check_ahead(self, tick: int) -> None:
         rate = self._time.control_rate
@@ -172,31 +184,43 @@ class Clock:
         self.paused, self._step_target = True, None
         return self.until
 
-    def resume(self, now: float) -> int:
+    def resume(self) -> int:
         """Lets time go on; returns the tick."""
         self.paused, self._step_target = False, None
         self._pauses = [tick for tick in self._pauses if tick > self.until]  # stepped over while standing still
-        self._pace_anew(now)
+        self.pace.anew()
         return self.until
 
-    def step(self, ticks: int, now: float) -> int:
+    def step(self, ticks: int) -> int:
         """Lets time go on for some ticks; returns the tick at which it will stop."""
         self.paused = True
         self._step_target = min(self.end, max(self.until, self._step_target or 0) + ticks)
-        self._pace_anew(now)
+        self.pace.anew()
         return self._step_target
 
-    def run_at(self, pace: float, now: float) -> int:
-        """Sets another pace, simulated seconds per wall second, above 0, from ``now`` on; returns the tick."""
-        if not pace > 0.0:
-            raise ClockError(f"A pace is a number above 0, or free, but {pace:g} was asked for.")
-        self._set_pace(pace)
-        self._pace_anew(now)
+    def run_at(self, pace: float) -> int:
+        """Sets another pace, simulated seconds per wall second or infinite, from now on; returns the tick."""
+        self.pace.set(pace)
         return self.until
 
+    def scene_at(self, tick: int) -> Scene:
+        """Returns the scene as it stands at a tick, all changes up to there made."""
+        unsettled = changes_of(self.events[self._settled :])
+        return at_work(self._scene, [change for change in unsettled if change.tick <= tick])
+
+    def settle(self, tick: int) -> None:
+        """Takes the changes before ``tick`` as made: all that was refused of them is on record."""
+        end = self._settled
+        while end < len(self.events) and self.events[end][0] < tick:
+            end += 1
+        if end > self._settled:
+            made = [change for change in changes_of(self.events[self._settled :]) if change.tick < tick]
+            waiting = tuple(event for event in self._scene.event if self._time.first_tick_at(event.at) >= tick)
+            self._scene, self._settled = replace(at_work(self._scene, made), event=waiting), end
+
     def present(self) -> Scene:
-        """Returns the scene as it stands at the first tick not yet granted, all changes up to there made."""
-        return at_work(self._scene, [change for change in changes_of(self.events) if change.tick <= self.until])
+        """Returns the scene as it stands at the first tick not yet granted."""
+        return self.scene_at(self.until)
 
     def stop(self) -> int:
         """Ends the run at the first tick not yet granted; returns it."""

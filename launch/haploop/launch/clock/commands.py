@@ -10,13 +10,15 @@ from typing import TYPE_CHECKING, Any
 
 from haploop.controller.dissipation import ElementError, PluginError, load_plugin
 from haploop.launch.clock.clock import Clock, ClockError
+from haploop.launch.clock.pace import PaceError, pace_of
 from haploop.launch.clock.roster import Roster
 from haploop.launch.scene.events import settable_keys
 from haploop.launch.scene.mistakes import SceneError
+from haploop.launch.scene.number import is_exotic
 from haploop.launch.spec import OutputError, keep_plugin
 from haploop.protocol.quantity import Quantity
 from haploop.protocol.scene.paths import value_at
-from haploop.protocol.scene.scene import Scene
+from haploop.protocol.scene.scene import NO_ELEMENT, Scene
 from haploop.protocol.scene.table import Tables
 from haploop.protocol.transport.wire import Message
 
@@ -25,6 +27,10 @@ if TYPE_CHECKING:
     from haploop.launch.spec import RunSpec
 
 Answer = tuple[bool, str, Message]
+# What one command may carry, so that none holds time up: keys and values, tables in each other, letters of a text.
+_MOST_VALUES, _DEEPEST, _LONGEST = 64, 3, 200
+_MOST_TOLD = 5
+_UNITS = "Hz, J, N, Pa, W, g, m, min, rad, s and %, with n, u, m, c, k or M before them"
 
 
 def in_words(pace: float) -> float | str:
@@ -38,8 +44,8 @@ class Commands:
     Whatever is refused leaves the run as it was.
     """
 
-    def __init__(self, clock: Clock, spec: RunSpec, roster: Callable[[], Roster], now: Callable[[], float]) -> None:
-        self._clock, self._spec, self._roster, self._now = clock, spec, roster, now
+    def __init__(self, clock: Clock, spec: RunSpec, roster: Callable[[], Roster]) -> None:
+        self._clock, self._spec, self._roster = clock, spec, roster
         self._rate = spec.scene.clock.control_rate
         self._verbs = {
             "status": self._status,
@@ -58,9 +64,14 @@ class Commands:
         if act is None:
             return False, f"{verb[:40]!r} is no command; these are: {', '.join(self._verbs)}.", {}
         try:
+            _check_burden(arguments)
             text, data = act(**arguments)
             return True, text, data
-        except (ClockError, SceneError, PluginError, ElementError, OutputError) as error:
+        except SceneError as error:
+            told = [str(mistake) for mistake in error.mistakes[:_MOST_TOLD]]
+            rest = len(error.mistakes) - len(told)
+            return False, "\n".join([*told, *([f"There are {rest} more mistakes."] if rest else [])]), {}
+        except (ClockError, PaceError, PluginError, ElementError, OutputError) as error:
             return False, str(error), {}
         except Exception as error:  # whatever a terminal sends, the run goes on
             return False, f"The arguments of {verb} cannot be used: {type(error).__name__}: {error}.", {}
@@ -79,8 +90,10 @@ class Commands:
             "end": clock.end,
             "control_rate": self._rate,
             "paused": clock.paused,
-            "pace": in_words(clock.pace),
+            "pace": in_words(clock.pace.rate),
+            "lateness": clock.pace.lateness(),
             "nodes": roster.table(),
+            "refused": roster.refused,
             "telemetry": {role: addresses["telemetry"] for role, addresses in roster.endpoints().items()},
             **({"status": logger.status} if logger else {}),
         }
@@ -97,22 +110,24 @@ class Commands:
         return f"paused at {self._at(tick)}", {"tick": tick}
 
     def _resume(self) -> tuple[str, Message]:
-        tick = self._clock.resume(self._now())
+        tick = self._clock.resume()
         self._clock.note({"resume": True})
         return f"resumed at {self._at(tick)}", {"tick": tick}
 
     def _step(self, ticks: int = 1) -> tuple[str, Message]:
-        if not isinstance(ticks, int) or ticks < 1:
-            raise ClockError(f"A step goes on for at least one tick, but {ticks} was asked for.")
+        longest = self._clock.end
+        if isinstance(ticks, bool) or not isinstance(ticks, int) or not 1 <= ticks <= longest:
+            given = repr(ticks)[:40]
+            raise ClockError(
+                f"A step goes on for a whole number of ticks from 1 to {longest}, but {given} was asked for."
+            )
         self._clock.note({"step": ticks})
-        tick = self._clock.step(ticks, self._now())
+        tick = self._clock.step(ticks)
         return f"stepping to {self._at(tick)}", {"tick": tick}
 
     def _pace(self, pace: float | str) -> tuple[str, Message]:
-        rate = math.inf if pace == "free" else pace
-        if isinstance(rate, bool) or not isinstance(rate, int | float):
-            raise ClockError(f"A pace is a number above 0, or free, but {pace!r} was asked for.")
-        tick = self._clock.run_at(rate, self._now())
+        rate = pace_of(pace)
+        tick = self._clock.run_at(rate)
         self._clock.note({"pace": in_words(rate)})
         return f"pace {in_words(rate)} from {self._at(tick)} on", {"tick": tick}
 
@@ -124,6 +139,7 @@ class Commands:
     def _swap(
         self, swap: Tables, element: int = 0, at: float | None = None, reload: bool = False
     ) -> tuple[str, Message]:
+        before = self._clock.scene_at(self._clock.tick_at(at)).dissipation
         kinds = dict(self._spec.kinds)
         extra = self._reload(str(swap.get("kind"))) if reload else {}
         try:
@@ -131,12 +147,21 @@ class Commands:
         except Exception:
             self._spec.kinds.update(kinds)
             raise
-        return f"element {element} becomes {swap['kind']} at {self._at(tick)}", {"tick": tick}
+        text, data = f"element {element} becomes {swap['kind']} at {self._at(tick)}", {"tick": tick}
+        if swap["kind"] == NO_ELEMENT and element < len(before) - 1:  # those after it move up: no swap brings it back
+            return text, data
+        back = before[element].as_dict() if element < len(before) else {"kind": NO_ELEMENT}
+        words = " ".join([back["kind"], *(f"{key}={value}" for key, value in back.items() if key != "kind")])
+        where = f" --element {element}" if element else ""
+        return f"{text}; to go back: swap {words}{where}", data | {"before": {"swap": back, "element": element}}
 
     def _set(self, set: dict[str, float], at: float | None = None) -> tuple[str, Message]:
+        before = self._clock.scene_at(self._clock.tick_at(at))
         tick = self._clock.change({"set": set}, at)
         what = ", ".join(f"{key} = {value}" for key, value in set.items())
-        return f"{what} from {self._at(tick)} on", {"tick": tick}
+        back = {key: value_at(before, key) for key in set}
+        words = " ".join(f"{key}={value}" for key, value in back.items())
+        return f"{what} from {self._at(tick)} on; to go back: set {words}", {"tick": tick, "before": {"set": back}}
 
     def _reload(self, kind: str) -> Message:
         """Loads the edited file of a kind named at launch; a file that does not load changes nothing."""
@@ -150,6 +175,25 @@ class Commands:
         kept = keep_plugin(source, self._spec.out)
         self._spec.kinds.update(loaded)
         return {"plugin": str(kept.resolve())}
+
+
+def _check_burden(arguments: Message) -> None:
+    """Raises ClockError where a command carries more than takes a moment to look through."""
+    left: list[tuple[Any, int]] = [(arguments, 0)]
+    seen = 0
+    while left:
+        value, depth = left.pop()
+        inner = [*value, *value.values()] if isinstance(value, dict) else value if isinstance(value, list) else []
+        seen += len(inner)
+        if seen > _MOST_VALUES or depth > _DEEPEST:
+            raise ClockError(
+                f"A command carries at most {_MOST_VALUES} keys and values, {_DEEPEST} tables deep; this one has more."
+            )
+        if isinstance(value, str | bytes) and len(value) > _LONGEST:
+            raise ClockError(f"A text in a command has at most {_LONGEST} letters, but one has {len(value)}.")
+        if isinstance(value, str) and is_exotic(value):
+            raise ClockError(f"{value!r} has a unit that a running loop does not know; it knows {_UNITS}.")
+        left += [(one, depth + 1) for one in inner]
 
 
 def capabilities(scene: Scene, kinds: Mapping[str, type[Element]]) -> Message:

@@ -37,8 +37,15 @@ class Node:
 
 
 class Roster:
+    """The nodes of a run by their identity on the clock's socket.
+
+    Attributes:
+        refused: role -> why the last that asked to join as one was not let in; others than the run's are observers.
+    """
+
     def __init__(self) -> None:
         self.nodes: dict[bytes, Node] = {}
+        self.refused: dict[str, str] = {}
 
     def own(self, role: str) -> Node | None:
         """Returns the run's own process of this role, None before it has joined."""

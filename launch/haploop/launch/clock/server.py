@@ -21,6 +21,8 @@ Command = Callable[[str, Message], tuple[bool, str, Message]]
 
 # Messages taken before grants go out, so that nobody who floods the clock can hold time up.
 _AT_ONCE = 200
+# A frame of anybody but the run's own processes, bytes: what is larger takes ms to read.
+_LARGEST_OF_STRANGERS = 32 * 1024
 _LONGEST_ROLE = 40
 
 
@@ -63,13 +65,8 @@ class ClockServer:
         Raises RunFailed where one of the run's own processes said that it cannot go on.
         """
         for _ in range(_AT_ONCE):
-            if not has_message(self.socket):
-                break
-            sender, *frames = self.socket.recv_multipart()
-            try:
-                self._take(sender, decode(frames[-1] if frames else b""))
-            except WireError as error:
-                self._refuse(sender, str(error))
+            if not has_message(self.socket) or self._take_one() == "COMMAND":
+                break  # what one command asks for may take milliseconds, and the next may wait for the grant
         if not self._greeted and self.roster.joined():
             self._greeted = True
             for node in list(self.roster.nodes.values()):
@@ -79,10 +76,25 @@ class ClockServer:
             if has_begun or self._start_gate({node.pid for node in self.roster.nodes.values() if node.ready}):
                 self.grant()
 
+    def _take_one(self) -> str:
+        """Takes a message; returns its name, "" for none."""
+        sender, *frames = self.socket.recv_multipart()
+        data = frames[-1] if frames else b""
+        try:
+            if len(data) > _LARGEST_OF_STRANGERS and not ((node := self.roster.nodes.get(sender)) and node.is_own):
+                raise WireError(f"A frame must be at most {_LARGEST_OF_STRANGERS} bytes, but one of {len(data)} came.")
+            frame = decode(data)
+            self._take(sender, frame)
+        except WireError as error:
+            self._refuse(sender, str(error))
+            return ""
+        return frame.name
+
     def grant(self) -> None:
         """Sends every node how far it may go and what changes on the way, if that is news."""
         clock = self._clock
-        until = clock.grant(self.roster.slowest(), self._machine.now())
+        plant = self.roster.own("plant")
+        until = clock.grant(self.roster.slowest(), self._machine.now(), plant and plant.tick)
         events = clock.take_events()
         if until == self._granted and clock.is_last == self._last_sent and not events:
             return
@@ -136,7 +148,7 @@ class ClockServer:
         known = role in PROCESSES
         reason = ""
         if known and request["secret"] != self._secret:
-            reason = f"The role {role} belongs to the run's own process; join as an observer."
+            reason = f"JOIN as {role}, a role of the run's own process, came with a wrong secret; join as an observer."
         elif known and self.roster.own(role):
             reason = f"The role {role} is taken."
         elif not known and not self._greeted:
@@ -147,7 +159,13 @@ class ClockServer:
             reason = f"JOIN.role must be a printable name of at most {_LONGEST_ROLE} characters."
         elif not all(isinstance(v, str) for pair in request["endpoints"].items() for v in pair):
             reason = "JOIN.endpoints must be a map from channel to address."
+        elif known and (missing := PROCESSES[role].binds.keys() - request["endpoints"]):
+            reason = (
+                f"JOIN.endpoints of the {role} must have the address of its {' and '.join(sorted(missing))} socket."
+            )
         if reason:
+            if known:
+                self.roster.refused[role] = reason
             self._send(sender, "REFUSED", reason)
             return
         lossless = request["lossless"] and role not in ("plant", "controller")
@@ -173,9 +191,12 @@ class ClockServer:
     def _on_progress(self, node: Node, tick: int, status: Message) -> None:
         node.tick = max(node.tick, tick)
         node.status = status or node.status
-        if node.role == "controller":
+        if node.role == "plant":
+            self._clock.pace.done(tick, node.heard)
+        elif node.role == "controller":
             for refusal in refusals_of(status):
                 self._clock.note(refusal)
+            self._clock.settle(node.tick)
 
     def _on_waiting(self, node: Node, tick: int, on: str) -> None:
         node.waits_for = on

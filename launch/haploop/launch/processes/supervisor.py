@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import secrets
 from collections.abc import Callable
 from contextlib import AbstractContextManager
@@ -82,7 +83,7 @@ class Supervisor:
             "attachments": spec.attachments,
         }
         welcome = sockets.name, scene.as_dict(), timebase.as_dict(), told
-        commands = Commands(self._clock, spec, lambda: self._server.roster, self._machine.now)
+        commands = Commands(self._clock, spec, lambda: self._server.roster)
         self._server = ClockServer(self._context, sockets, secret, self._clock, welcome, commands, spec.start_gate)
         keys = spec.transport.as_dict()["keys"]
         run_directory.announce(sockets, self._server.address, scene.title, str(spec.out), keys)
@@ -90,6 +91,8 @@ class Supervisor:
         start = {"address": self._server.address, "secret": secret, "transport": spec.transport.as_dict()}
         self._children = start_nodes(sockets, start, scene.run.pin, run_number)
         self._started = self._looked = self._machine.now()
+        if not math.isinf(spec.pace):  # the nodes are loading
+            self._clock.prepare()
         self._probe_due = 0.0
         self._stopping = False
 
@@ -119,7 +122,7 @@ class Supervisor:
             poller.register(child.died, zmq.POLLIN)
         while not self._server.roster.all_own("done"):
             wait_s = self._clock.wait_s(self._machine.now())
-            ready = dict(poller.poll(_LOOK_MS if wait_s is None else max(1, int(wait_s * 1000))))
+            ready = self._machine.wait(poller, _LOOK_MS / 1000 if wait_s is None else min(wait_s, _LOOK_MS / 1000))
             self._server.serve()
             self._heed_signals()
             for child in self._children.values():
@@ -139,7 +142,8 @@ class Supervisor:
         self._server.serve()
         while not ((node := self._server.roster.own(child.role)) and node.done):
             if self._machine.now() > given_up:
-                raise RunFailed(f"The {child.role} {ended}; {self._where()}")
+                refused = self._server.roster.refused.get(child.role)
+                raise RunFailed(f"The {child.role} {ended}; {refused or self._where()}")
             self._server.socket.poll(20)
             self._server.serve()
 
@@ -152,15 +156,20 @@ class Supervisor:
         if not roster.joined():
             if now - self._started > _START_DEADLINE_S:
                 missing = [role for role in self._children if not roster.own(role)]
-                raise RunFailed(f"The {' and the '.join(missing)} did not join within {_START_DEADLINE_S:g} s.")
-            return
-        for node in roster.silent(now, self._deadline_s):
-            if node.is_own:
+                sentence = f"The {' and the '.join(missing)} did not join within {_START_DEADLINE_S:g} s."
                 raise RunFailed(
-                    f"The {node.role} has not answered for {self._deadline_s:g} s and was ended; {self._where()} "
+                    " ".join([sentence, *(roster.refused[role] for role in missing if role in roster.refused)])
+                )
+            return
+        # Nodes may still load and a machine be busy with it; the deadline of the scene is that of a loop that runs.
+        deadline_s = self._deadline_s if roster.common_tick() else max(self._deadline_s, _START_DEADLINE_S)
+        for node in roster.silent(now, self._deadline_s):
+            if node.is_own and now - node.heard > deadline_s:
+                raise RunFailed(
+                    f"The {node.role} has not answered for {deadline_s:g} s and was ended; {self._where()} "
                     "A longer wait can be set with run.deadline."
                 )
-            if node.lossless and node.tick <= roster.slowest():
+            if not node.is_own and node.lossless and node.tick <= roster.slowest():
                 reason = f"Nothing was heard of you for {self._deadline_s:g} s; the run goes on without you."
                 self._server.drop(node, reason)
         if now >= self._probe_due:

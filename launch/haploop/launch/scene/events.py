@@ -38,13 +38,14 @@ def check_events(
     slots = [e.get("kind") if isinstance(e, dict) else None for e in _tables(layers.data.get("dissipation"))]
     has_wall = isinstance(layers.data.get("wall"), dict)
     settings: dict[int, dict[str, float]] = {}
+    settable = settable_keys(slots, has_wall, kinds)
     for index, event in sorted(events, key=lambda item: _read(item[1], "at")):
         key = ("event", index)
         _check_shape(layers, key, event, time)
         if isinstance(event.get("swap"), dict):
             _swap(layers, key, event, slots)
-        if isinstance(event.get("set"), dict):
             settable = settable_keys(slots, has_wall, kinds)
+        if isinstance(event.get("set"), dict):
             settings[index] = {
                 name: value
                 for name, given in event["set"].items()

@@ -8,7 +8,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 from decimal import Decimal
-from functools import cache
+from functools import cache, lru_cache
 from typing import Any, NoReturn
 
 from pydantic import GetJsonSchemaHandler
@@ -102,7 +102,83 @@ def from_text(text: str, target: str) -> Decimal:
     raise ValueError(f'Text must carry a unit, such as "{amount} {target}"; a number without one is written unquoted.')
 
 
+# The units that texts are mostly written in: exponents of kg, m, s and rad, and the factor to them. Pint knows every
+# unit, but takes half a second or more to load; a running loop cannot wait for it.
+_PREFIXES = {"": 0, "n": -9, "u": -6, "\u00b5": -6, "\u03bc": -6, "m": -3, "c": -2, "k": 3, "M": 6}
+_PREFIXED = {
+    "g": ((1, 0, 0, 0), -3),
+    "m": ((0, 1, 0, 0), 0),
+    "s": ((0, 0, 1, 0), 0),
+    "rad": ((0, 0, 0, 1), 0),
+    "Hz": ((0, 0, -1, 0), 0),
+    "N": ((1, 1, -2, 0), 0),
+    "J": ((1, 2, -2, 0), 0),
+    "W": ((1, 2, -3, 0), 0),
+    "Pa": ((1, -1, -2, 0), 0),
+}
+_UNITS = {
+    prefix + name: (exponents, Decimal(1).scaleb(power + own))
+    for name, (exponents, own) in _PREFIXED.items()
+    for prefix, power in _PREFIXES.items()
+} | {"%": ((0, 0, 0, 0), Decimal("0.01")), "min": ((0, 0, 1, 0), Decimal(60))}
+_DIMENSIONS = {"[length]": 1, "[mass]": 0, "[time]": 2}
+_RAISED = str.maketrans({"\u207b": "^-", "\u00b9": "^1", "\u00b2": "^2", "\u00b3": "^3", "\u2074": "^4"})
+_PARTS = re.compile(r"([\s*/·]*)([^\W\d]\w*|%)(?:(?:\*\*|\^)(-?[\d.]+))?")
+
+Exponents = tuple[Decimal, ...]
+
+
+@lru_cache(maxsize=256)
+def _exact(unit: str) -> tuple[Exponents, Decimal] | None:
+    """Returns a unit's exponents of kg, m, s and rad, and its factor to them; None unless the table has all of it."""
+    total, scale = (Decimal(0),) * 4, Decimal(1)
+    for between, name, power in _PARTS.findall(unit.translate(_RAISED).replace("^-^", "^-")):
+        exponents, factor = _UNITS.get(name, ((), Decimal(0)))
+        raised = Decimal(power or 1) * (-1 if "/" in between else 1)
+        if not exponents or (factor != 1 and raised % 1):
+            return None
+        total = tuple(sum_ + raised * exponent for sum_, exponent in zip(total, exponents, strict=True))
+        scale *= factor ** int(raised) if factor != 1 else 1
+    return total, scale
+
+
+def is_exotic(text: str) -> bool:
+    """Tells whether a text is a number with a unit that pint alone may know."""
+    match = _TEXT.fullmatch(text)
+    return bool(match) and _exact(match[2] or "") is None
+
+
+def _dimension(exponents: Exponents) -> str:
+    """Returns a dimension in the words of pint, such as ``[mass] / [time] ** 2``."""
+    over: list[str] = []
+    under: list[str] = []
+    for name, place in _DIMENSIONS.items():
+        if power := exponents[place]:
+            (over if power > 0 else under).append(name if abs(power) == 1 else f"{name} ** {abs(power)}")
+    return " / ".join([" * ".join(over) or ("1" if under else "dimensionless"), *under])
+
+
 def _convert(amount: Decimal, unit: str, target: str) -> Decimal:
+    given, wanted = _exact(unit), _exact(target)
+    if given is None or wanted is None:
+        return _convert_any(amount, unit, target)
+    if given[0][:-1] != wanted[0][:-1]:
+        raise ValueError(_another_dimension(unit, _dimension(given[0]), target, _dimension(wanted[0])))
+    if given[0] != wanted[0]:
+        raise ValueError(_angle(unit, target))
+    return amount * (given[1] / wanted[1])
+
+
+def _another_dimension(unit: str, dimension: object, target: str, wanted: object) -> str:
+    return f"{unit or 'A bare number'} has the dimension {dimension}, but {target or 'a bare number'} has {wanted}."
+
+
+def _angle(unit: str, target: str) -> str:
+    # To pint an angle is a bare number, so that 1 rad/s would pass for 1 Hz.
+    return f"{unit} counts angle and cannot stand for {target or 'a bare number'}."
+
+
+def _convert_any(amount: Decimal, unit: str, target: str) -> Decimal:
     units = _registry()
     try:
         given, wanted = units.parse_units(unit), units.parse_units(target)
@@ -111,13 +187,9 @@ def _convert(amount: Decimal, unit: str, target: str) -> Decimal:
         example = f', such as "{target}"' if " " in target else ""
         raise ValueError(f'"{unit}" is not a unit; leave a space between multiplied units{example}.') from error
     if given.dimensionality != wanted.dimensionality:
-        raise ValueError(
-            f"{unit} has the dimension {given.dimensionality}, "
-            f"but {target or 'a bare number'} has {wanted.dimensionality}."
-        )
-    # To pint an angle is a bare number, so that 1 rad/s would pass for 1 Hz.
+        raise ValueError(_another_dimension(unit, given.dimensionality, target, wanted.dimensionality))
     if angles[0] != angles[1]:
-        raise ValueError(f"{unit} counts angle and cannot stand for {target or 'a bare number'}.")
+        raise ValueError(_angle(unit, target))
     return units.Quantity(amount, given).to(wanted).magnitude
 
 
@@ -127,7 +199,7 @@ def _angle_power(quantity: Any) -> Any:
 
 @cache
 def _registry() -> Any:
-    """Loads pint, which takes half a second, with the first text that carries a unit."""
+    """Loads pint, which takes half a second, with the first text that carries a unit the table does not have."""
     import pint
 
     return pint.UnitRegistry(non_int_type=Decimal)  # pyright: ignore[reportArgumentType]

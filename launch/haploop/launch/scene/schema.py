@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from copy import deepcopy
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
@@ -37,7 +39,7 @@ def json_schema(kinds: Mapping[str, type[Element]]) -> Schema:
     A file that extends another may leave out what the other gives, so keys are required only in arrays of tables,
     which are replaced whole.
     """
-    schema = whole_schema(kinds)
+    schema = deepcopy(whole_schema(kinds))
     whole = {"Event", "none", *kinds}
     for name, table in [("Scene", schema), *schema["$defs"].items()]:
         if name not in whole:
@@ -49,8 +51,13 @@ def json_schema(kinds: Mapping[str, type[Element]]) -> Schema:
 
 
 def whole_schema(kinds: Mapping[str, type[Element]]) -> Schema:
-    """Returns the JSON Schema of a scene after everything it extends has been merged into it."""
-    schema = scene_model(kinds).model_json_schema(schema_generator=TomlSchema)
+    """Returns the JSON Schema of a scene after everything it extends has been merged into it; not to be changed."""
+    return _whole_schema(tuple(kinds.items()))
+
+
+@lru_cache(maxsize=4)
+def _whole_schema(kinds: tuple[tuple[str, type[Element]], ...]) -> Schema:
+    schema = scene_model(dict(kinds)).model_json_schema(schema_generator=TomlSchema)
     recording = {"type": "string", "description": "a CSV of time in s and force in N, in place of time and force"}
     schema["$defs"]["Trace"]["properties"]["file"] = recording
     return schema

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from reprlib import repr as shortened
 
 import msgpack
 import zmq
@@ -15,6 +15,7 @@ from haploop.protocol.transport.wire import Frame, WireError, decode, encode
 
 _COMMANDS = MESSAGES["COMMANDS"].code
 _SAMPLES = MESSAGES["SAMPLES"].code
+_LAST = MESSAGES["LAST"].code
 
 Idle = Callable[[], None]
 
@@ -63,10 +64,14 @@ class PlantEnd:
         while sender != partner:
             self.unknown_peers += 1
             sender, data = self._receive()
-        answer = msgpack.unpackb(data)
-        if answer[:3] != [VERSION, _COMMANDS, tick] or len(answer[3]) != len(samples):
-            raise LoopError(_mismatch("commands", tick, len(samples), decode(data)))
-        return answer[3]
+        try:
+            *head, forces = msgpack.unpackb(data)
+            if head == [VERSION, _COMMANDS, tick] and type(forces) is list and len(forces) == len(samples):
+                sum(forces)  # raises where one is no number
+                return forces
+        except Exception as error:  # whatever came is no answer
+            raise LoopError(_mismatch("commands", tick, len(samples), data)) from error
+        raise LoopError(_mismatch("commands", tick, len(samples), data))
 
     def close(self, tick: int) -> None:
         """Tells the controller that the run ends at ``tick``."""
@@ -119,13 +124,16 @@ class ControllerEnd:
         Raises LoopError where samples of other ticks came, or none will come although some are missing.
         """
         data = self._receive()
-        items = msgpack.unpackb(data)
-        if items[:3] == [VERSION, _SAMPLES, tick]:
-            return items[3]
-        frame = decode(data)
-        if frame.name == "LAST" and frame.fields[0] <= tick:
-            return None
-        raise LoopError(_mismatch("samples", tick, None, frame))
+        try:
+            *head, samples = msgpack.unpackb(data)
+            if head == [VERSION, _SAMPLES, tick] and type(samples) is list:
+                sum(map(sum, samples))  # raises where one is no number
+                return samples
+            if head == [VERSION, _LAST] and samples <= tick:
+                return None
+        except Exception as error:  # whatever came is no sample
+            raise LoopError(_mismatch("samples", tick, None, data)) from error
+        raise LoopError(_mismatch("samples", tick, None, data))
 
     def answer(self, tick: int, forces: list[float]) -> None:
         """Sends the forces of the ticks from ``tick`` on, N."""
@@ -152,9 +160,11 @@ def _is_hello(data: bytes, secret: str) -> bool:
         return False
 
 
-def _mismatch(what: str, tick: int, count: int | None, came: Frame) -> str:
+def _mismatch(what: str, tick: int, count: int | None, data: bytes) -> str:
     expected = f"{what} from tick {tick}" + (f", {count} of them," if count else "")
-    fields: list[Any] = came.fields
-    return (
-        f"In the loop {expected} were expected, but {came.name} of tick {fields[0]} with {str(fields[1:])[:80]} came."
-    )
+    try:
+        name, fields = decode(data)
+        came = f"{name} of tick {fields[0]} with {shortened(fields[1:])[:80]}"
+    except WireError as error:
+        came = f"something else ({str(error).rstrip('.')})"
+    return f"In the loop {expected} were expected, but {came} came."

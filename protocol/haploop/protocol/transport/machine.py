@@ -5,6 +5,7 @@ It comes with the context of the sockets, so that a simulation can stand in for 
 
 from __future__ import annotations
 
+import select
 import time
 from io import RawIOBase
 from pathlib import Path
@@ -22,6 +23,17 @@ class Machine:
 
     def poller(self) -> zmq.Poller:
         return zmq.Poller()
+
+    def wait(self, poller: zmq.Poller, seconds: float) -> dict[Any, int]:
+        """Waits for at most some time, to a tenth of a ms where a poller counts whole ms; returns what is ready."""
+        ready = poller.poll(int(seconds * 1000))
+        if not ready and seconds < 0.001:
+            try:
+                select.select([what for what, _ in poller.sockets], [], [], seconds)
+            except ValueError:  # a process with more than 1024 files open
+                time.sleep(seconds)
+            ready = poller.poll(0)
+        return dict(ready)
 
     def create(self, path: Path) -> RawIOBase:
         """Opens a new file for writing, over any of that name; every write goes to the operating system at once."""

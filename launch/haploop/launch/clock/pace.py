@@ -1,0 +1,126 @@
+"""The pace of a run: when each tick is due by the wall clock, how late it was done, and what real time was lost."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter, deque
+from typing import Any
+
+# Simulated seconds per wall second that may be asked for.
+SLOWEST, FASTEST = 1e-6, 1e6
+# Grants are at least so far apart, s of wall time: up to 2 ticks a ms go one by one, faster ones in blocks.
+LEAST_GRANT_S = 0.0005
+# Ticks held up for no longer than this are made up for at once, s of wall time; the rest of the time is lost.
+CATCH_UP_S = 0.02
+# Lateness is counted in classes, each wider than the one before by this factor.
+_FINEST_S, _FACTOR = 1e-6, 1.05
+
+
+class PaceError(ValueError):
+    """Raised for a pace that cannot be kept; the message says which can."""
+
+
+def pace_of(pace: object) -> float:
+    """Returns a pace that was asked for, infinite for ``free``; raises PaceError where it is none."""
+    if pace == "free":
+        return math.inf
+    if isinstance(pace, bool) or not isinstance(pace, int | float) or not SLOWEST <= pace <= FASTEST:
+        given = repr(pace)[:40]
+        raise PaceError(f"A pace is a number from {SLOWEST:g} to {FASTEST:g}, or free, but {given} was asked for.")
+    return pace
+
+
+class Pace:
+    """Says which ticks are due, and keeps count of how late they are done.
+
+    Tick k is due (k - first tick) / (control rate * pace) after the first. Whoever was held up for longer than
+    ``CATCH_UP_S`` makes up for that much; all further ticks are due later by the rest, which is lost.
+
+    Attributes:
+        rate: simulated seconds per wall second; infinite: every tick is due at once.
+        lost_s: wall time by which the schedule was put off.
+    """
+
+    def __init__(self, control_rate: int, rate: float) -> None:
+        self._control_rate = control_rate
+        self.lost_s = 0.0
+        self._late: Counter[int] = Counter()
+        self._most_s, self._by_a_period = 0.0, 0
+        self._awaited: deque[tuple[int, int, float]] = deque()
+        self.set(rate)
+
+    def set(self, rate: float) -> None:
+        """Takes another rate; the next tick asked for begins its schedule."""
+        self.rate = rate
+        self._period_s = 1.0 / (rate * self._control_rate)
+        self._least = self._ticks(LEAST_GRANT_S)
+        self.most_at_once = max(self._least, self._ticks(CATCH_UP_S))
+        self.anew()
+
+    def _ticks(self, seconds: float) -> int:
+        return 1 if math.isinf(self.rate) else max(1, math.floor(seconds / self._period_s))
+
+    def anew(self) -> None:
+        """Begins the schedule with the next tick asked for; time spent standing still is not made up for."""
+        self._from: tuple[float, int] | None = None
+
+    def _due(self, tick: int, now: float) -> float:
+        began, first = self._from = self._from or (now, tick)
+        return began + (tick - first) * self._period_s
+
+    def allowed(self, until: int, now: float) -> int:
+        """Returns the tick up to which all are due at wall time ``now`` (s); ``until`` while a grant comes too soon."""
+        behind = math.floor((now - self._due(until, now)) / self._period_s + 1e-6) + 1
+        return until + behind if behind >= self._least else until
+
+    def grant(self, until: int, limit: int, now: float) -> int:
+        """Notes that the ticks from ``until`` on are granted as far as they are due and ``limit`` lets them.
+
+        Returns the tick up to which they are granted.
+        """
+        due, allowed = self._due(until, now), self.allowed(until, now)
+        surplus = allowed - until - self.most_at_once
+        if surplus > 0:
+            began, first = self._from or (now, until)
+            self._from = began + surplus * self._period_s, first
+            self.lost_s += surplus * self._period_s
+        granted = max(until, min(limit, until + self.most_at_once, allowed))
+        if granted > until:
+            self._awaited.append((until, granted, due))
+        return granted
+
+    def wait_s(self, until: int, now: float) -> float:
+        """Returns the time in s until the next grant is due."""
+        return max(0.0, self._due(until, now) + (self._least - 1) * self._period_s - now)
+
+    def done(self, tick: int, now: float) -> None:
+        """Notes that every tick before ``tick`` is done at wall time ``now``."""
+        while self._awaited and self._awaited[0][0] < tick:
+            first, end, due = self._awaited.popleft()
+            for late_s in (now - due - place * self._period_s for place in range(min(end, tick) - first)):
+                self._late[max(0, math.ceil(math.log(max(late_s, _FINEST_S) / _FINEST_S, _FACTOR)))] += 1
+                self._most_s = max(self._most_s, late_s)
+                self._by_a_period += late_s > self._period_s
+            if end > tick:
+                self._awaited.appendleft((tick, end, due + (tick - first) * self._period_s))
+
+    def lateness(self) -> dict[str, Any]:
+        """Returns how late the ticks were done; {} where none was to keep a pace.
+
+        ``ticks`` of them, ``median_s``, ``percent_99_s`` (to 5 %) and ``most_s``, ``by_a_period`` how many were late by
+        more than a period, ``lost_s`` the real time lost.
+        """
+        ticks = self._late.total()
+        if not ticks:
+            return {}
+        quantiles = {name: self._quantile(share * ticks) for name, share in (("median_s", 0.5), ("percent_99_s", 0.99))}
+        most_s = {"most_s": max(0.0, self._most_s)}
+        return {"ticks": ticks, **quantiles, **most_s, "by_a_period": self._by_a_period, "lost_s": self.lost_s}
+
+    def _quantile(self, rank: float) -> float:
+        seen = 0
+        for place in sorted(self._late):
+            seen += self._late[place]
+            if seen >= rank:
+                return min(_FINEST_S * _FACTOR**place, max(0.0, self._most_s))
+        return self._most_s

@@ -1,0 +1,97 @@
+"""The clock at its socket: who is let in, and what it does between two grants."""
+
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import msgpack
+import pytest
+import zmq
+
+from haploop.launch.clock.server import ClockServer
+from haploop.protocol.transport.messages import PROCESSES
+from helpers.live.attacks import Stranger, pack
+from helpers.runs.clocks import clock
+
+SECRET = "s" * 32
+JOIN, REFUSED, COMMAND, REPLY = 1, 3, 13, 14
+
+
+class Served:
+    """A clock's server, and those who speak to it."""
+
+    def __init__(self) -> None:
+        self._folder = tempfile.TemporaryDirectory(prefix="hl", dir="/tmp")
+        self.sockets = Path(self._folder.name)
+        self.context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
+        self.asked: list[str] = []
+        self.server = ClockServer(
+            self.context, self.sockets, SECRET, clock(), ("", {}, {}, {}), self._note, lambda _: True
+        )
+
+    def _note(self, verb: str, arguments: dict[str, Any]) -> tuple[bool, str, dict[str, Any]]:
+        self.asked.append(verb)
+        return True, verb, {}
+
+    def answer(self, frame: bytes) -> list[Any]:
+        """What comes back to somebody new."""
+        with Stranger(self.context, self.sockets / "clock.sock") as stranger:
+            stranger.socket.send(frame)
+            self.server.socket.poll(10_000)
+            self.server.serve()
+            assert stranger.socket.poll(10_000)
+            return msgpack.unpackb(stranger.socket.recv())[1:]
+
+    def close(self) -> None:
+        self.server.close()
+        self.context.destroy(linger=0)
+        self._folder.cleanup()
+
+
+@pytest.fixture
+def served() -> Iterator[Served]:
+    made = Served()
+    yield made
+    made.close()
+
+
+@pytest.mark.parametrize("role", PROCESSES)
+def test_a_process_that_does_not_bring_the_sockets_its_role_must_bind_is_refused_with_their_names(
+    role: str, served: Served
+) -> None:
+    for brought in ({}, {"loop ": "ipc://x"}, {"Telemetry": "ipc://x"}):
+        code, reason = served.answer(pack(1, JOIN, role, SECRET, 1, brought, True))
+        assert code == REFUSED
+        assert all(name in reason for name in PROCESSES[role].binds)
+    assert served.server.roster.nodes == {}
+    assert served.server.roster.refused == {role: reason}
+
+
+def test_a_wrong_secret_is_called_so_and_kept_by_the_role_it_came_with(served: Served) -> None:
+    code, reason = served.answer(pack(1, JOIN, "plant", "0" * 32, 1, {"loop": "x", "telemetry": "y"}, True))
+    assert code == REFUSED
+    assert reason == "JOIN as plant, a role of the run's own process, came with a wrong secret; join as an observer."
+    assert served.server.roster.refused == {"plant": reason}
+
+
+def test_one_command_is_carried_out_between_two_grants_however_many_wait(served: Served) -> None:
+    with Stranger(served.context, served.sockets / "clock.sock") as stranger:
+        for number in range(5):
+            stranger.socket.send(pack(1, COMMAND, str(number), {}))
+        done = []
+        while len(served.asked) < 5:
+            assert served.server.socket.poll(10_000)
+            before = len(served.asked)
+            served.server.serve()
+            done.append(len(served.asked) - before)
+    assert done == [1] * 5
+    assert served.asked == list("01234")
+
+
+def test_a_frame_that_takes_long_to_read_is_refused_unread(served: Served) -> None:
+    code, reason = served.answer(pack(1, COMMAND, "set", {"set": {f"wall.k{i}": 1.0 for i in range(10_000)}}))
+    assert code == REFUSED
+    assert reason.startswith("A frame must be at most 32768 bytes, but one of ")
+    assert served.asked == []
+    assert served.answer(pack(1, COMMAND, "x" * 30_000, {}))[0] == REPLY

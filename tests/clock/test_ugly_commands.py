@@ -1,0 +1,131 @@
+"""What a terminal, a page or a program may send as a command: refused with a sentence, or done with the way back."""
+
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from haploop.launch.clock.commands import Commands
+from haploop.launch.clock.roster import Roster
+from haploop.launch.spec import RunSpec
+from helpers.runs.clocks import DAMPING, TICKS, clock, granted
+from helpers.scenes.least import KINDS
+
+BACK = "swap damping acts=in-contact damping=0.5"
+
+
+def commands(**tables: Any) -> Commands:
+    subject = clock(**tables)
+    granted(subject, 0)
+    return Commands(subject, RunSpec(subject.present(), dict(KINDS), Path("out")), Roster)
+
+
+def deep(levels: int) -> dict[str, Any]:
+    table: dict[str, Any] = {}
+    for _ in range(levels):
+        table = {"k": table}
+    return table
+
+
+@pytest.mark.parametrize(
+    ("verb", "arguments", "says"),
+    [
+        ("set", {"set": {f"wall.k{i}": 1.0 for i in range(10_000)}}, "at most 64 keys and values"),
+        ("set", {"set": [0.0] * 1000}, "at most 64 keys and values"),
+        ("set", {"set": deep(300)}, "3 tables deep"),
+        ("swap", {"swap": {"kind": [[[[]]]]}}, "3 tables deep"),
+        ("set", {"set": {"w" * 201: 1.0}}, "at most 200 letters, but one has 201"),
+        ("set", {"set": {"wall.stiffness": "1 " + "m " * 200}}, "at most 200 letters"),
+        ("set", {"set": {"wall.stiffness": b"\xff" * 300}}, "at most 200 letters"),
+        ("set", {"set": {"wall.stiffness": "3 furlong"}}, "unit that a running loop does not know; it knows Hz, J"),
+        ("set", {"set": {"wall.stiffness": "3 ms"}}, "ms has the dimension [time], but N/m has [mass] / [time] ** 2"),
+        ("swap", {"swap": {"kind": "damping", "damping": "1 lbf s/inch"}}, "unit that a running loop does not know"),
+        ("pace", {"pace": 1e305}, "from 1e-06 to 1e+06, or free, but 1e+305"),
+        ("pace", {"pace": float("inf")}, "or free, but inf"),
+        ("step", {"ticks": 10**18}, "from 1 to 1000, but 1000000000000000000"),
+        ("step", {"ticks": 1.0}, "whole number of ticks"),
+        ("step", {"ticks": "5"}, "whole number of ticks"),
+        ("step", {"ticks": True}, "whole number of ticks"),
+        ("step", {"ticks": 0}, "from 1 to 1000, but 0"),
+        ("set", {"set": {"wall.stiffness": 1.0}, "at": float("nan")}, "a time from 0 to 1e+09 s, or at once, but nan"),
+    ],
+)
+def test_what_carries_too_much_or_means_nothing_is_refused_with_a_sentence(
+    verb: str, arguments: dict[str, Any], says: str
+) -> None:
+    subject = commands()
+    ok, text, data = subject(verb, arguments)
+    assert (ok, data) == (False, {})
+    assert says in text
+    assert len(text) < 1000
+    assert subject("status", {})[1].startswith("running at tick 0 (0 s) of 1000")
+
+
+def test_of_many_mistakes_five_are_told_and_the_rest_counted() -> None:
+    ok, text, _ = commands()("set", {"set": {f"wall.k{i}": 1.0 for i in range(30)}})
+    assert not ok
+    lines = text.splitlines()
+    assert len(lines) == 6
+    assert lines[-1] == "There are 25 more mistakes."
+
+
+def test_values_with_units_do_not_load_the_library_of_units_where_grants_are_made() -> None:
+    code = """
+import sys
+sys.path.insert(0, sys.argv[1])
+from clock.test_ugly_commands import commands
+subject = commands()
+assert subject("set", {"set": {"wall.stiffness": "0.2 N/mm"}})[0]
+for value in ("3 ms", "3 furlong", "five N/m", "1 N/furlong"):
+    assert not subject("set", {"set": {"wall.stiffness": value}})[0], value
+assert subject("swap", {"swap": {"kind": "damping", "damping": "2 mN s/mm"}})[0]
+assert "pint" not in sys.modules
+"""
+    subprocess.run([sys.executable, "-c", code, str(Path(__file__).parents[1])], check=True)
+
+
+@pytest.mark.parametrize(
+    ("verb", "arguments", "back"),
+    [
+        (
+            "set",
+            {"set": {"wall.stiffness": "0.2 N/mm", "wall.position": -0.05}},
+            "wall.stiffness=150.0 wall.position=-0.06",
+        ),
+        ("set", {"set": {"dissipation.0.damping": 0.7}, "at": 0.6}, "set dissipation.0.damping=0.5"),
+        (
+            "swap",
+            {"swap": {"kind": "unidirectional-inertia", "mass": "3 g"}},
+            BACK,
+        ),
+        ("swap", {"swap": {"kind": "none"}}, BACK),
+        ("swap", {"swap": {**DAMPING, "damping": 0.1}, "element": 1}, "swap none --element 1"),
+    ],
+)
+def test_the_answer_to_a_change_says_how_to_go_back_and_going_back_does(
+    verb: str, arguments: dict[str, Any], back: str
+) -> None:
+    subject = clock()
+    granted(subject, 0)
+    steer = Commands(subject, RunSpec(subject.present(), dict(KINDS), Path("out")), Roster)
+    before = subject.present()
+    ok, text, data = steer(verb, arguments)
+    assert ok, text
+    assert text.endswith(back)
+    assert subject.scene_at(TICKS) != before
+    ok, text, _ = steer(verb, data["before"] | {key: arguments[key] for key in ("at",) if key in arguments})
+    assert ok, text
+    now = subject.scene_at(TICKS)
+    assert (now.wall, now.dissipation, now.clock) == (before.wall, before.dissipation, before.clock)
+
+
+def test_no_way_back_is_told_where_one_swap_cannot_go_it() -> None:
+    """Of two elements the first is taken out, and the second moves up: it would come back behind it."""
+    subject = commands()
+    subject("swap", {"swap": {**DAMPING, "damping": 0.1}, "element": 1})
+    ok, text, data = subject("swap", {"swap": {"kind": "none"}, "element": 0})
+    assert ok
+    assert "go back" not in text
+    assert "before" not in data

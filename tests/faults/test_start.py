@@ -1,0 +1,62 @@
+"""What goes wrong between the start of the processes and the first tick: it is waited for, or named."""
+
+import os
+import signal
+import threading
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from haploop.launch.processes import children, supervisor
+from haploop.launch.spec import RunFailed
+from helpers.live.launched import first_and_slowly
+from helpers.live.live_run import Going, going
+
+
+def stop_when_joined(run: Going, role: str) -> int:
+    """Stops a process as soon as it has joined; returns its pid."""
+    while True:
+        for node in run.ask("status")[1]["nodes"]:
+            if node["role"] == role:
+                os.kill(node["pid"], signal.SIGSTOP)
+                return node["pid"]
+        threading.Event().wait(0.005)
+
+
+def never(_ready: set[int]) -> bool:
+    return False
+
+
+@pytest.mark.parametrize("role", first_and_slowly("controller", "plant"))
+def test_a_node_that_hangs_before_the_first_tick_is_named_after_the_deadline_of_the_start(
+    role: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(supervisor, "_START_DEADLINE_S", 1.5)
+    with going(tmp_path, "duration=600", "run.deadline=0.6", start_gate=never) as run:
+        stop_when_joined(run, role)
+        with pytest.raises(RunFailed, match=f"The {role} has not answered for 1.5 s .* done is 0 "):
+            run.result()
+
+
+def test_the_deadline_of_a_running_loop_does_not_rule_its_start(tmp_path: Path) -> None:
+    """A logger that is busy for three deadlines before the first tick, as on a loaded machine."""
+    with going(tmp_path, "duration=0.2", "run.deadline=0.5", start_gate=never) as run:
+        pid = stop_when_joined(run, "logger")
+        threading.Event().wait(1.5)
+        assert run.ask("status")[1]["granted"] == 0
+        os.kill(pid, signal.SIGCONT)
+        run.ask("stop")
+        assert run.result()["ended"] == "stopped"
+
+
+def test_a_node_that_comes_with_a_wrong_secret_is_named_at_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def start(role: str, sockets: Path, told: dict[str, Any]) -> children.Child:
+        return real(role, sockets, {**told, "secret": "0" * 32} if role == "controller" else told)
+
+    real = children.Child
+    monkeypatch.setattr(children, "Child", start)
+    with going(tmp_path) as run, pytest.raises(RunFailed, match=r"JOIN as controller, .* came with a wrong secret"):
+        run.result()
