@@ -123,7 +123,7 @@ class Viewer:
             session.read_summary()
         if self._from_start and not session.is_complete:
             await self._backfill(session)
-        while session.verdict_is == "awaited" and not self._fresh(self._runs.live()):
+        while session.verdict_is in ("awaited", "abandoned") and not self._fresh(self._runs.live()):
             session.given_up = not self._runs.has_launcher(session.run)
             session.read_summary()
             await self._idle(_LOOK_S)

@@ -77,6 +77,17 @@ def is_live(run: LiveRun) -> bool:
     return is_held(run.sockets)
 
 
+def has_launcher(run: LiveRun) -> bool:
+    """Tells whether the process that leads a run is there: when the run is live no more, it judges it."""
+    try:
+        os.kill(run.pid, 0)
+    except (ProcessLookupError, OverflowError):
+        return False
+    except PermissionError:
+        pass
+    return True
+
+
 def find(run_id: str | None) -> LiveRun:
     """Returns the run with this id (or its beginning), or the only one there is; RunNotFound where not one fits."""
     runs = live_runs()

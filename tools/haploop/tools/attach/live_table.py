@@ -145,7 +145,7 @@ def _await_verdict(run: LiveStatus, live_run: LiveRun, observed: ObservedRun) ->
     is_there = True
     while run.is_awaited and is_there:
         time.sleep(_DRAWN_S)
-        is_there = run_directory.is_live(live_run)
+        is_there = run_directory.has_launcher(live_run)
         run.end(observed.failure, read_summary(observed.observer.welcome))
     run.is_awaited = False
 

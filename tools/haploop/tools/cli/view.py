@@ -41,7 +41,7 @@ class LiveRuns:
         """Returns whether the process that started a run is there, which judges it in the end."""
         from haploop.launch.processes import run_directory
 
-        return run_directory.is_live(run)
+        return run_directory.has_launcher(run)
 
     def ask(self, run: LiveRun, verb: str, arguments: Message) -> tuple[str, Message]:
         """Has a run carry out a command."""
