@@ -17,6 +17,7 @@ from haploop.protocol.transport.loop import ControllerEnd
 from haploop.protocol.transport.machine import machine_of
 from haploop.protocol.transport.messages import PROCESSES
 from haploop.protocol.transport.node import NodeError, run_node
+from haploop.protocol.transport.prints import mark_ticks
 from haploop.protocol.transport.sockets import bind
 from haploop.protocol.transport.telemetry import Publisher
 from haploop.protocol.transport.wire import Message
@@ -36,6 +37,7 @@ class ControllerNode:
         told = welcome["context"]
         kinds = registry([Path(path) for path in told["plugins"]], told["elements"])
         self._controller = Controller(scene, Timebase(**welcome["timebase"]), kinds)
+        mark_ticks(lambda: self._controller.tick)
         self._block = BlockLength(scene.run.block_ticks, machine_of(context).now)
         self._reported = 0
         self._secret = told["secret"]

@@ -20,8 +20,11 @@ from haploop.protocol.transport.wire import Message
 class Child:
     """One node's process.
 
-    Its stdin is a line of life: it ends at once when the launcher is gone. Its stdout carries nothing; that it closes
-    tells the launcher, without polling, that the process has ended.
+    Its stdin is a line of life: it ends at once when the launcher is gone. What it prints before it keeps its prints in
+    their file goes to the launcher's stderr, never to its stdout.
+
+    Attributes:
+        died: a file descriptor that becomes readable, without polling, when the process has ended.
     """
 
     def __init__(self, role: str, sockets: Path, start: Message) -> None:
@@ -29,21 +32,26 @@ class Child:
         environment = {**os.environ}
         ask_for_one_thread(environment)
         command = [sys.executable, "-m", PROCESSES[role].module, str(sockets)]
+        # Where the kernel has no descriptor of a process: a pipe that is open as long as it lives.
+        self.died, alive = (-1, -1) if _has_pidfd() else os.pipe()
         self._process = subprocess.Popen(
             command,
             stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
+            stdout=_terminal(),
+            pass_fds=() if alive < 0 else (alive,),
             # A group of its own, since Ctrl-C is for the launcher, which ends the run in order; but the same session:
             # the kernel schedules sessions as groups, and two of them preempt each other at every message.
             process_group=0,
             env=environment,
         )
+        if alive < 0:
+            self.died = os.pidfd_open(self._process.pid)
+        else:
+            os.close(alive)
         assert self._process.stdin
-        assert self._process.stdout
         with contextlib.suppress(BrokenPipeError):
             self._process.stdin.write(json.dumps(start).encode() + b"\n")
             self._process.stdin.flush()
-        self.died = self._process.stdout.fileno()
 
     @property
     def pid(self) -> int:
@@ -53,7 +61,7 @@ class Child:
         try:
             code = self._process.wait(timeout=1.0)
         except subprocess.TimeoutExpired:
-            return "closed its output but still runs"
+            return "closed what it was given but still runs"
         if code < 0:
             return f"was killed by {signal.Signals(-code).name}"
         return f"ended with exit status {code}"
@@ -76,10 +84,29 @@ class Child:
         with contextlib.suppress(ProcessLookupError):
             self._process.kill()
         self._process.wait()
-        for pipe in (self._process.stdin, self._process.stdout):
-            if pipe:
-                with contextlib.suppress(OSError):
-                    pipe.close()
+        if self._process.stdin:
+            with contextlib.suppress(OSError):
+                self._process.stdin.close()
+        with contextlib.suppress(OSError):
+            os.close(self.died)
+
+
+def _has_pidfd() -> bool:
+    """Tells whether a process can be watched by a descriptor of its own (Linux 5.3)."""
+    try:
+        os.close(os.pidfd_open(os.getpid()))
+    except (AttributeError, OSError):
+        return False
+    return True
+
+
+def _terminal() -> int:
+    """Returns the launcher's stderr, or nowhere if that is closed."""
+    try:
+        os.fstat(2)
+    except OSError:
+        return subprocess.DEVNULL
+    return 2
 
 
 def start_children(sockets: Path, start: Message, pin: bool, run_number: int) -> dict[str, Child]:

@@ -17,6 +17,7 @@ from haploop.launch.clock.commands import Commands
 from haploop.launch.clock.server import ClockServer
 from haploop.launch.processes import private_directory, run_directory
 from haploop.launch.processes.children import Child, interrupts, start_children
+from haploop.launch.processes.shown_prints import PRINTS, ShownPrints
 from haploop.launch.spec import RunFailed, RunSpec
 from haploop.protocol.changes import Event
 from haploop.protocol.ticks import Timebase
@@ -88,7 +89,13 @@ class Supervisor:
         keys = spec.transport.as_dict()["keys"]
         run_directory.announce(sockets, self._server.address, scene.title, str(spec.out), keys)
         run_number = len(run_directory.live_runs()) - 1
-        start = {"address": self._server.address, "secret": secret, "transport": spec.transport.as_dict()}
+        self._prints = ShownPrints(spec.out.resolve() / PRINTS)
+        start = {
+            "address": self._server.address,
+            "secret": secret,
+            "transport": spec.transport.as_dict(),
+            "prints": str(spec.out.resolve() / PRINTS),
+        }
         self._children = start_nodes(sockets, start, scene.run.pin, run_number)
         self._started = self._looked = self._machine.now()
         if not math.isinf(spec.pace):  # the nodes are loading
@@ -97,10 +104,12 @@ class Supervisor:
         self._stopping = False
 
     def run(self) -> Summary:
+        failed = True
         try:
             address = f" at {self._server.address}" if self._spec.transport.host else ""
             self._spec.on_started(self._sockets.name + address)
             self._lead()
+            failed = False
             return self._server.results["logger"]
         except RunFailed as error:
             self._save(str(error))
@@ -108,6 +117,7 @@ class Supervisor:
         finally:
             for child in self._children.values():
                 child.kill()
+            self._prints.close(failed)
             self._server.close()
             self._context.destroy(linger=0)
 
@@ -130,6 +140,7 @@ class Supervisor:
                     self._look_at(child)
                     poller.unregister(child.died)
             self._check_deadlines()
+            self._prints.look(self._machine.now())
             if logger := self._server.roster.own("logger"):
                 self._spec.on_progress(logger.status)
         for child in self._children.values():

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import sys
+import os
 from collections.abc import Sequence
-from contextlib import redirect_stdout
+from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -130,5 +130,6 @@ def _judged(spec: RunSpec, summary: Summary, events: list[tuple[int, Event]]) ->
         except (ElementError, ArithmeticError) as error:
             return Finding("undecided", "failed", detail=str(error))
 
-    with redirect_stdout(sys.stderr):  # what a plugin prints is no part of what the command says
+    # What a plugin prints here it has printed before.
+    with Path(os.devnull).open("w") as nowhere, redirect_stdout(nowhere), redirect_stderr(nowhere):
         return with_verdict(spec.scene, summary, find, spec.out)

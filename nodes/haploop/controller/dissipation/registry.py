@@ -5,9 +5,11 @@ from __future__ import annotations
 import inspect
 import sys
 from collections.abc import Mapping
+from contextlib import redirect_stdout
 from pathlib import Path
 from pkgutil import resolve_name
 from types import ModuleType
+from typing import Any
 
 from haploop.controller.dissipation.element import Element
 from haploop.protocol.installed import entry_points_of
@@ -63,6 +65,8 @@ def load_plugin(path: Path) -> dict[str, type[Element]]:
 def load_source(source: str, origin: str) -> dict[str, type[Element]]:
     """Returns the elements that the text of a Python file defines, by kind; ``origin`` is the file.
 
+    Its ``print`` writes to stderr, now and later, since stdout belongs to the answers of commands.
+
     Raises:
         PluginError: the text cannot be run, or defines no usable element.
     """
@@ -71,8 +75,10 @@ def load_source(source: str, origin: str) -> dict[str, type[Element]]:
     try:
         module = ModuleType("haploop_plugin_" + hashlib.sha256(source.encode()).hexdigest()[:12])
         module.__file__ = origin
+        module.__dict__["print"] = _print
         sys.modules[module.__name__] = module  # dataclasses and type hints look the names up there
-        exec(compile(source, origin, "exec"), module.__dict__)
+        with redirect_stdout(sys.stderr):
+            exec(compile(source, origin, "exec"), module.__dict__)
     except (Exception, SystemExit) as error:
         line = f", line {error.lineno}" if isinstance(error, SyntaxError) else ""
         raise PluginError(f"The plugin {origin}{line} does not load: {type(error).__name__}: {error}") from error
@@ -81,6 +87,10 @@ def load_source(source: str, origin: str) -> dict[str, type[Element]]:
     if not elements:
         raise PluginError(f"The plugin {origin} defines no element; a class derived from Element was expected.")
     return {element.kind: element for element in elements}
+
+
+def _print(*values: object, file: Any = None, **how: Any) -> None:
+    print(*values, file=sys.stderr if file is None else file, **how)
 
 
 def checked(element: object, origin: str) -> type[Element]:

@@ -10,11 +10,13 @@ import sys
 import threading
 from collections.abc import Callable
 from pathlib import Path
+from typing import TextIO
 
 import zmq
 
 from haploop.protocol.transport.clock_client import Aborted, ClockClient, Refused
 from haploop.protocol.transport.loop import LoopError
+from haploop.protocol.transport.prints import keep_prints
 from haploop.protocol.transport.sockets import SecureContext, Transport
 from haploop.protocol.transport.wire import Message
 
@@ -29,8 +31,8 @@ class NodeError(Exception):
 def run_node(role: str, work: Work) -> None:
     """Runs a node as a process, ``python -m module DIRECTORY``, and exits with status 0 after DONE, else 1.
 
-    Stdin brings one line of JSON: address of the clock, secret and transport of the run, and the cores to stay on, null
-    for any.
+    Stdin brings one line of JSON: address of the clock, secret and transport of the run, the file to which what is
+    printed goes, and the cores to stay on, null for any.
 
     It stays open as long as the launcher lives; at its end this process ends at once, whatever it is doing.
     """
@@ -39,10 +41,12 @@ def run_node(role: str, work: Work) -> None:
     if not line:
         sys.exit(1)  # the launcher is gone already
     start = json.loads(line)
+    keep_prints(role, Path(start["prints"]))
     if start["cores"]:
         with contextlib.suppress(OSError):
             os.sched_setaffinity(0, start["cores"])
-    threading.Thread(target=_end_with_parent, daemon=True).start()
+    life, sys.stdin = sys.stdin, open(os.devnull)  # noqa: SIM115, PTH123 (code that asks for input gets none)
+    threading.Thread(target=_end_with_parent, args=(life,), daemon=True).start()
     gc.freeze()
     context = SecureContext.from_transport(Transport.from_dict(start["transport"]))
     sys.exit(take_part(context, role, work, start, directory))
@@ -74,6 +78,6 @@ def take_part(context: zmq.Context[zmq.Socket[bytes]], role: str, work: Work, st
     return status
 
 
-def _end_with_parent() -> None:
-    sys.stdin.read()
+def _end_with_parent(life: TextIO) -> None:
+    life.read()
     os._exit(1)

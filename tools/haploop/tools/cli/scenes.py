@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 import sys
+from contextlib import redirect_stdout
 from json import dumps
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -65,7 +66,8 @@ def run(
         prepared = start.prepare(scene, set or [], plugin or [], out)
         print_notes(prepared.scene)
         try:
-            with ProgressLine(prepared.scene.title, prepared.scene.duration) as line:
+            # What an element prints is no part of the answer.
+            with ProgressLine(prepared.scene.title, prepared.scene.duration) as line, redirect_stdout(sys.stderr):
 
                 def told(run_id: str) -> None:
                     line.announce(run_id)
@@ -169,7 +171,7 @@ def replay(directory: Directory, json: Json = False) -> None:
     """Repeat a run from its own log and say whether every bit agreed."""
     from haploop.launch.runs import replay as runs
 
-    with plain_errors():
+    with plain_errors(), redirect_stdout(sys.stderr):
         try:
             result = runs.replay(directory)
         except runs.ReplayError as error:
@@ -195,7 +197,7 @@ def judge(directory: Directory, json: Json = False) -> None:
     from haploop.tools.render.report import finding_table
     from haploop.tools.render.terminal import console
 
-    with plain_errors():
+    with plain_errors(), redirect_stdout(sys.stderr):
         try:
             finding = judge_scene(*repeatable(directory))
         except ReplayError as error:
