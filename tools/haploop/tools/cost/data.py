@@ -95,11 +95,6 @@ class Point:
     time: Spread | None = None
 
     @property
-    def size_m(self) -> float:
-        """Inf where the run failed."""
-        return self.error.size_m if self.error else math.inf
-
-    @property
     def at_most_m(self) -> float:
         """Inf where the run failed."""
         return self.error.at_most_m if self.error else math.inf

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from haploop.tools.cost.data import Cost, Point, SceneCost
+from haploop.tools.cost.data import Cost, Errors, Point, SceneCost
 from haploop.tools.cost.findings import is_told_apart, takes_away
 from haploop.tools.figure import style
 from haploop.tools.figure.data import FigureError
@@ -69,19 +69,17 @@ def _how_to_read(ax: Axes, cost: Cost, scenes: list[SceneCost]) -> None:
     from matplotlib.patches import Patch
 
     ax.set_axis_off()
-    looks = {method: LOOKS.get(method, _OTHER) for method in methods_of(scenes)}
-    handles: list[Any] = [
-        Line2D([], [], color=colour, marker=marker, linewidth=1.6, label=method)
-        for method, (colour, marker) in looks.items()
-    ]
-    sign = partial(Line2D, [], [], linestyle="none")
+    sign, tolerance = partial(Line2D, [], []), f"tolerance {amount(cost.tolerance_m, 'm')}"
+    handles: list[Any] = []
+    for method in methods_of(scenes):
+        colour, marker = LOOKS.get(method, _OTHER)
+        handles.append(sign(color=colour, marker=marker, linewidth=1.6, label=method))
+    point, grey = partial(sign, linestyle="none"), style.GREY
     handles += [
-        sign(marker="o", markersize=11, markerfacecolor="none", color=style.INK, label="at 10 kHz"),
-        sign(marker="o", markerfacecolor="white", color=style.GREY, label="at most: not told apart from no error"),
-        sign(marker="x", markersize=7, markeredgewidth=1.8, color=style.GREY, label="failed: no error to draw"),
-        Line2D(
-            [], [], color=style.GREY, dashes=(4, 3), linewidth=0.9, label=f"tolerance {amount(cost.tolerance_m, 'm')}"
-        ),
+        point(marker="o", markersize=11, markerfacecolor="none", color=style.INK, label="at 10 kHz"),
+        point(marker="o", markerfacecolor="white", color=grey, label="at most: not told apart from no error"),
+        point(marker="x", markersize=7, markeredgewidth=1.8, color=grey, label="failed: no error to draw"),
+        sign(color=grey, dashes=(4, 3), linewidth=0.9, label=tolerance),
         Patch(facecolor=UNCERTAIN, label="the reference's own uncertainty"),
     ]
     ax.legend(handles=handles, loc="upper left", bbox_to_anchor=(0.0, 1.0), frameon=False, fontsize=style.TEXT, ncols=1)
@@ -91,16 +89,8 @@ def _how_to_read(ax: Axes, cost: Cost, scenes: list[SceneCost]) -> None:
         *wrap(f"Yardstick: {cost.yardstick}", 76),
         cost.machine,
     ]
-    ax.text(
-        0.02,
-        0.0,
-        "\n".join(words),
-        fontsize=style.SMALL,
-        color=style.GREY,
-        va="bottom",
-        transform=ax.transAxes,
-        gid="words",
-    )
+    look = {"fontsize": style.SMALL, "color": style.GREY, "transform": ax.transAxes}
+    ax.text(0.02, 0.0, "\n".join(words), va="bottom", gid="words", **look)
 
 
 def draw_panel(ax: Axes, scene: SceneCost, tolerance_m: float) -> None:
@@ -116,7 +106,7 @@ def draw_panel(ax: Axes, scene: SceneCost, tolerance_m: float) -> None:
     ax.axhline(tolerance_m, color=style.GREY, linewidth=0.9, dashes=(4, 3), zorder=1, gid="tolerance")
     for method in methods_of([scene]):
         _curve(ax, [point for point in scene.points if point.method == method], scene)
-    if any(point.time and _failed(point) for point in scene.points):
+    if any(point.time and not point.error for point in scene.points):
         ax.axhline(edge, color=style.FAINT, linewidth=0.8, zorder=1)
         ax.set_yticks([tick for tick in ax.get_yticks() if low <= tick < edge])
         place = {"ha": "right", "va": "center", "transform": ax.transAxes}
@@ -134,12 +124,12 @@ def _limits(scene: SceneCost, tolerance_m: float) -> tuple[float, float, float]:
 
 def drawn_m(point: Point, scene: SceneCost) -> float:
     """Returns the error of a point as drawn: no less than a share of the reference's uncertainty, or what is sure."""
-    told = point.error is None or not point.error.doubt_m or is_told_apart(point.error)
-    return max(point.size_m if told else point.at_most_m, _WITHIN * scene.reference.error_m, 1e-18)
+    size_m = math.inf if point.error is None else point.at_most_m if _in_doubt(point.error) else point.error.size_m
+    return max(size_m, _WITHIN * scene.reference.error_m, 1e-18)
 
 
-def _failed(point: Point) -> bool:
-    return not math.isfinite(point.size_m)
+def _in_doubt(error: Errors) -> bool:
+    return bool(error.doubt_m) and not is_told_apart(error)
 
 
 def _position(ax: Axes, point: Point, scene: SceneCost) -> tuple[float, float]:
@@ -147,7 +137,7 @@ def _position(ax: Axes, point: Point, scene: SceneCost) -> tuple[float, float]:
     assert point.time is not None
     low, high = np.log10(ax.get_ylim())
     top = float(10.0 ** (high - _TOP / 2.0 * (high - low)))
-    return point.time.median, top if _failed(point) else drawn_m(point, scene)
+    return point.time.median, drawn_m(point, scene) if point.error else top
 
 
 def _curve(ax: Axes, points: list[Point], scene: SceneCost) -> None:
@@ -157,34 +147,31 @@ def _curve(ax: Axes, points: list[Point], scene: SceneCost) -> None:
     method = points[0].method
     colour, marker = LOOKS.get(method, _OTHER)
     xy = np.array([_position(ax, point, scene) for point in points])
-    failed = np.array([_failed(point) for point in points])
+    failed = [point.error is None for point in points]
     wide = 2.2 if method == "exact" else 1.2
     ax.plot(xy[:, 0], np.where(failed, np.nan, xy[:, 1]), color=colour, linewidth=wide, zorder=3, gid=f"line {method}")
     for point, (x, y) in zip(points, xy, strict=True):
         mark = partial(ax.plot, [x], [y], color=colour, zorder=4, linestyle="none")
-        if _failed(point):
+        bar = partial(ax.plot, color=colour, linewidth=0.9, alpha=0.7, zorder=2)
+        if point.error is None:
             mark(marker="x", markersize=7.0, markeredgewidth=1.8, clip_on=False, gid="failure")
-        elif point.error and point.error.doubt_m and not is_told_apart(point.error):
+        elif _in_doubt(point.error):
             mark(marker=marker, markersize=5.5, markerfacecolor="white", gid="at most")
         else:
             mark(marker=marker, markersize=5.5, gid="point")
-        spread = point.time
-        assert spread is not None
-        bar = partial(ax.plot, color=colour, linewidth=0.9, alpha=0.7, zorder=2)
-        bar([spread.low, spread.high], [y, y], gid="interval of time")
-        if point.error and is_told_apart(point.error) and (doubt_m := point.error.doubt_m):
-            bar([x, x], [y - doubt_m, y + doubt_m], gid="interval of error")
+            if doubt_m := point.error.doubt_m:
+                bar([x, x], [y - doubt_m, y + doubt_m], gid="interval of error")
+        if time := point.time:
+            bar([time.low, time.high], [y, y], gid="interval of time")
         if point.plant_rate == _MARKED_HZ:
-            ax.plot(
-                [x], [y], marker="o", markersize=11, markerfacecolor="none", markeredgecolor=style.INK, gid="10 kHz"
-            )
+            mark(marker="o", markersize=11, markerfacecolor="none", markeredgecolor=style.INK, gid="10 kHz")
 
 
 def label_points(ax: Axes, scene: SceneCost) -> None:
     """Writes the plant rate in kHz beside the points: of the scene's own method first, then where there is room."""
     timed = [point for point in scene.points if point.time]
     labels = []
-    for point in sorted(timed, key=lambda point: (point.method != scene.own_method, _failed(point))):
+    for point in sorted(timed, key=lambda point: (point.method != scene.own_method, not point.error)):
         in_kHz, colour = f"{point.plant_rate / 1000:g}", LOOKS.get(point.method, _OTHER)[0]
         half_px = 9.0 if point.plant_rate == _MARKED_HZ else 5.0
         labels.append(Label(*_position(ax, point, scene), in_kHz, colour, in_kHz, half_px))

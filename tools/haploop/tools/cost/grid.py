@@ -6,7 +6,7 @@ import hashlib
 import json
 import math
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -80,17 +80,13 @@ def grid(path: Path, methods: Sequence[str], rates: Sequence[int]) -> Grid:
     at = {method: [min(rates)] if INTEGRATORS[method].chooses_steps else rates for method in methods}
     settings = {made.own, *((method, rate) for method in methods for rate in at[method])}
     for method, rate in sorted(settings, key=lambda setting: (order.index(setting[0]), setting[1])):
-        made.candidates.append(_candidate(path, method, rate))
+        bare = Candidate(path, method, rate)
+        try:
+            made.candidates.append(replace(bare, scene=load(path, [*bare.overrides, "run.log=none"])))
+        except SceneError as error:
+            reasons = " ".join(str(mistake).removeprefix(f"{COMMAND_LINE}: ") for mistake in error.mistakes)
+            made.candidates.append(replace(bare, refusal=f"Refused by the check: {reasons}"))
     return made
-
-
-def _candidate(path: Path, method: str, rate: int) -> Candidate:
-    bare = Candidate(path, method, rate)
-    try:
-        return replace(bare, scene=load(path, [*bare.overrides, "run.log=none"]))
-    except SceneError as error:
-        reasons = [str(mistake).removeprefix(f"{COMMAND_LINE}: ") for mistake in error.mistakes]
-        return replace(bare, refusal=f"Refused by the check: {' '.join(reasons)}")
 
 
 def digest(data: Any) -> str:
@@ -193,7 +189,7 @@ def _errors(runs: list[Trajectory], scene: Scene, reference: Reference, swings: 
     """
     ran = runs[0]
     energy = ran.summary["energy"]
-    residual = _share(energy["residual_J"], energy["moved_J"])
+    residual = abs(energy["residual_J"] / energy["moved_J"]) if energy["moved_J"] else None
     if reference.pointwise:
         off = np.abs(ran.x_m - np.asarray(reference.x_m))[1:]
         return Errors(
@@ -202,26 +198,16 @@ def _errors(runs: list[Trajectory], scene: Scene, reference: Reference, swings: 
     ours = [_swings(scene, each) for each in runs]
     names = {"amplitude": "amplitude_m", "frequency": "frequency_Hz", "energy_per_cycle": "energy_per_cycle_J"}
     relative = {entry: _relative(ours, swings, name) for entry, name in names.items()}
-    sizes = ([each["amplitude_m"] or 0.0 for each in each_run] for each_run in (ours, swings))
-    mine, true = map(np.array, sizes)
+    mine, true = (np.array([each["amplitude_m"] or 0.0 for each in runs]) for runs in (ours, swings))
     off = mine - true
     doubt_m = _T * float(off.std(ddof=1)) / math.sqrt(len(off))
     return Errors(**relative, amplitude_m=abs(float(off.mean())), doubt_m=doubt_m, residual=residual)
 
 
-def _pairs(ours: Sequence[Swings], theirs: Sequence[Swings]) -> Iterator[tuple[Swings, Swings]]:
-    return zip(ours, theirs, strict=True)
-
-
 def _relative(ours: Sequence[Swings], theirs: Sequence[Swings], name: str) -> float | None:
     """Returns the relative error of a mean over all starts; None where one of them has no such number."""
-    pairs = [(mine[name], true[name]) for mine, true in _pairs(ours, theirs)]
-    known = [(mine, true) for mine, true in pairs if mine is not None and true is not None]
-    if len(known) < len(pairs):
+    mine, true = ([each[name] for each in runs] for runs in (ours, theirs))
+    if None in (*mine, *true):
         return None
-    mean, true = (sum(column) for column in zip(*known, strict=True))
-    return _share(mean - true, true)
-
-
-def _share(off_by: float | None, reference: float | None) -> float | None:
-    return abs(off_by / reference) if off_by is not None and reference else None
+    total = sum(filter(None, true))
+    return abs((sum(filter(None, mine)) - total) / total) if total else None

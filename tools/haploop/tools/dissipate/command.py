@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import contextlib
 import sys
-from collections.abc import Callable, Iterator
+from contextlib import nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -15,10 +14,9 @@ from haploop.tools.cli.scenes import kinds_with
 from haploop.tools.dissipate.booking import Booking
 from haploop.tools.dissipate.controller_scene import Selection, make_scene_for_log, make_scene_for_text
 from haploop.tools.dissipate.figure import make_figure
-from haploop.tools.dissipate.log_recording import LogRecording, read_scene
 from haploop.tools.dissipate.outcome import Outcome, Recording, Trace, make_outcome
 from haploop.tools.dissipate.report import make_report
-from haploop.tools.dissipate.samples import RecordingError
+from haploop.tools.dissipate.samples import LogRecording, RecordingError, read_scene
 from haploop.tools.dissipate.text_recording import Layout, TextRecording
 from haploop.tools.figure.data import FigureError
 from haploop.tools.figure.style import write_figure
@@ -71,13 +69,14 @@ def compute_outcome(request: Request, kinds: dict[str, type[Element]]) -> Outcom
 
     recording, scene = _open(request, kinds)
     booking = Booking(scene, recording.period_s, recording.delay_s, kinds, recording.recorded, recording.has_force)
-    trace = Trace(recording.period_s)
-    end_x_m = None
-    with _shown(request.path.name) as show:
+    trace = Trace(recording.period_s, 2 + 2 * len(scene.dissipation) + 3 * recording.has_force)
+    end_x_m, shown = None, console(stderr=True)
+    with shown.status(f"reading {request.path.name}") if shown.is_terminal else nullcontext() as line:
         for piece in recording.samples():
             trace.add(booking.add(piece))
             end_x_m = piece.end_x_m
-            show(float(piece.t_s[-1]))
+            if line:
+                line.update(f"{request.path.name}: booked to {piece.t_s[-1]:.6g} s")
     if end_x_m is not None:
         booking.finish(end_x_m)
     return make_outcome(recording, booking, trace, scene, kinds)
@@ -102,14 +101,6 @@ def _open(request: Request, kinds: dict[str, type[Element]]) -> tuple[Recording,
             "or which column is a force with --force."
         )
     return recording, make_scene_for_text(selection, path, recording.period_s, recording.recorded, kinds)
-
-
-@contextlib.contextmanager
-def _shown(name: str) -> Iterator[Callable[[float], None]]:
-    """Shows a line on a terminal with the time to which the recording is booked, fed with that time in s."""
-    shown = console(stderr=True)
-    with shown.status(f"reading {name}") if shown.is_terminal else contextlib.nullcontext() as line:
-        yield lambda to_s: line.update(f"{name}: booked to {to_s:.6g} s") if line else None
 
 
 def _draw(outcome: Outcome, request: Request) -> Path | None:

@@ -13,8 +13,7 @@ from haploop.launch.scene.file import resolved
 from haploop.launch.scene.layers import Layers, key_path
 from haploop.protocol.scene.scene import Clock, Device, Scene, accelerometer_is_used
 from haploop.tools.cli.options import parse_assignments
-from haploop.tools.dissipate.log_recording import holds_readings
-from haploop.tools.dissipate.samples import RecordingError
+from haploop.tools.dissipate.samples import RecordingError, holds_readings
 
 Kinds = Mapping[str, "type[Element]"]
 # Tables that can be overridden; [encoder] tells the estimators to what the positions were rounded.

@@ -12,8 +12,7 @@ from haploop.controller.dissipation import Element, Quantity
 from haploop.protocol.scene.scene import ElementTable, Scene
 from haploop.tools.dissipate.booking import Booked, Booking
 from haploop.tools.dissipate.force_book import Passivity
-from haploop.tools.dissipate.log_recording import LogRecording
-from haploop.tools.dissipate.samples import Floats
+from haploop.tools.dissipate.samples import Floats, LogRecording
 from haploop.tools.dissipate.text_recording import TextRecording
 from haploop.tools.render.units import amount
 from haploop.view.store.lod_level import extremes
@@ -33,14 +32,17 @@ _ROUNDING = 1e-12
 class Trace:
     """Keeps the books of a recording of any length in bounded memory, decimated with their extremes kept.
 
+    Args:
+        rows: of ``lines``: t, x, sampled and true books of every element, rows of a recorded force.
+
     Attributes:
         close: in full, the interval in which most was given back, rows like those of ``lines``; None before any was.
     """
 
-    def __init__(self, period_s: float) -> None:
+    def __init__(self, period_s: float, rows: int) -> None:
         self._span = max(8, round(_CLOSE_S / period_s))
-        self._group, self._points, self._left = 1, np.empty((0, 0)), np.empty((0, 0))
-        self._open = np.empty((0, 0))
+        self._group, self._points, self._left = 1, np.empty((rows, 0)), np.empty((rows, 0))
+        self._open = np.empty((rows + 1, 0))
         self._most_given_J = 0.0
         self.close: Floats | None = None
 
@@ -50,25 +52,23 @@ class Trace:
         self._look_closely(np.vstack([rows, -np.minimum(booked.added_J, 0.0).sum(axis=0)]))
 
     def lines(self) -> Floats:
-        """Returns t, x, sampled and true books of every element, rows of a recorded force; shape (rows, points)."""
-        return np.hstack([self._points, self._left]) if self._points.size else self._left
+        """Returns the rows over the whole recording; shape (rows, points)."""
+        return np.hstack([self._points, self._left])
 
     def _keep(self, rows: Floats) -> None:
-        left = np.hstack([self._left, rows]) if self._left.size else rows
+        left = np.hstack([self._left, rows])
         whole = left.shape[1] - left.shape[1] % self._group
         done = left[:, :whole] if self._group == 1 else extremes(left[:, :whole], self._group)
-        self._left = left[:, whole:]
-        self._points = np.hstack([self._points, done]) if self._points.size else done
+        self._left, self._points = left[:, whole:], np.hstack([self._points, done])
         while self._points.shape[1] > _MOST:
-            usable = self._points.shape[1] // 4 * 4
-            thinned = extremes(self._points[:, :usable], 4)
             # What is left of a group of four are the newest points; they stay as they are.
-            self._points = np.hstack([thinned, self._points[:, usable:]])
+            usable = self._points.shape[1] // 4 * 4
+            self._points = np.hstack([extremes(self._points[:, :usable], 4), self._points[:, usable:]])
             self._group = max(4, 2 * self._group)
 
     def _look_closely(self, tagged: Floats) -> None:
         """Compares intervals of equal length that overlap by half, by what was given back, in the last row."""
-        waiting = np.hstack([self._open, tagged]) if self._open.size else tagged
+        waiting = np.hstack([self._open, tagged])
         while waiting.shape[1] >= self._span:
             self._consider(waiting[:, : self._span])
             waiting = waiting[:, self._span // 2 :]

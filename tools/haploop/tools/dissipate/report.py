@@ -28,6 +28,24 @@ _PASSIVITY: dict[Passivity, str] = {
         "whether it is passive cannot be said"
     ),
 }
+_NAIVE = (
+    "That is the work of a force on the device, positive along the position, held to the next sample; a sensor's, "
+    "or one of a thinned-out recording, is not. The sum F v T would make it {naive}, off by {off}{share}."
+)
+# Counts of the notes, and what each of them means.
+_COUNTS = {
+    "gaps": "Gaps: {count}, {missing} in all; what happened there is not booked, and estimates begin anew after.",
+    "unusable_rows": "Rows left out, since a number in them is missing or not finite: {count}.",
+    "bridged": "Single missing samples, taken as the mean of their neighbours: {count}.",
+    "repeated": (
+        "{count} samples ({percent:.2g} %) repeat the one before in mid-motion, as where a sensor is read faster than "
+        "it measures: each looks like a stop and a jump, in which an inertia seems to generate energy."
+    ),
+    "uneven": (
+        "{count} periods are more than a tenth off the others; estimates take them for equal, as a controller does "
+        "that counts its ticks."
+    ),
+}
 
 
 def make_report(outcome: Outcome) -> RenderableType:
@@ -52,22 +70,17 @@ def make_row(element: ElementOutcome) -> tuple[str, ...]:
 
 
 def conclusion(outcome: Outcome) -> str:
+    """Returns who would have dissipated most, and who would have fed the motion; of a force alone its work."""
     if not outcome.elements and outcome.force:
         return _passivity(outcome.force)
-    ranked = sorted(outcome.elements, key=lambda element: element.true_J, reverse=True)
-    best, others = ranked[0], ranked[1:]
+    best, *others = sorted(outcome.elements, key=lambda element: element.true_J, reverse=True)
     if best.true_J <= 0.0:
         return "none of these would have dissipated; all would have fed the motion."
     words = f"{best.label} would have dissipated {amount(best.true_J, 'J')}"
-    if not others:
-        return f"{words}."
-    feeding = [element for element in others if element.true_J < 0.0]
-    taking = [element for element in others if element.true_J > 0.0]
-    parts = [f"{_times(best, element)} {element.label}" for element in taking[:2]]
-    if parts:
-        words += ", " + " and ".join(parts)
-    if feeding:
-        words += f"; {feeding[-1].label} would have fed {amount(-feeding[-1].true_J, 'J')} into the motion"
+    if taking := [f"{_times(best, other)} {other.label}" for other in others[:2] if other.true_J > 0.0]:
+        words += f", {' and '.join(taking)}"
+    if others and others[-1].true_J < 0.0:
+        words += f"; {others[-1].label} would have fed {amount(-others[-1].true_J, 'J')} into the motion"
     return f"{words}."
 
 
@@ -78,43 +91,24 @@ def _times(best: ElementOutcome, other: ElementOutcome) -> str:
 
 def note_sentences(outcome: Outcome) -> list[str]:
     """Returns notes on the recording and on the books, a sentence each."""
-    recording, (from_s, to_s) = outcome.recording, outcome.span_s
+    recording, force, (from_s, to_s) = outcome.recording, outcome.force, outcome.span_s
     notes, taken = recording.notes, " and ".join(sorted(recording.recorded))
     estimated = [name for name in ("velocity", "acceleration") if name not in recording.recorded]
     sentences = [
         f"{notes.rows} samples at {1.0 / recording.period_s:.6g} Hz, {from_s:g} to {to_s:g} s.",
         (f"Taken as recorded: {taken}. " if taken else "") + _estimates(outcome.scene, estimated),
         _truth(outcome),
-        *_force_sentences(outcome),
     ]
-    if notes.gaps:
-        sentences.append(
-            f"{notes.gaps} gap{'s' * (notes.gaps != 1)} of {amount(notes.missing_s, 's')} in all: what happened there "
-            "is not booked, and estimates begin anew after."
-        )
-    if notes.unusable_rows:
-        sentences.append(f"Rows left out, since a number in them is missing or not finite: {notes.unusable_rows}.")
-    if notes.bridged:
-        sentences.append(f"Single missing samples, taken as the mean of their neighbours: {notes.bridged}.")
-    if notes.repeated:
-        sentences.append(
-            f"{notes.repeated} samples ({100.0 * notes.repeated / notes.rows:.2g} %) repeat the one before in "
-            "mid-motion, as where a sensor is read faster than it measures: each looks like a stop and a jump, "
-            "in which an inertia seems to generate energy."
-        )
-    if notes.uneven:
-        sentences.append(
-            f"{notes.uneven} periods are more than a tenth off the others; estimates take them for equal, as a "
-            "controller does that counts its ticks."
-        )
+    if force and outcome.elements:
+        said = _passivity(force)
+        sentences.append(said[:1].upper() + said[1:])
+    if force:
+        sentences.append(_naive(force))
+    for name, sentence in _COUNTS.items():
+        if count := getattr(notes, name):
+            percent, missing = 100.0 * count / notes.rows, amount(notes.missing_s, "s")
+            sentences.append(sentence.format(count=count, percent=percent, missing=missing))
     return [sentence for sentence in [*sentences, *notes.remarks] if sentence]
-
-
-def _force_sentences(outcome: Outcome) -> list[str]:
-    if not outcome.force:
-        return []
-    said = _passivity(outcome.force)
-    return [*([said[:1].upper() + said[1:]] if outcome.elements else []), _naive(outcome.force)]
 
 
 def _passivity(force: ForceOutcome) -> str:
@@ -125,11 +119,7 @@ def _passivity(force: ForceOutcome) -> str:
 def _naive(force: ForceOutcome) -> str:
     true_J, off_J = force.books.true_J, abs(force.naive_J - force.books.true_J)
     share = f" ({100.0 * off_J / abs(true_J):.3g} % of it)" if true_J else ""
-    return (
-        "That is the work of a force on the device, positive along the position, held to the next sample; a sensor's, "
-        f"or one of a thinned-out recording, is not. The sum F v T would make it {amount(-force.naive_J, 'J')}, "
-        f"off by {amount(off_J, 'J')}{share}."
-    )
+    return _NAIVE.format(naive=amount(-force.naive_J, "J"), off=amount(off_J, "J"), share=share)
 
 
 def _estimates(scene: Scene, names: list[str]) -> str:
@@ -147,7 +137,9 @@ def _truth(outcome: Outcome) -> str:
     delay_s = outcome.recording.delay_s
     delay = f"{amount(delay_s, 's')} after their sample" if delay_s else "at once"
     if outcome.recording.between == "plant steps":
-        return f"True books: forces that act {delay}, over every step of the plant."
-    if outcome.books_agree:
-        return f"True books: forces that act {delay} on the recorded positions; they agree with the sampled ones."
-    return f"True books: forces that act {delay}, the device on straight lines between the samples."
+        where = ", over every step of the plant"
+    elif outcome.books_agree:
+        where = " on the recorded positions; they agree with the sampled ones"
+    else:
+        where = ", the device on straight lines between the samples"
+    return f"True books: forces that act {delay}{where}."
