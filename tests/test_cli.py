@@ -114,7 +114,7 @@ def test_replay_says_whether_every_bit_agreed(done, tmp_path):
     )
     bad = haploop("replay", str(other))
     assert bad.exit_code == 1
-    assert "/controller wall differs" in bad.stdout
+    assert "scene.toml is not the scene that the log holds" in bad.stdout
 
 
 @pytest.mark.parametrize(

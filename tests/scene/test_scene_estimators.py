@@ -32,7 +32,7 @@ def test_a_scene_that_names_one_resolves_to_si_numbers_and_to_itself():
         (
             {"velocity": {"estimator": "foaw"}},
             [
-                "velocity.ticks is missing. The foaw estimator needs a whole number, at least 1.",
+                "velocity.ticks is missing. The foaw estimator needs a whole number, at least 1 and at most 10000.",
                 "velocity.bound is missing. Without an [encoder] to take it from it must be a number in m, above 0, "
                 'or text with its unit such as "1 m".',
             ],

@@ -97,7 +97,7 @@ def test_extends_is_a_path_or_a_list_of_them(files, extends):
         (b'title = "\xff"', "A scene must be UTF-8 text, but byte 9 is not."),
         (b"a = 1\nb = = 2\n", "This is not TOML: Invalid value (at line 2, column 5)."),
         (b"seed = " + 5000 * b"9", "This is not TOML: "),
-        (b"a = " + 5000 * b"[", "The tables are nested too deeply."),
+        (b"a = " + 5000 * b"[", "Tables and lists may lie at most 32 deep in one another."),
     ],
 )
 def test_a_file_that_cannot_be_read_says_why(tmp_path, monkeypatch, content, sentence):

@@ -257,7 +257,7 @@ def test_a_run_without_log_or_without_ticks_says_so(tmp_path: Path) -> None:
     shutil.copytree(silent, tmp_path / "begun")
     begun = made(tmp_path / "whole", "tap") / "log.mcap"
     (tmp_path / "begun" / "log.mcap").write_bytes(begun.read_bytes()[:900])
-    with pytest.raises(FigureError, match="holds no tick yet"):
+    with pytest.raises(FigureError, match="holds no tick, so there is nothing to draw"):
         draw(tmp_path / "begun")
 
 

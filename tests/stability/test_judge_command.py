@@ -7,7 +7,7 @@ import json
 import pytest
 from typer.testing import CliRunner
 
-from haploop.launch.runs.replay import repeatable
+from haploop.launch.runs.replay import logged_run, repeatable
 from haploop.launch.stability.judge import judge_scene
 from haploop.tools.cli.app import app
 
@@ -36,7 +36,7 @@ def test_a_recorded_run_is_judged_from_its_log_and_the_swap_in_it(run):
     told = json.loads(result.stdout)
     assert told["word"] == "limit-cycle"
     assert told["chaotic"]
-    scene, kinds, events = repeatable(directory)
+    scene, kinds, events = repeatable(directory, logged_run(directory))
     assert judge_scene(scene, kinds, events).sentence() == told["sentence"]
     assert judge_scene(scene, kinds, [event for event in events if "swap" not in event[1]]).word == "steady"
 
@@ -64,4 +64,4 @@ def test_a_run_that_diverged_is_called_so(run):
 def test_a_directory_without_a_log_is_refused_with_what_is_missing(tmp_path):
     result = haploop("judge", str(tmp_path))
     assert result.exit_code == 2
-    assert "holds no scene.toml" in result.output
+    assert "holds no log.mcap" in result.output

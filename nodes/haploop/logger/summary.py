@@ -6,13 +6,16 @@ import contextlib
 import json
 import math
 import platform
-from collections.abc import Iterable, Sequence
+import zlib
+from collections.abc import Iterable, Mapping, Sequence
 from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from haploop.logger.books.books import BooksState, moved_J, residual_J, stored_J, total_J
+from haploop.logger.log import LogError
 from haploop.logger.verdict.measures import RunMeasures
+from haploop.protocol.files import read_text
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.transport.machine import MACHINE, Machine
 
@@ -112,16 +115,61 @@ def awaits_verdict(scene: Scene, summary: Summary) -> bool:
     return scene.run.verdict == "pushed" and by_itself and "stability" not in summary
 
 
+# Key of the checksum in summary.json: CRC-32 of all else in it.
+_CHECKSUM = "checksum"
+
+
 def write(summary: Summary, path: Path, machine: Machine = MACHINE) -> None:
     """Writes as JSON, in one piece: a reader never sees half a file. Numbers that are not finite become null."""
     temporary = path.with_suffix(".part")
+    content = finite(summary)
+    text = json.dumps({**content, _CHECKSUM: _checksum(content)}, indent=2)
     try:
-        machine.write(temporary, (json.dumps(finite(summary), indent=2) + "\n").encode())
+        machine.write(temporary, f"{text}\n".encode())
         machine.rename(temporary, path)
     except OSError:
         with contextlib.suppress(OSError):
             temporary.unlink()
         raise
+
+
+def _checksum(content: Summary) -> str:
+    return f"{zlib.crc32(json.dumps(content, sort_keys=True).encode()):08x}"
+
+
+def read(path: Path) -> Summary:
+    """Returns what ``write`` wrote; LogError where the file cannot be read, or holds something else."""
+    why = "it is damaged"
+    try:
+        summary = json.loads(read_text(path))
+        told = summary.pop(_CHECKSUM, None)
+        if told in (None, _checksum(summary)):
+            return summary
+        why = "it does not match its checksum"
+    except OSError as error:
+        why = (error.strerror or "it cannot be read").rstrip(".")
+    except (ValueError, RecursionError, AttributeError, TypeError) as error:
+        raise LogError(f"The summary {path} is no JSON object that haploop wrote, or {why}.") from error
+    raise LogError(f"The summary {path} cannot be used: {why}.")
+
+
+def misfit(found: Any, expected: Any, at: str = "") -> str:
+    """Returns the dotted key at which a summary is not of the expected types; "" for nowhere.
+
+    Args:
+        expected: a type or several, a table of such by key, or a list of the one that every entry is.
+    """
+    if isinstance(expected, Mapping):
+        if not isinstance(found, dict):
+            return at or "the whole"
+        inner = ((found.get(key, ...), one, key) for key, one in expected.items())
+    elif isinstance(expected, list):
+        if not isinstance(found, list):
+            return at
+        inner = ((entry, expected[0], str(number)) for number, entry in enumerate(found))
+    else:
+        return "" if isinstance(found, expected) else at
+    return next((key for value, one, name in inner if (key := misfit(value, one, f"{at}.{name}".lstrip(".")))), "")
 
 
 def finite(value: Any) -> Any:

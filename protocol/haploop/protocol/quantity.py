@@ -3,7 +3,24 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
+
+# Bounds of what can be meant, by unit: the largest size to either side, what that is like, and the least of what must
+# be above 0. Beyond them products overflow; what declares bounds of its own has those.
+MEANT: Mapping[str, tuple[float, str, float]] = {
+    "s": (1e9, "thirty years", 1e-9),
+    "m": (1e6, "a thousand kilometres", 1e-15),
+    "m/s": (1e6, "two thousand times the speed of sound", 1e-12),
+    "m/s^2": (1e9, "a hundred million times gravity", 1e-12),
+    "kg": (1e6, "a thousand tonnes", 1e-9),
+    "N": (1e6, "the weight of a hundred tonnes", 1e-15),
+    "N/m": (1e9, "a steel bar a metre long and eight centimetres thick", 1e-9),
+    "N s/m": (1e9, "a newton at a nanometre a second", 1e-12),
+    "Hz": (1e12, "a thousand times the clock of a computer", 1e-9),
+    "rad": (1e6, "more than a hundred thousand turns", 1e-12),
+    "m/s^2/Hz^0.5": (1e6, "a sensor that measures nothing but its noise", 1e-15),
+}
 
 
 @dataclass(frozen=True)
@@ -15,7 +32,7 @@ class Quantity:
 
     Attributes:
         unit: SI unit in the spelling of pint (``"N s/m"``), ``""`` for a bare number.
-        at_least, above, at_most, below: bounds, each optional.
+        at_least, above, at_most, below: bounds, each optional; those of ``MEANT`` stand in for the ones left out.
         about: the meaning of the number in a few words, for editors.
         whole: only whole numbers, held as int.
     """
@@ -37,6 +54,9 @@ class Quantity:
         """Returns what is wrong with ``value`` ("must be above 0 kg"), or None when it may be used."""
         if not math.isfinite(value):
             return "must be a finite number" + (f" of {self.unit}" if self.unit else "")
+        return self._out_of_bounds(value) or self._not_meant(value)
+
+    def _out_of_bounds(self, value: float) -> str | None:
         for holds, bound, words in (
             (self.at_least is None or value >= self.at_least, self.at_least, "at least"),
             (self.above is None or value > self.above, self.above, "above"),
@@ -45,6 +65,18 @@ class Quantity:
         ):
             if not holds:
                 return f"must be {words} {bound:g} {self.unit}".rstrip()
+        return None
+
+    def _not_meant(self, value: float) -> str | None:
+        if self.unit not in MEANT:
+            return None
+        most, like, least = MEANT[self.unit]
+        if value > most and self.at_most is None and self.below is None:
+            return f"must be at most {most:g} {self.unit}, which is {like}"
+        if value < -most and self.at_least is None and self.above is None:
+            return f"must be at least {-most:g} {self.unit}, which is {like} to the other side"
+        if self.above == 0 and value < least:
+            return f"must be at least {least:g} {self.unit}; with less, numbers of a loop overflow"
         return None
 
 

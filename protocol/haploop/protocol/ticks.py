@@ -13,6 +13,8 @@ from haploop.protocol.scene.scene import Clock, Scene
 _WHOLE_WITHIN = 1e-6
 # The key of a scene by which the delay is set, also while a loop runs.
 DELAY = "clock.round_trip_delay"
+# What one run can hold in memory and come to the end of: plant steps in a tick, commands on their way, ticks in all.
+_MOST_STEPS, _MOST_ON_THEIR_WAY, _MOST_TICKS = 10_000, 100_000, 10**10
 
 
 class TimebaseError(ValueError):
@@ -54,10 +56,21 @@ class Timebase:
                 f"plant_rate must be a whole multiple of control_rate, "
                 f"but {plant_rate} Hz is {plant_rate / control_rate:.6g} times {control_rate} Hz."
             )
+        elif plant_rate > _MOST_STEPS * control_rate:
+            complaints.append(
+                f"plant_rate must be at most {_MOST_STEPS} times control_rate, since the steps of a tick are held at "
+                f"once, but {plant_rate} Hz is {plant_rate // control_rate} times {control_rate} Hz."
+            )
         delay_steps = whole_count(delay, plant_rate, "round_trip_delay", "plant steps", complaints)
+        complaints += too_long("round_trip_delay", delay, control_rate)
         ticks = whole_count(duration, control_rate, "duration", "control ticks", complaints)
         if not complaints and ticks < 1:
             complaints.append(f"duration must cover at least one control tick, {1 / control_rate:g} s.")
+        if ticks > _MOST_TICKS:
+            complaints.append(
+                f"duration must cover at most {_MOST_TICKS} control ticks, {_MOST_TICKS / control_rate:g} s, since no "
+                "run would come to its end."
+            )
         if complaints:
             raise TimebaseError("\n".join(complaints))
         return cls(plant_rate, control_rate, delay_steps, ticks)
@@ -119,6 +132,14 @@ def whole_count(seconds: float, rate: int, name: str, units: str, complaints: li
             f"the nearest legal values are {low:.9g} s and {high:.9g} s."
         )
     return nearest
+
+
+def too_long(name: str, delay_s: float, control_rate: int) -> list[str]:
+    """Returns a complaint of a delay in which more commands are on their way than can be held; none of another."""
+    if delay_s * control_rate <= _MOST_ON_THEIR_WAY:
+        return []
+    most_s = _MOST_ON_THEIR_WAY / control_rate
+    return [f"{name} must be at most {most_s:g} s at {control_rate} Hz: the commands on their way are held at once."]
 
 
 # A block that takes no longer than this is never far behind what a viewer shows or a killed run leaves in its log.

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import json
 import tempfile
 from pathlib import Path
 
@@ -12,12 +11,12 @@ import numpy as np
 import haploop.logger
 from haploop.controller.dissipation import Element, load_plugin, registry
 from haploop.launch.runs.in_process import run_in_process
-from haploop.launch.scene.file import load
+from haploop.launch.runs.run_files import recorded_log, recorded_scene, recorded_summary
 from haploop.launch.spec import PLUGINS, SCENE, RunFailed
 from haploop.logger.log.recording import Recording
-from haploop.logger.session import SUMMARY
 from haploop.logger.summary import Summary, finite
 from haploop.protocol.changes import Event
+from haploop.protocol.files import read_file
 from haploop.protocol.scene.scene import Scene
 
 
@@ -32,10 +31,12 @@ class Replay:
     Attributes:
         summary: of the repetition.
         differences: where recorded and repeated run disagree, as sentences; empty when every bit agreed.
+        cut: where the log ends if it was cut off, else "".
     """
 
     summary: Summary
     differences: list[str]
+    cut: str
 
 
 def replay(directory: Path) -> Replay:
@@ -46,57 +47,68 @@ def replay(directory: Path) -> Replay:
     Raises:
         ReplayError, LogError, SceneError: the directory does not hold a run that can be repeated.
     """
-    recorded = _recorded(directory)
-    scene, kinds, events = _repeatable(directory, recorded)
+    recorded = logged_run(directory)
+    scene, kinds, events = repeatable(directory, recorded)
+    before = recorded_summary(directory)
     with tempfile.TemporaryDirectory(prefix="haploop-replay-") as scratch:
         try:
             summary = run_in_process(scene, kinds, out=Path(scratch), events=events)
         except RunFailed:  # then ticks are missing, and the comparison says so
-            summary = _summary(Path(scratch)) or {}
+            summary = recorded_summary(Path(scratch)) or {}
         repeated = haploop.logger.read(scratch)
-    before = _summary(directory)
     failed = before is not None and before["ended"] == "failed"
-    differences = _compare(recorded, repeated, failed)
+    differences = _compare_scenes(directory, recorded) + _compare(recorded, repeated, failed)
     if before and not failed:
         differences += _compare_summaries(before, finite(summary))
-    return Replay(summary, differences)
+    return Replay(summary, differences, recorded.cut)
 
 
-def repeatable(directory: Path) -> tuple[Scene, dict[str, type[Element]], list[tuple[int, Event]]]:
-    """Returns what a run can be repeated from: its scene, the elements at hand, and every event by its tick.
+def logged_run(directory: Path) -> Recording:
+    """Returns the log of a run that can be repeated, from its first tick on.
 
     Raises:
-        ReplayError, LogError, SceneError: the directory does not hold a run that can be repeated.
+        ReplayError: there is no log, or none from tick 0 on, or it holds no tick.
+        LogError: it cannot be read.
     """
-    return _repeatable(directory, _recorded(directory))
-
-
-def _repeatable(
-    directory: Path, recorded: Recording
-) -> tuple[Scene, dict[str, type[Element]], list[tuple[int, Event]]]:
-    kinds = registry([directory / PLUGINS / name for name in _launch_plugins(directory, recorded)])
-    scene = load(directory / SCENE, (), kinds)
-    events = [_event(dict(event), directory) for event in recorded["/events"]] if "/events" in recorded else []
-    logged = len(recorded["/controller"]["x"]) if "/controller" in recorded else 0
-    return scene, kinds, [*events, (logged, {"stop": True})]  # one that was cut off: as far as its log goes
-
-
-def _recorded(directory: Path) -> Recording:
-    if not (directory / SCENE).is_file():
-        raise ReplayError(f"{directory} holds no {SCENE}; a directory that haploop run has written was expected.")
     try:
-        recorded = haploop.logger.read(directory)
+        recorded = recorded_log(directory)
     except FileNotFoundError as error:
         raise ReplayError(str(error)) from error
     seen = recorded["/controller"]["timestamp"][:1] if "/controller" in recorded else []
-    if any(t > 0.0 for t in seen):
+    if not len(seen):
+        raise ReplayError(f"The log in {directory} holds no tick, so there is nothing to repeat. {recorded.cut}")
+    if seen[0] > 0.0:
         raise ReplayError(f"{directory} was logged from {seen[0]:g} s on; replay the directory of the run itself.")
     return recorded
 
 
-def _summary(directory: Path) -> Summary | None:
-    file = directory / SUMMARY
-    return json.loads(file.read_text(encoding="utf-8")) if file.is_file() else None
+def repeatable(directory: Path, recorded: Recording) -> tuple[Scene, dict[str, type[Element]], list[tuple[int, Event]]]:
+    """Returns what a run can be repeated from: its scene, the elements at hand, and every event by its tick.
+
+    Args:
+        recorded: its log, as ``logged_run`` returns it.
+
+    Raises:
+        ReplayError, SceneError: the directory does not hold a run that can be repeated.
+    """
+    kinds = registry([directory / PLUGINS / name for name in _launch_plugins(directory, recorded)])
+    scene = recorded_scene(directory, recorded.attachments, kinds)
+    if scene is None:
+        raise ReplayError(f"{directory} holds no {SCENE}; a directory that haploop run has written was expected.")
+    events = [_event(dict(event), directory) for event in recorded.get("/events", [])]
+    # One that was cut off is repeated as far as its log goes.
+    return scene, kinds, [*events, (len(recorded["/controller"]["x"]), {"stop": True})]
+
+
+def _compare_scenes(directory: Path, recorded: Recording) -> list[str]:
+    held, file = recorded.attachments.get(SCENE), directory / SCENE
+    if held is None:
+        return []
+    try:
+        same = read_file(file) == held
+    except OSError as error:
+        return [f"{file} cannot be read: {error.strerror}."]
+    return [] if same else [f"{file} is not the scene that the log holds, from which the run was repeated."]
 
 
 def _launch_plugins(directory: Path, recorded: Recording) -> list[str]:

@@ -15,7 +15,7 @@ from haploop.launch.scene.number import Number
 from haploop.protocol.changes import Event
 from haploop.protocol.scene.scene import NO_ELEMENT, Clock, ElementTable, EventTable, Scene, Wall
 from haploop.protocol.scene.table import Tables
-from haploop.protocol.ticks import DELAY, Timebase, whole_count
+from haploop.protocol.ticks import DELAY, Timebase, too_long, whole_count
 
 if TYPE_CHECKING:
     from haploop.controller.dissipation import Element
@@ -111,6 +111,7 @@ def _setting(
         complaints: list[str] = []
         if name == DELAY and time:
             whole_count(value, time.plant_rate, "It", "plant steps", complaints)
+            complaints += too_long("It", value, time.control_rate)
         for sentence in complaints:
             layers.complain(key, sentence)
         return value

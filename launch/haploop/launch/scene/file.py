@@ -11,6 +11,7 @@ from haploop.launch.scene.check import resolve
 from haploop.launch.scene.layers import Layers, lay_overrides, read_layers
 from haploop.launch.scene.mistakes import COMMAND_LINE
 from haploop.launch.scene.models import fault
+from haploop.protocol.files import read_text
 from haploop.protocol.scene.scene import Scene
 
 if TYPE_CHECKING:
@@ -77,13 +78,15 @@ def read_trace(path: Path) -> tuple[list[float], list[float]]:
         TraceError: no such file, not text, or a line that is no pair of numbers, with its line number.
     """
     try:
-        lines = path.read_text(encoding="utf-8-sig").splitlines()
+        rows = list(csv.reader(read_text(path).splitlines()))
     except UnicodeDecodeError as error:
         raise TraceError(f"The recording must be UTF-8 text, but byte {error.start} is not.") from error
     except OSError as error:
         raise TraceError(f"The recording cannot be read: {error.strerror}.") from error
+    except csv.Error as error:
+        raise TraceError("The recording must be lines of two numbers, but a cell is longer than any number.") from error
     numbers, times, forces = [], [], []
-    for number, cells in enumerate(csv.reader(lines), start=1):
+    for number, cells in enumerate(rows, start=1):
         if not any(cell.strip() for cell in cells):
             continue
         try:

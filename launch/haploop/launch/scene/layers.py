@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import tomllib
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
@@ -11,9 +12,13 @@ from typing import Any
 
 from haploop.launch.scene.mistakes import COMMAND_LINE, Mistake, SceneError, counted, shown
 from haploop.launch.scene.toml_writer import inline
+from haploop.protocol.files import read_text
 from haploop.protocol.scene.table import Tables
 
 KeyPath = tuple[str | int, ...]
+# No scene needs tables deeper in one another than this, nor more files that extend one another, nor more keys outside
+# of lists; a thousand of them would end the program.
+_DEEPEST, _MOST_FILES, _MOST_KEYS = 32, 100, 2000
 # Keys that say what else is in their table, each with the keys that are there whatever it says.
 _SORTS = {"kind": (), "estimator": ("source", "cutoff")}
 
@@ -24,12 +29,14 @@ class Layers:
 
     Attributes:
         origins: the file, or ``"--set"``, that gave each value, and the last file that wrote into each table.
+        files: how many have been read.
     """
 
     path: Path
     data: Tables = field(default_factory=dict)
     origins: dict[KeyPath, str] = field(default_factory=dict)
     mistakes: list[Mistake] = field(default_factory=list)
+    files: int = 0
 
     def origin(self, key: KeyPath) -> str:
         """Returns the file that gave the value at ``key``, or the table nearest to it."""
@@ -98,7 +105,13 @@ def read_layers(path: Path) -> Layers:
 
 def _read(layers: Layers, path: Path, chain: tuple[Path, ...]) -> None:
     """Lays the file at ``path`` on, after what it extends."""
-    here = path.resolve()
+    here = Path(os.path.realpath(path))  # where links lead in a circle, reading the file says so
+    layers.files += 1
+    if len(chain) > _DEEPEST or layers.files > _MOST_FILES:
+        many = f"At most {_DEEPEST} files that extend one another, and {_MOST_FILES} in all, were expected."
+        if layers.files <= _MOST_FILES + 1:
+            layers.mistakes.append(Mistake(shown(path), "", "", many))
+        return
     if here in chain:
         circle = " extends ".join(shown(p) for p in (*chain[chain.index(here) :], here))
         layers.mistakes.append(Mistake(shown(chain[-1]), "", "", f"A scene cannot extend itself: {circle}."))
@@ -110,7 +123,7 @@ def _read(layers: Layers, path: Path, chain: tuple[Path, ...]) -> None:
         return
     below = table.pop("extends", [])
     names = [below] if isinstance(below, str) else below
-    if not isinstance(names, list) or not all(isinstance(name, str) and name for name in names):
+    if not isinstance(names, list) or not all(isinstance(name, str) and name and "\0" not in name for name in names):
         expected = "It must be the path of a scene file, or a list of them."
         layers.mistakes.append(Mistake(shown(path), "extends", f"is {_quoted(below)}", expected))
         return
@@ -125,9 +138,10 @@ def parse(path: Path, what: str = "scene", needs: str = "a duration and a [devic
     Raises SceneError where it is missing, empty, no file, no text or no TOML (with line and column).
     """
     try:
-        if table := tomllib.loads(path.read_bytes().decode("utf-8-sig")):
+        if not (table := tomllib.loads(read_text(path))):
+            problem = f"The file is empty; a {what} needs at least {needs}."
+        elif not (problem := _excess(table)):
             return table
-        problem = f"The file is empty; a {what} needs at least {needs}."
     except FileNotFoundError:
         problem = "There is no such file."
     except IsADirectoryError:
@@ -139,8 +153,27 @@ def parse(path: Path, what: str = "scene", needs: str = "a duration and a [devic
     except ValueError as error:
         problem = f"This is not TOML: {error}."
     except RecursionError:
-        problem = "The tables are nested too deeply."
+        problem = _TOO_DEEP
     raise SceneError([Mistake(shown(path), "", "", problem)])
+
+
+_TOO_DEEP = f"Tables and lists may lie at most {_DEEPEST} deep in one another."
+
+
+def _excess(value: Any) -> str:
+    """Returns what there is too much of in a value that was read, as a sentence; "" for nothing."""
+    level, depth = [value], 0
+    while level:
+        inner = [one for node in level for one in (node.values() if isinstance(node, dict) else node)]
+        level, depth = [one for one in inner if isinstance(one, dict | list)], depth + 1
+        if depth > _DEEPEST:
+            return _TOO_DEEP
+    keys = _count_keys(value)
+    return f"There are {keys} keys, and {_MOST_KEYS} at most were expected." if keys > _MOST_KEYS else ""
+
+
+def _count_keys(value: Any) -> int:
+    return len(value) + sum(map(_count_keys, value.values())) if isinstance(value, dict) else 0
 
 
 def lay_overrides(layers: Layers, overrides: Iterable[str]) -> None:
@@ -154,7 +187,7 @@ def lay_overrides(layers: Layers, overrides: Iterable[str]) -> None:
         path = key_path(name)
         if not path:
             expected = "It must read KEY=VALUE with a dotted key, such as dissipation.0.mass=0.02."
-            layers.mistakes.append(Mistake(COMMAND_LINE, text, "cannot be read", expected))
+            layers.mistakes.append(Mistake(COMMAND_LINE, _shortened(text), "cannot be read", expected))
         elif complaint := lay_value(layers, path, value):
             layers.mistakes.append(Mistake(COMMAND_LINE, name, "cannot be set", complaint))
 
@@ -193,13 +226,13 @@ def key_path(name: str) -> tuple[str, ...]:
     """Returns the parts of a dotted key, read as TOML reads it, so that a part may be quoted; () for no key."""
     try:
         node: Any = tomllib.loads(f"{name} = 0") if "\n" not in name else {}
-    except ValueError:
+    except (ValueError, RecursionError):
         return ()
     path = []
     while isinstance(node, dict) and node:
         [(part, node)] = node.items()
         path.append(part)
-    return tuple(path)
+    return tuple(path) if len(path) <= _DEEPEST else ()
 
 
 def split_assignment(text: str) -> tuple[str, Any] | None:
@@ -209,9 +242,9 @@ def split_assignment(text: str) -> tuple[str, Any] | None:
         return None
     try:
         table = tomllib.loads(f"value = {value}")
-    except ValueError:
+    except (ValueError, RecursionError):
         return name.strip(), value.strip()
-    return name.strip(), table["value"] if len(table) == 1 else value.strip()
+    return name.strip(), table["value"] if len(table) == 1 and not _excess(table) else value.strip()
 
 
 def _quoted(value: Any) -> str:
@@ -219,4 +252,10 @@ def _quoted(value: Any) -> str:
         text = inline(value)
     except TypeError:
         text = str(value)
+    except ValueError:  # Python writes no number of more than some thousand digits
+        text = "a number of thousands of digits"
+    return _shortened(text)
+
+
+def _shortened(text: str) -> str:
     return text if len(text) <= 60 else f"{text[:57]}..."

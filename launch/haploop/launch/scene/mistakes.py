@@ -9,6 +9,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 COMMAND_LINE = "--set"
+# So many mistakes are told; who has more has one that makes the others.
+_MOST_TOLD = 50
 
 
 @dataclass(frozen=True)
@@ -41,7 +43,9 @@ class SceneError(ValueError):
 
     def __init__(self, mistakes: Iterable[Mistake]) -> None:
         self.mistakes = list(dict.fromkeys(mistakes))
-        super().__init__("\n".join(map(str, self.mistakes)))
+        told = [str(mistake) for mistake in self.mistakes[:_MOST_TOLD]]
+        more = len(self.mistakes) - len(told)
+        super().__init__("\n".join([*told, f"... and {counted(more, 'more mistake')}."] if more else told))
 
 
 def nearest(name: object, allowed: Iterable[str]) -> str | None:

@@ -12,6 +12,7 @@ from types import ModuleType
 from typing import Any
 
 from haploop.controller.dissipation.element import Element
+from haploop.protocol.files import read_text
 from haploop.protocol.installed import entry_points_of
 
 ENTRY_POINT_GROUP = "haploop.dissipation"
@@ -56,9 +57,11 @@ def load_plugin(path: Path) -> dict[str, type[Element]]:
         PluginError: the file cannot be read or run, or defines no usable element.
     """
     try:
-        source = Path(path).read_text(encoding="utf-8")
-    except (OSError, ValueError) as error:
-        raise PluginError(f"The plugin {path} does not load: {type(error).__name__}: {error}") from error
+        source = read_text(path)
+    except OSError as error:
+        raise PluginError(f"The plugin {path} does not load: {error.strerror}.") from error
+    except UnicodeDecodeError as error:
+        raise PluginError(f"The plugin {path} does not load: byte {error.start} is not UTF-8 text.") from error
     return load_source(source, str(path))
 
 

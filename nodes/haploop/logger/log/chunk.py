@@ -121,14 +121,17 @@ class FreeRows:
         self._log_times: list[int] = []
 
 
-def chunk(rows: Sequence[TableRows | FreeRows], start: int, compression: Compression) -> tuple[bytes, ChunkIndex]:
+def chunk(
+    rows: Sequence[TableRows | FreeRows], start: int, compression: Compression, described: bytes = b""
+) -> tuple[bytes, ChunkIndex]:
     """Returns a chunk and the message indexes that follow it, as bytes, and the chunk's index for the file's summary.
 
     Args:
         rows: the messages, at least one channel's and at least one message each.
         start: byte of the file at which the chunk is to stand.
+        described: schema and channel records that are to stand before the messages.
     """
-    body = b"".join([some.body() for some in rows])
+    body = b"".join([described, *(some.body() for some in rows)])
     packed = body
     if compression == "lz4":
         import lz4.frame
@@ -139,7 +142,7 @@ def chunk(rows: Sequence[TableRows | FreeRows], start: int, compression: Compres
     piece = RecordBuilder()
     Chunk(compression, packed, end, begin, zlib.crc32(body), len(body)).write(piece)
     chunk_bytes = piece.count
-    base, index_offsets = 0, {}
+    base, index_offsets = len(described), {}
     for some in rows:
         # A MessageIndex record, which the library would compose pair by pair.
         pairs = np.stack((some.log_times(), np.uint64(base) + some.offsets()), axis=1).astype("<u8").tobytes()

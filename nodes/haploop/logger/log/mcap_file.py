@@ -19,6 +19,8 @@ from haploop.logger.log import LogError
 from haploop.protocol.transport.machine import MACHINE, Machine
 
 MAGIC = b"\x89MCAP0\r\n"
+# What the header says of the program that wrote the file.
+LIBRARY = "haploop"
 _CRC_BYTES = 4
 
 
@@ -34,6 +36,7 @@ class McapFile:
         """Makes the file and begins it; raises LogError where the operating system refuses."""
         self.path = Path(path)
         self.size = 0
+        self._crc = 0
         self.schemas: list[mcap.Schema] = []
         self.channels: list[mcap.Channel] = []
         self.chunks: list[mcap.ChunkIndex] = []
@@ -47,7 +50,7 @@ class McapFile:
             raise LogError(
                 f"The log {self.path} cannot be made ({error.strerror}); name a directory that exists and is writable."
             ) from error
-        self.append(MAGIC + bytes_of(mcap.Header(profile="", library="haploop")))
+        self.append(MAGIC + bytes_of(mcap.Header(profile="", library=LIBRARY)))
 
     def append(self, piece: bytes) -> None:
         """Hands a piece to the operating system.
@@ -66,6 +69,7 @@ class McapFile:
         except OSError as error:
             self._fail(error)
         self.size += len(piece)
+        self._crc = zlib.crc32(piece, self._crc)
 
     def _fail(self, error: OSError) -> NoReturn:
         # A device or a pipe cannot be cut back; it was never a log that could be read again.
@@ -89,7 +93,7 @@ class McapFile:
 
     def append_summary(self) -> None:
         """Ends the file, from the DataEnd record on; raises LogError as ``append`` does."""
-        data_end = bytes_of(mcap.DataEnd(data_section_crc=0))
+        data_end = bytes_of(mcap.DataEnd(data_section_crc=self._crc))
         start = self.size + len(data_end)
         statistics = mcap.Statistics(
             attachment_count=len(self.attachments),

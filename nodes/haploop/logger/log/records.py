@@ -31,9 +31,14 @@ _MESSAGE = struct.Struct("<HIQQ")
 
 @dataclass(frozen=True)
 class MessageRun:
-    """Messages of one channel and one length: log times in ns, shape (messages,), and their bytes, end to end."""
+    """Messages of one channel and one length: log times in ns, shape (messages,), and their bytes, end to end.
+
+    Attributes:
+        sequence: number of the first on its channel, as the file has it.
+    """
 
     channel: int
+    sequence: int
     log_times_ns: NDArray[np.uint64]
     payloads: bytes
     message_bytes: int
@@ -60,9 +65,21 @@ def chunk_body(content: bytes) -> bytes:
     return body.read(size)
 
 
+def frame(opcode: int, length: int) -> bytes:
+    """Returns what stands before the content of a record."""
+    return _PREFIX.pack(opcode, length)
+
+
+def demand_index(content: bytes) -> None:
+    """Raises ValueError where an index of messages is none: a chunk with a flipped bit before it may pass for one."""
+    head = 6
+    if len(content) != head + int.from_bytes(content[2:head], "little"):
+        raise ValueError("an index of messages is longer or shorter than it says")
+
+
 def lone_message(content: bytes) -> bytes:
     """Returns a message that stands outside of any chunk, as a chunk's body would hold it."""
-    return _PREFIX.pack(Opcode.MESSAGE, len(content)) + content
+    return frame(Opcode.MESSAGE, len(content)) + content
 
 
 def parts(body: bytes) -> Iterator[MessageRun | tuple[int, bytes]]:
@@ -94,9 +111,9 @@ def _run(body: bytes, start: int, end: int) -> tuple[MessageRun, int]:
     alike = (messages[:, : head_end - start] == messages[0, : head_end - start]).all(axis=1)
     messages = messages if alike.all() else messages[: alike.argmin()]
     data = _PREFIX.size + _MESSAGE.size
-    channel, _, _, _ = _MESSAGE.unpack_from(body, start + _PREFIX.size)
+    channel, sequence, _, _ = _MESSAGE.unpack_from(body, start + _PREFIX.size)
     log_times = messages[:, data - 16 : data - 8].copy().view("<u8")[:, 0]
-    return MessageRun(channel, log_times, messages[:, data:].tobytes(), size - data), start + messages.size
+    return MessageRun(channel, sequence, log_times, messages[:, data:].tobytes(), size - data), start + messages.size
 
 
 @dataclass(frozen=True)
@@ -123,7 +140,8 @@ class LogChannel:
                 rows = [[float(one.get(name, "nan")) for name in units] for of_message in maps for one in of_message]
                 rows_each = [len(of_message) for of_message in maps]
                 columns = list(np.array(rows, np.float64).reshape(-1, len(units)).T)
-        except (ValueError, TypeError, AttributeError) as error:
-            raise LogError(f"A message on {self.topic} is no msgpack map of its schema's numbers: {error}.") from error
+        except (ValueError, TypeError, AttributeError, OverflowError) as error:
+            what = f"of the numbers {', '.join(units)} of its schema" if units else "at all"
+            raise LogError(f"A message on {self.topic} is no msgpack map {what}.") from error
         kept = ((name, column) for name, column in zip(units, columns, strict=True) if names is None or name in names)
         return np.repeat(log_times_ns, rows_each), Table(kept, units)

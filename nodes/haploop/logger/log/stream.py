@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import struct
+import zlib
 from collections.abc import Collection, Iterator
 from io import BytesIO
 from pathlib import Path
@@ -12,16 +13,29 @@ import numpy as np
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
-from mcap.records import Attachment, Channel, Schema
+from mcap.records import Attachment, Channel, DataEnd, Header, Schema
 from numpy.typing import NDArray
 
 from haploop.logger.log import LogError
-from haploop.logger.log.mcap_file import MAGIC
+from haploop.logger.log.mcap_file import LIBRARY, MAGIC
 from haploop.logger.log.recording import Recording, Rows, join, merge_columns
-from haploop.logger.log.records import LogChannel, MessageRun, chunk_body, lone_message, parts, records
+from haploop.logger.log.records import (
+    LogChannel,
+    MessageRun,
+    chunk_body,
+    demand_index,
+    frame,
+    lone_message,
+    parts,
+    records,
+)
 from haploop.logger.log.table import TableLayout
+from haploop.protocol.files import demand_regular
 
-_DAMAGE = (ValueError, OverflowError, RuntimeError, struct.error, McapError)
+_DAMAGE = (ValueError, OverflowError, RuntimeError, MemoryError, struct.error, McapError)
+_CRC_BYTES = 4
+# Records that may stand in the data and say nothing of it; from a number on they are those of other programs.
+_PASSED_OVER, _PRIVATE = (Opcode.METADATA, Opcode.FOOTER), 0x80
 
 
 class Batch(NamedTuple):
@@ -78,11 +92,17 @@ class LogStream:
         self.units: dict[str, dict[str, str]] = {}
         self.attachments: dict[str, bytes] = {}
         self.read_bytes = len(MAGIC)
-        self._open_end = "it has no closing summary"
+        self._open_end, self._flaw = "it has no closing summary", ""
         self._schemas: dict[int, Schema] = {}
         self._channels: dict[int, LogChannel] = {}
-        with self.path.open("rb") as file:
-            start = file.read(len(MAGIC))
+        # Messages gone through by channel; None in a log of another program, which need not number its messages.
+        self._counts: dict[int, int] | None = None
+        self._crc, self._is_over = zlib.crc32(MAGIC), False
+        try:
+            with self.path.open("rb") as file:
+                start = file.read(len(MAGIC))
+        except OSError as error:
+            raise LogError(f"The log {self.path} cannot be read: {error.strerror}.") from error
         if not start:
             raise LogError(f"The log {self.path} is empty: the run ended before anything was written to it.")
         if start != MAGIC:
@@ -90,11 +110,11 @@ class LogStream:
 
     @property
     def cut(self) -> str:
-        """Sentence on where the file ends, "" once it was read to the end it should have."""
+        """Sentence on where the file ends or what of it is damaged, "" for one read to the end it should have."""
         if not self._open_end:
-            return ""
+            return self._flaw
         where = f"it was read up to byte {self.read_bytes} ({self._open_end})"
-        return f"The log {self.path} was cut off or is still being written; {where}."
+        return f"The log {self.path} was cut off or is still being written; {where}. {self._flaw}".rstrip()
 
     def _is_chosen(self, topic: str) -> bool:
         return self._topics is None or topic in self._topics
@@ -122,39 +142,80 @@ class LogStream:
                             return
                         self._open_end = ""
                     self.read_bytes = file.tell()
+                    self._crc = zlib.crc32(content, zlib.crc32(frame(opcode, len(content)), self._crc))
                     yield from batches
             except _DAMAGE as damage:
                 self._open_end = f"what follows is damaged: {damage or type(damage).__name__}"
 
     def _take(self, opcode: int, content: bytes) -> list[Batch]:
         """Returns the batches in one record of the file; indexes and the summary are passed over."""
+        if self._is_over:
+            return []
         if opcode == Opcode.CHUNK:
             return self._batches(chunk_body(content))
         if opcode == Opcode.MESSAGE:
             return self._batches(lone_message(content))
-        self._register(opcode, content)
+        if opcode == Opcode.ATTACHMENT:
+            self._attach(content)
+        elif opcode == Opcode.HEADER:
+            self._counts = {} if Header.read(ReadDataStream(BytesIO(content))).library == LIBRARY else None
+        elif opcode == Opcode.DATA_END:
+            self._is_over = True
+            told = DataEnd.read(ReadDataStream(BytesIO(content))).data_section_crc
+            if told and told != self._crc:
+                self._blame("its bytes do not match the checksum at its end")
+        elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
+            self._register(opcode, content)
+        elif opcode == Opcode.MESSAGE_INDEX:
+            demand_index(content)
+        elif opcode not in _PASSED_OVER and (self._counts is not None or opcode < _PRIVATE):
+            raise ValueError(f"a record of kind {opcode} is none of the data of a log")
         return []
+
+    def _blame(self, what: str) -> None:
+        self._flaw = self._flaw or f"The log {self.path} is damaged: {what}."
+
+    def _attach(self, content: bytes) -> None:
+        told = int.from_bytes(content[-_CRC_BYTES:], "little")
+        if told and told != zlib.crc32(content[:-_CRC_BYTES]):
+            self._blame(f"the file attached at byte {self.read_bytes} does not match its checksum and was left out")
+            return
+        attachment = Attachment.read(ReadDataStream(BytesIO(content)))
+        self.attachments[attachment.name] = attachment.data
 
     def _batches(self, body: bytes) -> list[Batch]:
         found: dict[str, dict[int, list[MessageRun]]] = {}
         for part in parts(body):
             if not isinstance(part, MessageRun):
                 self._register(*part)
-            elif part.channel not in self._channels:
+                continue
+            if part.channel not in self._channels:
                 raise ValueError(f"a message of channel {part.channel} came before the channel")
-            elif self._is_chosen(topic := self._channels[part.channel].topic):
+            topic = self._channels[part.channel].topic
+            if self._counts is not None:
+                self._count(part, topic)
+            if self._is_chosen(topic):
                 found.setdefault(topic, {}).setdefault(part.channel, []).append(part)
         return [
             Batch(topic, *join([self._channels[number].decode(some, self._columns) for number, some in runs.items()]))
             for topic, runs in found.items()
         ]
 
+    def _count(self, run: MessageRun, topic: str) -> None:
+        """Follows the numbers of the messages; raises ValueError where some are missing."""
+        assert self._counts is not None
+        before = self._counts.get(run.channel, 0)
+        if run.sequence != before & 0xFFFFFFFF:
+            raise ValueError(f"message {before} of {topic} should come, but it is message {run.sequence}")
+        self._counts[run.channel] = before + len(run.log_times_ns)
+
     def _register(self, opcode: int, content: bytes) -> None:
+        """Takes in a schema or a channel; one that stands in a chunk, under its checksum, replaces one that does not.
+
+        Raises LogError for channels that are none of a run's.
+        """
         stream = ReadDataStream(BytesIO(content))
-        if opcode == Opcode.ATTACHMENT:
-            attachment = Attachment.read(stream)
-            self.attachments[attachment.name] = attachment.data
-        elif opcode == Opcode.SCHEMA:
+        if opcode == Opcode.SCHEMA:
             schema = Schema.read(stream)
             self._schemas[schema.id] = schema
         elif opcode == Opcode.CHANNEL:
@@ -163,11 +224,13 @@ class LogStream:
                 raise LogError(f"The channel {channel.topic} is {channel.message_encoding}; a run's log is msgpack.")
             schema = self._schemas.get(channel.schema_id)
             layout = TableLayout.from_json_schema(schema.data if schema else b"")
-            known = self.units.setdefault(channel.topic, dict(layout.columns))
-            if bool(known) != bool(layout.columns):
-                raise LogError(f"The topic {channel.topic} mixes messages with and without columns; read them apart.")
-            self.units[channel.topic] = merge_columns(known, layout.columns)
-            self._channels.setdefault(channel.id, LogChannel(channel.topic, layout))
+            self._channels[channel.id] = LogChannel(channel.topic, layout)
+            self.units = {}
+            for topic, columns in ((known.topic, known.layout.columns) for known in self._channels.values()):
+                known = self.units.setdefault(topic, columns)
+                if bool(known) != bool(columns):
+                    raise LogError(f"The topic {topic} mixes messages with and without columns; read them apart.")
+                self.units[topic] = merge_columns(known, columns)
 
 
 def read(path: str | Path, topics: Collection[str] | None = None, columns: Collection[str] | None = None) -> Recording:
@@ -199,9 +262,16 @@ def survey(path: str | Path) -> LogStream:
 
 
 def _log_file(path: Path) -> Path:
-    if not path.exists():
-        raise FileNotFoundError(f"There is no {path}; give the directory of a run or its log.mcap.")
-    log = path / "log.mcap" if path.is_dir() else path
-    if not log.exists():
-        raise FileNotFoundError(f"The directory {path} holds no log.mcap; it is not the directory of a logged run.")
+    log = path
+    try:
+        if path.is_dir():
+            log = path / "log.mcap"
+        demand_regular(log)
+    except FileNotFoundError as error:
+        what = f"There is no {path}; give the directory of a run or its log.mcap."
+        if log != path:
+            what = f"The directory {path} holds no log.mcap; it is not the directory of a logged run."
+        raise FileNotFoundError(what) from error
+    except OSError as error:
+        raise LogError(f"The log {log} cannot be read: {error.strerror}.") from error
     return log

@@ -16,6 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
+# A message of more samples is none of a run's log, whatever a schema says.
+_MOST_SAMPLES = 1 << 20
 
 
 def pack(value: Any) -> bytes:
@@ -98,6 +100,8 @@ class TableLayout:
         try:
             found = json.loads(schema or b"{}")
             samples = found["minItems"] if found.get("type") == "array" else None
+            if samples is not None and not 1 <= samples <= _MOST_SAMPLES:
+                return cls({})
             numbers = (found if samples is None else found["items"])["properties"]
             return cls({name: str(kind.get("unit", "")) for name, kind in numbers.items()}, samples)
         except (ValueError, TypeError, AttributeError, KeyError):

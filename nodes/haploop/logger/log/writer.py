@@ -40,6 +40,8 @@ class Log:
         self._known: dict[Hashable, int] = {}
         self._rows: dict[int, TableRows | FreeRows] = {}
         self._file = McapFile(path, machine)
+        # Channels that stand in a chunk, too, not just outside of any.
+        self._described = 0
 
     def channel(
         self, topic: str, columns: Mapping[str, str], *, samples_per_message: int | None = None, title: str
@@ -123,9 +125,13 @@ class Log:
         held = [rows for rows in self._rows.values() if rows.count]
         if not held:
             return
-        piece, index = chunk(held, self._file.size, self._compression)
+        # Outside of a chunk no checksum protects what says which numbers these are, so it is said once more inside.
+        new = range(self._described, len(self._file.channels))
+        described = bytes_of(*(one for at in new for one in (self._file.schemas[at], self._file.channels[at])))
+        piece, index = chunk(held, self._file.size, self._compression, described)
         self._file.append(piece)
         self._file.chunks.append(index)
+        self._described = new.stop
         # A channel that was silent in this chunk (replaced at a swap, say) gives its memory back.
         self._rows = {rows.channel: rows for rows in held}
         for rows in held:

@@ -24,7 +24,7 @@ class Accelerometer(Table):
     resolution: Annotated[float | None, si("m/s^2", "one count", above=0)] = None
     noise_density: Annotated[float, si("m/s^2/Hz^0.5", "density of its white noise", at_least=0)] = 0.0
     bandwidth: Bandwidth | None = None
-    delay: Annotated[float, si("s", "age of a reading, whole plant steps", at_least=0)] = 0.0
+    delay: Annotated[float, si("s", "age of a reading, whole plant steps", at_least=0, at_most=10)] = 0.0
     bias: Annotated[float, si("m/s^2", "reading at rest")] = 0.0
     mount: Literal["tip", "motor"] = "tip"
 
@@ -67,15 +67,15 @@ class UniformJitter(Table):
     """Every whole number of plant steps from 0 to most is equally likely."""
 
     kind = "uniform"
-    most: Annotated[float, si("s", "longest additional delay, whole plant steps", at_least=0)]
+    most: Annotated[float, si("s", "longest additional delay, whole plant steps", at_least=0, at_most=10)]
 
 
 class GammaJitter(Table):
     """Gamma-distributed, rounded to the nearest plant step."""
 
     kind = "gamma"
-    mean: Annotated[float, si("s", "mean additional delay", above=0)]
-    deviation: Annotated[float, si("s", "standard deviation of the additional delay", above=0)]
+    mean: Annotated[float, si("s", "mean additional delay", above=0, at_most=10)]
+    deviation: Annotated[float, si("s", "standard deviation of the additional delay", above=0, at_most=10)]
 
 
 class Loss(Table):

@@ -8,7 +8,9 @@ from haploop.protocol.quantity import si
 from haploop.protocol.scene.table import OpenTable
 
 Cutoff = Annotated[float, si("Hz", "cutoff of a first-order low-pass", above=0)]
-Ticks = Annotated[int | None, si("", "ticks of the window, the longest one for foaw", whole=True, at_least=1)]
+Ticks = Annotated[
+    int | None, si("", "ticks of the window, the longest one for foaw", whole=True, at_least=1, at_most=10_000)
+]
 Fit = Literal["end", "best"]
 
 

@@ -11,13 +11,23 @@ from haploop.protocol.scene.estimators import Acceleration, Velocity
 from haploop.protocol.scene.hand_force import HandForce
 from haploop.protocol.scene.table import OpenTable, Table, Tables
 
+# Light takes 2.6 s to the moon and back; what is later is no answer to a hand.
+LONGEST_DELAY_S = 10.0
+_RATE = {"at_least": 1, "at_most": 10**7}
+
 
 class Clock(Table):
     """Rates, delay and what moves the plant; the plant rate is a whole multiple of the control rate."""
 
-    plant_rate: Annotated[int, si("Hz", "steps of the plant per second", whole=True, at_least=1)] = 10_000
-    control_rate: Annotated[int, si("Hz", "ticks of the controller per second", whole=True, at_least=1)] = 1_000
-    round_trip_delay: Annotated[float, si("s", "from a sample to the force that answers it", at_least=0)] = 0.0
+    plant_rate: Annotated[int, si("Hz", "steps of the plant per second", whole=True, at_least=1, at_most=10**7)] = (
+        10_000
+    )
+    control_rate: Annotated[
+        int, si("Hz", "ticks of the controller per second", whole=True, at_least=1, at_most=10**7)
+    ] = 1_000
+    round_trip_delay: Annotated[
+        float, si("s", "from a sample to the force that answers it", at_least=0, at_most=LONGEST_DELAY_S)
+    ] = 0.0
     integrator: str = "exact"
 
 
@@ -65,7 +75,9 @@ class Run(Table):
 
     log: Literal["steps", "ticks", "none"] = "steps"
     pin: bool = True
-    block_ticks: Annotated[int, si("", "most ticks in a block of telemetry", whole=True, at_least=1)] = 1000
+    block_ticks: Annotated[int, si("", "most ticks in a block of telemetry", whole=True, at_least=1, at_most=10**6)] = (
+        1000
+    )
     window_blocks: Annotated[int, si("", "blocks the clock grants ahead", whole=True, at_least=1, at_most=100)] = 2
     deadline: Annotated[float, si("s", "wall time a node may stay silent", above=0)] = 5.0
     verdict: Literal["pushed", "window"] = "pushed"
@@ -116,7 +128,9 @@ class Scene(OpenTable):
     title: str
     duration: Annotated[float, si("s", "simulated time", above=0)]
     seed: Annotated[int, si("", "seed of everything random", whole=True, at_least=0, below=2**63)] = 0
-    diverged_beyond: Annotated[float, si("m", "the run ends when the device is farther from 0", above=0)] = 1.0
+    diverged_beyond: Annotated[
+        float, si("m", "the run ends when the device is farther from 0", above=0, at_most=1e9)
+    ] = 1.0
     clock: Clock = Clock()
     device: Device
     transmission: Transmission | None = None

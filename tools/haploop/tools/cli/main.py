@@ -16,8 +16,15 @@ def main() -> None:
 
         ask_for_one_thread(os.environ)
         from haploop.tools.cli.app import app
+        from haploop.tools.cli.options import FAILED, WRONG_USE, leave
 
-        app()
+        for word in sys.argv[1:]:
+            if "\0" in word or (not word.isascii() and any("\ud800" <= letter <= "\udfff" for letter in word)):
+                leave(f"Every argument, names of files too, must be UTF-8 text, but {word!r} was given.", WRONG_USE)
+        try:
+            app()
+        except OSError as error:  # one that no command has words of its own for
+            leave(f"{error.filename or 'A file'} cannot be used: {error.strerror or error}.", FAILED)
     except (KeyboardInterrupt, SystemExit) as error:
         if isinstance(error, SystemExit) and error.code != _OF_TYPER:
             raise

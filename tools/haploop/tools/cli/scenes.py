@@ -176,6 +176,7 @@ def replay(directory: Directory, json: Json = False) -> None:
             result = runs.replay(directory)
         except runs.ReplayError as error:
             leave(str(error), WRONG_USE)
+    print_note(result.cut)
     if json:
         print_json({"agrees": not result.differences, "differences": result.differences, **result.summary})
     elif result.differences:
@@ -192,14 +193,16 @@ def judge(directory: Directory, json: Json = False) -> None:
     The run is repeated from its log, the hand then held still without noise, pushed hard and softly, and watched for
     up to 64 s of simulated time. The word is steady, limit-cycle, growing, diverged, no-contact or undecided.
     """
-    from haploop.launch.runs.replay import ReplayError, repeatable
+    from haploop.launch.runs.replay import ReplayError, logged_run, repeatable
     from haploop.launch.stability.judge import judge_scene
     from haploop.tools.render.report import finding_table
     from haploop.tools.render.terminal import console
 
     with plain_errors(), redirect_stdout(sys.stderr):
         try:
-            finding = judge_scene(*repeatable(directory))
+            recorded = logged_run(directory)
+            print_note(recorded.cut)
+            finding = judge_scene(*repeatable(directory, recorded))
         except ReplayError as error:
             leave(str(error), WRONG_USE)
     if json:
@@ -234,9 +237,15 @@ def kinds_with(plugins: list[Path]) -> dict[str, type[Element]]:
     return registry(plugins)
 
 
+def print_note(note: str) -> None:
+    """Prints a note on stderr, unless there is none."""
+    if note:
+        print(f"Note: {note}", file=sys.stderr)
+
+
 def print_notes(scene: Scene) -> None:
     """Prints on stderr what in a resolved scene may not be what was meant."""
     from haploop.launch.plan.effects import notes
 
     for note in notes(scene):
-        print(f"Note: {note}", file=sys.stderr)
+        print_note(note)

@@ -17,6 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from haploop.launch.scene.mistakes import nearest
+from haploop.protocol.files import demand_regular
 from haploop.tools.dissipate.samples import Floats, RecordingError
 
 _BLOCK_ROWS = 16_384
@@ -129,6 +130,7 @@ class DelimitedFile:
 @contextlib.contextmanager
 def _open_lines(path: Path) -> Iterator[Iterator[str]]:
     try:
+        demand_regular(path)
         file = path.open(encoding="utf-8-sig", newline=None)
     except OSError as error:
         raise RecordingError(f"The recording {path} cannot be read: {error.strerror}.") from error
@@ -138,7 +140,7 @@ def _open_lines(path: Path) -> Iterator[Iterator[str]]:
         except UnicodeDecodeError as error:
             raise RecordingError(f"The recording {path} must be UTF-8 text, which it is not.") from error
         except csv.Error as error:
-            raise RecordingError(f"The recording {path} is no table of text: {error}.") from error
+            raise RecordingError(f"The recording {path} is no table: a cell is longer than any number.") from error
 
 
 def _column(index: int, cell: str) -> Column:

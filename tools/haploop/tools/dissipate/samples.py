@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -11,6 +10,7 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
+from haploop.launch.runs.run_files import recorded_scene
 from haploop.logger.log.recording import Table
 from haploop.logger.log.stream import Batch, LogStream
 from haploop.protocol.scene.effects import Actuator
@@ -88,14 +88,13 @@ _COLUMNS = {"/controller": ("timestamp", "x", "v", "a", "total"), "/plant": ("x"
 def read_scene(path: Path) -> Scene:
     """Reads the resolved scene in a run's log; RecordingError where none is attached.
 
-    Raises FileNotFoundError, LogError where there is no log, or none that can be read.
+    Raises FileNotFoundError, LogError, SceneError where there is no log, or none that can be read.
     """
     log = LogStream(path, topics=())
     any("scene.toml" in log.attachments for _ in log)
-    content, beside = log.attachments.get("scene.toml"), log.path.with_name("scene.toml")
-    if content is None and not beside.exists():
+    if (scene := recorded_scene(log.path.parent, log.attachments)) is None:
         raise RecordingError(f"The log {log.path} holds no scene, so its rates and estimates are not known.")
-    return Scene.from_dict(tomllib.loads((content or beside.read_bytes()).decode()))
+    return scene
 
 
 def holds_readings(scene: Scene) -> bool:

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import json
 import math
-import tomllib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
-from haploop.logger import read
+from haploop.launch.runs.run_files import recorded_log, recorded_scene, recorded_summary
 from haploop.logger.summary import Summary
 from haploop.protocol.changes import Event, changes_of, spans
 from haploop.protocol.scene.scene import ElementTable, Scene, Wall
@@ -140,16 +138,20 @@ class RunData:
 
     @classmethod
     def from_directory(cls, directory: Path) -> RunData:
-        """Reads a run's directory; FigureError where there is nothing to be drawn, LogError where the log is none."""
-        scene_file, summary_file = directory / "scene.toml", directory / "summary.json"
-        text = scene_file.read_text(encoding="utf-8") if scene_file.exists() else ""
+        """Reads a run's directory.
+
+        Raises:
+            FigureError: there is nothing to be drawn.
+            LogError, SceneError: a file of it cannot be read.
+        """
         if not (directory / "log.mcap").exists():
-            raise FigureError(_no_log(directory, _scene(text)))
-        log = read(directory)
-        scene = _scene(text or log.attachments.get("scene.toml", b"").decode())
+            raise FigureError(_no_log(directory))
+        log = recorded_log(directory)
         controller, energy = log.get("/controller", {}), log.get("/energy", {})
-        if scene is None or not len(controller.get("timestamp", ())) or not len(energy.get("timestamp", ())):
-            raise FigureError(f"The log in {directory} holds no tick yet, so there is nothing to draw.")
+        if not len(controller.get("timestamp", ())) or not len(energy.get("timestamp", ())):
+            raise FigureError(f"The log in {directory} holds no tick, so there is nothing to draw. {log.cut}")
+        if (scene := recorded_scene(directory, log.attachments)) is None:
+            raise FigureError(f"There is neither a scene in the log in {directory} nor a scene.toml beside it.")
         plant = log.get("/plant")
         motion = plant or {**controller, "t": controller["timestamp"], "force": controller["total"]}
         forces = {name: motion[name] for name in ("actuator", "friction") if name in motion}
@@ -158,7 +160,7 @@ class RunData:
         events = log.get("/events", [])
         return cls(
             scene=scene,
-            summary=json.loads(summary_file.read_text(encoding="utf-8")) if summary_file.exists() else {},
+            summary=recorded_summary(directory) or {},
             history=History(scene, events),
             events=events,
             controller=controller,
@@ -255,13 +257,10 @@ class RunData:
         return Book(name, *curves)
 
 
-def _scene(text: str) -> Scene | None:
-    return Scene.from_dict(tomllib.loads(text)) if text else None
-
-
-def _no_log(directory: Path, scene: Scene | None) -> str:
+def _no_log(directory: Path) -> str:
     if not directory.exists():
         return f"There is no {directory}; give the directory of a run."
+    scene = recorded_scene(directory, {})
     if scene and scene.run.log == "none":
         return f'The run in {directory} was made with run.log = "none" and kept no log; run it again with "steps".'
     return f"The directory {directory} holds no log.mcap; it is not the directory of a logged run."

@@ -1,0 +1,76 @@
+"""Commands in this process, through their ``main``, with a limit of time and everything they printed."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import signal
+import sys
+import traceback
+from collections.abc import Iterator
+from dataclasses import dataclass
+from types import FrameType
+
+from haploop.tools.cli.main import main
+
+
+class Hung(BaseException):
+    """A command took longer than it may."""
+
+
+@dataclass(frozen=True)
+class Answer:
+    """The answer to a command: its exit status and texts; ``fault`` is the traceback of one that has none."""
+
+    status: int
+    stdout: str
+    stderr: str
+    fault: str
+
+    def broken(self) -> str:
+        """Returns what is wrong with an answer whatever was asked; "" for one that is in order."""
+        if self.fault:
+            return self.fault
+        if "Traceback" in self.stderr:
+            return self.stderr
+        if self.status not in (0, 1, 2):
+            return f"exit status {self.status}"
+        said = (self.stderr + self.stdout).strip()
+        return "it failed without a word" if self.status and not said else ""
+
+
+@contextlib.contextmanager
+def _at_most(seconds: float) -> Iterator[None]:
+    def end(_number: int, _frame: FrameType | None) -> None:
+        raise Hung
+
+    before = signal.signal(signal.SIGALRM, end)
+    signal.setitimer(signal.ITIMER_REAL, seconds)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.signal(signal.SIGALRM, before)
+
+
+def ask(*words: str, seconds: float = 20.0) -> Answer:
+    """Runs ``haploop WORDS`` to its end."""
+    stdout, stderr = (io.TextIOWrapper(io.BytesIO(), "utf-8", write_through=True) for _ in range(2))
+    stderr.reconfigure(errors="backslashreplace")
+    before, sys.argv = sys.argv, ["haploop", *words]
+    status, fault = 0, ""
+    try:
+        with contextlib.redirect_stdout(stdout), contextlib.redirect_stderr(stderr), _at_most(seconds):
+            main()
+    except SystemExit as end:
+        status = end.code if isinstance(end.code, int) else 0 if end.code is None else 1
+        if isinstance(end.code, str):
+            stderr.write(end.code)
+    except Hung:
+        fault = f"hung for {seconds:g} s: " + traceback.format_exc(limit=-3)
+    except BaseException:
+        fault = traceback.format_exc()
+    finally:
+        sys.argv = before
+    texts = [stream.buffer.getvalue().decode(errors="replace") for stream in (stdout, stderr)]  # pyright: ignore
+    return Answer(status, *texts, fault)

@@ -1,0 +1,128 @@
+"""Numbers and files that cannot be meant: refused with a sentence before anything is allocated."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+from haploop.launch.scene.file import load
+from haploop.launch.scene.mistakes import SceneError
+from haploop.protocol.quantity import MEANT, Quantity
+
+SCENES = Path(__file__).parents[2] / "launch" / "scenes"
+FIG6C = SCENES / "fig6c.toml"
+BASE = f'extends = "{FIG6C}"\n'
+
+
+def refused(path: Path, *overrides: str) -> str:
+    with pytest.raises(SceneError) as caught:
+        load(path, overrides)
+    return str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("overrides", "sentence"),
+    [
+        (["duration=1e300"], "It must be at most 1e+09 s, which is thirty years."),
+        (["duration=1e9", "clock.control_rate=10000"], "duration must cover at most 10000000000 control ticks"),
+        (["clock.round_trip_delay=1e6"], "It must be at most 10 s."),
+        (["clock.plant_rate=1000000000000"], "It must be at most 1e+07 Hz."),
+        (["clock.plant_rate=1000000", "clock.control_rate=10"], "at most 10000 times control_rate"),
+        (
+            ["clock.plant_rate=1000000", "clock.control_rate=1000000", "clock.round_trip_delay=1"],
+            "at most 0.1 s at 1000000 Hz: the commands on their way are held at once",
+        ),
+        (["wall.stiffness=1e308"], "It must be at most 1e+09 N/m, which is a steel bar"),
+        (["wall.position=-1e300"], "It must be at least -1e+06 m"),
+        (["device.mass=1e-300"], "It must be at least 1e-09 kg"),
+        (["encoder.resolution=1e-300"], "It must be at least 1e-15 m"),
+        (["jitter.kind=gamma", "jitter.mean=1e-3", "jitter.deviation=1e300"], "It must be at most 10 s."),
+        (["jitter.kind=uniform", "jitter.most=1e300"], "It must be at most 10 s."),
+        (["event.0.at=1e308", "event.0.pause=true"], "It must be at most 1e+09 s"),
+        (["event.0.at=0.5", 'event.0.set={"wall.stiffness"=1e308}'], "It must be at most 1e+09 N/m"),
+        (["event.0.at=0.5", 'event.0.set={"clock.round_trip_delay"=1e6}'], "It must be at most 10 s."),
+        (["velocity.estimator=window", "velocity.ticks=1000000000000"], "It must be at most 10000."),
+        (["run.block_ticks=1000000000000"], "It must be at most 1e+06."),
+        (["wall.stiffness=0x" + "f" * 5000], "is a number of thousands of digits."),
+        (["x=" + "[" * 3000 + "]" * 3000], "x is not a key of a scene."),
+        (["a." * 3000 + "b=1"], "It must read KEY=VALUE with a dotted key"),
+    ],
+)
+def test_a_number_that_no_loop_has_is_refused_with_its_bound(overrides, sentence):
+    assert sentence in refused(FIG6C, *overrides)
+
+
+def test_five_seconds_of_delay_are_a_scene():
+    assert load(FIG6C, ["clock.round_trip_delay=5", "duration=20"]).clock.round_trip_delay == 5.0
+
+
+@pytest.mark.parametrize("unit", MEANT)
+def test_a_bound_by_unit_stands_in_where_a_quantity_declares_none_of_its_own(unit):
+    most, _, least = MEANT[unit]
+    bare, positive, own = Quantity(unit), Quantity(unit, above=0), Quantity(unit, at_least=-1e300, at_most=1e300)
+    assert [bare.complaint(value) for value in (most, -most, 0.0, least / 2)] == [None] * 4
+    assert "at most" in str(bare.complaint(2 * most))
+    assert "to the other side" in str(bare.complaint(-2 * most))
+    assert positive.complaint(least) is None
+    assert "with less, numbers of a loop overflow" in str(positive.complaint(least / 2))
+    assert own.complaint(2 * most) is own.complaint(-2 * most) is None
+
+
+def test_every_shipped_scene_keeps_within_the_bounds():
+    for path in SCENES.rglob("*.toml"):
+        load(path)
+
+
+def test_tables_lists_and_files_deep_in_one_another_are_refused(tmp_path):
+    deep = tmp_path / "deep.toml"
+    for text in (
+        "[" + ".".join("a" * 3000) + "]\n",
+        "x = " + "[" * 3000 + "]" * 3000,
+        "x = " + "{a=" * 50 + "1" + "}" * 50,
+    ):
+        deep.write_text(f"{BASE}{text}\n")
+        assert "at most 32 deep in one another" in refused(deep)
+    for number in range(1500):
+        (tmp_path / f"{number}.toml").write_text(f'extends = "{number + 1}.toml"\n')
+    (tmp_path / "1500.toml").write_text(BASE)
+    assert "At most 32 files that extend one another" in refused(tmp_path / "0.toml")
+    assert load(tmp_path / "1480.toml").duration == 3.0
+
+
+def test_files_that_each_extend_the_next_one_twice_are_not_read_a_million_times(tmp_path):
+    for number in range(25):
+        (tmp_path / f"{number}.toml").write_text(f'extends = ["{number + 1}.toml", "{number + 1}.toml"]\n')
+    (tmp_path / "25.toml").write_text(BASE)
+    assert "100 in all" in refused(tmp_path / "0.toml")
+
+
+def test_a_circle_is_told_through_links_too(tmp_path):
+    (tmp_path / "here").symlink_to(".")
+    (tmp_path / "a.toml").write_text('extends = "here/b.toml"\n')
+    (tmp_path / "b.toml").write_text('extends = "here/here/a.toml"\n')
+    assert "A scene cannot extend itself" in refused(tmp_path / "a.toml")
+    (tmp_path / "c.toml").symlink_to("d.toml")
+    (tmp_path / "d.toml").symlink_to("c.toml")
+    (tmp_path / "e.toml").write_text('extends = "c.toml"\n')
+    assert "Too many levels of symbolic links" in refused(tmp_path / "e.toml")
+
+
+def test_a_pipe_or_a_device_is_no_scene_and_is_not_waited_for(tmp_path):
+    os.mkfifo(tmp_path / "pipe")
+    for name in (str(tmp_path / "pipe"), "/dev/zero"):
+        (tmp_path / "a.toml").write_text(f'extends = "{name}"\n')
+        assert "It is a pipe or a device, not a file." in refused(tmp_path / "a.toml")
+        assert "It is a pipe or a device" in refused(FIG6C, "hand.force.kind=trace", f"hand.force.file={name}")
+    (tmp_path / "a.toml").write_text('extends = "a\\u0000b"\n')
+    assert "It must be the path of a scene file" in refused(tmp_path / "a.toml")
+
+
+def test_of_thousands_of_mistakes_fifty_are_told(tmp_path):
+    path = tmp_path / "many.toml"
+    path.write_text(BASE + "\n".join(f"k{number} = 1" for number in range(1000)))
+    told = refused(path).splitlines()
+    assert (len(told), told[-1]) == (51, "... and 950 more mistakes.")
+    path.write_text(BASE + "\n".join(f"k{number} = 1" for number in range(20_000)))
+    assert "There are 20001 keys, and 2000 at most were expected." in refused(path)
