@@ -1,7 +1,7 @@
 """Damaged files of real runs put before every command that reads them.
 
-The claim: exit 0 with the numbers of the undamaged file, or with fewer ticks and a word about it; or another exit status
-and a sentence. Never a traceback, a wrong number, a hang, or a write to what is read.
+The claim: exit 0 with the numbers of the undamaged file, or with fewer ticks and a word about it; or another exit
+status and a sentence. Never a traceback, a wrong number, a hang, or a write to what is read.
 
 ``PYTHONPATH=tests python -m helpers.data.damaged_run FIRST END`` tries some seeds and tells of each that breaks it.
 """
@@ -55,7 +55,7 @@ class DamagedRuns:
         finally:
             haploop.logger.log.writer._CHUNK_BYTES = before
         assert not answer.status, answer
-        self._told = {name: self._ask(name)[1] for name in COMMANDS}
+        self._told: dict[str, Any] = {}
 
     def _ask(self, name: str) -> tuple[Any, Any]:
         """The answer to a command about a copy of the run, damaged or not, and what it gave, to be compared."""
@@ -77,13 +77,17 @@ class DamagedRuns:
     def attempt(self, seed: int, names: tuple[str, ...] = tuple(COMMANDS)) -> tuple[str, str]:
         """Damages a file of a copy and asks one command; returns what was done, and what broke ("" for nothing)."""
         rng = random.Random(seed)
+        name = rng.choice(names)
         shutil.rmtree(self._at, ignore_errors=True)
+        if name not in self._told:
+            self._told[name] = self._ask(name)[1]
+            shutil.rmtree(self._at)
         shutil.copytree(self._run, self._at / "run")
         file = self._at / "run" / rng.choice(["log.mcap"] * 3 + ["scene.toml", "summary.json"])
         if file.name == "log.mcap" and rng.random() < 0.3:  # that of a killed run
             content = file.read_bytes()
             file.write_bytes(content[: rng.randrange(9, len(content))])
-        how, name = damage(rng, file), rng.choice(names)
+        how = damage(rng, file)
         before = _digests(self._at / "run")
         answer, given = self._ask(name)
         fault = answer.broken()
