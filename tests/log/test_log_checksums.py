@@ -8,6 +8,7 @@ import os
 import numpy as np
 import pytest
 from mcap.opcode import Opcode
+from mcap.records import DataEnd
 from mcap.stream_reader import StreamReader
 
 from haploop.logger import read
@@ -114,8 +115,7 @@ def test_a_chunk_that_is_missing_ends_the_reading_there(whole, tmp_path):
 
 
 def test_the_checksums_are_those_of_the_mcap_format(whole):
-    found = list(StreamReader(io.BytesIO(whole), validate_crcs=True).records)
-    data_ends = [one for one in found if type(one).__name__ == "DataEnd"]
+    data_ends = [one for one in StreamReader(io.BytesIO(whole), validate_crcs=True).records if isinstance(one, DataEnd)]
     assert [bool(one.data_section_crc) for one in data_ends] == [True]
 
 

@@ -55,7 +55,8 @@ def _at_most(seconds: float) -> Iterator[None]:
 
 def ask(*words: str, seconds: float = 20.0) -> Answer:
     """Runs ``haploop WORDS`` to its end."""
-    stdout, stderr = (io.TextIOWrapper(io.BytesIO(), "utf-8", write_through=True) for _ in range(2))
+    streams = io.BytesIO(), io.BytesIO()
+    stdout, stderr = (io.TextIOWrapper(raw, "utf-8", write_through=True) for raw in streams)
     stderr.reconfigure(errors="backslashreplace")
     before, sys.argv = sys.argv, ["haploop", *words]
     status, fault = 0, ""
@@ -72,5 +73,5 @@ def ask(*words: str, seconds: float = 20.0) -> Answer:
         fault = traceback.format_exc()
     finally:
         sys.argv = before
-    texts = [stream.buffer.getvalue().decode(errors="replace") for stream in (stdout, stderr)]  # pyright: ignore
-    return Answer(status, *texts, fault)
+    said, complained = (bytes(raw.getvalue()).decode(errors="replace") for raw in streams)
+    return Answer(status, said, complained, fault)
