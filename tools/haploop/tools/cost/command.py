@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 import sys
+from contextlib import suppress
 from pathlib import Path
 from typing import Annotated
 
@@ -80,15 +81,14 @@ def cost(
 def _rates(text: str) -> list[int]:
     rates = []
     for word in text.split(","):
-        number = word.strip()
-        try:
-            rates.append(float(number.removesuffix("k")) * (1000.0 if number.endswith("k") else 1.0))
-        except ValueError:
-            rates.append(math.nan)
-        if not (0 < rates[-1] < math.inf and rates[-1].is_integer()):
+        number, rate = word.strip(), math.nan
+        with suppress(ValueError):
+            rate = float(number.removesuffix("k")) * (1000.0 if number.endswith("k") else 1.0)
+        if not (0 < rate < math.inf and rate.is_integer()):
             expected = "--rates must be whole numbers of Hz above 0, such as 1k,10k,20000"
             leave(f"{expected}, but {word!r} was given.", WRONG_USE)
-    return list(map(int, rates))
+        rates.append(int(rate))
+    return rates
 
 
 def _methods(text: str | None) -> list[str]:

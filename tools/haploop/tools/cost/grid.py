@@ -53,7 +53,7 @@ class Candidate:
         return [f"clock.integrator={self.method}", f"clock.plant_rate={self.plant_rate}"]
 
     def key(self, *made_with: Any) -> str:
-        """Returns its name in the store: a hash of the resolved scene and of what it is measured with."""
+        """Returns its name in the store: a hash of it and of what it is measured with."""
         return digest([self.method, self.plant_rate, self.scene, self.refusal, *made_with])
 
 
@@ -64,6 +64,10 @@ class Grid:
     path: Path
     scene: Scene
     candidates: list[Candidate]
+
+    def key(self, *made_with: Any) -> str:
+        """Returns the scene's name in the store."""
+        return digest([self.scene, *made_with])
 
     @property
     def own(self) -> tuple[str, int]:

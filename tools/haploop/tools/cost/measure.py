@@ -7,20 +7,21 @@ from collections.abc import Callable
 from dataclasses import asdict, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Self
+from typing import Self
+
+from pydantic import TypeAdapter
 
 from haploop.plant.chain.chain import Chain
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
 from haploop.tools.cost import times
 from haploop.tools.cost.alike import timed_alike
-from haploop.tools.cost.data import AlikeScene, Cost, Errors, Point, ReferenceNote, SceneCost, Spread, Step
+from haploop.tools.cost.data import AlikeScene, Cost, Point, ReferenceNote, SceneCost, Spread, Step
 from haploop.tools.cost.findings import advice
 from haploop.tools.cost.grid import (
     Candidate,
     Grid,
     Outcome,
-    digest,
     errors_made_with,
     outcome,
     times_made_with,
@@ -54,11 +55,9 @@ class Measurement:
         processes_repeats: int,
         find_reference: Callable[[Path, Scene], Reference] = reference_for,
     ) -> None:
-        self._grids = grids
+        self._grids, self._find_reference, self._store = grids, find_reference, Store(out)
         self._repeats = {IN_PROCESS: repeats, PROCESSES: processes_repeats}
-        self._find_reference = find_reference
         self._errors_made_with, self._times_made_with = errors_made_with(), times_made_with()
-        self._store = Store(out)
 
     def __enter__(self) -> Self:
         self._store.__enter__()
@@ -67,39 +66,36 @@ class Measurement:
     def __exit__(self, *_: object) -> None:
         self._store.__exit__()
 
-    def _key(self, candidate: Candidate) -> str:
-        return candidate.key(*self._errors_made_with)
+    def _error_key(self, of: Candidate | Grid) -> str:
+        return of.key(*self._errors_made_with)
 
-    def _reference_key(self, grid: Grid) -> str:
-        return digest([grid.scene, *self._errors_made_with])
-
-    def _alike_key(self, grid: Grid) -> str:
-        return digest([grid.scene, *self._times_made_with])
+    def _time_key(self, of: Candidate | Grid) -> str:
+        return of.key(*self._times_made_with)
 
     def errors(self, stage: Stage) -> None:
         """Runs and compares every candidate of which nothing is known, in random order, to tell the time left well."""
         for grid in self._grids:
-            left = [c for c in grid.candidates if not self._store.has(_OUTCOME, self._key(c))]
-            if not left and self._store.has(_REFERENCE, self._reference_key(grid)):
+            left = [c for c in grid.candidates if not self._store.has(_OUTCOME, self._error_key(c))]
+            if not left and self._store.has(_REFERENCE, self._error_key(grid)):
                 continue
             advance = stage(f"{grid.path.stem}: errors", len(left))
             reference = self._find_reference(grid.path, grid.scene)
             note = ReferenceNote(reference.how, reference.error_m, reference.pointwise)
-            self._store.add(_REFERENCE, self._reference_key(grid), asdict(note))
+            self._store.add(_REFERENCE, self._error_key(grid), asdict(note))
             swings = () if reference.pointwise else true_swings(grid.scene)
             for candidate in random.Random(0).sample(left, len(left)):
                 came = outcome(candidate, reference, swings)
-                self._store.add(_OUTCOME, self._key(candidate), asdict(came))
+                self._store.add(_OUTCOME, self._error_key(candidate), asdict(came))
                 advance()
 
     def times(self, stage: Stage) -> None:
         """Makes every measurement of time that is missing; errors come first."""
         times.measure(self._store, self._jobs(), self._repeats[IN_PROCESS], f"times, {IN_PROCESS}", stage)
         for grid in self._grids:
-            if not (grid.scene.friction or self._store.has(_ALIKE, self._alike_key(grid))):
+            if not (grid.scene.friction or self._store.has(_ALIKE, self._time_key(grid))):
                 advance = stage(f"{grid.path.stem}: steps alike", 1)
                 steps = timed_alike(grid.scene, self._repeats[IN_PROCESS])
-                self._store.add(_ALIKE, self._alike_key(grid), [asdict(step) for step in steps])
+                self._store.add(_ALIKE, self._time_key(grid), [asdict(step) for step in steps])
                 advance()
 
     @cached_property
@@ -117,7 +113,7 @@ class Measurement:
         short that there is more than the first one where it can be.
         """
         came, scene = self._outcome(candidate), candidate.scene
-        key = candidate.key(*self._times_made_with)
+        key = self._time_key(candidate)
         if scene is None or came is None or not (ticks := came.ticks):
             return None
         measured = scene
@@ -127,8 +123,8 @@ class Measurement:
         return Job(IN_PROCESS, (candidate.path, candidate.method), key, measured, lambda: times.loop_us(measured))
 
     def _outcome(self, candidate: Candidate) -> Outcome | None:
-        record = self._store.get(_OUTCOME, self._key(candidate))
-        return record and Outcome(**{**record, "error": record["error"] and Errors(**record["error"])})
+        record = self._store.get(_OUTCOME, self._error_key(candidate))
+        return record and TypeAdapter(Outcome).validate_python(record)
 
     def cost(self, tolerance_m: float) -> Cost:
         return Cost(
@@ -146,25 +142,18 @@ class Measurement:
         )
 
     def _alike(self, grid: Grid) -> AlikeScene | None:
-        found = self._store.get(_ALIKE, self._alike_key(grid))
+        found = self._store.get(_ALIKE, self._time_key(grid))
         states = len(Chain.from_scene(grid.scene).states)
-        return found and AlikeScene(grid.path.stem, states, [_step(**entries) for entries in found])
+        return found and AlikeScene(grid.path.stem, states, TypeAdapter(list[Step]).validate_python(found))
 
     def _scene_cost(self, grid: Grid, tolerance_m: float) -> SceneCost | None:
         """Returns what is known of a scene, with advice once that is all; None before its reference is there."""
-        if (note := self._store.get(_REFERENCE, self._reference_key(grid))) is None:
+        if (note := self._store.get(_REFERENCE, self._error_key(grid))) is None:
             return None
         points = [point for candidate in grid.candidates if (point := self._point(candidate))]
-        ticks = Timebase.from_scene(grid.scene).ticks
-        made = SceneCost(
-            grid.path.stem,
-            grid.scene.title,
-            *grid.own,
-            grid.scene.clock.control_rate,
-            ticks,
-            ReferenceNote(**note),
-            points,
-        )
+        scene, ticks = grid.scene, Timebase.from_scene(grid.scene).ticks
+        about = *grid.own, scene.clock.control_rate, ticks, ReferenceNote(**note)
+        made = SceneCost(grid.path.stem, scene.title, *about, points)
         untimed = times.missing(self._store, self._jobs(), self._repeats[IN_PROCESS])
         complete = len(points) == len(grid.candidates) and not untimed
         return replace(made, advice=advice(made, tolerance_m)) if complete else made
@@ -172,11 +161,7 @@ class Measurement:
     def _point(self, candidate: Candidate) -> Point | None:
         if (came := self._outcome(candidate)) is None:
             return None
-        values = self._store.all(IN_PROCESS, candidate.key(*self._times_made_with), self._repeats[IN_PROCESS])
+        values = self._store.all(IN_PROCESS, self._time_key(candidate), self._repeats[IN_PROCESS])
         known = [value for value in values if value is not None]
         time = Spread.from_values(known) if known else None
         return Point(candidate.method, candidate.plant_rate, came.error, came.failure, time)
-
-
-def _step(alone: dict[str, float], arrays: dict[str, float], **entries: Any) -> Step:
-    return Step(**entries, alone=Spread(**alone), arrays=Spread(**arrays))

@@ -43,17 +43,13 @@ _LED = ("hand.mass=10.0", "hand.force.offset=0.0", "hand.force.amplitude=15.8", 
 _LIMIT, _INSTRUCTIONS, _MOVES = "stiffness limit", "instructions", "moves"
 _WITH_LIMIT, _COUNTED = ("delay", "control rate"), ("effects",)
 _WALL = "fig6a.toml without delay"
+_LED_MASS = "a mass in a hand that leads the motion"
 _READ = "acceleration.source = accelerometer"
 # Group -> title, unit, way, how it was measured.
 _GROUPS = {
     "books": ("Energy books of every plant step", "a tick", IN_PROCESS, f"one process, {_WALL}, no log"),
     "log": ("What is logged", "a tick", PROCESSES, f"three processes, {_WALL}"),
-    "effects": (
-        "Each effect alone",
-        "a tick",
-        IN_PROCESS,
-        "one process, added to a mass in a hand that leads the motion",
-    ),
+    "effects": ("Each effect alone", "a tick", IN_PROCESS, f"one process, added to {_LED_MASS}"),
     "processes": ("Processes", "a tick", PROCESSES, f"{_WALL}, no log"),
     "delay": ("Delay as lookahead", "a tick", PROCESSES, "three processes, fig6a.toml, every step logged"),
     "control rate": ("Control rate", "a simulated ms", IN_PROCESS, f"one process, {_WALL}, no log"),
@@ -88,9 +84,8 @@ def price_jobs(depends_on: Sequence[Any]) -> Jobs:
     wall = scenes / "fig6a.toml"
 
     def in_process(*settings: str) -> Job:
-        return _in_process(
-            load(wall, [f"duration={_IN_PROCESS_S}", _FREE, _PROMPT, "run.log=none", *_BY_WINDOW, *settings])
-        )
+        overrides = [f"duration={_IN_PROCESS_S}", _FREE, _PROMPT, "run.log=none", *_BY_WINDOW, *settings]
+        return _in_process(load(wall, overrides))
 
     def as_processes(*settings: str) -> Job:
         overrides = [f"duration={_PROCESSES_S}", _FREE, _PROMPT, *_BY_WINDOW, *settings]
@@ -102,7 +97,9 @@ def price_jobs(depends_on: Sequence[Any]) -> Jobs:
     # Plant and controller alone: their telemetry is made and thrown away.
     bare = Job(IN_PROCESS, "bare", "bare", with_books.scene, lambda: bare_us(with_books.scene))
     whole = load(scenes / "all_effects.toml", [f"duration={_EFFECTS_S}", _FREE, "run.log=none", *_BY_WINDOW, *_LED])
-    effects = {NONE: alone(whole), AGAIN: alone(whole), **{name: alone(whole, name) for name in _names(whole)}}
+    # That which others are read through comes first.
+    names = sorted((effect.name for effect in effects_of(whole)), key=lambda name: name != _READ)
+    effects = {NONE: alone(whole), AGAIN: alone(whole), **{name: alone(whole, name) for name in names}}
     jobs = {
         "books": {"without": bare, "with": with_books},
         "log": {log: as_processes(f"run.log={log}") for log in _LOGS},
@@ -115,11 +112,6 @@ def price_jobs(depends_on: Sequence[Any]) -> Jobs:
         group: {what: replace(job, key=digest([job.key, job.scene, *depends_on])) for what, job in members.items()}
         for group, members in jobs.items()
     }
-
-
-def _names(scene: Scene) -> list[str]:
-    """Returns the names of a scene's effects, that which others are read through first."""
-    return sorted((effect.name for effect in effects_of(scene)), key=lambda name: name != _READ)
 
 
 def alone(scene: Scene, name: str = "") -> Scene:
@@ -213,25 +205,16 @@ class Prices:
             found = self._store.get(_LIMIT, job.key) if name in _WITH_LIMIT else None
             limit = StiffnessLimit(**found) if found else None
             adds = [value - other for value, other in zip(values, base, strict=False)] if prices else []
-            prices.append(
-                Price(
-                    what,
-                    Spread.from_values(values),
-                    Spread.from_values(adds) if adds else None,
-                    _steady_up_to(limit) if limit else buys[what],
-                    self._store.get(_MOVES, job.key),
-                    self._store.get(_INSTRUCTIONS, job.key),
-                    limit,
-                )
-            )
+            added = Spread.from_values(adds) if adds else None
+            gain = _steady_up_to(limit) if limit else buys[what]
+            counted = (self._store.get(_MOVES, job.key), self._store.get(_INSTRUCTIONS, job.key))
+            prices.append(Price(what, Spread.from_values(values), added, gain, *counted, limit))
         return PriceGroup(name, title, unit, self._repeats[way], how, prices)
 
     def _scaled(self, name: str, job: Job) -> list[float]:
         """Returns the times of a job in the unit of its group."""
-        return [
-            value * (job.scene.clock.control_rate / 1000.0 if name == "control rate" else 1.0)
-            for value in self._times(job)
-        ]
+        unit = job.scene.clock.control_rate / 1000.0 if name == "control rate" else 1.0
+        return [value * unit for value in self._times(job)]
 
 
 def _steady_up_to(limit: StiffnessLimit) -> str:

@@ -55,6 +55,7 @@ class Edges:
 
 
 def find_edges(data: MapData) -> Edges:
+    """Finds the boundaries of a finished bisecting sweep, of several seeds together."""
     key, holds = data.sweep["bisect"]["axis"], data.sweep["bisect"].get("holds", "steady")
     along = next(axis for axis in data.axes if axis.key == key)
     along = replace(along, values=along.planned)
@@ -67,11 +68,11 @@ def find_edges(data: MapData) -> Edges:
     rank = np.full(shape, np.inf)
     state, nearest = np.full(shape, UNKNOWN), np.full(shape, math.nan)
     low, high = np.full(shape, math.nan), np.full(shape, math.nan)
-    table, starts = data.boundary, _starts(data, key, first, others)
-    places = zip(*(axis.indices(table[axis.key]) for axis in others), strict=True) if others else None
-    for row in range(len(table["low"])):
-        at = tuple(int(index) for index in next(places)) if places else ()
-        value, started = float(table["boundary"][row]), starts.get((*at, _seed(table, row)))
+    table, begin = data.boundary, np.flatnonzero(np.asarray(data.columns[key], dtype=float) == first)
+    verdicts = [data.columns["verdict"][row] for row in begin.tolist()]
+    starts = dict(zip(_places(data.columns, others, begin), verdicts, strict=True))
+    for row, place in enumerate(_places(table, others, np.arange(len(table["low"])))):
+        at, value, started = place[:-1], float(table["boundary"][row]), starts.get(place)
         if math.isfinite(float(table["low"][row])):
             seen = FOUND
         elif verdict_number(started) == FAILED:
@@ -90,16 +91,11 @@ def find_edges(data: MapData) -> Edges:
     return Edges(along, tuple(others), holds, rising, state, nearest, low, high, more)
 
 
-def _starts(data: MapData, key: str, first: float, others: list[Axis]) -> dict[tuple[int, ...], str | None]:
-    """Returns the verdict where the search begins, by the indices of the other axes and the seed."""
-    columns = data.columns
-    indices = [axis.indices(columns[axis.key]) for axis in others]
-    begin = np.flatnonzero(np.asarray(columns[key], dtype=float) == first).tolist()
-    return {(*(int(index[row]) for index in indices), _seed(columns, row)): columns["verdict"][row] for row in begin}
-
-
-def _seed(table: Columns, row: int) -> int:
-    return int(table["seed"][row]) if "seed" in table else 0
+def _places(table: Columns, axes: Sequence[Axis], rows: np.ndarray) -> list[tuple[int, ...]]:
+    """Returns of some rows the indices on the axes, and the seed."""
+    seeds = table["seed"] if "seed" in table else [0] * len(table[axes[0].key])
+    columns = [*(axis.indices(table[axis.key]) for axis in axes), seeds]
+    return [tuple(int(column[row]) for column in columns) for row in rows]
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ import numpy as np
 from haploop.protocol.scene.scene import Scene
 from haploop.tools.figure.labels import LabelRoom
 from haploop.tools.figure.style import INK
-from haploop.tools.linear.bounds import Bound, bounds_of
+from haploop.tools.linear.bounds import bounds_of
 from haploop.tools.linear.linearity import installed_kinds, left_out, why_not_linear
 from haploop.tools.linear.one_tick import NotLinear, OneTickMap
 from haploop.tools.sweep.map.axis import Axis
@@ -87,16 +87,10 @@ def exact_limit(plane: Plane) -> MapLine:
         raise NotLinear("there is no wall")
     if curved := [reason for scene in scenes for reason in why_not_linear(scene)]:
         raise NotLinear(", ".join(dict.fromkeys(curved)))
-    loops: dict[tuple[float, ...], OneTickMap] = {}
-
-    def level(x: float, y: float) -> float:
-        key = plane.but_for_stiffness(x, y)
-        if key not in loops:
-            loops[key] = OneTickMap.from_scene(plane.at(x, y))
-        return math.log(loops[key].growth(plane.stiffness(x, y)))
-
+    loop = plane.once_for_all_stiffnesses(OneTickMap.from_scene)
     without = f", without {', '.join(left)}" if (left := left_out(plane.scene)) else ""
-    return MapLine(EXACT, f"exact, linear loop in contact{without}", plane.zero_lines(level))
+    pieces = plane.zero_lines(lambda x, y: math.log(loop(x, y).growth(plane.stiffness(x, y))))
+    return MapLine(EXACT, f"exact, linear loop in contact{without}", pieces)
 
 
 def bound_lines(plane: Plane) -> list[MapLine]:
@@ -106,32 +100,27 @@ def bound_lines(plane: Plane) -> list[MapLine]:
     """
     if plane.scene.wall is None:
         return []
-    known: dict[tuple[float, ...], dict[str, Bound]] = {}
+    bounds = plane.once_for_all_stiffnesses(bounds_of)
+    applied: set[str] = set()
 
-    def stiffness_over(name: str) -> Level:
+    def stiffness_over(place: int) -> Level:
         """Makes the logarithm of the wall's stiffness over what a bound allows; NaN where it does not apply."""
 
         def level(x: float, y: float) -> float:
-            key = plane.but_for_stiffness(x, y)
-            if key not in known:
-                known[key] = {bound.name: bound for bound in bounds_of(plane.at(x, y))}
-            allowed, stiffness = known[key][name].stiffness_N_m, plane.stiffness(x, y)
-            if allowed is None:
+            bound, stiffness = bounds(x, y)[place], plane.stiffness(x, y)
+            if (allowed := bound.stiffness_N_m) is None:
                 return math.nan
+            applied.add(bound.name)
             if not allowed or not stiffness:
                 return _MOST_LOG if stiffness > allowed else -_MOST_LOG
             return float(np.clip(math.log(stiffness / allowed), -_MOST_LOG, _MOST_LOG))
 
         return level
 
-    first = bounds_of(plane.scene)
-    lines = [plane.zero_lines(stiffness_over(bound.name), whole_ticks=True) for bound in first]
-    applied = {name for bounds in known.values() for name, bound in bounds.items() if bound.applies}
-    return [
-        MapLine(bound.name, _MEANING[bound.kind], pieces)
-        for bound, pieces in zip(first, lines, strict=True)
-        if bound.name in applied
-    ]
+    known = bounds_of(plane.scene)
+    lines = [plane.zero_lines(stiffness_over(place), whole_ticks=True) for place in range(len(known))]
+    found = [MapLine(bound.name, _MEANING[bound.kind], line) for bound, line in zip(known, lines, strict=True)]
+    return [line for line in found if line.name in applied]
 
 
 class LineStyle(TypedDict):

@@ -61,14 +61,12 @@ def _outline(ax: Axes, edges: tuple[np.ndarray, np.ndarray], verdict: np.ndarray
 
     steady, ran = verdict == STEADY, verdict != NOT_RUN
     xs, ys = edges
-    lines = []
-    for row, column in np.argwhere((steady[:, 1:] != steady[:, :-1]) & ran[:, 1:] & ran[:, :-1]):
-        lines.append([(xs[column + 1], ys[row]), (xs[column + 1], ys[row + 1])])
-    for row, column in np.argwhere((steady[1:] != steady[:-1]) & ran[1:] & ran[:-1]):
-        lines.append([(xs[column], ys[row + 1]), (xs[column + 1], ys[row + 1])])
-    ax.add_collection(
-        LineCollection(lines, colors=INK, linewidths=1.1, zorder=2, capstyle="projecting", gid="edge of steady")
-    )
+    upright = np.argwhere((steady[:, 1:] != steady[:, :-1]) & ran[:, 1:] & ran[:, :-1])
+    level = np.argwhere((steady[1:] != steady[:-1]) & ran[1:] & ran[:-1])
+    lines = [[(xs[column + 1], ys[row]), (xs[column + 1], ys[row + 1])] for row, column in upright]
+    lines += [[(xs[column], ys[row + 1]), (xs[column + 1], ys[row + 1])] for row, column in level]
+    look = {"colors": INK, "linewidths": 1.1, "zorder": 2, "capstyle": "projecting"}
+    ax.add_collection(LineCollection(lines, **look, gid="edge of steady"))
 
 
 def mark_disagreement(ax: Axes, x: Axis, y: Axis, cells: Cells) -> None:
@@ -136,11 +134,11 @@ def draw_swings(ax: Axes, x: Axis, cells: Cells, scale: SwingScale, label: bool)
         ax.plot([at[i]] * 2, span, color=INK, linewidth=0.9, alpha=0.6, zorder=2.5, gid="seeds")
     for number, look in LOOKS.items():
         here = cells.verdict == number
+        edge = ("white", 0.5) if look.marker != "x" else (look.colour, 1.5)
         if here.any():
             ax.plot(
                 at[here], places[here], look.marker, color=look.colour, markersize=5.5, zorder=3, linestyle="none",
-                markeredgecolor="white" if look.marker != "x" else look.colour,
-                markeredgewidth=0.5 if look.marker != "x" else 1.5, gid=f"cells {VERDICTS[number]}",
+                markeredgecolor=edge[0], markeredgewidth=edge[1], gid=f"cells {VERDICTS[number]}",
             )  # fmt: skip
     ax.set_yscale("log")
     ax.set_ylim(scale.low, scale.high)

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -21,6 +21,7 @@ from haploop.tools.sweep.map.data import STIFFNESS
 # point takes a map of its own.
 POINTS, FEW_POINTS = 41, 21
 Level = Callable[[float, float], float]
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -42,9 +43,17 @@ class Plane:
             scene = with_value(scene, axis.key, number(value))
         return scene
 
-    def but_for_stiffness(self, x: float, y: float) -> tuple[float, ...]:
-        """Returns the values at a place without the wall's stiffness."""
-        return tuple(v for axis, v in zip(self.axes, (x, y), strict=False) if axis.key != STIFFNESS)
+    def once_for_all_stiffnesses(self, make: Callable[[Scene], T]) -> Callable[[float, float], T]:
+        """Makes the function from a place to what is made of its scene, of those that differ in stiffness only once."""
+        made: dict[tuple[float, ...], T] = {}
+
+        def at(x: float, y: float) -> T:
+            key = tuple(v for axis, v in zip(self.axes, (x, y), strict=False) if axis.key != STIFFNESS)
+            if key not in made:
+                made[key] = make(self.at(x, y))
+            return made[key]
+
+        return at
 
     def stiffness(self, x: float, y: float) -> float:
         """Returns the wall's stiffness at a place, in N/m."""
