@@ -15,7 +15,7 @@ from typer.testing import CliRunner
 from haploop.tools.cli.app import app
 from haploop.tools.figure.data import FigureError
 from haploop.tools.sweep.map.data import AMPLITUDE, MapData, make_map_data
-from haploop.tools.sweep.map.edges import ALL_HOLD, FOUND, NONE_HOLDS, UNKNOWN, find_edges
+from haploop.tools.sweep.map.edges import State, find_edges
 from haploop.tools.sweep.map.figure import MOST_LINES, bisect_figure, draw_map
 from haploop.tools.sweep.table import read
 from helpers import shown
@@ -75,13 +75,13 @@ def test_every_boundary_stands_at_its_place_with_its_bracket() -> None:
 
 def test_where_there_is_no_boundary_the_edge_of_the_panel_says_on_which_side() -> None:
     data = bisected({B: [0.1, 0.2, 0.4, 0.8]}, {(0.1,): "none", (0.2,): 300.0, (0.4,): "all", (0.8,): "failed"})
-    assert find_edges(data).state.tolist() == [NONE_HOLDS, FOUND, ALL_HOLD, UNKNOWN]
+    assert find_edges(data).state.tolist() == [State.NONE_HOLDS, State.FOUND, State.ALL_HOLD, State.UNKNOWN]
     drawn = bisect_figure(data)
-    for state, x in ((NONE_HOLDS, 0.1), (ALL_HOLD, 0.4), (UNKNOWN, 0.8)):
+    for state, x in ((State.NONE_HOLDS, 0.1), (State.ALL_HOLD, 0.4), (State.UNKNOWN, 0.8)):
         [line] = artists(drawn, f"state {state}")
         assert line.get_xdata().tolist() == [x]
-    (bottom, top), (failed,) = drawn.axes[0].get_ylim(), artists(drawn, f"state {UNKNOWN}")
-    assert artists(drawn, f"state {ALL_HOLD}")[0].get_ydata().tolist() == [top]
+    (bottom, top), (failed,) = drawn.axes[0].get_ylim(), artists(drawn, f"state {State.UNKNOWN}")
+    assert artists(drawn, f"state {State.ALL_HOLD}")[0].get_ydata().tolist() == [top]
     assert failed.get_ydata().tolist() == [bottom]
     for part in ("1 found", "1 steady throughout", "1 not steady at 100 N/m", "1 unknown"):
         assert part in words(drawn, "description")
@@ -107,7 +107,7 @@ def test_of_several_seeds_the_one_that_holds_least_far_is_drawn_and_the_bar_cove
     edges = find_edges(bisected({B: [0.1, 0.2]}, given))
     assert edges.nearest[0] == 200.0
     assert (edges.low[0], edges.high[0]) == (pytest.approx(198.0), pytest.approx(303.0))
-    assert edges.state.tolist() == [FOUND, NONE_HOLDS]
+    assert edges.state.tolist() == [State.FOUND, State.NONE_HOLDS]
     downwards = find_edges(bisected({B: [0.1]}, {(0.1, 1): 300.0, (0.1, 2): 200.0}, POINTS[::-1]))
     assert not downwards.rising
     assert downwards.nearest[0] == 300.0

@@ -18,15 +18,7 @@ from haploop.tools.cost import times
 from haploop.tools.cost.alike import timed_alike
 from haploop.tools.cost.data import AlikeScene, Cost, Point, ReferenceNote, SceneCost, Spread, Step
 from haploop.tools.cost.findings import advice
-from haploop.tools.cost.grid import (
-    Candidate,
-    Grid,
-    Outcome,
-    errors_made_with,
-    outcome,
-    times_made_with,
-    true_swings,
-)
+from haploop.tools.cost.grid import Candidate, Grid, Outcome, errors_made_with, outcome, times_made_with, true_swings
 from haploop.tools.cost.prices import Prices
 from haploop.tools.cost.times import IN_PROCESS, PROCESSES, Job, Store
 from haploop.tools.machine import commit, machine, versions

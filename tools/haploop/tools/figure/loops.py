@@ -6,20 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from haploop.tools.figure import style
 from haploop.tools.figure.data import ElementSpan, Floats, RunData
-from haploop.tools.figure.style import (
-    EARLY,
-    FAINT,
-    GREY,
-    INK,
-    PRESSING,
-    RELEASING,
-    SMALL,
-    corner_legend,
-    dress,
-    element_colour,
-    few_ticks,
-)
 from haploop.tools.figure.time import MM
 
 if TYPE_CHECKING:
@@ -56,17 +44,19 @@ def draw_force_position(ax: Axes, run: RunData, span_s: tuple[float, float]) -> 
     """Draws force against penetration, pressing and releasing told apart, beside the spring it should be."""
     title = "Force against penetration"
     if not run.history.walls:
-        dress(ax, title, "", "")
+        style.dress(ax, title, "", "")
         ax.set_axis_off()
         text = "No wall in this scene, so there is no\nforce against penetration to show."
-        ax.text(0.5, 0.5, text, ha="center", va="center", fontsize=SMALL + 1, color=GREY, transform=ax.transAxes)
+        look = {"fontsize": style.SMALL + 1, "color": style.GREY, "transform": ax.transAxes}
+        ax.text(0.5, 0.5, text, ha="center", va="center", **look)
         return
-    dress(ax, title, "penetration (mm)", "force out of the wall (N)")
+    style.dress(ax, title, "penetration (mm)", "force out of the wall (N)")
     early_depth, early_force = force_position_loop(run, run.early_s())
     depth, force = force_position_loop(run, span_s)
-    ax.plot(early_depth * MM, early_force, color=EARLY, linewidth=0.8, label="first second of contact", gid="early")
+    early = {"color": style.EARLY, "linewidth": 0.8, "label": "first second of contact", "gid": "early"}
+    ax.plot(early_depth * MM, early_force, **early)
     pressing = np.diff(depth, append=depth[-1:]) > 0
-    for part, colour, label in ((pressing, PRESSING, "pressing"), (~pressing, RELEASING, "releasing")):
+    for part, colour, label in ((pressing, style.PRESSING, "pressing"), (~pressing, style.RELEASING, "releasing")):
         # Each stretch goes on to the point after it.
         drawn = part | np.concatenate([[False], part[:-1]]) if len(part) else part
         x, y = np.where(drawn, depth * MM, np.nan), np.where(drawn, force, np.nan)
@@ -76,11 +66,12 @@ def draw_force_position(ax: Axes, run: RunData, span_s: tuple[float, float]) -> 
     in_contact = in_contact[np.isfinite(in_contact)]
     deepest = in_contact.max(initial=0.0)
     line = np.array([0.0, deepest])
-    ax.plot(line * MM, stiffness[0] * line, color=INK, linewidth=1.0, dashes=(4, 2), label="ideal spring", gid="spring")
+    ideal = {"color": style.INK, "linewidth": 1.0, "dashes": (4, 2), "label": "ideal spring", "gid": "spring"}
+    ax.plot(line * MM, stiffness[0] * line, **ideal)
     low, high = in_contact.min(initial=0.0) * MM, deepest * MM
     margin = 0.06 * (high - low) or 0.01
     ax.set_xlim(low - margin, high + margin)
-    corner_legend(ax)
+    style.corner_legend(ax)
 
 
 def draw_momentum(ax: Axes, run: RunData, span_s: tuple[float, float]) -> None:
@@ -93,25 +84,25 @@ def draw_momentum(ax: Axes, run: RunData, span_s: tuple[float, float]) -> None:
     loops = [loop for loop in loops if len(loop[2][0])]
     if not loops:
         about = "position (mm)\n(no virtual inertia, so no momentum loop)"
-        dress(ax, "Velocity against position", about, "velocity (m/s)")
-        for stretch, colour, name in ((run.early_s(), EARLY, "early"), (span_s, INK, "motion")):
+        style.dress(ax, "Velocity against position", about, "velocity (m/s)")
+        for stretch, colour, name in ((run.early_s(), style.EARLY, "early"), (span_s, style.INK, "motion")):
             x, v = within(stretch, run.t_s, run.x_m, run.v_m_s)
             ax.plot(x * MM, v, color=colour, linewidth=0.9, gid=name)
-        few_ticks(ax)
+        style.few_ticks(ax)
         return
-    dress(ax, "Virtual momentum against velocity", "velocity v[k−1] (m/s)", "momentum m v[k] (g m/s)")
+    style.dress(ax, "Virtual momentum against velocity", "velocity v[k−1] (m/s)", "momentum m v[k] (g m/s)")
     for number, span, (velocity, momentum) in loops:
         early_velocity, early_momentum = within(run.early_s(span.from_tick), *momentum_loop(run, span))
         dots = {"linestyle": "none", "marker": ".", "markersize": 5}
-        ax.plot(early_velocity, early_momentum * GRAMS, color=EARLY, **dots)
-        colour = element_colour(number)
+        ax.plot(early_velocity, early_momentum * GRAMS, color=style.EARLY, **dots)
+        colour = style.element_colour(number)
         ax.plot(velocity, momentum * GRAMS, color=colour, linewidth=0.8, alpha=0.4)
         ax.plot(velocity, momentum * GRAMS, color=colour, label=span.name, gid=span.name, **dots)
         ends = np.array([velocity.min(), velocity.max()])
-        ax.plot(ends, ends * span.element.parameters["mass"] * GRAMS, color=INK, linewidth=1.0, dashes=(4, 2))
-    ax.plot([], [], color=INK, linewidth=1.0, dashes=(4, 2), label="ideal inertia")
-    ax.axhline(0.0, color=FAINT, linewidth=0.8, zorder=0)
-    corner_legend(ax)
+        ax.plot(ends, ends * span.element.parameters["mass"] * GRAMS, color=style.INK, linewidth=1.0, dashes=(4, 2))
+    ax.plot([], [], color=style.INK, linewidth=1.0, dashes=(4, 2), label="ideal inertia")
+    ax.axhline(0.0, color=style.FAINT, linewidth=0.8, zorder=0)
+    style.corner_legend(ax)
 
 
 def within(span_s: tuple[float, float], t_s: Floats, *series: Floats) -> list[Floats]:

@@ -3,29 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from haploop.logger.summary import Summary
 from haploop.protocol.changes import describe
+from haploop.tools.figure import style
 from haploop.tools.figure.data import TOGETHER, Book, RunData
 from haploop.tools.figure.loops import draw_force_position, draw_momentum
-from haploop.tools.figure.style import (
-    CLOSE,
-    GREY,
-    INK,
-    LARGE,
-    OF_THE_PLANT,
-    SMALL,
-    TEXT,
-    VERDICTS,
-    WALL,
-    element_colour,
-    empty_figure,
-    few_ticks,
-    fit_text,
-    legend,
-    write_figure,
-)
 from haploop.tools.figure.time import energy_panel, force_panel, mark_events, position_panel
 from haploop.tools.render.report import LEAK_CAUSES, count_losses, plant_books
 from haploop.tools.render.terminal import told
@@ -53,12 +37,12 @@ def draw(directory: Path, target: Path | None = None) -> Path:
         FigureError: matplotlib is missing, there is nothing to draw, or the file cannot be written.
         LogError: the log is no log.
     """
-    return write_figure(make_figure(RunData.from_directory(directory)), target or directory / "figure.png")
+    return style.write_figure(make_figure(RunData.from_directory(directory)), target or directory / "figure.png")
 
 
 def make_figure(run: RunData) -> Figure:
     """Makes the figure of a run, with all panels; FigureError where matplotlib is missing."""
-    figure = empty_figure(15.0, 9.2)
+    figure = style.empty_figure(15.0, 9.2)
     events = event_lines(run)
     heights = 0.085, 1.0, 0.001 + 0.025 * len(events)
     header, body, footer = figure.subfigures(3, 1, squeeze=False, height_ratios=heights)[:, 0]
@@ -68,22 +52,22 @@ def make_figure(run: RunData) -> Figure:
     position_panel(position, run, run.span_s, "Position")
     force_panel(force, run, run.span_s, "Force by part")
     for ax in (position, force):
-        legend(ax)
-        ax.axvspan(*close_s, color=CLOSE, alpha=0.5, zorder=0.5, linewidth=0)
+        style.legend(ax)
+        ax.axvspan(*close_s, color=style.CLOSE, alpha=0.5, zorder=0.5, linewidth=0)
     books = run.books()
-    colours = OF_THE_PLANT | {"wall": WALL, TOGETHER: INK}
-    colours |= {span.name: element_colour(number) for number, span in enumerate(run.history.elements)}
+    colours = style.OF_THE_PLANT | {"wall": style.WALL, TOGETHER: style.INK}
+    colours |= {span.name: style.element_colour(number) for number, span in enumerate(run.history.elements)}
     energy_panel(energy, run, books, colours)
     mark_events([position, force, energy], run)
     for row, (panel, title) in enumerate(((position_panel, "Position"), (force_panel, "Force by part"))):
         ax = body.add_subplot(grid[row, 1])
         panel(ax, run, close_s, f"{title}, close view")
-        few_ticks(ax)
+        style.few_ticks(ax)
     draw_force_position(body.add_subplot(grid[0, 2]), run, close_s)
     draw_momentum(body.add_subplot(grid[1, 2]), run, close_s)
     _draw_books(body.add_subplot(grid[2, 1:]), run, books, colours)
     _draw_header(header, run)
-    footer.text(0.012, 0.5, "\n".join(events), fontsize=SMALL + 0.5, color=GREY, va="center", gid="events")
+    footer.text(0.012, 0.5, "\n".join(events), fontsize=style.SMALL + 0.5, color=style.GREY, va="center", gid="events")
     body.align_ylabels()
     return figure
 
@@ -91,13 +75,14 @@ def make_figure(run: RunData) -> Figure:
 def _draw_header(figure: Figure | SubFigure, run: RunData) -> None:
     word = told(run.summary) if run.summary else "no verdict"
     sign = figure.text(
-        0.012, 0.66, word, fontsize=LARGE, fontweight="bold", color="white", va="center", gid="verdict",
-        bbox={"boxstyle": "round,pad=0.35", "facecolor": VERDICTS.get(word, GREY), "linewidth": 0},
+        0.012, 0.66, word, fontsize=style.LARGE, fontweight="bold", color="white", va="center", gid="verdict",
+        bbox={"boxstyle": "round,pad=0.35", "facecolor": style.VERDICTS.get(word, style.GREY), "linewidth": 0},
     )  # fmt: skip
     right = sign.get_window_extent().x1 / figure.bbox.width
-    title = figure.text(right + 0.018, 0.66, run.scene.title, fontsize=LARGE, color=INK, va="center", gid="title")
-    fit_text(title, figure.bbox.width * (0.97 - right), smallest=1.0)
-    figure.text(0.006, 0.16, "   ·   ".join(key_numbers(run)), fontsize=TEXT + 1, color=INK, va="center", gid="numbers")
+    look: dict[str, Any] = {"color": style.INK, "va": "center"}
+    title = figure.text(right + 0.018, 0.66, run.scene.title, fontsize=style.LARGE, gid="title", **look)
+    style.fit_text(title, figure.bbox.width * (0.97 - right), smallest=1.0)
+    figure.text(0.006, 0.16, "   ·   ".join(key_numbers(run)), fontsize=style.TEXT + 1, gid="numbers", **look)
 
 
 def key_numbers(run: RunData) -> list[str]:
@@ -117,14 +102,14 @@ def key_numbers(run: RunData) -> list[str]:
 
 def _draw_books(ax: Axes, run: RunData, books: list[Book], colours: dict[str, str]) -> None:
     rows = [Row("Books at the end", "true", "sampled", "at work (s)"), *book_rows(run, books)]
-    height, size = 1.0 / max(len(rows), 12), TEXT * min(1.0, 13.0 / len(rows))
+    height, size = 1.0 / max(len(rows), 12), style.TEXT * min(1.0, 13.0 / len(rows))
     ax.set_axis_off()
     ax.set(xlim=(0.0, 1.0), ylim=(1.0, 0.0))
     for number, row in enumerate(rows):
         y = (number + 0.5) * height
         if row.book:
             ax.plot([0.03, 0.06], [y, y], color=colours[row.book], linewidth=2.5, solid_capstyle="butt")
-        colour, weight = INK if row.book or not number else GREY, "normal" if number else "bold"
+        colour, weight = style.INK if row.book or not number else style.GREY, "normal" if number else "bold"
         ax.text(0.075, y, row.name, ha="left", va="center", fontsize=size, color=colour, fontweight=weight)
         for x, text in ((0.56, row.at_work), (0.72, row.true), (0.88, row.sampled)):
             ax.text(x, y, text, ha="right", va="center", fontsize=size, color=colour, fontweight=weight)

@@ -6,19 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from haploop.tools.figure import style
 from haploop.tools.figure.data import Book, Floats, RunData
-from haploop.tools.figure.style import (
-    FAINT,
-    GREY,
-    INK,
-    OF_THE_PLANT,
-    SMALL,
-    WALL,
-    WALL_FILL,
-    dress,
-    element_colour,
-    legend,
-)
 from haploop.tools.render.units import prefix_for
 
 if TYPE_CHECKING:
@@ -31,11 +20,11 @@ _DWARFED = 3.0
 _NEAR = 0.025
 
 
-def line(ax: Axes, t: Floats, y: Floats, label: str, colour: str, held: bool = False, **style: Any) -> None:
+def line(ax: Axes, t: Floats, y: Floats, label: str, colour: str, held: bool = False, **look: Any) -> None:
     """Draws a line over time, reduced to its extremes; ``held`` for a value that holds until the next."""
     keep = extremes(y)
     steps = "steps-post" if held else "default"
-    ax.plot(t[keep], y[keep], **{"linewidth": 1.2, "label": label, "color": colour, "drawstyle": steps, **style})
+    ax.plot(t[keep], y[keep], **{"linewidth": 1.2, "label": label, "color": colour, "drawstyle": steps, **look})
 
 
 def position_panel(ax: Axes, run: RunData, span_s: tuple[float, float], title: str) -> None:
@@ -43,15 +32,15 @@ def position_panel(ax: Axes, run: RunData, span_s: tuple[float, float], title: s
     inside = (run.t_s >= span_s[0]) & (run.t_s <= span_s[1])
     t, x_mm = run.t_s[inside], np.stack([run.x_m, *run.bodies_m.values()])[:, inside] * MM
     name = ("motor" if "tip" in run.bodies_m else "device") + ("" if run.every_step else " as measured")
-    line(ax, t, x_mm[0], name, INK, gid="position")
+    line(ax, t, x_mm[0], name, style.INK, gid="position")
     for body, position in zip(run.bodies_m, x_mm[1:], strict=True):
-        line(ax, t, position, body, OF_THE_PLANT[body], linewidth=1.0, gid=body)
+        line(ax, t, position, body, style.OF_THE_PLANT[body], linewidth=1.0, gid=body)
     ax.set_xlim(*span_s)
     low, high, left_out = _view_mm(run, t, x_mm)
     if run.history.walls:
         _shade_wall(ax, run, span_s, low, high)
     ax.set_ylim(low, high)
-    dress(ax, title + left_out, "time (s)", "position (mm)")
+    style.dress(ax, title + left_out, "time (s)", "position (mm)")
 
 
 def _view_mm(run: RunData, t: Floats, x_mm: Floats) -> tuple[float, float, str]:
@@ -81,50 +70,53 @@ def _shade_wall(ax: Axes, run: RunData, span_s: tuple[float, float], low: float,
     edges = np.array([span_s[0], *(t for t in changes if span_s[0] < t < span_s[1]), span_s[1]])
     surface = run.wall_at(edges)[0] * MM
     far = low - (high - low) if run.history.into_wall < 0 else high + (high - low)
-    ax.fill_between(edges, surface, far, step="post", color=WALL_FILL, zorder=0, linewidth=0, label="wall", gid="wall")
-    ax.plot(edges, surface, drawstyle="steps-post", color=WALL, linewidth=1.0, zorder=1)
+    look = {"color": style.WALL_FILL, "zorder": 0, "linewidth": 0, "label": "wall", "gid": "wall"}
+    ax.fill_between(edges, surface, far, step="post", **look)
+    ax.plot(edges, surface, drawstyle="steps-post", color=style.WALL, linewidth=1.0, zorder=1)
 
 
 def force_panel(ax: Axes, run: RunData, span_s: tuple[float, float], title: str) -> None:
     """Draws the forces of wall and elements at every tick, and their sum, held from tick to tick."""
-    dress(ax, title, "time (s)", "force on the device (N)")
+    style.dress(ax, title, "time (s)", "force on the device (N)")
     inside = (run.ticks_s >= span_s[0]) & (run.ticks_s <= span_s[1])
     t = run.ticks_s[inside]
     if run.history.elements:
-        line(ax, t, run.controller["total"][inside], "total", INK, held=True, linewidth=2.4, alpha=0.35, gid="total")
+        total = run.controller["total"][inside]
+        line(ax, t, total, "total", style.INK, held=True, linewidth=2.4, alpha=0.35, gid="total")
     if run.history.walls:
-        line(ax, t, run.controller["wall"][inside], "wall", WALL, held=True, gid="wall")
+        line(ax, t, run.controller["wall"][inside], "wall", style.WALL, held=True, gid="wall")
     for number, span in enumerate(run.history.elements):
         times, force = run.element_force(span)
         here = (times >= span_s[0]) & (times <= span_s[1])
         if here.any():
-            colour = element_colour(number)
+            colour = style.element_colour(number)
             line(ax, times[here], force[here], span.name, colour, held=True, linewidth=1.0, gid=span.name)
     at_steps = (run.t_s >= span_s[0]) & (run.t_s <= span_s[1])
     for name, force in run.plant_forces_N.items():
-        line(ax, run.t_s[at_steps], force[at_steps], name, OF_THE_PLANT[name], linewidth=1.0, gid=name)
+        line(ax, run.t_s[at_steps], force[at_steps], name, style.OF_THE_PLANT[name], linewidth=1.0, gid=name)
     most = run.scene.actuator and run.scene.actuator.saturation
     if most is not None and np.abs(run.controller["total"][inside]).max(initial=0.0) > most:
+        look = {"color": style.OF_THE_PLANT["actuator"], "linewidth": 0.8, "dashes": (1, 2), "zorder": 0}
         for limit in (-most, most):
-            ax.axhline(limit, color=OF_THE_PLANT["actuator"], linewidth=0.8, dashes=(1, 2), zorder=0, gid="saturation")
+            ax.axhline(limit, **look, gid="saturation")
     ax.set_xlim(*span_s)
-    ax.axhline(0.0, color=FAINT, linewidth=0.8, zorder=0)
+    ax.axhline(0.0, color=style.FAINT, linewidth=0.8, zorder=0)
 
 
 def energy_panel(ax: Axes, run: RunData, books: list[Book], colours: dict[str, str]) -> None:
     """Draws the energy taken out of the device: true books drawn through, sampled ones dashed."""
     energies = np.concatenate([np.empty(0), *(curve for book in books for curve in (book.true_J, book.sampled_J))])
     factor, letter = prefix_for(np.abs(energies[np.isfinite(energies)]).max(initial=0.0, keepdims=True))
-    dress(ax, "Energy taken out of the device (given to it below 0)", "time (s)", f"energy ({letter}J)")
+    style.dress(ax, "Energy taken out of the device (given to it below 0)", "time (s)", f"energy ({letter}J)")
     for book in books:
         line(ax, book.t_s, book.true_J / factor, book.name, colours[book.name], linewidth=1.6, gid=f"{book.name}.true")
         look = {"linewidth": 1.0, "dashes": (4, 2), "gid": f"{book.name}.sampled"}
         line(ax, book.t_s, book.sampled_J / factor, "_", colours[book.name], **look)
-    for label, style in (("true", "-"), ("sampled", (0, (4, 2)))):
-        ax.plot([], [], color=GREY, linestyle=style, linewidth=1.3, label=label)
-    ax.axhline(0.0, color=GREY, linewidth=0.8, zorder=0)
+    for label, dashes in (("true", "-"), ("sampled", (0, (4, 2)))):
+        ax.plot([], [], color=style.GREY, linestyle=dashes, linewidth=1.3, label=label)
+    ax.axhline(0.0, color=style.GREY, linewidth=0.8, zorder=0)
     ax.set_xlim(*run.span_s)
-    legend(ax, only=("true", "sampled"))
+    style.legend(ax, only=("true", "sampled"))
 
 
 def mark_events(axes: list[Axes], run: RunData) -> None:
@@ -134,7 +126,7 @@ def mark_events(axes: list[Axes], run: RunData) -> None:
     for number, event in enumerate(run.events, start=1):
         t = float(event["timestamp"])
         for ax in axes:
-            ax.axvline(t, color=GREY, linewidth=0.9, linestyle=(0, (1, 2)), gid="event")
+            ax.axvline(t, color=style.GREY, linewidth=0.9, linestyle=(0, (1, 2)), gid="event")
         if groups and t - groups[-1][0] < _NEAR * (last - first):
             groups[-1][1].append(number)
         else:
@@ -143,8 +135,8 @@ def mark_events(axes: list[Axes], run: RunData) -> None:
         label = f"{numbers[0]}" if len(numbers) == 1 else f"{numbers[0]}–{numbers[-1]}"
         axes[0].annotate(
             label, (t, 1.0), xycoords=("data", "axes fraction"), xytext=(0, -2), textcoords="offset points",
-            ha="center", va="top", fontsize=SMALL, color="white", gid="event-label", annotation_clip=True,
-            bbox={"boxstyle": "round,pad=0.25", "facecolor": GREY, "linewidth": 0},
+            ha="center", va="top", fontsize=style.SMALL, color="white", gid="event-label", annotation_clip=True,
+            bbox={"boxstyle": "round,pad=0.25", "facecolor": style.GREY, "linewidth": 0},
         )  # fmt: skip
 
 

@@ -108,14 +108,7 @@ class Engine:
             for item, row in self._rows([Group(missing, together)], len(missing)):
                 yield places[_cell(item)], row
 
-        return find_boundaries(
-            len(rows),
-            axis.values,
-            bisect.tolerance,
-            run,
-            verdict_is(bisect.holds),
-            bisect.holds,
-        )
+        return find_boundaries(len(rows), axis.values, bisect.tolerance, run, verdict_is(bisect.holds), bisect.holds)
 
 
 def _without(groups: Iterable[Group], done: set[int]) -> Iterator[Group]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from enum import IntEnum
 from itertools import islice, product
 from typing import Any
 
@@ -15,13 +16,23 @@ from haploop.tools.sweep.map.axis import Axis
 from haploop.tools.sweep.table import ResolvedSweep
 
 AMPLITUDE, WIDTH, STIFFNESS = "window.oscillation_m", "stability.width_m", "wall.stiffness"
-# The worse later: of several seeds a cell shows the worst. A failed run says nothing, a swinging one that it swings.
-VERDICTS = ("steady", "no-contact", "failed", "undecided", "limit-cycle", "growing", "diverged")
-STEADY, NO_CONTACT, FAILED, UNDECIDED, LIMIT_CYCLE, GROWING, DIVERGED = range(len(VERDICTS))
 NOT_RUN = -1
 MOST_PANELS = 12
 # By name, equally long: lists or NumPy arrays.
 Columns = Mapping[str, Any]
+
+
+class Verdict(IntEnum):
+    """Verdicts, the worse later: of several seeds a cell shows the worst.
+
+    A failed run says nothing, a swinging one that it swings.
+    """
+
+    STEADY, NO_CONTACT, FAILED, UNDECIDED, LIMIT_CYCLE, GROWING, DIVERGED = range(7)
+
+
+# Their words in the table of a sweep, by number.
+VERDICTS = tuple(verdict.name.lower().replace("_", "-") for verdict in Verdict)
 
 
 @dataclass(frozen=True)
@@ -154,7 +165,7 @@ class MapData:
         All else by the oscillation at the end of its run; NaN where it is not known.
         """
         width_m = self._numbers(WIDTH)
-        return np.where((self.verdicts == LIMIT_CYCLE) & (width_m > 0.0), width_m, self._numbers(AMPLITUDE))
+        return np.where((self.verdicts == Verdict.LIMIT_CYCLE) & (width_m > 0.0), width_m, self._numbers(AMPLITUDE))
 
     def _numbers(self, name: str) -> np.ndarray:
         column = self.columns.get(name, [None] * len(self.columns["verdict"]))
@@ -163,7 +174,7 @@ class MapData:
 
 def verdict_number(word: str | None) -> int:
     """Returns the place of a verdict in ``VERDICTS``; a run without a verdict failed."""
-    return VERDICTS.index(word) if word in VERDICTS else FAILED
+    return VERDICTS.index(word) if word in VERDICTS else Verdict.FAILED
 
 
 def make_map_data(

@@ -5,23 +5,18 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from enum import IntEnum
 
 import numpy as np
 
 from haploop.tools.sweep.map.axis import Axis, with_unit
-from haploop.tools.sweep.map.data import (
-    FAILED,
-    NO_CONTACT,
-    STEADY,
-    STIFFNESS,
-    Cells,
-    Columns,
-    MapData,
-    verdict_number,
-)
+from haploop.tools.sweep.map.data import STIFFNESS, Cells, Columns, MapData, Verdict, verdict_number
 
-# What is known of a combination of the other axes' values.
-FOUND, ALL_HOLD, NONE_HOLDS, UNKNOWN = range(4)
+
+class State(IntEnum):
+    """Knowledge of a boundary: found, held at all points, not even where the search begins, or unknown."""
+
+    FOUND, ALL_HOLD, NONE_HOLDS, UNKNOWN = range(4)
 
 
 @dataclass(frozen=True)
@@ -33,8 +28,7 @@ class Edges:
         others: the other axes, along x first; none where there is none.
         holds: the verdict on the near side.
         rising: whether the search went towards greater values.
-        state: FOUND, ALL_HOLD at every point, NONE_HOLDS where the search begins, or UNKNOWN; of seeds that differ,
-            what holds least far.
+        state: a ``State``; of seeds that differ, that of the seed that holds least far.
         nearest, low, high: the boundary of the seed that holds least far; the brackets of all seeds together.
         more: how often a seed changed more than once at the planned points.
     """
@@ -66,7 +60,7 @@ def find_edges(data: MapData) -> Edges:
     shape = tuple(len(axis.values) for axis in others)
     # What holds least far: none, unknown, found, all.
     rank = np.full(shape, np.inf)
-    state, nearest = np.full(shape, UNKNOWN), np.full(shape, math.nan)
+    state, nearest = np.full(shape, State.UNKNOWN), np.full(shape, math.nan)
     low, high = np.full(shape, math.nan), np.full(shape, math.nan)
     table, begin = data.boundary, np.flatnonzero(np.asarray(data.columns[key], dtype=float) == first)
     verdicts = [data.columns["verdict"][row] for row in begin.tolist()]
@@ -74,17 +68,19 @@ def find_edges(data: MapData) -> Edges:
     for row, place in enumerate(_places(table, others, np.arange(len(table["low"])))):
         at, value, started = place[:-1], float(table["boundary"][row]), starts.get(place)
         if math.isfinite(float(table["low"][row])):
-            seen = FOUND
-        elif verdict_number(started) == FAILED:
-            seen = UNKNOWN
+            seen = State.FOUND
+        elif verdict_number(started) == Verdict.FAILED:
+            seen = State.UNKNOWN
         elif started != holds:
-            seen = NONE_HOLDS
+            seen = State.NONE_HOLDS
         else:
-            seen = ALL_HOLD if table["changes"][row] == 0 else UNKNOWN
-        distance = {NONE_HOLDS: -math.inf, UNKNOWN: -1e300, FOUND: value if rising else -value, ALL_HOLD: 1e300}[seen]
+            seen = State.ALL_HOLD if table["changes"][row] == 0 else State.UNKNOWN
+        found = value if rising else -value
+        least_far = {State.NONE_HOLDS: -math.inf, State.UNKNOWN: -1e300, State.FOUND: found, State.ALL_HOLD: 1e300}
+        distance = least_far[seen]
         if distance < rank[at]:
-            rank[at], state[at], nearest[at] = distance, seen, value if seen == FOUND else math.nan
-        if seen == FOUND:
+            rank[at], state[at], nearest[at] = distance, seen, value if seen == State.FOUND else math.nan
+        if seen == State.FOUND:
             low[at] = np.fmin(low[at], table["low"][row])
             high[at] = np.fmax(high[at], table["high"][row])
     more = int(np.sum(np.asarray(table["changes"]) > 1))
@@ -109,8 +105,8 @@ class Furthest:
 
 def furthest(edges: Edges) -> Furthest | None:
     """Finds what holds furthest from where the search begins; None where no boundary was found and nothing holds."""
-    found = edges.state == FOUND
-    if (throughout := np.argwhere(edges.state == ALL_HOLD)).size:
+    found = edges.state == State.FOUND
+    if (throughout := np.argwhere(edges.state == State.ALL_HOLD)).size:
         end = -1 if edges.rising else 0
         words = f"{edges.holds} up to {edges.along.word(end)} and perhaps beyond"
         middle = tuple(int(i) for i in throughout[len(throughout) // 2])
@@ -146,7 +142,8 @@ def stiffest_steady(axes: Sequence[Axis], cells: Cells) -> StiffestSteady | None
         return None
     along = keys.index(STIFFNESS)
     verdict = np.moveaxis(cells.verdict, along, -1)
-    held = np.logical_and.accumulate((verdict == STEADY) | (verdict == NO_CONTACT), axis=-1) & (verdict == STEADY)
+    steady = verdict == Verdict.STEADY
+    held = np.logical_and.accumulate(steady | (verdict == Verdict.NO_CONTACT), axis=-1) & steady
     if not held.any():
         return None
     reached = np.where(held, np.arange(held.shape[-1]), -1).max(axis=-1)

@@ -11,17 +11,8 @@ import numpy as np
 from haploop.tools.figure.data import FigureError
 from haploop.tools.figure.style import ELEMENTS, FAINT, INK, WALL, fix_layout, write_figure
 from haploop.tools.sweep.map.axis import Axis
-from haploop.tools.sweep.map.data import LIMIT_CYCLE, STEADY, Layout, MapData, make_map_data
-from haploop.tools.sweep.map.edges import (
-    ALL_HOLD,
-    FOUND,
-    NONE_HOLDS,
-    UNKNOWN,
-    Edges,
-    find_edges,
-    furthest,
-    stiffest_steady,
-)
+from haploop.tools.sweep.map.data import Layout, MapData, Verdict, make_map_data
+from haploop.tools.sweep.map.edges import Edges, State, find_edges, furthest, stiffest_steady
 from haploop.tools.sweep.map.lines import (
     LineStyle,
     PanelLines,
@@ -80,7 +71,7 @@ def make_figure(data: MapData) -> Figure:
     overs = [find_lines((scenes[row] for row in panel.cells.row.flat if row >= 0), along) for panel in panels]
     styles = line_styles(list(dict.fromkeys(line.name for over in overs for line in over.lines if line.pieces)))
     swings = SwingScale(cells)
-    scale = amplitude_scale(cells.amplitude_m[cells.verdict == LIMIT_CYCLE]) if layout.y is not None else None
+    scale = amplitude_scale(cells.amplitude_m[cells.verdict == Verdict.LIMIT_CYCLE]) if layout.y is not None else None
     sheet = Sheet(len(panels), data.title, description(data, cells))
     for number, (ax, panel, over) in enumerate(zip(sheet.axes, panels, overs, strict=True)):
         if layout.y is None:
@@ -172,7 +163,7 @@ def _draw_boundary(ax: Axes, edges: Edges, part: tuple[Any, ...], number: int, c
     from matplotlib.transforms import offset_copy
 
     x, y, state = edges.others[0], edges.along, edges.state[part]
-    at, found = x.coordinates, state == FOUND
+    at, found = x.coordinates, state == State.FOUND
     ax.plot(
         at, np.where(found, y.place(edges.nearest[part]), np.nan), color=color, marker=marker, markersize=5.5,
         linestyle="none" if x.names else "-", linewidth=0.8, markeredgecolor="white", markeredgewidth=0.6, zorder=4.5,
@@ -183,7 +174,8 @@ def _draw_boundary(ax: Axes, edges: Edges, part: tuple[Any, ...], number: int, c
     bottom, top = ax.get_ylim()
     far, near = (top, bottom) if edges.rising else (bottom, top)
     arrow = "^" if edges.rising else "v"
-    for kind, where, sign in ((ALL_HOLD, far, arrow), (NONE_HOLDS, near, "x"), (UNKNOWN, near, "$?$")):
+    signs = {State.ALL_HOLD: (far, arrow), State.NONE_HOLDS: (near, "x"), State.UNKNOWN: (near, "$?$")}
+    for kind, (where, sign) in signs.items():
         here = at[state == kind]
         inwards = (1.0 if where == bottom else -1.0) * (_STACK_PT * (number + 0.6))
         shifted = offset_copy(ax.transData, ax.get_figure(root=True), y=inwards, units="points")
@@ -193,7 +185,8 @@ def _draw_boundary(ax: Axes, edges: Edges, part: tuple[Any, ...], number: int, c
 
 def _make_room(ax: Axes, y: Axis, edges: Edges, lines: int) -> None:
     """Adds a strip at either end for the signs of combinations without a boundary, one line's above the other's."""
-    none, throughout = np.isin(edges.state, (NONE_HOLDS, UNKNOWN)).any(), (edges.state == ALL_HOLD).any()
+    states = {*edges.state.flat}
+    none, throughout = bool({State.NONE_HOLDS, State.UNKNOWN} & states), State.ALL_HOLD in states
     below, above = (none, throughout) if edges.rising else (throughout, none)
     bottom, top = y.edges[0], y.edges[-1]
     low, high = np.log((bottom, top)) if y.scale == "log" else (bottom, top)
@@ -209,7 +202,7 @@ def _fill(ax: Axes, x: Axis, y: Axis, edges: Edges) -> None:
     """Fills what holds: from where the search begins to the boundary, or to the end where none was found."""
     near, far = y.edges[[0, -1]] if edges.rising else y.edges[[-1, 0]]
     borders = x.edges
-    for i in np.flatnonzero(np.isin(edges.state, (FOUND, ALL_HOLD))):
-        end = float(y.place([edges.nearest[i]])[0]) if edges.state[i] == FOUND else far
-        look = {"color": LOOKS[STEADY].fill, "linewidth": 0, "zorder": 0.5, "gid": "holds"}
+    for i in np.flatnonzero(np.isin(edges.state, (State.FOUND, State.ALL_HOLD))):
+        end = float(y.place([edges.nearest[i]])[0]) if edges.state[i] == State.FOUND else far
+        look = {"color": LOOKS[Verdict.STEADY].fill, "linewidth": 0, "zorder": 0.5, "gid": "holds"}
         ax.fill_between(borders[i : i + 2], [near] * 2, [end] * 2, **look)

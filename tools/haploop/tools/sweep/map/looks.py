@@ -10,16 +10,7 @@ import numpy as np
 from haploop.tools.figure.style import GREY
 from haploop.tools.figure.style import VERDICTS as COLOURS
 from haploop.tools.render.units import amount
-from haploop.tools.sweep.map.data import (
-    DIVERGED,
-    FAILED,
-    GROWING,
-    LIMIT_CYCLE,
-    NO_CONTACT,
-    STEADY,
-    UNDECIDED,
-    VERDICTS,
-)
+from haploop.tools.sweep.map.data import VERDICTS, Verdict
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -38,14 +29,14 @@ class Look(NamedTuple):
 
 
 # From light to dark: steady, no contact, undecided, failed, the limit cycles' scale, growing, diverged.
-LOOKS = {
-    STEADY: Look("#D9EEF7", "", "", "o", COLOURS["steady"]),
-    NO_CONTACT: Look("#FFFFFF", "...", "#A8A8A8", "s", COLOURS["no-contact"]),
-    FAILED: Look("#BFBFBF", "xxx", "#666666", "x", "#222222"),
-    UNDECIDED: Look("#E6E6E6", "\\\\\\", "#8C8C8C", "P", COLOURS["undecided"]),
-    LIMIT_CYCLE: Look("#E0A030", "", "", "D", COLOURS["limit-cycle"]),
-    GROWING: Look("#7A2430", "+++", "#D0A0A8", "v", COLOURS["growing"]),
-    DIVERGED: Look("#3B0F1E", "///", "#A58090", "^", COLOURS["diverged"]),
+LOOKS: dict[int, Look] = {
+    Verdict.STEADY: Look("#D9EEF7", "", "", "o", COLOURS["steady"]),
+    Verdict.NO_CONTACT: Look("#FFFFFF", "...", "#A8A8A8", "s", COLOURS["no-contact"]),
+    Verdict.FAILED: Look("#BFBFBF", "xxx", "#666666", "x", "#222222"),
+    Verdict.UNDECIDED: Look("#E6E6E6", "\\\\\\", "#8C8C8C", "P", COLOURS["undecided"]),
+    Verdict.LIMIT_CYCLE: Look("#E0A030", "", "", "D", COLOURS["limit-cycle"]),
+    Verdict.GROWING: Look("#7A2430", "+++", "#D0A0A8", "v", COLOURS["growing"]),
+    Verdict.DIVERGED: Look("#3B0F1E", "///", "#A58090", "^", COLOURS["diverged"]),
 }
 AMPLITUDES = "limit cycle: swing, peak to peak"
 # Of amplitudes that have colours of their own, the least over the greatest.

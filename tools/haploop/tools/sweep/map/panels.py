@@ -8,7 +8,7 @@ import numpy as np
 
 from haploop.tools.figure.style import FAINT, GREY, INK, SMALL, TEXT
 from haploop.tools.sweep.map.axis import Axis
-from haploop.tools.sweep.map.data import LIMIT_CYCLE, NOT_RUN, STEADY, VERDICTS, Cells
+from haploop.tools.sweep.map.data import NOT_RUN, VERDICTS, Cells, Verdict
 from haploop.tools.sweep.map.looks import LOOKS, Look, amplitude_colours, metres_along
 
 if TYPE_CHECKING:
@@ -29,7 +29,7 @@ def draw_cells(ax: Axes, x: Axis, y: Axis, cells: Cells, scale: LogNorm | None) 
     norm = BoundaryNorm(np.arange(len(VERDICTS) + 1) - 0.5, len(VERDICTS))
     ran = np.ma.masked_equal(verdict, NOT_RUN)
     ax.pcolormesh(*edges, ran, cmap=fills, norm=norm, zorder=1, rasterized=True, gid="verdicts")
-    swinging = (verdict == LIMIT_CYCLE) & np.isfinite(cells.amplitude_m.T) & (cells.amplitude_m.T > 0.0)
+    swinging = (verdict == Verdict.LIMIT_CYCLE) & np.isfinite(cells.amplitude_m.T) & (cells.amplitude_m.T > 0.0)
     if scale and swinging.any():
         shown = np.ma.array(cells.amplitude_m.T, mask=~swinging)
         colours = amplitude_colours()
@@ -59,7 +59,7 @@ def _hatch(ax: Axes, edges: tuple[np.ndarray, np.ndarray], where: np.ndarray, lo
 def _outline(ax: Axes, edges: tuple[np.ndarray, np.ndarray], verdict: np.ndarray) -> None:
     from matplotlib.collections import LineCollection
 
-    steady, ran = verdict == STEADY, verdict != NOT_RUN
+    steady, ran = verdict == Verdict.STEADY, verdict != NOT_RUN
     xs, ys = edges
     upright = np.argwhere((steady[:, 1:] != steady[:, :-1]) & ran[:, 1:] & ran[:, :-1])
     level = np.argwhere((steady[1:] != steady[:-1]) & ran[1:] & ran[:-1])
@@ -125,8 +125,8 @@ def draw_swings(ax: Axes, x: Axis, cells: Cells, scale: SwingScale, label: bool)
     """Draws a panel; ``cells`` have the shape (values of x,). The first panel of a row has the label along y."""
     ran = cells.verdict != NOT_RUN
     at, places, edges = x.coordinates, scale.place(cells.amplitude_m), x.edges
-    for i in np.flatnonzero(cells.verdict == STEADY):
-        ax.axvspan(edges[i], edges[i + 1], color=LOOKS[STEADY].fill, linewidth=0, zorder=0.2, gid="steady")
+    for i in np.flatnonzero(cells.verdict == Verdict.STEADY):
+        ax.axvspan(edges[i], edges[i + 1], color=LOOKS[Verdict.STEADY].fill, linewidth=0, zorder=0.2, gid="steady")
     known = ran & np.isfinite(cells.amplitude_m)
     ax.plot(at, np.where(known, places, np.nan), color=FAINT, linewidth=1.2, zorder=2, gid="line")
     for i in np.flatnonzero(known & (cells.seeds > 1)):

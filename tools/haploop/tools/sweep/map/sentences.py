@@ -10,17 +10,8 @@ import numpy as np
 
 from haploop.tools.render.units import spring
 from haploop.tools.sweep.map.axis import Axis, short
-from haploop.tools.sweep.map.data import FAILED, LIMIT_CYCLE, NOT_RUN, STIFFNESS, WIDTH, Cells, Layout, MapData
-from haploop.tools.sweep.map.edges import (
-    ALL_HOLD,
-    FOUND,
-    NONE_HOLDS,
-    UNKNOWN,
-    Edges,
-    Furthest,
-    StiffestSteady,
-    stiffest_steady,
-)
+from haploop.tools.sweep.map.data import NOT_RUN, STIFFNESS, WIDTH, Cells, Layout, MapData, Verdict
+from haploop.tools.sweep.map.edges import Edges, Furthest, State, StiffestSteady, stiffest_steady
 from haploop.tools.sweep.map.lines import PanelLines
 from haploop.tools.sweep.map.looks import verdict_words
 
@@ -41,10 +32,10 @@ def description(data: MapData, cells: Cells) -> str:
 def edge_description(data: MapData, edges: Edges) -> str:
     """Returns one line: the base scene, what was swept and bisected, the seeds, and what was found."""
     words = {
-        FOUND: "found",
-        ALL_HOLD: f"{edges.holds} throughout",
-        NONE_HOLDS: f"not {edges.holds} at {edges.begin}",
-        UNKNOWN: "unknown",
+        State.FOUND: "found",
+        State.ALL_HOLD: f"{edges.holds} throughout",
+        State.NONE_HOLDS: f"not {edges.holds} at {edges.begin}",
+        State.UNKNOWN: "unknown",
     }
     counts = Counter(edges.state.ravel().tolist())
     return _about(data, "boundaries: " + ", ".join(f"{counts[s]} {word}" for s, word in words.items() if counts[s]))
@@ -94,7 +85,7 @@ def _place(at: Iterable[tuple[Axis, int]]) -> str:
 
 
 def _failures(data: MapData) -> str:
-    failed = np.flatnonzero(data.verdicts == FAILED).tolist()
+    failed = np.flatnonzero(data.verdicts == Verdict.FAILED).tolist()
     if not failed:
         return ""
     whys = data.columns.get("why", [""] * len(data.columns["verdict"]))
@@ -120,7 +111,8 @@ def map_notes(data: MapData, cells: Cells, layout: Layout, lines: Sequence[Panel
         "Upright lines reach down to the seed that swings least.": layout.y is None and len(data.seeds) > 1,
         "Limit cycles as they swing on after a push, all else at the end of its run.": layout.y is None
         and WIDTH in data.columns,
-        "How far limit cycles swing was not recorded.": LIMIT_CYCLE in cells.verdict and not data.has_amplitudes,
+        "How far limit cycles swing was not recorded.": not data.has_amplitudes
+        and Verdict.LIMIT_CYCLE in cells.verdict,
         _failures(data): True,
     })  # fmt: skip
 
@@ -134,9 +126,9 @@ def edge_notes(data: MapData, edges: Edges, best: Furthest | None, lines: Sequen
         f"★ Furthest: {best.words}{_place(zip(edges.others, best.index, strict=True))}." if best else "": True,
         f"The first {len(lines)} of {rows} lines are drawn.": len(lines) < rows,
         f"Upright bars are the brackets{more}. Each boundary is the first change from {edges.begin} on.": True,
-        f"{'▲' if edges.rising else '▼'} {holds} at every point that was tried.": ALL_HOLD in edges.state,
-        f"× not {holds} where the search begins.": NONE_HOLDS in edges.state,
-        "? a run failed before a boundary was found.": UNKNOWN in edges.state,
+        f"{'▲' if edges.rising else '▼'} {holds} at every point that was tried.": State.ALL_HOLD in edges.state,
+        f"× not {holds} where the search begins.": State.NONE_HOLDS in edges.state,
+        "? a run failed before a boundary was found.": State.UNKNOWN in edges.state,
         f"{edges.more} of {len(data.boundary['low'])} searches changed more than once.": edges.more,
         f"No exact limit, since the loop is not linear: {reasons}.": reasons,
         _failures(data): True,
