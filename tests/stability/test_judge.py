@@ -10,11 +10,14 @@ import pytest
 from haploop.controller.dissipation import registry
 from haploop.launch.runs.in_process import run_in_process
 from haploop.launch.scene.file import load
-from haploop.launch.stability.decide import Finding, Pushed, measure
+from haploop.launch.stability.decide import Finding
 from haploop.launch.stability.judge import judge
-from haploop.launch.stability.traces import frequency_Hz, is_felt, ripple, smallest_felt_m, trend, widths
+from haploop.launch.stability.swing import Pushed, measure
+from haploop.launch.stability.traces import frequency_Hz, is_felt, ripple, sizes, smallest_felt_m, trend, widths
+from haploop.protocol.scene.effects import Friction
 from helpers.runs.judged import ended, found
 from helpers.scenes.least import scene
+from helpers.scenes.unseen_loops import drawn
 
 PLAIN = {
     "duration": 2.0,
@@ -68,6 +71,17 @@ def test_the_chatter_of_a_coarse_encoder_is_a_limit_cycle_and_that_of_a_fine_one
 
 def test_friction_that_holds_the_device_is_rest():
     assert word(**pressed(friction={"kinetic": 0.3})) == "steady"
+
+
+@pytest.mark.parametrize(("kinetic", "blown"), [(0.043, "swings on"), (0.17, "rests")])
+def test_friction_that_stops_a_pushed_loop_is_told_to_let_a_blow_set_it_swinging(kinetic, blown):
+    """A loop of rho(M) > 1 by its map: friction of 2 % of the hold stops what 0.3 of it set off, but not what 3 do."""
+    loop = drawn(7026)
+    assert loop.rate_1_s > 0.0
+    finding = found(replace(loop.scene, friction=Friction(kinetic=kinetic)))
+    assert (finding.word, finding.blown) == ("steady", blown)
+    assert finding.blow_N == pytest.approx(10.0 * finding.push_N)
+    assert f"{finding.blow_N:.3g} N" in finding.sentence()
 
 
 def test_a_device_that_nobody_holds_at_the_wall_is_undecided():
@@ -156,6 +170,24 @@ def test_the_force_ripple_is_that_of_the_last_quarter():
     [swing] = measure(Pushed(0.1 * x, x, command, one, 0.0 * one, one > 0, one > 0, one > 0), 1000.0)
     assert swing.ripple_N == 0.0
     assert swing.frequency_Hz == pytest.approx(40.0)
+
+
+@pytest.mark.parametrize("periods", [2.0, 2.3, 3.1, 4.05, 7.02])
+def test_a_sine_that_does_not_grow_is_not_said_to_however_its_pieces_fall(periods):
+    """The widths alone, of pieces that do not hold whole periods, seem to grow by several of their standard errors."""
+    rate, seconds = 1000.0, 4.8
+    t = np.arange(round(seconds * rate)) / rate
+    said = {sizes: 0.0, widths: 0.0}
+    for phase in np.arange(12.0) / 2.0:
+        x = 1e-4 * np.sin(2 * np.pi * periods * t / 0.2 + phase)
+        for measured in said:
+            growth = trend(measured(x, 200)[12:], 0.2)
+            said[measured] = max(said[measured], abs(float(growth.change)))
+        one = np.ones(1)
+        [swing] = measure(Pushed(0.1 * x[None], x[None], x[None], one, 0.0 * one, one > 0, one > 0, one > 0), rate)
+        assert all(abs(change) < 3.0 * error for change, error in zip(swing.changes, swing.errors, strict=True))
+        assert abs(swing.changes[0]) < 0.03
+    assert said[sizes] < 0.4 * said[widths]
 
 
 def test_a_scene_without_noise_is_judged_the_same_with_its_noise_off():

@@ -3,24 +3,16 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import Any, NamedTuple
+from dataclasses import dataclass, replace
+from typing import Any
 
-import numpy as np
+from haploop.launch.stability.swing import FEW_PIECES, LEAST_PERIODS, REST_M, SAME, Swing
+from haploop.launch.stability.traces import is_felt, smallest_felt_m
 
-from haploop.launch.stability.traces import frequency_Hz, is_felt, ripple, smallest_felt_m, trend, widths
-
-# Pieces in which the width of a swing is measured, and the periods that one covers at least.
-PIECES, FEW_PIECES = 24, 8
-_LEAST_PERIODS = 1.5
-# A swing this small is rounding: a thousand atoms would be wider.
-_REST_M = 1e-9
 # A swing that dies is watched until it is this small, or for long.
 _SMALL_M = 20e-6
 # So much may the logarithm of the width change over the second half where a swing is said to last.
 _LASTING, _LASTING_LONG = 0.05, 0.02
-# Sizes whose ratio lies between these are the same; those of the pushes differ by ten.
-_SAME = (0.7, 1.43)
 # After so long, and so many periods, a slow change counts as none, and a steady growth as one.
 _LONG_S = 8.0
 _COUNTED_PERIODS = 60.0
@@ -28,6 +20,8 @@ _COUNTED_PERIODS = 60.0
 _ALIKE_S = 4.0
 # A swing of the loop that is wider than that of its run by more than this has not been seen in it.
 _WIDER = 1.2
+# A frequency is known from so many periods on.
+_SEEN_PERIODS = 6.0
 # Behind an encoder a swing that decays may end as a chatter of so many counts, peak to peak, at the most.
 _COUNTS = 10
 
@@ -50,6 +44,13 @@ WHY = {
     "too slow": "Its swing of {width_mm:.3g} mm peak to peak at {frequency_Hz:.3g} Hz changes by {rate_1_s:.2g} +- "
     "{error_1_s:.1g} 1/s, too slowly to tell within {watched_s:g} s; {needs_s:.3g} s would tell.",
 }
+# What is said beside that after a blow, and how the words for its finding are told.
+AFTER_BLOW = {
+    "rests": " It did after {blow_N:.3g} N, too.",
+    "swings on": " After a harder blow, of {blow_N:.3g} N, it swings on.",
+    "undecided": " Whether it does after a harder blow, of {blow_N:.3g} N, could not be told.",
+}
+_BLOWN = {"steady": "rests", "limit-cycle": "swings on", "growing": "swings on"}
 
 
 @dataclass(frozen=True)
@@ -70,6 +71,8 @@ class Finding:
         chaotic: whether two copies started a thousandth apart ended apart by a fifth of the swing; None if not asked.
         detail: why the run itself ended, where it diverged, or what failed.
         needs_s: time after which a swing that changes too slowly would be told; None otherwise.
+        blow_N: of a loop that rests after the push, a harder one; None if not asked.
+        blown: what it does after that: rests, swings on, or undecided.
     """
 
     word: str
@@ -85,7 +88,13 @@ class Finding:
     felt: bool = False
     chaotic: bool | None = None
     needs_s: float | None = None
+    blow_N: float | None = None
+    blown: str | None = None
     detail: str = ""
+
+    def after_blow(self, found: Finding) -> Finding:
+        """Returns the finding with what was found after a harder push."""
+        return replace(self, blow_N=found.push_N, blown=_BLOWN.get(found.word, found.word))
 
     def entries(self, seen_m: float | None = None) -> dict[str, Any]:
         """Returns what a summary tells of it: the word, why as a sentence, and the numbers as its ``stability``.
@@ -102,7 +111,7 @@ class Finding:
         What is left is the hand's own motion, the noise, or dies away. None where it cannot be told: of a loop that
         does not settle, of a run that did not swing, and where the loop swings wider than the run did.
         """
-        if self.word not in ("steady", "limit-cycle") or not seen_m or seen_m < _REST_M:
+        if self.word not in ("steady", "limit-cycle") or not seen_m or seen_m < REST_M:
             return None
         own_m = 0.0 if self.why == "decays" else self.width_m
         return min(own_m / seen_m, 1.0) if own_m < _WIDER * seen_m else None
@@ -111,170 +120,60 @@ class Finding:
         """Returns why, with its numbers."""
         numbers = {name: math.nan if value is None else value for name, value in vars(self).items()}
         sizes = {"width_mm": 1e3 * self.width_m, "width_um": 1e6 * self.width_m}
-        return WHY[self.why].format(**numbers, **sizes, felt_um=2e6 * smallest_felt_m(self.frequency_Hz))
-
-
-class Pushed(NamedTuple):
-    """Some loops after both pushes; arrays have the members on their first axis.
-
-    Attributes:
-        small, large: position at the ticks after the smaller and the larger push, shape (members, ticks), m.
-        command: command at the ticks after the larger one, shape (members, ticks), N.
-        push_N: the larger push, shape (members,).
-        count_m: one count of the encoder, shape (members,); 0 without.
-        inside: whether a tick in the last quarter of both was in contact, shape (members,).
-        stays_inside: whether all ticks in the last half of both were.
-        smooth: whether the loop treats small swings as large ones, but for the counts of its encoder, shape (members,).
-    """
-
-    small: np.ndarray
-    large: np.ndarray
-    command: np.ndarray
-    push_N: np.ndarray
-    count_m: np.ndarray
-    inside: np.ndarray
-    stays_inside: np.ndarray
-    smooth: np.ndarray
-
-
-class Swing(NamedTuple):
-    """Measures of one loop after both pushes.
-
-    Attributes:
-        watched_s: time since the push.
-        changes, errors: of the logarithm of the width over the second half, small and large, and their standard errors.
-        rate_1_s, error_1_s: growth of the one that changes less, and its standard error.
-        width_m, spread_m, most_m: mean, half range and maximum of the widths in the last quarter of both.
-        moved_m: peak to peak over the last half of either, with its trend.
-        at_first, at_last: width after the larger push over that after the smaller, in the first piece and at the last.
-        frequency_Hz: of the end.
-        covers_periods: periods that a piece covers.
-    """
-
-    watched_s: float
-    push_N: float
-    count_m: float
-    inside: bool
-    stays_inside: bool
-    smooth: bool
-    changes: tuple[float, float]
-    errors: tuple[float, float]
-    rate_1_s: float
-    error_1_s: float
-    width_m: float
-    spread_m: float
-    most_m: float
-    moved_m: float
-    at_first: float
-    at_last: float
-    frequency_Hz: float
-    ripple_N: float
-    covers_periods: float
-
-    def lasts(self, within: float) -> bool:
-        """Tells whether both swings neither grow nor decay, as far as their scatter lets one say."""
-        pairs = zip(self.changes, self.errors, strict=True)
-        return all(abs(change) < max(within, 2 * error) and error < 0.1 for change, error in pairs)
-
-    def is_alike(self) -> bool:
-        """Tells whether swings of other sizes go as these: never off the wall, or the larger as the smaller one."""
-        rate = abs(self.changes[1] - self.changes[0]) < 0.1 * abs(self.changes[1]) + 3 * math.hypot(*self.errors)
-        kept_ratio = self.at_first > 2.0 and _SAME[0] < self.at_last / self.at_first < _SAME[1]
-        return rate and (self.stays_inside or kept_ratio)
-
-    def finding(self, word: str, why: str) -> Finding:
-        felt_m = 2.0 * smallest_felt_m(self.frequency_Hz)
-        needs_s = None
-        if word == "undecided":
-            slower = min(zip(self.changes, self.errors, strict=True), key=lambda each: abs(each[0]))
-            needs_s = FEW_PIECES * _LEAST_PERIODS / self.frequency_Hz if self.frequency_Hz else 0.0
-            needs_s = max(needs_s, self.watched_s * max(2.0, 4.0 * slower[1] / max(abs(slower[0]), 1e-12)))
-            if self.rate_1_s < 0.0:
-                needs_s = max(needs_s, self.watched_s + math.log(max(self.width_m / felt_m, 1.0)) / -self.rate_1_s)
-        return Finding(
-            word, why, self.push_N, self.watched_s, self.rate_1_s, self.error_1_s, self.frequency_Hz, self.width_m,
-            self.spread_m, self.ripple_N, self.width_m >= felt_m, None, needs_s,
-        )  # fmt: skip
-
-
-def measure(pushed: Pushed, rate: float) -> list[Swing]:
-    """Returns the measures of each loop, worked out as if it were alone; slow swings in fewer, longer pieces.
-
-    ``rate``: ticks a second.
-    """
-    ticks = pushed.large.shape[-1]
-    frequency = frequency_Hz(pushed.large[:, ticks // 2 :], rate)
-    is_slow = frequency * ticks / rate < _LEAST_PERIODS * PIECES
-    found: dict[int, Swing] = {}
-    for pieces, which in ((PIECES, ~is_slow), (FEW_PIECES, is_slow)):
-        places = np.flatnonzero(which)
-        if len(places):
-            some = Pushed(*(part[places] for part in pushed))
-            found |= zip(places.tolist(), _measured(some, rate, frequency[places], pieces), strict=True)
-    return [found[place] for place in range(len(frequency))]
-
-
-def _measured(pushed: Pushed, rate: float, frequency: np.ndarray, pieces: int) -> list[Swing]:
-    small_x, large_x, command, *of_each = pushed
-    ticks = large_x.shape[-1]
-    size, last_half, last_quarter = ticks // pieces, slice(ticks // 2, None), slice(-ticks // 4, None)
-    small, large = widths(small_x, size), widths(large_x, size)
-    half, quarter = small.shape[-1] // 2, small.shape[-1] // 4
-    small_trend, large_trend = (trend(width[:, half:], size / rate) for width in (small, large))
-    slower = np.where(np.abs(large_trend.rate_1_s) < np.abs(small_trend.rate_1_s), large_trend[:2], small_trend[:2])
-    tail = np.concatenate([small[:, -quarter:], large[:, -quarter:]], axis=1)
-    ends = [width[:, -quarter:].mean(axis=1) for width in (small, large)]
-    columns = [
-        *of_each,
-        np.stack([small_trend.change, large_trend.change], axis=-1),
-        np.stack([small_trend.error, large_trend.error], axis=-1),
-        *slower,
-        tail.mean(axis=1),
-        np.ptp(tail, axis=1) / 2.0,
-        tail.max(axis=1),
-        np.maximum(*(np.ptp(x[:, last_half], axis=1) for x in (small_x, large_x))),
-        large[:, 0] / np.maximum(small[:, 0], _REST_M),
-        ends[1] / np.maximum(ends[0], _REST_M),
-        frequency,
-        ripple(command[:, last_quarter], rate),
-        size * frequency / rate,
-    ]
-    rows = zip(*(column.tolist() for column in columns), strict=True)
-    return [Swing(ticks / rate, *row) for row in rows]
+        sentence = WHY[self.why].format(**numbers, **sizes, felt_um=2e6 * smallest_felt_m(self.frequency_Hz))
+        return sentence + (AFTER_BLOW[self.blown].format(**numbers) if self.blown else "")
 
 
 def decide(swing: Swing, *, last: bool) -> Finding:
     """Returns the finding; ``undecided`` asks for a longer time unless it is the ``last`` one.
 
-    *steady*: the swing died, or dies and what is left of it no hand feels, or at the last look both swings still decay
-    alike. *limit-cycle*: it forgets how hard it was pushed, yet remains, and is felt. *growing*: both swings grow. Of
-    swings so slow that a piece covers less than one and a half nothing is said.
+    *steady*: the swing died, or dies or lasts and what is left of it no hand feels, or at the last look both swings
+    still decay alike. *limit-cycle*: it forgets how hard it was pushed, yet remains, and is felt. *growing*: both
+    swings grow. Of swings so slow that a piece covers less than two nothing is said.
     """
     if not swing.inside:
         return Finding("undecided", "leaves the wall", swing.push_N, swing.watched_s)
-    if swing.most_m < _REST_M:
-        return swing.finding("steady", "rest")
+    if swing.most_m < REST_M:
+        return _finding(swing, "steady", "rest")
     is_long, changes = swing.watched_s >= _LONG_S, [*zip(swing.changes, swing.errors, strict=True)]
+    covers = swing.covers_periods >= LEAST_PERIODS
     rising = any(change > max(_LASTING, 3 * error) for change, error in changes)
-    falling = max(swing.changes) < -_LASTING and (swing.width_m < _SMALL_M or is_long)
+    falling = max(swing.changes) < -_LASTING and (swing.width_m < _SMALL_M or (is_long and covers))
+    forgets = swing.lasts(_LASTING) and SAME[0] < swing.at_last < SAME[1] and not 0.5 < swing.at_first < 2.0
     unfelt = not is_felt(swing.width_m, swing.frequency_Hz)
     # What is too slow for its frequency to be seen is judged by all of its way.
-    seen = swing.frequency_Hz * swing.watched_s >= 4 * _LEAST_PERIODS or not is_felt(swing.moved_m, swing.frequency_Hz)
-    if unfelt and seen and not rising and (falling or swing.width_m <= 2.0 * swing.count_m):
-        return swing.finding("steady", "unfelt")
-    if swing.covers_periods < _LEAST_PERIODS:
-        return swing.finding("undecided", "too slow")
-    if swing.lasts(_LASTING) and _SAME[0] < swing.at_last < _SAME[1] and not 0.5 < swing.at_first < 2.0:
-        return swing.finding("limit-cycle", "forgets")
-    kept_ratio = swing.at_first > 2.0 and _SAME[0] < swing.at_last / swing.at_first < _SAME[1]
+    seen = swing.frequency_Hz * swing.watched_s >= _SEEN_PERIODS or not is_felt(swing.moved_m, swing.frequency_Hz)
+    goes_on = not (falling or swing.width_m <= 2.0 * swing.count_m or (forgets and covers))
+    if unfelt and seen and not rising and not goes_on:
+        return _finding(swing, "steady", "unfelt")
+    if not covers:
+        return _finding(swing, "undecided", "too slow")
+    if forgets:
+        return _finding(swing, "limit-cycle", "forgets")
+    kept_ratio = swing.at_first > 2.0 and SAME[0] < swing.at_last / swing.at_first < SAME[1]
     clearly = swing.watched_s >= _ALIKE_S and all(abs(change) + 2 * error < _LASTING_LONG for change, error in changes)
     counted = swing.frequency_Hz * swing.watched_s >= _COUNTED_PERIODS
     if (clearly or (is_long and counted and swing.lasts(_LASTING_LONG))) and not kept_ratio:
-        return swing.finding("limit-cycle", "lasts")
+        return _finding(swing, "limit-cycle", "lasts")
     grows = all(change > 4 * error for change, error in changes)
     if grows and (is_long or (swing.watched_s >= _ALIKE_S and min(swing.changes) > _LASTING and swing.is_alike())):
-        return swing.finding("growing", "grows")
+        return _finding(swing, "growing", "grows")
     decays = last and all(change < -3 * error for change, error in changes) and swing.is_alike()
     if decays and swing.smooth and not is_felt(_COUNTS * swing.count_m, swing.frequency_Hz):
-        return swing.finding("steady", "decays")
-    return swing.finding("undecided", "too slow")
+        return _finding(swing, "steady", "decays")
+    return _finding(swing, "undecided", "too slow")
+
+
+def _finding(swing: Swing, word: str, why: str) -> Finding:
+    felt_m = 2.0 * smallest_felt_m(swing.frequency_Hz)
+    needs_s = None
+    if word == "undecided":
+        change, error = min(zip(swing.changes, swing.errors, strict=True), key=lambda each: abs(each[0]))
+        needs_s = FEW_PIECES * LEAST_PERIODS / swing.frequency_Hz if swing.frequency_Hz else 0.0
+        needs_s = max(needs_s, swing.watched_s * max(2.0, 4.0 * error / max(abs(change), 1e-12)))
+        if swing.rate_1_s < 0.0:
+            needs_s = max(needs_s, swing.watched_s + math.log(max(swing.width_m / felt_m, 1.0)) / -swing.rate_1_s)
+    return Finding(
+        word, why, swing.push_N, swing.watched_s, swing.rate_1_s, swing.error_1_s, swing.frequency_Hz, swing.width_m,
+        swing.spread_m, swing.ripple_N, swing.width_m >= felt_m, None, needs_s,
+    )  # fmt: skip

@@ -14,10 +14,12 @@ from haploop.launch.scene.events import scene_events
 from haploop.launch.stability.decide import Finding
 from haploop.launch.stability.looks import (
     BESIDE,
+    BLOW,
     PATIENT_S,
     SMALLER,
     failed,
     findings,
+    is_struck,
     left_limit,
     parts,
     push_of,
@@ -123,28 +125,40 @@ def judge(end: End, looks_s: Sequence[float] = PATIENT_S) -> Finding:
 
     The hand is held still with the mean force of its last contacts, noise is switched off, and two copies of the loop
     are pushed, one ten times as hard as the other. Whatever moves a second later is the loop's own. Most loops tell
-    within a second or two; slow ones are watched to the last look. It takes as long as simulating that time twice.
+    within a second or two; slow ones are watched to the last look. It takes as long as simulating that time twice. One
+    that comes to rest though it may swing on after a harder blow is struck, too, which takes half as long again.
     """
     push_N = push_of(end.hold_N)
-    small, large = StillHand(end, push_N * SMALLER), StillHand(end, push_N)
-    wall, found = end.controller.params.wall, failed(push_N, 0.0, "")
-    delay_steps = end.plant.checkpoint().delay_steps
-    times_s = watch_times(end.time, end.time.delay_steps if delay_steps is None else delay_steps, looks_s)
-    for seconds in times_s:
-        try:
-            small.go_to(seconds)
-            large.go_to(seconds)
-        except (ArithmeticError, ElementError) as error:
-            return failed(push_N, seconds, str(error))
-        gone = [each for each in (small, large) if each.stop_reason]
-        if gone:
-            return left_limit(push_N, seconds, wall, min((each.x for each in gone), key=len))
-        pushed = (each[None] for each in (small.x, large.x, large.command))
-        [found] = findings([*pushed], end.time, wall, [end.scene], np.array([push_N]), last=seconds == times_s[-1])
-        if found.word != "undecided":
-            break
+    found, x = _watched(end, (push_N * SMALLER, push_N), looks_s)
     if found.word == "limit-cycle":
         beside = StillHand(end, push_N * (1.0 + BESIDE))
         beside.go_to(found.watched_s)
-        found = replace(found, chaotic=parts(large.x, beside.x, found.width_m))
+        return replace(found, chaotic=parts(x, beside.x, found.width_m))
+    if is_struck(end.scene, found):
+        return found.after_blow(_watched(end, (push_N * BLOW,), looks_s)[0])
     return found
+
+
+def _watched(end: End, pushes_N: tuple[float, ...], looks_s: Sequence[float]) -> tuple[Finding, np.ndarray]:
+    """Watches a copy for each push, the hardest last, until they tell; returns what, and the last one's positions."""
+    copies = [StillHand(end, push_N) for push_N in pushes_N]
+    wall, push_N = end.controller.params.wall, pushes_N[-1]
+    delay_steps = end.plant.checkpoint().delay_steps
+    times_s = watch_times(end.time, end.time.delay_steps if delay_steps is None else delay_steps, looks_s)
+    found = failed(push_N, 0.0, "")
+    for seconds in times_s:
+        try:
+            for copy in copies:
+                copy.go_to(seconds)
+        except (ArithmeticError, ElementError) as error:
+            found = failed(push_N, seconds, str(error))
+            break
+        gone = [copy.x for copy in copies if copy.stop_reason]
+        if gone:
+            found = left_limit(push_N, seconds, wall, min(gone, key=len))
+            break
+        pushed = [each[None] for each in (copies[0].x, copies[-1].x, copies[-1].command)]
+        [found] = findings(pushed, end.time, wall, [end.scene], np.array([push_N]), last=seconds == times_s[-1])
+        if found.word != "undecided":
+            break
+    return found, copies[-1].x

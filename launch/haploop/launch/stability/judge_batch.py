@@ -12,10 +12,12 @@ from haploop.launch.batch.batch import BatchEnd
 from haploop.launch.stability.decide import Finding
 from haploop.launch.stability.looks import (
     BESIDE,
+    BLOW,
     LOOKS_S,
     SMALLER,
     failed,
     findings,
+    is_struck,
     left_limit,
     parts,
     push_of,
@@ -46,11 +48,31 @@ def judge_batch(end: BatchEnd, looks_s: Sequence[float] = LOOKS_S) -> list[Findi
 
 
 def _judge_some(end: BatchEnd, members: np.ndarray, hold_N: np.ndarray, looks_s: Sequence[float]) -> list[Finding]:
-    """Judges members that touch the wall; copy i is of member i pushed little, copy count + i the same pushed hard."""
-    count, push_N = len(members), np.array([push_of(hold) for hold in hold_N])
+    """Judges members that touch the wall."""
+    push_N = np.array([push_of(hold) for hold in hold_N])
+    found, asked = _watched(end, members, hold_N, push_N, (SMALLER, 1.0), looks_s)
+    struck = [place for place, each in enumerate(found) if is_struck(end.scenes[members[place]], each)]
+    if struck:
+        blows, _ = _watched(end, members[struck], hold_N[struck], push_N[struck] * BLOW, (1.0,), looks_s)
+        for place, blow in zip(struck, blows, strict=True):
+            found[place] = found[place].after_blow(blow)
+    return _with_chaos(end, members, hold_N, push_N, found, asked)
+
+
+def _watched(
+    end: BatchEnd, members: np.ndarray, hold_N: np.ndarray, push_N: np.ndarray, shares: tuple[float, ...],
+    looks_s: Sequence[float],
+) -> tuple[list[Finding], list[tuple[int, np.ndarray]]]:  # fmt: skip
+    """Watches copies for each share of the pushes, the hardest last; copy ``i + n count`` is of member i and share n.
+
+    Returns:
+        What is found of each, and (its place, the last copy's positions) of every limit cycle.
+    """
+    count = len(members)
     found = [failed(push, 0.0, "") for push in push_N.tolist()]
-    copies = StillBatch(end, np.tile(members, 2), np.tile(hold_N, 2), np.append(push_N * SMALLER, push_N))
-    asked: list[tuple[int, np.ndarray]] = []
+    pushes_N = np.concatenate([push_N * share for share in shares])
+    copies = StillBatch(end, np.tile(members, len(shares)), np.tile(hold_N, len(shares)), pushes_N)
+    cycles: list[tuple[int, np.ndarray]] = []
     times_s = watch_times(end.time, end.time.delay_steps, looks_s)
     for seconds in times_s:
         for copy, x in copies.go_to(seconds):
@@ -58,20 +80,20 @@ def _judge_some(end: BatchEnd, members: np.ndarray, hold_N: np.ndarray, looks_s:
             if found[place].word == "undecided":
                 found[place] = left_limit(push_N[place], seconds, _wall_of(end, members[place]), x)
         _keep(copies, found, count)
-        here = copies.copy[: len(copies.copy) // 2]
+        here = copies.copy[: len(copies.copy) // len(shares)]
         if not len(here):
             break
         x, command = copies.positions(), copies.commands()
-        pushed = [x[: len(here)], x[len(here) :], command[len(here) :]]
+        pushed = [x[: len(here)], x[-len(here) :], command[-len(here) :]]
         scenes = [end.scenes[place] for place in members[here]]
         wall = _wall_of(end, members[here])
         told = findings(pushed, end.time, wall, scenes, push_N[here], last=seconds == times_s[-1])
         for at, (place, finding) in enumerate(zip(here.tolist(), told, strict=True)):
             found[place] = finding
             if finding.word == "limit-cycle":
-                asked.append((place, pushed[1][at]))
+                cycles.append((place, pushed[1][at]))
         _keep(copies, found, count)
-    return _with_chaos(end, members, hold_N, push_N, found, asked)
+    return found, cycles
 
 
 def _keep(copies: StillBatch, found: list[Finding], count: int) -> None:

@@ -7,12 +7,15 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from haploop.controller.tick import Wall
-from haploop.launch.stability.decide import Finding, Pushed, decide, measure
+from haploop.launch.stability.decide import Finding, decide
+from haploop.launch.stability.swing import Pushed, measure
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
 
 # The larger push, as a share of what the hand holds the wall with, and the smaller one, as a share of it.
 PUSH, SMALLER = 0.3, 0.1
+# A blow, as a share of the larger push: three times what the hand holds the wall with.
+BLOW = 10.0
 # Times since the push at which the loop is looked at, in s: of a run as part of it, and where somebody asks.
 LOOKS_S = (1.0, 2.0, 4.0, 8.0, 16.0)
 PATIENT_S = (*LOOKS_S, 32.0, 64.0)
@@ -44,6 +47,15 @@ def parts(one: np.ndarray, other: np.ndarray, width_m: float) -> bool:
 
 def push_of(hold_N: float) -> float:
     return PUSH * max(abs(hold_N), _LEAST_LOAD_N) * (1.0 if hold_N > 0.0 else -1.0)
+
+
+def is_struck(scene: Scene, found: Finding) -> bool:
+    """Tells whether a loop that came to rest is struck as well: friction may hold a swing that a blow sets off.
+
+    So may an actuator that saturates, whose wall gives way to a wide swing.
+    """
+    saturates = scene.actuator is not None and scene.actuator.saturation is not None
+    return found.word == "steady" and found.why != "decays" and (scene.friction is not None or saturates)
 
 
 def failed(push_N: float, seconds: float, detail: str) -> Finding:

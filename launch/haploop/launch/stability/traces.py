@@ -42,16 +42,35 @@ def widths(x: np.ndarray, size: int) -> np.ndarray:
     return np.ptp(offset, axis=-1)
 
 
-def trend(width: np.ndarray, spacing_s: float) -> Trend:
-    """Returns the growth of widths that lie ``spacing_s`` apart, shape (..., three at least)."""
+def sizes(x: np.ndarray, size: int) -> np.ndarray:
+    """Returns what ``widths`` would of a sine, from the mean square about the trend under a window of Hann.
+
+    The least and the greatest of a piece that does not hold whole periods depend on where it begins, which a row of
+    pieces turns into a growth that is none, of up to 0.2 in the logarithm over twelve of them; these come to 0.03 of it
+    where a piece covers two periods, and to 0.002 where it covers three.
+    """
+    pieces = x[..., x.shape[-1] % size :].reshape(*x.shape[:-1], -1, size)
+    t = np.arange(size) - (size - 1) / 2.0
+    weight = np.hanning(size + 2)[1:-1]
+    weight /= weight.sum()
+    offset = pieces - np.vecdot(pieces, weight)[..., None]
+    offset -= t * (np.vecdot(offset, weight * t) / np.vecdot(weight * t, t))[..., None]
+    return np.sqrt(8.0 * np.vecdot(np.square(offset, out=offset), weight))
+
+
+def trend(width: np.ndarray, spacing_s: float, unsure: np.ndarray | float = 0.0) -> Trend:
+    """Returns the growth of widths that lie ``spacing_s`` apart, shape (..., three at least).
+
+    ``unsure`` is a standard error of the change that does not show in the scatter, shape (...).
+    """
     logs = np.log(np.maximum(width, LEAST_WIDTH_M))
     count = logs.shape[-1]
     t = (np.arange(count) - (count - 1) / 2.0) * spacing_s
     square = np.vecdot(t, t)
     rate = np.vecdot(logs, t) / square
     left = logs - logs.mean(axis=-1, keepdims=True) - rate[..., None] * t
-    error = np.sqrt(np.vecdot(left, left) / ((count - 2) * square))
     seconds = count * spacing_s
+    error = np.hypot(np.sqrt(np.vecdot(left, left) / ((count - 2) * square)), unsure / seconds)
     return Trend(rate, error, rate * seconds, error * seconds)
 
 

@@ -57,8 +57,9 @@ def summary_table(summary: Summary) -> RenderableType:
 
     word = told(summary)
     head = Text.assemble((word, verdict_style(word)), "  ", (summary["title"], "bold"))
-    # Of the rule the measures alone, without the limits they were held against.
-    rule = summary["verdict_rule"].partition("; ")[0].rstrip(".")
+    # Of the rule of a window the measures alone, without the limits they were held against.
+    rule = summary["verdict_rule"] if "stability" in summary else summary["verdict_rule"].partition("; ")[0]
+    rule = rule.rstrip(".")
     parts: list[RenderableType] = [head, Text(f"{rule[:1].upper()}{rule[1:]}.", style="dim")]
     if summary["ended"] not in ("done", "diverged"):
         parts.append(Text(f"ended early: {summary['ended']}", style="bold red"))
@@ -139,6 +140,8 @@ def _stability(found: Summary) -> list[tuple[str, str]]:
     if (share := found.get("own_share")) is not None:
         own = f"{100 * share:.0f} %" if share >= 0.01 else "less than 1 %"
         rows.append(("of the oscillation", f"{own} its own; else the hand's motion, noise, or dying away"))
+    if blown := found.get("blown"):
+        rows.append(("after a blow", f"of {amount(found['blow_N'], 'N')}: {blown}"))
     return rows
 
 

@@ -1,0 +1,139 @@
+"""Measures of a loop after both pushes: how wide it swings, how the swing changes, and how surely that is known."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from haploop.launch.stability.traces import frequency_Hz, ripple, sizes, trend, widths
+
+# Pieces in which the width of a swing is measured, and the periods that one covers at least.
+PIECES, FEW_PIECES = 24, 8
+LEAST_PERIODS = 2.0
+# What the place where pieces begin in a period makes of the change of the logarithm of the width, where a piece covers
+# one; it falls with the fourth power of the periods that a piece covers.
+_PHASE = 0.3
+# A swing this small is rounding: a thousand atoms would be wider.
+REST_M = 1e-9
+# Sizes whose ratio lies between these are the same; those of the pushes differ by ten.
+SAME = (0.7, 1.43)
+
+
+class Pushed(NamedTuple):
+    """Some loops after both pushes; arrays have the members on their first axis.
+
+    Attributes:
+        small, large: position at the ticks after the smaller and the larger push, shape (members, ticks), m.
+        command: command at the ticks after the larger one, shape (members, ticks), N.
+        push_N: the larger push, shape (members,).
+        count_m: one count of the encoder, shape (members,); 0 without.
+        inside: whether a tick in the last quarter of both was in contact, shape (members,).
+        stays_inside: whether all ticks in the last half of both were.
+        smooth: whether the loop treats small swings as large ones, but for the counts of its encoder, shape (members,).
+    """
+
+    small: np.ndarray
+    large: np.ndarray
+    command: np.ndarray
+    push_N: np.ndarray
+    count_m: np.ndarray
+    inside: np.ndarray
+    stays_inside: np.ndarray
+    smooth: np.ndarray
+
+
+class Swing(NamedTuple):
+    """Measures of one loop after both pushes.
+
+    Attributes:
+        watched_s: time since the push.
+        changes, errors: of the logarithm of the width over the second half, small and large, and their standard errors.
+        rate_1_s, error_1_s: growth of the one that changes less, and its standard error.
+        width_m, spread_m, most_m: mean, half range and maximum of the widths in the last quarter of both.
+        moved_m: peak to peak over the last half of either, with its trend.
+        at_first, at_last: width after the larger push over that after the smaller, in the first piece and at the last.
+        frequency_Hz: of the end.
+        covers_periods: periods that a piece covers.
+    """
+
+    watched_s: float
+    push_N: float
+    count_m: float
+    inside: bool
+    stays_inside: bool
+    smooth: bool
+    changes: tuple[float, float]
+    errors: tuple[float, float]
+    rate_1_s: float
+    error_1_s: float
+    width_m: float
+    spread_m: float
+    most_m: float
+    moved_m: float
+    at_first: float
+    at_last: float
+    frequency_Hz: float
+    ripple_N: float
+    covers_periods: float
+
+    def lasts(self, within: float) -> bool:
+        """Tells whether both swings neither grow nor decay, as far as their scatter lets one say."""
+        pairs = zip(self.changes, self.errors, strict=True)
+        return all(abs(change) < max(within, 2 * error) and error < 0.1 for change, error in pairs)
+
+    def is_alike(self) -> bool:
+        """Tells whether swings of other sizes go as these: never off the wall, or the larger as the smaller one."""
+        rate = abs(self.changes[1] - self.changes[0]) < 0.1 * abs(self.changes[1]) + 3 * math.hypot(*self.errors)
+        kept_ratio = self.at_first > 2.0 and SAME[0] < self.at_last / self.at_first < SAME[1]
+        return rate and (self.stays_inside or kept_ratio)
+
+
+def measure(pushed: Pushed, rate: float) -> list[Swing]:
+    """Returns the measures of each loop, worked out as if it were alone; slow swings in fewer, longer pieces.
+
+    ``rate``: ticks a second.
+    """
+    ticks = pushed.large.shape[-1]
+    frequency = frequency_Hz(pushed.large[:, ticks // 2 :], rate)
+    is_slow = ticks // PIECES * frequency / rate < LEAST_PERIODS
+    found: dict[int, Swing] = {}
+    for pieces, which in ((PIECES, ~is_slow), (FEW_PIECES, is_slow)):
+        places = np.flatnonzero(which)
+        if len(places):
+            some = Pushed(*(part[places] for part in pushed))
+            found |= zip(places.tolist(), _measured(some, rate, frequency[places], pieces), strict=True)
+    return [found[place] for place in range(len(frequency))]
+
+
+def _measured(pushed: Pushed, rate: float, frequency: np.ndarray, pieces: int) -> list[Swing]:
+    small_x, large_x, command, *of_each = pushed
+    ticks = large_x.shape[-1]
+    size, last_half, last_quarter = ticks // pieces, slice(ticks // 2, None), slice(-ticks // 4, None)
+    small, large = widths(small_x, size), widths(large_x, size)
+    half, quarter = small.shape[-1] // 2, small.shape[-1] // 4
+    covers = size * frequency / rate
+    unsure = np.minimum(_PHASE / np.maximum(covers, 1e-3) ** 4, 1.0)
+    trends = [trend(sizes(x[:, -half * size :], size), size / rate, unsure) for x in (small_x, large_x)]
+    small_trend, large_trend = trends
+    slower = np.where(np.abs(large_trend.rate_1_s) < np.abs(small_trend.rate_1_s), large_trend[:2], small_trend[:2])
+    tail = np.concatenate([small[:, -quarter:], large[:, -quarter:]], axis=1)
+    ends = [width[:, -quarter:].mean(axis=1) for width in (small, large)]
+    columns = [
+        *of_each,
+        np.stack([each.change for each in trends], axis=-1),
+        np.stack([each.error for each in trends], axis=-1),
+        *slower,
+        tail.mean(axis=1),
+        np.ptp(tail, axis=1) / 2.0,
+        tail.max(axis=1),
+        np.maximum(*(np.ptp(x[:, last_half], axis=1) for x in (small_x, large_x))),
+        large[:, 0] / np.maximum(small[:, 0], REST_M),
+        ends[1] / np.maximum(ends[0], REST_M),
+        frequency,
+        ripple(command[:, last_quarter], rate),
+        covers,
+    ]
+    rows = zip(*(column.tolist() for column in columns), strict=True)
+    return [Swing(ticks / rate, *row) for row in rows]
