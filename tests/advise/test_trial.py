@@ -11,8 +11,7 @@ from haploop.protocol.scene.scene import ElementTable, Scene
 from haploop.tools.advise.subject import make_subject
 from haploop.tools.advise.walls.cases import Case, make_loop
 from haploop.tools.advise.walls.loops import LoneLoop, Loops, make_loops
-from haploop.tools.advise.walls.store import Store, Tried
-from haploop.tools.advise.walls.trial import Job, Trial
+from haploop.tools.advise.walls.trial import Job, Store, Trial, Tried
 from haploop.tools.linear.one_tick import OneTickMap
 from helpers.scenes.least import KINDS, scene
 

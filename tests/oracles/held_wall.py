@@ -1,12 +1,12 @@
 """A device held to a wall by a swaying hand, written by hand: bodies, cable, grip, dry friction, encoder, elements.
 
 Nothing of the code it judges is used: semi-implicit Euler steps of 20 us, friction as the impulse that stops a body, a
-buzz read off turning points instead of spectra. All holds in all corners are columns of one array.
+buzz of motion or force read off turning points instead of spectra. All holds in all corners are columns of one array.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -52,25 +52,48 @@ _SCALED = (
     ("hand_damping", "grip_damping"),
     ("hand_stiffness", "grip_stiffness"),
 )
+_NUMBERS = [field.name for field in fields(Bodies) if field.name != "delay_s"]
+# What a preset assumes of its device.
+ASSUMED = {
+    "premium15_cable": ("motor_mass", "motor_damping", "cable_stiffness", "cable_damping"),
+    "omega3": ("mass", "damping", "friction"),
+    "falcon": ("mass", "damping", "friction"),
+    "touch": ("damping",),
+}
 
 
-def in_corners(device: Bodies, holds: np.ndarray, share: float = 0.2) -> tuple[Bodies, np.ndarray]:
-    """Returns the members: every hold in all 16 corners and in the loop as described, and their holds."""
-    signs = [(0, 0, 0, 0), *np.array(np.meshgrid(*[[-1, 1]] * 4)).reshape(4, -1).T.tolist()]
-    members = {field.name: [] for field in fields(Bodies)}
-    for sign in signs:
-        for name, values in members.items():
-            factor = next((1.0 + share * s for s, names in zip(sign, _SCALED, strict=True) if name in names), 1.0)
-            values += [factor * getattr(device, name) if name != "delay_s" else device.delay_s] * len(holds)
-    columns = {name: np.array(values) for name, values in members.items() if name != "delay_s"}
-    return Bodies(**columns, delay_s=device.delay_s), np.tile(holds, len(signs))
+def in_corners(
+    device: Bodies, holds: np.ndarray, assumed: tuple[str, ...] = (), most: int = 64
+) -> tuple[Bodies, np.ndarray]:
+    """Returns the members: every hold in the loop as described and in all its corners, and their holds.
+
+    Bodies and hand are a fifth off, what is assumed is half or double; of more corners as many are drawn as ``most``.
+    """
+    ends = [(tuple(name for name in names if name not in assumed), (0.8, 1.2)) for names in _SCALED]
+    ends = [each for each in ends if each[0]] + [((name,), (0.5, 2.0)) for name in assumed]
+    drawn = np.random.default_rng(2).permutation(2 ** len(ends))[:most]
+    members = []
+    for number in (-1, *drawn.tolist()):
+        factors = {name: at[number >> i & 1] for i, (names, at) in enumerate(ends) for name in names}
+        members += [[factors.get(name, 1.0) * getattr(device, name) if number >= 0 else getattr(device, name)
+                     for name in _NUMBERS]] * len(holds)  # fmt: skip
+    columns = dict(zip(_NUMBERS, np.array(members).T, strict=True))
+    return Bodies(**columns, delay_s=device.delay_s), np.tile(holds, 1 + len(drawn))
+
+
+def columns(of: Bodies, some: np.ndarray) -> Bodies:
+    """Returns some of the members, by their places."""
+    return replace(of, **{name: getattr(of, name)[some] for name in _NUMBERS})
 
 
 def press(
-    of: Bodies, holds: np.ndarray, stiffness: float, elements: dict[str, float], *, sway: float = 0.3,
+    of: Bodies, holds: np.ndarray, stiffness: Any, elements: dict[str, Any], *, sway: float = 0.3,
     sway_Hz: float = 0.5, speed: float = 0.2,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:  # fmt: skip
-    """Returns position at the encoder, counts and command at the ticks, each of shape (ticks, members)."""
+    """Returns position at the encoder, counts and command at the ticks, each of shape (ticks, members).
+
+    Stiffness and elements, by their kind, are numbers or one for each member.
+    """
     members, ticks = len(holds), round(LASTS_S / PERIOD_S)
     has_cable, h = bool(np.any(of.motor_mass)), STEP_S
     x = np.full(members, 2e-4)
@@ -116,36 +139,58 @@ def _rubbed(v: np.ndarray, most: np.ndarray) -> np.ndarray:
     return np.sign(v) * np.maximum(np.abs(v) - most, 0.0)
 
 
-def buzzes(x: np.ndarray, counts: np.ndarray, begins_s: float = 1.0, stretch_s: float = 0.2) -> np.ndarray:
+def buzzes(
+    of: Bodies, x: np.ndarray, counts: np.ndarray, forces: np.ndarray, begins_s: float = 1.0, stretch_s: float = 0.2
+) -> np.ndarray:
     """Tells of each member whether it goes to and fro so that it is felt, by its turning points alone.
 
-    In a stretch with four turns of the counts or more, the second largest way back is compared with what is felt at the
-    rate of the turns: through the points 52, 17 and 0.12 um, peak to peak, at 10, 20 and 320 Hz (Israr et al. 2006).
+    In a stretch with four turns of the counts or more, the third largest way back is compared with what is felt at the
+    rate of the turns: through the points 52, 17 and 0.12 um, peak to peak, at 10, 20 and 320 Hz (Israr et al. 2006);
+    that of the command with the force that moves the bodies by as much.
     """
     size, found = round(stretch_s / PERIOD_S), np.zeros(x.shape[1], bool)
+    points = np.log([10.0, 20.0, 320.0]), np.log([52e-6, 17e-6, 0.12e-6])
     for begin in range(round(begins_s / PERIOD_S), len(x) - size + 1, size // 2):
-        for member in range(x.shape[1]):
-            steps = np.diff(counts[begin : begin + size, member])
-            steps = steps[steps != 0]
-            if np.sum(steps[1:] * steps[:-1] < 0) < 4:
-                continue
-            piece = x[begin : begin + size, member]
-            ways = np.diff(piece)
-            turning = piece[[0, *(1 + np.flatnonzero(ways[1:] * ways[:-1] < 0)), -1]]
-            swings = np.abs(np.diff(turning))
-            to_and_fro = np.sort(np.minimum(swings[1:], swings[:-1]))
-            frequency = max(1.0, len(swings) / 2.0 / stretch_s)
-            points = np.log([10.0, 20.0, 320.0]), np.log([52e-6, 17e-6, 0.12e-6])
-            found[member] |= len(to_and_fro) > 3 and to_and_fro[-3] > np.exp(np.interp(np.log(frequency), *points))
+        for member in np.flatnonzero(_turns(counts[begin : begin + size]) >= 4).tolist():
+            for trace, is_force in ((x, False), (forces, True)):
+                swing, frequency = _to_and_fro(trace[begin : begin + size, member], stretch_s)
+                felt = np.exp(np.interp(np.log(frequency), *points))
+                found[member] |= swing > felt * (_stiffness(of, member, frequency) if is_force else 1.0)
     return found
+
+
+def _to_and_fro(piece: np.ndarray, seconds: float) -> tuple[float, float]:
+    """Returns the third largest way back of a trace, and how often a second it turns twice."""
+    moves = piece[np.append(True, np.diff(piece) != 0.0)]
+    ways = np.diff(moves)
+    swings = np.abs(np.diff(moves[[0, *(1 + np.flatnonzero(ways[1:] * ways[:-1] < 0)), -1]]))
+    back = np.sort(np.minimum(swings[1:], swings[:-1]))
+    return float(back[-3]) if len(back) > 2 else 0.0, max(1.0, len(swings) / 2.0 / seconds)
+
+
+def _stiffness(of: Bodies, member: int, frequency: float) -> float:
+    """Returns the force at the encoder that moves it by a metre at a frequency, hand and cable hanging on it, N/m."""
+    one = Bodies(*(np.broadcast_to(getattr(of, name), member + 1)[member] for name in _NUMBERS))
+    s = 2j * np.pi * frequency
+    grip, cable = one.grip_stiffness + one.grip_damping * s, one.cable_stiffness + one.cable_damping * s
+    hand = one.hand_mass * s**2 + one.hand_damping * s + one.hand_stiffness
+    tip = one.mass * s**2 + one.damping * s + grip * hand / (grip + hand)
+    if not one.motor_mass:
+        return abs(tip)
+    return abs(one.motor_mass * s**2 + one.motor_damping * s + cable * tip / (cable + tip))
 
 
 def turns(counts: np.ndarray, begins_s: float = 1.0, stretch_s: float = 0.25) -> np.ndarray:
     """Counts of each member the most turns of its counts in any stretch: chatter, however narrow."""
-    size, most = round(stretch_s / PERIOD_S), np.zeros(counts.shape[1], int)
-    for begin in range(round(begins_s / PERIOD_S), len(counts) - size + 1, size // 2):
-        for member in range(counts.shape[1]):
-            steps = np.diff(counts[begin : begin + size, member])
-            steps = steps[steps != 0]
-            most[member] = max(most[member], np.sum(steps[1:] * steps[:-1] < 0))
-    return most
+    size = round(stretch_s / PERIOD_S)
+    begins = range(round(begins_s / PERIOD_S), len(counts) - size + 1, size // 2)
+    return np.max([_turns(counts[begin : begin + size]) for begin in begins], axis=0)
+
+
+def _turns(counts: np.ndarray) -> np.ndarray:
+    found = np.zeros(counts.shape[1], int)
+    for member in range(counts.shape[1]):
+        steps = np.diff(counts[:, member])
+        steps = steps[steps != 0]
+        found[member] = np.sum(steps[1:] * steps[:-1] < 0)
+    return found

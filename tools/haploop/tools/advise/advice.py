@@ -7,17 +7,15 @@ from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from typing import Any, NamedTuple
 
+from haploop.protocol.scene.paths import value_at
 from haploop.protocol.scene.scene import Scene
-from haploop.tools.advise.assumptions import Assumed
 from haploop.tools.advise.changes import assumed_otherwise, changed_limits, changes, idealised
-from haploop.tools.advise.formulas import Formula, formulas
-from haploop.tools.advise.published import PUBLISHED, Published
-from haploop.tools.advise.search import Best, Found, every_case, search
-from haploop.tools.advise.subject import Subject
-from haploop.tools.advise.walls.cases import Case, make_loop, task_words, uncertain_quantities
+from haploop.tools.advise.known import PUBLISHED, Formula, Published, formulas
+from haploop.tools.advise.search import Best, Found, search
+from haploop.tools.advise.subject import Assumed, Subject
+from haploop.tools.advise.walls.cases import Case, every_case, is_number, make_loop, ranges, task_words
 from haploop.tools.advise.walls.limit import Limit
-from haploop.tools.advise.walls.store import Failure, Tried
-from haploop.tools.advise.walls.trial import Trial
+from haploop.tools.advise.walls.trial import Failure, Trial, Tried
 
 # An advice as one JSON object.
 AdviceData = dict[str, Any]
@@ -48,8 +46,9 @@ class Advice:
     Attributes:
         is_ideal: whether the device is rigid and its loop without delay: then it is an upper bound.
         tried_by: what every wall was tried by, in words.
-        uncertain: the quantities that were taken a fifth more or less.
-        changed, without: the limit after each change of the device, and without each cause of buzzing, best first.
+        uncertain: the factors between which each uncertain quantity, or assumed number, was taken.
+        described: the limit of the loop as described, with the element advised or without any.
+        changed, without: that after each change of the device, and without each cause of buzzing, best first.
         assumed: each assumed number with the limit at half and at double of it.
         own: of a scene with a wall: its stiffness, and what it does with its own elements; None where it bears all.
         scene: that shows the advised wall; None where nothing is safe.
@@ -59,10 +58,11 @@ class Advice:
     notes: tuple[str, ...]
     is_ideal: bool
     tried_by: str
-    uncertain: tuple[str, ...]
+    uncertain: dict[str, tuple[float, float]]
     found: Found
     formulas: tuple[Formula, ...]
     published: tuple[Published, ...]
+    described: Limit
     changed: tuple[Changed, ...]
     without: tuple[Changed, ...]
     assumed: tuple[tuple[Assumed, Limit, Limit], ...]
@@ -78,16 +78,19 @@ class Advice:
 def advice(subject: Subject, trial: Trial, stage: Callable[[str], object] = lambda name: None) -> Advice:
     """Searches the wall, then what a change of the device, or of what is assumed of it, would make of it."""
     scene, loop = subject.scene, make_loop(subject.scene, subject.has_task)
-    found = search(loop, trial, stage)
+    assumed = [of for of in subject.assumed if is_number(value_at(loop, of.key))]
+    keys = [of.key for of in assumed]
+    found = search(loop, keys, trial, stage)
     stage("changes of the device")
-    altered, ideal, otherwise = changes(loop), idealised(loop), assumed_otherwise(loop, subject.assumed)
-    loops = [*altered.values(), *ideal.values(), *otherwise.values()]
-    limits = iter(changed_limits(trial, loops, found.advised))
-    nominal = found.advised.nominal.stiffness_N_m
+    altered, ideal, otherwise = changes(loop), idealised(loop), assumed_otherwise(loop, keys)
+    loops = [loop, *altered.values(), *ideal.values(), *otherwise.values()]
+    described, *others = changed_limits(trial, loops, found.advised)
+    limits = iter(others)
 
     def rows(some: dict[str, Scene]) -> tuple[Changed, ...]:
+        base = described.stiffness_N_m
         made = [(words, limit) for words, limit in zip(some, limits, strict=False)]
-        return tuple(sorted((Changed(*row, row[1].stiffness_N_m / nominal if nominal else 0.0) for row in made),
+        return tuple(sorted((Changed(*row, row[1].stiffness_N_m / base if base else 0.0) for row in made),
                             key=lambda row: -row.factor))  # fmt: skip
 
     changed, without = rows(altered), rows(ideal)
@@ -95,21 +98,20 @@ def advice(subject: Subject, trial: Trial, stage: Callable[[str], object] = lamb
     own = None
     if subject.has_task and scene.wall and scene.wall.stiffness:
         wall = Tried(scene.wall.stiffness, tuple(scene.dissipation))
-        own = wall.stiffness_N_m, trial.failures(loop, [wall], every_case(loop))[0]
+        own = wall.stiffness_N_m, trial.failures(loop, [wall], every_case(ranges(loop, keys)))[0]
     return Advice(
         name=subject.name,
         notes=subject.notes if is_ideal(loop) or loop.transmission else (*subject.notes, _RIGID),
         is_ideal=is_ideal(loop),
         tried_by=task_words(loop),
-        uncertain=tuple(uncertain_quantities(loop)),
+        uncertain=ranges(loop, keys),
         found=found,
         formulas=tuple(formulas(loop)),
         published=PUBLISHED.get(subject.name, ()),
+        described=described,
         changed=changed,
         without=without,
-        assumed=tuple(
-            (of, by_number[of.key, 0.5], by_number[of.key, 2.0]) for of in subject.assumed if (of.key, 0.5) in by_number
-        ),
+        assumed=tuple((of, by_number[of.key, 0.5], by_number[of.key, 2.0]) for of in assumed),
         own=own,
         scene=_shown(subject, loop, found),
         runs=trial.runs,
@@ -151,6 +153,7 @@ def as_data(told: Advice, sentences: list[str]) -> AdviceData:
             "stiffness_N_m": found.stiffness_N_m,
             "cases": found.cases,
         },
+        "as_assumed": _best_data(found.as_assumed) if found.as_assumed else None,
         "breaks_first": _broken(found.breaks) if found.breaks else None,
         "elements": [_best_data(best) for best in found.bests],
         "formulas": [formula._asdict() for formula in told.formulas],

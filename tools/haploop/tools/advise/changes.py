@@ -7,13 +7,13 @@ from collections.abc import Sequence
 from haploop.launch.plan.effects import all_effects
 from haploop.protocol.scene.paths import value_at, with_value
 from haploop.protocol.scene.scene import Scene
-from haploop.tools.advise.assumptions import Assumed
 from haploop.tools.advise.search import Best
-from haploop.tools.advise.walls.cases import DELAY, FIRST_HOLDS, Case, delay_s
+from haploop.tools.advise.walls.cases import ASSUMED, DELAY, FIRST_HOLDS, Case, delay_s
 from haploop.tools.advise.walls.limit import Limit, Query, ladder, limits
 from haploop.tools.advise.walls.trial import Trial
 
-_TOLERANCE = 0.06
+# How closely these limits are found.
+CLOSE = 0.06
 # One value halved or doubled: words, key, factor.
 _SCALED = (
     ("encoder step halved", "encoder.resolution", 0.5),
@@ -59,14 +59,9 @@ def idealised(loop: Scene) -> dict[str, Scene]:
     return found
 
 
-def assumed_otherwise(loop: Scene, assumed: Sequence[Assumed]) -> dict[tuple[str, float], Scene]:
+def assumed_otherwise(loop: Scene, keys: Sequence[str]) -> dict[tuple[str, float], Scene]:
     """Returns the loops with one assumed number halved or doubled, by (key, factor)."""
-    return {
-        (of.key, factor): scaled(loop, of.key, factor)
-        for of in assumed
-        for factor in (0.5, 2.0)
-        if isinstance(value_at(loop, of.key), float) and value_at(loop, of.key)
-    }
+    return {(key, factor): scaled(loop, key, factor) for key in keys for factor in ASSUMED}
 
 
 def scaled(loop: Scene, key: str, factor: float) -> Scene:
@@ -82,6 +77,6 @@ def changed_limits(trial: Trial, loops: Sequence[Scene], best: Best) -> list[Lim
     top = max(1.0, best.nominal.stiffness_N_m)
     cases, rungs = tuple(Case(hold) for hold in FIRST_HOLDS), ladder(top / 4.0, top * 4.0, 1.26)
     choices = [best.family.elements(best.values)] + [()] * bool(best.values)
-    found = limits(trial, [Query(loop, elements, cases, rungs) for loop in loops for elements in choices], _TOLERANCE)
+    found = limits(trial, [Query(loop, elements, cases, rungs) for loop in loops for elements in choices], CLOSE)
     each = len(choices)
     return [max(found[i : i + each], key=lambda limit: limit.stiffness_N_m) for i in range(0, len(found), each)]

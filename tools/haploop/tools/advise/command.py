@@ -19,8 +19,7 @@ from haploop.tools.advise.advice import Advice, AdviceData, advice, as_data
 from haploop.tools.advise.figure import draw
 from haploop.tools.advise.report import report, sentences
 from haploop.tools.advise.subject import InvalidRequest, make_subject
-from haploop.tools.advise.walls.store import Store
-from haploop.tools.advise.walls.trial import Trial
+from haploop.tools.advise.walls.trial import Store, Trial
 from haploop.tools.cli.options import FAILED, WRONG_USE, leave, plain_errors, print_json
 from haploop.tools.cli.scenes import kinds_with, print_notes
 from haploop.tools.figure.data import FigureError
@@ -65,11 +64,11 @@ def advise(request: Request, as_json: bool) -> None:
                 found = advice(asked, trial, stage)
         except KeyboardInterrupt:
             leave(f"Interrupted; the same command with --out {out} goes on.", FAILED)
+    if not as_json:
+        console().print(report(found))
     data = _write(found, out)
     if as_json:
         print_json(data)
-    else:
-        console().print(report(found))
     for path in data["files"].values():
         print(path, file=sys.stderr)
 

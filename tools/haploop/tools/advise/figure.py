@@ -30,8 +30,7 @@ def figure_of(told: Advice) -> Figure:
     Raises FigureError where matplotlib is missing.
     """
     others = [(words, limit.stiffness_N_m, format_limit(limit)) for words, limit, _ in (*told.changed, *told.without)]
-    nominal = told.found.advised.nominal
-    for of, half, double in (row for row in told.assumed if moves(row[1], row[2], nominal)):
+    for of, half, double in (row for row in told.assumed if moves(row[1], row[2], told.described)):
         others += [(f"{of.key} halved (assumed)", half.stiffness_N_m, format_limit(half))]
         others += [(f"{of.key} doubled (assumed)", double.stiffness_N_m, format_limit(double))]
     lines = [line for name, words in answer(told) for line in textwrap.wrap(f"{name}: {words}", _LETTERS)]
@@ -77,7 +76,7 @@ def _walls(ax: Axes, told: Advice, lines: list[str]) -> None:
 
 
 def _changes(ax: Axes, told: Advice, others: list[tuple[str, float, str]]) -> None:
-    nominal = told.found.advised.nominal.stiffness_N_m
+    nominal = told.described.stiffness_N_m
     for row, (_, stiffness, words) in enumerate(others):
         colour = style.VERDICTS["steady"] if stiffness > nominal else "#D9B08C"
         ax.barh(row, stiffness / 1e3, _BAR, color=colour)

@@ -9,9 +9,10 @@ from rich.table import Table
 from rich.text import Text
 
 from haploop.tools.advise.advice import Advice
-from haploop.tools.advise.search import Best
+from haploop.tools.advise.changes import CLOSE
+from haploop.tools.advise.search import ROUGH, WORTH, Best
 from haploop.tools.advise.walls.limit import Limit
-from haploop.tools.advise.walls.store import Failure
+from haploop.tools.advise.walls.trial import Failure
 from haploop.tools.render.terminal import make_facts, make_table
 from haploop.tools.render.units import amount, fixed
 
@@ -21,10 +22,16 @@ _NOTHING_BREAKS = "nothing that was tried"
 _TELLS = 1.2
 _NO_CHANGE = "no single change that was tried gains a fifth"
 _READING = (
-    "Every corner: all quantities 20 % more or less, in all combinations; a dash where a simpler element bears as "
-    "much. Changes and assumptions: with the element advised or with none, whichever bears more. These limits are to "
-    "6 to 12 %, at holds of 0.3, 1 and 3 times the task's; the safe stiffness is to 3 %, in all cases."
+    "Every corner: what is uncertain 20 % more or less, what is assumed half or twice, in all combinations, or 32 of "
+    "more; a dash where a simpler element bears as much. Changes and assumptions: of the loop as described, with the "
+    "element advised or with none, whichever bears more. All these at holds of 0.3, 1 and 3 times the task's."
 )
+_SAFE = "{0} with {1}: at rest, or swinging by less than a hand feels"
+# What is assumed, how much that costs, and what to measure.
+_ASSUMED = "{0}, published nowhere: safe at half and at twice {1}. {2}"
+_COSTS = "Were {0} right: about {1} with {2}. {3}"
+_SAME = "Were {0} right, the wall would be as stiff within a tenth."
+_MEASURE = "Measure {0} first: it moves the wall most."
 
 
 def report(told: Advice) -> RenderableType:
@@ -47,8 +54,10 @@ def report(told: Advice) -> RenderableType:
 def answer(told: Advice) -> list[tuple[str, str]]:
     """Returns the lines that a builder reads first, each with its name."""
     found, best = told.found, told.found.advised
-    safe = f"{format_stiffness(found.stiffness_N_m)} with {best.family.phrase(best.values)}"
+    safe = _SAFE.format(format_stiffness(found.stiffness_N_m), best.family.phrase(best.values))
     lines = [("at most" if told.is_ideal else "safe up to", safe if found.stiffness_N_m else _NO_WALL)]
+    if found.as_assumed:
+        lines.append(("assumes", assumes(told, found.as_assumed)))
     broken = found.breaks
     breaks = f"{format_stiffness(broken[0])}: {describe(broken[1])}" if broken else _NOTHING_BREAKS
     lines.append(("breaks first", breaks))
@@ -57,21 +66,24 @@ def answer(told: Advice) -> list[tuple[str, str]]:
     if told.published:
         values = [f"{format_stiffness(value.stiffness_N_m)} ({value.by})" for value in told.published]
         lines.append(("published", ", ".join(values)))
-    moving = [
-        f"{of.key} halved: {format_limit(half)}, doubled: {format_limit(double)}"
-        for of, half, double in told.assumed
-        if moves(half, double, best.nominal)
-    ]
-    if told.assumed:
-        names = ", ".join(of.key for of, _, _ in told.assumed)
-        lines.append(
-            ("rests on", "; ".join(moving) if moving else f"assumed {names}, none of which moves it by a fifth")
-        )
     if told.own:
         own, failure = told.own
         does = f"buzzes: {describe(failure)}" if failure else "bears every case"
         lines.append(("its own wall", f"{format_stiffness(own)} {does}"))
     return lines
+
+
+def assumes(told: Advice, right: Best) -> str:
+    """Describes what is assumed, and how stiff a wall would be were it right."""
+    it, them = ("it", "it") if len(told.assumed) == 1 else ("they", "each")
+    of, half, double = min(told.assumed, key=lambda row: min(row[1].stiffness_N_m, row[2].stiffness_N_m))
+    measure = _MEASURE.format(of.key)
+    if not right.safe or right.safe.stiffness_N_m <= WORTH * told.found.stiffness_N_m:
+        costs = _SAME.format(it)
+    else:
+        stiffness, phrase = format_stiffness(right.safe.stiffness_N_m), right.family.phrase(right.values)
+        costs = _COSTS.format(it, stiffness, phrase, measure if moves(half, double, told.described) else "")
+    return _ASSUMED.format(", ".join(of.key for of, _, _ in told.assumed), them, costs).strip()
 
 
 def sentences(told: Advice) -> list[str]:
@@ -95,7 +107,8 @@ def moves(half: Limit, double: Limit, nominal: Limit) -> bool:
 
 
 def _elements(told: Advice) -> Table:
-    table = make_table("element", "parameter", "as described", "every corner", numbers=("as described", "every corner"))
+    heads = f"as described\nto {ROUGH * 100:.0f} %", f"every corner\nto {CLOSE * 100:.0f} %"
+    table = make_table("element", "parameter", *heads, numbers=heads)
     for best in told.found.bests:
         is_advised = best is told.found.advised
         safe = format_limit(best.safe) if best.safe else "–"
@@ -119,14 +132,16 @@ def _limits(told: Advice) -> Table:
 
 
 def _changes(told: Advice) -> Table:
-    table = make_table("one change, or an ideal", "limit", "times", numbers=("limit", "times"))
+    limit = f"limit, to {CLOSE * 100:.0f} %"
+    table = make_table("one change, or an ideal", limit, "times", numbers=(limit, "times"))
     for words, limit, factor in (*told.changed, *told.without):
         table.add_row(words, format_limit(limit), fixed(factor, 2), style="bold" if factor >= _TELLS else "")
     return table
 
 
 def _assumed(told: Advice) -> Table:
-    table = make_table("assumed of the device", "why", "halved", "doubled", numbers=("halved", "doubled"))
+    heads = f"halved\nto {CLOSE * 100:.0f} %", f"doubled\nto {CLOSE * 100:.0f} %"
+    table = make_table("assumed of the device", "why", *heads, numbers=heads)
     for of, half, double in told.assumed:
         table.add_row(of.key, of.words, format_limit(half), format_limit(double))
     return table

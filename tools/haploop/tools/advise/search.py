@@ -21,14 +21,13 @@ from haploop.tools.advise.families import (
     first_choices,
     together,
 )  # fmt: skip
-from haploop.tools.advise.walls.cases import FIRST_HOLDS, HOLDS, Case, corners
+from haploop.tools.advise.walls.cases import FIRST_HOLDS, Case, Ranges, attack, every_case, ranges
 from haploop.tools.advise.walls.limit import LEAST_N_M, Limit, Query, ladder, limits
-from haploop.tools.advise.walls.store import Failure, Tried
-from haploop.tools.advise.walls.trial import Trial
+from haploop.tools.advise.walls.trial import Failure, Trial, Tried
 from haploop.tools.linear.linearity import installed_kinds
 
 # How closely limits are found while elements are compared, and that of the one advised.
-_ROUGH, _FINE = 0.12, 0.03
+ROUGH, _FINE = 0.12, 0.02
 # An element that allows no more than this much beyond a simpler one is not worth having.
 WORTH = 1.1
 # Softer walls that have to bear everything, too, as shares of the limit.
@@ -37,8 +36,6 @@ _SOFTER = (0.8, 0.62, 0.48, 0.35, 0.25, 0.15, 0.08, 0.03)
 _LOWER, _TIMES = 0.97, 60
 # So much stiffer walls have to withstand it, too: where a count lies in the hold is chance, and differs with each.
 _BEYOND = (1.0, 1.02, 1.04)
-# A slow press, and the fastest of the taps on a wall that were measured (0.20 to 0.24 m/s).
-_SPEEDS = (1e-3, 0.24)
 _STEADY = ("steady", "no-contact")
 
 Choice = tuple[Family, Values]
@@ -67,6 +64,7 @@ class Found:
         bests: of every family.
         advised: the best of the family to use.
         stiffness_N_m: that withstood the attack, rounded down; 0 where none does.
+        as_assumed: the best, and how stiff, were every assumed number right; None where nothing is assumed.
         breaks: the softest wall known not to bear everything, and what it does; None where none was found.
         cases: how many it was tried in, attack included.
     """
@@ -74,17 +72,20 @@ class Found:
     bests: tuple[Best, ...]
     advised: Best
     stiffness_N_m: float
+    as_assumed: Best | None
     breaks: tuple[float, Failure] | None
     cases: int
 
 
-def search(loop: Scene, trial: Trial, stage: Callable[[str], object] = lambda name: None) -> Found:
-    """Finds the element that bears the stiffest wall in all cases, and how stiff."""
+def search(
+    loop: Scene, assumed: Sequence[str], trial: Trial, stage: Callable[[str], object] = lambda name: None
+) -> Found:
+    """Finds the element that bears the stiffest wall in all cases, assumed keys halved and doubled, and how stiff."""
     first = tuple(Case(hold) for hold in FIRST_HOLDS)
 
     def nominal(choices: Sequence[Choice], rungs: tuple[float, ...]) -> dict[Choice, Limit]:
         queries = [Query(loop, family.elements(values), first, rungs) for family, values in choices]
-        return dict(zip(choices, limits(trial, queries, _ROUGH), strict=True))
+        return dict(zip(choices, limits(trial, queries, ROUGH), strict=True))
 
     stage("the wall alone")
     known = nominal([(NOTHING, ())], ladder(10.0, 1e5, 1.6))
@@ -98,31 +99,29 @@ def search(loop: Scene, trial: Trial, stage: Callable[[str], object] = lambda na
     pairs = together(_equals(known, DAMPING)[-1], _equals(known, UNIDIRECTIONAL)[-1])
     known |= nominal([(BOTH, values) for values in pairs], rungs)
     stage("every corner")
-    bests = _in_corners(loop, trial, known)
-    advised = _refined(loop, trial, _advised(bests))
+    of, measured = ranges(loop, assumed), ranges(loop)
+    bests = _in_corners(loop, trial, known, of)
+    as_assumed = None if of == measured else _advised(_in_corners(loop, trial, known, measured))
+    advised = _refined(loop, trial, _advised(bests), of)
     bests = [advised if best.family is advised.family else best for best in bests]
     stage("softer walls")
-    top = _softer(loop, trial, advised)
+    top = _softer(loop, trial, advised, of)
     stage("the attack")
-    stiffness, broken, count = _attacked(loop, trial, advised, top)
+    stiffness, broken, count = _attacked(loop, trial, advised, top, attack(of))
     if not broken and top.failure:
         broken = [(top.fails_N_m, top.failure)]
-    return Found(tuple(bests), advised, stiffness, broken[-1] if broken else None, count + len(every_case(loop)))
-
-
-def every_case(loop: Scene, holds: Sequence[float] = HOLDS) -> tuple[Case, ...]:
-    """Returns every hold in every corner, and in the loop as described."""
-    return tuple(Case(hold, corner) for corner in ((), *corners(loop)) for hold in holds)
+    cases = count + len(every_case(of))
+    return Found(tuple(bests), advised, stiffness, as_assumed, broken[-1] if broken else None, cases)
 
 
 def _equals(known: dict[Choice, Limit], family: Family) -> list[Values]:
     """Returns the parameters whose limits are, as closely as they are known, the largest, from small to large."""
     tried = {values: limit.stiffness_N_m for (other, values), limit in known.items() if other is family}
     most = max(tried.values())
-    return sorted(values for values, stiffness in tried.items() if stiffness >= most / (1.0 + _ROUGH))
+    return sorted(values for values, stiffness in tried.items() if stiffness >= most / (1.0 + ROUGH))
 
 
-def _in_corners(loop: Scene, trial: Trial, known: dict[Choice, Limit]) -> list[Best]:
+def _in_corners(loop: Scene, trial: Trial, known: dict[Choice, Limit], of: Ranges) -> list[Best]:
     """Returns the best of each family; those worth it with their limit in every corner, at the holds tried first.
 
     Of parameters that bear as much in the loop as described the smallest, a middle one and the largest are tried.
@@ -135,12 +134,12 @@ def _in_corners(loop: Scene, trial: Trial, known: dict[Choice, Limit]) -> list[B
         if not family.parts or bests[-1].nominal.stiffness_N_m > WORTH * bests[0].nominal.stiffness_N_m:
             some = dict.fromkeys((equals[0], equals[len(equals) // 2], equals[-1]))
             candidates += [(family, values) for values in some]
-    cases = every_case(loop, FIRST_HOLDS)
+    cases = every_case(of, FIRST_HOLDS)
     queries = []
     for family, values in candidates:
         top = known[family, values].stiffness_N_m or LEAST_N_M
         queries.append(Query(loop, family.elements(values), cases, ladder(top / 3.0, top * 1.06, 1.5)))
-    safe = dict(zip(candidates, limits(trial, queries, _ROUGH / 2.0), strict=True))
+    safe = dict(zip(candidates, limits(trial, queries, ROUGH / 2.0), strict=True))
     for place, best in enumerate(bests):
         of_family = {values: limit for (family, values), limit in safe.items() if family is best.family}
         if of_family:
@@ -159,14 +158,14 @@ def _advised(bests: Sequence[Best]) -> Best:
     return advised
 
 
-def _refined(loop: Scene, trial: Trial, best: Best) -> Best:
+def _refined(loop: Scene, trial: Trial, best: Best, of: Ranges) -> Best:
     """Returns the best with its parameter moved half a step up or down, as often as that bears more in every corner."""
     tried = {best.values}
     while True:
         near = best.safe.stiffness_N_m if best.safe else 0.0
         new = [values for values in beside(best.values) if values not in tried] if near else []
-        rungs, cases = ladder(near, near * 1.5, 1.07), every_case(loop, FIRST_HOLDS)
-        found = limits(trial, [Query(loop, best.family.elements(values), cases, rungs) for values in new], _ROUGH / 2.0)
+        rungs, cases = ladder(near, near * 1.5, 1.07), every_case(of, FIRST_HOLDS)
+        found = limits(trial, [Query(loop, best.family.elements(values), cases, rungs) for values in new], ROUGH / 2.0)
         tried |= set(new)
         values, limit = max(zip(new, found, strict=True), key=lambda each: each[1].stiffness_N_m, default=((), None))
         if not limit or limit.stiffness_N_m <= near * 1.01:
@@ -178,35 +177,25 @@ def _described(loop: Scene, trial: Trial, family: Family, values: Values, safe: 
     """Returns the limit of the loop as described, which bears what it bears in every corner."""
     first = tuple(Case(hold) for hold in FIRST_HOLDS)
     rungs = ladder(safe.stiffness_N_m, safe.stiffness_N_m * 3.0, 1.4)
-    return limits(trial, [Query(loop, family.elements(values), first, rungs)], _ROUGH)[0]
+    return limits(trial, [Query(loop, family.elements(values), first, rungs)], ROUGH)[0]
 
 
-def _softer(loop: Scene, trial: Trial, advised: Best) -> Limit:
+def _softer(loop: Scene, trial: Trial, advised: Best, of: Ranges) -> Limit:
     """Returns the limit at every hold in every corner, with all softer walls bearing it, too."""
     assert advised.safe
     near = advised.safe.stiffness_N_m
     if not near:
         return advised.safe
-    elements, cases = advised.family.elements(advised.values), every_case(loop)
+    elements, cases = advised.family.elements(advised.values), every_case(of)
     rungs = (*sorted(near * share for share in _SOFTER), near, min(advised.safe.fails_N_m, near * 1.1))
     return limits(trial, [Query(loop, elements, cases, rungs)], _FINE)[0]
 
 
-def attack(loop: Scene) -> tuple[Case, ...]:
-    """Returns cases that the search has not seen: other holds and sways, a hand held still, another approach."""
-    apart, evenly = [0.3 * 10.0 ** (i / 10.0) for i in range(11)], [0.3 + 0.27 * i for i in range(1, 10)]
-    found: list[Case] = []
-    for corner in ((), *corners(loop)):
-        found += [Case(hold, corner) for hold in evenly]
-        found += [Case(hold, corner, sway_Hz=0.8) for hold in apart]
-        found += [Case(hold, corner, sway=0.0) for hold in (*apart, *evenly)]
-        found += [Case(hold, corner, sway=0.2, sway_Hz=0.4, tap_m_s=speed) for hold in apart[::5] for speed in _SPEEDS]
-    return tuple(found)
-
-
-def _attacked(loop: Scene, trial: Trial, advised: Best, top: Limit) -> tuple[float, list[tuple[float, Failure]], int]:
+def _attacked(
+    loop: Scene, trial: Trial, advised: Best, top: Limit, cases: Sequence[Case]
+) -> tuple[float, list[tuple[float, Failure]], int]:
     """Lowers the wall until no attack breaks it: projected friction in every case, exact friction in a few."""
-    elements, cases, broken = advised.family.elements(advised.values), attack(loop), []
+    elements, broken = advised.family.elements(advised.values), []
     stiffness = rounded_down(top.stiffness_N_m)
     for _ in range(_TIMES):
         if stiffness < LEAST_N_M:
@@ -236,8 +225,9 @@ def _judged(loop: Scene, wall: Tried) -> Failure | None:
 
 
 def rounded_down(stiffness: float) -> float:
-    """Returns a stiffness rounded down to three digits, of which the last is 0 or 5."""
+    """Returns a stiffness rounded down to three digits; of one that begins with 5 or more the last is 0 or 5."""
     if not stiffness:
         return 0.0
-    unit = 5.0 * 10.0 ** (math.floor(math.log10(stiffness)) - 2)
+    unit = 10.0 ** (math.floor(math.log10(stiffness)) - 2)
+    unit *= 5.0 if stiffness >= 500.0 * unit else 1.0
     return float(f"{math.floor(stiffness / unit * (1.0 + 1e-12)) * unit:.12g}")

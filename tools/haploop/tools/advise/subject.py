@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import contextlib
+import re
+import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from haploop.controller.dissipation import Element
 from haploop.launch.scene.file import resolved
@@ -14,7 +16,6 @@ from haploop.launch.scene.layers import Layers, read_layers
 from haploop.launch.scene.mistakes import nearest
 from haploop.protocol.changes import Change, at_work
 from haploop.protocol.scene.scene import Scene
-from haploop.tools.advise.assumptions import Assumed, assumptions
 from haploop.tools.advise.walls.cases import MOST_DELAY_S
 from haploop.tools.cost.grid import scenes_folder
 
@@ -33,9 +34,23 @@ _TOO_LATE = (
     '"{0:g} ms" for milliseconds.'
 )
 
+# How a device file says which of its numbers are assumed.
+_MARK = "ASSUMPTION"
+_TABLE = re.compile(r"\[+\s*([\w.]+)\s*\]+")
+_VALUE = re.compile(r"([\w]+)\s*=\s*[^#]*#\s*(.*)")
+# What decides how stiff a wall may be; the hand is tried in its own corners.
+_TABLES = ("device", "friction", "encoder", "transmission", "clock")
+
 
 class InvalidRequest(ValueError):
     """A device, hand or estimator that does not exist, or gets no advice; the message says what is allowed."""
+
+
+class Assumed(NamedTuple):
+    """A number that nobody published: its dotted key, and the file's words on it."""
+
+    key: str
+    words: str
 
 
 @dataclass(frozen=True)
@@ -91,6 +106,27 @@ def make_subject(
         scene = apply_events(scene)
         notes.append("What the scene's events change is taken as changed from the start.")
     return Subject(path.stem, scene, not is_preset, tuple(notes), assumptions(path))
+
+
+def assumptions(path: Path) -> tuple[Assumed, ...]:
+    """Returns the assumed numbers of a device file and of those it extends, of which its own lines take the place."""
+    return tuple(found for found in _by_key(path).values() if found.words)
+
+
+def _by_key(path: Path) -> dict[str, Assumed]:
+    """Returns the numbers of a device file by key, with no words where they are not assumed."""
+    text = path.read_text(encoding="utf-8")
+    extends = tomllib.loads(text).get("extends")
+    found = _by_key(path.parent / extends) if isinstance(extends, str) else {}
+    table = ""
+    for line in text.splitlines():
+        if match := _TABLE.match(line):
+            table = match[1]
+        elif (match := _VALUE.match(line)) and table.split(".")[0] in _TABLES:
+            key, comment = f"{table}.{match[1]}", match[2]
+            words = comment.partition(f"{_MARK}: ")[2] if _MARK in comment else ""
+            found[key] = Assumed(key, words)
+    return found
 
 
 def apply_events(scene: Scene) -> Scene:

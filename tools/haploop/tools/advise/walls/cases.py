@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import itertools
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,8 +15,9 @@ from haploop.protocol.scene.paths import value_at, with_value
 from haploop.protocol.scene.scene import Hand, Scene, Wall
 from haploop.tools.render.units import amount
 
-# The device meets the wall at this speed, a firm tap.
+# The device meets the wall at this speed, a firm tap; in an attack by a slow press, and by the fastest tap measured.
 TAP_M_S = 0.2
+_SPEEDS = (1e-3, 0.24)
 # The hand presses with this, or with this share of what the actuator can give where that is less.
 PRESS_N, OF_THE_ACTUATOR = 1.0, 0.3
 # Holds as multiples of the task's, and those that are tried first.
@@ -30,8 +30,8 @@ MOST_DELAY_S, ROUND_TRIPS = 0.5, 60
 # So does one so many periods of device and hand without a wall, where that swings, being damped by less than this share
 # of the critical; no run is longer than so many usual ones for that.
 PERIODS, _DAMPED, _SLOWEST = 22, 0.3, 10.0
-# By so much may delay, device mass and the hand be other than described.
-SHARE = 0.2
+# Factors between which delay, device mass and the hand may be other than described, and what a device file assumes.
+TOLERANCE, ASSUMED = (0.8, 1.2), (0.5, 2.0)
 DELAY = "delay"
 # What else is uncertain, and its key; effects such as a grip and a motor have keys that go with it.
 _KEYS = {
@@ -41,8 +41,18 @@ _KEYS = {
     "hand stiffness": "hand.stiffness",
 }
 _STAYS = (None, "constant", "ramp", "step", "minimum-jerk")
+# A search takes a regular fraction of the corners: all of so many quantities, each further one as the parity of some of
+# these, so that no two go together (a fractional factorial design; Box, Hunter and Hunter 1978).
+_ALL_OF = 5
+_PARITIES = sorted((mask for mask in range(2**_ALL_OF) if mask.bit_count() in (3, 5)), key=int.bit_count, reverse=True)
+# An attack has so many cases about.
+_ATTACKS = 800
+# Corners take what they are attacked by in steps of this, which has no divisor in common with how many there are.
+_STRIDE = 17
 
 Corner = tuple[tuple[str, float], ...]
+# Factors between which quantities, or numbers by their dotted keys, may lie, by name.
+Ranges = Mapping[str, tuple[float, float]]
 
 
 @dataclass(frozen=True)
@@ -116,27 +126,67 @@ def slowness(loop: Scene) -> float:
     return max(1.0, math.ceil(10.0 * times) / 10.0)
 
 
-def corners(loop: Scene) -> list[Corner]:
-    """Returns every combination of all quantities a fifth less or more, first the likely worst: all of them less."""
-    names = uncertain_quantities(loop)
-    factors = itertools.product((1.0 - SHARE, 1.0 + SHARE), repeat=len(names))
-    return [tuple(zip(names, some, strict=True)) for some in factors] if names else []
+def ranges(loop: Scene, assumed: Sequence[str] = ()) -> dict[str, tuple[float, float]]:
+    """Returns what is uncertain and by which factors: what a user's loop differs in, and the assumed keys.
+
+    Only what is there and not 0; a quantity all of whose keys are assumed is none of its own.
+    """
+    found = {DELAY: TOLERANCE} if loop.clock.round_trip_delay else {}
+    for name in _KEYS:
+        if any(value_at(loop, key) for key in _keys_of(name) if key not in assumed):
+            found[name] = TOLERANCE
+    return found | {key: ASSUMED for key in assumed if is_number(value_at(loop, key))}
 
 
-def uncertain_quantities(loop: Scene) -> list[str]:
-    """Returns the quantities that can be a fifth more or less: those that are there and not 0."""
-    found = [DELAY] if loop.clock.round_trip_delay else []
-    return found + [name for name in _KEYS if any(value_at(loop, key) for key in _keys_of(name))]
+def is_number(value: object) -> bool:
+    """Tells whether a value is a number that can be halved and doubled."""
+    return isinstance(value, float) and value != 0.0
+
+
+def corner(of: Ranges, number: int) -> Corner:
+    """Returns one combination of the ends of the ranges: bit i of the number says which end of the i-th."""
+    return tuple((name, ends[number >> i & 1]) for i, (name, ends) in enumerate(of.items()))
+
+
+def every_case(of: Ranges, holds: Sequence[float] = HOLDS) -> tuple[Case, ...]:
+    """Returns every hold in the loop as described and in every corner, or in 32 of more that are as good."""
+    found: list[Corner] = [()]
+    for low in range(2 ** min(len(of), _ALL_OF)):
+        bits = ((low & mask).bit_count() % 2 << _ALL_OF + i for i, mask in enumerate(_PARITIES[: len(of) - _ALL_OF]))
+        found.append(corner(of, low + (sum(bits) if len(of) > _ALL_OF else 0)))
+    return tuple(Case(hold, some) for some in dict.fromkeys(found) for hold in holds)
+
+
+def attack(of: Ranges) -> tuple[Case, ...]:
+    """Returns cases that the search has not seen: other holds and sways, a hand held still, another approach.
+
+    All of them in every corner; of more than 16 corners each has its share of them.
+    """
+    apart, evenly = [0.3 * 10.0 ** (i / 10.0) for i in range(11)], [0.3 + 0.27 * i for i in range(1, 10)]
+    some = [Case(hold, sway_Hz=0.3) for hold in evenly]
+    some += [Case(hold, sway_Hz=0.8) for hold in apart]
+    some += [Case(hold, sway=0.0) for hold in (*apart, *evenly)]
+    some += [Case(hold, sway=0.2, sway_Hz=0.4, tap_m_s=speed) for hold in apart[::5] for speed in _SPEEDS]
+    count = 2 ** len(of)
+    each = min(len(some), max(1, _ATTACKS // count))
+    found = list(some)
+    for place in range(0, count, max(1, count // _ATTACKS)):
+        shares = (some[(place * each + i) * _STRIDE % len(some)] for i in range(each))
+        found += [replace(case, corner=corner(of, place)) for case in shares]
+    return tuple(found)
 
 
 def scale_quantities(scene: Scene, factors: Mapping[str, float]) -> Scene:
-    """Returns the scene with these quantities multiplied; a delay is rounded to whole plant steps, by at least one."""
+    """Returns the scene with these quantities, or keys, multiplied; a key goes before the quantity it belongs to.
+
+    A delay is rounded to whole plant steps, by at least one.
+    """
     for name, factor in factors.items():
         if name == DELAY:
             scene = with_value(scene, "clock.round_trip_delay", delay_s(scene, factor))
             continue
         for key in _keys_of(name):
-            if value := value_at(scene, key):
+            if (value := value_at(scene, key)) and (key == name or key not in factors):
                 scene = with_value(scene, key, value * factor)
     return scene
 
@@ -160,4 +210,7 @@ def task_words(loop: Scene) -> str:
 
 
 def _keys_of(quantity: str) -> list[str]:
+    """Returns the keys of a quantity; a key is its own."""
+    if quantity not in _KEYS:
+        return [quantity]
     return [_KEYS[quantity], *(e.scaled_with[quantity] for e in all_effects() if quantity in e.scaled_with)]

@@ -11,13 +11,11 @@ import numpy as np
 from haploop.controller.controller import Controller
 from haploop.controller.dissipation import Element
 from haploop.controller.recorder import BatchRecorder
+from haploop.launch.batch.loop import BatchLoop
 from haploop.launch.batch.stacking import is_batchable, stacked, structures
-from haploop.plant.choose import make_motion, make_position_sensor
 from haploop.plant.friction.projected import ProjectedFrictionMotion
-from haploop.plant.line.delay import make_line
 from haploop.plant.plant import Plant
-from haploop.plant.sensing.accelerometer import make_accelerometer
-from haploop.protocol.scene.scene import Scene, accelerometer_is_used
+from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
 
 Kinds = Mapping[str, type[Element]]
@@ -39,48 +37,36 @@ class Seen(NamedTuple):
     gone: np.ndarray
 
 
-class Loops:
+class Loops(BatchLoop):
     """Scenes of one structure, moved together; friction is projected, see ``ProjectedFrictionMotion``."""
 
     def __init__(self, scenes: Sequence[Scene], kinds: Kinds) -> None:
-        scene = stacked([replace(one, friction=None) for one in scenes])
-        self._time = time = Timebase.from_scene(scene)
-        rubs = scenes[0].friction is not None
-        make = ProjectedFrictionMotion.of(scenes, scene, time) if rubs else make_motion(scene, time, len(scenes))
-        self._motion, self._line = make, make_line(scene, time, len(scenes))
-        self._position, self._sensor = make_position_sensor(scene, time), make_accelerometer(scene, time, len(scenes))
-        self._feels, self._rows = accelerometer_is_used(scene), BatchRecorder()
-        self._controller = Controller(scene, time, dict(kinds), self._rows)
+        scene, rows = stacked([replace(one, friction=None) for one in scenes]), BatchRecorder()
+        time = Timebase.from_scene(scene)
+        super().__init__(scene, time, Controller(scene, time, dict(kinds), rows), rows, len(scenes))
+        if scenes[0].friction is not None:
+            self._motion = ProjectedFrictionMotion.of(scenes, scene, time)
         self._limit_m, self._tick = scene.diverged_beyond, 0
 
     def go_on(self, ticks: int) -> Seen:
         """Runs so many ticks more."""
-        motion, members = self._motion, len(np.atleast_1d(self._motion.x))
-        x, measured, command = np.empty((3, ticks, members))
+        x = np.empty((ticks, len(np.atleast_1d(self._motion.x))))
         with np.errstate(all="ignore"):
             for row in range(ticks):
-                x[row], measured[row] = motion.x, self._position.reading(motion.x)
-                forces = self._controller.answer([self._sample(measured[row])])
-                command[row] = forces[0]
-                self._line.receive(forces)
-                motion.advance(self._tick, self._line.holds(self._tick))
-                self._tick += 1
-            gone = np.asarray(~(np.abs(x) <= self._limit_m).all(axis=0) | ~np.isfinite(command).all(axis=0))
-        self._rows.take_rows()
-        motion.take_record(self._tick - ticks, positions_only=True)
-        return Seen(x, measured, command, gone)
-
-    def _sample(self, measured: np.ndarray) -> tuple[Any, ...]:
-        if not self._feels:
-            return (measured.copy(),)
-        acceleration = self._motion.acceleration(self._tick)
-        return measured.copy(), self._sensor.reading(acceleration) if self._sensor else acceleration
+                x[row] = self._motion.x
+                self._work(self._tick + row)
+        columns = [row.columns for row in self._rows.take_rows()]
+        self._motion.take_record(self._tick, positions_only=True)
+        self._tick += ticks
+        measured, command = (
+            np.array([np.broadcast_to(each[name], x.shape[1:]) for each in columns]) for name in ("x", "total")
+        )
+        gone = ~(np.abs(x) <= self._limit_m).all(axis=0) | ~np.isfinite(command).all(axis=0)
+        return Seen(x, measured, command, np.asarray(gone))
 
     def select(self, kept: np.ndarray) -> None:
         """Goes on with these members alone, a truth value of each."""
-        for part in (self._motion, self._line, self._position, self._sensor, self._controller):
-            if part:
-                part.select(kept)
+        self._select(kept)
 
 
 class LoneLoop:
@@ -92,21 +78,15 @@ class LoneLoop:
 
     def go_on(self, ticks: int) -> Seen:
         """Runs so many ticks more."""
-        measured: list[float] = []
-        command: list[float] = []
-
-        def exchange(_: int, samples: list[tuple[float, ...]]) -> list[float]:
-            forces = [float(force) for force in self._controller.answer(samples)]
-            measured.extend(sample[0] for sample in samples)
-            command.extend(forces)
-            return forces
-
-        self._plant.run_until(self._plant.tick + ticks, exchange)
+        self._plant.run_until(
+            self._plant.tick + ticks, lambda _, samples: [float(force) for force in self._controller.answer(samples)]
+        )
         _, done, columns = self._plant.take_block()
-        self._controller.recorder.take()
         x = np.frombuffer(columns["x"])[: done * self._time.steps_per_tick : self._time.steps_per_tick]
-        shown, read, commanded = (np.resize(np.array(values, float), (ticks, 1)) for values in (x, measured, command))
-        return Seen(shown, read, commanded, np.array([self._plant.stop_reason is not None]))
+        blocks = self._controller.recorder.take()
+        told = (np.frombuffer(b"".join(block["columns"][name] for block in blocks)) for name in ("x", "total"))
+        shown, measured, command = (np.resize(values, (ticks, 1)) for values in (x, *told))
+        return Seen(shown, measured, command, np.array([self._plant.stop_reason is not None]))
 
     def select(self, kept: np.ndarray) -> None:
         """Has no others to leave out."""

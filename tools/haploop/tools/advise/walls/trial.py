@@ -1,20 +1,25 @@
-"""The trial of walls: each with an element, in many cases at once, until one of them buzzes."""
+"""The trial of walls: each with an element, in many cases at once, until one of them buzzes; and what came of it."""
 
 from __future__ import annotations
 
+import contextlib
+import hashlib
+import json
 import math
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from importlib.metadata import version
+from pathlib import Path
 from typing import Self
 
 import numpy as np
 
 from haploop.controller.dissipation import ElementError
-from haploop.protocol.scene.scene import Scene, Wall
+from haploop.launch.spec import OutputError
+from haploop.protocol.scene.scene import ElementTable, Scene, Wall
 from haploop.tools.advise.walls.cases import LASTS_S, Case, slowness
 from haploop.tools.advise.walls.felt import Buzz, Threshold, buzz, felt_force_N
 from haploop.tools.advise.walls.loops import LoneLoop, Loops, make_loops
-from haploop.tools.advise.walls.store import Failure, Store, Tried
 from haploop.tools.executor.executors import Executor, InlineExecutor, make_executor, map_parallel
 from haploop.tools.linear.linearity import installed_kinds
 
@@ -25,6 +30,83 @@ STRETCH_S, FROM_S = 0.25, 0.75
 _DYING, _LONGER = 0.8, 4
 # Members that are worth a worker of their own.
 _PART = 150
+
+
+@dataclass(frozen=True)
+class Tried:
+    """A wall to be tried: its stiffness and the elements with it."""
+
+    stiffness_N_m: float
+    elements: tuple[ElementTable, ...] = ()
+
+
+@dataclass(frozen=True)
+class Failure:
+    """What a wall does in the case that it does not bear.
+
+    Attributes:
+        case: in words.
+        at_s: end of the stretch in which it was seen.
+        gone: whether the device left its limits; the numbers are of no meaning then.
+        motion_m, force_N, frequency_Hz, times_felt, by_force: of that stretch, as of ``Buzz``.
+    """
+
+    case: str
+    at_s: float
+    gone: bool
+    motion_m: float = 0.0
+    force_N: float = 0.0
+    frequency_Hz: float = 0.0
+    times_felt: float = 0.0
+    by_force: bool = False
+
+
+class Store:
+    """Failures of walls, or None, by a key that has everything in it that decides: a changed scene finds nothing.
+
+    A line each in a file, so that an interrupted advice goes on; several may add to one file. What is no such line, as
+    after a kill or on a full disk, is passed over, and its wall tried again.
+
+    Args:
+        file: JSON lines, read and added to; None keeps nothing.
+
+    Raises:
+        OutputError: the file cannot be read, or added to.
+    """
+
+    def __init__(self, file: Path | None = None) -> None:
+        self._file = file
+        self.known: dict[str, Failure | None] = {}
+        with self._writable():
+            text = file.read_text(encoding="utf-8", errors="replace") if file and file.exists() else ""
+        for line in text.split("\n"):
+            with contextlib.suppress(ValueError, TypeError):
+                key, failure = json.loads(line)
+                self.known[str(key)] = None if failure is None else Failure(**failure)
+
+    def key(self, loop: Scene, wall: Tried, cases: Sequence[Case]) -> str:
+        """Returns the key of a trial: loop, wall, cases and the version of haploop."""
+        told = repr((version("haploop"), loop, wall, tuple(cases)))
+        return hashlib.sha256(told.encode()).hexdigest()[:24]
+
+    def add(self, results: Mapping[str, Failure | None]) -> None:
+        """Keeps results by their keys, on disk at once, whole lines after whatever is there."""
+        self.known |= results
+        lines = (json.dumps([key, asdict(failure) if failure else None]) for key, failure in results.items())
+        with self._writable():
+            if self._file:
+                with self._file.open("ab") as file:
+                    file.write("\n".join(["", *lines, ""]).encode())
+
+    @contextlib.contextmanager
+    def _writable(self) -> Iterator[None]:
+        try:
+            yield
+        except OSError as error:
+            raise OutputError(
+                f"{self._file}, where what was tried is kept, cannot be used: {error.strerror}. Make room or give "
+                "another directory with --out; with the same one, what is in it already is not tried again."
+            ) from error
 
 
 @dataclass(frozen=True)
