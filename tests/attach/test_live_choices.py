@@ -1,5 +1,6 @@
 """Choices of a running loop: each takes effect, is on record and can be replayed."""
 
+import json
 import math
 
 import pytest
@@ -9,7 +10,7 @@ from haploop.launch.processes.run_directory import CommandRefused
 from haploop.launch.runs.replay import replay
 from haploop.logger import read
 from haploop.protocol.scene.scene import Wall
-from helpers.live.live_run import going
+from helpers.live.live_run import going, undisturbed
 from helpers.runs.clocks import clock, granted
 from helpers.scenes.least import KINDS, WALL, scene
 
@@ -87,6 +88,22 @@ def test_a_run_takes_pace_and_delay_while_it_goes_records_them_and_replays_to_th
     assert summary["lost"]["commands_dropped"] > 0
     assert summary["energy"]["residual_J"] <= 1e-12 * summary["energy"]["moved_J"]
     assert replay(subject.prepared.out).differences == []
+
+
+def test_a_paced_run_tells_how_late_its_ticks_were_and_has_the_bits_of_a_free_one(tmp_path):
+    with going(tmp_path, "duration=0.5", pauses=(250,), pace=1.0) as subject:
+        subject.stands_at(250)
+        late = subject.ask("status")[1]["lateness"]
+        assert late["ticks"] == 250
+        subject.ask("resume")
+        summary = subject.result()
+        assert summary["lateness"]["ticks"] == 500
+        assert 0.0 <= late["median_s"] <= late["percent_99_s"] <= late["most_s"]
+        written = json.loads((subject.prepared.out / "summary.json").read_text())
+        assert written["lateness"] == summary["lateness"]
+        free = undisturbed(subject.prepared)
+        assert "lateness" not in free
+        assert summary["trajectory_sha256"] == free["trajectory_sha256"]
 
 
 def test_what_cannot_be_is_refused_with_the_reason_and_the_run_goes_on_as_it_was(tmp_path):

@@ -70,6 +70,13 @@ def test_time_spent_standing_still_is_neither_made_up_for_nor_lost() -> None:
     assert subject.pace.lost_s == 0.0
 
 
+def test_the_schedule_begins_with_the_first_grant_not_while_nodes_are_waited_for() -> None:
+    subject = clock(1.0)
+    assert subject.wait_s(10.0) is None
+    assert granted(subject, now=50.0) == 1
+    assert subject.pace.lost_s == 0.0
+
+
 def test_only_a_pace_makes_the_clock_look_at_the_time() -> None:
     free = clock()
     granted(free, 0)

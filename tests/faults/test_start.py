@@ -32,9 +32,9 @@ def never(_ready: set[int]) -> bool:
 def test_a_node_that_hangs_before_the_first_tick_is_named_after_the_deadline_of_the_start(
     role: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(supervisor, "_START_DEADLINE_S", 1.5)
     with going(tmp_path, "duration=600", "run.deadline=0.6", start_gate=never) as run:
         stop_when_joined(run, role)
+        monkeypatch.setattr(supervisor, "_START_DEADLINE_S", 1.5)
         with pytest.raises(RunFailed, match=f"The {role} has not answered for 1.5 s .* done is 0 "):
             run.result()
 

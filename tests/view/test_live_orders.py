@@ -12,9 +12,10 @@ def test_commands_of_the_page_reach_the_run_and_what_took_effect_is_told_with_it
     async def play(run, tab, here):
         await stands(run, 500)
         state = await tab.phase("paused")
+        back = "swap unidirectional-inertia acts=in-contact mass=0.01"
         assert await tab.ask("swap", swap={"kind": "damping", "damping": "0.8 N s/m"}, element=0) == (
             True,
-            "element 0 becomes damping at tick 500 (0.5 s)",
+            f"element 0 becomes damping at tick 500 (0.5 s); to go back: {back}",
         )
         assert (await tab.ask("set", set={"wall.stiffness": 200, "clock.round_trip_delay": "1 ms"}))[0]
         assert (await tab.ask("step", ticks=7))[0]
@@ -70,7 +71,7 @@ REFUSED = [
     ("swap", {"surprise": 1}, "cannot be used"),
     ("set", {"set": {"wall.stiffness": -1}}, "wall.stiffness"),
     ("set", {"set": {"clock.round_trip_delay": 0.00015}}, "whole number"),
-    ("step", {"ticks": 0}, "at least one tick"),
+    ("step", {"ticks": 0}, "whole number of ticks"),
     ("pace", {"pace": -1}, "pace"),
     ("pace", {"pace": 10**30}, "cannot be used"),
     ("pause", {"verb": "stop"}, "cannot be used"),

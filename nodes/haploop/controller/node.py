@@ -12,8 +12,8 @@ from haploop.controller.dissipation import ElementError, PluginError, registry
 from haploop.protocol.changes import is_change, refusals_as_status
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import BlockLength, Timebase
-from haploop.protocol.transport.clock_client import ClockClient
-from haploop.protocol.transport.loop import ControllerEnd
+from haploop.protocol.transport.clock_client import REPORT_MS, ClockClient
+from haploop.protocol.transport.loop import IDLE_MS, ControllerEnd
 from haploop.protocol.transport.machine import machine_of
 from haploop.protocol.transport.messages import PROCESSES
 from haploop.protocol.transport.node import NodeError, run_node
@@ -39,9 +39,9 @@ class ControllerNode:
         self._controller = Controller(scene, Timebase(**welcome["timebase"]), kinds)
         mark_ticks(lambda: self._controller.tick)
         self._block = BlockLength(scene.run.block_ticks, machine_of(context).now)
-        self._reported = 0
+        self._reported = self._idle_ms = 0
         self._secret = told["secret"]
-        self._loop = ControllerEnd(context, welcome["endpoints"]["plant"]["loop"], lambda: self._wait("plant"))
+        self._loop = ControllerEnd(context, welcome["endpoints"]["plant"]["loop"], self._idle)
 
     def _state(self) -> tuple[int, Message]:
         return self._controller.tick, {"history": self._controller.recorder.history}
@@ -67,7 +67,8 @@ class ControllerNode:
             except ElementError:
                 self._flush()
                 raise
-            if end - self._reported >= self._block.ticks or end >= client.until:
+            held = end - self._reported
+            if held >= self._block.ticks or (end >= client.until and self._block.is_worth_it(held)):
                 self._flush()
                 client.poll()
         self._flush()
@@ -87,11 +88,18 @@ class ControllerNode:
         self._block.next()
 
     def _wait(self, on: str) -> None:
-        """Says that nothing came for a while, and serves whoever subscribes to a loop that stands still."""
         self._client.waiting(self._controller.tick, on)
         self._client.poll()
-        if self._controller.recorder.is_empty:
-            self._publisher.serve()
+
+    def _idle(self) -> None:
+        """Tells what was held back, says now and then that no sample comes, and serves whoever subscribes meanwhile."""
+        if self._controller.tick > self._reported:
+            self._flush()
+        self._idle_ms += IDLE_MS
+        if self._idle_ms >= REPORT_MS:
+            self._idle_ms = 0
+            self._wait("plant")
+        self._publisher.serve()
 
 
 def work(client: ClockClient, context: zmq.Context[zmq.Socket[bytes]], directory: Path) -> tuple[int, Message]:

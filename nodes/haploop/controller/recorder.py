@@ -49,10 +49,6 @@ class Recorder:
         self._rows: list[float] = []
         self.add = self._rows.extend
 
-    @property
-    def is_empty(self) -> bool:
-        return not self._rows and not self._cut
-
     def cover(self, ticks: int) -> None:
         """Keeps a history of at least so many ticks from now on."""
         self._history_ticks = max(self._history_ticks, ticks)

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 # A summary as summary.json holds it, or an entry of it.
 Summary = dict[str, Any]
 # Entries that differ between two runs of the same scene.
-OF_THE_MACHINE = ("wall_s", "real_time_factor", "versions")
+OF_THE_MACHINE = ("wall_s", "real_time_factor", "lateness", "versions")
 # Runs of processes that are longer, in simulated seconds, are not gone through again for their verdict.
 REPEATED_S = 60.0
 _FINITE = (str, int, bool)

@@ -8,7 +8,7 @@ import zmq
 
 from haploop.plant.plant import Plant
 from haploop.protocol.scene.scene import Scene
-from haploop.protocol.ticks import BlockLength, Timebase
+from haploop.protocol.ticks import HELD_S, BlockLength, Timebase
 from haploop.protocol.transport.clock_client import ClockClient
 from haploop.protocol.transport.loop import PlantEnd
 from haploop.protocol.transport.machine import machine_of
@@ -35,6 +35,7 @@ class PlantNode:
         scene = Scene.from_dict(welcome["scene"])
         self._plant = Plant(scene, Timebase(**welcome["timebase"]))
         self._block = BlockLength(scene.run.block_ticks, machine_of(context).now)
+        self._flushed = 0
         self._secret = welcome["context"]["secret"]
 
     def _state(self) -> tuple[int, Message]:
@@ -52,12 +53,18 @@ class PlantNode:
         while plant.stop_reason is None and not (client.last and plant.tick >= client.until):
             for tick, event in client.take_events():
                 plant.schedule(tick, event)
-            plant.run_until(min(plant.tick + self._block.ticks, client.until), self._loop.exchange)
-            self._flush()
+            plant.run_until(min(self._flushed + self._block.ticks, client.until), self._loop.exchange)
+            if self._block.is_worth_it(plant.reached - self._flushed):
+                self._flush()
+            else:
+                client.progress(plant.reached)
             client.poll()
             while plant.tick >= client.until and not client.last and plant.stop_reason is None:
-                client.wait(plant.tick)
-                self._publisher.serve()
+                if plant.reached == self._flushed:
+                    client.wait(plant.tick)
+                    self._publisher.serve()
+                elif not client.hears(int(HELD_S * 1000)):
+                    self._flush()
         return self._end()
 
     def _end(self) -> tuple[int, Message]:
@@ -74,7 +81,8 @@ class PlantNode:
         if ticks:
             self._publisher.publish("PLANT_BLOCK", first, ticks, columns)
         self._publisher.serve()
-        self._client.progress(self._plant.reached)
+        self._flushed = self._plant.reached
+        self._client.progress(self._flushed)
         self._block.next()
 
     def _wait(self, on: str) -> None:

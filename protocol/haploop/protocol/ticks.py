@@ -144,6 +144,8 @@ def too_long(name: str, delay_s: float, control_rate: int) -> list[str]:
 
 # A block that takes no longer than this is never far behind what a viewer shows or a killed run leaves in its log.
 AT_MOST_S = 0.1
+# A shorter block is not worth its messages: where time is granted tick by tick, so much of it makes a block.
+HELD_S = 0.01
 _FIRST_TICKS = 100
 
 
@@ -158,6 +160,10 @@ class BlockLength:
         self.ticks = min(most_ticks, _FIRST_TICKS)
         self._wall_clock = wall_clock
         self._began = wall_clock()
+
+    def is_worth_it(self, ticks: int) -> bool:
+        """Tells whether so many ticks make a block: it is full, or has taken ``HELD_S``."""
+        return ticks >= self.ticks or self._wall_clock() - self._began >= HELD_S
 
     def next(self) -> None:
         """Ends a block; doubles the length after a fast one, halves it after a slow one."""

@@ -58,7 +58,7 @@ class Clock:
         self._most_changes = len(scene.event) + MOST_CHANGES
         self._pauses = [tick for tick, event in self.events if event.get("pause")]
         self.pace = Pace(time.control_rate, pace)
-        self._held = False
+        self._held = True
         self._ahead: deque[int] = deque()
 
     # Time

@@ -91,6 +91,8 @@ class Pace:
 
     def wait_s(self, until: int, now: float) -> float:
         """Returns the time in s until the next grant is due."""
+        if not self._from:
+            return 0.0
         return max(0.0, self._due(until, now) + (self._least - 1) * self._period_s - now)
 
     def done(self, tick: int, now: float) -> None:

@@ -21,7 +21,7 @@ from haploop.launch.processes.shown_prints import PRINTS, ShownPrints
 from haploop.launch.spec import RunFailed, RunSpec
 from haploop.protocol.changes import Event
 from haploop.protocol.ticks import Timebase
-from haploop.protocol.transport.machine import machine_of
+from haploop.protocol.transport.machine import Machine, machine_of
 from haploop.protocol.transport.sockets import SecureContext, Transport
 from haploop.protocol.transport.wire import Message
 
@@ -62,6 +62,16 @@ def run_processes(
     with interrupts(usual_from=3) as received, private_directory.made() as sockets:
         supervisor = Supervisor(spec, sockets, received, make_context(spec.transport), start_nodes)
         return supervisor.run(), supervisor.events
+
+
+def _with_lateness(summary: Summary, lateness: Message, out: Path, machine: Machine) -> Summary:
+    """Puts into the summary of a run, on disk, too, how late its ticks were; leaves that of a run without a pace."""
+    if lateness:
+        from haploop.logger.session import write_summary
+
+        summary = summary | {"lateness": lateness}
+        write_summary(summary, out, machine)
+    return summary
 
 
 class Supervisor:
@@ -110,7 +120,8 @@ class Supervisor:
             self._spec.on_started(self._sockets.name + address)
             self._lead()
             failed = False
-            return self._server.results["logger"]
+            summary = self._server.results["logger"]
+            return _with_lateness(summary, self._clock.pace.lateness(), self._spec.out, self._machine)
         except RunFailed as error:
             self._save(str(error))
             raise

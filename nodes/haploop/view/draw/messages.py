@@ -102,6 +102,7 @@ def state(session: RunSession) -> Message:
         "plant_rate": time.plant_rate,
         "pace": status.get("pace"),
         "real_time_factor": session.real_time_factor,
+        "lateness": (summary or status).get("lateness") or None,
         "nodes": [] if session.outcome else status.get("nodes", []),
         "skipped_ticks": session.skipped_ticks,
         "first_s": (history.first_tick or 0) / time.control_rate,

@@ -69,14 +69,18 @@ class ClockClient:
         while has_message(self.socket):
             self._receive()
 
-    def wait(self, tick: int) -> bool:
-        """Waits for a message of the clock; after 0.2 s without one, reports WAITING and returns False."""
-        if self.socket.poll(REPORT_MS):
-            self._receive()
-            self.poll()
-            return True
-        self.waiting(tick, "clock")
-        return False
+    def hears(self, most_ms: int) -> bool:
+        """Waits for a message of the clock, and takes all there are; returns False when none came in time."""
+        if not self.socket.poll(most_ms):
+            return False
+        self._receive()
+        self.poll()
+        return True
+
+    def wait(self, tick: int) -> None:
+        """Waits for a message of the clock; after 0.2 s without one, reports WAITING."""
+        if not self.hears(REPORT_MS):
+            self.waiting(tick, "clock")
 
     def _receive(self) -> Frame | None:
         try:

@@ -17,6 +17,9 @@ _COMMANDS = MESSAGES["COMMANDS"].code
 _SAMPLES = MESSAGES["SAMPLES"].code
 _LAST = MESSAGES["LAST"].code
 
+# So often a controller that gets no samples sees to what else it has to do.
+IDLE_MS = 20
+
 Idle = Callable[[], None]
 
 
@@ -101,13 +104,13 @@ class PlantEnd:
 class ControllerEnd:
     """The controller's end of the connection: a DEALER that knows only the plant.
 
-    ``idle`` is called now and then while samples are awaited.
+    ``idle`` is called every 20 ms while samples are awaited.
     """
 
     def __init__(self, context: zmq.Context[zmq.Socket[bytes]], address: str, idle: Idle) -> None:
         self._idle = idle
         self.socket = open_socket(context, zmq.DEALER)
-        self.socket.setsockopt(zmq.RCVTIMEO, REPORT_MS)
+        self.socket.setsockopt(zmq.RCVTIMEO, IDLE_MS)
         self.socket.connect(address)
         self._pack = msgpack.Packer(autoreset=True, default=float).pack  # an element may give a number of another type
         self._emit = bare_send(self.socket)

@@ -72,7 +72,11 @@ def _key_figures(summary: Summary) -> list[tuple[str, str]]:
     ran = f"{summary['duration_s']:g} s, {summary['ticks']} ticks"
     if summary["wall_s"]:
         ran += f", in {amount(summary['wall_s'], 's')} ({fixed(summary['real_time_factor'])} times real time)"
-    figures = [("ran", ran), ("oscillation", f"{amount(window['oscillation_m'], 'm')} peak to peak at its end")]
+    figures = [
+        ("ran", ran),
+        *_lateness(summary),
+        ("oscillation", f"{amount(window['oscillation_m'], 'm')} peak to peak at its end"),
+    ]
     figures += _stability(summary.get("stability", {}))
     if window["penetration_mean_m"] is not None:
         depth = f"{amount(window['penetration_mean_m'], 'm')} on average"
@@ -83,6 +87,16 @@ def _key_figures(summary: Summary) -> list[tuple[str, str]]:
     if happened := count_losses(summary):
         figures.append(("in all", ", ".join(f"{count} {words}" for words, count in happened.items())))
     return figures
+
+
+def _lateness(of: Summary) -> list[tuple[str, str]]:
+    """Returns how late the ticks of a paced run were; nothing for one without a pace."""
+    if not (late := of.get("lateness")):
+        return []
+    by = ("median_s", "(median)"), ("percent_99_s", "(99 %)"), ("most_s", "at most")
+    words = ", ".join(f"{amount(late[key], 's')} {which}" for key, which in by)
+    lost = f"; {amount(late['lost_s'], 's')} of real time lost" if late["lost_s"] else ""
+    return [("ticks late by", f"{words}; {late['by_a_period']} of {late['ticks']} by more than a period{lost}")]
 
 
 def _books(energy: Summary, control_rate: float) -> Table:
@@ -160,6 +174,8 @@ def status_table(data: Message) -> RenderableType:
         word = seen(status["verdict"])
         looks = f" so far, oscillation {amount(status['oscillation_m'], 'm')} peak to peak"
         parts.append(Text.assemble((word, verdict_style(word)), looks))
+    parts += [Text(f"{words} {late}") for words, late in _lateness(data)]
+    parts += [Text(reason, "yellow") for reason in data.get("refused", {}).values()]
     return Group(*parts, _nodes(data["nodes"], rate))
 
 
