@@ -31,10 +31,10 @@ def test_a_finished_measurement_is_not_made_again(smooth, tmp_path, monkeypatch)
     grids = [grid(smooth, ["exact", "rk4"], [5_000, 10_000])]
     first, again = {}, {}
     for counts in (first, again):
-        with Measurement(grids, tmp_path, 2, 0, exact_reference) as measurement:
-            measurement.errors(count_stages(counts))
-            measurement.times(count_stages(counts))
-            costs = measurement.cost(1e-6)
+        measurement = Measurement(grids, tmp_path, 2, 0, exact_reference)
+        measurement.errors(count_stages(counts))
+        measurement.times(count_stages(counts))
+        costs = measurement.cost(1e-6)
         monkeypatch.setattr(measure, "outcome", None)
         monkeypatch.setattr(times, "loop_us", None)
     assert [stage["made"] for stage in first.values()] == [5, 10, 1]
@@ -60,17 +60,17 @@ def test_what_was_stopped_goes_on_where_it_was_and_gives_a_cost_meanwhile(smooth
     # Nothing is timed here, so that each call stands for one measurement.
     monkeypatch.setattr(times, "loop_us", interrupted)
     monkeypatch.setattr(times, "_warm", lambda *_: None)
-    with Measurement(grids, tmp_path, 3, 0, exact_reference) as measurement:
-        measurement.errors(count_stages({}))
-        with pytest.raises(KeyboardInterrupt):
-            measurement.times(count_stages({}))
-        partial = measurement.cost(1e-6)
+    measurement = Measurement(grids, tmp_path, 3, 0, exact_reference)
+    measurement.errors(count_stages({}))
+    with pytest.raises(KeyboardInterrupt):
+        measurement.times(count_stages({}))
+    partial = measurement.cost(1e-6)
     assert len(partial.scenes[0].points) == 3
     assert partial.scenes[0].advice == ""
     monkeypatch.setattr(times, "loop_us", lambda scene: ((scene == plain or timed.append(scene.clock)) and 1.0) or 1.0)
-    with Measurement(grids, tmp_path, 3, 0, exact_reference) as measurement:
-        measurement.times(count_stages({}))
-        assert measurement.cost(1e-6).scenes[0].advice
+    measurement = Measurement(grids, tmp_path, 3, 0, exact_reference)
+    measurement.times(count_stages({}))
+    assert measurement.cost(1e-6).scenes[0].advice
     assert [timed.count(clock) for clock in set(timed)] == [3, 3, 3]
 
 
@@ -79,9 +79,9 @@ def test_every_round_times_every_candidate_once_in_an_order_of_its_own(smooth, t
     plain = times.yardstick()
     monkeypatch.setattr(times, "loop_us", lambda scene: ((scene == plain or order.append(scene.clock)) and 1.0) or 1.0)
     monkeypatch.setattr(times, "_warm", lambda *_: None)
-    with Measurement([grid(smooth, ["euler"], [1_000, 2_000, 5_000, 10_000])], tmp_path, 5, 0, exact_reference) as made:
-        made.errors(count_stages({}))
-        made.times(count_stages({}))
+    made = Measurement([grid(smooth, ["euler"], [1_000, 2_000, 5_000, 10_000])], tmp_path, 5, 0, exact_reference)
+    made.errors(count_stages({}))
+    made.times(count_stages({}))
     rounds = [tuple(order[i : i + 4]) for i in range(0, 20, 4)]
     assert all(len(set(keys)) == 4 for keys in rounds)
     assert len(set(rounds)) > 1
@@ -90,8 +90,8 @@ def test_every_round_times_every_candidate_once_in_an_order_of_its_own(smooth, t
 def test_another_scene_or_another_source_is_measured_anew(smooth, tmp_path, monkeypatch):
     def made():
         counts = {}
-        with Measurement([grid(smooth, ["euler"], [5_000])], tmp_path, 1, 0, exact_reference) as measurement:
-            measurement.errors(count_stages(counts))
+        measurement = Measurement([grid(smooth, ["euler"], [5_000])], tmp_path, 1, 0, exact_reference)
+        measurement.errors(count_stages(counts))
         return sum(stage["made"] for stage in counts.values())
 
     assert [made(), made()] == [1, 0]
@@ -106,8 +106,8 @@ def test_a_line_cut_off_by_a_kill_is_measured_again(smooth, tmp_path):
 
     def made():
         counts = {}
-        with Measurement(grids, tmp_path, 1, 0, exact_reference) as measurement:
-            measurement.errors(count_stages(counts))
+        measurement = Measurement(grids, tmp_path, 1, 0, exact_reference)
+        measurement.errors(count_stages(counts))
         return sum(stage["made"] for stage in counts.values())
 
     assert made() == 2
@@ -119,26 +119,26 @@ def test_a_line_cut_off_by_a_kill_is_measured_again(smooth, tmp_path):
 
 def test_a_store_passes_over_what_was_cut_off_and_what_is_no_record(tmp_path):
     file = tmp_path / "points.jsonl"
-    with Store(tmp_path) as store:
-        store.add("us", "a", 1.0)
-        store.add("us", "a", 2.0, repeat=2)
+    store = Store(tmp_path)
+    store.add("us", "a", 1.0)
+    store.add("us", "a", 2.0, repeat=2)
     file.write_text(file.read_text() + '{"what": "us"}\n[1]\n{"what": "us", "key": "b", "rep')
-    with Store(tmp_path) as store:
-        assert not store.has("us", "b")
-        store.add("us", "b", None)
-    with Store(tmp_path) as store:
-        assert store.has("us", "b")
-        assert store.all("us", "a", 5) == [1.0, 2.0]
-        assert store.all("us", "a", 2) == [1.0]
+    store = Store(tmp_path)
+    assert not store.has("us", "b")
+    store.add("us", "b", None)
+    store = Store(tmp_path)
+    assert store.has("us", "b")
+    assert store.all("us", "a", 5) == [1.0, 2.0]
+    assert store.all("us", "a", 2) == [1.0]
 
 
 def test_a_failure_has_a_time_and_a_refusal_has_none(smooth, tmp_path):
     """It is let go on far beyond where it failed; one that the check refuses has no time."""
     smooth.write_text(SMOOTH.replace("stiffness = 400.0", "stiffness = 400000.0"))
-    with Measurement([grid(smooth, ["euler"], [1_000, 1_500])], tmp_path, 1, 1, exact_reference) as measurement:
-        measurement.errors(count_stages({}))
-        measurement.times(count_stages({}))
-        points: dict[int, Any] = {p.plant_rate: p for p in measurement.cost(1e-6).scenes[0].points}
+    measurement = Measurement([grid(smooth, ["euler"], [1_000, 1_500])], tmp_path, 1, 1, exact_reference)
+    measurement.errors(count_stages({}))
+    measurement.times(count_stages({}))
+    points: dict[int, Any] = {p.plant_rate: p for p in measurement.cost(1e-6).scenes[0].points}
     assert points[1_000].failure
     assert points[1_000].time.median > 0
     assert points[1_500].time is None
@@ -157,10 +157,10 @@ def test_each_time_is_over_the_yardstick_before_and_after_it(smooth, tmp_path, m
     monkeypatch.setattr(times, "_warm", lambda *_: None)
     plain = times.yardstick()
     monkeypatch.setattr(times, "loop_us", lambda scene: next(clock) * (1.0 if scene == plain else 3.0))
-    with Measurement([grid(smooth, ["euler"], [1_000, 5_000])], tmp_path, 3, 0, exact_reference) as made:
-        made.errors(count_stages({}))
-        made.times(count_stages({}))
-        seen: list[Any] = [point.time for point in made.cost(1e-6).scenes[0].points]
+    made = Measurement([grid(smooth, ["euler"], [1_000, 5_000])], tmp_path, 3, 0, exact_reference)
+    made.errors(count_stages({}))
+    made.times(count_stages({}))
+    seen: list[Any] = [point.time for point in made.cost(1e-6).scenes[0].points]
     assert all((time.low, time.median, time.high) == pytest.approx((3.0, 3.0, 3.0), rel=1e-12) for time in seen)
 
 

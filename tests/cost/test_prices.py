@@ -173,10 +173,10 @@ class Measuring:
         return us
 
     def measure(self, processes_repeats: int = 2) -> list[PriceGroup]:
-        with Store(self.directory) as store:
-            measured = prices.Prices(store, {IN_PROCESS: 3, PROCESSES: processes_repeats})
-            measured.measure(lambda name, count: lambda: None)
-            return measured.groups()
+        store = Store(self.directory)
+        measured = prices.Prices(store, {IN_PROCESS: 3, PROCESSES: processes_repeats})
+        measured.measure(lambda name, count: lambda: None)
+        return measured.groups()
 
 
 @pytest.fixture

@@ -52,16 +52,16 @@ def cost(
         except OSError as error:
             leave(f"The directory {out} cannot be used: {error.strerror}.", WRONG_USE)
         interrupted = False
-        with Measurement(grids, out, repeats, repeats if processes else 0) as measurement:
-            try:
-                with bars() as stage:
-                    measurement.errors(stage)
-                    measurement.times(stage)
-                    if not scenes:
-                        measurement.other_prices.measure(stage)
-            except KeyboardInterrupt:
-                interrupted = True
-            result = measurement.cost(tolerance)
+        measurement = Measurement(grids, out, repeats, repeats if processes else 0)
+        try:
+            with bars() as stage:
+                measurement.errors(stage)
+                measurement.times(stage)
+                if not scenes:
+                    measurement.other_prices.measure(stage)
+        except KeyboardInterrupt:
+            interrupted = True
+        result = measurement.cost(tolerance)
     save(result, out)
     if interrupted:
         leave(f"Stopped; what was measured is in {out}, and the same command takes it up again.", FAILED)

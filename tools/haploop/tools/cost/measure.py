@@ -7,7 +7,6 @@ from collections.abc import Callable
 from dataclasses import asdict, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Self
 
 from pydantic import TypeAdapter
 
@@ -33,7 +32,7 @@ _OUTCOME, _REFERENCE, _ALIKE = "outcome", "reference", "steps alike"
 
 
 class Measurement:
-    """The measurements of some grids, kept in a directory that is there; a context manager.
+    """The measurements of some grids, kept in a directory that is there.
 
     Repeats are of each time in one process, and of the other prices as processes, 0 for not at all. ``find_reference``
     makes or finds what the runs of a scene, given by its file and resolved, are compared with.
@@ -50,13 +49,6 @@ class Measurement:
         self._grids, self._find_reference, self._store = grids, find_reference, Store(out)
         self._repeats = {IN_PROCESS: repeats, PROCESSES: processes_repeats}
         self._errors_made_with, self._times_made_with = errors_made_with(), times_made_with()
-
-    def __enter__(self) -> Self:
-        self._store.__enter__()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._store.__exit__()
 
     def _error_key(self, of: Candidate | Grid) -> str:
         return of.key(*self._errors_made_with)

@@ -17,10 +17,10 @@ import time
 import warnings
 from collections import deque
 from collections.abc import Callable, Hashable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Self, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -48,7 +48,7 @@ _YARDSTICK_S = 1.5
 
 
 class Store:
-    """DIR/points.jsonl: records by (what, key, repeat), a line each, only appended; a context manager.
+    """DIR/points.jsonl: records by (what, key, repeat), a line each, only appended.
 
     A line that was cut off when the program was killed is passed over: its record is measured again.
     """
@@ -56,29 +56,22 @@ class Store:
     def __init__(self, directory: Path) -> None:
         self._path = directory / "points.jsonl"
         self._records: dict[tuple[str, str, int], Any] = {}
-
-    def __enter__(self) -> Self:
         text = self._path.read_text(encoding="utf-8") if self._path.exists() else ""
         for line in text.splitlines():
-            try:
+            with suppress(ValueError, LookupError, TypeError):
                 record = json.loads(line)
                 self._records[record["what"], record["key"], record["repeat"]] = record["value"]
-            except (ValueError, LookupError, TypeError):
-                continue
-        self._file = self._path.open("a", encoding="utf-8")
         if text and not text.endswith("\n"):
-            self._file.write("\n")
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._file.close()
+            self._append("\n")
 
     def add(self, what: str, key: str, value: Any, repeat: int = 0) -> None:
         """Keeps a record, on disk at once."""
         self._records[what, key, repeat] = value
-        record = {"what": what, "key": key, "repeat": repeat, "value": value}
-        self._file.write(json.dumps(record) + "\n")
-        self._file.flush()
+        self._append(json.dumps({"what": what, "key": key, "repeat": repeat, "value": value}) + "\n")
+
+    def _append(self, text: str) -> None:
+        with self._path.open("a", encoding="utf-8") as file:
+            file.write(text)
 
     def get(self, what: str, key: str) -> Any:
         return self._records.get((what, key, 0))

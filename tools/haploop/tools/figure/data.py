@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
@@ -11,7 +10,7 @@ import numpy as np
 
 from haploop.launch.runs.run_files import recorded_log, recorded_scene, recorded_summary
 from haploop.logger.summary import Summary
-from haploop.protocol.changes import Event, changes_of, spans
+from haploop.protocol.changes import Event, Span, changes_of, spans
 from haploop.protocol.scene.scene import ElementTable, Scene, Wall
 
 Floats = np.ndarray
@@ -60,12 +59,12 @@ class History:
         self.into_wall = 1.0 if scene.wall and scene.wall.occupies == "above" else -1.0
         self.elements: list[ElementSpan] = []
         changes = changes_of((int(event.get("tick", 0)), event) for event in events)
-        at_work: list[ElementSpan] = []
         for span in spans(scene, (single for change in changes for single in change.singly())):
             wall = span.scene.wall
             if wall and (not self.walls or self.walls[-1].wall != wall):
                 self.walls.append(WallSpan(span.from_tick, wall))
-            at_work = self._follow(span.scene.dissipation, at_work, span.from_tick)
+            for place, element in enumerate(span.scene.dissipation):
+                self._follow(element, place, span)
         # What was replaced in the tick of its coming has no book.
         self.elements = [span for span in self.elements if span.to_tick > span.from_tick]
         for number, span in enumerate(self.elements):
@@ -73,24 +72,17 @@ class History:
             same = sum(before.element.name == kind for before in self.elements[:number])
             span.name = f"{kind}-{same + 1}" if same else kind
 
-    def _follow(self, elements: tuple[ElementTable, ...], before: list[ElementSpan], tick: int) -> list[ElementSpan]:
-        """Ends the spans of elements that are gone, begins those of new ones, and follows all that change places."""
-        now = []
-        for element in elements:
-            span = next((span for span in before if span.element is element), None)
-            if span is None:
-                span = ElementSpan(element, tick, math.inf, [])
-                self.elements.append(span)
-            now.append(span)
-        for place, span in enumerate(before):
-            if span not in now:
-                span.to_tick = tick
-            if now[place : place + 1] != [span]:
-                span.slots[-1] = (*span.slots[-1][:2], tick)
-        for place, span in enumerate(now):
-            if before[place : place + 1] != [span]:
-                span.slots.append((place, tick, math.inf))
-        return now
+    def _follow(self, element: ElementTable, place: int, span: Span) -> None:
+        """Goes on with an element that was at work up to this span, at this place or another, or begins a new one."""
+        goes_on = (known for known in self.elements if known.element is element and known.to_tick == span.from_tick)
+        found = next(goes_on, None)
+        if found is None:
+            found = ElementSpan(element, span.from_tick, span.to_tick, [])
+            self.elements.append(found)
+        found.to_tick = span.to_tick
+        same = found.slots[-1:] and found.slots[-1][0] == place
+        first = found.slots.pop()[1] if same else span.from_tick
+        found.slots.append((place, first, span.to_tick))
 
 
 @dataclass

@@ -9,6 +9,8 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
+import numpy as np
+
 from haploop.launch.batch.stacking import is_batchable
 from haploop.launch.scene.events import elements_of, try_out
 from haploop.launch.scene.layers import key_path
@@ -94,9 +96,13 @@ class Sweep:
         """From the outermost to the innermost."""
         return tuple(sorted(self.axes, key=lambda axis: not axis.apart))
 
+    @property
+    def _shape(self) -> tuple[int, ...]:
+        return *(len(axis.values) for axis in self.order), self.repeat
+
     @cached_property
     def count(self) -> int:
-        return math.prod(len(axis.values) for axis in self.axes) * self.repeat
+        return math.prod(self._shape)
 
     def groups(self) -> Iterator[Group]:
         """Yields the cells whose scenes go into one array, if they go into any."""
@@ -112,21 +118,16 @@ class Sweep:
 
     def number(self, places: dict[str, int], repeat: int) -> int:
         """Returns the cell at a place on each axis."""
-        cell = 0
-        for axis in self.order:
-            cell = cell * len(axis.values) + places[axis.key]
-        return cell * self.repeat + repeat
+        return int(np.ravel_multi_index((*(places[axis.key] for axis in self.order), repeat), self._shape))
 
     def values(self, item: Item) -> tuple[Values, int]:
         """Returns the value of each axis, by key, and the seed."""
-        cell, repeat = divmod(item.beside if isinstance(item, Extra) else item, self.repeat)
-        found = {}
-        for axis in reversed(self.order):
-            cell, place = divmod(cell, len(axis.values))
-            found[axis.key] = axis.values[place]
+        cell = item.beside if isinstance(item, Extra) else item
+        *places, repeat = np.unravel_index(cell, self._shape)
+        found = {axis.key: axis.values[place] for axis, place in zip(self.order, places, strict=True)}
         if isinstance(item, Extra) and self.bisect:
             found[self.bisect.axis] = item.value
-        return {axis.key: found[axis.key] for axis in self.axes}, self.base.seed + repeat
+        return {axis.key: found[axis.key] for axis in self.axes}, self.base.seed + int(repeat)
 
     def scene(self, item: Item) -> Scene:
         """Returns the resolved scene of a cell; tables that its values leave alone are those of the base.

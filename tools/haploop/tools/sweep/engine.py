@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from itertools import product
+from itertools import pairwise, product
 from typing import Any
 
 from haploop.tools.executor.pool import Group, Pool
@@ -114,14 +114,10 @@ class Engine:
 def _without(groups: Iterable[Group], done: set[int]) -> Iterator[Group]:
     """Yields what is left of the groups, in stretches without a gap."""
     for group in groups:
-        first = group.items[0]
-        for cell in group.items if done else ():
-            if cell in done:
-                if first < cell:
-                    yield Group(range(first, cell), group.together)
-                first = cell + 1
-        if first <= group.items[-1]:
-            yield Group(range(first, group.items[-1] + 1), group.together)
+        ends = [group.items[0] - 1, *(cell for cell in group.items if done and cell in done), group.items[-1] + 1]
+        for before, after in pairwise(ends):
+            if after - before > 1:
+                yield Group(range(before + 1, after), group.together)
 
 
 def _rows_of(sweep: Sweep, others: Sequence[Axis]) -> Iterator[tuple[dict[str, int], int]]:

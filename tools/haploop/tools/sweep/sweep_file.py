@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field, ValidationError
 from pydantic_core import PydanticCustomError
@@ -28,9 +28,6 @@ from haploop.tools.sweep.cells import Axis, Bisect, Sweep
 from haploop.tools.sweep.points import NoSuchKey, PointsError, Span, listed, make_points, number_at
 from haploop.tools.sweep.record import make_columns, usual
 from haploop.tools.sweep.table import Column
-
-if TYPE_CHECKING:
-    pass
 
 MOST_AXES = 3
 Verdict = Literal["steady", "limit-cycle", "diverged", "no-contact"]
