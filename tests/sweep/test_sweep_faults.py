@@ -12,7 +12,7 @@ from pathlib import Path
 import pyarrow.parquet
 import pytest
 
-from haploop.tools.sweep.table import read
+from haploop.tools.sweep.table import TableError, read
 from helpers.live.launched import Launched, alive, processes, wait_for
 from helpers.scenes.sweep_files import PRESS, sweep_file, swept
 
@@ -231,3 +231,20 @@ def test_on_a_dask_cluster_the_table_is_the_same(launched: Callable[..., Launche
     assert {name: column.tolist() for name, column in table.columns.items()} == {
         name: column.tolist() for name, column in whole.columns.items()
     }
+
+
+def test_a_damaged_table_is_refused_and_gives_no_other_number(tmp_path: Path) -> None:
+    """One bit here and there: of numbers, of names and units, and of the sweep's text."""
+    out = tmp_path / "out"
+    whole = swept(tmp_path, '[axes]\n"wall.stiffness" = [100, 200, 300]\n', out=out)
+    for name in ("table.parquet", "sweep.toml"):
+        content = (out / name).read_bytes()
+        for at in range(0, len(content), 61):
+            (out / name).write_bytes(content[:at] + bytes([content[at] ^ 1 << at % 8]) + content[at + 1 :])
+            try:
+                found = read(out)
+            except TableError:
+                continue
+            assert (found.units, found.sweep, list(found.columns)) == (whole.units, whole.sweep, list(whole.columns))
+            assert all([*map(str, found[key])] == [*map(str, whole[key])] for key in whole.columns)
+        (out / name).write_bytes(content)

@@ -109,6 +109,8 @@ class DamagedRuns:
         if name == "csv":
             for file, lines in given.items():
                 names, *rows = lines
+                if not rows:
+                    continue
                 if file not in whole or not set(names.split(",")) <= set(whole[file][0].split(",")):
                     return f"new columns in {file}"
                 if names == whole[file][0] and rows != whole[file][1 : len(lines)]:

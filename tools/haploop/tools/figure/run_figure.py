@@ -97,7 +97,7 @@ def key_numbers(run: RunData) -> list[str]:
         displayed, wanted = window["displayed_stiffness_N_m"], run.history.walls[-1].wall.stiffness
         words += [f"displayed stiffness {spring(displayed)} of {spring(wanted)}"] if displayed is not None else []
     words.append(f"residual {amount(energy['residual_J'], 'J')} of {amount(energy['moved_J'], 'J')} moved")
-    return words
+    return words + [f"of a damaged log: {last - first:g} s"] * bool(run.cut)
 
 
 def _draw_books(ax: Axes, run: RunData, books: list[Book], colours: dict[str, str]) -> None:

@@ -104,8 +104,10 @@ def write_figure(figure: Figure, target: Path) -> Path:
     """Writes a figure in the format of the file's suffix; returns the file. FigureError where it cannot be written."""
     try:
         figure.savefig(target, dpi=_DPI)
-    except (ValueError, OSError) as error:
+    except ValueError as error:  # which names the formats there are
         raise FigureError(f"The figure {target} cannot be written: {error}.") from error
+    except OSError as error:
+        raise FigureError(f"The figure {target} cannot be written: {error.strerror}.") from error
     return target
 
 

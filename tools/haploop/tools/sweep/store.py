@@ -11,7 +11,18 @@ from pathlib import Path
 from typing import Any, Self
 
 from haploop.launch.spec import OutputError
-from haploop.tools.sweep.table import BOUNDARY, CELL, PARTS, TABLE, Row, make_table, pyarrow
+from haploop.tools.sweep.table import (
+    BOUNDARY,
+    CELL,
+    PARTS,
+    TABLE,
+    Row,
+    TableError,
+    make_table,
+    pyarrow,
+    read_part,
+    write_table,
+)
 
 LOCK = ".lock"
 # The parts that a sweep writes, by their first cell; nothing else is ever removed.
@@ -33,6 +44,7 @@ class Store:
 
     def __init__(self, directory: Path, schema: Any) -> None:
         self.directory, self._schema = directory, schema
+        self._sweep = schema.metadata[b"sweep"].decode()
         self._parts = directory / PARTS
         self.rows = 0
 
@@ -60,11 +72,11 @@ class Store:
 
     def done(self, columns: Sequence[str] = (CELL,)) -> list[Row]:
         """Returns some columns of all rows that are stored; a part that cannot be read is given up, to be run again."""
-        arrow, rows = pyarrow(), []
+        rows = []
         for file in self._files():
             try:
-                rows += arrow.parquet.read_table(file, columns=list(columns)).to_pylist()
-            except (OSError, ValueError):
+                rows += read_part(file, self._sweep).select(list(columns)).to_pylist()
+            except (TableError, KeyError):
                 file.unlink()
         self.rows = len(rows)
         return rows
@@ -72,16 +84,16 @@ class Store:
     def add(self, rows: Sequence[Row]) -> None:
         """Keeps the rows of a part that is done; raises StoreError where they cannot be written."""
         path = self._parts / f"{rows[0][CELL]:012d}.parquet"
-        self._write(path, lambda file: pyarrow().parquet.write_table(make_table(rows, self._schema), file))
+        self._write(path, lambda file: write_table(make_table(rows, self._schema), file))
         self.rows += len(rows)
 
     def finish(self, boundaries: Any = None) -> None:
         """Merges all parts into the table, in the order of the cells; writes the table of the boundaries, if any."""
         if boundaries is not None:
-            self._write(self.directory / BOUNDARY, lambda file: pyarrow().parquet.write_table(boundaries, file))
+            self._write(self.directory / BOUNDARY, lambda file: write_table(boundaries, file))
         temporary = self.directory / f"{TABLE}.part"
         with self._safely(temporary):
-            with pyarrow().parquet.ParquetWriter(temporary, self._schema) as writer:
+            with pyarrow().parquet.ParquetWriter(temporary, self._schema, write_page_checksum=True) as writer:
                 for table in self._in_order():
                     writer.write_table(table)
             temporary.replace(self.directory / TABLE)
@@ -98,8 +110,7 @@ class Store:
             if int(file.stem) > last and sum(map(len, held)) >= _GROUP_ROWS:
                 yield arrow.concat_tables(held).sort_by(CELL)
                 held = []
-            # Threads and read-ahead would keep memory of their own for every file.
-            held.append(arrow.parquet.ParquetFile(file).read(use_threads=False))
+            held.append(read_part(file, self._sweep))
             last = max(last, held[-1][CELL][-1].as_py())
         if held:
             yield arrow.concat_tables(held).sort_by(CELL)

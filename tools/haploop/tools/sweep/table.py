@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import tomllib
+import zlib
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from haploop.logger.summary import versions
+from haploop.protocol.files import demand_regular, read_text
 
 # What stands in every table beside the axes and what is recorded.
 CELL, SEED, ENDED, WHY, SCENE = "cell", "seed", "ended", "why", "scene"
@@ -55,7 +57,22 @@ def make_schema(columns: Iterable[Column], sweep: str) -> Any:
     for column in columns:
         unit = {"unit": column.unit} if column.unit else None
         fields.append(arrow.field(column.name, arrow.type_for_alias(column.kind), metadata=unit))
-    return arrow.schema(fields, metadata={"sweep": sweep, "versions": json.dumps(versions())})
+    schema = arrow.schema(fields, metadata={"sweep": sweep, "versions": json.dumps(versions())})
+    return schema.with_metadata({**schema.metadata, _CHECKSUM: _checksum(schema)})
+
+
+# Key of the metadata: CRC-32 of what says which numbers a table holds; those have checksums of their own.
+_CHECKSUM = b"checksum"
+
+
+def _checksum(schema: Any) -> bytes:
+    fields = [(field.name, str(field.type), (field.metadata or {}).get(b"unit")) for field in schema]
+    return b"%08x" % zlib.crc32(repr((fields, schema.metadata.get(b"sweep"))).encode())
+
+
+def write_table(table: Any, file: Any) -> None:
+    """Writes a table as Parquet, with checksums."""
+    pyarrow().parquet.write_table(table, file, write_page_checksum=True)
 
 
 def make_table(rows: Sequence[Row], schema: Any) -> Any:
@@ -114,20 +131,44 @@ def read(directory: str | Path) -> SweepTable:
     """
     directory, arrow = Path(directory), pyarrow()
     try:
-        sweep = tomllib.loads((directory / SWEEP).read_text(encoding="utf-8"))
-        finished = (directory / TABLE).exists()
-        files = [directory / TABLE] if finished else sorted((directory / PARTS).glob("*.parquet"))
-        tables = [arrow.parquet.read_table(file) for file in files]
-        boundary = directory / BOUNDARY
-        boundaries = _columns(arrow.parquet.read_table(boundary)) if finished and boundary.exists() else {}
-    except (OSError, ValueError) as error:
-        raise TableError(f"{directory} holds no sweep that can be read: {error}") from error
+        text = read_text(directory / SWEEP)
+        sweep = tomllib.loads(text)
+    except OSError as error:
+        raise TableError(f"{directory} holds no sweep that can be read: {SWEEP}: {error.strerror}.") from error
+    except (ValueError, RecursionError) as error:
+        raise TableError(f"{directory / SWEEP} is damaged: it is no TOML.") from error
+    finished, boundary = (directory / TABLE).exists(), directory / BOUNDARY
+    files = [directory / TABLE] if finished else sorted((directory / PARTS).glob("*.parquet"))
+    tables = [read_part(file, text) for file in files]
+    boundaries = _columns(read_part(boundary, text)) if finished and boundary.exists() else {}
     if not tables:
         raise TableError(f"The sweep in {directory} has no finished cell yet.")
     whole = arrow.concat_tables(tables).sort_by(CELL)
     described = [field for field in whole.schema if b"unit" in (field.metadata or {})]
     units = {field.name: field.metadata[b"unit"].decode() for field in described}
     return SweepTable(_columns(whole), units, sweep, boundaries, finished)
+
+
+def read_part(path: Path, sweep: str) -> Any:
+    """Reads a Parquet file of a sweep, whose text it holds; TableError where it is damaged or of another one."""
+    arrow, why = pyarrow(), "it is none that haploop wrote"
+    try:
+        demand_regular(path)
+        # Threads and read-ahead would keep memory of their own for every file.
+        file = arrow.parquet.ParquetFile(path, page_checksum_verification=True)
+        table = file.read(use_threads=False)
+        held = table.schema.metadata or {}
+        if held.get(_CHECKSUM) not in (None, _checksum(table.schema)):
+            why = "its columns do not match their checksum"
+        elif held.get(b"sweep", b"").decode() != sweep:
+            why = f"it is that of another sweep than {SWEEP} beside it"
+        else:
+            return table
+    except OSError as error:
+        why = error.strerror or "it is damaged"
+    except (ValueError, TypeError, ArithmeticError, LookupError) as error:  # what pyarrow raises
+        raise TableError(f"{path} cannot be read: it is damaged.") from error
+    raise TableError(f"{path} cannot be read: {why}.")
 
 
 def _columns(table: Any) -> dict[str, np.ndarray]:
