@@ -1,7 +1,6 @@
 """The page of a real run: it shows what was logged, what it asks for is done or refused, and the run does not mind."""
 
 import asyncio
-import json
 import os
 import signal
 import threading
@@ -12,6 +11,7 @@ import pytest
 from haploop.launch.spec import RunFailed
 from haploop.launch.stability.decide import Finding
 from haploop.logger import read
+from haploop.logger.summary import read as read_summary
 from haploop.tools.cli.view import LiveRuns
 from haploop.view.receive.run_session import RunSession
 from helpers.live.browsing import site, to_its_end
@@ -121,7 +121,7 @@ def test_the_end_is_told_with_the_summary_and_what_was_seen_can_still_be_looked_
         await tab.phase("paused")
         await tab.ask("resume")
         state = await tab.phase("ended")
-        summary = json.loads((tmp_path / "out" / "summary.json").read_text())
+        summary = read_summary(tmp_path / "out" / "summary.json")
         assert state["summary"] == summary
         assert (state["verdict"], state["verdict_rule"]) == (summary["verdict"], summary["verdict_rule"])
         assert state["residual_J"] == summary["energy"]["residual_J"]

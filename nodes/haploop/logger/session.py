@@ -4,17 +4,16 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from haploop.logger.log import LogError
 from haploop.logger.log.channels import Channels
 from haploop.logger.log.recording import MemoryLog
 from haploop.logger.log.writer import Log
 from haploop.logger.logger import Logger
-from haploop.logger.summary import Summary, finite, write
+from haploop.logger.summary import Summary, finite, write_summary
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
 from haploop.protocol.transport.machine import MACHINE, Machine
 
-LOG, SUMMARY = "log.mcap", "summary.json"
+LOG = "log.mcap"
 # The log is at most this far behind on disk, in wall time.
 _FLUSH_S = 0.4
 
@@ -43,14 +42,6 @@ class LogSession:
         if self._out:
             write_summary(summary, self._out, self._machine)
         return summary
-
-
-def write_summary(summary: Summary, out: Path, machine: Machine = MACHINE) -> None:
-    """Writes the summary into the directory of its run; LogError where that fails."""
-    try:
-        write(summary, out / SUMMARY, machine)
-    except OSError as error:
-        raise LogError(f"The summary {out / SUMMARY} could not be written: {error.strerror}.") from error
 
 
 def open_session(

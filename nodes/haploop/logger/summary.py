@@ -22,6 +22,7 @@ from haploop.protocol.transport.machine import MACHINE, Machine
 if TYPE_CHECKING:
     from haploop.controller.active_elements import Description
 
+SUMMARY = "summary.json"
 # A summary as summary.json holds it, or an entry of it.
 Summary = dict[str, Any]
 # Entries that differ between two runs of the same scene.
@@ -170,6 +171,14 @@ def misfit(found: Any, expected: Any, at: str = "") -> str:
     else:
         return "" if isinstance(found, expected) else at
     return next((key for value, one, name in inner if (key := misfit(value, one, f"{at}.{name}".lstrip(".")))), "")
+
+
+def write_summary(summary: Summary, out: Path, machine: Machine = MACHINE) -> None:
+    """Writes the summary into the directory of its run; LogError where that fails."""
+    try:
+        write(summary, out / SUMMARY, machine)
+    except OSError as error:
+        raise LogError(f"The summary {out / SUMMARY} could not be written: {error.strerror}.") from error
 
 
 def finite(value: Any) -> Any:

@@ -15,8 +15,7 @@ from haploop.launch.scene.mistakes import Mistake, SceneError
 from haploop.launch.spec import SCENE
 from haploop.logger.log import LogError
 from haploop.logger.log.recording import Recording, Table
-from haploop.logger.session import SUMMARY
-from haploop.logger.summary import Summary, misfit, read
+from haploop.logger.summary import SUMMARY, Summary, misfit, read
 from haploop.protocol.quantity import Quantity
 from haploop.protocol.scene.scene import NO_ELEMENT, Scene
 from haploop.protocol.scene.table import Tables

@@ -113,8 +113,7 @@ def _judged(spec: RunSpec, summary: Summary, events: list[tuple[int, Event]]) ->
     """
     if spec.scene.run.verdict == "window":
         return summary
-    from haploop.logger.session import write_summary
-    from haploop.logger.summary import REPEATED_S
+    from haploop.logger.summary import REPEATED_S, write_summary
 
     if summary["duration_s"] > REPEATED_S:
         summary["verdict_rule"] = f"{_NOT_REPEATED.format(REPEATED_S)} {summary['verdict_rule']}"

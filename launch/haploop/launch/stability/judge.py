@@ -26,8 +26,7 @@ from haploop.launch.stability.looks import (
     watch_times,
 )
 from haploop.launch.stability.still_hand import End, StillHand, hold_of
-from haploop.logger.session import write_summary
-from haploop.logger.summary import Summary, finite
+from haploop.logger.summary import Summary, finite, write_summary
 from haploop.plant.plant import Plant
 from haploop.protocol.changes import Event, is_change
 from haploop.protocol.scene.scene import Scene
@@ -103,13 +102,14 @@ def with_verdict(scene: Scene, summary: Summary, find: Callable[[], Finding], ou
     """Returns the summary of a run with the verdict that its scene asks for, and writes it into the run's directory.
 
     Args:
-        find: returns what is found of the end of the run; not called for one that failed or diverged.
+        find: returns what is found of the end of the run; not called where it failed, diverged, or kept off the wall.
 
     Raises:
         LogError: it could not be written.
     """
     if is_watched(scene, summary):
-        finding = find()
+        untouched = summary["verdict"] == "no-contact"
+        finding = Finding("no-contact", "no contact") if untouched else find()
     elif scene.run.verdict == "pushed" and summary["ended"] == "diverged":
         finding = Finding("diverged", "diverged", detail=summary["why"])
     else:

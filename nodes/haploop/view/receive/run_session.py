@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import contextlib
-import json
 import time as wall_clock
 from collections import deque
 from pathlib import Path
 
 import zmq
 
-from haploop.logger.summary import Summary, awaits_verdict
+from haploop.logger.log import LogError
+from haploop.logger.summary import SUMMARY, Summary, awaits_verdict, read
 from haploop.protocol.changes import Event, at_work, changes_of
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import DELAY, Timebase
@@ -126,8 +126,8 @@ class RunSession:
 
     def read_summary(self) -> None:
         """Reads the run's summary if it is there; a run that failed may still be writing it."""
-        with contextlib.suppress(OSError, ValueError):
-            self.summary = summary = json.loads((self.out / "summary.json").read_text(encoding="utf-8"))
+        with contextlib.suppress(LogError):
+            self.summary = summary = read(self.out / SUMMARY)
             self.outcome = "failed" if summary.get("ended") == "failed" else self.outcome
             self.why = self.why or summary.get("why", "")
 

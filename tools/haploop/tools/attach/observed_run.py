@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -10,7 +9,8 @@ from typing import Self
 
 from haploop.launch.processes import run_directory
 from haploop.launch.processes.run_directory import LiveRun, RunNotFound
-from haploop.logger.summary import Summary
+from haploop.logger.log import LogError
+from haploop.logger.summary import SUMMARY, Summary, read
 from haploop.protocol.transport.clock_client import Aborted, Refused
 from haploop.protocol.transport.messages import PROCESSES
 from haploop.protocol.transport.observer import Observer
@@ -131,6 +131,6 @@ class ObservedRun:
 def read_summary(welcome: Message) -> Summary | None:
     """Returns the summary that a run has written; None where there is none, or it is on another machine."""
     try:
-        return json.loads((Path(welcome["context"]["out"]) / "summary.json").read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        return read(Path(welcome["context"]["out"]) / SUMMARY)
+    except LogError:
         return None
