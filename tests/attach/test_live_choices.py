@@ -24,7 +24,7 @@ def test_options_name_every_key_that_can_be_set_with_unit_bounds_and_present_val
     assert settable["wall.stiffness"]["unit"] == "N/m"
     assert settable["wall.stiffness"]["value"] == 150.0
     assert settable["clock.round_trip_delay"] == {
-        "unit": "s", "at_least": 0, "above": None, "at_most": None, "below": None, "value": 0.002,
+        "unit": "s", "at_least": 0, "above": None, "at_most": 10.0, "below": None, "value": 0.002,
     }  # fmt: skip
     assert settable["dissipation.0.damping"]["value"] == 0.5
     assert set(data["kinds"]) == set(KINDS)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import struct
+import tracemalloc
 import zlib
 from pathlib import Path
 from typing import Any
@@ -158,6 +159,31 @@ def test_a_chunk_is_closed_once_its_messages_pass_a_megabyte(tmp_path: Path) -> 
     sizes = [chunk.uncompressed_size for chunk in summary.chunk_indexes]
     assert len(sizes) > 2
     assert all(1 << 20 <= size < (1 << 20) + 20_000 for size in sizes[:-1])
+
+
+def test_of_a_chunk_that_is_written_the_log_keeps_less_than_two_hundred_bytes(tmp_path: Path) -> None:
+    """Of the objects that describe a chunk in the summary it would be ten times as much."""
+    with Log(tmp_path / "log.mcap") as log:
+        channels = [log.channel(f"/{name}", {"x": "m"}, title=name) for name in "abc"]
+
+        def write_chunks(first: int, count: int) -> int:
+            for number in range(first, first + count):
+                for channel in channels:
+                    log.write(channel, np.array([number]), np.zeros((1, 1)))
+                log.flush()
+            return tracemalloc.get_traced_memory()[0]
+
+        tracemalloc.start()
+        before = write_chunks(0, 200)
+        after = write_chunks(200, 1000)
+        tracemalloc.stop()
+    assert after - before < 200 * 1000
+    with (tmp_path / "log.mcap").open("rb") as file:
+        summary = make_reader(file).get_summary()
+    assert summary
+    assert summary.statistics
+    assert len(summary.chunk_indexes) == summary.statistics.chunk_count == 1200
+    assert (summary.statistics.message_start_time, summary.statistics.message_end_time) == (0, 1199)
 
 
 def test_the_footer_leads_to_the_summary_and_its_groups_and_checks_them(tmp_path: Path) -> None:

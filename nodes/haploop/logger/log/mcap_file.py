@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import contextlib
 import zlib
-from collections.abc import Sequence
 from pathlib import Path
 from typing import NoReturn
 
@@ -29,7 +28,7 @@ class McapFile:
 
     Attributes:
         size: bytes of the pieces written.
-        schemas, channels, chunks, attachments, message_counts: what its summary will tell of it.
+        schemas, channels, attachments, message_counts: what its summary will tell of it.
     """
 
     def __init__(self, path: str | Path, machine: Machine = MACHINE) -> None:
@@ -39,7 +38,8 @@ class McapFile:
         self._crc = 0
         self.schemas: list[mcap.Schema] = []
         self.channels: list[mcap.Channel] = []
-        self.chunks: list[mcap.ChunkIndex] = []
+        self._chunk_indexes, self._chunks = bytearray(), 0
+        self._times: tuple[int, int] | None = None
         self.attachments: list[mcap.AttachmentIndex] = []
         self.message_counts: dict[int, int] = {}
         self._failure: LogError | None = None
@@ -51,6 +51,14 @@ class McapFile:
                 f"The log {self.path} cannot be made ({error.strerror}); name a directory that exists and is writable."
             ) from error
         self.append(MAGIC + bytes_of(mcap.Header(profile="", library=LIBRARY)))
+
+    def append_chunk(self, piece: bytes, index: mcap.ChunkIndex) -> None:
+        """Appends a chunk. Its entry of the summary is kept as bytes, some 130 a chunk: all that grows with a log."""
+        self.append(piece)
+        self._chunk_indexes += bytes_of(index)
+        self._chunks += 1
+        first, last = self._times or (index.message_start_time, 0)
+        self._times = min(first, index.message_start_time), max(last, index.message_end_time)
 
     def append(self, piece: bytes) -> None:
         """Hands a piece to the operating system.
@@ -95,27 +103,28 @@ class McapFile:
         """Ends the file, from the DataEnd record on; raises LogError as ``append`` does."""
         data_end = bytes_of(mcap.DataEnd(data_section_crc=self._crc))
         start = self.size + len(data_end)
+        first, last = self._times or (0, 0)
         statistics = mcap.Statistics(
             attachment_count=len(self.attachments),
             channel_count=len(self.channels),
             channel_message_counts=self.message_counts,
-            chunk_count=len(self.chunks),
+            chunk_count=self._chunks,
             message_count=sum(self.message_counts.values()),
-            message_end_time=max((chunk.message_end_time for chunk in self.chunks), default=0),
-            message_start_time=min((chunk.message_start_time for chunk in self.chunks), default=0),
+            message_end_time=last,
+            message_start_time=first,
             metadata_count=0,
             schema_count=len(self.schemas),
         )
-        groups: dict[Opcode, Sequence[mcap.McapRecord]] = {
-            Opcode.SCHEMA: self.schemas,
-            Opcode.CHANNEL: self.channels,
-            Opcode.STATISTICS: [statistics],
-            Opcode.CHUNK_INDEX: self.chunks,
-            Opcode.ATTACHMENT_INDEX: self.attachments,
+        groups: dict[Opcode, bytes | bytearray] = {
+            Opcode.SCHEMA: bytes_of(*self.schemas),
+            Opcode.CHANNEL: bytes_of(*self.channels),
+            Opcode.STATISTICS: bytes_of(statistics),
+            Opcode.CHUNK_INDEX: self._chunk_indexes,
+            Opcode.ATTACHMENT_INDEX: bytes_of(*self.attachments),
         }
         covered, offsets = b"", []
-        for opcode, records in groups.items():
-            if group := bytes_of(*records):
+        for opcode, group in groups.items():
+            if group:
                 offsets.append(mcap.SummaryOffset(opcode, start + len(covered), len(group)))
             covered += group
         # The checksum covers the footer as well, up to the checksum itself.

@@ -129,8 +129,7 @@ class Log:
         new = range(self._described, len(self._file.channels))
         described = bytes_of(*(one for at in new for one in (self._file.schemas[at], self._file.channels[at])))
         piece, index = chunk(held, self._file.size, self._compression, described)
-        self._file.append(piece)
-        self._file.chunks.append(index)
+        self._file.append_chunk(piece, index)
         self._described = new.stop
         # A channel that was silent in this chunk (replaced at a swap, say) gives its memory back.
         self._rows = {rows.channel: rows for rows in held}
