@@ -114,7 +114,7 @@ def _measured(pushed: Pushed, rate: float, frequency: np.ndarray, pieces: int) -
     small, large = widths(small_x, size), widths(large_x, size)
     half, quarter = small.shape[-1] // 2, small.shape[-1] // 4
     covers = size * frequency / rate
-    unsure = np.minimum(_PHASE / np.maximum(covers, 1e-3) ** 4, 1.0)
+    unsure = np.where(frequency > 0.0, np.minimum(_PHASE / np.maximum(covers, 1e-3) ** 4, 1.0), 0.0)
     trends = [trend(sizes(x[:, -half * size :], size), size / rate, unsure) for x in (small_x, large_x)]
     small_trend, large_trend = trends
     slower = np.where(np.abs(large_trend.rate_1_s) < np.abs(small_trend.rate_1_s), large_trend[:2], small_trend[:2])
