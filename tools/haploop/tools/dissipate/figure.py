@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import textwrap
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -23,6 +23,7 @@ _AT = (0.04, 0.46, 0.585, 0.71, 0.835, 1.0)
 _MOST = len(style.ELEMENTS)
 # Letters of a line, at most.
 _LINE_LETTERS = 170
+_CORNER: dict[str, Any] = {"loc": "upper left", "bbox_to_anchor": (0.0, 1.0), "ncols": 1}
 
 
 def make_figure(outcome: Outcome) -> Figure:
@@ -83,42 +84,46 @@ def _motion(ax: Axes, outcome: Outcome, lines: Floats, title: str, whole: bool) 
 
 
 def _energies(ax: Axes, outcome: Outcome, lines: Floats, title: str) -> None:
-    count, agree = len(outcome.elements), outcome.books_agree
-    books = lines[2 : 2 + 2 * count]
-    factor, letter = prefix_for([float(np.abs(books).max())])
+    """Draws the books of the elements: true ones drawn through, sampled ones dashed where they differ."""
+    count, agree, curves = len(outcome.elements), outcome.books_agree, []
     for index, element in enumerate(outcome.elements[:_MOST]):
         colour, name = style.element_colour(index), element.label
-        ax.plot(lines[0], books[count + index] / factor, color=colour, linewidth=1.5, label=name, gid=f"{name}.true")
-        if not agree:
-            dashed = {"color": colour, "linewidth": 1.0, "dashes": (4, 2)}
-            ax.plot(lines[0], books[index] / factor, **dashed, gid=f"{name}.sampled")
+        look = {"color": colour, "linewidth": 1.5, "label": name, "gid": f"{name}.true"}
+        dashed = {"color": colour, "linewidth": 1.0, "dashes": (4, 2), "gid": f"{name}.sampled"}
+        curves += [(lines[2 + count + index], look), (lines[2 + index], dashed)][: 1 if agree else 2]
     if not agree:
         for label, dashes in (("true", "-"), ("sampled", (0, (4, 2)))):
             ax.plot([], [], color=style.GREY, linestyle=dashes, linewidth=1.3, label=label)
-        style.legend(ax, only=("true", "sampled"), loc="upper left", bbox_to_anchor=(0.0, 1.0), ncols=1)
-    ax.axhline(0.0, color=style.GREY, linewidth=0.8, zorder=0)
-    _common(ax, outcome, lines[0])
-    style.dress(ax, title, "time (s)", f"energy ({letter}J)")
+    _curves(ax, outcome, lines[0], curves, title, "energy", "J")
+    if not agree:
+        style.legend(ax, only=("true", "sampled"), **_CORNER)
 
 
 def _force(ax: Axes, outcome: Outcome, lines: Floats) -> None:
-    factor, letter = prefix_for([float(np.abs(lines[-3]).max())])
-    ax.plot(lines[0], lines[-3] / factor, color=style.INK, linewidth=1.0, gid="force")
-    _common(ax, outcome, lines[0])
-    style.dress(ax, "Recorded force on the device", "time (s)", f"force ({letter}N)")
+    curve = lines[-3], {"color": style.INK, "linewidth": 1.0, "gid": "force"}
+    _curves(ax, outcome, lines[0], [curve], "Recorded force on the device", "force", "N")
 
 
 def _force_energies(ax: Axes, outcome: Outcome, lines: Floats) -> None:
     """Draws the true book of the recorded force beside the sum F v T."""
-    factor, letter = prefix_for([float(np.abs(lines[-2:]).max())])
-    ax.plot(lines[0], lines[-2] / factor, color=style.INK, linewidth=1.5, label="true", gid="force.true")
-    ax.plot(lines[0], lines[-1] / factor, color=style.GREY, dashes=(4, 2), label="sum F v T", gid="force.naive")
-    style.legend(ax, loc="upper left", bbox_to_anchor=(0.0, 1.0), ncols=1)
-    ax.axhline(0.0, color=style.GREY, linewidth=0.8, zorder=0)
-    _common(ax, outcome, lines[0])
-    style.dress(
-        ax, "Energy that the force took out of the device (fed to it below 0)", "time (s)", f"energy ({letter}J)"
-    )
+    true = lines[-2], {"color": style.INK, "linewidth": 1.5, "label": "true", "gid": "force.true"}
+    naive = lines[-1], {"color": style.GREY, "dashes": (4, 2), "label": "sum F v T", "gid": "force.naive"}
+    title = "Energy that the force took out of the device (fed to it below 0)"
+    _curves(ax, outcome, lines[0], [true, naive], title, "energy", "J")
+    style.legend(ax, **_CORNER)
+
+
+def _curves(
+    ax: Axes, outcome: Outcome, t: Floats, curves: list[tuple[Floats, dict[str, Any]]], title: str, name: str, unit: str
+) -> None:
+    """Draws curves over time, each with its look, in one unit with the prefix that suits them."""
+    factor, letter = prefix_for([max(float(np.abs(values).max()) for values, _ in curves)])
+    for values, look in curves:
+        ax.plot(t, values / factor, **look)
+    if unit == "J":
+        ax.axhline(0.0, color=style.GREY, linewidth=0.8, zorder=0)
+    _common(ax, outcome, t)
+    style.dress(ax, title, "time (s)", f"{name} ({letter}{unit})")
 
 
 def _common(ax: Axes, outcome: Outcome, t: Floats) -> None:

@@ -26,14 +26,21 @@ if TYPE_CHECKING:
 MOST_POINTS = 1_000_000
 # A last step may miss the end by this part of a step, from rounding.
 _ROUNDING = Decimal("1e-9")
+_NOT_SET = "cannot be set"
 
 
-class NoSuchKey(ValueError):
-    """A key that no scene of this shape has; its fields are those of a ``Mistake``."""
+class AxisError(ValueError):
+    """An axis that cannot be swept; its fields are those of a ``Mistake``.
 
-    def __init__(self, expected: str, given: str = "cannot be set", nearest: str | None = None) -> None:
+    Attributes:
+        place: of the mistake below the axis: a key of the span, or a place in the list; empty for the whole.
+    """
+
+    def __init__(
+        self, expected: str, given: str | None = None, nearest: str | None = None, place: str | int = ""
+    ) -> None:
         super().__init__(expected)
-        self.given, self.expected, self.nearest = given, expected, nearest
+        self.expected, self.given, self.nearest, self.place = expected, given, nearest, place
 
 
 def number_at(path: Sequence[str], scene: Layers, kinds: Mapping[str, type[Element]]) -> Number | None:
@@ -44,7 +51,7 @@ def number_at(path: Sequence[str], scene: Layers, kinds: Mapping[str, type[Eleme
         scene: says which kind each table is that has kinds.
 
     Raises:
-        NoSuchKey: no scene like this one has the key.
+        AxisError: no scene like this one has the key.
     """
     choices: list[Any] = [scene_model(kinds)]
     value: Any = scene.data
@@ -55,13 +62,13 @@ def number_at(path: Sequence[str], scene: Layers, kinds: Mapping[str, type[Eleme
             value = value.get(part) if isinstance(value, dict) else None
         elif lists := [choice for choice in choices if get_origin(choice) is list]:
             if not part.isdecimal():
-                raise NoSuchKey(f"{place} is a list, counted from 0, so {part} is none of its places.")
+                raise AxisError(f"{place} is a list, counted from 0, so {part} is none of its places.", _NOT_SET)
             choices = [*_alternatives(get_args(lists[0])[0])]
             value = value[int(part)] if isinstance(value, list) and int(part) < len(value) else None
         elif any(get_origin(choice) is dict for choice in choices):
             return None
         else:
-            raise NoSuchKey(f"{place} holds a value, not a table.")
+            raise AxisError(f"{place} holds a value, not a table.", _NOT_SET)
     return next((choice for choice in choices if isinstance(choice, Number)), None)
 
 
@@ -69,7 +76,7 @@ def _at_key(table: type[Model], name: str, place: str) -> list[Any]:
     if name not in table.model_fields:
         names = list(table.model_fields)
         where = f"[{place}]" if place else "a scene"
-        raise NoSuchKey(f"Allowed: {', '.join(names)}.", f"is not a key of {where}", nearest(name, names))
+        raise AxisError(f"Allowed: {', '.join(names)}.", f"is not a key of {where}", nearest(name, names))
     field = table.model_fields[name]
     return [*field.metadata, *_alternatives(field.annotation)]
 
@@ -80,7 +87,9 @@ def _chosen(tables: Sequence[type[Model]], value: Any, place: str) -> type[Model
     kinds = {get_args(table.model_fields["kind"].annotation)[0]: table for table in tables}
     kind = value.get("kind") if isinstance(value, dict) else None
     if kind not in kinds:
-        raise NoSuchKey(f"[{place}] of the base scene names no kind; set {place}.kind first: {', '.join(kinds)}.")
+        raise AxisError(
+            f"[{place}] of the base scene names no kind; set {place}.kind first: {', '.join(kinds)}.", _NOT_SET
+        )
     return kinds[kind]
 
 
@@ -120,36 +129,24 @@ class Span(Model):
         return self
 
 
-class PointsError(ValueError):
-    """Values that are none; the message is a full sentence.
-
-    Attributes:
-        key: of the span that is wrong, or the place in the list; empty for the whole.
-    """
-
-    def __init__(self, key: str | int, sentence: str) -> None:
-        super().__init__(sentence)
-        self.key = key
-
-
 def make_points(span: Span, number: Number) -> list[float]:
     """Returns the values of a span in SI units.
 
-    Raises PointsError where an end or the step is no such number, or they do not go together.
+    Raises AxisError where an end or the step is no such number, or they do not go together.
     """
     first, last = _read(number, "from", span.start), _read(number, "to", span.to)
     if first == last:
-        raise PointsError("to", "It must differ from the value that the axis starts from.")
+        raise AxisError("It must differ from the value that the axis starts from.", place="to")
     if span.scale == "log":
         assert span.count
         if not first * last > 0.0:
-            raise PointsError("scale", "A log scale needs two ends of one sign, neither of them 0.")
+            raise AxisError("A log scale needs two ends of one sign, neither of them 0.", place="scale")
         inner = (first * (last / first) ** (k / (span.count - 1)) for k in range(1, span.count - 1))
         values = [first, *inner, last]
         return list(dict.fromkeys(map(round, values))) if number.quantity.whole else values
     steps = span.count - 1 if span.count else _steps(number, first, last, span.step)
     # In decimal, so that 0.1, 0.2, 0.3 are the numbers that a person would write.
-    begin, way = _decimal(first), _decimal(last) - _decimal(first)
+    begin, way = Decimal(repr(first)), Decimal(repr(last)) - Decimal(repr(first))
     values = (float(begin + way * k / steps) for k in range(steps + 1))
     return [_read(number, "count" if span.count else "step", value) for value in values]
 
@@ -157,15 +154,15 @@ def make_points(span: Span, number: Number) -> list[float]:
 def listed(values: list[Any], number: Number | None) -> list[Any]:
     """Returns the values of a list, numbers in SI units.
 
-    Raises PointsError where there are none, one is no such number, or stands there twice.
+    Raises AxisError where there are none, one is no such number, or stands there twice.
     """
     if not values:
-        raise PointsError("", "It must have at least one value.")
+        raise AxisError("It must have at least one value.")
     read = [value if number is None else _read(number, place, value) for place, value in enumerate(values)]
     seen: set[str] = set()
     for place, value in enumerate(read):
         if repr(value) in seen:
-            raise PointsError(place, "Every value may stand there once.")
+            raise AxisError("Every value may stand there once.", place=place)
         seen.add(repr(value))
     return read
 
@@ -174,21 +171,17 @@ def _read(number: Number, key: str | int, value: Any) -> float:
     try:
         return number.read(value)
     except PydanticCustomError as error:
-        raise PointsError(key, error.message()) from error
-
-
-def _decimal(value: float) -> Decimal:
-    return Decimal(repr(value))
+        raise AxisError(error.message(), place=key) from error
 
 
 def _steps(number: Number, first: float, last: float, given: Any) -> int:
-    step = _decimal(_read(Number(Quantity(number.quantity.unit, above=0.0)), "step", given))
-    ratio = abs(_decimal(last) - _decimal(first)) / step
+    step = Decimal(repr(_read(Number(Quantity(number.quantity.unit, above=0.0)), "step", given)))
+    ratio = abs(Decimal(repr(last)) - Decimal(repr(first))) / step
     count = round(ratio)
     if count > MOST_POINTS:
-        raise PointsError("step", f"It makes {count + 1} values; an axis has at most {MOST_POINTS}.")
+        raise AxisError(f"It makes {count + 1} values; an axis has at most {MOST_POINTS}.", place="step")
     if abs(ratio - count) > _ROUNDING * max(1, count):
         way = 1 if last > first else -1
-        low, high = (float(_decimal(first) + way * whole * step) for whole in (int(ratio), int(ratio) + 1))
-        raise PointsError("to", f"It must be a whole number of steps from the start, such as {low:g} or {high:g}.")
+        low, high = (float(Decimal(repr(first)) + way * whole * step) for whole in (int(ratio), int(ratio) + 1))
+        raise AxisError(f"It must be a whole number of steps from the start, such as {low:g} or {high:g}.", place="to")
     return count

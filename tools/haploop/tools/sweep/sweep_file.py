@@ -25,7 +25,7 @@ from haploop.tools.executor.work import Sources, load_kinds
 from haploop.tools.search.bisect import Tolerance
 from haploop.tools.sweep.cell_scene import Refused, Values, resolved
 from haploop.tools.sweep.cells import Axis, Bisect, Sweep
-from haploop.tools.sweep.points import NoSuchKey, PointsError, Span, listed, make_points, number_at
+from haploop.tools.sweep.points import AxisError, Span, listed, make_points, number_at
 from haploop.tools.sweep.record import make_columns, usual
 from haploop.tools.sweep.table import Column
 
@@ -156,21 +156,18 @@ class _Reader:
             return None
         try:
             if not path:
-                raise NoSuchKey("It must be a dotted key, such as wall.stiffness.", "cannot be read")
+                raise AxisError("It must be a dotted key, such as wall.stiffness.", "cannot be read")
             number = number_at(path, scene, self._kinds)
             points = self._points(at, values, number)
-        except NoSuchKey as error:
-            self._layers.complain(at, error.expected, error.given, error.nearest)
-        except PointsError as error:
-            place = at if error.key == "" else (*at, error.key)
-            self._layers.complain(place, str(error))
-        else:
-            if points is None or (number is None and not self._names_fit(at, key, points, scene)):
-                return None
-            if number is None:
-                return Axis(key, tuple(points))
-            return Axis(key, tuple(points), number.quantity.unit, number.quantity.whole)
-        return None
+        except AxisError as error:
+            place = at if error.place == "" else (*at, error.place)
+            self._layers.complain(place, error.expected, error.given, error.nearest)
+            return None
+        if points is None or (number is None and not self._names_fit(at, key, points, scene)):
+            return None
+        if number is None:
+            return Axis(key, tuple(points))
+        return Axis(key, tuple(points), number.quantity.unit, number.quantity.whole)
 
     def _points(self, at: KeyPath, values: Any, number: Number | None) -> list[Any] | None:
         if isinstance(values, list):
