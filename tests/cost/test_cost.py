@@ -15,7 +15,7 @@ from haploop.tools.cost.data import load
 from haploop.tools.cost.findings import is_told_apart
 from haploop.tools.cost.grid import METHODS, accuracy_scenes, grid, outcome, starts, true_swings
 from haploop.tools.cost.measure import Measurement
-from haploop.tools.reference.nearest import reference_for, statistics
+from haploop.tools.cost.reference import reference_for, statistics
 from haploop.tools.trajectory import trajectory
 from helpers.scenes.cost_scene import SMOOTH, exact_reference, outcomes
 

@@ -12,7 +12,7 @@ from mpmath import mpf
 from haploop.launch.scene.file import load
 from haploop.protocol.scene.paths import with_value
 from haploop.protocol.scene.scene import Scene
-from haploop.tools.reference.nearest import (
+from haploop.tools.cost.reference import (
     MOST_GROWTH,
     REFERENCES,
     Reference,
@@ -235,7 +235,7 @@ def test_what_does_not_swing_has_no_frequency():
 
 
 def test_reading_a_reference_needs_no_mpmath():
-    reads = "import sys, haploop.tools.reference.nearest; sys.exit('mpmath' in sys.modules)"
+    reads = "import sys, haploop.tools.cost.reference; sys.exit('mpmath' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", reads], check=False).returncode == 0
 
 

@@ -15,7 +15,7 @@ from haploop.launch.scene.file import load as load_scene
 from haploop.protocol.scene.paths import value_at
 from haploop.protocol.scene.scene import Scene
 from haploop.tools.sweep.command import Request, sweep
-from haploop.tools.sweep.progress import SweepProgress
+from haploop.tools.sweep.engine import SweepProgress
 from haploop.tools.sweep.table import TableError, read
 from helpers.runs.sweep_runs import engine_run, rows
 from helpers.scenes.least import KINDS

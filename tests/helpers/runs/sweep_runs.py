@@ -9,8 +9,7 @@ import pyarrow.parquet
 
 from haploop.tools.executor.pool import Pool
 from haploop.tools.sweep.boundary import Boundary
-from haploop.tools.sweep.engine import Engine, Stopped
-from haploop.tools.sweep.progress import SweepProgress
+from haploop.tools.sweep.engine import Engine, Stopped, SweepProgress
 from haploop.tools.sweep.store import Store
 from haploop.tools.sweep.table import make_schema
 

@@ -6,7 +6,7 @@ from typing import Any
 from haploop.launch.scene.file import load as load_scene
 from haploop.protocol.scene.scene import Scene
 from haploop.tools.cost.grid import grid, outcome, true_swings
-from haploop.tools.reference.nearest import Reference, statistics
+from haploop.tools.cost.reference import Reference, statistics
 from haploop.tools.trajectory import trajectory
 
 SMOOTH = """

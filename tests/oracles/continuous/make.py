@@ -32,7 +32,7 @@ from haploop.plant.sensing.accelerometer import make_accelerometer
 from haploop.protocol.scene.hand_force import Constant, Ramp, Trace
 from haploop.protocol.scene.scene import Hand, Scene, accelerometer_is_used
 from haploop.protocol.ticks import Timebase
-from haploop.tools.reference.nearest import (
+from haploop.tools.cost.reference import (
     REFERENCES,
     Reference,
     compares_pointwise,

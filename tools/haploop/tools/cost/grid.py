@@ -19,8 +19,8 @@ from haploop.launch.scene.mistakes import COMMAND_LINE, SceneError
 from haploop.plant.integrators.registry import INTEGRATORS
 from haploop.protocol.scene.scene import Scene
 from haploop.tools.cost.data import Errors
+from haploop.tools.cost.reference import Reference, exactly, statistics
 from haploop.tools.machine import machine, source_digest, versions
-from haploop.tools.reference.nearest import Reference, exactly, statistics
 from haploop.tools.trajectory import Trajectory, trajectory
 
 METHODS = tuple(INTEGRATORS)
@@ -28,7 +28,7 @@ METHODS = tuple(INTEGRATORS)
 STARTS, _APART_M, _T = 30, 1e-6, 2.045
 # Errors depend on these packages whole, and of this one on these files; times on more of them.
 _PACKAGES = ("haploop.protocol", "haploop.plant", "haploop.controller", "haploop.logger", "haploop.launch")
-_OF_ERRORS = ("cost/grid.py", "trajectory.py", "reference/nearest.py")
+_OF_ERRORS = ("cost/grid.py", "trajectory.py", "cost/reference.py")
 _OF_TIMES = (
     *("cost/times.py", "cost/prices.py", "cost/alike.py"),
     *("operations.py", "linear/one_tick.py", "linear/stiffness_limit.py"),
@@ -102,7 +102,7 @@ def digest(data: Any) -> str:
 def errors_made_with() -> list[Any]:
     """Returns what errors depend on beside the scenes: versions and the source of what is run; not the machine."""
     tools = Path(__file__).parents[1]
-    files = [*(tools / name for name in _OF_ERRORS), *sorted((tools / "reference/stored").glob("*"))]
+    files = [*(tools / name for name in _OF_ERRORS), *sorted((tools / "cost/references").glob("*"))]
     return [versions(), source_digest(_PACKAGES, files)]
 
 

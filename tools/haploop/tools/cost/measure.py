@@ -19,9 +19,9 @@ from haploop.tools.cost.data import AlikeScene, Cost, Point, ReferenceNote, Scen
 from haploop.tools.cost.findings import advice
 from haploop.tools.cost.grid import Candidate, Grid, Outcome, errors_made_with, outcome, times_made_with, true_swings
 from haploop.tools.cost.prices import Prices
+from haploop.tools.cost.reference import Reference, reference_for
 from haploop.tools.cost.times import IN_PROCESS, PROCESSES, Job, Store
 from haploop.tools.machine import commit, machine, versions
-from haploop.tools.reference.nearest import Reference, reference_for
 from haploop.tools.render.progress import Stage
 
 # Far enough for some ticks more, near enough for squares to stay finite.

@@ -22,10 +22,10 @@ from haploop.protocol.ticks import BlockLength, Timebase
 from haploop.tools.cost.data import Price, PriceGroup, Spread
 from haploop.tools.cost.findings import AGAIN
 from haploop.tools.cost.grid import digest, scenes_folder, times_made_with
+from haploop.tools.cost.reference import difference_m
 from haploop.tools.cost.times import IN_PROCESS, PROCESSES, Job, Store, loop_us, measure, run_us, tick_us
 from haploop.tools.linear.stiffness_limit import StiffnessLimit, stiffness_limit
 from haploop.tools.operations import NONE, WHOLE, operations
-from haploop.tools.reference.nearest import difference_m
 from haploop.tools.render.progress import Stage
 from haploop.tools.render.units import spring
 from haploop.tools.trajectory import trajectory

@@ -18,8 +18,7 @@ from haploop.tools.cli.options import FAILED, WRONG_USE, leave, plain_errors, pr
 from haploop.tools.executor.executors import ExecutorError
 from haploop.tools.executor.pool import Pool, read_sources
 from haploop.tools.machine import machine, versions
-from haploop.tools.sweep.engine import Engine, Stopped
-from haploop.tools.sweep.progress import SweepProgress, describe_counts
+from haploop.tools.sweep.engine import Engine, Stopped, SweepProgress, describe_counts
 from haploop.tools.sweep.record import wants_trajectories
 from haploop.tools.sweep.store import Store, StoreError
 from haploop.tools.sweep.sweep_file import load

@@ -16,7 +16,7 @@ from haploop.logger.verdict.measures import SMALLEST_SWING_M, WINDOW_S
 from haploop.protocol.scene.scene import Hand, Scene
 from haploop.tools.trajectory import trajectory
 
-REFERENCES = Path(__file__).parent / "stored"
+REFERENCES = Path(__file__).parent / "references"
 # A reference made on the spot has at least this plant rate, and is checked against half of it.
 _LEAST_RATE = 100_000
 # Starts moved by so much tell whether positions at a time can be compared at all: the errors of the methods compared.
