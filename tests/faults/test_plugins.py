@@ -1,5 +1,6 @@
 """A user's element that goes wrong is never silent but named with its tick; a failed reload leaves the old at work."""
 
+import re
 import signal
 
 import numpy as np
@@ -110,13 +111,50 @@ def test_a_force_of_another_number_type_gives_the_same_bits_both_ways(launched, 
     assert digests[0] == digests[1]
 
 
-def test_a_force_that_never_returns_is_named_after_the_deadline(running, brake):
-    run = started(
-        running, brake, ELEMENT.format(at_150="\n            while True: pass"), sets=("run.deadline=0.7",), pace=()
-    )
+NEVER = "while True: pass"
+HANGS = first_and_slowly(
+    NEVER,
+    "time.sleep(1000)",
+    "threading.Lock().acquire() and threading.Event().wait()",
+    "while True: exec('try: time.sleep(9)\\nexcept Exception: pass')",
+)
+
+
+@pytest.mark.parametrize("hang", HANGS)
+def test_a_force_that_never_returns_is_named_with_element_tick_and_line_after_the_deadline(hang, running, brake):
+    """At a pace: then all nodes have reported a tick before, and the deadline is that of a loop that runs."""
+    run = started(running, brake, "import threading, time\n" + ELEMENT.format(at_150=hang), sets=("run.deadline=0.7",))
+    run.end(1)
+    run.leaves_nothing()
+    assert "Element 0 (brake) gave no force at tick 150: DeadlineOver: it was in line " in run.stderr
+    assert "/plugins/brake-" in run.stderr
+    assert len(run.log()["/controller"]["x"]) == 150
+    assert replay(run.out).differences == []
+
+
+@pytest.mark.slow
+def test_of_a_force_that_never_returns_from_compiled_code_node_line_and_deadline_are_told(running, brake):
+    """No Python code can run then, the end of a line of life goes unheard; the stack is shown all the same."""
+    source = "import itertools\n" + ELEMENT.format(at_150="any(itertools.repeat(0))")
+    run = started(running, brake, source, sets=("run.deadline=0.7",))
     run.end(1)
     run.leaves_nothing()
     assert "The controller has not answered for 0.7 s" in run.stderr
+    assert re.search(r'File ".*/plugins/brake-.*", line \d+ in force', run.stderr)
+
+
+@pytest.mark.parametrize(
+    ("statement", "reason"),
+    first_and_slowly(
+        ("sys.exit(3)", "SystemExit: 3"), ("quit()", "SystemExit: None"), ("raise SystemExit", "SystemExit: ")
+    ),
+)
+def test_an_element_that_leaves_is_named_with_its_tick(statement, reason, running, brake):
+    run = started(running, brake, ELEMENT.format(at_150=statement))
+    run.end(1)
+    run.leaves_nothing()
+    assert f"Element 0 (brake) gave no force at tick 150: {reason}" in run.stderr
+    assert replay(run.out).differences == []
 
 
 def test_a_force_that_never_returns_in_one_process_is_ended_by_the_second_interrupt(launched, brake, tmp_path):

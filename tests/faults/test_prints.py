@@ -49,7 +49,7 @@ KINDS = {
     "no newline": ("sys.stdout.write('import')", "pass", "print('on', end=' ', flush=True)"),
     "binary": ("pass", "pass", "sys.stdout.buffer.write(bytes(range(256))); sys.stdout.flush()"),
     "surrogates": ("pass", "pass", "print(chr(0xD800), chr(27) + '[2J')"),
-    "raw": ("pass", "pass", "os.write(1, b'raw'); os.write(2, b'raw')"),
+    "raw": ("os.write(1, b'raw')", "os.write(1, b'raw')", "os.write(1, b'raw'); os.write(2, b'raw')"),
     "closes": ("sys.stdout.close()", "sys.stderr.close()", "sys.stdout.close(); print('still there')"),
     "closes 1 and 2": ("pass", "pass", "self.tick in (20, 30) and os.close(self.tick // 10 - 1); print('on')"),
     "threads": ("pass", "pass", "threading.Thread(target=print, args=('thread', self.tick)).start()"),

@@ -42,6 +42,7 @@ class RunSpec:
         attachments: text files for the log, by name.
         plugins: plugin files within ``out`` that the controller loads.
         plugin_sources: kind -> the user's file it came from, for reloading.
+        plugin_files: kind -> the file within ``out`` that it is at work from; a reloaded one changes it.
         pace: simulated seconds per wall second; infinite for as fast as possible. For processes only.
         transport: addresses and keys of the sockets. For processes only.
         on_progress: called now and then with the logger's status.
@@ -57,6 +58,7 @@ class RunSpec:
     attachments: dict[str, str] = field(default_factory=dict)
     plugins: list[Path] = field(default_factory=list)
     plugin_sources: dict[str, Path] = field(default_factory=dict)
+    plugin_files: dict[str, Path] = field(default_factory=dict)
     pace: float = math.inf
     transport: Transport = field(default_factory=Transport)
     on_progress: Callable[[Message], None] = lambda status: None
@@ -128,21 +130,25 @@ def write_scene(scene: Scene, out: Path) -> str:
     return text
 
 
-def kept_name(path: Path) -> str:
+def kept_name(path: Path, data: bytes | None = None) -> str:
     """Returns the name under which a plugin file is kept: its own with its digest, unless that is its name already."""
-    digest = hashlib.sha256(path.read_bytes()).hexdigest()[:12]
+    digest = hashlib.sha256(path.read_bytes() if data is None else data).hexdigest()[:12]
     return path.name if path.stem.endswith(f"-{digest}") else f"{path.stem}-{digest}.py"
 
 
-def keep_plugin(path: Path, out: Path) -> Path:
+def keep_plugin(path: Path, out: Path, data: bytes | None = None) -> Path:
     """Copies a plugin file into the run's directory under a name with its digest, so that a replay finds it.
+
+    Args:
+        data: what was read of it; it is read anew when None.
 
     Raises OutputError where it cannot be read or copied.
     """
     try:
-        name = kept_name(path)
-        (out / PLUGINS).mkdir(exist_ok=True)
-        (out / PLUGINS / name).write_bytes(path.read_bytes())
+        data = path.read_bytes() if data is None else data
+        kept = out / PLUGINS / kept_name(path, data)
+        kept.parent.mkdir(exist_ok=True)
+        kept.write_bytes(data)
     except OSError as error:
         raise OutputError(f"The plugin {path} cannot be copied into {out / PLUGINS}: {error.strerror}.") from error
-    return out / PLUGINS / name
+    return kept

@@ -47,7 +47,7 @@ def make_element(table: ElementTable, kinds: Mapping[str, type[Element]]) -> tup
     """
     try:
         return kinds[table.name](**table.parameters), table.acts
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         given = ", ".join(f"{name} = {value}" for name, value in table.parameters.items()) or "no parameters"
         what = f"{type(error).__name__}: {error}"
         raise ElementError(f"The element {table.name} cannot be made with {given}: {what}") from error

@@ -163,7 +163,7 @@ class Controller:
             change = self._changes.pop(0)
             try:
                 self.params, state = apply_change(change, self.params, state, self._kinds)
-            except Exception as error:
+            except (Exception, SystemExit) as error:
                 self.recorder.refused.append(change.refuse(error))
         self._next_change = self._changes[0].tick if self._changes else _NEVER
         self.recorder.open(self.params)

@@ -8,6 +8,7 @@ from pathlib import Path
 import zmq
 
 from haploop.controller.controller import Controller
+from haploop.controller.deadline import heed_deadline
 from haploop.controller.dissipation import ElementError, PluginError, registry
 from haploop.protocol.changes import is_change, refusals_as_status
 from haploop.protocol.scene.scene import Scene
@@ -115,4 +116,5 @@ def work(client: ClockClient, context: zmq.Context[zmq.Socket[bytes]], directory
 
 
 if __name__ == "__main__":
+    heed_deadline()
     run_node(ROLE, work)

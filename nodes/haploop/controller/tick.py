@@ -136,7 +136,7 @@ def tick(params: ControllerParams, state: StateTuple, sample: Sample) -> tuple[S
             row.append(force)
             total = total + force
             index += 1
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         raise NoForce(index) from error
     row += (total, contact)
     return (of_velocity, of_acceleration, a, memories), row

@@ -101,7 +101,7 @@ class Change:
         words += ["always"] * (self.swap.acts == "always")
         return f"element {self.element} becomes {kind}" + (f" ({', '.join(words)})" if words else "")
 
-    def refuse(self, error: Exception) -> Change:
+    def refuse(self, error: BaseException) -> Change:
         """Returns the change as one that could not be carried out."""
         sentence = f"The change at tick {self.tick}, {self.describe()}, was refused: {type(error).__name__}: {error}"
         return replace(self, refused=sentence)

@@ -14,7 +14,7 @@ from haploop.launch.scene.check import resolve_event
 from haploop.launch.scene.events import swapped_in, try_out
 from haploop.launch.scene.mistakes import SceneError
 from haploop.protocol.changes import Event, at_work, changes_of
-from haploop.protocol.scene.scene import Scene
+from haploop.protocol.scene.scene import EventTable, Scene
 from haploop.protocol.ticks import Timebase
 
 if TYPE_CHECKING:
@@ -136,15 +136,19 @@ class Clock:
             ElementError: the new element's own code does not take its parameters; nothing happens.
             ClockError: the time is past or after the end.
         """
-        tick = self.tick_at(at_s)
-        self._check_ahead(tick)
-        if len(self._scene.event) >= self._most_changes:
-            raise ClockError(f"{MOST_CHANGES} changes wait for their tick already; let time go on, then ask again.")
-        event = resolve_event({**change, "at": tick / self._time.control_rate}, self._scene, self._kinds)
+        tick, event = self.resolved(change, at_s, self._kinds)
         try_out(swapped_in([event]), self._kinds)
         self._scene = replace(self._scene, event=(*self._scene.event, event))
         self._insert(tick, event.as_dict() | extra)
         return tick
+
+    def resolved(self, change: Event, at_s: float | None, kinds: Mapping[str, type[Element]]) -> tuple[int, EventTable]:
+        """Returns the tick of a change and the change itself, checked with these kinds; raises as ``change`` does."""
+        tick = self.tick_at(at_s)
+        self._check_ahead(tick)
+        if len(self._scene.event) >= self._most_changes:
+            raise ClockError(f"{MOST_CHANGES} changes wait for their tick already; let time go on, then ask again.")
+        return tick, resolve_event({**change, "at": tick / self._time.control_rate}, self._scene, kinds)
 
     def prepare(self) -> None:
         """Makes what the check of a first change would make, and a first mistake, while nobody waits for it."""

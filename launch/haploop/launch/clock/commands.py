@@ -4,21 +4,22 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Callable, Mapping
-from pathlib import Path
+from collections.abc import Callable, Generator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from haploop.controller.dissipation import ElementError, PluginError, load_plugin
+from haploop.controller.dissipation import ElementError, PluginError
 from haploop.launch.clock.clock import Clock, ClockError
 from haploop.launch.clock.pace import PaceError, pace_of
+from haploop.launch.clock.plugin_swap import swap_plugin
 from haploop.launch.clock.roster import Roster
 from haploop.launch.scene.events import settable_keys
 from haploop.launch.scene.mistakes import SceneError
 from haploop.launch.scene.number import is_exotic
-from haploop.launch.spec import OutputError, keep_plugin
+from haploop.launch.spec import OutputError
+from haploop.protocol.changes import Event
 from haploop.protocol.quantity import Quantity
 from haploop.protocol.scene.paths import value_at
-from haploop.protocol.scene.scene import NO_ELEMENT, Scene
+from haploop.protocol.scene.scene import NO_ELEMENT, ElementTable, Scene
 from haploop.protocol.scene.table import Tables
 from haploop.protocol.transport.wire import Message
 
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
     from haploop.controller.dissipation import Element
     from haploop.launch.spec import RunSpec
 
+Done = tuple[str, Message]
 Answer = tuple[bool, str, Message]
 # What one command may carry, so that none holds time up: keys and values, tables in each other, letters of a text.
 _MOST_VALUES, _DEEPEST, _LONGEST = 64, 3, 200
@@ -47,6 +49,7 @@ class Commands:
     def __init__(self, clock: Clock, spec: RunSpec, roster: Callable[[], Roster]) -> None:
         self._clock, self._spec, self._roster = clock, spec, roster
         self._rate = spec.scene.clock.control_rate
+        self._is_trying = False
         self._verbs = {
             "status": self._status,
             "options": self._options,
@@ -59,22 +62,24 @@ class Commands:
             "set": self._set,
         }
 
-    def __call__(self, verb: str, arguments: Message) -> Answer:
+    def __call__(self, verb: str, arguments: Message) -> Answer | Generator[None, None, Answer]:
+        """Returns the answer, or steps to be gone through one by one while time goes on, which return it."""
         act = self._verbs.get(verb)
         if act is None:
             return False, f"{verb[:40]!r} is no command; these are: {', '.join(self._verbs)}.", {}
         try:
             _check_burden(arguments)
-            text, data = act(**arguments)
-            return True, text, data
-        except SceneError as error:
-            told = [str(mistake) for mistake in error.mistakes[:_MOST_TOLD]]
-            rest = len(error.mistakes) - len(told)
-            return False, "\n".join([*told, *([f"There are {rest} more mistakes."] if rest else [])]), {}
-        except (ClockError, PaceError, PluginError, ElementError, OutputError) as error:
-            return False, str(error), {}
-        except Exception as error:  # whatever a terminal sends, the run goes on
-            return False, f"The arguments of {verb} cannot be used: {type(error).__name__}: {error}.", {}
+            done = act(**arguments)
+        except Exception as error:
+            return _refusal(verb, error)
+        return (True, *done) if isinstance(done, tuple) else self._later(verb, done)
+
+    def _later(self, verb: str, steps: Generator[None, None, Done]) -> Generator[None, None, Answer]:
+        try:
+            done = yield from steps
+        except Exception as error:
+            return _refusal(verb, error)
+        return (True, *done)
 
     def _at(self, tick: int) -> str:
         return f"tick {tick} ({tick / self._rate:g} s)"
@@ -138,15 +143,32 @@ class Commands:
 
     def _swap(
         self, swap: Tables, element: int = 0, at: float | None = None, reload: bool = False
-    ) -> tuple[str, Message]:
+    ) -> Done | Generator[None, None, Done]:
+        """A kind that came from a file is tried first, which takes time: the answer comes later."""
+        kind, change = swap.get("kind"), {"swap": swap, "element": element}
+        if kind in self._spec.plugin_sources:
+            return self._swap_tried(change, at, reload)
+        if reload:
+            known = ", ".join(sorted(self._spec.plugin_sources)) or "none"
+            raise ClockError(f"Only kinds from --plugin files can be reloaded ({known}), but {kind} was asked for.")
         before = self._clock.scene_at(self._clock.tick_at(at)).dissipation
-        kinds = dict(self._spec.kinds)
-        extra = self._reload(str(swap.get("kind"))) if reload else {}
+        return self._swapped(change, before, self._clock.change(change, at))
+
+    def _swap_tried(self, change: Event, at: float | None, reload: bool) -> Generator[None, None, Done]:
+        if self._is_trying:
+            raise ClockError("The file of another swap is being tried; wait for its answer, then ask again.")
+        self._is_trying = True
         try:
-            tick = self._clock.change({"swap": swap, "element": element}, at, **extra)
-        except Exception:
-            self._spec.kinds.update(kinds)
-            raise
+            tick, before = yield from swap_plugin(self._clock, self._spec, change, at, reload)
+        finally:
+            self._is_trying = False
+        if reload:  # the code before is gone from here: no swap brings it back
+            return f"element {change['element']} becomes {change['swap']['kind']} at {self._at(tick)}", {"tick": tick}
+        return self._swapped(change, before, tick)
+
+    def _swapped(self, change: Event, before: Sequence[ElementTable], tick: int) -> Done:
+        """Tells what was done, and what would undo it."""
+        swap, element = change["swap"], change["element"]
         text, data = f"element {element} becomes {swap['kind']} at {self._at(tick)}", {"tick": tick}
         if swap["kind"] == NO_ELEMENT and element < len(before) - 1:  # those after it move up: no swap brings it back
             return text, data
@@ -163,18 +185,16 @@ class Commands:
         words = " ".join(f"{key}={value}" for key, value in back.items())
         return f"{what} from {self._at(tick)} on; to go back: set {words}", {"tick": tick, "before": {"set": back}}
 
-    def _reload(self, kind: str) -> Message:
-        """Loads the edited file of a kind named at launch; a file that does not load changes nothing."""
-        source: Path | None = self._spec.plugin_sources.get(kind)
-        if source is None:
-            known = ", ".join(sorted(self._spec.plugin_sources)) or "none"
-            raise ClockError(f"Only kinds from --plugin files can be reloaded ({known}), but {kind} was asked for.")
-        loaded = load_plugin(source)
-        if kind not in loaded:
-            raise ClockError(f"{source} no longer defines {kind}, but {', '.join(loaded)}; the old element stays.")
-        kept = keep_plugin(source, self._spec.out)
-        self._spec.kinds.update(loaded)
-        return {"plugin": str(kept.resolve())}
+
+def _refusal(verb: str, error: Exception) -> Answer:
+    """Returns the answer to what failed: whatever a terminal sends, the run goes on."""
+    if isinstance(error, SceneError):
+        told = [str(mistake) for mistake in error.mistakes[:_MOST_TOLD]]
+        rest = len(error.mistakes) - len(told)
+        return False, "\n".join([*told, *([f"There are {rest} more mistakes."] if rest else [])]), {}
+    if isinstance(error, ClockError | PaceError | PluginError | ElementError | OutputError):
+        return False, str(error), {}
+    return False, f"The arguments of {verb} cannot be used: {type(error).__name__}: {error}.", {}
 
 
 def _check_burden(arguments: Message) -> None:

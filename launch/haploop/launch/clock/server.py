@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Generator
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +17,8 @@ from haploop.protocol.transport.messages import PROCESSES
 from haploop.protocol.transport.sockets import bind, has_message, open_socket
 from haploop.protocol.transport.wire import Frame, Message, WireError, decode, encode
 
-Command = Callable[[str, Message], tuple[bool, str, Message]]
+Answer = tuple[bool, str, Message]
+Command = Callable[[str, Message], Answer | Generator[None, None, Answer]]
 
 # Messages taken before grants go out, so that nobody who floods the clock can hold time up.
 _AT_ONCE = 200
@@ -54,9 +55,12 @@ class ClockServer:
         self._greeted, self._start_gate = False, start_gate
         self._granted = -1
         self._last_sent = False
+        self._awaited: list[tuple[bytes, Generator[None, None, Answer]]] = []
 
     def close(self) -> None:
-        """Stops listening; what was sent still goes out."""
+        """Stops listening; what was sent still goes out, and what is still being tried for an answer is given up."""
+        for _, steps in self._awaited:
+            steps.close()
         self.socket.close(linger=200)
 
     def serve(self) -> None:
@@ -67,6 +71,9 @@ class ClockServer:
         for _ in range(_AT_ONCE):
             if not has_message(self.socket) or self._take_one() == "COMMAND":
                 break  # what one command asks for may take milliseconds, and the next may wait for the grant
+        self._awaited, awaited = [], self._awaited
+        for sender, steps in awaited:
+            self._reply(sender, steps)
         if not self._greeted and self.roster.joined():
             self._greeted = True
             for node in list(self.roster.nodes.values()):
@@ -117,12 +124,24 @@ class ClockServer:
             if node and not node.is_own:
                 del self.roster.nodes[identity]
 
+    def _reply(self, sender: bytes, answer: Answer | Generator[None, None, Answer]) -> None:
+        """Sends an answer, or goes one step further towards it."""
+        if not isinstance(answer, tuple):
+            try:
+                next(answer)
+            except StopIteration as done:
+                answer = done.value
+            else:
+                self._awaited.append((sender, answer))
+                return
+        self._send(sender, "REPLY", *answer)
+
     def _take(self, sender: bytes, frame: Frame) -> None:
         if frame.name == "JOIN":
             self._join(sender, frame.as_dict())
             return
         if frame.name == "COMMAND":
-            self._send(sender, "REPLY", *self._command(*frame.fields))
+            self._reply(sender, self._command(*frame.fields))
             return
         node = self.roster.nodes.get(sender)
         if node is None:

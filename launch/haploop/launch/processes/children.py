@@ -71,6 +71,10 @@ class Child:
         code = self._process.poll()
         return code is not None and code >= 0
 
+    def rouse(self) -> None:
+        """Has a controller that hangs in an element's code give that up, and say where it was."""
+        self._process.send_signal(signal.SIGUSR1)
+
     def wait(self, timeout_s: float) -> bool:
         """Gives the process some time to end by itself; returns whether it did."""
         try:

@@ -22,7 +22,8 @@ from haploop.launch.spec import OutputError
 from haploop.protocol.transport.sockets import SecureContext, Transport, open_socket
 from haploop.protocol.transport.wire import Message, WireError, decode, encode
 
-_ANSWER_MS = 5000
+# A swap may try a plugin first.
+_ANSWER_MS, _SWAP_MS = 5000, 30_000
 _LOOK_MS = 250
 
 
@@ -114,13 +115,14 @@ def ask(run: LiveRun, verb: str, **arguments: Any) -> tuple[str, Message]:
     try:
         socket.connect(run.clock)
         socket.send(encode("COMMAND", verb, arguments))
-        for _ in range(_ANSWER_MS // _LOOK_MS):
+        answer_ms = _SWAP_MS if verb == "swap" else _ANSWER_MS
+        for _ in range(answer_ms // _LOOK_MS):
             if socket.poll(_LOOK_MS):
                 break
             if not is_live(run):
                 raise RunNotFound(f"Run {run.id} ({run.title}) has ended.")
         else:
-            raise RunNotFound(f"Run {run.id} ({run.title}) has not answered for {_ANSWER_MS // 1000} s.")
+            raise RunNotFound(f"Run {run.id} ({run.title}) has not answered for {answer_ms // 1000} s.")
         frame = decode(socket.recv())
     except WireError as error:
         raise RunNotFound(f"Run {run.id} answered with something else: {error}") from error

@@ -14,6 +14,7 @@ import zmq
 from haploop.controller.dissipation.registry import installed
 from haploop.launch.clock.clock import Clock
 from haploop.launch.clock.commands import Commands
+from haploop.launch.clock.roster import Node
 from haploop.launch.clock.server import ClockServer
 from haploop.launch.processes import private_directory, run_directory
 from haploop.launch.processes.children import Child, interrupts, start_children
@@ -112,6 +113,7 @@ class Supervisor:
             self._clock.prepare()
         self._probe_due = 0.0
         self._stopping = False
+        self._roused: dict[tuple[str, float], float] = {}  # role and when it was last heard of -> when it was roused
 
     def run(self) -> Summary:
         failed = True
@@ -186,7 +188,7 @@ class Supervisor:
         # Nodes may still load and a machine be busy with it; the deadline of the scene is that of a loop that runs.
         deadline_s = self._deadline_s if roster.common_tick() else max(self._deadline_s, _START_DEADLINE_S)
         for node in roster.silent(now, self._deadline_s):
-            if node.is_own and now - node.heard > deadline_s:
+            if node.is_own and now - node.heard > deadline_s and not self._may_rouse(node, now):
                 raise RunFailed(
                     f"The {node.role} has not answered for {deadline_s:g} s and was ended; {self._where()} "
                     "A longer wait can be set with run.deadline."
@@ -197,6 +199,16 @@ class Supervisor:
         if now >= self._probe_due:
             self._probe_due = now + _PROBE_S
             self._server.probe(roster.silent(now, _PROBE_S))
+
+    def _may_rouse(self, node: Node, now: float) -> bool:
+        """Rouses a controller that hangs, once; tells whether a last word of it may still come."""
+        if node.role != "controller":
+            return False
+        silence = (node.role, node.heard)
+        if silence not in self._roused:
+            self._roused[silence] = now
+            self._children[node.role].rouse()
+        return now - self._roused[silence] < _LAST_WORDS_S
 
     def _where(self) -> str:
         tick = self._server.roster.common_tick()

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from contextlib import redirect_stderr, redirect_stdout
+from contextlib import ExitStack, redirect_stderr, redirect_stdout
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from haploop.controller.dissipation import Element, ElementError, load_plugin, registry
+from haploop.controller.dissipation import Element, ElementError, PluginError, registry
+from haploop.launch.processes.plugin_trial import PluginTrial, read_source, with_code
 from haploop.launch.scene.events import elements_of, try_out
 from haploop.launch.scene.file import load
 from haploop.launch.spec import OutputError, RunSpec, discard, keep_plugin, make_output, write_scene
@@ -27,6 +28,8 @@ def prepare(
 ) -> RunSpec:
     """Reads and checks everything; only when all is well is anything written.
 
+    Plugins are tried in processes of their own; ``kinds`` of what is returned are stand-ins of their elements.
+
     Raises:
         SceneError: the scene has mistakes.
         PluginError: a plugin does not load.
@@ -35,11 +38,16 @@ def prepare(
     """
     kinds = registry()
     sources: dict[str, Path] = {}
-    for plugin in plugins:
-        for kind, element in load_plugin(plugin).items():
-            kinds[kind], sources[kind] = element, plugin
-    scene = load(scene_path, overrides, kinds)
-    try_out(elements_of(scene), kinds)
+    with ExitStack() as open_trials:
+        trials = {path: open_trials.enter_context(PluginTrial(read_source(path), str(path))) for path in plugins}
+        for plugin, trial in trials.items():
+            for kind, element in trial.wait(trial.load()).items():
+                kinds[kind], sources[kind] = element, plugin
+        scene = load(scene_path, overrides, kinds)
+        elements = elements_of(scene)
+        try_out([element for element in elements if element.name not in sources], kinds)
+        for plugin, trial in trials.items():
+            trial.wait(trial.make([element for element in elements if sources.get(element.name) == plugin]))
     is_new = out is None or not out.exists()
     return lay_out(scene, kinds, make_output(out, scene_path), plugins, sources, is_new)
 
@@ -63,7 +71,10 @@ def lay_out(
     except BaseException:
         discard(directory, is_new)
         raise
-    return RunSpec(scene, kinds, directory, attachments, kept, sources or {}, is_new=is_new)
+    sources = sources or {}
+    copies = dict(zip(plugins, kept, strict=True))
+    files = {kind: copies[source] for kind, source in sources.items()}
+    return RunSpec(scene, kinds, directory, attachments, kept, sources, files, is_new=is_new)
 
 
 def run(spec: RunSpec, *, in_process: bool = False, **options: Any) -> Summary:
@@ -98,7 +109,7 @@ def run(spec: RunSpec, *, in_process: bool = False, **options: Any) -> Summary:
     with interrupts(usual_from=2) as received:
         return run_in_process(
             spec.scene,
-            spec.kinds,
+            with_code(spec.kinds, spec.plugins),
             out=spec.out,
             attachments=spec.attachments,
             on_progress=spec.on_progress,
@@ -125,8 +136,8 @@ def _judged(spec: RunSpec, summary: Summary, events: list[tuple[int, Event]]) ->
 
     def find() -> Finding:
         try:
-            return judge_scene(spec.scene, spec.kinds, events, LOOKS_S)
-        except (ElementError, ArithmeticError) as error:
+            return judge_scene(spec.scene, with_code(spec.kinds, spec.plugins), events, LOOKS_S)
+        except (ElementError, PluginError, ArithmeticError) as error:
             return Finding("undecided", "failed", detail=str(error))
 
     # What a plugin prints here it has printed before.

@@ -1,0 +1,159 @@
+"""Trying a plugin in a process of its own: whatever it does to that process, here it is a sentence.
+
+This process never runs the file. What it needs of it, the declared parameters, it gets as a stand-in for each element.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import select
+import signal
+import stat
+import subprocess
+import sys
+import time
+from collections.abc import Generator, Iterable, Mapping
+from pathlib import Path
+from typing import Annotated, Any, Self
+
+from haploop.controller.dissipation.element import Element, ElementError
+from haploop.controller.dissipation.registry import PluginError, load_plugin
+from haploop.launch.processes.one_thread import ask_for_one_thread
+from haploop.protocol.quantity import Quantity
+from haploop.protocol.scene.scene import ElementTable
+
+# For each of loading the file and making its elements: what a large library may take to import on a busy machine.
+LIMIT_S = 10.0
+_LARGEST = 1 << 20
+_LOOK_S = 0.05
+Kinds = dict[str, type[Element]]
+Steps = Generator[None, None, Any]
+
+
+class StandIn(Element):
+    """An element as its file declares it, without its code."""
+
+    def force(self, *args: Any, **kwargs: Any) -> Any:
+        raise ElementError(f"{self.kind} is the declaration of an element; it has no force here.")
+
+
+def read_source(path: Path) -> str:
+    """Returns the text of a plugin file; raises PluginError where it is no file, too large, or no text."""
+    try:
+        status = path.stat()
+        if not stat.S_ISREG(status.st_mode) or status.st_size > _LARGEST:
+            raise PluginError(f"The plugin {path} does not load: a Python file of at most 1 MiB was expected.")
+        return path.read_text(encoding="utf-8")
+    except (OSError, ValueError) as error:
+        raise PluginError(f"The plugin {path} does not load: {type(error).__name__}: {error}") from error
+
+
+class PluginTrial:
+    """One plugin in a process of its own, which ends with this object, a context manager.
+
+    ``load`` and ``make`` are generators, so that a clock can go on meanwhile: they yield while the answer is not there.
+    """
+
+    def __init__(self, source: str, origin: str, limit_s: float = LIMIT_S) -> None:
+        self._source, self._origin, self._limit_s = source, origin, limit_s
+        environment = {**os.environ}
+        ask_for_one_thread(environment)
+        self._process = subprocess.Popen(
+            [sys.executable, "-m", "haploop.controller.trial"],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            process_group=0,
+            env=environment,
+        )
+        assert self._process.stdin
+        assert self._process.stdout
+        self._in, self._out = self._process.stdin.fileno(), self._process.stdout.fileno()
+        os.set_blocking(self._in, False)
+        os.set_blocking(self._out, False)
+
+    def load(self) -> Generator[None, None, Kinds]:
+        """Loads the file; returns a stand-in for each element, by kind.
+
+        Raises PluginError where it does not load, ends its process, or does not come to an end within the limit.
+        """
+        reply = yield from self._ask({"source": self._source, "origin": self._origin}, "as it loaded", PluginError)
+        return {kind: _stand_in(kind, declared) for kind, declared in reply["kinds"].items()}
+
+    def make(self, elements: Iterable[ElementTable]) -> Steps:
+        """Makes elements of resolved tables and has each give a force at rest; raises ElementError as ``load`` does."""
+        asked = [[element.name, dict(element.parameters)] for element in elements]
+        names = " and ".join(f"the element {name}" for name, _ in asked)
+        if asked:
+            yield from self._ask({"make": asked}, f"as {names} was made and gave a force at rest", ElementError)
+
+    def _ask(self, request: Mapping[str, Any], when: str, kind: type[Exception]) -> Generator[None, None, Any]:
+        to_send, answer = json.dumps(request).encode() + b"\n", b""
+        give_up = time.monotonic() + self._limit_s
+        while not answer.endswith(b"\n"):
+            with contextlib.suppress(BlockingIOError, BrokenPipeError):
+                to_send = to_send[os.write(self._in, to_send) :] if to_send else to_send
+            with contextlib.suppress(BlockingIOError):
+                data = os.read(self._out, 1 << 16)
+                answer += data
+                if not data or len(answer) > _LARGEST:
+                    raise kind(f"The plugin {self._origin} ended the process it was tried in {when}: {self._end()}.")
+            if time.monotonic() > give_up:
+                raise kind(f"The plugin {self._origin} was given up: {self._limit_s:g} s were not enough {when}.")
+            yield
+        try:
+            reply = json.loads(answer)
+        except ValueError:
+            raise kind(f"The plugin {self._origin} answered for the process it was tried in {when}.") from None
+        if "error" in reply:
+            raise kind(reply["error"])
+        return reply
+
+    def _end(self) -> str:
+        try:
+            code = self._process.wait(timeout=1.0)
+        except subprocess.TimeoutExpired:
+            return "it closed its output"
+        return f"killed by {signal.Signals(-code).name}" if code < 0 else f"exit status {code}"
+
+    def wait(self, steps: Generator[None, None, Any]) -> Any:
+        """Goes through steps of this trial with nothing else to do; returns what they return."""
+        while True:
+            try:
+                next(steps)
+            except StopIteration as done:
+                return done.value
+            select.select([self._out], [], [], _LOOK_S)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Ends the process and what it has started, unless that has left its group."""
+        with contextlib.suppress(ProcessLookupError, PermissionError):
+            os.killpg(self._process.pid, signal.SIGKILL)
+        self._process.kill()
+        self._process.wait()
+        for pipe in (self._process.stdin, self._process.stdout):
+            if pipe:
+                with contextlib.suppress(OSError):
+                    pipe.close()
+
+
+def with_code(kinds: Mapping[str, type[Element]], files: Iterable[Path]) -> Kinds:
+    """Returns the kinds with the elements of these files in place of their stand-ins; this process then runs the files.
+
+    Raises PluginError where one does not load.
+    """
+    if not any(issubclass(element, StandIn) for element in kinds.values()):
+        return dict(kinds)
+    return {**kinds, **{kind: element for file in files for kind, element in load_plugin(file).items()}}
+
+
+def _stand_in(kind: str, declared: Mapping[str, Any]) -> type[Element]:
+    annotations = {name: Annotated[float, Quantity(**of)] for name, of in declared["parameters"].items()}
+    defaults = declared["defaults"]
+    about = {"__doc__": declared["about"], "__module__": __name__, "__annotations__": annotations}
+    return type(declared["name"], (StandIn,), about | defaults | {"kind": kind, "linear": declared["linear"]})

@@ -1,0 +1,102 @@
+"""A process in which a plugin is tried before anything depends on it: ``python -m haploop.controller.trial``.
+
+Stdin brings one JSON object a line, answered by one on what was stdout. ``source`` and ``origin`` of a file are
+answered by ``kinds``, the elements it declares; ``make``, a list of kinds and parameters, by ``made``; what fails by
+``error``, a sentence. It ends with whoever started it, and has a limit on memory; the other side sets one on time.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import json
+import os
+import queue
+import sys
+import threading
+from typing import Any, TextIO
+
+from haploop.controller.active_elements import make_element
+from haploop.controller.dissipation.element import Element, ElementError, Motion
+from haploop.controller.dissipation.registry import PluginError, load_source
+from haploop.protocol.scene.scene import ElementTable
+
+_MOST_BYTES = 4 << 30
+Reply = dict[str, Any]
+
+
+def main() -> None:
+    """Answers requests until there are no more."""
+    answers = os.fdopen(os.dup(1), "w", encoding="utf-8")
+    nowhere = os.open(os.devnull, os.O_RDWR)
+    os.dup2(nowhere, 1)  # what the file prints, it prints again where it is used
+    os.dup2(nowhere, 2)
+    _limit_memory()
+    requests: queue.SimpleQueue[str] = queue.SimpleQueue()
+    threading.Thread(target=_read, args=(sys.stdin, requests), daemon=True).start()
+    sys.stdin = os.fdopen(nowhere)
+    kinds: dict[str, type[Element]] = {}
+    while True:
+        request = json.loads(requests.get())
+        try:
+            reply = _load(request, kinds) if "source" in request else _make(request["make"], kinds)
+        except (PluginError, ElementError) as error:
+            reply = {"error": str(error)}
+        except BaseException as error:  # whatever the file raises, it is told
+            reply = {"error": f"The plugin cannot be used: {type(error).__name__}: {error}"}
+        print(json.dumps(reply), file=answers, flush=True)
+
+
+def _read(asked: TextIO, requests: queue.SimpleQueue[str]) -> None:
+    for line in asked:
+        requests.put(line)
+    os._exit(0)
+
+
+def _limit_memory() -> None:
+    import resource
+
+    physical = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    limit = min(_MOST_BYTES, physical // 2)
+    with contextlib.suppress(OSError, ValueError):
+        resource.setrlimit(resource.RLIMIT_DATA, (limit, limit))
+        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+
+
+def _load(request: Reply, kinds: dict[str, type[Element]]) -> Reply:
+    kinds.update(load_source(request["source"], request["origin"]))
+    return {"kinds": {kind: _declaration(element, request["origin"]) for kind, element in kinds.items()}}
+
+
+def _declaration(element: type[Element], origin: str) -> Reply:
+    parameters, defaults = {}, {}
+    for name, (quantity, default) in element.parameters().items():
+        parameters[name] = dataclasses.asdict(quantity)
+        if default is not dataclasses.MISSING:
+            try:
+                defaults[name] = float(default)
+            except (TypeError, ValueError):
+                raise PluginError(f"{origin}: the default of {name} must be a number, but is {default!r}.") from None
+    words = {"name": element.__name__, "about": element.__doc__, "linear": bool(element.linear)}
+    return {**words, "parameters": parameters, "defaults": defaults}
+
+
+def _make(elements: list[tuple[str, dict[str, float]]], kinds: dict[str, type[Element]]) -> Reply:
+    """Makes each element and has it give a force at rest, out of contact and in it."""
+    for kind, parameters in elements:
+        element, _ = make_element(ElementTable(name=kind, parameters=parameters), kinds)
+        memory = element.memory
+        for contact in (False, True):
+            motion = Motion(0.001, -1.0)
+            motion.contact = contact
+            try:
+                force = element.force(motion) if memory is None else element.force(motion, memory)[0]
+                float(force)
+            except Exception as error:
+                what = f"{type(error).__name__}: {error}"
+                raise ElementError(f"The element {kind} gave no force when it was tried at rest: {what}.") from error
+    return {"made": len(elements)}
+
+
+if __name__ == "__main__":
+    main()
