@@ -166,7 +166,7 @@ class Supervisor:
         self._server.serve()
         while not ((node := self._server.roster.own(child.role)) and node.done):
             if self._machine.now() > given_up:
-                refused = self._server.roster.refused.get(child.role)
+                refused = "" if node else self._server.roster.refused.get(child.role)
                 raise RunFailed(f"The {child.role} {ended}; {refused or self._where()}")
             self._server.socket.poll(20)
             self._server.serve()

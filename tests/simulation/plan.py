@@ -1,0 +1,150 @@
+"""What a seed draws: the scene, the temper of the network, and what happens when."""
+
+from __future__ import annotations
+
+import errno
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from random import Random
+from typing import Any
+
+from simulation.faults import (
+    ALL,
+    OPERATIONS,
+    OWN,
+    DiskFull,
+    Fault,
+    Garble,
+    Kill,
+    Late,
+    LateStart,
+    Refuse,
+    Signals,
+    Slow,
+    SlowDisk,
+    Stop,
+    When,
+)
+from simulation.scenes import NAMES
+from simulation.visitors import Commands, Impostor, Listener, SecondLogger, Stranger
+
+from helpers.live.attacks import SOCKETS, impossible_commands, junk, pack
+
+_TICKS = 70
+_STAYS = ("stays", 0.0)
+# Those that ``ask`` can send.
+_IMPOSSIBLE = [
+    (verb, arguments)
+    for verb, arguments in impossible_commands()
+    if isinstance(arguments, dict) and all(type(key) is str and key != "self" for key in arguments)
+]
+_FORCES = ("1 N", None, [0.0], {"force": 1.0})
+_GARBLED = [*junk(), *(pack(1, code, tick, [force]) for code in (21, 22) for tick in (0, 20, 40) for force in _FORCES)]
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A history before it happens: the same plan always gives the same history.
+
+    Attributes:
+        seed: of the network and of who runs when.
+        jumpiness, latency_s: as of ``World``.
+        pace: simulated seconds a second.
+        starts_s: what each process takes to start, by role.
+    """
+
+    seed: int
+    scene: str
+    jumpiness: float
+    latency_s: float
+    pace: float
+    starts_s: dict[str, float]
+    faults: tuple[Fault, ...]
+
+
+def draw(seed: int) -> Plan:
+    """Draws the plan of a seed: the scene, the network, and up to six faults; one in twelve has none."""
+    dice = Random(f"plan {seed}")
+    faults = tuple(_fault(dice) for _ in range(dice.choice((0, 1, 1, 1, 1, 2, 2, 2, 3, 3, 4, 6))))
+    return Plan(
+        seed,
+        dice.choice(NAMES),
+        dice.choice((0.0, 0.01, 0.05, 0.2)),
+        dice.choice((20e-6, 100e-6, 400e-6)),
+        dice.choice((math.inf, math.inf, math.inf, 1.0, 0.1, 0.03)),
+        {role: dice.uniform(0.01, 0.6) for role in OWN},
+        faults,
+    )
+
+
+def _when(dice: Random) -> When:
+    if dice.random() < 0.25:
+        return When(-1, dice.uniform(0.0, 0.7))
+    soon_s = dice.expovariate(1e3)
+    return When(dice.randint(0, _TICKS), dice.choice((0.0, soon_s, soon_s, dice.random(), 3.0 * dice.random())))
+
+
+def _fate(dice: Random) -> tuple[str, float]:
+    return dice.choice(("stays", "stays", "leaves", "killed", "stopped")), dice.expovariate(20.0)
+
+
+def _fault(dice: Random) -> Fault:
+    """Draws one fault; what ends a run is rarer than what it must go through."""
+    make, weight = zip(*_KINDS.items(), strict=True)
+    return dice.choices(make, weight)[0](dice)
+
+
+def _commands(dice: Random) -> Commands:
+    commands: list[tuple[str, dict[str, Any], float]] = []
+    for _ in range(dice.randint(1, 3)):
+        match dice.choice(("ask", "pause", "step", "pace", "stop", "set", "set", "swap", "swap", "impossible")):
+            case "ask":
+                commands.append((dice.choice(("status", "options")), {}, dice.expovariate(100.0)))
+            case "pause":
+                commands += [("pause", {}, dice.expovariate(2.0)), ("resume", {}, 0.0)]
+            case "step":
+                steps = [("step", {"ticks": dice.randint(1, 30)}, dice.expovariate(10.0)) for _ in range(2)]
+                commands += [*steps, ("resume", {}, 0.0)]
+            case "pace":
+                commands.append(("pace", {"pace": dice.choice(("free", 0.1, 3.0, 40.0))}, dice.expovariate(10.0)))
+            case "stop":
+                commands.append(("stop", {}, 0.0))
+            case "set":
+                key, value = dice.choice(
+                    (
+                        ("wall.stiffness", dice.uniform(0.0, 900.0)),
+                        ("wall.position", dice.uniform(-0.02, 0.0)),
+                        ("dissipation.0.damping", dice.uniform(0.0, 1.0)),
+                        ("clock.round_trip_delay", dice.randint(0, 60) / 10_000),
+                    )
+                )
+                at = {"at": dice.uniform(0.0, 0.08)} if dice.random() < 0.4 else {}
+                commands.append(("set", {"set": {key: value}, **at}, dice.expovariate(100.0)))
+            case "swap":
+                kind = dice.choice(({"kind": "none"}, {"kind": "damping", "damping": dice.random()}))
+                arguments = {"swap": kind, "element": dice.randint(0, 1)}
+                commands.append(("swap", arguments, dice.expovariate(100.0)))
+            case _:
+                commands.append((*dice.choice(_IMPOSSIBLE), 0.0))
+    return Commands(_when(dice), _STAYS, tuple(commands))
+
+
+# Maker of a fault -> how often it is drawn.
+_KINDS: dict[Callable[[Random], Fault], int] = {
+    lambda dice: Kill(_when(dice), dice.choice(OWN)): 3,
+    lambda dice: Stop(_when(dice), dice.choice(ALL), dice.choice((0.05, 0.5, 3.0, 8.0))): 3,
+    lambda dice: Slow(_when(dice), dice.choice(ALL), dice.choice((1e-4, 1e-3, 5e-3))): 3,
+    lambda dice: Late(_when(dice), dice.choice(ALL), dice.choice((1e-3, 0.02, 0.2)), dice.random()): 3,
+    lambda dice: LateStart(When(-1, 0.0), dice.choice(OWN), dice.uniform(0.0, 10.0)): 2,
+    lambda dice: DiskFull(_when(dice), dice.choice((0, dice.randint(0, 30_000)))): 1,
+    lambda dice: Refuse(_when(dice), dice.choice(OPERATIONS), dice.choice((errno.EIO, errno.EROFS))): 1,
+    lambda dice: SlowDisk(_when(dice)): 1,
+    lambda dice: Garble(_when(dice), dice.choice(OWN[:2]), dice.choice(_GARBLED)): 1,
+    lambda dice: Signals(_when(dice), dice.choice((1, 1, 2))): 2,
+    _commands: 6,
+    lambda dice: Listener(_when(dice), _fate(dice), dice.random() < 0.5, dice.choice((0.005, 0.03, 0.3))): 3,
+    lambda dice: SecondLogger(_when(dice), _fate(dice)): 3,
+    lambda dice: Stranger(_when(dice), _STAYS, dice.choice(SOCKETS), dice.choice((5, 30, 600)), dice.randrange(999)): 3,
+    lambda dice: Impostor(_when(dice), _STAYS, dice.choice(OWN)): 1,
+}

@@ -1,0 +1,94 @@
+"""Histories in virtual time: whatever a seed does to a run, it keeps what haploop promises (docs/reliability.md)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from simulation.defects import DEFECTS, put_back, seeds_needed
+from simulation.faults import Kill, LateStart, Stop, When
+from simulation.plan import Plan, draw
+from simulation.play import play
+from simulation.shrink import fewest, shrink, tell
+from simulation.visitors import Impostor, SecondLogger
+
+_STARTS_S = {"plant": 0.1, "controller": 0.2, "logger": 0.3}
+_CALM = Plan(0, "wall", 0.0, 1e-4, math.inf, _STARTS_S, ())
+_STAYS = ("stays", 0.0)
+# Histories that once broke a promise: nodes waited for, and a run ended, by the deadline of a loop that runs; a clock
+# that asked the time without end while nodes loaded; an impostor's refusal told as the reason of a death.
+_RECORDED = {
+    "a controller that takes 9 s to start, in a scene whose deadline is 2 s": (
+        LateStart(When(-1, 0.0), "controller", 9.0),
+    ),
+    "a plant stopped for 3 s before the others have joined": (Stop(When(-1, 0.23), "plant", 3.0),),
+    "an impostor with the secret, and a death": (
+        Impostor(When(-1, 0.4), _STAYS, "plant"),
+        Kill(When(21, 0.002), "plant"),
+    ),
+    "a second logger that joins as the run ends": (SecondLogger(When(69, 0.0), _STAYS),),
+}
+
+
+def broken_in(seeds: range) -> str:
+    """The first seed that breaks a promise, with its plan; "" where none does."""
+    for seed in seeds:
+        if broken := play(draw(seed), reads_log=seed % 4 == 0).broken:
+            return f"{broken}\n{tell(draw(seed))}\nIts shortest history: make simulate FROM={seed} SEEDS=1"
+    return ""
+
+
+@pytest.mark.parametrize("part", range(4))
+def test_a_share_of_the_seeds_keeps_every_promise(part: int) -> None:
+    assert broken_in(range(40 * part, 40 * part + 40)) == ""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("part", range(9))
+def test_two_thousand_seeds_keep_every_promise(part: int) -> None:
+    assert broken_in(range(200 + 200 * part, 400 + 200 * part)) == ""
+
+
+@pytest.mark.parametrize("pace", [math.inf, 0.5])
+@pytest.mark.parametrize("what", _RECORDED)
+def test_a_history_that_broke_a_promise_once_keeps_it(what: str, pace: float) -> None:
+    assert play(replace(_CALM, faults=_RECORDED[what], pace=pace)).broken == ""
+
+
+def test_a_seed_gives_the_same_history_again() -> None:
+    plan = next(plan for plan in map(draw, range(1000)) if len(plan.faults) == 6 and plan.jumpiness == 0.2)
+    first, second = play(plan), play(plan)
+    assert first.history == second.history
+    assert first.how == second.how
+    assert len(first.history) > 6
+
+
+@given(st.lists(st.integers(0, 9), unique=True, max_size=9), st.sets(st.integers(0, 9), max_size=3))
+def test_of_what_was_drawn_only_that_is_kept_without_which_nothing_fails(drawn: list[int], guilty: set[int]) -> None:
+    if guilty <= set(drawn):
+        assert set(fewest(drawn, lambda kept: guilty <= set(kept))) == guilty
+
+
+def test_a_failing_history_is_told_without_the_faults_that_have_no_part_in_it() -> None:
+    late = LateStart(When(-1, 0.0), "logger", 9.0)
+    plan = replace(
+        _CALM, jumpiness=0.05, faults=(SecondLogger(When(3, 0.0), _STAYS), late, Kill(When(40, 0.0), "plant"))
+    )
+    with put_back("the deadline of a running loop rules its start"):
+        shortest = shrink(plan, lambda candidate: bool(play(candidate).broken))
+    assert shortest.faults == (late,)
+    assert (shortest.jumpiness, shortest.scene) == (0.0, "least")
+
+
+@pytest.mark.parametrize("defect", ["a grant goes back when a slower node joins", "END with a reason is not sent"])
+def test_a_defect_put_back_is_found_at_once(defect: str) -> None:
+    assert seeds_needed(defect, 50) is not None
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("defect", DEFECTS)
+def test_every_defect_put_back_is_found_within_ten_thousand_seeds(defect: str) -> None:
+    assert seeds_needed(defect, 10_000) is not None
