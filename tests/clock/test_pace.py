@@ -57,13 +57,6 @@ def test_a_plant_that_stands_still_is_never_granted_more_than_it_may_make_up_for
     assert subject.grant(TICKS, 0.5, CATCH_UP) == 2 * CATCH_UP
 
 
-def test_before_the_first_grant_nothing_is_due_so_that_nobody_asks_again_and_again_while_nodes_load() -> None:
-    subject = clock(1.0)
-    assert subject.wait_s(0.0) is None
-    granted(subject, now=3.0)
-    assert subject.wait_s(3.0) == pytest.approx(0.001)
-
-
 def test_time_spent_standing_still_is_neither_made_up_for_nor_lost() -> None:
     subject = clock(1.0)
     granted(subject, now=100.0)

@@ -14,9 +14,8 @@ from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
-from simulation.plan import draw
+from simulation.plan import draw, shrink, tell
 from simulation.play import play
-from simulation.shrink import shrink, tell
 
 _PIECE = 50
 

@@ -7,8 +7,6 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 import msgpack
-from simulation.plan import draw
-from simulation.play import play
 
 from haploop.launch.clock.clock import Clock
 from haploop.launch.clock.roster import Roster
@@ -19,6 +17,8 @@ from haploop.protocol.transport.clock_client import ClockClient
 from haploop.protocol.transport.loop import LoopError, PlantEnd
 from haploop.protocol.transport.messages import MESSAGES, PROCESSES, VERSION
 from haploop.protocol.transport.telemetry import Publisher, Subscriber
+from simulation.plan import draw
+from simulation.play import play
 
 Method = Callable[..., Any]
 

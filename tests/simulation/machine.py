@@ -11,11 +11,10 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from simulation.sockets import SimContext, SimPoller
-from simulation.world import Process, World
-
 from haploop.protocol.transport.messages import PROCESSES
 from haploop.protocol.transport.node import take_part
+from simulation.sockets import SimContext, SimPoller
+from simulation.world import Process, World
 
 
 @dataclass

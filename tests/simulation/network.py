@@ -11,6 +11,7 @@ from collections import deque
 from typing import Any
 
 import zmq
+
 from simulation.world import World
 
 Frames = list[bytes]

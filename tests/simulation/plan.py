@@ -1,14 +1,18 @@
-"""What a seed draws: the scene, the temper of the network, and what happens when."""
+"""What a seed draws: the scene, the temper of the network, and what happens when; and how little of it still fails.
+
+A failing plan is shortened by delta debugging (Zeller & Hildebrandt 2002).
+"""
 
 from __future__ import annotations
 
 import errno
 import math
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from random import Random
-from typing import Any
+from typing import Any, TypeVar
 
+from helpers.live.attacks import SOCKETS, impossible_commands, junk, pack
 from simulation.faults import (
     ALL,
     OPERATIONS,
@@ -26,10 +30,10 @@ from simulation.faults import (
     Stop,
     When,
 )
-from simulation.scenes import NAMES
+from simulation.reference import NAMES
 from simulation.visitors import Commands, Impostor, Listener, SecondLogger, Stranger
 
-from helpers.live.attacks import SOCKETS, impossible_commands, junk, pack
+Part = TypeVar("Part")
 
 _TICKS = 70
 _STAYS = ("stays", 0.0)
@@ -148,3 +152,35 @@ _KINDS: dict[Callable[[Random], Fault], int] = {
     lambda dice: Stranger(_when(dice), _STAYS, dice.choice(SOCKETS), dice.choice((5, 30, 600)), dice.randrange(999)): 3,
     lambda dice: Impostor(_when(dice), _STAYS, dice.choice(OWN)): 1,
 }
+
+
+def fewest(parts: Sequence[Part], fails: Callable[[tuple[Part, ...]], bool]) -> tuple[Part, ...]:
+    """Returns a part of ``parts``, in order, that still fails and of which none can be left out."""
+    kept, pieces = tuple(parts), 2
+    while kept:
+        size = math.ceil(len(kept) / pieces)
+        rests = [kept[:first] + kept[first + size :] for first in range(0, len(kept), size)]
+        smaller = next((rest for rest in rests if fails(rest)), None)
+        if smaller is not None:
+            kept, pieces = smaller, max(pieces - 1, 2)
+        elif size == 1:
+            break
+        else:
+            pieces = min(2 * pieces, len(kept))
+    return kept
+
+
+def shrink(plan: Plan, breaks: Callable[[Plan], bool]) -> Plan:
+    """Returns the plan with the fewest faults, the calmest network and the least scene that still breaks a promise."""
+    plan = replace(plan, faults=fewest(plan.faults, lambda faults: breaks(replace(plan, faults=faults))))
+    for calmer in ({"pace": math.inf}, {"jumpiness": 0.0}, {"scene": "least"}):
+        if breaks(candidate := replace(plan, **calmer)):
+            plan = candidate
+    return plan
+
+
+def tell(plan: Plan) -> str:
+    """Returns a plan in lines."""
+    temper = f"scene {plan.scene}, pace {plan.pace:g}, latency {plan.latency_s:g} s, jumpiness {plan.jumpiness:g}"
+    faults = [f"  {fault}" for fault in plan.faults] or ["  no fault at all"]
+    return "\n".join([f"seed {plan.seed}: {temper}", *faults])

@@ -13,17 +13,15 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from simulation.faults import Fault, Kill, Signals
-from simulation.machine import Disk, SimRun
-from simulation.plan import Plan
-from simulation.reference import difference, logged_ticks
-from simulation.scenes import DEADLINE_S, scene_of
-from simulation.watch import Watch
-from simulation.world import Process, Stuck, World
-
 from haploop.launch.processes.supervisor import run_processes
 from haploop.launch.spec import RunFailed, RunSpec
 from helpers.scenes.least import KINDS
+from simulation.faults import Fault, Kill, Signals
+from simulation.machine import Disk, SimRun
+from simulation.plan import Plan
+from simulation.reference import DEADLINE_S, difference, logged_ticks, scene_of
+from simulation.watch import Watch
+from simulation.world import Process, Stuck, World
 
 # What the start may take, and what a run may take to end after all that held it up.
 _START_S, _PATIENCE_S = 20.0, 30.0
@@ -200,7 +198,6 @@ class Outcome:
     history: list[tuple[float, str]] = field(default_factory=list)
     how: str = ""
     kinds: list[str] = field(default_factory=list)
-    events: int = 0
 
 
 @contextlib.contextmanager
@@ -229,8 +226,6 @@ def play(plan: Plan, reads_log: bool = True) -> Outcome:
         sim.world.clear_away()
         error = sim.run.launcher.error
         how = type(error).__name__ if error else "in order"
-        return Outcome(
-            broken, list(sim.world.history), how, [type(fault).__name__ for fault in sim.happened], sim.world._number
-        )
+        return Outcome(broken, list(sim.world.history), how, [type(fault).__name__ for fault in sim.happened])
     finally:
         shutil.rmtree(directory)

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import zmq
+
 from simulation.network import Frames, Lane, Pipe
 from simulation.world import Process, World
 

@@ -10,8 +10,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import zmq
-from simulation.faults import Fault
-from simulation.world import Process
 
 from haploop.launch.processes.run_directory import CommandRefused, LiveRun, RunNotFound, ask
 from haploop.logger.books.buffers import TelemetryGap
@@ -22,6 +20,8 @@ from haploop.protocol.transport.observer import Observer
 from haploop.protocol.transport.wire import encode
 from haploop.view.receive.run_session import RunSession
 from helpers.live.attacks import false_joins, junk, out_of_place
+from simulation.faults import Fault
+from simulation.world import Process
 
 if TYPE_CHECKING:
     from simulation.play import Sim

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 
 import msgpack
 import zmq
-from simulation.world import Process
 
 from haploop.protocol.changes import Event
 from haploop.protocol.transport.messages import BY_CODE
 from haploop.protocol.transport.wire import decode
+from simulation.world import Process
 
 if TYPE_CHECKING:
     from simulation.machine import SimRun
