@@ -14,6 +14,7 @@ from aiohttp.typedefs import Handler
 
 from haploop.view.receive.runs import Runs
 from haploop.view.serve.assets import TYPES, assets
+from haploop.view.serve.connections import SILENT_S, Connections, Heard, quiet_logger
 from haploop.view.serve.guard import HOST, Guard
 from haploop.view.serve.page import Page
 from haploop.view.viewer import Viewer
@@ -28,8 +29,8 @@ _GOODBYE_S = 1.0
 _WAITING_BYTES = 256 * 1024
 
 
-def make_app(viewer: Viewer, guard: Guard) -> web.Application:
-    """Makes the web application.
+def make_app(viewer: Viewer, guard: Guard, heard: Heard) -> web.Application:
+    """Makes the web application, which notes in ``heard`` the connections from which a request has come.
 
     GET / is the page, /static/NAME its files, /stream a WebSocket (see :mod:`haploop.view.serve.page`), /enter/KEY
     the way in for a browser that is started with a link.
@@ -67,6 +68,7 @@ def make_app(viewer: Viewer, guard: Guard) -> web.Application:
 
     @web.middleware
     async def only_by_name(request: web.Request, handler: Handler) -> web.StreamResponse:
+        heard.add(request.protocol)
         if not guard.is_own_host(request.headers.get(hdrs.HOST)):
             raise web.HTTPForbidden(text=f"This server answers at {guard.address} alone.")
         return await handler(request)
@@ -124,17 +126,24 @@ async def serve(
     for number in (signal.SIGINT, signal.SIGTERM):
         with contextlib.suppress(NotImplementedError, RuntimeError, ValueError):  # not in the main thread
             loop.add_signal_handler(number, end.set)
-    runner = web.AppRunner(make_app(viewer, guard), access_log=None, shutdown_timeout=_GOODBYE_S)
+    heard = Heard()
+    app = make_app(viewer, guard, heard)
+    quiet = {"access_log": None, "logger": quiet_logger()}
+    runner = web.AppRunner(app, **quiet, keepalive_timeout=SILENT_S, shutdown_timeout=_GOODBYE_S)
     await runner.setup()
+    assert runner.server
+    connections = Connections(runner.server, heard)
     following, ending = asyncio.create_task(viewer.follow_runs()), asyncio.create_task(end.wait())
+    closing = asyncio.create_task(connections.close_silent())
+    server = await loop.create_server(connections.open, sock=listening)
     try:
-        await web.SockSite(runner, listening).start()
         on_serving(guard)
         await asyncio.wait((following, ending), return_when=asyncio.FIRST_COMPLETED)
         if following.done():
             following.result()
     finally:
-        for task in (following, ending):
+        server.close()
+        for task in (following, ending, closing):
             task.cancel()
         with contextlib.suppress(asyncio.CancelledError):
             await following
