@@ -39,21 +39,30 @@ class Answer:
         return "it failed without a word" if self.status and not said else ""
 
 
+# Standing still for so many times as long as a command may compute is no matter of a busy machine either.
+_WAITING = 10.0
+
+
 @contextlib.contextmanager
-def _at_most(seconds: float) -> Iterator[None]:
+def at_most(seconds: float) -> Iterator[None]:
+    """Raises Hung after some seconds of computing, or ten times as long of wall time."""
+
     def end(_number: int, _frame: FrameType | None) -> None:
         raise Hung
 
-    before = signal.signal(signal.SIGALRM, end)
-    signal.setitimer(signal.ITIMER_REAL, seconds)
+    clocks = {signal.SIGPROF: (signal.ITIMER_PROF, 1.0), signal.SIGALRM: (signal.ITIMER_REAL, _WAITING)}
+    before = {number: signal.signal(number, end) for number in clocks}
     try:
+        for clock, factor in clocks.values():
+            signal.setitimer(clock, factor * seconds)
         yield
     finally:
-        signal.setitimer(signal.ITIMER_REAL, 0)
-        signal.signal(signal.SIGALRM, before)
+        for number, (clock, _) in clocks.items():
+            signal.setitimer(clock, 0)
+            signal.signal(number, before[number])
 
 
-def ask(*words: str, seconds: float = 20.0) -> Answer:
+def ask(*words: str, seconds: float = 10.0) -> Answer:
     """Runs ``haploop WORDS`` to its end."""
     streams = io.BytesIO(), io.BytesIO()
     stdout, stderr = (io.TextIOWrapper(raw, "utf-8", write_through=True) for raw in streams)
@@ -61,7 +70,7 @@ def ask(*words: str, seconds: float = 20.0) -> Answer:
     before, sys.argv = sys.argv, ["haploop", *words]
     status, fault = 0, ""
     try:
-        with contextlib.redirect_stdout(stdout), contextlib.redirect_stderr(stderr), _at_most(seconds):
+        with contextlib.redirect_stdout(stdout), contextlib.redirect_stderr(stderr), at_most(seconds):
             main()
     except SystemExit as end:
         status = end.code if isinstance(end.code, int) else 0 if end.code is None else 1

@@ -13,6 +13,7 @@ from haploop.controller.dissipation import Element, load_plugin, registry
 from haploop.launch.runs.in_process import run_in_process
 from haploop.launch.runs.run_files import recorded_log, recorded_scene, recorded_summary
 from haploop.launch.spec import PLUGINS, SCENE, RunFailed
+from haploop.logger.log import LogError
 from haploop.logger.log.recording import Recording
 from haploop.logger.summary import Summary, finite
 from haploop.protocol.changes import Event
@@ -55,6 +56,11 @@ def replay(directory: Path) -> Replay:
             summary = run_in_process(scene, kinds, out=Path(scratch), events=events)
         except RunFailed:  # then ticks are missing, and the comparison says so
             summary = recorded_summary(Path(scratch)) or {}
+        except LogError as error:
+            why = getattr(error.__cause__, "strerror", None) or "it could not be written"
+            raise LogError(
+                f"The repetition keeps a log in {scratch} meanwhile: {why}. Make room or set TMPDIR."
+            ) from error
         repeated = haploop.logger.read(scratch)
     failed = before is not None and before["ended"] == "failed"
     differences = _compare_scenes(directory, recorded) + _compare(recorded, repeated, failed)

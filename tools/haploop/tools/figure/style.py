@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import io
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -101,9 +103,20 @@ def empty_figure(width_in: float, height_in: float) -> Figure:
 
 
 def write_figure(figure: Figure, target: Path) -> Path:
-    """Writes a figure in the format of the file's suffix; returns the file. FigureError where it cannot be written."""
+    """Writes a figure in the format of the file's suffix; returns the file.
+
+    Raises FigureError where it cannot be written; a figure that was there then stays.
+    """
+    picture, part = io.BytesIO(), target.with_name(f"{target.name}.part")
     try:
-        figure.savefig(target, dpi=_DPI)
+        figure.savefig(picture, dpi=_DPI, format=target.suffix.removeprefix(".") or None)
+        try:
+            part.write_bytes(picture.getbuffer())
+            part.replace(target)
+        except OSError:
+            with contextlib.suppress(OSError):
+                part.unlink()
+            raise
     except ValueError as error:  # which names the formats there are
         raise FigureError(f"The figure {target} cannot be written: {error}.") from error
     except OSError as error:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import sys
 import time
@@ -146,6 +147,8 @@ def _directory(request: Request, made: Sweep) -> Path:
         part.write_text(text, encoding="utf-8")
         part.replace(directory / SWEEP)
     except OSError as error:
+        with contextlib.suppress(OSError):
+            part.unlink()
         raise OutputError(f"{directory / SWEEP} cannot be written: {error.strerror}.") from error
     return directory
 
