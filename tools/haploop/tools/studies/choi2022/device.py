@@ -6,8 +6,8 @@ The nearest interpretation of it is a scene file: launch/scenes/premium_press.to
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass, fields, replace
+import tomllib
+from dataclasses import asdict, dataclass, replace
 from functools import cache
 from pathlib import Path
 from typing import Any, Self
@@ -16,9 +16,10 @@ from haploop.protocol.scene.effects import Friction, Transmission
 from haploop.protocol.scene.estimators import Acceleration, Velocity
 from haploop.protocol.scene.hand_force import Constant
 from haploop.protocol.scene.scene import Device, ElementTable, Hand, Scene
+from haploop.tools.cost.grid import scenes_folder
 from haploop.tools.linear.stiffness_limit import smooth
 from haploop.tools.search.random import Row
-from haploop.tools.studies.choi2022.work import hand_of, shipped, wall_of
+from haploop.tools.studies.choi2022.runs import hand_of, shipped, wall_of
 
 Elements = tuple[ElementTable, ...]
 KINDS = ("nothing", "damping", "bidirectional-inertia", "unidirectional-inertia")
@@ -99,11 +100,6 @@ class Setup:
             friction_N=scene.friction.kinetic if scene.friction else 0.0,
         )
 
-    @classmethod
-    def from_row(cls, row: Mapping[str, Any]) -> Self:
-        """Takes it from a row that holds its values among others."""
-        return cls(**{key.name: row[key.name] for key in fields(cls)})
-
     def as_dict(self) -> Row:
         return asdict(self)
 
@@ -116,7 +112,6 @@ class Setup:
         spring = (2.0 * math.pi * self.mode_Hz) ** 2 * reduced
         bandwidth, late = UNITS[self.unit]
         cutoff, by_unit = VELOCITIES[self.velocity], self.acceleration == "unit"
-        hand = _with_impedance(_published_hand(), lambda value: value * self.hand)
         return replace(
             base,
             clock=replace(base.clock, round_trip_delay=self.delay_s),
@@ -130,7 +125,7 @@ class Setup:
             accelerometer=replace(unit, bandwidth=bandwidth, delay=late, mount=self.mount) if by_unit else None,
             velocity=Velocity(cutoff=cutoff) if cutoff else None,
             acceleration=Acceleration(source="accelerometer" if by_unit else "encoder"),
-            hand=replace(hand, force=Constant(value=-self.push_N)),
+            hand=replace(_hand_times(self.hand), force=Constant(value=-self.push_N)),
             wall=replace(wall_of(base), stiffness=float(stiffness)),
             friction=Friction(kinetic=self.friction_N) if self.friction_N else None,
             dissipation=elements,
@@ -183,11 +178,10 @@ def _rounded(value: float, digits: int = 3) -> float:
 
 
 @cache
-def _published_hand() -> Hand:
-    share = nearest().hand
-    return _with_impedance(hand_of(shipped(SCENE_FILE)), lambda value: _rounded(value / share, 6))
-
-
-def _with_impedance(hand: Hand, of: Callable[[float], float]) -> Hand:
-    grip = hand.grip and replace(hand.grip, stiffness=of(hand.grip.stiffness), damping=of(hand.grip.damping))
-    return replace(hand, mass=of(hand.mass), damping=of(hand.damping), stiffness=of(hand.stiffness), grip=grip)
+def _hand_times(share: float) -> Hand:
+    """Makes the published hand, so many times as heavy, damped and stiff."""
+    file = scenes_folder().parent / "hands" / "fu_cavusoglu_y.toml"
+    table = tomllib.loads(file.read_text(encoding="utf-8"))["hand"]
+    grip, hand = ({key: share * value for key, value in of.items() if key != "grip"} for of in (table["grip"], table))
+    base = hand_of(shipped(SCENE_FILE))
+    return replace(base, grip=base.grip and replace(base.grip, **grip), **hand)

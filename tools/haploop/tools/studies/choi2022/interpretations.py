@@ -1,18 +1,22 @@
 """Interpretations of a paper: one choice for everything that it leaves open, and for which of them its claims hold.
 
-A table of interpretations has a row each: its choices and numbers by key, and by name of each claim how far it falls
-short of it, 0.0 where the claim holds; ``all``, ``holding`` and ``distance`` sum that up (``summed_up``).
+What is open is told in ``interpretations.toml``. A table of interpretations has a row each: its choices and numbers by
+key, and by name of each claim how far it falls short of it, 0.0 where the claim holds; ``all``, ``holding`` and
+``distance`` sum that up (``summed_up``).
 """
 
 from __future__ import annotations
 
 import math
+import tomllib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 from itertools import pairwise
 from operator import itemgetter
+from pathlib import Path
 from types import MappingProxyType
-from typing import Any, Generic, NamedTuple, Self, TypeVar
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
@@ -20,15 +24,19 @@ from haploop.tools.render.units import amount
 from haploop.tools.search import random
 from haploop.tools.search.intervals import Interval, share_interval
 from haploop.tools.search.random import Effort, Evaluate, Group, Point, Row, Space, random_search
-from haploop.tools.studies.choi2022.claims import words_of
-from haploop.tools.studies.choi2022.work import Work
+from haploop.tools.studies.choi2022.answers import Answers
 
-Nearest = TypeVar("Nearest")
 SEED = 2022
 # An option with fewer interpretations says nothing.
 _FEWEST = 20
 # What falls short of a claim counts for no more than this: a factor of 20.
 MOST = 3.0
+
+
+@cache
+def tables_of(figure: int) -> dict[str, Any]:
+    """Returns what is open in a figure: ``choices``, ``numbers``, and the claims that are ``tested``."""
+    return tomllib.loads(Path(__file__).with_name("interpretations.toml").read_text(encoding="utf-8"))[str(figure)]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,23 +46,20 @@ class InterpretationSpace(Space):
     Attributes:
         labels: by key; the unit, where there is one, in brackets at the end.
         ours: our own interpretation, where there is one.
-        whys: why the bounds of a number are as they are.
     """
 
     labels: Mapping[str, str]
     ours: Point
-    whys: Mapping[str, str]
 
     @classmethod
-    def from_words(cls, figure: int, labels: Mapping[str, str] = MappingProxyType({}), **options: Any) -> Self:
-        """Makes the space of a figure of its tables ``choices`` and ``numbers``, labels of other values besides."""
-        choices, numbers = words_of(figure, "choices"), words_of(figure, "numbers")
+    def of_figure(cls, figure: int, labels: Mapping[str, str] = MappingProxyType({}), **options: Any) -> Self:
+        """Makes the space of a figure, with labels of other values besides."""
+        choices, numbers = tables_of(figure)["choices"], tables_of(figure)["numbers"]
         return cls(
             choices={key: tuple(one["options"]) for key, one in choices.items()},
             bounds={key: (one["from"], one["to"]) for key, one in numbers.items()},
             labels={key: one["label"] for key, one in (choices | numbers).items()} | dict(labels),
             ours=Point(*({key: one.get("ours") for key, one in of.items()} for of in (choices, numbers)), seed=1),
-            whys={key: one.get("why", "") for key, one in numbers.items()},
             **options,
         )
 
@@ -74,17 +79,11 @@ class InterpretationSpace(Space):
         return ", ".join(f"{self.label(key)} {self.value(key, values[key])}" for key in keys)
 
 
-@dataclass(frozen=True)
-class Found(Generic[Nearest]):
-    """The outcome of a search among interpretations.
-
-    Attributes:
-        rows: of every interpretation, with the ``stage`` at which it was run.
-        nearest: the interpretation nearest to the paper.
-    """
+class Found(NamedTuple):
+    """The outcome of a search: the rows of all interpretations, with their ``stage``, and the one nearest the paper."""
 
     rows: list[Row]
-    nearest: Nearest
+    nearest: Point
 
     def of(self, stage: str) -> list[Row]:
         """Returns the rows of a stage."""
@@ -92,12 +91,12 @@ class Found(Generic[Nearest]):
 
 
 def searched(
-    work: Work, space: Space, evaluate: Evaluate, effort: Effort, tie: Callable[[Row], float] = lambda _: 0.0
+    answers: Answers, space: Space, evaluate: Evaluate, effort: Effort, tie: Callable[[Row], float] = lambda _: 0.0
 ) -> random.Found:
     """Searches for the interpretation nearest to the paper: the same effort gives the same rows on any workers."""
 
     def evaluate_all(stage: str, evaluate: Evaluate, groups: Sequence[Group]) -> list[list[Row]]:
-        return work.map_parallel(f"{stage} interpretations, in groups", evaluate, groups)
+        return answers.map_parallel(f"{stage} interpretations, in groups", evaluate, groups)
 
     distance = itemgetter("distance")
     return random_search(space, evaluate, effort, seed=SEED, distance=distance, tie=tie, evaluate_all=evaluate_all)
@@ -146,13 +145,7 @@ def percent(value: float) -> str:
     return f"{100 * value:.1f} %" if value < 0.0995 else f"{min(99.0, 100 * value):.0f} %"
 
 
-def yes(row: Row, claim: str) -> str:
-    """Returns "yes" where a claim holds under an interpretation, else "no"."""
-    return "yes" if holds(row, claim) else "no"
-
-
-@dataclass(frozen=True)
-class Option:
+class Option(NamedTuple):
     """One option of a dimension, both by label, and the interpretations that took it."""
 
     dimension: str
@@ -182,38 +175,26 @@ def options(rows: Sequence[Row], space: InterpretationSpace) -> list[Option]:
 
 
 class Decider(NamedTuple):
-    """The best and the worst option of the dimension on which a claim hangs most."""
+    """The best and the worst option of the dimension on which a claim hangs most, with the shares of both."""
 
     best: Option
     worst: Option
+    shares: tuple[float, float]
 
-    def gap(self, claim: str) -> float:
-        """Returns the difference of their shares."""
-        return self.best.share(claim) - self.worst.share(claim)
-
-    def describe(self, claim: str) -> str:
-        """Returns the best option with its share and the worst with its."""
-        best, worst = percent(self.best.share(claim)), percent(self.worst.share(claim))
-        return f"{self.best} {best}, {self.worst.name} {worst}"
+    def __str__(self) -> str:
+        return f"{self.best} {percent(self.shares[0])}, {self.worst.name} {percent(self.shares[1])}"
 
 
-def decider(found: Iterable[Option], claim: str) -> Decider | None:
+def decider(found: Sequence[Option], claim: str) -> Decider | None:
     """Returns the options of the dimension whose shares differ most; None where no shares differ."""
-    by_dimension: dict[str, list[Option]] = {}
-    for option in found:
-        by_dimension.setdefault(option.dimension, []).append(option)
 
     def share_of(option: Option) -> float:
         return option.share(claim)
 
-    deciders = [Decider(max(one, key=share_of), min(one, key=share_of)) for one in by_dimension.values()]
-    most = max(deciders, key=lambda one: one.gap(claim), default=None)
-    return most if most and most.gap(claim) > 0.0 else None
-
-
-def never_together(rows: Sequence[Row], claims: Sequence[str]) -> str:
-    """Returns the pairs of claims that each hold somewhere, and nowhere both; empty if there are none."""
-    table = np.array([[holds(row, name) for name in claims] for row in rows], int)
-    both = table.T @ table
-    pairs = ((i, j) for i in range(len(claims)) for j in range(i) if not both[i, j] and both[i, i] and both[j, j])
-    return "; ".join(f"*{claims[i]}* and *{claims[j]}*" for i, j in pairs)
+    deciders: list[Decider] = []
+    for dimension in dict.fromkeys(option.dimension for option in found):
+        some = [option for option in found if option.dimension == dimension]
+        best, worst = max(some, key=share_of), min(some, key=share_of)
+        deciders.append(Decider(best, worst, (share_of(best), share_of(worst))))
+    most = max(deciders, key=lambda one: one.shares[0] - one.shares[1], default=None)
+    return most if most and most.shares[0] > most.shares[1] else None

@@ -22,7 +22,7 @@ _PARAMETERS = {
 SPRING = "spring"
 KINDS = (SPRING, "damping", "bidirectional-inertia", "unidirectional-inertia")
 STIFFNESS_N_M, DAMPING_N_S_M, MASS_KG = 150.0, 0.8, 0.01
-_SINE_TICKS, _PHASES, _TICKS = 400, 16, 4000
+_TICKS = 4000
 
 
 def forces(x_m: np.ndarray, kind: str, cutoff_Hz: float | None = None) -> np.ndarray:
@@ -91,7 +91,7 @@ def closed_form(kind: str, theta: np.ndarray, late: int) -> np.ndarray:
 
 
 def mean_taken(
-    kind: str, theta: np.ndarray, late: int, cutoff_Hz: float | None = None, ticks: int = 4000
+    kind: str, theta: np.ndarray, late: int, cutoff_Hz: float | None = None, ticks: int = _TICKS
 ) -> np.ndarray:
     """Returns the mean energy taken a sample under a sine of A = 1 by running the program's controller.
 
@@ -103,12 +103,6 @@ def mean_taken(
     return weights @ taken_J(x, forces(x, kind, cutoff_Hz), late)[ticks // 2 :] / weights.sum()
 
 
-def damper_J(frequency_Hz: np.ndarray) -> np.ndarray:
-    """Returns the mean energy a sample that 1 N s/m takes from a sine of 1 m: (2 / T) sin^2(theta / 2) cos(theta)."""
-    theta = 2.0 * np.pi * frequency_Hz * PERIOD_S
-    return 2.0 / PERIOD_S * np.sin(theta / 2.0) ** 2 * np.cos(theta)
-
-
 def bidirectional_J(frequency_Hz: np.ndarray, age_s: float | None) -> np.ndarray:
     """Returns the mean energy a sample that 1 kg takes from a sine of 1 m: |a| sin(theta / 2) sin(w (age + T / 2)).
 
@@ -116,27 +110,10 @@ def bidirectional_J(frequency_Hz: np.ndarray, age_s: float | None) -> np.ndarray
     The older the reading, the more it takes: all of what is moved at a quarter of a swing. Without an age it is a
     difference of differences: T old, and |a| = (2 / T)^2 sin^2(theta / 2).
     """
-    w, size, age = _reading(frequency_Hz, age_s)
-    return size * np.sin(w * PERIOD_S / 2.0) * np.sin(w * (age + PERIOD_S / 2.0))
-
-
-def unidirectional_J(frequency_Hz: np.ndarray, age_s: float | None) -> np.ndarray:
-    """Returns the mean energy a sample that 1 kg with the gate of eq. 9 takes, whatever the phase of the sine."""
-    w, size, age = _reading(frequency_Hz, age_s)
-    t = np.arange(_SINE_TICKS)[:, None, None] * PERIOD_S
-    phase = 2.0 * np.pi * np.arange(_PHASES)[:, None] / _PHASES
-    moved = np.diff(np.sin(w * t + phase), axis=0, prepend=np.nan)
-    a = -size * np.sin(w * (t - age) + phase)
-    force = np.where(moved[1:] * a[:-1] >= 0.0, a[1:], 0.0)
-    return (force[:-1] * moved[2:]).mean(axis=(0, 1))
-
-
-def _reading(frequency_Hz: np.ndarray, age_s: float | None) -> tuple[np.ndarray, np.ndarray, float]:
-    """Returns w, the amplitude of the reading, and its age."""
     w = 2.0 * np.pi * np.asarray(frequency_Hz, float)
-    if age_s is None:
-        return w, (2.0 / PERIOD_S * np.sin(w * PERIOD_S / 2.0)) ** 2, PERIOD_S
-    return w, w**2, age_s
+    half = np.sin(w * PERIOD_S / 2.0)
+    size = w**2 if age_s is not None else (2.0 / PERIOD_S * half) ** 2
+    return size * half * np.sin(w * ((PERIOD_S if age_s is None else age_s) + PERIOD_S / 2.0))
 
 
 def returned(frequency_Hz: float, *, before: bool = True) -> float:

@@ -4,15 +4,18 @@ A contact is *steady* where, some time after a push, the position swings by no m
 ("no unwanted vibration", Choi et al. 2022, V.B.3). An element's *largest steady stiffness* is the largest of 2.5, 3.0,
 ... N/mm up to which every wall is steady with one and the same size of it.
 
-Sizes are tried by the cheap form of it (``is_steady``): the push is the tap that begins the press. What is told as a
-result is judged (``judged_largest``), held still and pushed twice, from starts by which no size was chosen.
+Sizes are tried by the cheap form of it (``is_steady``): the push is the tap that begins the press. They are tried in
+batches on a grid that begins with 0, then between the neighbours of the best; the best is the one with the greatest
+mean over a few starts of what it holds, of several the one that swings least. What is told as a result is judged
+(``reached``), held still and pushed twice, from starts by which no size was chosen.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import NamedTuple
+from itertools import product
+from typing import NamedTuple, Self
 
 import numpy as np
 
@@ -21,7 +24,9 @@ from haploop.launch.batch.run import run_batch
 from haploop.logger.summary import Summary
 from haploop.protocol.scene.scene import Scene, by_window
 from haploop.tools.search.bisect import rungs_held
-from haploop.tools.studies.choi2022.device import Setup, elements_of
+from haploop.tools.search.intervals import Interval, mean_interval
+from haploop.tools.studies.choi2022.answers import Answers
+from haploop.tools.studies.choi2022.device import KINDS, Setup, elements_of
 
 STEP_N_M = 500.0
 # From 2.5 N/mm in steps of 0.5 (Choi et al. 2022, V.B.3), to where nothing here is steady any more.
@@ -30,8 +35,19 @@ STIFFNESSES = np.arange(2500.0, 8001.0, STEP_N_M)
 WIDEST_M = 2.0 * 28.7e-6
 # A press is looked at over the half second before this time; the tap that begins it comes after some 10 ms.
 WATCHED_S, BRIEFLY_S = 3.0, 1.5
+# Sizes of one element, N s/m or kg, and of both: dampings, then masses. Neighbours differ by some 10 and 25 per cent.
+DAMPINGS = np.append(0.0, np.geomspace(0.1, 10.0, 47))
+MASSES = np.append(0.0, np.geomspace(5e-4, 0.05, 47))
+PAIR_DAMPINGS = np.append(0.0, np.geomspace(0.4, 8.0, 13))
+PAIR_MASSES = np.append(0.0, np.geomspace(0.003, 0.045, 13))
+# Starts by which a size is chosen, and by which it is judged.
+CHOSEN_BY, JUDGED_BY = tuple(range(4)), tuple(range(100, 112))
+# Sizes tried between the neighbours of the best, of one element and of each of two.
+_FINER = {1: 16, 2: 6}
+# The walls are tried in so many parts, for so many cores to share; larger batches cost less.
+_PARTS = 4
 # With friction no two setups run in one batch, so that batches are small.
-FEWEST = 4
+_FEWEST = 4
 _GOLDEN = 0.5 * (5.0**0.5 - 1.0)
 # What is "steady" by the judge's own, stricter word no hand feels; a wider swing is so only if it does not grow.
 _NOT_STEADY = ("growing", "diverged", "no-contact")
@@ -64,7 +80,7 @@ def is_steady(result: Summary) -> bool:
 
 def run_all(scenes: Sequence[Scene], *, energy: bool = False) -> list[Summary]:
     """Returns the results of scenes, those of one structure in batches."""
-    return run_batch([*map(by_window, scenes)], registry(), energy=energy, fewest=FEWEST)
+    return run_batch([*map(by_window, scenes)], registry(), energy=energy, fewest=_FEWEST)
 
 
 def largest(steady: np.ndarray, stiffnesses: np.ndarray = STIFFNESSES) -> float:
@@ -81,30 +97,156 @@ def held(steady: np.ndarray) -> np.ndarray:
     return np.logical_and.accumulate(steady, axis=0).sum(axis=0)
 
 
-class Judged(NamedTuple):
-    """The largest stiffness in N/m up to which all are steady, and whether at it no hand feels what is left."""
+class Range(NamedTuple):
+    """What was tried of one element.
 
-    steady: float
-    unfelt: bool
-
-
-def judged_largest(setup: Setup, kind: str, sizes: Sequence[float], starts: Sequence[int]) -> list[Judged]:
-    """Returns what one size of an element comes to from each start, by the judge of runs.
-
-    The judge holds the hand, takes the noise away, pushes twice, and watches until it tells, for up to 16 s.
+    Attributes:
+        sizes: N s/m or kg, shape (sizes, 1), of damping with inertia (sizes, 2).
+        swings_m: of the position in the end, peak to peak, shape (stiffnesses, sizes, starts).
     """
-    elements = elements_of(kind, *sizes)
-    walls = [setup.scene(float(stiffness), elements) for stiffness in STIFFNESSES]
-    results = run_batch([started(wall, start) for start in starts for wall in walls], registry(), energy=False)
-    found = []
-    for first in range(0, len(results), len(walls)):
-        climbed = results[first : first + len(walls)]
-        count = rungs_held(map(_is_judged_steady, climbed))
-        unfelt = count > 0 and climbed[count - 1]["verdict"] == "steady"
-        found.append(Judged(float(STIFFNESSES[count - 1]) if count else 0.0, unfelt))
-    return found
+
+    sizes: np.ndarray
+    swings_m: np.ndarray
+
+    @property
+    def steady(self) -> np.ndarray:
+        """What is steady from all starts, shape (stiffnesses, sizes)."""
+        return np.all(self.swings_m <= WIDEST_M, axis=-1)
+
+    def held(self, widest_m: float = WIDEST_M) -> np.ndarray:
+        """Returns the mean over the starts of how many stiffnesses each size holds."""
+        return held(self.swings_m <= widest_m).mean(axis=-1)
+
+    def best(self) -> int:
+        """Returns the index of the best size; of several the one that swings least up to the stiffness it holds."""
+        most = self.held()
+        there = np.flatnonzero(most == most.max())
+        rungs = max(int(most.max()), 1)
+        return int(there[self.swings_m[:rungs, there].max(axis=(0, 2)).argmin()])
+
+    def with_more(self, other: Self) -> Self:
+        """Returns both, of the same starts, as one."""
+        swings_m = np.concatenate([self.swings_m, other.swings_m], axis=1)
+        return type(self)(np.concatenate([self.sizes, other.sizes]), swings_m)
+
+
+class Reached(NamedTuple):
+    """The largest steady stiffness of an element, N/m: with which size, and by the judge from each start.
+
+    Attributes:
+        unfelt: how many starts leave nothing there that a hand feels.
+        twice: the largest, in the batches by which the size was chosen, if a swing might be twice as wide.
+    """
+
+    kind: str
+    sizes: tuple[float, ...]
+    steady: tuple[float, ...]
+    unfelt: int
+    twice: float
+
+    @property
+    def mean(self) -> Interval:
+        """Mean over the starts in N/mm, with its interval of confidence."""
+        return mean_interval(np.array(self.steady) / 1e3)
+
+    def describe(self) -> str:
+        """Returns it in N/mm: ``"5.2 [4.9, 5.5]"``, or ``"4.5"`` where all starts come to the same."""
+        mean, low, high = self.mean
+        return f"{mean:.1f}" if low == high else f"{mean:.1f} [{low:.1f}, {high:.1f}]"
+
+
+def beats(one: Reached, other: Reached) -> bool:
+    """Tells whether one bears more than the other: by a step of the stiffness or more, their intervals apart."""
+    return one.mean.value - other.mean.value >= 0.5 and one.mean.apart(other.mean)
+
+
+def sizes_of(kind: str, small: bool) -> np.ndarray:
+    """Returns the sizes tried first, shape (sizes, 1 or 2)."""
+    if kind == KINDS[0]:
+        return np.zeros((1, 1))
+    if kind == "both":
+        step = 6 if small else 1
+        return np.array([*product(PAIR_DAMPINGS[::step], PAIR_MASSES[::step])])
+    return (DAMPINGS if kind == KINDS[1] else MASSES)[:: 8 if small else 1, None]
+
+
+class _Presses(NamedTuple):
+    """Presses on some walls, in N/m, with some sizes of an element, from some starts."""
+
+    setup: Setup
+    kind: str
+    walls: Sequence[float]
+    sizes: Sequence[Sequence[float]]
+    starts: tuple[int, ...]
+
+    def scenes(self) -> list[Scene]:
+        elements = [elements_of(self.kind, *size) for size in self.sizes]
+        scenes = [self.setup.scene(stiffness, one) for stiffness in self.walls for one in elements]
+        return [started(scene, start) for scene in scenes for start in self.starts]
+
+    def swings_m(self) -> np.ndarray:
+        """Returns how far the position swings in the end, shape (walls, sizes, starts)."""
+        swings = [swing_m(result) for result in run_all([pressed(scene) for scene in self.scenes()])]
+        return np.array(swings).reshape(len(self.walls), len(self.sizes), -1)
+
+    def judged(self) -> list[tuple[float, bool]]:
+        """Returns from each start the largest stiffness in N/m up to which all are steady, and whether none is felt.
+
+        By the judge of runs, which holds the hand, takes the noise away, pushes twice, and watches until it tells, for
+        up to 16 s.
+        """
+        results = run_batch(self.scenes(), registry(), energy=False)
+        found: list[tuple[float, bool]] = []
+        for start in range(len(self.starts)):
+            climbed = results[start :: len(self.starts)]
+            count = rungs_held(map(_is_judged_steady, climbed))
+            unfelt = count > 0 and climbed[count - 1]["verdict"] == "steady"
+            found.append((self.walls[count - 1] if count else 0.0, unfelt))
+        return found
 
 
 def _is_judged_steady(result: Summary) -> bool:
     """Tells whether a run that was judged is steady, by how wide what remains is; what grows is not."""
     return result.get("verdict", "diverged") not in _NOT_STEADY and result["stability"]["width_m"] <= WIDEST_M
+
+
+def tried(answers: Answers, setup: Setup, kind: str, sizes: np.ndarray) -> Range:
+    """Runs every size on every wall from the starts by which a size is chosen."""
+    starts = CHOSEN_BY[:1] if answers.small else CHOSEN_BY
+    parts = np.array_split(STIFFNESSES, 1 if answers.small else _PARTS)
+    presses = [_Presses(setup, kind, part.tolist(), sizes.tolist(), starts) for part in parts]
+    swings_m = answers.map_parallel(f"walls with {kind.replace('-', ' ')}", _Presses.swings_m, presses)
+    return Range(sizes, np.concatenate(swings_m))
+
+
+def finer(found: Range) -> np.ndarray:
+    """Returns sizes between the neighbours of the best, evenly in their logarithm."""
+    best = found.sizes[found.best()]
+    columns = []
+    for one, at in zip(found.sizes.T, best, strict=True):
+        values = np.unique(one)
+        i = int(np.searchsorted(values, at))
+        low, high = values[max(i - 1, 0)], values[min(i + 1, len(values) - 1)]
+        count = _FINER[found.sizes.shape[1]]
+        columns.append(np.geomspace(low or 0.1 * high, high, count + 2)[1:-1] if high else np.zeros(1))
+    return np.array([*product(*columns)])
+
+
+def reached(answers: Answers, setup: Setup, kind: str) -> Reached:
+    """Returns the largest steady stiffness of an element with its best size."""
+    grid = tried(answers, setup, kind, sizes_of(kind, answers.small))
+    if kind != KINDS[0] and not answers.small:
+        grid = grid.with_more(tried(answers, setup, kind, finer(grid)))
+    best = grid.best()
+    sizes = () if kind == KINDS[0] else tuple(grid.sizes[best].tolist())
+    rungs = round(grid.held(2.0 * WIDEST_M).max())
+    twice = float(STIFFNESSES[rungs - 1]) if rungs else 0.0
+    if answers.small:
+        level = largest(grid.swings_m[:, best] <= WIDEST_M)
+        return Reached(kind, sizes, (level,) * 2, 0, twice)
+    half = len(JUDGED_BY) // 2
+    walls = STIFFNESSES.tolist()
+    halves = [_Presses(setup, kind, walls, [sizes], starts) for starts in (JUDGED_BY[:half], JUDGED_BY[half:])]
+    parts = answers.map_parallel(f"judging {kind.replace('-', ' ')}", _Presses.judged, halves)
+    steady, unfelt = zip(*(one for part in parts for one in part), strict=True)
+    return Reached(kind, sizes, steady, sum(unfelt), twice)

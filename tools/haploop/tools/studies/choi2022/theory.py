@@ -38,34 +38,21 @@ _NO_MASS, _SOME_MASS = 1e-15, 1e-3
 _STARTS, _TICKS, _SETTLED, _RESCALED_EVERY = 3, 1200, 400, 50
 
 
-class Felt(NamedTuple):
-    """The fundamental of the force of a virtual inertia m on a device that swings at w, over what a mass m would take.
+def bidirectional(frequency_Hz: ArrayLike, *, reading_s: float, delay_s: ArrayLike) -> np.ndarray:
+    """Returns what f = -m a comes to for a device that swings at w: felt mass / m - j felt damping / (m w).
 
-    Attributes:
-        duty: share of the ticks at which the gate is open.
-        mass: felt mass over m.
-        damping: felt damping over m w; the element takes energy out where it is positive.
-    """
-
-    duty: np.ndarray
-    mass: np.ndarray
-    damping: np.ndarray
-
-
-def bidirectional(frequency_Hz: np.ndarray, *, reading_s: float, delay_s: float | np.ndarray) -> Felt:
-    """Returns what f = -m a comes to, late by the age of the reading, the extra delay and half a period of the hold.
-
-    By psi = w (reading + delay + T / 2) it lags, so that the device feels m cos(psi) and the damping m w sin(psi): late
-    inertia damps, most at a quarter of a period, and drives from half a period on.
+    Late by psi = w (reading + delay + T / 2), age of the reading, extra delay and half a period of the hold, it is
+    felt as the mass m cos(psi) and the damping m w sin(psi): late inertia damps, most at a quarter of a period, and
+    drives from half a period on.
     """
     w = 2.0 * np.pi * np.asarray(frequency_Hz, float)
-    return _felt(np.ones_like(w), np.ones_like(w, complex), w * (reading_s + delay_s + PERIOD_S / 2.0))
+    return np.exp(-1j * w * (reading_s + np.asarray(delay_s) + PERIOD_S / 2.0))
 
 
 def unidirectional(
-    frequency_Hz: np.ndarray, *, reading_s: float, delay_s: float | np.ndarray, velocity_s: float | np.ndarray = 5e-4
-) -> Felt:
-    """Returns the describing function of f = -m a[k] while v[k] a[k-1] >= 0 (Choi et al. 2022, eq. 9).
+    frequency_Hz: ArrayLike, *, reading_s: float, delay_s: ArrayLike, velocity_s: ArrayLike = PERIOD_S / 2.0
+) -> np.ndarray:
+    """Returns what f = -m a[k] while v[k] a[k-1] >= 0 (Choi et al. 2022, eq. 9) comes to, as a bidirectional one does.
 
     Against the reading a[k], the velocity (a difference, T / 2 old) lags by p = pi/2 + w (velocity - reading), a[k-1]
     by q = w T. With d = p - q folded into [0, pi] the gate is open around (p + q) / 2 for the share 1 - d / pi, and
@@ -81,15 +68,10 @@ def unidirectional(
         velocity_s: age of the velocity; of one that is low-passed by frequency, ``low_passed_s``.
     """
     w = 2.0 * np.pi * np.asarray(frequency_Hz, float)
-    p, q = np.pi / 2.0 + w * (velocity_s - reading_s), w * PERIOD_S
+    p, q = np.pi / 2.0 + w * (np.asarray(velocity_s) - reading_s), w * PERIOD_S
     open_rad = np.pi - np.arccos(np.cos(p - q))
     left = (open_rad + np.exp(-1j * (p + q)) * np.sin(open_rad)) / np.pi
-    return _felt(open_rad / np.pi, left, w * (reading_s + delay_s + PERIOD_S / 2.0))
-
-
-def _felt(duty: np.ndarray, left: np.ndarray, lag: np.ndarray) -> Felt:
-    arrives = left * np.exp(-1j * lag)
-    return Felt(duty, np.real(arrives), -np.imag(arrives))
+    return left * bidirectional(frequency_Hz, reading_s=reading_s, delay_s=delay_s)
 
 
 def low_passed_s(frequency_Hz: np.ndarray, cutoff_Hz: float | None, age_s: float) -> np.ndarray:
@@ -100,24 +82,24 @@ def low_passed_s(frequency_Hz: np.ndarray, cutoff_Hz: float | None, age_s: float
 
 def always_open_Hz(*, reading_s: float) -> float:
     """Returns the lowest frequency at which the gate never closes, Hz: w (T + reading - T / 2) = pi / 2."""
-    return 0.25 / (PERIOD_S + reading_s - 5e-4)
+    return 0.25 / (PERIOD_S / 2.0 + reading_s)
 
 
 def damps(reading_s: float) -> np.ndarray:
     """Returns which inertia damps, an index from 0 to 3 to the colours, shape (delays, frequencies)."""
     delay, frequency = np.meshgrid(DELAYS_S, FREQUENCIES_HZ, indexing="ij")
-    two = bidirectional(frequency, reading_s=reading_s, delay_s=delay).damping > 0.0
-    one = unidirectional(frequency, reading_s=reading_s, delay_s=delay).damping > 0.0
-    return two + 2 * one
+    two, one = (of(frequency, reading_s=reading_s, delay_s=delay) for of in (bidirectional, unidirectional))
+    return (np.imag(two) < 0.0) + 2 * (np.imag(one) < 0.0)
 
 
-def felt_with(setup: Setup, frequency_Hz: np.ndarray) -> tuple[Felt, Felt]:
-    """Returns what bi- and unidirectional inertia come to with a setup's delay, unit and low-pass of the velocity."""
+def felt_damping(setup: Setup, frequency_Hz: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Returns damping / (m w) of bi- and unidirectional inertia with a setup's delay, unit and low-passed velocity."""
     bandwidth, late = UNITS[setup.unit]
     reading_s = late + (1.0 / (2.0 * np.pi * bandwidth) if bandwidth else 0.0)
-    velocity_s = low_passed_s(frequency_Hz, VELOCITIES[setup.velocity], 5e-4)
+    velocity_s = low_passed_s(frequency_Hz, VELOCITIES[setup.velocity], PERIOD_S / 2.0)
     two = bidirectional(frequency_Hz, reading_s=reading_s, delay_s=setup.delay_s)
-    return two, unidirectional(frequency_Hz, reading_s=reading_s, delay_s=setup.delay_s, velocity_s=velocity_s)
+    one = unidirectional(frequency_Hz, reading_s=reading_s, delay_s=setup.delay_s, velocity_s=velocity_s)
+    return -np.imag(two), -np.imag(one)
 
 
 class Best(NamedTuple):

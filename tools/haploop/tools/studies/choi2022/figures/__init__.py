@@ -1,16 +1,27 @@
-"""The figures of the paper: every module ``figure_N`` here is one, found by its name."""
+"""The figures of the paper, and how they are drawn, told and kept.
+
+A function ``make_N`` in a module with N in its name, ``figure_N`` or ``figure_M_N``, makes figure N from a ``Work`` and
+returns its findings; it needs no entry anywhere. Its words stand in ``words.toml``.
+"""
 
 from __future__ import annotations
 
 import pkgutil
+from collections.abc import Callable
 from importlib import import_module
-from types import ModuleType
+from typing import Any
+
+
+def _modules() -> dict[int, str]:
+    names = [module.name for module in pkgutil.iter_modules(__path__) if module.name.startswith("figure_")]
+    return {int(number): name for name in names for number in name.split("_")[1:]}
 
 
 def numbers() -> list[int]:
-    return sorted(int(module.name.removeprefix("figure_")) for module in pkgutil.iter_modules(__path__))
+    """Returns the numbers of the figures that can be made."""
+    return sorted(_modules())
 
 
-def figure(number: int) -> ModuleType:
-    """Imports the module of a figure: ``CLAIMS`` by name, and ``make`` from a ``Work`` to findings."""
-    return import_module(f"{__name__}.figure_{number}")
+def maker(number: int) -> Callable[..., Any]:
+    """Imports the function that makes a figure: from a ``Work`` to findings."""
+    return getattr(import_module(f"{__name__}.{_modules()[number]}"), f"make_{number}")

@@ -11,17 +11,15 @@ import numpy as np
 
 from haploop.tools.figure.style import INK, SMALL, dress, empty_figure
 from haploop.tools.render.terminal import markdown_table
-from haploop.tools.studies.choi2022.claims import Finding, claims_of
 from haploop.tools.studies.choi2022.device import KINDS, Setup, elements_of
-from haploop.tools.studies.choi2022.drawing import COLOURS, SHORT, legend_of_colours
+from haploop.tools.studies.choi2022.figures.claims import Finding
+from haploop.tools.studies.choi2022.figures.drawing import COLOURS, SHORT, legend_of_colours
+from haploop.tools.studies.choi2022.figures.work import Work
 from haploop.tools.studies.choi2022.theory import Best, limits
-from haploop.tools.studies.choi2022.work import Work
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-CLAIMS = claims_of(14)
 
 _MODES_HZ = (60.0, 80.0, 105.0, 140.0, 185.0, 245.0, 325.0, 430.0, 570.0)
 # Of the row that is looked at more closely.
@@ -46,7 +44,7 @@ DRIVES = {
 }
 
 
-def make(work: Work) -> list[Finding]:
+def make_14(work: Work) -> list[Finding]:
     """Computes the limits of every cell, without a run."""
     modes, delays = (_MODES_HZ[2:7:2], _DELAYS_S[1:2]) if work.small else (_MODES_HZ, _DELAYS_S)
     names = [*DRIVES][1:2] if work.small else [*DRIVES]
@@ -60,7 +58,7 @@ def make(work: Work) -> list[Finding]:
     work.data("figure_14", grid | {"stiffness_N_m": stiffness, "size_N_s_m_or_kg": sizes})
     work.scene("figure_14", setups[len(setups) // 2].scene(2000.0, elements_of(KINDS[3], 0.009)))
     band, table = _band(work)
-    finding, winners = _higher(stiffness)
+    finding, winners = _higher(work, stiffness)
     rows = soft_and_stiff(stiffness)
     count, follow, against = len(rows), int(np.sum(rows > 0)), int(np.sum(rows < 0))
     computed = {"band": band, "rows": count, "follow": follow, "against": against, "cells": len(setups)}
@@ -127,7 +125,7 @@ def _panel(ax: Axes, name: str, stiffness: np.ndarray, modes: Sequence[float], d
     ax.set_yticks(range(len(delays)), [f"{1e3 * delay:g}" for delay in delays])
 
 
-def _higher(stiffness: np.ndarray) -> tuple[Finding, str]:
+def _higher(work: Work, stiffness: np.ndarray) -> tuple[Finding, str]:
     """Returns the finding, and in how many cells of the map each element wins."""
     cells = stiffness.reshape(-1, len(KINDS))
     best, by = winner(cells)
@@ -136,7 +134,7 @@ def _higher(stiffness: np.ndarray) -> tuple[Finding, str]:
     winners = f"{shares}, nobody {np.sum(~clear)}"
     uni, others = cells[:, 3], cells[:, 1:3].max(axis=1)
     above = uni >= DRAW * others
-    finding = CLAIMS["higher"].holds_if(
+    finding = work.claims["higher"].holds_if(
         False,
         bool(above.any()),
         cells=len(cells),

@@ -15,15 +15,14 @@ from haploop.protocol.scene.paths import without
 from haploop.protocol.scene.scene import Encoder, Scene
 from haploop.tools.figure.style import INK, PRESSING, RELEASING, SMALL, dress, empty_figure, legend
 from haploop.tools.render.units import amount
-from haploop.tools.studies.choi2022.claims import Finding, claims_of
-from haploop.tools.studies.choi2022.drawing import INSIDE, UPPER_LEFT
+from haploop.tools.studies.choi2022.figures.claims import Finding
+from haploop.tools.studies.choi2022.figures.drawing import INSIDE, UPPER_LEFT
+from haploop.tools.studies.choi2022.figures.work import Work
+from haploop.tools.studies.choi2022.runs import fig6, run, wall_of
 from haploop.tools.studies.choi2022.sampled import PERIOD_S, SPRING, STIFFNESS_N_M, forces, taken_J
-from haploop.tools.studies.choi2022.work import Work, fig6, run, wall_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-CLAIMS = claims_of(3)
 
 # Coarse enough to be seen.
 _RESOLUTION_M = 1e-4
@@ -36,7 +35,7 @@ _FILL = "#E8A0A0"
 Curve = tuple[np.ndarray, np.ndarray]
 
 
-def make(work: Work) -> list[Finding]:
+def make_3(work: Work) -> list[Finding]:
     """Runs three contacts: sampled and held, with an encoder's steps too, with 2 ms of delay too."""
     encoder = Encoder(resolution=_RESOLUTION_M)
     late = "One contact, sampled, held, quantised and delayed"
@@ -62,7 +61,7 @@ def make(work: Work) -> list[Finding]:
     sampled, quantised, delayed = map(_spread, leaks_J.values())
     supports = min(map(np.min, leaks_J.values())) > 0.0
     work.conclude(supports=supports, sampled=sampled, quantised=quantised, delayed=delayed)
-    return _findings(curves, walls, leaks_J)
+    return _findings(work, curves, walls, leaks_J)
 
 
 def single_contact(title: str, *, delay_s: float = 0.0, **tables: Any) -> Scene:
@@ -122,7 +121,7 @@ def _taken_and_given_J(depth: np.ndarray, force: np.ndarray) -> tuple[float, flo
 
 
 def _findings(
-    curves: Mapping[str, Curve], walls: Mapping[str, Summary], leaks_J: Mapping[str, np.ndarray]
+    work: Work, curves: Mapping[str, Curve], walls: Mapping[str, Summary], leaks_J: Mapping[str, np.ndarray]
 ) -> list[Finding]:
     energies = {name: _taken_and_given_J(*one) for name, one in curves.items()}
     # -sum f dx: the force points out, so what it gives on the way out is counted positive: counter-clockwise.
@@ -140,7 +139,7 @@ def _findings(
     exact, closed = _constant_speed()
     summed, formula = _telescoped()
     return [
-        CLAIMS["generates"].holds_if(
+        work.claims["generates"].holds_if(
             all(gave > took for took, gave in energies.values()) and min(map(np.min, leaks_J.values())) > 0.0,
             energies="; ".join(f"{name}: took {_J(took)}, gave {_J(gave)}" for name, (took, gave) in energies.items()),
             leaks="; ".join(f"{name} {_spread(leak)}" for name, leak in leaks_J.items()),
@@ -148,20 +147,20 @@ def _findings(
             exact=_J(exact),
             closed=_J(closed),
         ),
-        CLAIMS["late"].holds_if(
+        work.claims["late"].holds_if(
             all(late),
             late[0],
             edges="; ".join(f"{1e3 * began:.2f} and {1e3 * end:.2f} mm".replace("-", "−") for began, end in edges),
         ),
-        CLAIMS["staircase"].holds_if(
+        work.claims["staircase"].holds_if(
             all(level < count / 5 for level, count in zip(levels, steps, strict=True)) and levels[1] < levels[0],
             levels=" / ".join(map(str, levels)),
             steps=" / ".join(map(str, steps)),
             causes=", ".join(f"{cause.replace('_', ' ')} {_J(-leak[f'{cause}_J'])}" for cause in causes),
         ),
-        CLAIMS["counterclockwise"].holds_if(min(areas) > 0.0 and apart < 1e-9, areas=", ".join(map(_J, areas))),
-        CLAIMS["sum"].holds_if(abs(summed / formula - 1.0) < 1e-9, summed=_J(summed), formula=_J(formula)),
-        CLAIMS["ideal"].holds_if(max(abs(wall["ideal_J"]) for wall in walls.values()) < 1e-12),
+        work.claims["counterclockwise"].holds_if(min(areas) > 0.0 and apart < 1e-9, areas=", ".join(map(_J, areas))),
+        work.claims["sum"].holds_if(abs(summed / formula - 1.0) < 1e-9, summed=_J(summed), formula=_J(formula)),
+        work.claims["ideal"].holds_if(max(abs(wall["ideal_J"]) for wall in walls.values()) < 1e-12),
     ]
 
 

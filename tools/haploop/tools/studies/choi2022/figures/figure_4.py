@@ -15,13 +15,13 @@ from haploop.tools.figure.style import INK, SMALL, empty_figure
 from haploop.tools.linear.one_tick import OneTickMap
 from haploop.tools.render.units import amount, fixed
 from haploop.tools.search.bisect import Tolerance, bisect
-from haploop.tools.studies.choi2022.claims import Finding, claims_of
-from haploop.tools.studies.choi2022.drawing import draw_momentum
+from haploop.tools.studies.choi2022.figures.claims import Finding
+from haploop.tools.studies.choi2022.figures.drawing import draw_momentum
 from haploop.tools.studies.choi2022.figures.figure_3 import single_contact
+from haploop.tools.studies.choi2022.figures.work import Work
+from haploop.tools.studies.choi2022.runs import Run, fig6, hand_of, run
 from haploop.tools.studies.choi2022.sampled import MASS_KG, PERIOD_S, closed_form, mean_taken, steps_J
-from haploop.tools.studies.choi2022.work import Run, Work, fig6, hand_of, run
 
-CLAIMS = claims_of(4)
 # Cutoffs in Hz by what a row of numbers calls them.
 CUTOFFS_HZ = {"unfiltered": None, "100 Hz": 100.0, "30 Hz": 30.0, "10 Hz": 10.0}
 # Extra delays, and inertias, for the low-pass with the least lag.
@@ -34,7 +34,7 @@ COUNT_M = 28.7e-6
 _FINE_M = 1e-7
 
 
-def make(work: Work) -> list[Finding]:
+def make_4(work: Work) -> list[Finding]:
     """Draws the motion of the schematic and a run, and tests filters over the acceleration."""
     pulse = 0.1 * np.sin(np.pi * np.arange(-1, 15) / 12.0).clip(0.0)
     pushed = run(_pushed_and_braked(_inertia(MASS_KG)))
@@ -55,7 +55,7 @@ def make(work: Work) -> list[Finding]:
     masses_g = {name: 1e3 * largest_mass_kg(cutoff, 0.0) for name, cutoff in CUTOFFS_HZ.items()}
     masses = [f"{mass:.0f} g {'at ' * bool(CUTOFFS_HZ[name])}{name}" for name, mass in masses_g.items()]
     work.conclude(supports=max(masses_g.values()) > masses_g["unfiltered"], masses=", ".join(masses))
-    return [*_on_energy(pulse, v, pushed, contact, 20 if work.small else 160), *_on_filters(masses_g)]
+    return [*_on_energy(work, pulse, v, pushed, contact), *_on_filters(work, masses_g)]
 
 
 def _pushed_and_braked(element: ElementTable) -> Scene:
@@ -70,47 +70,49 @@ def _inertia(mass_kg: float) -> ElementTable:
     return ElementTable(name="bidirectional-inertia", acts="always", parameters={"mass": mass_kg})
 
 
-def _on_energy(pulse: np.ndarray, v: np.ndarray, pushed: Run, contact: Run, frequencies: int) -> list[Finding]:
+def _on_energy(work: Work, pulse: np.ndarray, v: np.ndarray, pushed: Run, contact: Run) -> list[Finding]:
     energy, free = contact.summary["energy"], pushed.summary["energy"]
     sampled_J, wall_J = energy["elements"][0]["sampled_J"], energy["wall"]["sampled_J"]
     apart = abs(float(steps_J(v, MASS_KG).sum()) / free["elements"][0]["sampled_J"] - 1.0)
     closed = float(steps_J(pulse, MASS_KG).sum())
-    theta = 2.0 * np.pi * np.linspace(5.3, 497.9, frequencies) * PERIOD_S
+    theta = 2.0 * np.pi * np.linspace(5.3, 497.9, 20 if work.small else 160) * PERIOD_S
     formula = closed_form("bidirectional-inertia", theta, 0)
     off = float(np.abs(mean_taken("bidirectional-inertia", theta, 0) - formula).max() / np.abs(formula).max())
     return [
-        CLAIMS["step"].holds_if(apart < 1e-9),
-        CLAIMS["clockwise"].holds_if(closed > 0.0, closed=amount(closed, "J")),
-        CLAIMS["unlike"].holds_if(sampled_J > 0.0 > wall_J, inertia=amount(sampled_J, "J"), wall=amount(wall_J, "J")),
-        CLAIMS["passive"].holds_if(False, off < 1e-3, undelayed=1e3 / 3.0, delayed=1e3 / 7.0, off=100 * off),
+        work.claims["step"].holds_if(apart < 1e-9),
+        work.claims["clockwise"].holds_if(closed > 0.0, closed=amount(closed, "J")),
+        work.claims["unlike"].holds_if(
+            sampled_J > 0.0 > wall_J, inertia=amount(sampled_J, "J"), wall=amount(wall_J, "J")
+        ),
+        work.claims["passive"].holds_if(False, off < 1e-3, undelayed=1e3 / 3.0, delayed=1e3 / 7.0, off=100 * off),
     ]
 
 
-def _on_filters(masses_g: dict[str, float]) -> list[Finding]:
+def _on_filters(work: Work, masses_g: dict[str, float]) -> list[Finding]:
     passive = {name: passive_up_to_Hz(cutoff) for name, cutoff in CUTOFFS_HZ.items()}
     lags = {f"{1e3 * delay_s:g} ms": least_lag_best_g(delay_s) for delay_s in _DELAYS_S}
     stiffest = {name: 1e-3 * _stiffest_N_m(MASS_KG, cutoff, 0.002) for name, cutoff in CUTOFFS_HZ.items()}
     errors, fine = errors_m_s2(), errors_m_s2(_FINE_M)
     best, finest = (min(of[name] for name in of if name != "accelerometer") for of in (errors, fine))
     return [
-        CLAIMS["filtered"].holds_if(
+        work.claims["filtered"].holds_if(
             min(passive.values()) >= 0.98 * passive["unfiltered"],
             True,
             passive=_listed(passive, "Hz"),
             least=min(passive.values()),
         ),
-        CLAIMS["range"].holds_if(
+        work.claims["range"].holds_if(
             all(mass > masses_g["unfiltered"] for name, mass in masses_g.items() if name != "unfiltered"),
             masses=_listed(masses_g, "g"),
         ),
-        CLAIMS["lag"].holds_if(
+        work.claims["lag"].holds_if(
             False,
             any(lags.values()),
             masses=", ".join(f"{name} {of}" for name, of in lags.items() if of),
             stiffest=_listed(stiffest, "N/mm"),
         ),
-        CLAIMS["measured"].holds_if(errors["accelerometer"] < best, errors=_listed(errors, "m/s²")),
-        CLAIMS["choose"].holds_if(
+        work.claims["measured"].holds_if(errors["accelerometer"] < best, errors=_listed(errors, "m/s²")),
+        work.claims["choose"].holds_if(
             finest < fine["accelerometer"], difference=fixed(finest), accelerometer=fixed(fine["accelerometer"])
         ),
     ]

@@ -9,21 +9,19 @@ import numpy as np
 from haploop.tools.figure.style import GREY, dress, empty_figure, legend, plain_numbers
 from haploop.tools.render.units import amount, fixed
 from haploop.tools.studies.choi2022 import sampled
-from haploop.tools.studies.choi2022.claims import Finding, claims_of
-from haploop.tools.studies.choi2022.drawing import COLOURS, INSIDE, draw_momentum
+from haploop.tools.studies.choi2022.figures.claims import Finding
+from haploop.tools.studies.choi2022.figures.drawing import COLOURS, INSIDE, draw_momentum
+from haploop.tools.studies.choi2022.figures.work import Work
 from haploop.tools.studies.choi2022.sampled import KINDS, MASS_KG, PERIOD_S, mean_taken, steps_J
-from haploop.tools.studies.choi2022.work import Work
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-CLAIMS = claims_of(5)
 
 BI, UNI = "bidirectional-inertia", "unidirectional-inertia"
 _JITTER_M_S, _DRIFT_M_S = 0.01, 0.05
 
 
-def make(work: Work) -> list[Finding]:
+def make_5(work: Work) -> list[Finding]:
     """Draws momentum over an alternating velocity, its energy sample by sample, and all kinds over frequency."""
     frequencies = np.concatenate([np.geomspace(2.03, 60.7, 20), np.linspace(63.1, 497.3, 60)])
     if work.small:
@@ -45,7 +43,7 @@ def make(work: Work) -> list[Finding]:
     both = (f"{kind.replace('-', ' ')} {_hertz(ends[kind, 0])} and {_hertz(ends[kind, 2])}" for kind in KINDS[1:])
     supports = all(min(ends[BI, late], ends[UNI, late]) > ends["damping", late] for late in (0, 2))
     work.conclude(supports=supports, ends=", ".join(both))
-    return [*_on_alternation(), *_on_unidirectional(frequencies, measured, ends)]
+    return [*_on_alternation(work), *_on_unidirectional(work, frequencies, measured, ends)]
 
 
 def _over_samples(ax: Axes) -> dict[str, np.ndarray]:
@@ -92,7 +90,7 @@ def _unsampled_damper(frequencies: np.ndarray) -> np.ndarray:
     return 0.8 * (2.0 * np.pi * frequencies) ** 2 * PERIOD_S / 2.0
 
 
-def _on_alternation() -> list[Finding]:
+def _on_alternation(work: Work) -> list[Finding]:
     rng = np.random.default_rng(5)
     level = _taken_under_jitter(BI, 0.0)[1:].mean()
     formula = -2.0 * MASS_KG * _JITTER_M_S**2
@@ -102,17 +100,17 @@ def _on_alternation() -> list[Finding]:
     drifts = (-_DRIFT_M_S, 0.0, _DRIFT_M_S)
     shifts = [_taken_under_jitter(BI, drift)[1:].reshape(-1, 2).sum(axis=1).mean() for drift in drifts]
     return [
-        CLAIMS["alternates"].holds_if(
+        work.claims["alternates"].holds_if(
             abs(level / formula - 1.0) < 1e-9,
             level=amount(level, "J"),
             formula=amount(formula, "J"),
             leaking=100 * leaking,
         ),
-        CLAIMS["three"].holds_if(least >= -1e-15, least=amount(least, "J")),
-        CLAIMS["any_velocity"].holds_if(
+        work.claims["three"].holds_if(least >= -1e-15, least=amount(least, "J")),
+        work.claims["any_velocity"].holds_if(
             max(shifts) - min(shifts) < 1e-9 * abs(shifts[1]), shifts=", ".join(amount(one, "J") for one in shifts)
         ),
-        CLAIMS["at_rest"].holds_if(level < 0.0, power=amount(level / PERIOD_S, "W")),
+        work.claims["at_rest"].holds_if(level < 0.0, power=amount(level / PERIOD_S, "W")),
     ]
 
 
@@ -138,7 +136,10 @@ def _cycle_J(v: np.ndarray) -> float:
 
 
 def _on_unidirectional(
-    frequencies: np.ndarray, measured: dict[tuple[str, int], np.ndarray], ends: dict[tuple[str, int], float]
+    work: Work,
+    frequencies: np.ndarray,
+    measured: dict[tuple[str, int], np.ndarray],
+    ends: dict[tuple[str, int], float],
 ) -> list[Finding]:
     ratio = measured[UNI, 0] / measured[BI, 0]
     until = _first_negative(frequencies, ratio - 1.0)
@@ -152,14 +153,14 @@ def _on_unidirectional(
         for late, how in ((0, "without delay"), (2, "with 2 ms"))
     )
     return [
-        CLAIMS["only_stored"].holds_if(
+        work.claims["only_stored"].holds_if(
             False, True, shares=", ".join(f"{100 * share:.2g} % at {name}" for name, share in back.items())
         ),
-        CLAIMS["before"].holds_if(at_once >= back["50 Hz"], before=100 * back["50 Hz"], present=100 * at_once),
-        CLAIMS["pure"].holds_if(
+        work.claims["before"].holds_if(at_once >= back["50 Hz"], before=100 * back["50 Hz"], present=100 * at_once),
+        work.claims["pure"].holds_if(
             not np.isfinite(ends[UNI, 2]), True, undelayed=_hertz(ends[UNI, 0]), delayed=_hertz(ends[UNI, 2])
         ),
-        CLAIMS["more"].holds_if(
+        work.claims["more"].holds_if(
             until > 0.0 and not np.isfinite(until),
             until > 0.0,
             hertz=frequencies[at],
@@ -168,10 +169,10 @@ def _on_unidirectional(
             slow_times=fixed(float(ratio[4])),
             until=_hertz(until),
         ),
-        CLAIMS["chatter"].holds_if(
+        work.claims["chatter"].holds_if(
             False, rest >= 0.0, rest=amount(rest, "J") if rest else "nothing", drift=amount(drift, "J")
         ),
-        CLAIMS["higher"].holds_if(min(ends[BI, 0], ends[UNI, 0]) > ends["damping", 0], ends=up_to),
+        work.claims["higher"].holds_if(min(ends[BI, 0], ends[UNI, 0]) > ends["damping", 0], ends=up_to),
     ]
 
 

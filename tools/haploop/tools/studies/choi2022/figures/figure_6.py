@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from haploop.launch.scene.toml_writer import inline
 from haploop.logger.log.recording import Recording
+from haploop.protocol.scene.table import Table
 from haploop.tools.figure.style import (
     GREY,
     INK,
@@ -23,36 +25,40 @@ from haploop.tools.figure.style import (
 )
 from haploop.tools.figure.time import extremes
 from haploop.tools.linear.one_tick import OneTickMap
-from haploop.tools.render.terminal import markdown_table
 from haploop.tools.render.units import amount
-from haploop.tools.search.random import Point, Row
-from haploop.tools.studies.choi2022.claims import HOLDS, RARE_BELOW, Finding, claims_of
-from haploop.tools.studies.choi2022.drawing import claims_table, search_words, share_map
+from haploop.tools.search.random import Point
+from haploop.tools.studies.choi2022.figures.claims import HOLDS, RARE_BELOW, Finding
+from haploop.tools.studies.choi2022.figures.drawing import claims_table, columns_of, open_table, search_words
+from haploop.tools.studies.choi2022.figures.work import Work
 from haploop.tools.studies.choi2022.interpretations import (
     Found,
     Option,
     decider,
     holds,
     interval,
-    never_together,
     often,
     options,
-    percent,
     share,
-    yes,
 )
-from haploop.tools.studies.choi2022.simulation import BASE, NEAREST, SPACE, describe, scene_of, scene_text
-from haploop.tools.studies.choi2022.simulation_measure import ASIDE, WHOLE, findings_on_logs, search
-from haploop.tools.studies.choi2022.simulation_measure import CLAIMS as COUNTED
-from haploop.tools.studies.choi2022.work import Run, Work, run, wall_of
+from haploop.tools.studies.choi2022.runs import Run, faster_m, hand_of, run, strongest_Hz, wall_of
+from haploop.tools.studies.choi2022.simulation import (
+    ASIDE,
+    BASE,
+    CLAIMS,
+    SPACE,
+    WHOLE,
+    scene_of,
+    search,
+    used_numbers,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-CLAIMS = claims_of(6)
 # The claims that the search tests under every interpretation, in its words.
-TESTED = {name: (COUNTED | ASIDE)[name] for name in CLAIMS if name in COUNTED | ASIDE}
+_TESTED = CLAIMS | ASIDE
+_OURS, _NEAREST = "our interpretation", "[the nearest interpretation](#figure-6)"
 # A claim that holds as often as this, our own interpretation included, needs no assumption.
 _ALWAYS = 0.9
 _PANELS = {
@@ -60,38 +66,68 @@ _PANELS = {
     "b": "(b) 0.15 N/mm, damping 0.8 N s/m",
     "c": "(c) 0.15 N/mm, unidirectional inertia 10 g",
 }
-_ANOTHER = "another interpretation than ours or the nearest"
+# Least amplitude of a vibration that is felt (Israr, Choi and Tan 2006): at 10 Hz, m.
+_FELT_M = 26e-6
+_SETTLED_S, _HIGH_HZ, _NEARLY_ALL = 9.0, 50.0, 0.9
 
 
-def make(work: Work) -> list[Finding]:
+def make_6(work: Work) -> list[Finding]:
     """Runs both interpretations, and searches for the second."""
     found = search(work)
     runs: dict[str, dict[str, Run]] = {}
-    for name, stem, one in (("base", "figure_6", BASE), ("nearest", "figure_6_nearest", found.nearest)):
+    for name, stem, one in ((_OURS, "figure_6", BASE), ("the nearest", "figure_6_nearest", found.nearest)):
         runs[name] = {panel: run(scene_of(one, panel)) for panel in "abc"}
-        work.figure(_panels(runs[name]), stem, work.tell(f"seen_{name}"))
+        work.figure(_panels(runs[name]), stem, work.tell(f"seen_{stem}"))
         work.data(stem, _columns(runs[name]))
         for panel, ran in runs[name].items():
             work.scene(f"{stem}_{panel}", ran.scene)
     for panel in "abc":
-        work.text(f"fig6{panel}_nearest.toml", scene_text(found.nearest, panel))
-    rows = found.of("random")
-    if there := options(rows, SPACE):
-        work.figure(share_map(there, [*COUNTED, "all"], len(rows)), "figure_6_search", work.tell("seen_search"))
-    work.table("figure_6_interpretations", found.rows)
-    work.notes = [_notes(work, found, there)]
-    decides = decider(there, "c beats bidirectional")
+        work.text(f"fig6{panel}_nearest.toml", scene_text(work, found.nearest, panel))
+    rows, there = found.of("random"), options(found.of("random"), SPACE)
+    work.data("figure_6_interpretations", columns_of(found.rows))
+    alone = {"ours": found.of("base")[0], "nearest": found.of("nearest")[0]}
+    chosen = found.nearest.choices
+    words = search_words(found, WHOLE, CLAIMS)
+    table = claims_table(CLAIMS | {"all": "all of the above"} | ASIDE, SPACE, alone, found, there)
+    described = SPACE.describe(chosen | found.nearest.numbers, [*chosen, *used_numbers(chosen)])
+    aside = ", ".join(f"*{name}*" for name in ASIDE)
+    work.notes = [work.tell("notes", **words, table=table, aside=aside, described=described, open=open_table(SPACE, 6))]
     smaller, beats = (interval(rows, name, SPACE) for name in ("c smaller", "c beats bidirectional"))
-    work.conclude(
-        supports=smaller.value >= RARE_BELOW,
-        smaller=often(smaller),
-        count=len(rows),
-        holding=found.of("nearest")[0]["holding"],
-        claims=len(COUNTED),
-        beats=often(beats),
-        decided=f", decided most by the {decides.describe('c beats bidirectional')}" if decides else "",
-    )
-    return [*(_verdict(name, found) for name in TESTED), *findings_on_logs(CLAIMS, runs), _together(found)]
+    decides = decider(there, "c beats bidirectional")
+    supports = smaller.value >= RARE_BELOW
+    work.conclude(supports=supports, smaller=often(smaller), beats=often(beats), decided=decides or "–", **words)
+    return [
+        *(_verdict(work, name, found, there) for name in _TESTED if name in work.claims),
+        *_on_logs(work, runs),
+        _together(work, found),
+    ]
+
+
+def scene_text(work: Work, interpretation: Point, panel: str) -> str:
+    """Returns the scene file of an interpretation, which extends the paper's scene of the panel."""
+    scene = scene_of(interpretation, panel)
+    hand, title = hand_of(scene), work.texts[f"scene_{panel}"]
+    sensing = ("encoder", "noise", "velocity", "acceleration")
+    tables = {"hand.force": hand.force} | {name: getattr(scene, name) for name in sensing}
+    lines = [
+        work.tell("about_scene", title=title).rstrip(),
+        f"title = {inline(title)}",
+        f'extends = "../fig6{panel}.toml"',
+        f"duration = {inline(scene.duration)}",
+        f"seed = {inline(scene.seed)}",
+        "",
+        "[hand]",
+        f"rest = {inline(hand.rest)}",
+    ]
+    for name, table in tables.items():
+        lines += ["", f"[{name}]", *_lines(table)] if table else []
+    for element in scene.dissipation:
+        lines += ["", "[[dissipation]]", *_lines(element)]
+    return "\n".join(lines) + "\n"
+
+
+def _lines(table: Table) -> list[str]:
+    return [f"{key} = {inline(value)}" for key, value in table.as_dict().items()]
 
 
 def _columns(runs: dict[str, Run]) -> dict[str, np.ndarray]:
@@ -104,88 +140,83 @@ def _columns(runs: dict[str, Run]) -> dict[str, np.ndarray]:
     return kept
 
 
-def _verdict(name: str, found: Found[Point]) -> Finding:
+def _verdict(work: Work, name: str, found: Found, there: Sequence[Option]) -> Finding:
     """Finds that a claim holds if it does in our interpretation and nearly all; under an assumption if in some.
 
     That is the nearest interpretation, or what the claim is likeliest with.
     """
     rows, [base], [nearest] = found.of("random"), found.of("base"), found.of("nearest")
-    claim, shared = CLAIMS[name], interval(rows, name, SPACE)
-    numbers = (
-        f"{TESTED[name]}: in {often(shared)} of {len(rows)} random interpretations; ours: {yes(base, name)}, the "
-        f"nearest, searched for by these claims: {yes(nearest, name)}"
-    )
+    claim, shared, decides = work.claims[name], interval(rows, name, SPACE), decider(there, name)
+    ours, searched = ("yes" if holds(row, name) else "no" for row in (base, nearest))
+    computed = {"share": often(shared), "count": len(rows), "ours": ours, "nearest": searched}
+    numbers = f"{_TESTED[name]}: {work.tell('tested', **computed)}"
     if name == "wall unstable":
         growth = OneTickMap.from_scene(replace(scene_of(BASE, "b"), dissipation=())).growth(150.0)
-        numbers += f". In contact the loop is linear and grows by a factor of {growth:.4f} a tick"
+        numbers += claim.numbers.format(growth=growth)
     if shared.value >= _ALWAYS and holds(base, name):
         return Finding(claim, HOLDS, numbers)
-    where = NEAREST if holds(nearest, name) else ""
-    if not where and any(holds(row, name) for row in found.rows):
-        decides = decider(options(rows, SPACE), name)
-        where = f"an interpretation with {decides.best}" if decides else _ANOTHER
-    return Finding.by_share(claim, numbers, shared.value, where)
+    if holds(nearest, name):
+        return Finding.by_share(claim, numbers, shared.value, _NEAREST)
+    likeliest = work.tell("likeliest", option=decides.best) if decides else work.texts["another"]
+    return Finding.by_share(claim, numbers, shared.value, likeliest * any(holds(row, name) for row in found.rows))
 
 
-def _together(found: Found[Point]) -> Finding:
-    rows, held = found.of("random"), [row for row in found.rows if holds(row, "all")]
-    most = _fullest(found)
-    lacks = ", ".join(name for name in COUNTED if not holds(most, name))
-    numbers = CLAIMS["together"].numbers.format(
-        claims=len(COUNTED),
+def _together(work: Work, found: Found) -> Finding:
+    held = [row for row in found.rows if holds(row, "all")]
+    most = max(found.rows, key=lambda row: (row["holding"], -row["distance"]))
+    claim, [base] = work.claims["together"], found.of("base")
+    numbers = claim.numbers.format(
+        **search_words(found, WHOLE, CLAIMS),
         held=len(held),
         count=len(found.rows),
-        random=len(rows),
-        most=most["holding"],
-        lacks=f", without: {lacks}" if lacks else "",
-        nearest=found.of("nearest")[0]["holding"],
-        ours=found.of("base")[0]["holding"],
+        without=", ".join(name for name in CLAIMS if not holds(most, name)) or "nothing",
+        ours=base["holding"],
     )
-    where = CLAIMS["together"].assumption if held else ""
-    return Finding.by_share(CLAIMS["together"], numbers, share(rows, "all"), where)
+    return Finding.by_share(claim, numbers, share(found.of("random"), "all"), claim.assumption if held else "")
 
 
-def _notes(work: Work, found: Found[Point], there: Sequence[Option]) -> str:
-    rows, refined, around = (found.of(stage) for stage in ("random", "refined", "neighbour"))
-    [base], [nearest], most = found.of("base"), found.of("nearest"), _fullest(found)
-    lacks = ", ".join(f"*{name}*" for name in COUNTED if not holds(most, name))
-    never = never_together(rows, list(COUNTED))
-    missed = ", ".join(f"*{name}* by {nearest[name]:.2g}" for name in COUNTED if nearest[name] > 0.0)
-    swings = {key.removeprefix("swing ").removesuffix("_m"): nearest[key] for key in nearest if key[:6] == "swing "}
-    numbers = [
-        [SPACE.label(key), SPACE.value(key, low), SPACE.value(key, high), SPACE.whys[key]]
-        for key, (low, high) in SPACE.bounds.items()
+def _on_logs(work: Work, runs: Mapping[str, Mapping[str, Run]]) -> list[Finding]:
+    """Tests the claims "heat", "felt", "noise" and "phases" on the runs of both interpretations."""
+
+    def listed(values: Mapping[str, str]) -> str:
+        return "; ".join(f"{name} {value}" for name, value in values.items())
+
+    settled = _heat_over_leak(run(replace(scene_of(BASE, "a"), duration=_SETTLED_S)).log)
+    swings = {name: of["a"].summary["window"]["oscillation_m"] for name, of in runs.items()}
+    felt = {name: f"{amount(swings[name], 'm')} at {strongest_Hz(of['a'].log):.0f} Hz" for name, of in runs.items()}
+    fast = {name: [faster_m(of[panel].log, _HIGH_HZ) for panel in "bc"] for name, of in runs.items()}
+    noise = {name: f"{amount(b, 'm')} with damping, {amount(c, 'm')} with inertia" for name, (b, c) in fast.items()}
+    quieter = [name for name, (b, c) in fast.items() if c < b]
+    where = _OURS if _OURS in quieter else _NEAREST
+    phases = {name: _in_phase(of["c"].log) for name, of in runs.items()}
+    shares = {name: f"{100.0 * value:.1f} %" for name, value in phases.items()}
+    claims, always, once = work.claims, min(phases.values()) > _NEARLY_ALL, max(phases.values()) > _NEARLY_ALL
+    return [
+        claims["heat"].holds_if(abs(settled - 1.0) < 0.05, settled_s=_SETTLED_S, ratio=settled),
+        claims["felt"].holds_if(min(swings.values()) > _FELT_M, swings=listed(felt)),
+        claims["noise"].holds_if(len(quieter) == 2, bool(quieter), high_Hz=_HIGH_HZ, noise=listed(noise), where=where),
+        claims["phases"].holds_if(always, once, shares=listed(shares)),
     ]
-    alone = claims_table(
-        COUNTED | {"all": "all of the above"} | ASIDE,
-        SPACE,
-        {"ours": base, "nearest": nearest},
-        around,
-        rows,
-        there,
-    )
-    return work.tell(
-        "notes",
-        **search_words(SPACE, WHOLE, found, COUNTED),
-        held=sum(holds(row, "all") for row in rows),
-        held_refined=sum(holds(row, "all") for row in refined),
-        limit=work.tell("limit", most=most["holding"], lacks=lacks) if lacks else "",
-        both=f"Never both at random: {never}." if never else "Every two of them hold together somewhere.",
-        alone=alone,
-        aside=", ".join(f"*{name}*" for name in ASIDE),
-        described=describe(found.nearest),
-        verdict=f"It misses {missed}" if missed else "All claims hold for it",
-        distance=nearest["distance"],
-        swings=", ".join(f"{name} {amount(value, 'm')}" for name, value in swings.items()),
-        all=percent(share(around, "all")),
-        mean=np.mean([one["holding"] for one in around]),
-        numbers=markdown_table(["number, drawn evenly in its logarithm", "from", "to", "why"], numbers, numbers=(1, 2)),
-    )
 
 
-def _fullest(found: Found[Point]) -> Row:
-    """Returns the one with the most claims, of several the nearest to the paper."""
-    return max(found.rows, key=lambda row: (row["holding"], -row["distance"]))
+def _in_phase(log: Recording) -> float:
+    """Returns the share of the ticks with a force at which the acceleration has the direction of motion."""
+    force, v, a = (log["/controller"][name] for name in ("dissipation.0", "v", "a"))
+    return float(np.mean((v * a)[force != 0.0] >= 0.0))
+
+
+def _heat_over_leak(log: Recording) -> float:
+    """Returns the heat of both dampers over what the wall gave beyond what it took, in whole swings of the last second.
+
+    A swing begins where x rises through its mean.
+    """
+    energy, x = log["/energy"], log["/controller"]["x"]
+    since = len(x) - round(1.0 / (energy["timestamp"][1] - energy["timestamp"][0]))
+    above = x[since:] > x[since:].mean()
+    rises = since + np.flatnonzero(above[1:] & ~above[:-1])
+    first, last = int(rises[0]), int(rises[-1])
+    heat, wall = energy["device_heat"] + energy["hand_heat"], energy["wall.true"]
+    return float((heat[last] - heat[first]) / (wall[first] - wall[last]))
 
 
 def _panels(runs: Mapping[str, Run]) -> Figure:

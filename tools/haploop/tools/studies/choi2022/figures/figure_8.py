@@ -6,26 +6,26 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from haploop.controller.dissipation import registry
 from haploop.protocol.ticks import Timebase
 from haploop.tools.dissipate.booking import Booked, Booking
 from haploop.tools.dissipate.samples import Samples
-from haploop.tools.figure.style import GREY, dress, empty_figure, legend
+from haploop.tools.figure.style import dress, empty_figure, legend
 from haploop.tools.render.units import amount
-from haploop.tools.studies.choi2022.claims import ASSUMING, Finding, claims_of
 from haploop.tools.studies.choi2022.device import FRICTION_N, KINDS, Setup, elements_of
-from haploop.tools.studies.choi2022.drawing import COLOURS, INSIDE, UPPER_LEFT
-from haploop.tools.studies.choi2022.experiment import describe, findings, nearest, nearest_with
-from haploop.tools.studies.choi2022.experiment_measure import BOOKED_AT_N_M, BOOKED_DAMPING, BOOKED_KG
-from haploop.tools.studies.choi2022.sampled import bidirectional_J, damper_J, unidirectional_J
-from haploop.tools.studies.choi2022.work import Run, Work, run, strongest_Hz
+from haploop.tools.studies.choi2022.experiment import BOOKED_AT_N_M, BOOKED_DAMPING, BOOKED_KG
+from haploop.tools.studies.choi2022.figures.claims import ASSUMING, Finding
+from haploop.tools.studies.choi2022.figures.drawing import COLOURS, INSIDE, UPPER_LEFT
+from haploop.tools.studies.choi2022.figures.work import Work
+from haploop.tools.studies.choi2022.runs import Run, run, strongest_Hz
+from haploop.tools.studies.choi2022.sampled import DAMPING_N_S_M, PERIOD_S, bidirectional_J, closed_form
 
-CLAIMS = claims_of(8)
 LABELS = ("damping", "bidirectional inertia", "unidirectional inertia")
 # Relative to the energy moved, what rounding leaves of a sum that cancels.
 _ROUNDING = 1e-9
 _FREQUENCIES_HZ = np.linspace(2.3, 247.9, 492)
-# Ages of the acceleration: of a difference of differences, and of an MPU-9250 at its settings of 1046 and 420 Hz.
-_AGES_S: dict[str, float | None] = {"differenced": None, "unit of 0.50 ms": 5e-4, "unit of 1.38 ms": 1.38e-3}
+# Ages of an acceleration: of a difference of differences, and of an MPU-9250 at its settings of 1046 and 420 Hz.
+_AGES_S = (None, 5e-4, 1.38e-3)
 
 
 @dataclass(frozen=True)
@@ -43,37 +43,35 @@ class Contact:
         return -np.minimum(np.diff(self.booked.sampled_J, axis=-1), 0.0).sum(axis=-1)
 
 
-def make(work: Work) -> list[Finding]:
+def make_8(work: Work) -> list[Finding]:
     """Runs two contacts with damping, and books all three elements on the motion of each."""
-    found = contacts(nearest(work), work)
-    _picture(work, found, "figure_8", work.tell("seen_nearest"))
-    _sines(work)
-    if setup := nearest_with(work, "8 more"):
-        _picture(work, contacts(setup, work), "figure_8_holds", work.tell("seen_holds", setup=describe(setup)))
+    found = contacts(work.nearest)
+    _picture(work, found)
     sizes = {"damping": BOOKED_DAMPING, "mass_g": 1e3 * BOOKED_KG}
     work.caption = work.tell("caption", **sizes)
     if not work.small:
-        rough = contacts(replace(nearest(work), friction_N=FRICTION_N), work)
+        rough = contacts(replace(work.nearest, friction_N=FRICTION_N))
         ends = [contact.booked.sampled_J[:, -1] for contact in rough]
         needed_g = 1e3 * max(BOOKED_KG * end[0] / end[1:].min() for end in ends)
         work.notes = [work.tell("tried", labels=", ".join(LABELS), ends=_by_wall(rough, ends), needed_g=needed_g)]
-    first = first_ahead_Hz(bidirectional_J(_FREQUENCIES_HZ, None))
-    results = _findings(found, work)
+    first = [first_ahead_Hz(age_s) for age_s in _AGES_S]
+    swings = " and ".join(f"{contact.swings_Hz:.0f}" for contact in found)
+    results = _findings(work, found, first, swings)
     supports = any(one.claim.name == "more" and one.verdict == ASSUMING for one in results)
-    work.conclude(supports=supports, first=first, swings=found[0].swings_Hz, **sizes)
+    work.conclude(supports=supports, least=min(first), most=max(first), swings=swings, **sizes)
     return results
 
 
-def contacts(setup: Setup, work: Work) -> list[Contact]:
+def contacts(setup: Setup) -> list[Contact]:
     """Runs a contact with the paper's damping at both of its stiffnesses."""
     found = []
     for stiffness in BOOKED_AT_N_M:
         ran = run(setup.scene(stiffness, elements_of("damping", BOOKED_DAMPING)))
-        found.append(Contact(stiffness, ran, _booked_on(ran, work), strongest_Hz(ran.log)))
+        found.append(Contact(stiffness, ran, _booked_on(ran), strongest_Hz(ran.log)))
     return found
 
 
-def _booked_on(ran: Run, work: Work) -> Booked:
+def _booked_on(ran: Run) -> Booked:
     """Books damping and both inertias on the motion of a run, in the order of ``LABELS``."""
     scene, time = ran.scene, Timebase.from_scene(ran.scene)
     n, late = time.steps_per_tick, time.delay_steps % time.steps_per_tick
@@ -81,7 +79,7 @@ def _booked_on(ran: Run, work: Work) -> Booked:
     elements = tuple(element for kind, size in sizes for element in elements_of(kind, size))
     recorded = frozenset({"velocity", "acceleration"})
     delay_s = scene.clock.round_trip_delay
-    booking = Booking(replace(scene, dissipation=elements), time.period_s, delay_s, work.kinds, recorded)
+    booking = Booking(replace(scene, dissipation=elements), time.period_s, delay_s, registry(), recorded)
     ticks, x = ran.log["/controller"], ran.log["/plant"]["x"]
     count = len(ticks["x"])
     true, between = x[: count * n : n], x[late : late + count * n : n]
@@ -89,7 +87,7 @@ def _booked_on(ran: Run, work: Work) -> Booked:
     return booking.add(Samples(t_s, ticks["x"], ticks["v"], ticks["a"], true, between, True))
 
 
-def _picture(work: Work, contacts: list[Contact], name: str, seen: str) -> None:
+def _picture(work: Work, contacts: list[Contact]) -> None:
     figure = empty_figure(12.0, 3.8)
     axes = figure.subplots(1, len(contacts))
     columns: dict[str, np.ndarray] = {}
@@ -97,43 +95,29 @@ def _picture(work: Work, contacts: list[Contact], name: str, seen: str) -> None:
         booked = contact.booked
         for i, label in enumerate(LABELS):
             colour = COLOURS[KINDS[i + 1]]
-            ax.plot(booked.t_s, 1e3 * booked.sampled_J[i], color=colour, linewidth=1.3, label=label)
+            # The last is drawn thin: the two inertias come to nearly the same.
+            ax.plot(booked.t_s, 1e3 * booked.sampled_J[i], color=colour, linewidth=(1.4, 3.0, 1.2)[i], label=label)
             ax.plot(booked.t_s, 1e3 * booked.true_J[i], color=colour, linewidth=0.9, linestyle="--")
-        dress(ax, f"{contact.stiffness_N_m / 1e3:.1f} N/mm", "time (s)", "energy taken (mJ)")
+        heading = f"{contact.stiffness_N_m / 1e3:.1f} N/mm, solid: sampled books, dashed: true ones"
+        dress(ax, heading, "time (s)", "energy taken (mJ)")
         columns |= {f"{key}_t_s": booked.t_s, f"{key}_sampled_J": booked.sampled_J, f"{key}_true_J": booked.true_J}
-        work.scene(f"{name}_{key}", contact.ran.scene)
+        work.scene(f"figure_8_{key}", contact.ran.scene)
     legend(axes[0], **UPPER_LEFT, **INSIDE)
-    work.data(name, columns)
-    work.figure(figure, name, f"{seen} {work.tell('seen_books')}")
+    work.data("figure_8", columns)
+    work.figure(figure, "figure_8", work.texts["seen"])
 
 
-def _sines(work: Work) -> None:
-    """Draws what each inertia takes over what the damper takes, by frequency and by the age of the acceleration."""
-    figure = empty_figure(12.0, 3.6)
-    axes = figure.subplots(1, 2, sharey=True)
-    for ax, kind, taken in zip(axes, KINDS[2:], (bidirectional_J, unidirectional_J), strict=True):
-        for (name, age_s), style in zip(_AGES_S.items(), ("-", "--", ":"), strict=True):
-            ax.plot(_FREQUENCIES_HZ, ahead(taken(_FREQUENCIES_HZ, age_s)), style, color=COLOURS[kind], label=name)
-        ax.axhline(1.0, color=GREY, linewidth=0.8)
-        dress(ax, f"{kind.replace('-', ' ')} of 1.8 g over damping of 2.7 N s/m", "frequency of a swing (Hz)", "")
-        ax.set_ylim(0.0, 3.0)
-        legend(ax, **UPPER_LEFT)
-    axes[0].set_ylabel("energy taken, inertia / damping (sampled)")
-    work.figure(figure, "figure_8_sines", work.tell("seen_sines"))
+def first_ahead_Hz(age_s: float | None) -> float:
+    """Returns the lowest frequency below 250 Hz at which the paper's bidirectional inertia takes more than its damper.
 
-
-def ahead(inertia_J: np.ndarray) -> np.ndarray:
-    """Returns what the paper's inertia takes over what its damper does, from what 1 kg takes at 2.3 to 247.9 Hz."""
-    return BOOKED_KG * inertia_J / (BOOKED_DAMPING * damper_J(_FREQUENCIES_HZ))
-
-
-def first_ahead_Hz(inertia_J: np.ndarray) -> float:
-    """Returns the lowest frequency below 250 Hz from which the inertia is ahead; NaN if none."""
-    over = ahead(inertia_J) >= 1.0
+    Both from a sine, by the sampled books; the age of the acceleration is as of ``bidirectional_J``. NaN if none.
+    """
+    damped = BOOKED_DAMPING / DAMPING_N_S_M * closed_form("damping", 2.0 * np.pi * _FREQUENCIES_HZ * PERIOD_S, 0)
+    over = BOOKED_KG * bidirectional_J(_FREQUENCIES_HZ, age_s) >= damped
     return float(_FREQUENCIES_HZ[over.argmax()]) if over.any() else float("nan")
 
 
-def _findings(contacts: list[Contact], work: Work) -> list[Finding]:
+def _findings(work: Work, contacts: list[Contact], first: list[float], swings: str) -> list[Finding]:
     ends = [contact.booked.sampled_J[:, -1] for contact in contacts]
     back = [contact.back_J for contact in contacts]
     all_more = all((end[1:] > end[0]).all() and end[0] > 0.0 for end in ends)
@@ -142,8 +126,8 @@ def _findings(contacts: list[Contact], work: Work) -> list[Finding]:
     computed = {
         "labels": ", ".join(LABELS),
         "ends": _by_wall(contacts, ends),
-        "first": first_ahead_Hz(bidirectional_J(_FREQUENCIES_HZ, None)),
-        "swings": " and ".join(f"{contact.swings_Hz:.0f} Hz" for contact in contacts),
+        "first": ", ".join(f"{one:.0f}" for one in first),
+        "swings": swings,
         "back": _by_wall(contacts, back),
         "limit": 250.0 / late,
         "share": 100 * pure,
@@ -154,7 +138,7 @@ def _findings(contacts: list[Contact], work: Work) -> list[Finding]:
         "also_generates": all(of[0] > _ROUNDING for of in back),
         "pure": all_more and pure < 0.01,
     }
-    return findings(work, CLAIMS, holding, **computed)
+    return work.findings(holding, **computed)
 
 
 def _by_wall(contacts: list[Contact], values: list[np.ndarray]) -> str:

@@ -1,4 +1,4 @@
-"""Claims of the paper, the findings that tests of them come to, and the texts of the figures (``figures.toml``)."""
+"""Claims of the paper, the findings that tests of them come to, and the texts of the figures (``words.toml``)."""
 
 from __future__ import annotations
 
@@ -7,15 +7,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
-from typing import Any, Literal, cast
+from typing import Any, Literal, cast, get_args
 
 Verdict = Literal["holds", "holds under a stated assumption", "rare", "does not hold here"]
-VERDICTS: tuple[Verdict, Verdict, Verdict, Verdict] = (
-    "holds",
-    "holds under a stated assumption",
-    "rare",
-    "does not hold here",
-)
+VERDICTS: tuple[Verdict, ...] = get_args(Verdict)
 HOLDS, ASSUMING, RARE, FAILS = VERDICTS
 # Of random interpretations a claim holds in fewer than this share where it is rare.
 RARE_BELOW = 0.05
@@ -91,19 +86,18 @@ class Finding:
 
 
 @cache
-def _figures() -> dict[str, Any]:
-    return tomllib.loads(Path(__file__).with_name("figures.toml").read_text(encoding="utf-8"))
+def _words() -> dict[str, Any]:
+    return tomllib.loads(Path(__file__).with_name("words.toml").read_text(encoding="utf-8"))
 
 
 def claims_of(figure: int) -> dict[str, Claim]:
-    return {name: Claim(name=name, **claim) for name, claim in words_of(figure, "claims").items()}
+    """Returns the claims that a figure tests, by name."""
+    return {name: Claim(name=name, **claim) for name, claim in _words()[str(figure)]["claims"].items()}
 
 
-def texts_of(part: int | Literal["page"]) -> dict[str, str]:
-    """Returns title, caption and the other texts of a figure, with names in braces for what is computed."""
-    return {name: text for name, text in _figures()[str(part)].items() if isinstance(text, str)}
+def texts_of(part: int | Literal["page"]) -> dict[str, Any]:
+    """Returns title, caption and the other texts of a figure, with names in braces for what is computed.
 
-
-def words_of(part: int | Literal["page"], table: str) -> dict[str, Any]:
-    """Returns a table of a figure, or of the page, such as ``tested``: what its search tests, by name of the claim."""
-    return _figures()[str(part)][table]
+    Those of the page have the titles of the paper's ``sections`` among them.
+    """
+    return {name: text for name, text in _words()[str(part)].items() if name != "claims"}

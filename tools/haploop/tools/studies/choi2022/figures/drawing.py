@@ -1,4 +1,4 @@
-"""Drawings and tables of several figures: colours of elements, momentum over velocity, and what a search found."""
+"""Drawings and tables of several figures: colours of elements, momentum over velocity, outcomes of a search."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from haploop.tools.figure.style import ELEMENTS, FAINT, INK, SMALL, TEXT, WALL, dress, empty_figure
+from haploop.tools.figure.style import ELEMENTS, FAINT, INK, TEXT, WALL, dress
 from haploop.tools.render.terminal import markdown_table
 from haploop.tools.search.random import Effort, Row
 from haploop.tools.studies.choi2022.interpretations import (
@@ -17,11 +17,10 @@ from haploop.tools.studies.choi2022.interpretations import (
     InterpretationSpace,
     Option,
     decider,
+    holds,
     interval,
     often,
-    percent,
-    share,
-    yes,
+    tables_of,
 )
 from haploop.tools.studies.choi2022.sampled import steps_J
 
@@ -82,73 +81,62 @@ def claims_table(
     claims: Mapping[str, str],
     space: InterpretationSpace,
     alone: Mapping[str, Row],
-    around: Sequence[Row],
-    random: Sequence[Row],
-    found: Sequence[Option],
+    found: Found,
+    options: Sequence[Option],
 ) -> str:
     """Returns a table with a row a claim: where it holds, how often, and what decides it.
 
     Args:
         alone: interpretations with a column of yes or no, by heading.
-        around, random: interpretations with a column of shares; the latter with its interval of confidence.
+        options: of the random interpretations.
     """
-    rows = []
+    random, around = found.of("random"), found.of("neighbour")
+    rows: list[list[str]] = []
     for name, about in claims.items():
-        decides = decider(found, name)
-        held, shares = (
-            (yes(row, name) for row in alone.values()),
-            (percent(share(around, name)), often(interval(random, name, space))),
-        )
-        rows.append([f"*{name}*", about, *held, *shares, decides.describe(name) if decides else ""])
+        held = ("yes" if holds(row, name) else "no" for row in alone.values())
+        near = f"{sum(holds(row, name) for row in around)} of {len(around)}"
+        rows.append([f"*{name}*", about, *held, near, often(interval(random, name, space)), _most(options, name)])
     heads = ["claim", "as tested", *alone, "its neighbours", "at random [95 %]", "most with, least with"]
     return markdown_table(heads, rows, numbers=range(2 + len(alone), len(heads) - 1))
 
 
-def search_words(
-    space: InterpretationSpace, effort: Effort, found: Found[Any], claims: Collection[str]
-) -> dict[str, str | float]:
-    """Returns what the words on any search name: its seed and effort, the interpretations of each stage, ``claims``,
-    the choices as a list, and ``counts``: how many random interpretations have how many of the claims.
+def _most(options: Sequence[Option], claim: str) -> str:
+    return str(decider(options, claim) or "")
+
+
+def open_table(space: InterpretationSpace, figure: int) -> str:
+    """Returns a table of what the paper leaves open: options, or bounds and why they are as they are."""
+    rows = [
+        [space.label(key), ", ".join(space.value(key, one) for one in some), ""] for key, some in space.choices.items()
+    ]
+    whys = tables_of(figure)["numbers"]
+    for key, (low, high) in space.bounds.items():
+        rows.append(
+            [space.label(key), f"{space.value(key, low)} to {space.value(key, high)}", whys[key].get("why", "")]
+        )
+    return markdown_table(["open", "drawn from", "why"], rows)
+
+
+def columns_of(rows: Sequence[Row]) -> dict[str, list[Any]]:
+    """Returns a table of interpretations by column."""
+    return {key.replace(" ", "_"): [row[key] for row in rows] for key in rows[0]}
+
+
+def search_words(found: Found, effort: Effort, claims: Collection[str]) -> dict[str, Any]:
+    """Returns what the words on any search name: its seed and spread, the interpretations of each stage, ``claims``,
+    how many of them hold in the ``nearest``, what it ``lacks``, and how many hold at ``most``.
     """
-    holding = Counter(row["holding"] for row in found.of("random"))
-    choices = (
-        f"- {space.label(key)}: {', '.join(space.value(key, option) for option in some)}"
-        for key, some in space.choices.items()
-    )
+    [nearest] = found.of("nearest")
+    stages = Counter(row["stage"] for row in found.rows)
     return {
-        **Counter(row["stage"] for row in found.rows),
+        "random": stages["random"],
+        "refined": stages["refined"],
+        "neighbours": stages["neighbour"],
         "seed": SEED,
         "far": effort.far,
         "close": effort.close,
         "claims": len(claims),
-        "choices": "\n".join(choices),
-        "counts": ", ".join(f"{n} of {len(claims)}: {holding[n]}" for n in sorted(holding, reverse=True)),
+        "nearest": nearest["holding"],
+        "lacks": ", ".join(f"*{name}*" for name in claims if not holds(nearest, name)),
+        "most": max(row["holding"] for row in found.rows),
     }
-
-
-def share_map(found: Sequence[Option], claims: Sequence[str], count: int) -> Figure:
-    """Draws a row an option, a column a claim, the share of interpretations as colour and number."""
-    shares = np.array([[option.share(claim) for claim in claims] for option in found])
-    starts = [i == 0 or option.dimension != found[i - 1].dimension for i, option in enumerate(found)]
-    figure = empty_figure(11.5, 2.0 + 0.2 * len(found))
-    ax = figure.subplots()
-    ax.pcolormesh(shares, cmap="YlGnBu", vmin=0.0, vmax=1.0, edgecolors="white", linewidth=0.5)
-    for (row, column), value in np.ndenumerate(shares):
-        text = percent(float(value)).removesuffix(" %")
-        colour = "white" if value > 0.55 else INK
-        ax.text(column + 0.5, row + 0.5, text, ha="center", va="center", fontsize=SMALL - 1, color=colour)
-    ax.set_xticks(np.arange(len(claims)) + 0.5, claims, rotation=40, ha="left", fontsize=SMALL)
-    ax.xaxis.tick_top()
-    names = [
-        f"{option.dimension}: {option.name}" if start else option.name
-        for option, start in zip(found, starts, strict=True)
-    ]
-    ax.set_yticks(np.arange(len(found)) + 0.5, names, fontsize=SMALL)
-    ax.invert_yaxis()
-    for i in np.flatnonzero(starts)[1:]:
-        ax.axhline(i, color=INK, linewidth=0.7)
-    ax.tick_params(length=0)
-    for spine in ax.spines.values():
-        spine.set_visible(False)
-    ax.set_xlabel(f"% of {count} random interpretations under which the claim holds", fontsize=TEXT, color=INK)
-    return figure

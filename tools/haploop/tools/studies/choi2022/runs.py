@@ -1,0 +1,78 @@
+"""Runs behind the figures, in this process, and the frequencies in what they did."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import NamedTuple
+
+import numpy as np
+
+from haploop.controller.dissipation import registry
+from haploop.launch.runs.in_process import run_in_process
+from haploop.launch.scene.file import load
+from haploop.logger.log.recording import MemoryLog, Recording
+from haploop.logger.summary import Summary
+from haploop.protocol.scene.scene import Hand, Scene, Wall, by_window
+from haploop.tools.cost.grid import scenes_folder
+
+_LAST_S = 0.5
+
+
+@cache
+def shipped(name: str) -> Scene:
+    """Returns a scene that comes with haploop, by the name of its file."""
+    return load(scenes_folder() / name)
+
+
+def fig6(panel: str) -> Scene:
+    """Returns the scene of a panel of Fig. 6, "a", "b" or "c", in our interpretation."""
+    return shipped(f"fig6{panel}.toml")
+
+
+def wall_of(scene: Scene) -> Wall:
+    """Returns the wall of a scene that is known to have one."""
+    assert scene.wall
+    return scene.wall
+
+
+def hand_of(scene: Scene) -> Hand:
+    """Returns the hand of a scene that is known to have one."""
+    assert scene.hand
+    return scene.hand
+
+
+class Run(NamedTuple):
+    """A run in this process: its resolved scene, its summary, and its log by channel."""
+
+    scene: Scene
+    summary: Summary
+    log: Recording
+
+
+def run(scene: Scene) -> Run:
+    """Runs a scene; its verdict is the cheap one, of the last half second alone."""
+    memory = MemoryLog()
+    summary = run_in_process(by_window(scene), registry(), memory=memory)
+    return Run(scene, summary, memory.recording())
+
+
+def spectrum(log: Recording) -> tuple[np.ndarray, np.ndarray]:
+    """Returns frequencies in Hz and amplitudes in m of the position in the last half second, its trend taken out."""
+    t, x = log["/plant"]["t"], log["/plant"]["x"]
+    last = t >= t[-1] - _LAST_S
+    t, x = t[last], x[last]
+    x = x - np.polyval(np.polyfit(t - t[0], x, 1), t - t[0])
+    window = np.hanning(len(x))
+    amplitudes = np.abs(np.fft.rfft(x * window)) / window.sum() * 2.0 * np.sqrt(2.0 / 3.0)
+    return np.fft.rfftfreq(len(x), t[1] - t[0]), amplitudes
+
+
+def strongest_Hz(log: Recording) -> float:
+    frequencies, amplitudes = spectrum(log)
+    return float(frequencies[np.argmax(amplitudes[1:]) + 1])
+
+
+def faster_m(log: Recording, frequency_Hz: float) -> float:
+    """Returns the root mean square of what of the position is faster than a frequency."""
+    frequencies, amplitudes = spectrum(log)
+    return float(np.sqrt((amplitudes[frequencies > frequency_Hz] ** 2).sum() / 2.0))
