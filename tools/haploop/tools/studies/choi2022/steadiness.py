@@ -49,8 +49,8 @@ _PARTS = 4
 # With friction no two setups run in one batch, so that batches are small.
 _FEWEST = 4
 _GOLDEN = 0.5 * (5.0**0.5 - 1.0)
-# What is "steady" by the judge's own, stricter word no hand feels; a wider swing is so only if it does not grow.
-_NOT_STEADY = ("growing", "diverged", "no-contact")
+# The judge's words for what does not grow, and is not undecided: its "steady" no hand feels, a limit cycle may be small.
+_LASTING = ("steady", "limit-cycle")
 
 
 def started(scene: Scene, start: int) -> Scene:
@@ -206,8 +206,8 @@ class _Presses(NamedTuple):
 
 
 def _is_judged_steady(result: Summary) -> bool:
-    """Tells whether a run that was judged is steady, by how wide what remains is; what grows is not."""
-    return result.get("verdict", "diverged") not in _NOT_STEADY and result["stability"]["width_m"] <= WIDEST_M
+    """Tells whether a run that was judged is steady, by how wide what remains is; what grows, or may grow, is not."""
+    return result.get("verdict") in _LASTING and result["stability"]["width_m"] <= WIDEST_M
 
 
 def tried(answers: Answers, setup: Setup, kind: str, sizes: np.ndarray) -> Range:
