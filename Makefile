@@ -53,7 +53,7 @@ accuracy: $(READY) ## measure what accuracy costs and write docs/accuracy.md (fo
 	@$(BIN)/haploop cost --out runs/accuracy
 	@$(BIN)/python -m haploop.tools.cost.page runs/accuracy docs
 
-paper: $(READY) ## make every figure of the paper, write docs/paper.md and paper_claims.md (some 20 minutes on two cores)
+paper: $(READY) ## make every figure of the paper, write docs/paper.md and paper_claims.md (some 20 minutes on two cores; stopped, it goes on)
 	@$(BIN)/haploop paper --out runs/paper
 	@$(BIN)/python -m haploop.tools.studies.choi2022.command runs/paper docs
 	@cp runs/paper/fig6?_nearest.toml launch/scenes/paper/

@@ -6,7 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from haploop.tools.studies.choi2022.claims import (
+from haploop.tools.studies.choi2022.command import paper
+from haploop.tools.studies.choi2022.figures import maker, numbers
+from haploop.tools.studies.choi2022.figures.claims import (
     ASSUMING,
     FAILS,
     HOLDS,
@@ -18,9 +20,8 @@ from haploop.tools.studies.choi2022.claims import (
     claims_of,
     texts_of,
 )
-from haploop.tools.studies.choi2022.command import claims_page, made, page, paper
-from haploop.tools.studies.choi2022.figures import figure, numbers
-from haploop.tools.studies.choi2022.work import Work
+from haploop.tools.studies.choi2022.figures.page import claims_page, made, page
+from haploop.tools.studies.choi2022.figures.work import Work
 
 DOCS = Path(__file__).parents[2] / "docs"
 CLAIM = Claim("III, Fig. 4", "inertia dissipates | stores", "dissipates")
@@ -83,14 +84,15 @@ def test_the_page_tells_every_finding_by_section_and_what_was_not_made() -> None
 
 @pytest.mark.parametrize("number", numbers())
 def test_every_figure_has_a_title_and_claims_of_its_own(number: int) -> None:
-    module = figure(number)
+    claims = claims_of(number)
+    assert callable(maker(number))
     assert texts_of(number)["title"]
-    assert len(set(module.CLAIMS.values())) == len(module.CLAIMS) > 0
-    assert all(claim.place and claim.quote for claim in module.CLAIMS.values())
+    assert len(set(claims.values())) == len(claims) > 0
+    assert all(claim.place and claim.quote for claim in claims.values())
 
 
 def test_no_claim_is_made_twice() -> None:
-    claims = [claim for number in numbers() for claim in figure(number).CLAIMS.values()]
+    claims = [claim for number in numbers() for claim in claims_of(number).values()]
     assert len(set(claims)) == len(claims)
 
 
@@ -127,7 +129,7 @@ def test_the_pages_in_the_documentation_tell_every_claim_of_their_figures_and_sh
     told = [int(number) for number in re.findall(r'id="figure-(\d+)"', text)]
     assert {3, 4, 5, 6} <= set(told)
     for number in told:
-        missing = [claim.quote for claim in figure(number).CLAIMS.values() if claim.quote not in text]
+        missing = [claim.quote for claim in claims_of(number).values() if claim.quote not in text]
         assert missing == []
     pictures = re.findall(r"!\[.*?\]\((.*?)\)", text + (DOCS / "paper.md").read_text(encoding="utf-8"))
     assert len(pictures) >= len(told)

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from haploop.tools.search.random import Group, Point, Row, random_search
-from haploop.tools.studies.choi2022 import experiment, simulation_measure
+from haploop.tools.studies.choi2022 import experiment, simulation
 from haploop.tools.studies.choi2022.interpretations import SEED
 
 
@@ -38,7 +38,7 @@ def as_line(point: Point) -> list[Any]:
 @pytest.mark.parametrize(
     ("module", "tie", "count", "digest"),
     [
-        (simulation_measure, 0.0, 5056, "94bc47aa11aa59a10dfea94efdb4f87718f4ce387746fa27dfb2798e5e0ff2ae"),
+        (simulation, 0.0, 5056, "94bc47aa11aa59a10dfea94efdb4f87718f4ce387746fa27dfb2798e5e0ff2ae"),
         (experiment, 1.0, 744, "26e362e434242bf08b1b9333a411e9eac4c7eb87e8d69620bf848e87418798a8"),
     ],
 )

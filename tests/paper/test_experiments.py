@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import shutil
 from dataclasses import replace
@@ -19,24 +18,34 @@ from haploop.tools.cost.grid import scenes_folder
 from haploop.tools.linear.one_tick import OneTickMap
 from haploop.tools.linear.stiffness_limit import smooth
 from haploop.tools.search.random import Point
-from haploop.tools.studies.choi2022.claims import Claim, Finding
-from haploop.tools.studies.choi2022.command import make_figure
 from haploop.tools.studies.choi2022.device import KINDS, SCENE_FILE, Setup, elements_of, file_text, nearest
-from haploop.tools.studies.choi2022.experiment import NEAREST, SPACE, finding, keep_shares, nearest_with, setup_of
-from haploop.tools.studies.choi2022.experiment import nearest as nearest_in
-from haploop.tools.studies.choi2022.experiment_measure import CLAIMS, NAMES, SIZES, measure, stiffness_ladder
-from haploop.tools.studies.choi2022.figures import figure
+from haploop.tools.studies.choi2022.experiment import (
+    CLAIMS,
+    NAMES,
+    SHARES,
+    SIZES,
+    SPACE,
+    measure,
+    setup_of,
+    shares_of,
+    stiffness_ladder,
+)
+from haploop.tools.studies.choi2022.figures.claims import Claim
 from haploop.tools.studies.choi2022.figures.figure_8 import contacts as figure_8_contacts
-from haploop.tools.studies.choi2022.interpretations import options
+from haploop.tools.studies.choi2022.figures.work import NEAREST, Work
 from haploop.tools.studies.choi2022.steadiness import BRIEFLY_S, is_steady, pressed
 from haploop.tools.studies.choi2022.theory import GatedMap, first_end, gated_ends
-from haploop.tools.studies.choi2022.work import Work, wall_of
 
 # A drive, a hand and a unit with all that a loop may have but friction.
 SETUP = Setup(
     mode_Hz=225.0, near_share=0.45, mode_damping=0.013, push_N=3.0, entry_m_s=0.2, hand=1.0, delay_s=0.0016,
     unit="420 Hz", mount="tip",
 )  # fmt: skip
+
+
+def point_of(setup: Setup) -> Point:
+    values = setup.as_dict()
+    return Point({key: values[key] for key in SPACE.choices}, {key: values[key] for key in SPACE.bounds})
 
 
 def test_the_scene_file_is_the_nearest_interpretation() -> None:
@@ -89,6 +98,7 @@ def test_the_gated_maps_growth_without_a_gate_is_that_of_the_eigenvalues() -> No
         assert gated.growth(stiffness, 0.0) == pytest.approx(math.log(exact.growth(stiffness)), abs=1e-4)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("share", "grows"), [(0.9, False), (1.15, True)])
 def test_runs_of_the_program_grow_and_decay_as_the_gated_map_says(share: float, grows: bool) -> None:
     """Without encoder, noise and friction; deep enough that the contact is never left while it matters."""
@@ -116,8 +126,7 @@ def test_interpretations_are_a_function_of_their_seed_with_every_choice_equally_
 
 
 def test_interpretations_around_one_share_its_choices_and_keep_to_whole_steps_of_delay() -> None:
-    values = SETUP.as_dict()
-    point = Point({key: values[key] for key in SPACE.choices}, {key: values[key] for key in SPACE.bounds})
+    point = point_of(SETUP)
     assert setup_of(point) == SETUP
     near = [setup_of(one) for one in SPACE.neighbours(np.random.default_rng(1), point, 0.3, 6)]
     assert len({setup.delay_s for setup in near}) == 1
@@ -143,44 +152,23 @@ def test_an_element_climbs_until_no_size_of_it_is_steady() -> None:
 @pytest.mark.slow
 def test_inertias_that_are_booked_unfelt_are_booked_as_recorded() -> None:
     """The books of a millionth, a million times: those of ``haploop dissipate`` on the run with the damper alone."""
-    row = measure([SETUP])[0]
-    [*_, higher] = figure_8_contacts(SETUP, Work(Path(), 8))
+    row = measure([point_of(SETUP)])[0]
+    [*_, higher] = figure_8_contacts(SETUP)
     for i in range(3):
         assert row[f"higher {i}_J"] == pytest.approx(float(higher.booked.sampled_J[i, -1]), rel=1e-3)
 
 
 def test_a_claim_that_the_nearest_interpretation_breaks_may_hold_in_another(tmp_path: Path) -> None:
     work, claim = Work(tmp_path, 8), Claim("V.B", "it does", "does", "{energy}", tested="8 more")
-    assert finding(work, claim, False, energy="1 J").verdict == "does not hold here"
-    assert nearest_with(work, "8 more") is None
+    assert work.finding(claim, False, energy="1 J").verdict == "does not hold here"
     broken, held = ({name: float(not is_so) for name in CLAIMS} | {"distance": 3.0} for is_so in (False, True))
     table = [SETUP.as_dict() | broken] * 30 + [replace(SETUP, mount="motor").as_dict() | held] * 30
-    keep_shares(work, list(CLAIMS), table, options(table, SPACE))
+    work.text(SHARES, shares_of(table, small=False))
     work.scene("figure_7", replace(SETUP, mode_Hz=300.0).scene(5000.0))
-    found = finding(work, claim, False, energy="1 J")
+    found = work.finding(claim, False, energy="1 J")
     assert "mount of the unit: motor" in found.assumption
     # Two clusters that agree within: as much evidence as one draw.
     assert found.numbers == "1 J. In 50 % [5.5, 95] of 60 random interpretations"
-    assert finding(work, claim, True, energy="1 J").assumption == NEAREST
-    assert nearest_with(work, "8 more") == replace(SETUP, mount="motor")
-    assert nearest_in(work).mode_Hz == 300.0
-    assert nearest_in(Work(tmp_path, 8, small=True)) == nearest()
-
-
-@pytest.mark.parametrize("number", [8, 9, 11, 12, 13])
-def test_a_small_figure_has_its_files_and_a_finding_for_every_claim(number: int, tmp_path: Path) -> None:
-    make_figure(number, tmp_path, small=True, workers=1)
-    kept = json.loads((tmp_path / f"figure_{number}.json").read_text(encoding="utf-8"))
-    claims = [Finding.from_dict(entry, figure(number).CLAIMS).claim for entry in kept["findings"]]
-    assert sorted(claims, key=str) == sorted(figure(number).CLAIMS.values(), key=str)
-    for name in kept["files"]:
-        assert (tmp_path / name).stat().st_size > 0
-        if name.endswith(".toml") and name != SCENE_FILE:  # that one extends what lies elsewhere
-            assert wall_of(load(tmp_path / name)).stiffness > 0.0
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("number", [7, 10, 14])
-def test_small_figures_of_many_runs(number: int, tmp_path: Path) -> None:
-    """The same as above for those that take longer."""
-    test_a_small_figure_has_its_files_and_a_finding_for_every_claim(number, tmp_path)
+    assert work.finding(claim, True, energy="1 J").assumption == NEAREST
+    assert work.nearest.mode_Hz == 300.0
+    assert Work(tmp_path, 8, small=True).nearest == nearest()

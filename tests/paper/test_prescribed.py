@@ -111,6 +111,7 @@ def test_jitter_about_rest_costs_unidirectional_inertia_nothing_and_on_a_velocit
         assert taken["unidirectional-inertia"] == 0.0
 
 
+@pytest.mark.slow
 def test_a_filter_narrows_where_inertia_takes_and_widens_how_much_of_it_is_stable() -> None:
     assert passive_up_to_Hz(None) == pytest.approx(1000.0 / 3.0, abs=2.0)
     assert 200.0 < passive_up_to_Hz(10.0) < passive_up_to_Hz(100.0) < passive_up_to_Hz(None)

@@ -11,6 +11,11 @@ from haploop.tools.studies.choi2022.device import KINDS, Setup, elements_of
 from haploop.tools.studies.choi2022.steadiness import (
     STIFFNESSES,
     WIDEST_M,
+    Range,
+    Reached,
+    beats,
+    finer,
+    is_judged_steady,
     judged_largest,
     largest,
     pressed,
@@ -18,7 +23,6 @@ from haploop.tools.studies.choi2022.steadiness import (
     started,
     swing_m,
 )
-from haploop.tools.studies.choi2022.tuning import Range, Reached, beats, finer
 
 SETUP = Setup(
     mode_Hz=225.0, near_share=0.45, mode_damping=0.013, push_N=3.0, entry_m_s=0.2, hand=1.0, delay_s=0.0016,
@@ -67,13 +71,22 @@ def test_one_element_bears_more_only_by_a_step_and_with_intervals_apart() -> Non
     assert not beats(reached(4500.0, 4500.0, 5000.0, 4500.0), reached(4500.0, 4500.0, 4500.0, 4500.0))
     assert not beats(reached(3000.0, 7000.0), reached(4000.0, 4500.0))
     assert reached(4500.0, 4500.0).describe() == "4.5"
-    assert reached(4000.0, 5000.0).describe() == "4.5 [-1.9, 10.9]"
+    assert reached(4000.0, 5000.0).describe() == "4.50 [-1.85, 10.85]"
+
+
+def test_a_wall_of_which_the_judge_cannot_tell_or_that_the_device_leaves_is_not_steady() -> None:
+    """However narrow what remains: it may grow, or there is no contact left that could swing."""
+    narrow = {"stability": {"width_m": 0.0}}
+    words = ("steady", "limit-cycle", "undecided", "growing", "diverged", "no-contact")
+    assert [is_judged_steady(narrow | {"verdict": word}) for word in words] == [True, True, *[False] * 4]
+    assert not is_judged_steady({"verdict": "limit-cycle", "stability": {"width_m": 1.1 * WIDEST_M}})
+    assert not is_judged_steady({"ended": "error", "why": "it failed"})
 
 
 @pytest.mark.slow
 def test_the_judge_and_a_long_press_agree_but_near_the_line_between_them() -> None:
     """Damping on a wall that it holds and one that it does not, far from where one begins and the other ends."""
-    best = judged_largest(SETUP, KINDS[1], (2.0,), (3,))[0].steady
+    best = judged_largest(SETUP, KINDS[1], (2.0,), 3)
     soft, hard = (max(best - 500.0, 500.0), best + 1500.0)
     one, two = run_all([pressed(started(SETUP.scene(k, elements_of(KINDS[1], 2.0)), 3)) for k in (soft, hard)])
     assert swing_m(one) <= WIDEST_M < swing_m(two)

@@ -49,7 +49,7 @@ _PARTS = 4
 # With friction no two setups run in one batch, so that batches are small.
 _FEWEST = 4
 _GOLDEN = 0.5 * (5.0**0.5 - 1.0)
-# The judge's words for what does not grow, and is not undecided: its "steady" no hand feels, a limit cycle may be small.
+# The judge's words for what surely does not grow: its "steady" no hand feels, a limit cycle may be small.
 _LASTING = ("steady", "limit-cycle")
 
 
@@ -150,9 +150,9 @@ class Reached(NamedTuple):
         return mean_interval(np.array(self.steady) / 1e3)
 
     def describe(self) -> str:
-        """Returns it in N/mm: ``"5.2 [4.9, 5.5]"``, or ``"4.5"`` where all starts come to the same."""
+        """Returns it in N/mm: ``"4.96 [4.87, 5.05]"``, or ``"4.5"`` where all starts come to the same."""
         mean, low, high = self.mean
-        return f"{mean:.1f}" if low == high else f"{mean:.1f} [{low:.1f}, {high:.1f}]"
+        return f"{mean:.1f}" if low == high else f"{mean:.2f} [{low:.2f}, {high:.2f}]"
 
 
 def beats(one: Reached, other: Reached) -> bool:
@@ -171,7 +171,7 @@ def sizes_of(kind: str, small: bool) -> np.ndarray:
 
 
 class _Presses(NamedTuple):
-    """Presses on some walls, in N/m, with some sizes of an element, from some starts."""
+    """_Presses on some walls, in N/m, with some sizes of an element, from some starts."""
 
     setup: Setup
     kind: str
@@ -199,13 +199,18 @@ class _Presses(NamedTuple):
         found: list[tuple[float, bool]] = []
         for start in range(len(self.starts)):
             climbed = results[start :: len(self.starts)]
-            count = rungs_held(map(_is_judged_steady, climbed))
+            count = rungs_held(map(is_judged_steady, climbed))
             unfelt = count > 0 and climbed[count - 1]["verdict"] == "steady"
             found.append((self.walls[count - 1] if count else 0.0, unfelt))
         return found
 
 
-def _is_judged_steady(result: Summary) -> bool:
+def judged_largest(setup: Setup, kind: str, size: Sequence[float], start: int) -> float:
+    """Returns the largest stiffness in N/m that a size of an element steadies from a start, by the judge of runs."""
+    return _Presses(setup, kind, STIFFNESSES.tolist(), [size], (start,)).judged()[0][0]
+
+
+def is_judged_steady(result: Summary) -> bool:
     """Tells whether a run that was judged is steady, by how wide what remains is; what grows, or may grow, is not."""
     return result.get("verdict") in _LASTING and result["stability"]["width_m"] <= WIDEST_M
 

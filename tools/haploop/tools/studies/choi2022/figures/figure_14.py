@@ -118,7 +118,8 @@ def _panel(ax: Axes, name: str, stiffness: np.ndarray, modes: Sequence[float], d
     for (row, column), times in np.ndenumerate(by):
         most = stiffness[row, column].max()
         text = f"{most / 1e3:.1f}" + (f"\n×{min(times, 99):.1f}" if times >= DRAW else "")
-        ax.text(column, row, text, ha="center", va="center", fontsize=SMALL - 1.5, color=INK)
+        tone = "white" if strength[row, column, 0] > 0.75 else INK
+        ax.text(column, row, text, ha="center", va="center", fontsize=SMALL - 0.5, color=tone)
     dress(ax, name, "mode of the drive (Hz)", "extra delay (ms)")
     ax.grid(visible=False)
     ax.set_xticks(range(len(modes)), [f"{mode:g}" for mode in modes])

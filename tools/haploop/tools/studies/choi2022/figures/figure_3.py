@@ -13,7 +13,7 @@ from haploop.launch.batch.run import run_batch
 from haploop.logger.summary import Summary
 from haploop.protocol.scene.paths import without
 from haploop.protocol.scene.scene import Encoder, Scene
-from haploop.tools.figure.style import INK, PRESSING, RELEASING, SMALL, dress, empty_figure, legend
+from haploop.tools.figure.style import INK, PRESSING, RELEASING, SMALL, TEXT, dress, empty_figure, legend
 from haploop.tools.render.units import amount
 from haploop.tools.studies.choi2022.figures.claims import Finding
 from haploop.tools.studies.choi2022.figures.drawing import INSIDE, UPPER_LEFT
@@ -52,8 +52,10 @@ def make_3(work: Work) -> list[Finding]:
         columns |= {f"penetration_{number}_m": depth, f"force_{number}_N": force}
         work.scene(f"figure_3_{number}", scene)
     figure = empty_figure(13.0, 4.4)
-    for ax, (name, curve) in zip(figure.subplots(1, 3, sharey=True, sharex=True), curves.items(), strict=True):
+    axes = figure.subplots(1, 3, sharey=True, sharex=True)
+    for ax, (name, curve) in zip(axes, curves.items(), strict=True):
         _draw(ax, name, curve, walls[name])
+    axes[0].set_ylabel("force out of the wall (N)", fontsize=TEXT, color=INK)
     work.figure(figure, "figure_3")
     work.data("figure_3", columns)
     leaks_J = {name: leaks_of_phases_J(scene, 16 if work.small else _PHASES) for name, scene in scenes.items()}
@@ -107,7 +109,7 @@ def _draw(ax: Axes, name: str, curve: Curve, wall: Summary) -> None:
     way_in, way_out, held = slice(deepest + 1), slice(deepest, None), {"linewidth": 1.2, "drawstyle": "steps-post"}
     ax.plot(mm[way_in], force[way_in], color=PRESSING, label="pressing", **held)
     ax.plot(mm[way_out], force[way_out], color=RELEASING, label="releasing", **held)
-    dress(ax, name, "penetration (mm)", "force out of the wall (N)")
+    dress(ax, name, "penetration (mm)", "")
     ax.set_xlim(-0.45, None)
     took, gave = map(_J, _taken_and_given_J(depth, force))
     text = f"took {took}\ngave {gave}\nleak {_J(-wall['true_J'])}"

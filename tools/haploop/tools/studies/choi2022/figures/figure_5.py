@@ -55,7 +55,7 @@ def _over_samples(ax: Axes) -> dict[str, np.ndarray]:
             ax.plot(1e6 * book, label=f"{kind.partition('-')[0]}, {where}", **look)
             drawn[f"{kind}_{where}_J".replace("-", "_").replace(" ", "_").replace("/", "_per_")] = book
     ax.axhline(0.0, color=GREY, linewidth=0.8, zorder=0)
-    dress(ax, "Energy taken by 10 g of inertia under that jitter", "sample", "energy (µJ)")
+    dress(ax, "Energy taken by 10 g of inertia under that jitter", "sample", "energy taken (µJ)")
     legend(ax, loc="lower left", bbox_to_anchor=(0.0, 0.0), ncols=1, **INSIDE)
     return drawn
 
@@ -78,7 +78,7 @@ def _over_frequency(ax: Axes, frequencies: np.ndarray, measured: dict[tuple[str,
         look = {"linestyle": "-" if kind == UNI else "none", "linewidth": 0.8, "marker": ".", "markersize": 5}
         ax.plot(frequencies, measured[kind, late] / scale, color=colour, label=kind.replace("-inertia", ""), **look)
     ax.axhline(0.0, color=GREY, linewidth=0.8, zorder=0)
-    dress(ax, f"From a sine, {late} ms of delay", "frequency (Hz)", "energy taken / that of the damper")
+    dress(ax, f"From a sine, {late} ms of delay", "frequency (Hz)", "energy taken / that of an unsampled damper")
     ax.set_xscale("log")
     plain_numbers(ax.xaxis)
     ax.set_yscale("symlog", linthresh=0.1, linscale=0.7)

@@ -149,9 +149,9 @@ def _draw(base: Largest, influences: Influences, varied: Mapping[str, Pair]) -> 
                 text = {"ha": "left" if of[name] >= base[name] else "right", "fontsize": SMALL - 1, "color": INK}
                 ax.text(of[name] / 1e3, row + side, f" {SPACE.value(key, value)} ", va="center", **text)
         ax.axvline(base[name] / 1e3, color=GREY, linewidth=0.8)
-        dress(ax, name.replace("-", " "), "largest steady stiffness (N/mm)", "")
+        dress(ax, SHORT[name], "largest steady stiffness (N/mm)", "")
         ax.margins(x=0.3)
         ax.set_xticks(range(0, 9, 2))
     axes[0].set_yticks(range(len(varied)), [SPACE.label(key) for key in varied])
-    axes[0].invert_yaxis()
+    axes[0].set_ylim(len(varied) - 0.4, -0.6)
     return figure
