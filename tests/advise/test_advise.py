@@ -8,6 +8,7 @@ import pytest
 from typer.testing import CliRunner
 
 from haploop.launch.scene.file import load
+from haploop.launch.scene.mistakes import SceneError
 from haploop.protocol.scene.paths import value_at, with_value
 from haploop.tools.advise.advice import is_ideal
 from haploop.tools.advise.known import PUBLISHED, formulas
@@ -183,6 +184,33 @@ def test_an_advice_says_first_that_it_is_an_upper_bound_goes_on_when_stopped_and
     again = json.loads(CliRunner().invoke(app, asked).stdout.splitlines()[-1])
     assert 0 < again.pop("runs") < found.pop("runs")
     assert again == found
+
+
+def test_a_device_of_ones_own_is_taken_as_the_presets_are_and_a_scene_with_a_wall_as_a_task(tmp_path):
+    mine = tmp_path / "mine.toml"
+    mine.write_text('extends = "omega3.toml"\n[device]\nmass = 0.3  # weighed\n')
+    (tmp_path / "omega3.toml").write_text(presets("devices")["omega3"].read_text())
+    asked = make_subject(str(mine), None, None, None, [], KINDS)
+    assert not asked.has_task
+    assert asked.scene.device.mass == 0.3
+    assert {of.key for of in asked.assumed} == {"device.damping", "friction.kinetic"}
+    assert make_subject("fig6c", None, None, None, [], KINDS).has_task
+
+
+@pytest.mark.parametrize(
+    ("tables", "words"),
+    [
+        ("[device]\nmass = 0.0", "device.mass is 0.0. It must be above 0 kg"),
+        ("[device]\nmass = -0.1", "device.mass is -0.1. It must be above 0 kg"),
+        ("[device]\nmass = 1e308", "device.mass is 1e\\+308. It must be at most"),
+        ("[device]\nmass = 0.1\n[friction]\nkinetic = 1e308", "friction.kinetic is 1e\\+308. It must be at most"),
+        ("[device]\nmass = 0.1\n[encoder]\nresolution = nan", "encoder.resolution is nan. It must be a finite number"),
+    ],
+)
+def test_a_device_of_absurd_numbers_is_refused_with_what_was_expected(tmp_path, tables, words):
+    (tmp_path / "mine.toml").write_text(tables)
+    with pytest.raises(SceneError, match=words):
+        make_subject(str(tmp_path / "mine.toml"), None, None, None, [], KINDS)
 
 
 def test_a_directory_of_something_else_is_refused(tmp_path):

@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, fields, is_dataclass, replace
 from typing import Any, NamedTuple
 
 from haploop.protocol.scene.paths import value_at
 from haploop.protocol.scene.scene import Scene
 from haploop.tools.advise.changes import assumed_otherwise, changed_limits, changes, idealised
 from haploop.tools.advise.known import PUBLISHED, Formula, Published, formulas
-from haploop.tools.advise.search import Best, Found, search
+from haploop.tools.advise.search import Found, search
 from haploop.tools.advise.subject import Assumed, Subject
 from haploop.tools.advise.walls.cases import Case, every_case, is_number, make_loop, ranges, task_words
 from haploop.tools.advise.walls.limit import Limit
 from haploop.tools.advise.walls.trial import Failure, Trial, Tried
+from haploop.tools.linear.linearity import installed_kinds
 
 # An advice as one JSON object.
 AdviceData = dict[str, Any]
@@ -25,6 +25,7 @@ UPPER_BOUND = (
 )
 ADVICE = "Advice on {name}, as described and 20 % off."
 _RIGID = "There is no [transmission]: what a resonance of the structure takes is not in it."
+_PLUGIN = "The scene's own wall is not tried: its elements come from a plugin file."
 SAFE_MEANS = (
     "at rest, or swinging by less than a hand feels, in position (Israr, Choi and Tan 2006) and in force (what would "
     "move device and hand by as much)"
@@ -95,13 +96,16 @@ def advice(subject: Subject, trial: Trial, stage: Callable[[str], object] = lamb
 
     changed, without = rows(altered), rows(ideal)
     by_number = dict(zip(otherwise, limits, strict=True))
-    own = None
+    own, notes = None, [] if is_ideal(loop) or loop.transmission else [_RIGID]
     if subject.has_task and scene.wall and scene.wall.stiffness:
         wall = Tried(scene.wall.stiffness, tuple(scene.dissipation))
-        own = wall.stiffness_N_m, trial.failures(loop, [wall], every_case(ranges(loop, keys)))[0]
+        if {element.name for element in wall.elements} <= installed_kinds().keys():
+            own = wall.stiffness_N_m, trial.failures(loop, [wall], every_case(ranges(loop, keys)))[0]
+        else:
+            notes.append(_PLUGIN)
     return Advice(
         name=subject.name,
-        notes=subject.notes if is_ideal(loop) or loop.transmission else (*subject.notes, _RIGID),
+        notes=(*subject.notes, *notes),
         is_ideal=is_ideal(loop),
         tried_by=task_words(loop),
         uncertain=ranges(loop, keys),
@@ -136,61 +140,25 @@ def _shown(subject: Subject, loop: Scene, found: Found) -> Scene | None:
     return replace(scene, title=title, wall=wall, dissipation=elements, run=subject.scene.run)
 
 
-def as_data(told: Advice, sentences: list[str]) -> AdviceData:
-    """Returns the advice as one JSON object; the sentences are put in as they are."""
-    found = told.found
+def advice_data(told: Advice, sentences: list[str]) -> AdviceData:
+    """Returns the advice as one JSON object: what is recommended and the sentences first, then all that was found."""
+    best = told.found.advised
+    sizes = {f"{kind}.{key}": size for (kind, key), size in zip(best.family.parts, best.values, strict=True)}
     return {
-        "name": told.name,
         "headline": told.headline,
-        "upper_bound": told.is_ideal,
-        "notes": told.notes,
-        "tried_by": told.tried_by,
+        "recommended": {"element": best.family.name, "stiffness_N_m": told.found.stiffness_N_m, "parameters": sizes},
         "safe_means": SAFE_MEANS,
-        "uncertain": told.uncertain,
-        "recommended": {
-            "element": found.advised.family.name,
-            "parameters": _parameters(found.advised),
-            "stiffness_N_m": found.stiffness_N_m,
-            "cases": found.cases,
-        },
-        "as_assumed": _best_data(found.as_assumed) if found.as_assumed else None,
-        "breaks_first": _broken(found.breaks) if found.breaks else None,
-        "elements": [_best_data(best) for best in found.bests],
-        "formulas": [formula._asdict() for formula in told.formulas],
-        "published": [value._asdict() for value in told.published],
-        "changes": [_changed_data(row) for row in told.changed],
-        "without": [_changed_data(row) for row in told.without],
-        "assumed": [
-            {**of._asdict(), "halved": _ends(half), "doubled": _ends(double)} for of, half, double in told.assumed
-        ],
-        "own_wall": _broken(told.own) if told.own else None,
         "advice": " ".join(sentences),
-        "runs": told.runs,
+        **_as_data(replace(told, scene=None)),
     }
 
 
-def _changed_data(row: Changed) -> AdviceData:
-    return {"change": row.words, **_ends(row.limit), "factor": row.factor}
-
-
-def _broken(wall: tuple[float, Failure | None]) -> AdviceData:
-    return {"stiffness_N_m": wall[0], "failure": asdict(wall[1]) if wall[1] else None}
-
-
-def _best_data(best: Best) -> AdviceData:
-    return {
-        "element": best.family.name,
-        "parameters": _parameters(best),
-        "as_described": _ends(best.nominal),
-        "every_corner": _ends(best.safe) if best.safe else None,
-    }
-
-
-def _parameters(best: Best) -> dict[str, float]:
-    return {f"{kind}.{key}": value for (kind, key), value in zip(best.family.parts, best.values, strict=True)}
-
-
-def _ends(limit: Limit) -> dict[str, float | None]:
-    """Returns the largest that bears all and the softest that does not, None where none was found."""
-    fails = limit.fails_N_m if math.isfinite(limit.fails_N_m) else None
-    return {"stiffness_N_m": limit.stiffness_N_m, "fails_N_m": fails}
+def _as_data(value: Any) -> Any:
+    """Returns a value as JSON has it: objects for dataclasses and named tuples."""
+    if is_dataclass(value):
+        return {field.name: _as_data(getattr(value, field.name)) for field in fields(value)}
+    if named := getattr(value, "_asdict", None):
+        return _as_data(named())
+    if isinstance(value, tuple):
+        return [_as_data(each) for each in value]
+    return {key: _as_data(each) for key, each in value.items()} if isinstance(value, dict) else value

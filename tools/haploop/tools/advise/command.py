@@ -15,7 +15,7 @@ from haploop.launch.scene.events import elements_of, try_out
 from haploop.launch.scene.toml_writer import to_toml
 from haploop.launch.spec import make_output
 from haploop.logger.summary import finite
-from haploop.tools.advise.advice import Advice, AdviceData, advice, as_data
+from haploop.tools.advise.advice import Advice, AdviceData, advice, advice_data
 from haploop.tools.advise.figure import draw
 from haploop.tools.advise.report import report, sentences
 from haploop.tools.advise.subject import InvalidRequest, make_subject
@@ -81,7 +81,7 @@ def _output(out: Path | None, name: str) -> Path:
 
 
 def _write(found: Advice, out: Path) -> AdviceData:
-    files, data = {}, as_data(found, sentences(found))
+    files, data = {}, advice_data(found, sentences(found))
     try:
         if found.scene:
             (out / SCENE).write_text(to_toml(found.scene.as_dict()), encoding="utf-8")

@@ -21,7 +21,7 @@ from haploop.tools.advise.families import (
     first_choices,
     together,
 )  # fmt: skip
-from haploop.tools.advise.walls.cases import FIRST_HOLDS, Case, Ranges, attack, every_case, ranges
+from haploop.tools.advise.walls.cases import FIRST_HOLDS, Case, Ranges, attack, corner, every_case, ranges
 from haploop.tools.advise.walls.limit import LEAST_N_M, Limit, Query, ladder, limits
 from haploop.tools.advise.walls.trial import Failure, Trial, Tried
 from haploop.tools.linear.linearity import installed_kinds
@@ -100,18 +100,19 @@ def search(
     known |= nominal([(BOTH, values) for values in pairs], rungs)
     stage("every corner")
     of, measured = ranges(loop, assumed), ranges(loop)
-    bests = _in_corners(loop, trial, known, of)
-    as_assumed = None if of == measured else _advised(_in_corners(loop, trial, known, measured))
-    advised = _refined(loop, trial, _advised(bests), of)
-    bests = [advised if best.family is advised.family else best for best in bests]
+    bests = _in_corners(loop, trial, known, of, (0.0, 0.5, 1.0))
+    as_assumed = None if of == measured else _advised(_in_corners(loop, trial, known, measured, (0.5,)))
+    best = _advised(bests)
+    values, safe = _refined(loop, trial, best, of)
+    described = known.get((best.family, values)) or nominal([(best.family, values)], rungs)[best.family, values]
+    advised = Best(best.family, values, described, safe)
     stage("softer walls")
     top = _softer(loop, trial, advised, of)
     stage("the attack")
-    stiffness, broken, count = _attacked(loop, trial, advised, top, attack(of))
-    if not broken and top.failure:
-        broken = [(top.fails_N_m, top.failure)]
-    cases = count + len(every_case(of))
-    return Found(tuple(bests), advised, stiffness, as_assumed, broken[-1] if broken else None, cases)
+    stiffness, broken = _attacked(loop, trial, advised, top, of)
+    cases = len(_BEYOND) * len(attack(of)) + len(every_case(of))
+    shown = tuple(advised if each is best else each for each in bests)
+    return Found(shown, advised, stiffness, as_assumed, broken, cases)
 
 
 def _equals(known: dict[Choice, Limit], family: Family) -> list[Values]:
@@ -121,10 +122,13 @@ def _equals(known: dict[Choice, Limit], family: Family) -> list[Values]:
     return sorted(values for values, stiffness in tried.items() if stiffness >= most / (1.0 + ROUGH))
 
 
-def _in_corners(loop: Scene, trial: Trial, known: dict[Choice, Limit], of: Ranges) -> list[Best]:
+def _in_corners(
+    loop: Scene, trial: Trial, known: dict[Choice, Limit], of: Ranges, places: Sequence[float]
+) -> list[Best]:
     """Returns the best of each family; those worth it with their limit in every corner, at the holds tried first.
 
-    Of parameters that bear as much in the loop as described the smallest, a middle one and the largest are tried.
+    Of parameters that bear as much in the loop as described those at these places, from the smallest, 0, to the
+    largest, 1.
     """
     bests: list[Best] = []
     candidates: list[Choice] = []
@@ -132,7 +136,7 @@ def _in_corners(loop: Scene, trial: Trial, known: dict[Choice, Limit], of: Range
         equals = _equals(known, family)
         bests.append(Best(family, equals[0], known[family, equals[0]]))
         if not family.parts or bests[-1].nominal.stiffness_N_m > WORTH * bests[0].nominal.stiffness_N_m:
-            some = dict.fromkeys((equals[0], equals[len(equals) // 2], equals[-1]))
+            some = dict.fromkeys(equals[round(place * (len(equals) - 1))] for place in places)
             candidates += [(family, values) for values in some]
     cases = every_case(of, FIRST_HOLDS)
     queries = []
@@ -158,26 +162,20 @@ def _advised(bests: Sequence[Best]) -> Best:
     return advised
 
 
-def _refined(loop: Scene, trial: Trial, best: Best, of: Ranges) -> Best:
-    """Returns the best with its parameter moved half a step up or down, as often as that bears more in every corner."""
-    tried = {best.values}
-    while True:
-        near = best.safe.stiffness_N_m if best.safe else 0.0
-        new = [values for values in beside(best.values) if values not in tried] if near else []
+def _refined(loop: Scene, trial: Trial, best: Best, of: Ranges) -> tuple[Values, Limit]:
+    """Returns parameters moved half a step up or down, as often as that bears more in every corner, and their limit."""
+    assert best.safe
+    values, safe, tried = best.values, best.safe, {best.values}
+    while near := safe.stiffness_N_m:
+        new = [other for other in beside(values) if other not in tried]
         rungs, cases = ladder(near, near * 1.5, 1.07), every_case(of, FIRST_HOLDS)
-        found = limits(trial, [Query(loop, best.family.elements(values), cases, rungs) for values in new], ROUGH / 2.0)
+        found = limits(trial, [Query(loop, best.family.elements(each), cases, rungs) for each in new], ROUGH / 2.0)
         tried |= set(new)
-        values, limit = max(zip(new, found, strict=True), key=lambda each: each[1].stiffness_N_m, default=((), None))
-        if not limit or limit.stiffness_N_m <= near * 1.01:
-            return best
-        best = Best(best.family, values, _described(loop, trial, best.family, values, limit), limit)
-
-
-def _described(loop: Scene, trial: Trial, family: Family, values: Values, safe: Limit) -> Limit:
-    """Returns the limit of the loop as described, which bears what it bears in every corner."""
-    first = tuple(Case(hold) for hold in FIRST_HOLDS)
-    rungs = ladder(safe.stiffness_N_m, safe.stiffness_N_m * 3.0, 1.4)
-    return limits(trial, [Query(loop, family.elements(values), first, rungs)], ROUGH)[0]
+        more = max(zip(new, found, strict=True), key=lambda each: each[1].stiffness_N_m, default=None)
+        if not more or more[1].stiffness_N_m <= near * 1.01:
+            break
+        values, safe = more
+    return values, safe
 
 
 def _softer(loop: Scene, trial: Trial, advised: Best, of: Ranges) -> Limit:
@@ -192,28 +190,34 @@ def _softer(loop: Scene, trial: Trial, advised: Best, of: Ranges) -> Limit:
 
 
 def _attacked(
-    loop: Scene, trial: Trial, advised: Best, top: Limit, cases: Sequence[Case]
-) -> tuple[float, list[tuple[float, Failure]], int]:
-    """Lowers the wall until no attack breaks it: projected friction in every case, exact friction in a few."""
-    elements, broken = advised.family.elements(advised.values), []
+    loop: Scene, trial: Trial, advised: Best, top: Limit, of: Ranges
+) -> tuple[float, tuple[float, Failure] | None]:
+    """Lowers the wall until no attack breaks it: projected friction in every case, exact friction in a few.
+
+    Returns the stiffness, and the softest wall that broke with what it does.
+    """
+    elements, cases = advised.family.elements(advised.values), attack(of)
+    broken = (top.fails_N_m, top.failure) if top.failure else None
     stiffness = rounded_down(top.stiffness_N_m)
     for _ in range(_TIMES):
         if stiffness < LEAST_N_M:
-            return 0.0, broken, len(cases)
+            break
         found = trial.failures(loop, [Tried(share * stiffness, elements) for share in _BEYOND], cases)
-        failure = next((each for each in found if each), None) or _judged(loop, Tried(stiffness, elements))
+        broke = ((share, each) for share, each in zip(_BEYOND, found, strict=True) if each)
+        share, failure = next(broke, None) or (1.0, _judged(loop, Tried(stiffness, elements), of))
         if not failure:
-            return stiffness, broken, len(_BEYOND) * len(cases)
-        first = next((share for share, each in zip(_BEYOND, found, strict=True) if each), 1.0)
-        broken.append((first * stiffness, failure))
+            return stiffness, broken
+        broken = share * stiffness, failure
         stiffness = rounded_down(stiffness * _LOWER)
-    return 0.0, broken, len(cases)
+    return 0.0, broken
 
 
-def _judged(loop: Scene, wall: Tried) -> Failure | None:
-    """Judges the wall by pushes and with exact friction, see ``haploop.launch.stability``, at the holds tried first."""
-    for hold in FIRST_HOLDS:
-        case = Case(hold, sway=0.0)
+def _judged(loop: Scene, wall: Tried, of: Ranges) -> Failure | None:
+    """Judges the wall by pushes and with exact friction, see ``haploop.launch.stability``, in the cases tried first.
+
+    They are the loop as described and the likely worst corner, in which all that is uncertain is least.
+    """
+    for case in (Case(hold, some, sway=0.0) for some in ((), corner(of, 0)) for hold in FIRST_HOLDS):
         scene = case.scene(loop)
         assert scene.wall
         scene = replace(scene, wall=replace(scene.wall, stiffness=wall.stiffness_N_m), dissipation=wall.elements)

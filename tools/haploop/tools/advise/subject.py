@@ -59,7 +59,7 @@ class Subject:
 
     Attributes:
         scene: resolved; events that change it are taken as done from the start.
-        has_task: whether it came with a task of its own; a preset has none.
+        has_task: whether it came with a task of its own; a device alone, without wall and duration, has none.
         notes: what was taken, one sentence each.
         assumed: numbers of the device that its file assumes.
     """
@@ -83,16 +83,17 @@ def make_subject(
 
     Raises InvalidRequest for a name that is none, SceneError where the scene cannot be run.
     """
-    path, is_preset = _device(device)
+    path = _device(device)
     layers, notes = read_layers(path), []
-    if hand is None and is_preset and "hand" not in layers.data:
+    has_task = not {"wall", "duration"}.isdisjoint(layers.data)
+    if hand is None and not has_task and "hand" not in layers.data:
         hand = DEFAULT_HAND
         notes.append(f"The hand is {hand}, a pen-like grip (Fu and Cavusoglu 2012); --hand names another.")
     if hand is not None:
         _lay_hand(layers, hand)
     if estimator is not None:
         _lay_estimator(layers, estimator)
-    if is_preset:
+    if not has_task:
         task = {"title": path.stem, "duration": 1.0, "wall": {"position": 0.0, "stiffness": 1000.0}}
         layers.lay(task, str(path))
     if delay is not None:
@@ -105,7 +106,7 @@ def make_subject(
     if scene.event:
         scene = apply_events(scene)
         notes.append("What the scene's events change is taken as changed from the start.")
-    return Subject(path.stem, scene, not is_preset, tuple(notes), assumptions(path))
+    return Subject(path.stem, scene, has_task, tuple(notes), assumptions(path))
 
 
 def assumptions(path: Path) -> tuple[Assumed, ...]:
@@ -142,15 +143,15 @@ def presets(folder: str) -> dict[str, Path]:
     return {path.stem: path for path in sorted(scenes_folder().with_name(folder).glob("*.toml"))}
 
 
-def _device(name: str) -> tuple[Path, bool]:
-    """Returns the file that a name means, and whether it is a device without a task."""
-    path, devices = Path(name), presets("devices")
-    if path.suffix != ".toml" and not path.exists():
-        known = devices | presets("scenes")
-        if name not in known:
-            raise InvalidRequest(_unknown("DEVICE", name, list(known), "the path of a scene file"))
-        path = known[name]
-    return path, path.resolve() in {file.resolve() for file in devices.values()}
+def _device(name: str) -> Path:
+    """Returns the file that a name means."""
+    path = Path(name)
+    if path.suffix == ".toml" or path.exists():
+        return path
+    known = presets("devices") | presets("scenes")
+    if name not in known:
+        raise InvalidRequest(_unknown("DEVICE", name, list(known), "the path of a file with a device or a scene"))
+    return known[name]
 
 
 def _lay_hand(layers: Layers, name: str) -> None:
