@@ -147,6 +147,16 @@ def test_a_pace_that_cannot_be_kept_is_refused_with_those_that_can(pace: Any) ->
         pace_of(pace)
 
 
+@pytest.mark.parametrize("pace", [1e305, 0.0, -math.inf, math.nan])
+def test_no_run_begins_at_a_pace_that_cannot_be_kept_and_none_changes_to_it(pace: float) -> None:
+    with pytest.raises(PaceError):
+        clock(pace)
+    subject = clock(2.0)
+    with pytest.raises(PaceError):
+        subject.run_at(pace)
+    assert subject.pace.rate == 2.0
+
+
 def test_a_pace_is_a_number_or_free() -> None:
     assert pace_of("free") == math.inf
     assert [pace_of(pace) for pace in (1, 0.1, SLOWEST, FASTEST)] == [1.0, 0.1, SLOWEST, FASTEST]

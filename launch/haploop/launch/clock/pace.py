@@ -50,8 +50,8 @@ class Pace:
         self.set(rate)
 
     def set(self, rate: float) -> None:
-        """Takes another rate; the next tick asked for begins its schedule."""
-        self.rate = rate
+        """Takes another rate, infinite for none; PaceError where it cannot be kept."""
+        self.rate = rate if rate == math.inf else pace_of(rate)
         self._period_s = 1.0 / (rate * self._control_rate)
         self._least = self._ticks(LEAST_GRANT_S)
         self.most_at_once = max(self._least, self._ticks(CATCH_UP_S))

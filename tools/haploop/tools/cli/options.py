@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import json
-import math
 import sys
 from collections.abc import Iterator
 from contextlib import suppress
@@ -33,16 +32,18 @@ def parse_assignments(texts: list[str]) -> dict[str, Any]:
 
 
 def parse_pace(text: str) -> float | Literal["free"]:
-    """Returns ``free``, or a positive number of simulated seconds per second."""
+    """Returns ``free``, or a number of simulated seconds per second."""
+    from haploop.launch.clock.pace import PaceError, pace_of
+
     if text == "free":
         return "free"
+    given: float | str = text
+    with suppress(ValueError):
+        given = float(text.removesuffix("x"))
     try:
-        rate = float(text.removesuffix("x"))
-    except ValueError:
-        rate = math.nan
-    if not (rate > 0 and math.isfinite(rate)):
-        leave(f"A pace must be free or a number above 0 (1 is real time), but {text!r} was given.", WRONG_USE)
-    return rate
+        return pace_of(given)
+    except PaceError as error:
+        leave(f"{error} 1 is real time.", WRONG_USE)
 
 
 def parse_seconds(text: str | None, option: str = "--at") -> float | None:
