@@ -2,6 +2,7 @@
 
 import re
 import signal
+import sys
 
 import numpy as np
 import pytest
@@ -9,7 +10,7 @@ import pytest
 import haploop.logger
 from haploop.launch.processes import run_directory
 from haploop.launch.runs.replay import replay
-from helpers.live.launched import ROLES, SCENES, command, first_and_slowly, wait_for
+from helpers.live.launched import ROLES, SCENES, alive, command, first_and_slowly, wait_for
 
 HEAD = """
 import math, os, sys
@@ -130,6 +131,19 @@ def test_a_force_that_never_returns_is_named_with_element_tick_and_line_after_th
     assert "/plugins/brake-" in run.stderr
     assert len(run.log()["/controller"]["x"]) == 150
     assert replay(run.out).differences == []
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere the kernel's signal is ignored")
+def test_when_the_launcher_is_killed_a_node_that_hangs_in_compiled_code_ends_too(running, brake, tmp_path):
+    here = f"open({str(tmp_path / 'here')!r}, 'w').close()"
+    source = "import itertools\n" + ELEMENT.format(at_150=f"{here}; any(itertools.repeat(0))")
+    run = started(running, brake, source)
+    run.nodes_started()
+    wait_for("tick 150", (tmp_path / "here").exists)
+    run.signal(signal.SIGKILL)
+    wait_for("the end of the nodes", lambda: not alive(list(run.nodes.values())))
+    run.end(-signal.SIGKILL)
 
 
 @pytest.mark.slow

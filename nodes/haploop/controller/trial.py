@@ -22,6 +22,7 @@ from haploop.controller.dissipation.registry import PluginError, load_source
 from haploop.protocol.scene.scene import ElementTable
 
 _MOST_BYTES = 4 << 30
+_MOST_CPU_S = 120
 Reply = dict[str, Any]
 
 
@@ -36,14 +37,16 @@ def main() -> None:
     threading.Thread(target=_read, args=(sys.stdin, requests), daemon=True).start()
     sys.stdin = os.fdopen(nowhere)
     kinds: dict[str, type[Element]] = {}
+    origin = ""
     while True:
         request = json.loads(requests.get())
+        origin = request.get("origin", origin)
         try:
             reply = _load(request, kinds) if "source" in request else _make(request["make"], kinds)
         except (PluginError, ElementError) as error:
             reply = {"error": str(error)}
         except BaseException as error:  # whatever the file raises, it is told
-            reply = {"error": f"The plugin cannot be used: {type(error).__name__}: {error}"}
+            reply = {"error": f"The plugin {origin} cannot be used: {type(error).__name__}: {error}"}
         print(json.dumps(reply), file=answers, flush=True)
 
 
@@ -61,6 +64,7 @@ def _limit_memory() -> None:
     with contextlib.suppress(OSError, ValueError):
         resource.setrlimit(resource.RLIMIT_DATA, (limit, limit))
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+        resource.setrlimit(resource.RLIMIT_CPU, (_MOST_CPU_S, _MOST_CPU_S))  # if nobody is there to end it
 
 
 def _load(request: Reply, kinds: dict[str, type[Element]]) -> Reply:

@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Annotated, Any, Self
 
 from haploop.controller.dissipation.element import Element, ElementError
-from haploop.controller.dissipation.registry import PluginError, load_plugin
+from haploop.controller.dissipation.registry import PluginError
 from haploop.launch.processes.one_thread import ask_for_one_thread
 from haploop.protocol.quantity import Quantity
 from haploop.protocol.scene.scene import ElementTable
@@ -140,16 +140,6 @@ class PluginTrial:
             if pipe:
                 with contextlib.suppress(OSError):
                     pipe.close()
-
-
-def with_code(kinds: Mapping[str, type[Element]], files: Iterable[Path]) -> Kinds:
-    """Returns the kinds with the elements of these files in place of their stand-ins; this process then runs the files.
-
-    Raises PluginError where one does not load.
-    """
-    if not any(issubclass(element, StandIn) for element in kinds.values()):
-        return dict(kinds)
-    return {**kinds, **{kind: element for file in files for kind, element in load_plugin(file).items()}}
 
 
 def _stand_in(kind: str, declared: Mapping[str, Any]) -> type[Element]:

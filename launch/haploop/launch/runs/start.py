@@ -9,8 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from haploop.controller.dissipation import Element, ElementError, PluginError, registry
-from haploop.launch.processes.plugin_trial import PluginTrial, read_source, with_code
+from haploop.controller.dissipation import Element, ElementError, PluginError, load_plugin, registry
 from haploop.launch.scene.events import elements_of, try_out
 from haploop.launch.scene.file import load
 from haploop.launch.spec import OutputError, RunSpec, discard, keep_plugin, make_output, write_scene
@@ -36,8 +35,23 @@ def prepare(
         ElementError: an element's own code does not take the parameters it is given.
         OutputError: the directory cannot be used.
     """
-    kinds = registry()
-    sources: dict[str, Path] = {}
+    if plugins:
+        scene, kinds, sources = _with_plugins(scene_path, overrides, plugins)
+    else:
+        kinds, sources = registry(), {}
+        scene = load(scene_path, overrides, kinds)
+        try_out(elements_of(scene), kinds)
+    is_new = out is None or not out.exists()
+    return lay_out(scene, kinds, make_output(out, scene_path), plugins, sources, is_new)
+
+
+def _with_plugins(
+    scene_path: Path, overrides: Sequence[str], plugins: Sequence[Path]
+) -> tuple[Scene, dict[str, type[Element]], dict[str, Path]]:
+    """Returns the scene, every kind by name and the file of each that has one, all of them tried."""
+    from haploop.launch.processes.plugin_trial import PluginTrial, read_source
+
+    kinds, sources = registry(), {}
     with ExitStack() as open_trials:
         trials = {path: open_trials.enter_context(PluginTrial(read_source(path), str(path))) for path in plugins}
         for plugin, trial in trials.items():
@@ -48,8 +62,16 @@ def prepare(
         try_out([element for element in elements if element.name not in sources], kinds)
         for plugin, trial in trials.items():
             trial.wait(trial.make([element for element in elements if sources.get(element.name) == plugin]))
-    is_new = out is None or not out.exists()
-    return lay_out(scene, kinds, make_output(out, scene_path), plugins, sources, is_new)
+    return scene, kinds, sources
+
+
+def _with_code(spec: RunSpec) -> dict[str, type[Element]]:
+    """Returns the kinds with the elements that the run's plugin files define; this process then runs the files.
+
+    Raises PluginError where one does not load.
+    """
+    loaded = {kind: element for file in spec.plugins for kind, element in load_plugin(file).items()}
+    return spec.kinds | {kind: element for kind, element in loaded.items() if kind in spec.plugin_files}
 
 
 def lay_out(
@@ -109,7 +131,7 @@ def run(spec: RunSpec, *, in_process: bool = False, **options: Any) -> Summary:
     with interrupts(usual_from=2) as received:
         return run_in_process(
             spec.scene,
-            with_code(spec.kinds, spec.plugins),
+            _with_code(spec),
             out=spec.out,
             attachments=spec.attachments,
             on_progress=spec.on_progress,
@@ -136,7 +158,7 @@ def _judged(spec: RunSpec, summary: Summary, events: list[tuple[int, Event]]) ->
 
     def find() -> Finding:
         try:
-            return judge_scene(spec.scene, with_code(spec.kinds, spec.plugins), events, LOOKS_S)
+            return judge_scene(spec.scene, _with_code(spec), events, LOOKS_S)
         except (ElementError, PluginError, ArithmeticError) as error:
             return Finding("undecided", "failed", detail=str(error))
 

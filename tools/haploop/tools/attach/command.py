@@ -9,7 +9,7 @@ from pathlib import Path
 from haploop.launch.processes import run_directory
 from haploop.launch.processes.children import interrupts
 from haploop.launch.processes.run_directory import LiveRun
-from haploop.launch.spec import make_output, write_scene
+from haploop.launch.spec import discard, make_output, write_scene
 from haploop.logger.books.buffers import TelemetryGap
 from haploop.logger.node import LoggerNode
 from haploop.logger.summary import Summary
@@ -46,6 +46,7 @@ def attach_to(target: str, out: Path | None, run_id: str | None, port: int | Non
 def attach_logger(run_id: str | None, out: Path | None) -> None:
     """Logs a run from its present tick on, with a log and a summary of its own; lossless, so it may slow the run."""
     run = run_directory.find(run_id)
+    is_new = out is None or not out.exists()
     directory = make_output(out, Path(f"attached-{run.id}"))
     context = run.make_context()
     try:
@@ -55,6 +56,7 @@ def attach_logger(run_id: str | None, out: Path | None) -> None:
         leave(str(error), WRONG_USE)
     finally:
         context.destroy(linger=500)
+        discard(directory, is_new)  # where nothing was logged
     if summary is None:
         leave(f"Run {run.id} ended before anything could be logged.", FAILED)
     print_summary(summary)

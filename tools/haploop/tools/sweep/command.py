@@ -130,8 +130,8 @@ def _run(request: Request, made: Sweep, directory: Path) -> Summary:
 def _directory(request: Request, made: Sweep) -> Path:
     """Returns a new directory, or that of this very sweep, which then goes on; OutputError for any other."""
     out, text = request.out, made.toml()
-    if out is not None and (out / SWEEP).is_file():
-        there = (out / SWEEP).read_text(encoding="utf-8")
+    there = (out / SWEEP).read_text(encoding="utf-8") if out is not None and (out / SWEEP).is_file() else ""
+    if out is not None and there:  # empty as long as another is just about to begin there
         if there != text:
             changed = _first_difference(there, text)
             raise OutputError(f"{out} holds another sweep ({changed}); name another directory with --out.")
@@ -148,7 +148,8 @@ def _directory(request: Request, made: Sweep) -> Path:
         part.replace(directory / SWEEP)
     except OSError as error:
         with contextlib.suppress(OSError):
-            part.unlink()
+            for begun in (part, directory / SWEEP):
+                begun.unlink(missing_ok=True)
         raise OutputError(f"{directory / SWEEP} cannot be written: {error.strerror}.") from error
     return directory
 
