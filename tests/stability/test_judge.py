@@ -10,9 +10,9 @@ import pytest
 from haploop.controller.dissipation import registry
 from haploop.launch.runs.in_process import run_in_process
 from haploop.launch.scene.file import load
-from haploop.launch.stability.decide import Finding
+from haploop.launch.stability.decide import Finding, decide
 from haploop.launch.stability.judge import judge
-from haploop.launch.stability.swing import Pushed, measure
+from haploop.launch.stability.swing import Pushed, Swing, measure
 from haploop.launch.stability.traces import frequency_Hz, is_felt, ripple, sizes, smallest_felt_m, trend, widths
 from haploop.protocol.scene.effects import Friction
 from helpers.runs.judged import ended, found
@@ -30,6 +30,14 @@ PLAIN = {
 def pressed(value: float = -1.0, **tables) -> dict:
     """The plain loop pressed against the wall; for it alone K = 1 000 N/m is the limit."""
     return {**PLAIN, "hand": {"force": {"kind": "constant", "value": value}}, **tables}
+
+
+def swing_of(x: np.ndarray, rate: float, command: np.ndarray | None = None) -> Swing:
+    """The measures of a loop that swings so after the larger push, a tenth as wide after the smaller one."""
+    one, large = np.ones(1), x[None]
+    held = large if command is None else command[None]
+    [swing] = measure(Pushed(0.1 * large, large, held, one, 0.0 * one, one > 0, one > 0, one > 0), rate)
+    return swing
 
 
 def word(**tables) -> str:
@@ -165,11 +173,28 @@ def test_growth_frequency_and_ripple_of_a_sine_are_its_own():
 def test_the_force_ripple_is_that_of_the_last_quarter():
     """A buzz of the command that ends before it leaves none, though the swing of the device goes on."""
     t = np.arange(4000) / 1000.0
-    x, one = 1e-4 * np.sin(2 * np.pi * 40.0 * t)[None], np.ones(1)
-    command = np.where(t < 2.9, np.sin(2 * np.pi * 100.0 * t), 0.0)[None]
-    [swing] = measure(Pushed(0.1 * x, x, command, one, 0.0 * one, one > 0, one > 0, one > 0), 1000.0)
+    command = np.where(t < 2.9, np.sin(2 * np.pi * 100.0 * t), 0.0)
+    swing = swing_of(1e-4 * np.sin(2 * np.pi * 40.0 * t), 1000.0, command)
     assert swing.ripple_N == 0.0
     assert swing.frequency_Hz == pytest.approx(40.0)
+
+
+@pytest.mark.parametrize("frequency", [0.1, 0.25, 0.375, 0.6])
+def test_a_slow_swing_that_grows_is_not_taken_for_one_that_dies_unfelt(frequency):
+    """What a hand feels at a quarter of a hertz is wide, and half a period may fall while its swing grows."""
+    for seconds in (1.0, 2.0, 4.0, 8.0, 16.0):
+        t = np.arange(round(1000.0 * seconds)) / 1000.0
+        for phase in np.arange(12.0) / 2.0:
+            x = 2e-3 * np.exp(0.0105 * t) * np.sin(2 * np.pi * frequency * t + phase)
+            finding = decide(swing_of(x, 1000.0), last=seconds == 16.0)
+            assert finding.word in ("undecided", "growing"), (seconds, phase, finding.sentence())
+
+
+def test_a_slow_creep_that_grows_is_not_taken_for_rest():
+    """Its pieces are straight lines to less than a nanometre."""
+    for seconds in (1.0, 2.0, 4.0):
+        t = np.arange(round(1000.0 * seconds)) / 1000.0
+        assert decide(swing_of(1e-2 * np.exp(0.01 * t), 1000.0), last=False).word == "undecided"
 
 
 @pytest.mark.parametrize("periods", [2.0, 2.3, 3.1, 4.05, 7.02])
@@ -183,8 +208,7 @@ def test_a_sine_that_does_not_grow_is_not_said_to_however_its_pieces_fall(period
         for measured in said:
             growth = trend(measured(x, 200)[12:], 0.2)
             said[measured] = max(said[measured], abs(float(growth.change)))
-        one = np.ones(1)
-        [swing] = measure(Pushed(0.1 * x[None], x[None], x[None], one, 0.0 * one, one > 0, one > 0, one > 0), rate)
+        swing = swing_of(x, rate)
         assert all(abs(change) < 3.0 * error for change, error in zip(swing.changes, swing.errors, strict=True))
         assert abs(swing.changes[0]) < 0.03
     assert said[sizes] < 0.4 * said[widths]

@@ -33,10 +33,10 @@ def test_of_hundreds_of_loops_none_is_called_steady_that_grows_and_few_stay_unde
         if loop and finding and finding.word not in ("diverged", "no-contact"):
             grows = loop.rate_1_s > 0.0
             words[grows, finding.word] += 1
-            if not grows and finding.word == "limit-cycle":
+            if not grows and finding.word in ("limit-cycle", "growing"):
                 gone += not still_swings(loop.scene, finding.width_m)
     assert not words[True, "steady"], words
-    assert not gone, "called a limit cycle, yet at rest two minutes later"
+    assert not gone, "called a limit cycle, or growing, yet at rest two minutes later"
     assert words[False, "undecided"] + words[True, "undecided"] <= 0.15 * sum(words.values()), words
 
 

@@ -133,17 +133,18 @@ def decide(swing: Swing, *, last: bool) -> Finding:
     """
     if not swing.inside:
         return Finding("undecided", "leaves the wall", swing.push_N, swing.watched_s)
-    if swing.most_m < REST_M:
+    if swing.most_m < REST_M and swing.moved_m < _SMALL_M:
         return _finding(swing, "steady", "rest")
     is_long, changes = swing.watched_s >= _LONG_S, [*zip(swing.changes, swing.errors, strict=True)]
     covers = swing.covers_periods >= LEAST_PERIODS
+    # Of what is too slow for its pieces all of its way counts, since they show but a part of it.
+    size_m = swing.width_m if covers else swing.moved_m
     rising = any(change > max(_LASTING, 3 * error) for change, error in changes)
-    falling = max(swing.changes) < -_LASTING and (swing.width_m < _SMALL_M or (is_long and covers))
+    falling = max(swing.changes) < -_LASTING and (size_m < _SMALL_M or (is_long and covers))
     forgets = swing.lasts(_LASTING) and SAME[0] < swing.at_last < SAME[1] and not 0.5 < swing.at_first < 2.0
     unfelt = not is_felt(swing.width_m, swing.frequency_Hz)
-    # What is too slow for its frequency to be seen is judged by all of its way.
     seen = swing.frequency_Hz * swing.watched_s >= _SEEN_PERIODS or not is_felt(swing.moved_m, swing.frequency_Hz)
-    goes_on = not (falling or swing.width_m <= 2.0 * swing.count_m or (forgets and covers))
+    goes_on = not (falling or size_m <= 2.0 * swing.count_m or (forgets and covers))
     if unfelt and seen and not rising and not goes_on:
         return _finding(swing, "steady", "unfelt")
     if not covers:
