@@ -164,7 +164,9 @@ class DiskFull(Fault):
 
     @property
     def excuse(self) -> str:
-        return r"The logger failed: (The log .* cannot be made|Writing the log .* failed|The summary .* not be written)"
+        return (
+            r"(The logger failed: )?(The log .* cannot be made|Writing the log .* failed|The summary .* not be written)"
+        )
 
     def happen(self, sim: Sim) -> None:
         sim.run.disk.room = min(sim.run.disk.room, self.room)

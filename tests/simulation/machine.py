@@ -134,6 +134,9 @@ class SimChild:
     def wait(self, timeout_s: float) -> bool:
         return self._launcher.wait(self.readable, timeout_s)
 
+    def rouse(self) -> None:
+        """No element hangs here: a signal by which one would be given up finds nothing to do."""
+
     def kill(self) -> None:
         self._launcher.check()
         if self._run.named_at is None:
@@ -174,7 +177,7 @@ class SimRun:
             process.kill()
 
     def make_context(self, _transport: Any) -> Any:
-        return self.context(self.launcher)
+        return self.context(self.launcher, self.disk)
 
     def start_nodes(self, sockets: Path, start: dict[str, Any], pin: bool, number: int) -> Any:
         self.sockets, self.clock, self.secret = sockets, start["address"], start["secret"]

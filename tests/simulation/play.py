@@ -15,6 +15,7 @@ from typing import Any
 
 from haploop.launch.processes.supervisor import run_processes
 from haploop.launch.spec import RunFailed, RunSpec
+from haploop.logger.log import LogError
 from helpers.scenes.least import KINDS
 from simulation.faults import Fault, Kill, Signals
 from simulation.machine import Disk, SimRun
@@ -129,7 +130,7 @@ class Sim:
         if error is None:
             return ""
         said = "KeyboardInterrupt" if isinstance(error, KeyboardInterrupt) else str(error)
-        if not isinstance(error, RunFailed | KeyboardInterrupt):
+        if not isinstance(error, RunFailed | LogError | KeyboardInterrupt):
             return "the launcher ended with a traceback:\n" + "".join(traceback.format_exception(error))
         if _PYTHONS_WORDS.search(said):
             return f"the run ended with Python's words: {said}"

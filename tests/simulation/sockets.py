@@ -12,8 +12,6 @@ import zmq
 from simulation.network import Frames, Lane, Pipe
 from simulation.world import Process, World
 
-_BINDING = (zmq.ROUTER, zmq.XPUB)
-
 
 class SimSocket:
     """A ROUTER, DEALER, XPUB, SUB or XSUB of one process.
@@ -28,6 +26,7 @@ class SimSocket:
         self.linger = -1
         self.is_closed = False
         self.pipes: dict[bytes, Pipe] = {}
+        self._gone: list[Pipe] = []
         self._full: dict[Pipe, Lane] = {}
         self._requests: deque[Frames] = deque()  # of an XPUB, which outlive who sent them
         self._rest: Frames = []
@@ -46,6 +45,7 @@ class SimSocket:
     def get(self, option: int) -> int:
         assert option == zmq.EVENTS
         self.process.may_lose_the_processor()
+        self._look()
         return (zmq.POLLIN if self.readable() else 0) | zmq.POLLOUT
 
     def getsockopt(self, option: int) -> bytes:
@@ -79,7 +79,9 @@ class SimSocket:
         """Takes note that the other end is gone; what came before it went can still be read."""
         if self.is_closed:
             return
-        if self.kind in _BINDING:
+        if self.kind == zmq.ROUTER:
+            self._gone.append(pipe)
+        elif self.kind == zmq.XPUB:
             self.pipes.pop(pipe.identity, None)
             kept = {topic for other in self.pipes.values() for topic in other.topics}
             self._requests.extend([b"\0" + topic] for topic in sorted(pipe.topics - kept))
@@ -130,6 +132,11 @@ class SimSocket:
             self._full[pipe] = lane
         self.process.nudge()
 
+    def _look(self) -> None:
+        """Learns who has gone: what was sent to them before that goes nowhere, afterwards they cannot be reached."""
+        while self._gone:
+            self.pipes.pop(self._gone.pop().identity, None)
+
     def readable(self) -> bool:
         return bool(self._rest or self._full or self._requests)
 
@@ -141,6 +148,7 @@ class SimSocket:
             raise zmq.Again
         if self._requests:
             return self._requests.popleft()
+        self._look()
         pipes = list(self._full)
         pipe = pipes[0] if len(pipes) == 1 else self._world.dice.choice(pipes)
         lane = self._full[pipe]
@@ -200,7 +208,8 @@ class SimSocket:
                 raise zmq.Again
             self.process.sleep(0.001)
         self.context.watch.sent(self, pipe, frames)
-        lane.send(frames)
+        if pipe not in self._gone:
+            lane.send(frames)
 
 
 class SimPoller:
