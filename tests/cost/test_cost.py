@@ -47,7 +47,7 @@ def test_exact_is_at_rounding_and_every_other_method_is_ordered_behind_it(smooth
 def test_swings_are_compared_where_positions_cannot_be(smooth):
     """A free oscillation: exact has its amplitude, frequency and losses; Euler swings wider and dissipates less."""
     smooth.write_text(
-        SMOOTH.replace("duration = 0.04", "duration = 1.0")
+        SMOOTH.replace("duration = 0.04", "duration = 0.5")
         .replace("damping = 0.4", "damping = 0.02\nposition = 0.01")
         .split("[hand.force]")[0]
     )

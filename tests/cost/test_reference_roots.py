@@ -3,7 +3,7 @@
 from fractions import Fraction
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from mpmath import mp, mpf
 
@@ -19,6 +19,7 @@ def series_of(places: list[Fraction]) -> list:
     return [mpf(c.numerator) / c.denominator for c in series]
 
 
+@settings(max_examples=25)
 @given(st.sets(st.integers(1, 999), min_size=1, max_size=5), st.sets(st.integers(1001, 1500), max_size=2))
 def test_all_places_within_the_length_are_found_and_none_beyond(inside, beyond):
     with mp.workdps(50):

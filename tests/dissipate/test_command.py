@@ -14,6 +14,7 @@ from haploop.launch.scene.toml_writer import to_toml
 from haploop.tools.cli.app import app
 from haploop.tools.dissipate.figure import make_figure
 from haploop.tools.dissipate.report import conclusion
+from haploop.tools.figure.data import FigureError
 from helpers.data.recordings import outcome, write
 from helpers.scenes.least import KINDS, scene
 
@@ -47,6 +48,16 @@ def recording(tmp_path: Path) -> Path:
     return write(tmp_path / "tap.csv", {"t": T, "x": X})
 
 
+@pytest.fixture
+def no_figure(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Leaves the drawing out, which takes longer than all else."""
+
+    def undrawn(_outcome: object) -> None:
+        raise FigureError("left out")
+
+    monkeypatch.setattr("haploop.tools.dissipate.command.make_figure", undrawn)
+
+
 def test_a_table_on_stderr_and_the_figure_on_stdout(recording: Path) -> None:
     result = dissipate(recording, "--damping", "2.7", "--mass", "0.0018")
     assert result.exit_code == 0, result.output
@@ -57,8 +68,12 @@ def test_a_table_on_stderr_and_the_figure_on_stdout(recording: Path) -> None:
         assert words in result.stderr
 
 
-def test_json_holds_what_the_table_does(recording: Path) -> None:
-    data = json.loads(dissipate(recording, "--damping", "2.7", "--mass", "0.0018", "--json").stdout)
+def test_json_holds_what_the_table_does_and_the_figure_is_where_it_is_asked_for(
+    recording: Path, tmp_path: Path
+) -> None:
+    data = json.loads(
+        dissipate(recording, "--damping", "2.7", "--mass", "0.0018", "--json", "--out", tmp_path / "f.svg").stdout
+    )
     assert [element["kind"] for element in data["elements"]] == [
         "damping",
         "bidirectional-inertia",
@@ -66,9 +81,11 @@ def test_json_holds_what_the_table_does(recording: Path) -> None:
     ]
     assert data["elements"][0]["true_J"] == outcome(recording, dampings=["2.7"]).elements[0].true_J
     assert (data["samples"], data["gaps"], data["rate_Hz"]) == (3000, 0, pytest.approx(1000.0))
-    assert Path(data["figure"]).exists()
+    assert Path(data["figure"]) == tmp_path / "f.svg"
+    assert (tmp_path / "f.svg").exists()
 
 
+@pytest.mark.usefixtures("no_figure")
 def test_numbers_may_carry_units_and_elements_be_of_any_kind(recording: Path, tmp_path: Path) -> None:
     plugin = tmp_path / "squeeze.py"
     plugin.write_text(SQUEEZE)
@@ -79,6 +96,7 @@ def test_numbers_may_carry_units_and_elements_be_of_any_kind(recording: Path, tm
     assert squeeze["true_J"] == pytest.approx(damping["true_J"], rel=1e-12)
 
 
+@pytest.mark.usefixtures("no_figure")
 def test_estimates_are_those_that_are_set(recording: Path) -> None:
     plain, filtered = (
         json.loads(dissipate(recording, "--mass", "0.0018", "--json", *more).stdout)["elements"][0]
@@ -87,6 +105,7 @@ def test_estimates_are_those_that_are_set(recording: Path) -> None:
     assert filtered["strongest_N"] < 0.3 * plain["strongest_N"]
 
 
+@pytest.mark.usefixtures("no_figure")
 def test_the_log_of_a_run_takes_no_more_than_its_directory(tmp_path: Path) -> None:
     made = scene(duration=0.2, hand={"stiffness": 50.0, "force": {"kind": "constant", "value": -1.0}})
     directory = tmp_path / "run"
@@ -94,7 +113,7 @@ def test_the_log_of_a_run_takes_no_more_than_its_directory(tmp_path: Path) -> No
     run_in_process(made, KINDS, out=directory, attachments={"scene.toml": to_toml(made.as_dict())})
     (directory / "scene.toml").write_text(to_toml(made.as_dict()))
     for path in (directory, directory / "log.mcap"):
-        result = dissipate(path, "--damping", "0.5", "--out", tmp_path / "f.svg")
+        result = dissipate(path, "--damping", "0.5")
         assert result.exit_code == 0, result.output
         assert "over every step of the plant" in result.stderr
 
