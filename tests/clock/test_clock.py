@@ -6,7 +6,7 @@ from typing import Any
 from hypothesis import given
 from hypothesis import strategies as st
 
-from haploop.launch.clock.clock import ClockError
+from haploop.launch.clock.clock import MOST_GRANTS, ClockError
 from haploop.launch.scene.mistakes import SceneError
 from helpers.runs.clocks import DAMPING, SWAP, TICKS, WINDOW, clock, granted, sent
 
@@ -169,3 +169,17 @@ def test_the_plant_may_end_the_run_early() -> None:
     subject.end_at(123)
     assert granted(subject, 123) == 400
     assert subject.is_last
+
+
+def test_a_node_behind_holds_the_grants_once_seventy_of_them_lie_ahead_of_it_ten_ms_apart() -> None:
+    """Grants within 10 ms end in one block; the blocks that a node has not taken must not become too many to keep."""
+    subject = clock(1.0)
+    for millisecond in range(2000):
+        subject.grant(0, millisecond / 1000)
+    assert subject.until == WINDOW, "at this pace the window holds first"
+    slow = clock(0.02)
+    for millisecond in range(0, 100_000, 25):
+        slow.grant(0, millisecond / 1000)
+    assert slow.until == MOST_GRANTS
+    assert slow.wait_s(100.0) is None
+    assert slow.grant(1, 100.0) > MOST_GRANTS

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from haploop.launch.clock.commands import Commands
+from haploop.launch.clock.commands import Answer, Commands
 from haploop.launch.clock.roster import Roster
 from haploop.launch.spec import RunSpec
 from helpers.runs.clocks import DAMPING, TICKS, clock, granted
@@ -20,6 +20,13 @@ def commands(**tables: Any) -> Commands:
     subject = clock(**tables)
     granted(subject, 0)
     return Commands(subject, RunSpec(subject.present(), dict(KINDS), Path("out")), Roster)
+
+
+def at_once(subject: Commands, verb: str, arguments: dict[str, Any]) -> Answer:
+    """The answer of a command that needs no steps."""
+    answer = subject(verb, arguments)
+    assert isinstance(answer, tuple)
+    return answer
 
 
 def deep(levels: int) -> dict[str, Any]:
@@ -42,6 +49,8 @@ def deep(levels: int) -> dict[str, Any]:
         ("set", {"set": {"wall.stiffness": "3 furlong"}}, "unit that a running loop does not know; it knows Hz, J"),
         ("set", {"set": {"wall.stiffness": "3 ms"}}, "ms has the dimension [time], but N/m has [mass] / [time] ** 2"),
         ("swap", {"swap": {"kind": "damping", "damping": "1 lbf s/inch"}}, "unit that a running loop does not know"),
+        ("stop", {"self": 1}, "The arguments of stop cannot be used: it takes none."),
+        ("swap", {"surprise": 1}, "it takes swap, element, at, reload, and swap must be given."),
         ("pace", {"pace": 1e305}, "from 1e-06 to 1e+06, or free, but 1e+305"),
         ("pace", {"pace": float("inf")}, "or free, but inf"),
         ("step", {"ticks": 10**18}, "from 1 to 1000, but 1000000000000000000"),
@@ -56,15 +65,15 @@ def test_what_carries_too_much_or_means_nothing_is_refused_with_a_sentence(
     verb: str, arguments: dict[str, Any], says: str
 ) -> None:
     subject = commands()
-    ok, text, data = subject(verb, arguments)
+    ok, text, data = at_once(subject, verb, arguments)
     assert (ok, data) == (False, {})
     assert says in text
     assert len(text) < 1000
-    assert subject("status", {})[1].startswith("running at tick 0 (0 s) of 1000")
+    assert at_once(subject, "status", {})[1].startswith("running at tick 0 (0 s) of 1000")
 
 
 def test_of_many_mistakes_five_are_told_and_the_rest_counted() -> None:
-    ok, text, _ = commands()("set", {"set": {f"wall.k{i}": 1.0 for i in range(30)}})
+    ok, text, _ = at_once(commands(), "set", {"set": {f"wall.k{i}": 1.0 for i in range(30)}})
     assert not ok
     lines = text.splitlines()
     assert len(lines) == 6
@@ -111,11 +120,11 @@ def test_the_answer_to_a_change_says_how_to_go_back_and_going_back_does(
     granted(subject, 0)
     steer = Commands(subject, RunSpec(subject.present(), dict(KINDS), Path("out")), Roster)
     before = subject.present()
-    ok, text, data = steer(verb, arguments)
+    ok, text, data = at_once(steer, verb, arguments)
     assert ok, text
     assert text.endswith(back)
     assert subject.scene_at(TICKS) != before
-    ok, text, _ = steer(verb, data["before"] | {key: arguments[key] for key in ("at",) if key in arguments})
+    ok, text, _ = at_once(steer, verb, data["before"] | {key: arguments[key] for key in ("at",) if key in arguments})
     assert ok, text
     now = subject.scene_at(TICKS)
     assert (now.wall, now.dissipation, now.clock) == (before.wall, before.dissipation, before.clock)
@@ -125,7 +134,7 @@ def test_no_way_back_is_told_where_one_swap_cannot_go_it() -> None:
     """Of two elements the first is taken out, and the second moves up: it would come back behind it."""
     subject = commands()
     subject("swap", {"swap": {**DAMPING, "damping": 0.1}, "element": 1})
-    ok, text, data = subject("swap", {"swap": {"kind": "none"}, "element": 0})
+    ok, text, data = at_once(subject, "swap", {"swap": {"kind": "none"}, "element": 0})
     assert ok
     assert "go back" not in text
     assert "before" not in data

@@ -15,14 +15,14 @@ from haploop.launch.scene.events import swapped_in, try_out
 from haploop.launch.scene.mistakes import SceneError
 from haploop.protocol.changes import Event, at_work, changes_of
 from haploop.protocol.scene.scene import EventTable, Scene
-from haploop.protocol.ticks import Timebase
+from haploop.protocol.ticks import HELD_S, Timebase
 
 if TYPE_CHECKING:
     from haploop.controller.dissipation import Element
 
-# Grants that the slowest lossless node has not worked through. Each may end in a block of its own, however short; with
-# those of the window they must stay below what telemetry keeps for a subscriber.
-MOST_GRANTS = 100
+# Grants, ``HELD_S`` apart, that the slowest lossless node has not worked through. Each may end in blocks of its own,
+# however short; with those of the window they must stay below what telemetry keeps for a subscriber.
+MOST_GRANTS = 70
 # Changes that may wait for their tick at a time: every further one is checked against all of them.
 MOST_CHANGES = 100
 # No run goes on for longer, s of simulated time.
@@ -60,6 +60,7 @@ class Clock:
         self.pace = Pace(time.control_rate, pace)
         self._held = True
         self._ahead: deque[int] = deque()
+        self._ahead_from = 0.0
 
     # Time
 
@@ -89,7 +90,11 @@ class Clock:
             limit = self.pace.grant(self.until, limit, now)
         if limit > self.until and not self._held:
             self.until = limit
-            self._ahead.append(limit)
+            if self._ahead and now - self._ahead_from < HELD_S:
+                self._ahead[-1] = limit
+            else:
+                self._ahead.append(limit)
+                self._ahead_from = now
         return self.until
 
     def wait_s(self, now: float) -> float | None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Callable, Generator, Mapping, Sequence
+from inspect import signature
 from typing import TYPE_CHECKING, Any
 
 from haploop.controller.dissipation import ElementError, PluginError
@@ -68,6 +69,7 @@ class Commands:
         if act is None:
             return False, f"{verb[:40]!r} is no command; these are: {', '.join(self._verbs)}.", {}
         try:
+            _check_names(verb, act, arguments)
             _check_burden(arguments)
             done = act(**arguments)
         except Exception as error:
@@ -195,6 +197,16 @@ def _refusal(verb: str, error: Exception) -> Answer:
     if isinstance(error, ClockError | PaceError | PluginError | ElementError | OutputError):
         return False, str(error), {}
     return False, f"The arguments of {verb} cannot be used: {type(error).__name__}: {error}.", {}
+
+
+def _check_names(verb: str, act: Callable[..., Any], arguments: Message) -> None:
+    """Raises ClockError where an argument is none of the command's, or one that it needs is missing."""
+    taken = signature(act).parameters
+    needed = [name for name, one in taken.items() if one.default is one.empty and name not in arguments]
+    if needed or not arguments.keys() <= taken.keys():
+        names = f"it takes {', '.join(taken)}" if taken else "it takes none"
+        lacks = f", and {' and '.join(needed)} must be given" if needed else ""
+        raise ClockError(f"The arguments of {verb} cannot be used: {names}{lacks}.")
 
 
 def _check_burden(arguments: Message) -> None:
