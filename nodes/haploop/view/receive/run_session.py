@@ -10,7 +10,7 @@ from pathlib import Path
 import zmq
 
 from haploop.logger.log import LogError
-from haploop.logger.summary import SUMMARY, Summary, awaits_verdict, read
+from haploop.logger.summary import REPEATED_S, SUMMARY, Summary, awaits_verdict, read
 from haploop.protocol.changes import Event, at_work, changes_of
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import DELAY, Timebase
@@ -136,13 +136,17 @@ class RunSession:
         """Returns what there is of a verdict.
 
         ``seen`` in the last half second, ``judged`` once the run has ended; between the two ``awaited``, or
-        ``abandoned`` where its launcher has gone; ``unknown`` where no summary can be read.
+        ``abandoned`` where its launcher has gone; ``unjudged`` of a run that was too long, ``unknown`` where no summary
+        can be read.
         """
         if not self.summary:
             return "unknown" if self.outcome == "ended" else "seen"
         if awaits_verdict(self.scene, self.summary):
             return "abandoned" if self.given_up else "awaited"
-        return "judged" if "stability" in self.summary else "seen"
+        if "stability" in self.summary:
+            return "judged"
+        is_long = self.scene.run.verdict == "pushed" and self.summary["duration_s"] > REPEATED_S
+        return "unjudged" if is_long else "seen"
 
     @property
     def version(self) -> tuple[object, ...]:
