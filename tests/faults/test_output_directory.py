@@ -14,7 +14,7 @@ from haploop.launch.runs.start import prepare
 from haploop.launch.spec import OutputError, make_output
 from haploop.tools.sweep.store import Store
 from haploop.tools.sweep.table import make_schema
-from helpers.live.launched import SCENE, command, first_and_slowly
+from helpers.live.launched import HAPLOOP, SCENE, command, first_and_slowly
 
 # Round after round, processes that stand at a barrier make the directory at the same instant; prints what each got.
 CROWD = """
@@ -117,10 +117,11 @@ def test_a_run_whose_sockets_cannot_be_made_leaves_no_directory(live_runs_here, 
 
 
 @pytest.mark.parametrize("after_s", first_and_slowly(0.3, 0.02, 0.06, 0.1, 0.15, 0.2, 0.4, 0.5))
-def test_an_interrupt_in_the_first_half_second_is_never_a_traceback_and_leaves_nothing_half_made(after_s, tmp_path):
-    """Python itself says nothing of haploop before its first line has run; from there on the word is haploop's."""
+@pytest.mark.parametrize("number", first_and_slowly(signal.SIGTERM, signal.SIGINT))
+def test_a_signal_in_the_first_half_second_is_never_a_traceback_and_leaves_nothing_half_made(after_s, number, tmp_path):
+    """Until the first line of haploop has run, the words are Python's; from there on they are haploop's."""
     out = tmp_path / "out"
-    begin = "import sys; print(flush=True); from haploop.tools.cli.main import main; sys.argv[0] = 'haploop'; main()"
+    begin = "from haploop.tools.cli.main import main; print(flush=True); main()"
     words = ["run", str(SCENE), "--set", "duration=600", "--json", "--out", str(out)]
     run = subprocess.Popen(
         [sys.executable, "-c", begin, *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
@@ -130,7 +131,7 @@ def test_an_interrupt_in_the_first_half_second_is_never_a_traceback_and_leaves_n
     try:
         run.wait(timeout=after_s)
     except subprocess.TimeoutExpired:
-        run.send_signal(signal.SIGINT)
+        run.send_signal(number)
     said, complaints = run.communicate(timeout=40)
     assert "Traceback" not in complaints
     if said:
@@ -140,6 +141,21 @@ def test_an_interrupt_in_the_first_half_second_is_never_a_traceback_and_leaves_n
         assert run.returncode == 1
         assert not out.exists()
         assert complaints.strip()
+
+
+def test_a_run_without_enough_open_files_is_a_sentence_and_leaves_nothing(tmp_path, live_runs_here):
+    """As long as ZeroMQ itself does not end the process; what such an end leaves, the next command clears away."""
+    limit = "import os, resource, sys; resource.setrlimit(resource.RLIMIT_NOFILE, (int(sys.argv[1]),) * 2)"
+    for count in (12, 14):
+        words = [*HAPLOOP, "run", str(SCENE), "--out", str(tmp_path / "out")]
+        starter = [sys.executable, "-c", f"{limit}; os.execv(sys.argv[2], sys.argv[2:])", str(count), *words]
+        done = subprocess.run(starter, capture_output=True, text=True)
+        assert done.returncode != 0
+        assert "Too many open files" in done.stderr
+        assert "Traceback" not in done.stderr
+        assert list(tmp_path.iterdir()) == []
+    assert command("status").returncode == 0
+    assert list((live_runs_here / "haploop").iterdir()) == []
 
 
 def test_what_a_sweep_has_not_written_stays_in_its_directory(tmp_path):

@@ -44,7 +44,7 @@ def dead(name: str = "abcdef") -> Path:
     path = private_directory.base_directory() / name
     path.mkdir()
     for file in ("lock", "clock.sock", "loop.sock", "plant.sock", "controller.sock", "logger.sock", "run.part"):
-        (path / file).touch()
+        (path / file).write_bytes(b"haploop" if file == "lock" else b"")
     entry = {"pid": 1, "clock": f"ipc://{path}/clock.sock", "title": "dead", "out": "nowhere", "keys": None}
     (path / "run.json").write_text(json.dumps(entry))
     os.utime(path, LONG_AGO)
@@ -72,6 +72,13 @@ def test_a_folder_that_no_run_has_made_stays_with_all_that_is_in_it(name, live_r
         os.utime(path, LONG_AGO)
     before = tree(live_runs_here)
     assert command("status").returncode == 0
+    assert tree(live_runs_here) == before
+
+
+def test_a_directory_with_the_names_of_a_run_but_another_lock_stays(live_runs_here):
+    (dead() / "lock").write_text("of another program")
+    before = tree(live_runs_here)
+    assert run_directory.live_runs() == []
     assert tree(live_runs_here) == before
 
 

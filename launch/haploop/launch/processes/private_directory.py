@@ -19,6 +19,7 @@ ENTRY, PART, LOCK = "run.json", "run.part", "lock"
 # Every name that may stand in a private directory; the lock goes last, since it says that the directory is ours.
 _SOCKETS = ("clock", *(name for process in PROCESSES.values() for name in process.binds.values()))
 _OURS = (*(f"{name}.sock" for name in _SOCKETS), PART, ENTRY, LOCK)
+_OWNER = b"haploop"
 _NAME = re.compile(r"[0-9a-f]{6}")
 # A socket's path must stay below the kernel's 107 bytes; this leaves room for the run and the socket's name.
 _LONGEST_BASE = 70
@@ -63,7 +64,7 @@ def _is_long(path: Path) -> bool:
 def directories() -> list[Path]:
     """Returns what is named as a private directory of a run in the user's directory of live runs, oldest first."""
     found = [path for path in base_directory().iterdir() if _NAME.fullmatch(path.name)]
-    return sorted(found, key=_made)
+    return sorted(found, key=_mtime)
 
 
 @contextlib.contextmanager
@@ -73,34 +74,31 @@ def made() -> Iterator[Path]:
     At the end the files of the run are removed, and the directory unless something else is in it. Raises OutputError
     where it cannot be made.
     """
-    path, lock = _make()
-    try:
+    with contextlib.ExitStack() as held:
+        path = base_directory()
+        try:
+            while not (path := _made_in(path, held)):
+                path = base_directory()
+        except OSError as error:
+            raise OutputError(f"A run's directory in {path} cannot be made: {_why(error)}; {_ADVICE}") from error
         yield path
-    finally:
-        with contextlib.suppress(OSError), _opened(path) as directory:
-            _remove(path, directory)
-        os.close(lock)
 
 
-def _make() -> tuple[Path, int]:
-    while True:
-        path = base_directory() / secrets.token_hex(3)
-        try:
-            path.mkdir(mode=0o700)
-        except FileExistsError:
-            continue
-        except OSError as error:
-            raise OutputError(f"The run's directory {path} cannot be made: {_why(error)}; {_ADVICE}") from error
-        try:
-            lock = os.open(path / LOCK, os.O_RDWR | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW, 0o600)
-            fcntl.flock(lock, fcntl.LOCK_EX)
-        except OSError as error:
-            with contextlib.suppress(OSError), _opened(path) as directory:
-                _remove(path, directory)
-            raise OutputError(f"The lock {path / LOCK} cannot be made: {_why(error)}; {_ADVICE}") from error
-        if os.fstat(lock).st_nlink:  # else somebody who cleared up has found it before it was locked
-            return path, lock
-        os.close(lock)
+def _made_in(base: Path, held: contextlib.ExitStack) -> Path | None:
+    """Makes a directory that ``held`` removes; None where the name is taken, or it was cleared away unlocked."""
+    path = base / secrets.token_hex(3)
+    try:
+        path.mkdir(mode=0o700)
+    except FileExistsError:
+        return None
+    held.callback(_rmdir, path)
+    directory = held.enter_context(_opened(path))
+    held.callback(_unlink, directory)
+    lock = os.open(LOCK, os.O_RDWR | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW, 0o600, dir_fd=directory)
+    held.callback(os.close, lock)
+    fcntl.flock(lock, fcntl.LOCK_EX)
+    os.write(lock, _OWNER)
+    return path if os.fstat(lock).st_nlink else None
 
 
 def is_held(path: Path) -> bool:
@@ -122,10 +120,9 @@ def clear_dead(path: Path) -> None:
             return
         lock = _free_lock(directory, fcntl.LOCK_EX)
         if lock is not None:
-            try:
-                _remove(path, directory)
-            finally:
-                os.close(lock)
+            _unlink(directory)
+            os.close(lock)
+            _rmdir(path)
 
 
 def read_entry(path: Path) -> bytes:
@@ -138,6 +135,8 @@ def _free_lock(directory: int, kind: int) -> int | None:
     """Takes the lock of a directory and returns its descriptor, None where somebody holds it; OSError for none."""
     lock = _open_file(directory, LOCK)
     try:
+        if os.pread(lock, len(_OWNER), 0) != _OWNER:  # another program's, or not ready
+            raise PermissionError
         fcntl.flock(lock, kind | fcntl.LOCK_NB)
     except OSError as error:
         os.close(lock)
@@ -169,15 +168,18 @@ def _open_file(directory: int, name: str) -> int:
     return descriptor
 
 
-def _remove(path: Path, directory: int) -> None:
+def _unlink(directory: int) -> None:
     for name in _OURS:
         with contextlib.suppress(OSError):  # not there, or no file
             os.unlink(name, dir_fd=directory)
-    with contextlib.suppress(OSError):  # something else is in it
+
+
+def _rmdir(path: Path) -> None:
+    with contextlib.suppress(OSError):  # gone, or something else is in it
         path.rmdir()
 
 
-def _made(path: Path) -> float:
+def _mtime(path: Path) -> float:
     """Returns the time at which a run's directory was made; 0 for one that its run has just removed."""
     try:
         return path.lstat().st_mtime

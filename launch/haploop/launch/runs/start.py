@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from haploop.controller.dissipation import Element, ElementError, PluginError, load_plugin, registry
 from haploop.launch.scene.events import elements_of, try_out
 from haploop.launch.scene.file import load
-from haploop.launch.spec import OutputError, RunSpec, discard, keep_plugin, make_output, write_scene
+from haploop.launch.spec import RunFailed, RunSpec, discard, keep_plugin, make_output, write_scene
 from haploop.protocol.scene.scene import Scene
 
 if TYPE_CHECKING:
@@ -121,7 +121,9 @@ def run(spec: RunSpec, *, in_process: bool = False, **options: Any) -> Summary:
             from haploop.launch.processes.supervisor import run_processes
 
             made = run_processes(spec)
-        except (OutputError, KeyboardInterrupt):
+        except RunFailed:
+            raise
+        except BaseException:
             discard(spec.out, spec.is_new)  # where it never began
             raise
         return _judged(spec, *made)

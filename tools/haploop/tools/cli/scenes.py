@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from haploop.tools.cli.interrupt import LeavingAtOnce
 from haploop.tools.cli.options import (
     FAILED,
     WRONG_USE,
@@ -46,12 +47,13 @@ def run(
     json: Json = False,
 ) -> None:
     """Run a scene to its end; other terminals can steer and watch it meanwhile."""
-    from haploop.launch.runs import start
-    from haploop.launch.spec import RunFailed
-    from haploop.protocol.transport.sockets import Transport, TransportError
-    from haploop.tools.cli.view import viewing
-    from haploop.tools.render.progress import ProgressLine
-    from haploop.tools.render.report import print_summary
+    with LeavingAtOnce():
+        from haploop.launch.runs import start
+        from haploop.launch.spec import RunFailed
+        from haploop.protocol.transport.sockets import Transport, TransportError
+        from haploop.tools.cli.view import viewing
+        from haploop.tools.render.progress import ProgressLine
+        from haploop.tools.render.report import print_summary
 
     with viewing(view, in_process) as viewer, plain_errors():
         rate = parse_pace(pace or ("1" if view else "free"))
