@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 
 from haploop.tools.dissipate.booking import Booking
-from haploop.tools.dissipate.command import Request, compute_outcome
-from haploop.tools.dissipate.controller_scene import Selection, make_scene_for_text
+from haploop.tools.dissipate.command import Request, Selection, compute_outcome, make_scene_for_text
 from haploop.tools.dissipate.outcome import Outcome
 from haploop.tools.dissipate.samples import Floats, Samples
 from haploop.tools.dissipate.text_recording import Layout

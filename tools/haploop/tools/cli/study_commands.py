@@ -71,9 +71,8 @@ def dissipate(
     Of a force that was recorded too: its true work, held from sample to sample, and whether it is passive. One pass in
     flat memory. The last line names the figure's file.
     """
-    from haploop.tools.dissipate.command import Request
+    from haploop.tools.dissipate.command import Request, Selection
     from haploop.tools.dissipate.command import dissipate as book
-    from haploop.tools.dissipate.controller_scene import Selection
     from haploop.tools.dissipate.text_recording import Layout
 
     selection = Selection(damping or [], mass or [], element or [], wall, occupies, set or [])

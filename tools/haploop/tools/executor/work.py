@@ -16,10 +16,6 @@ Sources = tuple[tuple[str, str], ...]
 Results = Callable[[list[Scene]], Iterator[tuple[int, Summary]]]
 
 
-def _scene_itself(item: Any) -> Any:
-    return item
-
-
 def _whole_result(_item: Any, _scene: Scene | None, result: Summary) -> Summary:
     return result
 
@@ -29,13 +25,12 @@ class Work:
     """A job that is sent to workers with every part: nothing but values and importable functions.
 
     Attributes:
-        make: from an item to its resolved scene, which it is by default; an error that it raises is the reason why the
-            item is refused.
+        make: from an item to its resolved scene; an error that it raises is the reason why the item is refused.
         keep: from an item, its scene (None where it was refused) and its result to what travels back: by default all.
         sources: plugin files as (name, text); a worker on another machine has no files of this one.
     """
 
-    make: Callable[[Any], Scene] = _scene_itself
+    make: Callable[[Any], Scene]
     keep: Callable[[Any, Scene | None, Summary], Any] = _whole_result
     sources: Sources = ()
     energy: bool = True

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import IO
 from urllib.parse import quote
@@ -31,6 +31,9 @@ class ExportFailed(Exception):
 
 def export_run(path: Path, to: str, out: Path | None, topics: str | None, force: bool) -> None:
     """Writes a run's log in another format and names the files."""
+    from rich.progress import Progress
+
+    shown = console(stderr=True)
     with plain_errors():
         if to not in WRITERS:
             leave(f"--to must be one of {', '.join(FORMATS)}, but {to!r} was given.", WRONG_USE)
@@ -44,11 +47,12 @@ def export_run(path: Path, to: str, out: Path | None, topics: str | None, force:
             with (
                 new_files(targets, force) as files,
                 writer(files, units, contents.attachments) as exported,
-                _progress(contents.read_bytes) as show,
+                Progress(console=shown, transient=True, disable=not shown.is_terminal) as bar,
             ):
+                task = bar.add_task("exporting", total=contents.read_bytes)
                 for batch in log:
                     exported.add(batch)
-                    show(log.read_bytes)
+                    bar.update(task, completed=log.read_bytes)
                 exported.finish()
         except (FileNotFoundError, ImportError) as error:
             leave(str(error), WRONG_USE)
@@ -79,16 +83,6 @@ def _targets(log: Path, out: Path | None, writer: type[ExportWriter], topics: li
     if out and not out.is_dir():
         return [out]
     return [(out or log.parent) / f"{log.stem}{writer.suffix}"]
-
-
-@contextlib.contextmanager
-def _progress(total_bytes: int) -> Iterator[Callable[[int], None]]:
-    from rich.progress import Progress
-
-    shown = console(stderr=True)
-    with Progress(console=shown, transient=True, disable=not shown.is_terminal) as bar:
-        task = bar.add_task("exporting", total=total_bytes)
-        yield lambda done_bytes: bar.update(task, completed=done_bytes)
 
 
 @contextlib.contextmanager

@@ -127,13 +127,10 @@ def place_labels(ax: Axes, labels: Sequence[Label], lines: Iterable[np.ndarray])
     room.avoid_lines(lines)
     for label in labels:
         room.take(label.x, label.y, label.half_px)
-    placed: set[Label] = set()
-    for group in dict.fromkeys(label.group for label in labels):
-        members = [(reach, label) for reach in (_NEAR_PX, _FAR_PX) for label in labels if label.group == group]
-        placed |= {next((label for reach, label in members if _place(ax, room, label, reach)), members[0][1])}
+    written = {label.group for label in labels if _place(ax, room, label, _NEAR_PX)}
     for label in labels:
-        if label not in placed:
-            _place(ax, room, label, _NEAR_PX)
+        if label.group not in written and _place(ax, room, label, _FAR_PX):
+            written.add(label.group)
 
 
 def _place(ax: Axes, room: LabelRoom, label: Label, reach: Sequence[float]) -> bool:
