@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
 
 import msgpack
 
+from haploop.launch import spec
 from haploop.launch.clock.clock import Clock
 from haploop.launch.clock.roster import Roster
 from haploop.launch.clock.server import ClockServer
@@ -154,8 +156,19 @@ def _before_its_state(kept: Method) -> Method:
     return follows
 
 
-# What the defect is -> the class, its method, and what makes the defective one of it.
-DEFECTS: dict[str, tuple[type, str, Callable[[Method], Method]]] = {
+def _not_exclusively(kept: Method) -> Method:
+    def claimed(out: Path, first: str) -> bool:
+        out.mkdir(parents=True, exist_ok=True)
+        if any(out.iterdir()):
+            return False
+        (out / first).touch()
+        return True
+
+    return claimed
+
+
+# What the defect is -> the class or module, its method, and what makes the defective one of it.
+DEFECTS: dict[str, tuple[Any, str, Callable[[Method], Method]]] = {
     "a grant goes back when a slower node joins": (Clock, "grant", _goes_back),
     "PROGRESS is taken from somebody who has not joined": (ClockServer, "_take", _from_strangers),
     "a JOIN without endpoints is welcomed": (ClockServer, "_join", _without_endpoints),
@@ -170,6 +183,7 @@ DEFECTS: dict[str, tuple[type, str, Callable[[Method], Method]]] = {
     "the rest of a short write is forgotten": (McapFile, "append", _short_write),
     "a change that comes while others are worked on is forgotten": (ClockClient, "poll", _forgets_changes),
     "a second lossless node is not waited for": (Roster, "slowest", _not_waited_for),
+    "two runs that start at one instant take one directory": (spec, "_claimed", _not_exclusively),
     "blocks from before a STATE are taken": (Subscriber, "_follows", _before_its_state),
 }
 

@@ -14,13 +14,14 @@ from pathlib import Path
 from typing import Any
 
 from haploop.launch.processes.supervisor import run_processes
-from haploop.launch.spec import RunFailed, RunSpec
+from haploop.launch.spec import OutputError, RunFailed, RunSpec, make_output
 from haploop.logger.log import LogError
+from haploop.protocol.changes import Event
 from helpers.scenes.least import KINDS
 from simulation.faults import Fault, Kill, Signals
 from simulation.machine import Disk, SimRun
 from simulation.plan import Plan
-from simulation.reference import DEADLINE_S, difference, logged_ticks, scene_of
+from simulation.reference import DEADLINE_S, difference, logged_ticks, scene_of, second_difference
 from simulation.watch import Watch
 from simulation.world import Process, Stuck, World
 
@@ -41,6 +42,10 @@ class Sim:
     Attributes:
         out: the run's directory.
         visitors: processes that came to the run.
+        owners: who was given the directory.
+        heard: (observer, events) of those that took part to the end.
+        shown: (viewer, outcome) likewise.
+        second_logs: directory and summary of second loggers that ended in order.
         killed_at: role -> time at which one of its processes was killed.
         may_fail: whether anything has happened that may end the run.
     """
@@ -49,7 +54,10 @@ class Sim:
         self.plan = plan
         self.scene = scene_of(plan.scene)
         self.out = directory / "out"
-        self.out.mkdir()
+        self.owners: list[str] = []
+        self.heard: list[tuple[str, list[tuple[int, Event]]]] = []
+        self.shown: list[tuple[str, str]] = []
+        self.second_logs: list[tuple[Path, dict[str, Any]]] = []
         self.world = World(plan.seed, plan.jumpiness, plan.latency_s)
         self.watch = Watch(self.scene.run.window_blocks * self.scene.run.block_ticks)
         self.run = SimRun(self.world, self.watch, Disk(), dict(plan.starts_s))
@@ -96,7 +104,13 @@ class Sim:
             if silence_s > 0.6 * _START_S:
                 yield f"The {role} (has not answered for|did not join within) {_START_S:g} s"
 
+    def claim(self, who: str) -> None:
+        """Takes the run's directory; raises OutputError where it is taken."""
+        make_output(self.out, Path("scene.toml"))
+        self.owners.append(who)
+
     def launch(self, run: SimRun) -> Any:
+        self.claim("launcher")
         spec = RunSpec(self.scene, dict(KINDS), self.out, pace=self.plan.pace)
         return run_processes(spec, run.make_context, run.start_nodes, run.interrupts)
 
@@ -126,8 +140,12 @@ class Sim:
         return self.watch.broken
 
     def _how_it_ended(self) -> str:
+        if len(self.owners) > 1:
+            return "two runs have one directory"
         error = self.run.launcher.error
         if error is None:
+            return ""
+        if isinstance(error, OutputError) and self.owners == ["rival"]:
             return ""
         said = "KeyboardInterrupt" if isinstance(error, KeyboardInterrupt) else str(error)
         if not isinstance(error, RunFailed | LogError | KeyboardInterrupt):
@@ -160,6 +178,13 @@ class Sim:
         for process in self.visitors:
             if process.error is not None:
                 return f"{process.name} ended with a traceback:\n" + "".join(traceback.format_exception(process.error))
+        if self.run.launcher.error is None:
+            events = self.run.launcher.result[1]
+            for name, heard in self.heard:
+                if heard != events[: len(heard)]:
+                    return f"{name} heard of other events than there were: {heard}"
+            wrong = [name for name, outcome in self.shown if outcome not in ("", "ended")]
+            return f"{wrong[0]} shows a run that ended in order as failed" if wrong else ""
         return ""
 
     def _files(self, reads_log: bool) -> str:
@@ -174,6 +199,9 @@ class Sim:
         else:
             events, reads_log = self.watch.events, True
         log = self.out / "log.mcap" if reads_log and self.scene.run.log != "none" else None
+        for out, of_second in self.second_logs:
+            if summary and (broken := second_difference(self.plan.scene, events, of_second, out / "log.mcap")):
+                return broken
         broken = difference(self.plan.scene, events, summary, log, self.watch.granted)
         if broken or log is None or not log.exists():
             return broken[0] if broken else ""
@@ -202,18 +230,24 @@ class Outcome:
 
 
 @contextlib.contextmanager
-def _no_tracebacks(sim: Sim) -> Iterator[None]:
-    """Takes note of what a node would have printed as a traceback."""
-    kept = traceback.print_exc
+def _seen_through(sim: Sim) -> Iterator[None]:
+    """Takes note of what a node would print as a traceback, and lets processes meet between two looks at the disk."""
+    kept, kept_iterdir = traceback.print_exc, Path.iterdir
+
+    def iterdir(path: Path) -> Iterator[Path]:
+        found = list(kept_iterdir(path))
+        if path == sim.out and sim.world.running:
+            sim.world.running.may_lose_the_processor()
+        return iter(found)
 
     def note(*_: Any, **__: Any) -> None:
         sim.watch.fail("a traceback was printed:\n" + traceback.format_exc())
 
-    traceback.print_exc = note
+    traceback.print_exc, Path.iterdir = note, iterdir  # pyright: ignore[reportAttributeAccessIssue]
     try:
         yield
     finally:
-        traceback.print_exc = kept
+        traceback.print_exc, Path.iterdir = kept, kept_iterdir  # pyright: ignore[reportAttributeAccessIssue]
 
 
 def play(plan: Plan, reads_log: bool = True) -> Outcome:
@@ -221,7 +255,7 @@ def play(plan: Plan, reads_log: bool = True) -> Outcome:
     directory = Path(tempfile.mkdtemp(prefix="sim-", dir="/dev/shm" if Path("/dev/shm").is_dir() else None))
     try:
         sim = Sim(plan, directory)
-        with _no_tracebacks(sim):
+        with _seen_through(sim):
             sim.play()
         broken = sim.judge(reads_log)
         sim.world.clear_away()

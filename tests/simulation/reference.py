@@ -66,6 +66,28 @@ def logged_ticks(log: Path) -> int:
     return len(recording["/controller"]["x"]) if "/controller" in recording else 0
 
 
+def _packed(events: list[tuple[int, Event]], with_stops: bool) -> bytes:
+    """The events that change something, as bytes."""
+    told = [(tick, event) for tick, event in events if is_change(event) or (with_stops and event.get("stop"))]
+    return msgpack.packb(told) or b""
+
+
+def second_difference(name: str, events: list[tuple[int, Event]], summary: dict[str, Any], log: Path) -> str:
+    """In what the log of a second logger differs from the undisturbed run, from where it begins; "" in nothing."""
+    if summary["lost"]["telemetry_gaps"]:
+        return "a second logger has gaps"
+    _, recording = _undisturbed(name, _packed(events, True))
+    if not log.exists() or "/controller" not in (kept := haploop.logger.read(log)):
+        return ""
+    begin = kept["/controller"]["timestamp"][:1]
+    first = int(np.searchsorted(recording["/controller"]["timestamp"], begin)[0]) if len(begin) else 0
+    for column in ("x", "total"):
+        values = kept["/controller"][column]
+        if not np.array_equal(values, recording["/controller"][column][first : first + len(values)]):
+            return f"{column} of a second logger, from tick {first} on, is not that of the undisturbed run"
+    return ""
+
+
 def difference(
     name: str, events: list[tuple[int, Event]], summary: dict[str, Any] | None, log: Path | None, granted: int
 ) -> list[str]:
@@ -75,10 +97,7 @@ def difference(
         summary: None for a run that failed, whose log holds the beginning of it.
         granted: the last tick that it was allowed to work on is the one before.
     """
-    told = [(tick, event) for tick, event in events if is_change(event) or event.get("stop")]
-    if summary is None:
-        told = [(tick, event) for tick, event in told if not event.get("stop")]
-    undisturbed, recording = _undisturbed(name, msgpack.packb(told))
+    undisturbed, recording = _undisturbed(name, _packed(events, summary is not None))
     if summary is not None:
         for key in ("trajectory_sha256", "ticks", "ended"):
             if summary[key] != undisturbed[key]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import random
 from collections.abc import Callable
@@ -12,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import zmq
 
 from haploop.launch.processes.run_directory import CommandRefused, LiveRun, RunNotFound, ask
+from haploop.launch.spec import OutputError
 from haploop.logger.books.buffers import TelemetryGap
 from haploop.logger.node import LoggerNode
 from haploop.protocol.transport.clock_client import Aborted, ClockClient, Refused
@@ -134,6 +136,7 @@ class Listener(Visit):
                 if not sim.run.launcher.alive:
                     session.end_without_launcher()
             session.close()
+            sim.shown.append((process.name, session.outcome))
             return
         context = live.make_context()
         try:
@@ -141,6 +144,7 @@ class Listener(Visit):
             while sim.run.launcher.alive and len(observer.ended) < len(PROCESSES) and not leave():
                 observer.poll()
                 observer.wait(int(1000 * self.every_s))
+            sim.heard.append((process.name, observer.take_events()))
             observer.leave()
         finally:
             context.destroy(linger=200)
@@ -176,8 +180,7 @@ class SecondLogger(Visit):
                 node.start(client.join({}), out)
                 tick, summary = node.run()
                 client.leave("LEAVE", tick)
-                if summary["lost"]["telemetry_gaps"]:
-                    sim.watch.fail("a second logger has gaps")
+                sim.second_logs.append((out, summary))
                 return
             except Refused:
                 process.sleep(_LOOK_S)
@@ -217,6 +220,18 @@ class Stranger(Visit):
                 process.sleep(dice.random() * 1e-3)
         process.sleep(0.5)
         sender.close(0)
+
+
+@dataclass(frozen=True)
+class Rival(Fault):
+    """Another launcher that wants the same directory at the same instant; only one may have it."""
+
+    def happen(self, sim: Sim) -> None:
+        sim.visitors.append(Process(sim.world, "rival", lambda: self._claim(sim)))
+
+    def _claim(self, sim: Sim) -> None:
+        with contextlib.suppress(OutputError):
+            sim.claim("rival")
 
 
 @dataclass(frozen=True)
