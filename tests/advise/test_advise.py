@@ -1,7 +1,10 @@
 """`haploop advise`: names, loops and cases, what the first line says, and that an interrupted advice goes on."""
 
 import json
+import os
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -9,11 +12,22 @@ from typer.testing import CliRunner
 
 from haploop.launch.scene.file import load
 from haploop.launch.scene.mistakes import SceneError
+from haploop.launch.spec import OutputError
 from haploop.protocol.scene.paths import value_at, with_value
 from haploop.tools.advise.advice import is_ideal
+from haploop.tools.advise.families import DAMPING
 from haploop.tools.advise.known import PUBLISHED, formulas
-from haploop.tools.advise.search import rounded_down
-from haploop.tools.advise.subject import DEFAULT_HAND, InvalidRequest, apply_events, assumptions, make_subject, presets
+from haploop.tools.advise.report import assumes
+from haploop.tools.advise.search import Best, rounded_down
+from haploop.tools.advise.subject import (
+    DEFAULT_HAND,
+    Assumed,
+    InvalidRequest,
+    apply_events,
+    assumptions,
+    make_subject,
+    presets,
+)  # fmt: skip
 from haploop.tools.advise.walls.cases import (
     HOLDS,
     Case,
@@ -25,6 +39,8 @@ from haploop.tools.advise.walls.cases import (
     scale_quantities,
     slowness,
 )  # fmt: skip
+from haploop.tools.advise.walls.limit import Limit
+from haploop.tools.advise.walls.trial import Failure, Store, Tried
 from haploop.tools.cli.app import app
 from helpers.scenes.least import KINDS, scene
 
@@ -221,8 +237,6 @@ def test_a_directory_of_something_else_is_refused(tmp_path):
 
 
 def test_a_changed_number_of_a_loop_makes_another_key():
-    from haploop.tools.advise.walls.trial import Store, Tried
-
     store, cases = Store(), [Case(1.0)]
     loop = loop_of("touch")
     key = store.key(loop, Tried(1000.0), cases)
@@ -231,3 +245,57 @@ def test_a_changed_number_of_a_loop_makes_another_key():
     others = {store.key(changed, Tried(1000.0), cases), store.key(loop, Tried(1000.1), cases),
               store.key(loop, Tried(1000.0), [Case(1.5)])}  # fmt: skip
     assert len(others | {key}) == 4
+
+
+@pytest.mark.parametrize(
+    ("right_N_m", "words"),
+    [
+        (33_700.0, "Were it right: about 34 N/mm with 12 N s/m of damping. Measure friction.kinetic first"),
+        (17_500.0, "Were it right, the wall would be as stiff within a tenth."),
+    ],
+)
+def test_what_is_assumed_stands_in_the_answer_with_what_the_wall_would_be_were_it_right(right_N_m, words):
+    limits = [Limit(value, 1.05 * value) for value in (16_000.0, 40_000.0, 30_000.0, right_N_m)]
+    right = Best(DAMPING, (12.0,), limits[2], limits[3])
+    told: Any = SimpleNamespace(
+        assumed=((Assumed("friction.kinetic", "a guess"), *limits[:2]),), described=limits[2],
+        found=SimpleNamespace(stiffness_N_m=17_000.0),
+    )  # fmt: skip
+    found = assumes(told, right)
+    assert found.startswith("friction.kinetic, published nowhere: the wall bears half and twice of it. " + words)
+
+
+def test_lines_of_a_damaged_store_are_passed_over_and_whole_ones_of_two_advices_at_once_are_kept(tmp_path):
+    file, failure = tmp_path / "walls.jsonl", Failure("hold x 3", 1.0, gone=False, force_N=0.1)
+    one, other = Store(file), Store(file)
+    one.add({"a": None})
+    other.add({"b": failure})
+    with file.open("ab") as lines:
+        lines.write(b'["c", {"case": "x", "at\n\xff\xfe\n[1]\n{}\n["d", {"no": 1}]\n["e", nul')
+    one.add({"f": None})
+    assert Store(file).known == {"a": None, "b": failure, "f": None}
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows has no limit of a file's size")
+def test_a_full_disk_is_told_in_a_sentence_and_what_was_kept_stays(tmp_path):
+    import resource
+    import signal
+
+    file = tmp_path / "walls.jsonl"
+    kept = Store(file)
+    kept.add({"a": None})
+    before, handler = resource.getrlimit(resource.RLIMIT_FSIZE), signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (20, before[1]))
+    try:
+        with pytest.raises(OutputError, match=r"walls.jsonl, where .* cannot be used: File too large. Make room"):
+            kept.add({"b": None, "c": None})
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+        signal.signal(signal.SIGXFSZ, handler)
+    kept.add({"d": None})
+    assert {"a", "d"} <= Store(file).known.keys() <= {"a", "b", "d"}
+
+
+def test_a_store_that_cannot_be_read_is_told_in_a_sentence(tmp_path):
+    with pytest.raises(OutputError, match="cannot be used: "):
+        Store(tmp_path)

@@ -5,11 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from haploop.launch.stability.judge import judge_scene
 from haploop.plant.chain.chain import Chain
 from haploop.protocol.scene.paths import with_value
 from haploop.protocol.scene.scene import ElementTable, Scene
 from haploop.tools.advise.subject import make_subject
-from haploop.tools.advise.walls.cases import Case, make_loop
+from haploop.tools.advise.walls.cases import HOLDS, Case, corner, make_loop, ranges
 from haploop.tools.advise.walls.loops import LoneLoop, Loops, make_loops
 from haploop.tools.advise.walls.trial import Job, Store, Trial, Tried
 from haploop.tools.linear.one_tick import OneTickMap
@@ -129,3 +130,23 @@ def test_loops_of_other_bodies_and_friction_are_tried_in_one_array_each_by_its_o
     assert [[failure is None for failure in of_job] for of_job in together] == [
         [True, True], [True, False], [True, False]
     ]  # fmt: skip
+
+
+@pytest.mark.slow
+def test_no_wall_that_a_trial_bears_is_a_felt_limit_cycle_or_grows_when_pushed_with_exact_friction():
+    rng, borne = np.random.default_rng(5), 0
+    elements = {"premium15": (3300.0, ()), "omega3": (17_000.0, (replace(DAMPING, parameters={"damping": 4.4}),)),
+                "touch": (9000.0, ())}  # fmt: skip
+    for device, (top, some) in elements.items():
+        loop = loop_of(device)
+        of = ranges(loop)
+        for _ in range(6):
+            case = Case(float(rng.choice(HOLDS)), corner(of, int(rng.integers(2 ** len(of)))), sway=0.0)
+            stiffness = top * float(rng.uniform(0.6, 1.5))
+            with Trial(Store()) as trial:
+                [failure] = trial.failures(loop, [Tried(stiffness, some)], [case])
+            if failure is None:
+                found = judge_scene(placed(loop, case, stiffness, *some), KINDS)
+                borne += 1
+                assert found.word in ("steady", "no-contact"), (device, stiffness, case, found)
+    assert 4 < borne < 18

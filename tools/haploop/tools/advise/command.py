@@ -6,10 +6,7 @@ import contextlib
 import json
 import sys
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from pathlib import Path
-
-from rich import progress
 
 from haploop.launch.scene.events import elements_of, try_out
 from haploop.launch.scene.toml_writer import to_toml
@@ -26,41 +23,34 @@ from haploop.tools.figure.data import FigureError
 from haploop.tools.render.terminal import console
 
 ADVICE, SCENE, FIGURE, WALLS = "advice.json", "advice.toml", "figure.png", "walls.jsonl"
-_STAGES = 7
 
 
-@dataclass(frozen=True)
-class Request:
-    """The arguments of ``haploop advise``; what is None is left as it is, or made by default."""
-
-    device: str
-    hand: str | None
-    delay: str | None
-    estimator: str | None
-    overrides: list[str]
-    plugins: list[Path]
-    workers: int | None
-    out: Path | None
-
-
-def advise(request: Request, as_json: bool) -> None:
-    """Searches, writes the results into the directory and prints them."""
-    if request.workers is not None and request.workers < 1:
-        leave(f"--workers must be at least 1, but {request.workers} was given.", WRONG_USE)
+def advise(
+    device: str,
+    hand: str | None,
+    delay: str | None,
+    estimator: str | None,
+    overrides: list[str],
+    plugins: list[Path],
+    workers: int | None,
+    out: Path | None,
+    as_json: bool,
+) -> None:
+    """Searches, writes the results into the directory and prints them; the arguments are those of the command."""
+    if workers is not None and workers < 1:
+        leave(f"--workers must be at least 1, but {workers} was given.", WRONG_USE)
     with plain_errors():
-        kinds = kinds_with(request.plugins)
+        kinds = kinds_with(plugins)
         try:
-            asked = make_subject(
-                request.device, request.hand, request.delay, request.estimator, request.overrides, kinds
-            )
+            asked = make_subject(device, hand, delay, estimator, overrides, kinds)
         except InvalidRequest as error:
             leave(str(error), WRONG_USE)
         try_out(elements_of(asked.scene), kinds)
         print_notes(asked.scene)
-        out = _output(request.out, asked.name)
+        out = _output(out, asked.name)
         store = Store(out / WALLS)
         try:
-            with _progress() as (stage, on_progress), Trial(store, request.workers, on_progress) as trial:
+            with _progress() as (stage, on_progress), Trial(store, workers, on_progress) as trial:
                 found = advice(asked, trial, stage)
         except KeyboardInterrupt:
             leave(f"Interrupted; the same command with --out {out} goes on.", FAILED)
@@ -98,20 +88,17 @@ def _write(found: Advice, out: Path) -> AdviceData:
 
 @contextlib.contextmanager
 def _progress() -> Iterator[tuple[Callable[[str], None], Callable[[int], None]]]:
-    screen = console(stderr=True)
-    columns = (
-        "{task.description}",
-        progress.BarColumn(bar_width=24),
-        "{task.fields[runs]} runs",
-        progress.TimeElapsedColumn(),
-    )
-    shown = screen.is_terminal
-    with progress.Progress(*columns, console=screen, disable=not shown, transient=True) as bars:
-        task = bars.add_task("starting", total=_STAGES, runs=0)
+    """Shows stage and runs so far on a terminal, and a line a stage elsewhere."""
+    screen, now = console(stderr=True), ["starting"]
+    with screen.status("starting") if screen.is_terminal else contextlib.nullcontext() as status:
 
         def stage(name: str) -> None:
-            if not shown:
+            now[0] = name
+            if not status:
                 print(f"{name} ...", file=sys.stderr)
-            bars.update(task, description=name, advance=1)
 
-        yield stage, lambda runs: bars.update(task, runs=runs)
+        def on_progress(runs: int) -> None:
+            if status:
+                status.update(f"{now[0]}: {runs} runs")
+
+        yield stage, on_progress

@@ -28,7 +28,7 @@ _READING = (
 )
 _SAFE = "{0} with {1}: at rest, or swinging by less than a hand feels"
 # What is assumed, how much that costs, and what to measure.
-_ASSUMED = "{0}, published nowhere: safe at half and at twice {1}. {2}"
+_ASSUMED = "{0}, published nowhere: the wall bears half and twice of {1}. {2}"
 _COSTS = "Were {0} right: about {1} with {2}. {3}"
 _SAME = "Were {0} right, the wall would be as stiff within a tenth."
 _MEASURE = "Measure {0} first: it moves the wall most."
@@ -81,8 +81,10 @@ def assumes(told: Advice, right: Best) -> str:
     if not right.safe or right.safe.stiffness_N_m <= WORTH * told.found.stiffness_N_m:
         costs = _SAME.format(it)
     else:
-        stiffness, phrase = format_stiffness(right.safe.stiffness_N_m), right.family.phrase(right.values)
-        costs = _COSTS.format(it, stiffness, phrase, measure if moves(half, double, told.described) else "")
+        phrase = right.family.phrase(right.values)
+        costs = _COSTS.format(
+            it, format_limit(right.safe), phrase, measure if moves(half, double, told.described) else ""
+        )
     return _ASSUMED.format(", ".join(of.key for of, _, _ in told.assumed), them, costs).strip()
 
 
@@ -147,18 +149,18 @@ def _assumed(told: Advice) -> Table:
     return table
 
 
-def format_stiffness(stiffness_N_m: float) -> str:
-    """Formats a stiffness in N/m: ``1.4 N/mm``; softer than 0.01 N/mm in N/m; ``any`` for an infinite one."""
+def format_stiffness(stiffness_N_m: float, digits: int = 3) -> str:
+    """Formats a stiffness in N/m: ``1.42 N/mm``; softer than 0.01 N/mm in N/m; ``any`` for an infinite one."""
     if not math.isfinite(stiffness_N_m):
         return "any"
     if 0.0 < stiffness_N_m < 10.0:
         return f"{fixed(stiffness_N_m, 2)} N/m"
-    return f"{fixed(stiffness_N_m / 1e3)} N/mm" if stiffness_N_m >= 1e3 else f"{fixed(stiffness_N_m / 1e3, 2)} N/mm"
+    return f"{fixed(stiffness_N_m / 1e3, digits if stiffness_N_m >= 1e3 else 2)} N/mm"
 
 
 def format_limit(limit: Limit) -> str:
-    """Formats a limit: ``none`` where no wall bears it, ``over ...`` where no end was found."""
+    """Formats a limit, known to two digits: ``none`` where no wall bears it, ``over ...`` where no end was found."""
     if not limit.stiffness_N_m:
         return "none"
     over = "over " if not math.isfinite(limit.fails_N_m) else ""
-    return over + format_stiffness(limit.stiffness_N_m)
+    return over + format_stiffness(limit.stiffness_N_m, 2)

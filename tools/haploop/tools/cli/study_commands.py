@@ -117,7 +117,6 @@ def advise(
 
     Can be stopped; the same command with --out DIR, the directory of the first, goes on.
     """
-    from haploop.tools.advise.command import Request
     from haploop.tools.advise.command import advise as give
 
-    give(Request(device, hand, delay, estimator, set or [], plugin or [], workers, out), json)
+    give(device, hand, delay, estimator, set or [], plugin or [], workers, out, json)
