@@ -12,7 +12,7 @@ import haploop.logger
 from haploop.controller.dissipation import Element, load_plugin, registry
 from haploop.launch.runs.in_process import run_in_process
 from haploop.launch.runs.run_files import recorded_log, recorded_scene, recorded_summary
-from haploop.launch.spec import PLUGINS, SCENE, RunFailed
+from haploop.launch.spec import PLUGINS, SCENE, RunFailed, kept_name
 from haploop.logger.log import LogError
 from haploop.logger.log.recording import Recording
 from haploop.logger.summary import Summary, finite
@@ -97,7 +97,7 @@ def repeatable(directory: Path, recorded: Recording) -> tuple[Scene, dict[str, t
     Raises:
         ReplayError, SceneError: the directory does not hold a run that can be repeated.
     """
-    kinds = registry([directory / PLUGINS / name for name in _launch_plugins(directory, recorded)])
+    kinds = registry(_launch_plugins(directory, recorded))
     scene = recorded_scene(directory, recorded.attachments, kinds)
     if scene is None:
         raise ReplayError(f"{directory} holds no {SCENE}; a directory that haploop run has written was expected.")
@@ -117,15 +117,20 @@ def _compare_scenes(directory: Path, recorded: Recording) -> list[str]:
     return [] if same else [f"{file} is not the scene that the log holds, from which the run was repeated."]
 
 
-def _launch_plugins(directory: Path, recorded: Recording) -> list[str]:
-    """Names of the plugin files the run began with; those taken up later stand in its events."""
-    names = [name.removeprefix(f"{PLUGINS}/") for name in recorded.attachments if name.startswith(f"{PLUGINS}/")]
-    for name in names:
-        if not (directory / PLUGINS / name).is_file():
-            raise ReplayError(
-                f"{directory / PLUGINS / name} is missing; the run cannot be repeated without its plugin."
-            )
-    return names
+def _launch_plugins(directory: Path, recorded: Recording) -> list[Path]:
+    """Files of the plugins the run began with; those taken up later stand in its events."""
+    names = [name for name in recorded.attachments if name.startswith(f"{PLUGINS}/")]
+    return [_kept_plugin(directory, name) for name in names]
+
+
+def _kept_plugin(directory: Path, name: str) -> Path:
+    """Returns the file of a plugin in the directory of its run, the very one: its name ends with its digest."""
+    path = directory / PLUGINS / Path(name).name
+    if not path.is_file():
+        raise ReplayError(f"{path} is missing; the run cannot be repeated without its plugin.")
+    if kept_name(path) != path.name:
+        raise ReplayError(f"{path} is no longer what the run was made with; the run cannot be repeated.")
+    return path
 
 
 def _event(event: Event, directory: Path) -> tuple[int, Event]:
@@ -133,8 +138,9 @@ def _event(event: Event, directory: Path) -> tuple[int, Event]:
     del event["timestamp"]
     tick = event.pop("tick")
     if "plugin" in event:
-        event["plugin"] = str(directory / PLUGINS / Path(event["plugin"]).name)
-        load_plugin(Path(event["plugin"]))
+        path = _kept_plugin(directory, event["plugin"])
+        event["plugin"] = str(path)
+        load_plugin(path)
     return tick, event
 
 

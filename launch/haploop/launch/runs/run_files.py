@@ -16,6 +16,7 @@ from haploop.launch.spec import SCENE
 from haploop.logger.log import LogError
 from haploop.logger.log.recording import Recording, Table
 from haploop.logger.summary import SUMMARY, Summary, misfit, read
+from haploop.protocol.changes import changes_of
 from haploop.protocol.quantity import Quantity
 from haploop.protocol.scene.scene import NO_ELEMENT, Scene
 from haploop.protocol.scene.table import Tables
@@ -92,9 +93,11 @@ def recorded_log(directory: Path) -> Recording:
         lacking = sorted(_COLUMNS[topic] - log[topic].keys()) if isinstance(log[topic], Table) else ["columns"]
         if lacking:
             raise LogError(f"The log in {directory} is none of a run: {topic} lacks {', '.join(lacking)}.")
-    for event in log.get("/events", []):
-        if not (isinstance(event, dict) and isinstance(event.get("tick"), int) and "timestamp" in event):
-            raise LogError(f"The log in {directory} is none of a run: an event in it has no tick.")
+    try:
+        events = [(int(event["tick"]), event) for event in log.get("/events", []) if event["timestamp"] >= 0]
+        changes_of(events)
+    except (LookupError, TypeError, ValueError, AttributeError) as error:
+        raise LogError(f"The log in {directory} is none of a run: an event in it cannot be read.") from error
     return log
 
 

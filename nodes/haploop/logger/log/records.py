@@ -132,7 +132,10 @@ class LogChannel:
         units = self.layout.columns
         try:
             if not units:
-                return log_times_ns, [msgpack.unpackb(payload) for run in runs for payload in run]
+                maps = [msgpack.unpackb(payload) for run in runs for payload in run]
+                if not all(isinstance(one, dict) for one in maps):
+                    raise TypeError
+                return log_times_ns, maps
             rows_each, columns = self.layout.samples or 1, self.layout.read(b"".join([run.payloads for run in runs]))
             if columns is None:  # other programs may order or encode the same numbers otherwise
                 messages = [msgpack.unpackb(payload) for run in runs for payload in run]

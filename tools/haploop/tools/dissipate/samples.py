@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -175,7 +174,9 @@ class _Waiting:
         self._plant = np.empty((2, 0))
 
     def add(self, batch: Batch) -> None:
-        rows = cast(Table, batch.rows)
+        rows, wanted = batch.rows, _COLUMNS[batch.topic]
+        if not isinstance(rows, Table) or not rows.keys() >= set(wanted) or not np.isfinite(rows[wanted[0]]).all():
+            raise RecordingError(f"The log is none of a run: {', '.join(wanted)} were expected on {batch.topic}.")
         if batch.topic == "/plant":
             self._plant = np.hstack([self._plant, [rows[name] for name in _COLUMNS["/plant"]]])
         else:
