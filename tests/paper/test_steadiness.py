@@ -74,13 +74,25 @@ def test_one_element_bears_more_only_by_a_step_and_with_intervals_apart() -> Non
     assert reached(4000.0, 5000.0).describe() == "4.50 [-1.85, 10.85]"
 
 
-def test_a_wall_of_which_the_judge_cannot_tell_or_that_the_device_leaves_is_not_steady() -> None:
-    """However narrow what remains: it may grow, or there is no contact left that could swing."""
-    narrow = {"stability": {"width_m": 0.0}}
-    words = ("steady", "limit-cycle", "undecided", "growing", "diverged", "no-contact")
-    assert [is_judged_steady(narrow | {"verdict": word}) for word in words] == [True, True, *[False] * 4]
-    assert not is_judged_steady({"verdict": "limit-cycle", "stability": {"width_m": 1.1 * WIDEST_M}})
+def judged(word: str, why: str = "", width_m: float = 0.5 * WIDEST_M, rate_1_s: float = 0.0) -> bool:
+    found = {"why": why, "width_m": width_m, "rate_1_s": rate_1_s, "error_1_s": 0.01}
+    return is_judged_steady({"verdict": word, "stability": found})
+
+
+def test_a_judged_wall_is_steady_by_how_wide_what_remains_is_and_never_where_it_grows_or_is_left() -> None:
+    """A device that goes away from the wall is undecided with a width of 0: that is no steady contact."""
+    assert judged("steady")
+    assert judged("limit-cycle")
+    assert not judged("limit-cycle", width_m=1.1 * WIDEST_M)
+    assert not any(judged(word) for word in ("growing", "diverged", "no-contact"))
+    assert not judged("undecided", "leaves the wall", width_m=0.0)
     assert not is_judged_steady({"ended": "error", "why": "it failed"})
+
+
+def test_a_swing_of_which_the_judge_cannot_tell_how_it_goes_on_is_steady_only_if_it_is_not_seen_to_grow() -> None:
+    assert judged("undecided", "too slow", rate_1_s=0.02)
+    assert not judged("undecided", "too slow", rate_1_s=0.04)
+    assert not judged("undecided", "too slow", width_m=1.1 * WIDEST_M)
 
 
 @pytest.mark.slow

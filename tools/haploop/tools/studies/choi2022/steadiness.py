@@ -49,8 +49,6 @@ _PARTS = 4
 # With friction no two setups run in one batch, so that batches are small.
 _FEWEST = 4
 _GOLDEN = 0.5 * (5.0**0.5 - 1.0)
-# The judge's words for what surely does not grow: its "steady" no hand feels, a limit cycle may be small.
-_LASTING = ("steady", "limit-cycle")
 
 
 def started(scene: Scene, start: int) -> Scene:
@@ -211,8 +209,15 @@ def judged_largest(setup: Setup, kind: str, size: Sequence[float], start: int) -
 
 
 def is_judged_steady(result: Summary) -> bool:
-    """Tells whether a run that was judged is steady, by how wide what remains is; what grows, or may grow, is not."""
-    return result.get("verdict") in _LASTING and result["stability"]["width_m"] <= WIDEST_M
+    """Tells whether a run that was judged is steady: how wide what remains is, of what does not grow at the wall.
+
+    Where the judge cannot tell within 16 s whether a slow change goes on, that is how wide it was by then, unless it
+    grew by more than three times the error of its rate.
+    """
+    found = result.get("stability", {"why": "", "width_m": np.inf})
+    rate, error = (found.get(name) or 0.0 for name in ("rate_1_s", "error_1_s"))
+    lasts = result.get("verdict") in ("steady", "limit-cycle") or (found["why"] == "too slow" and rate <= 3.0 * error)
+    return lasts and found["width_m"] <= WIDEST_M
 
 
 def tried(answers: Answers, setup: Setup, kind: str, sizes: np.ndarray) -> Range:

@@ -8,7 +8,6 @@ import numpy as np
 
 from haploop.tools.figure.style import FAINT, GREY, INK, SMALL, TEXT, dress, empty_figure, legend, plain_numbers
 from haploop.tools.render.terminal import markdown_table
-from haploop.tools.render.units import amount
 from haploop.tools.studies.choi2022.device import KINDS, Setup, elements_of
 from haploop.tools.studies.choi2022.experiment import LOW_KG, PAIR, PAIR_AT_N_M, shares_in
 from haploop.tools.studies.choi2022.figures.claims import Finding
@@ -40,8 +39,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-# Felt by a hand at 100 Hz, between 8.5 um at 20 Hz and 0.06 um at 320 Hz in logarithms (Israr, Choi and Tan 2006).
-FELT_M = 0.5e-6
 _DAMPS = {
     "both drive": "#F0F0F0",
     "bidirectional damps, unidirectional drives": COLOURS["bidirectional-inertia"],
@@ -67,7 +64,7 @@ def make_10(work: Work) -> list[Finding]:
     *others, uni = (most[kind] for kind in KINDS[1:])
     is_first = all(beats(uni, one) for one in others)
     work.conclude("first" if is_first else "not_first", supports=is_first, starts=len(uni.steady), bears=bears)
-    work.notes = [_words(work, most), _why(work, setup), _felt(work, grids)]
+    work.notes = [_words(work, most), _why(work, setup)]
     return _findings(work, grids, most, bears)
 
 
@@ -157,7 +154,7 @@ def _draw(found: dict[str, Range], most: dict[str, Reached]) -> Figure:
         style, size = (".", 2.5) if colour == FAINT else ("s", 4.5)
         ax.plot(sizes[columns], STIFFNESSES[rows] / 1e3, style, color=colour, markersize=size, label=label)
 
-    figure = empty_figure(13.0, 4.6)
+    figure = empty_figure(14.5, 4.6)
     axes = figure.subplots(1, 4, sharey=True)
     for ax, kind in zip(axes, KINDS[1:], strict=False):
         unit, label = (1.0, "damping (N s/m)") if kind == "damping" else (1e3, "inertia (g)")
@@ -174,7 +171,7 @@ def _draw(found: dict[str, Range], most: dict[str, Reached]) -> Figure:
             "label": "largest, judged",
         }
         ax.errorbar([unit * most[kind].sizes[0]], [mean], ends, fmt="*", **look)
-        dress(ax, f"{SHORT[kind]}: up to {most[kind].describe()} N/mm", label, "")
+        dress(ax, f"{SHORT[kind]}: {most[kind].describe()} N/mm", label, "")
     axes[0].set_ylabel("wall stiffness (N/mm)", fontsize=TEXT, color=INK)
     two, one = (found[kind].steady for kind in KINDS[2:])
     sizes_g = found[KINDS[2]].sizes[:, 0] * 1e3
@@ -188,14 +185,6 @@ def _draw(found: dict[str, Range], most: dict[str, Reached]) -> Figure:
         legend(ax, **UPPER_LEFT, **INSIDE)
     axes[3].set_xlim(axes[2].get_xlim())
     return figure
-
-
-def _felt(work: Work, found: dict[str, Range]) -> str:
-    left = np.concatenate([one.swings_m[one.steady].ravel() for one in found.values()])
-    if not len(left):
-        return ""
-    median, moving = amount(float(np.median(left)), "m", 2), np.sum(left > FELT_M)
-    return work.tell("felt", felt_um=1e6 * FELT_M, steady=len(left), moving=moving, median=median)
 
 
 def _why(work: Work, setup: Setup) -> str:
@@ -242,7 +231,7 @@ def _gate(setup: Setup) -> Figure:
         felt.plot(FREQUENCIES_HZ, damping, color=COLOURS[kind], label=SHORT[kind])
     felt.axhline(0.0, color=GREY, linewidth=0.6)
     dress(felt, "in the nearest interpretation", "frequency (Hz)", "felt damping / (m w)")
-    legend(felt, loc="upper right", **INSIDE)
+    legend(felt, loc="lower right", **INSIDE)
     headings = {0.0: "an ideal accelerometer", OLD_S: f"a reading {1e3 * OLD_S:.2f} ms old"}
     reach = (FREQUENCIES_HZ[0], FREQUENCIES_HZ[-1], 0.0, 1e3 * DELAYS_S[-1])
     colours = {"cmap": ListedColormap(list(_DAMPS.values())), "vmin": -0.5, "vmax": 3.5, "interpolation": "nearest"}

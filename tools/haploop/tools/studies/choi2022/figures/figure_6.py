@@ -78,7 +78,6 @@ def make_6(work: Work) -> list[Finding]:
     for name, stem, one in ((_OURS, "figure_6", BASE), ("the nearest", "figure_6_nearest", found.nearest)):
         runs[name] = {panel: run(scene_of(one, panel)) for panel in "abc"}
         work.figure(_panels(runs[name]), stem, work.tell(f"seen_{stem}"))
-        work.data(stem, _columns(runs[name]))
         for panel, ran in runs[name].items():
             work.scene(f"{stem}_{panel}", ran.scene)
     for panel in "abc":
@@ -93,9 +92,9 @@ def make_6(work: Work) -> list[Finding]:
     aside = ", ".join(f"*{name}*" for name in ASIDE)
     work.notes = [work.tell("notes", **words, table=table, aside=aside, described=described, open=open_table(SPACE, 6))]
     smaller, beats = (interval(rows, name, SPACE) for name in ("c smaller", "c beats bidirectional"))
-    decides = decider(there, "c beats bidirectional")
+    decided = decider(there, "c beats bidirectional") or "–"
     supports = smaller.value >= RARE_BELOW
-    work.conclude(supports=supports, smaller=often(smaller), beats=often(beats), decided=decides or "–", **words)
+    work.conclude(supports=supports, smaller=often(smaller), beats=often(beats), decided=decided, **words)
     return [
         *(_verdict(work, name, found, there) for name in _TESTED if name in work.claims),
         *_on_logs(work, runs),
@@ -128,16 +127,6 @@ def scene_text(work: Work, interpretation: Point, panel: str) -> str:
 
 def _lines(table: Table) -> list[str]:
     return [f"{key} = {inline(value)}" for key, value in table.as_dict().items()]
-
-
-def _columns(runs: dict[str, Run]) -> dict[str, np.ndarray]:
-    kept: dict[str, np.ndarray] = {}
-    for panel, (_, _, log) in runs.items():
-        plant, ticks, energy = log["/plant"], log["/controller"], log["/energy"]
-        kept |= {f"{panel}_t_s": plant["t"], f"{panel}_x_m": plant["x"], f"{panel}_tick_s": ticks["timestamp"]}
-        kept |= {f"{panel}_{name}_N": ticks[name] for name in ("wall", "dissipation.0") if name in ticks}
-        kept |= {f"{panel}_{name}_J": energy[name] for name in energy if name.endswith((".true", ".sampled"))}
-    return kept
 
 
 def _verdict(work: Work, name: str, found: Found, there: Sequence[Option]) -> Finding:
