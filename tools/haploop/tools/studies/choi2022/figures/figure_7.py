@@ -82,7 +82,6 @@ def make_7(work: Work) -> list[Finding]:
         "often" if larger.value >= RARE_BELOW else "rare",
         supports=larger.value >= RARE_BELOW,
         larger=often(larger),
-        more=often(interval(rows, "11 more", SPACE)),
         near=sum(holds(row, "10 larger") for row in around),
         friction_mN=1e3 * FRICTION_N,
         friction=", ".join(f"{SHORT[name]} {stiffness / 1e3:.1f}" for name, stiffness in friction.items()),
