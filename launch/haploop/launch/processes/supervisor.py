@@ -20,7 +20,7 @@ from haploop.launch.clock.server import ClockServer
 from haploop.launch.processes import private_directory, run_directory
 from haploop.launch.processes.children import Child, interrupts, start_children
 from haploop.launch.processes.shown_prints import PRINTS, ShownPrints
-from haploop.launch.spec import RunFailed, RunSpec
+from haploop.launch.spec import OutputError, RunFailed, RunSpec
 from haploop.protocol.changes import Event
 from haploop.protocol.ticks import Timebase
 from haploop.protocol.transport.machine import Machine, machine_of
@@ -58,11 +58,15 @@ def run_processes(
 
     Raises:
         RunFailed: a process was killed, hung or could not go on; nothing of the run is left but its files.
-        OutputError: the private directory of its sockets cannot be made.
+        OutputError: sockets or processes cannot be made.
         KeyboardInterrupt: the second signal came.
     """
     with interrupts(usual_from=3) as received, private_directory.made() as sockets:
-        supervisor = Supervisor(spec, sockets, received, make_context(spec.transport), start_nodes)
+        try:
+            supervisor = Supervisor(spec, sockets, received, make_context(spec.transport), start_nodes)
+        except (OSError, zmq.ZMQError) as error:
+            reason = error.strerror or str(error)
+            raise OutputError(f"Sockets and processes of the run cannot be made: {reason}.") from error
         return supervisor.run(), supervisor.events
 
 
