@@ -95,3 +95,16 @@ def test_a_frame_that_takes_long_to_read_is_refused_unread(served: Served) -> No
     assert reason.startswith("A frame must be at most 32768 bytes, but one of ")
     assert served.asked == []
     assert served.answer(pack(1, COMMAND, "x" * 30_000, {}))[0] == REPLY
+
+
+def test_a_message_of_very_many_frames_is_taken_over_several_turns_with_grants_between(served: Served) -> None:
+    with Stranger(served.context, served.sockets / "clock.sock") as stranger:
+        stranger.socket.send_multipart([b""] * 999 + [pack(1, COMMAND, "pause", {})])
+        assert served.server.socket.poll(10_000)
+        turns = 0
+        while not served.asked:
+            served.server.serve()
+            turns += 1
+        assert turns == 5
+        assert stranger.socket.poll(10_000)
+        assert msgpack.unpackb(stranger.socket.recv())[1:3] == [REPLY, True]

@@ -52,6 +52,7 @@ class ClockServer:
         self.roster = Roster()
         self.results: dict[str, Message] = {}
         self.unknown_peers = 0
+        self._sender = b""  # of a message of which frames are still to be taken
         self._greeted, self._start_gate = False, start_gate
         self._granted = -1
         self._last_sent = False
@@ -69,8 +70,8 @@ class ClockServer:
         Raises RunFailed where one of the run's own processes said that it cannot go on.
         """
         for _ in range(_AT_ONCE):
-            if not has_message(self.socket) or self._take_one() == "COMMAND":
-                break  # what one command asks for may take milliseconds, and the next may wait for the grant
+            if not has_message(self.socket) or not self._take_one():
+                break  # that may have taken a millisecond, and the next may wait for the grant
         self._awaited, awaited = [], self._awaited
         for sender, steps in awaited:
             self._reply(sender, steps)
@@ -83,19 +84,26 @@ class ClockServer:
             if has_begun or self._start_gate({node.pid for node in self.roster.nodes.values() if node.ready}):
                 self.grant()
 
-    def _take_one(self) -> str:
-        """Takes a message; returns its name, "" for none."""
-        sender, *frames = self.socket.recv_multipart()
-        data = frames[-1] if frames else b""
+    def _take_one(self) -> bool:
+        """Takes a message, or some frames of one with very many; tells whether that was a moment, and no command."""
+        sender = self._sender or self.socket.recv()
+        data, frames = b"", 0
+        while self.socket.rcvmore:
+            if frames == _AT_ONCE:
+                self._sender = sender
+                return False
+            data, frames = self.socket.recv(), frames + 1
+        self._sender = b""
+        is_large = len(data) > _LARGEST_OF_STRANGERS
         try:
-            if len(data) > _LARGEST_OF_STRANGERS and not ((node := self.roster.nodes.get(sender)) and node.is_own):
+            if is_large and not ((node := self.roster.nodes.get(sender)) and node.is_own):
                 raise WireError(f"A frame must be at most {_LARGEST_OF_STRANGERS} bytes, but one of {len(data)} came.")
             frame = decode(data)
             self._take(sender, frame)
         except WireError as error:
             self._refuse(sender, str(error))
-            return ""
-        return frame.name
+            return not is_large
+        return frame.name != "COMMAND"
 
     def grant(self) -> None:
         """Sends every node how far it may go and what changes on the way, if that is news."""
@@ -106,9 +114,10 @@ class ClockServer:
         if until == self._granted and clock.is_last == self._last_sent and not events:
             return
         self._granted, self._last_sent = until, clock.is_last
+        grant = encode("GRANT", until, clock.is_last, events)
         for node in list(self.roster.nodes.values()):
             if node.ready and not node.done:
-                self._send(node.identity, "GRANT", until, clock.is_last, events)
+                self._send_frame(node.identity, grant)
 
     def probe(self, nodes: list[Node]) -> None:
         """Repeats the grant to attached nodes; one to which it cannot be sent is gone and is taken off."""
@@ -117,8 +126,11 @@ class ClockServer:
                 self._send(node.identity, "GRANT", self._clock.until, self._clock.is_last, [])
 
     def _send(self, identity: bytes, name: str, *fields: Any) -> None:
+        self._send_frame(identity, encode(name, *fields))
+
+    def _send_frame(self, identity: bytes, frame: bytes) -> None:
         try:
-            self.socket.send_multipart([identity, encode(name, *fields)], flags=zmq.DONTWAIT)
+            self.socket.send_multipart([identity, frame], flags=zmq.DONTWAIT)
         except zmq.ZMQError:  # gone, or so far behind that its queue is full
             node = self.roster.nodes.get(identity)
             if node and not node.is_own:
