@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -23,7 +23,7 @@ from haploop.tools.figure.style import (
     empty_figure,
     legend,
 )
-from haploop.tools.figure.time import extremes
+from haploop.tools.figure.time import line
 from haploop.tools.linear.one_tick import OneTickMap
 from haploop.tools.render.units import amount
 from haploop.tools.search.random import Point
@@ -221,8 +221,7 @@ def _panels(runs: Mapping[str, Run]) -> Figure:
         _position(column[0], surface, t, mm, f"{_PANELS[panel]}: {summary['verdict']}")
         _force(column[1], log)
         _energy(column[2], log)
-        kept = extremes(mm)
-        ends.append(mm[kept][t[kept] >= t[kept].max() / 2.0])
+        ends.append(mm[t >= t[-1] / 2.0])
         deepest, highest = min(float(end.min()) for end in ends), max(float(end.max()) for end in ends)
         room = max(3.0, 0.5 * (highest - deepest))
         for ax in axes[0]:
@@ -234,13 +233,8 @@ def _panels(runs: Mapping[str, Run]) -> Figure:
     return figure
 
 
-def _curve(ax: Axes, t: np.ndarray, values: np.ndarray, **look: Any) -> None:
-    kept = extremes(values)
-    ax.plot(t[kept], values[kept], **look)
-
-
 def _position(ax: Axes, surface: float, t: np.ndarray, mm: np.ndarray, title: str) -> None:
-    _curve(ax, t, mm, color=INK, linewidth=1.0, label="device")
+    line(ax, t, mm, "device", INK, linewidth=1.0)
     ax.axhspan(surface - 1e4, surface, color=WALL_FILL, zorder=0, linewidth=0)
     ax.axhline(surface, color=WALL, linewidth=1.0, zorder=1, label="wall")
     ax.set_xlim(0.0, float(t[-1]))
@@ -251,7 +245,7 @@ def _force(ax: Axes, log: Recording) -> None:
     ticks = log["/controller"]
     for name, label, colour in (("wall", "wall", WALL), ("dissipation.0", "element", element_colour(0))):
         if name in ticks:
-            _curve(ax, ticks["timestamp"], ticks[name], color=colour, linewidth=0.8, label=label)
+            line(ax, ticks["timestamp"], ticks[name], label, colour, linewidth=0.8)
     dress(ax, "", "time (s)", "force on the device (N)")
     legend(ax)
 
@@ -260,9 +254,8 @@ def _energy(ax: Axes, log: Recording) -> None:
     t, energy = log["/energy"]["timestamp"], log["/energy"]
     for name in [key.removesuffix(".true") for key in energy if key.endswith(".true")]:
         label, colour = ("wall", WALL) if name == "wall" else ("element", element_colour(0))
-        true, sampled = 1e3 * energy[f"{name}.true"], 1e3 * energy[f"{name}.sampled"]
-        _curve(ax, t, true, color=colour, linestyle="-", linewidth=1.5, label=label)
-        _curve(ax, t, sampled, color=colour, linestyle=(0, (4, 2)), linewidth=1.0, label="_")
+        line(ax, t, 1e3 * energy[f"{name}.true"], label, colour, linewidth=1.5)
+        line(ax, t, 1e3 * energy[f"{name}.sampled"], "_", colour, linewidth=1.0, dashes=(4, 2))
     heat = 1e3 * (energy["device_heat"] + energy["hand_heat"])
     ax.plot(t, heat, color=OF_THE_PLANT["hand"], linewidth=1.0, label="heat")
     ax.axhline(0.0, color=GREY, linewidth=0.8, zorder=0)
