@@ -179,7 +179,9 @@ def measure(store: Store, jobs: Sequence[Job], repeats: int, name: str, stage: S
                     assert before
                     assert after
                     mean = (before + after) / 2.0
-                    seen = {"yardstick_us": mean, "load": _load_average() if way == IN_PROCESS else None}
+                    # How many processes run or wait for a core, of the last minute, where that can be known.
+                    is_known = way == IN_PROCESS and hasattr(os, "getloadavg")
+                    seen = {"yardstick_us": mean, "load": os.getloadavg()[0] if is_known else None}
                     store.add(_QUIET + way, job.key, seen, repeat)
                     store.add(way, job.key, took and took / mean, repeat)
                     before = after
@@ -218,8 +220,3 @@ def quiet(store: Store, jobs: Sequence[Job], repeats: int) -> Load | None:
     q1, median, q3 = statistics.quantiles([one["yardstick_us"] for one in seen], n=4, method="inclusive")
     loads = [one["load"] for one in seen if one["load"] is not None]
     return Load(median, (q3 - q1) / median, statistics.median(loads) if loads else None)
-
-
-def _load_average() -> float | None:
-    """Returns how many processes run or wait for a core, of the last minute; None where that cannot be known."""
-    return os.getloadavg()[0] if hasattr(os, "getloadavg") else None

@@ -1,5 +1,5 @@
 """``haploop dissipate``: the energy that dissipation elements would have taken out of a recorded motion.
 
-``text_recording`` and ``log_recording`` read a recording, ``booking`` puts elements to work on it, ``outcome`` holds
+``text_recording`` and ``samples`` read a recording, ``booking`` puts elements to work on it, ``outcome`` holds
 the numbers, ``report`` and ``figure`` show them.
 """
