@@ -9,6 +9,7 @@ from enum import IntEnum
 
 import numpy as np
 
+from haploop.tools.render.units import spring
 from haploop.tools.sweep.map.axis import Axis, with_unit
 from haploop.tools.sweep.map.data import STIFFNESS, Cells, Columns, MapData, Verdict, verdict_number
 
@@ -95,43 +96,39 @@ def _places(table: Columns, axes: Sequence[Axis], rows: np.ndarray) -> list[tupl
 
 
 @dataclass(frozen=True)
-class Furthest:
-    """The combination that holds furthest: its index, the boundary, and what to write beside it."""
+class Answer:
+    """The combination that holds furthest.
+
+    Attributes:
+        index: its places on the axes it was looked for on.
+        value: up to where it holds.
+        words: what to write beside it, ever shorter.
+        open_end: whether nothing beyond was tried with its other values.
+    """
 
     index: tuple[int, ...]
     value: float
-    words: str
+    words: tuple[str, ...]
+    open_end: bool
 
 
-def furthest(edges: Edges) -> Furthest | None:
+def furthest(edges: Edges) -> Answer | None:
     """Finds what holds furthest from where the search begins; None where no boundary was found and nothing holds."""
-    found = edges.state == State.FOUND
     if (throughout := np.argwhere(edges.state == State.ALL_HOLD)).size:
         end = -1 if edges.rising else 0
         words = f"{edges.holds} up to {edges.along.word(end)} and perhaps beyond"
         middle = tuple(int(i) for i in throughout[len(throughout) // 2])
-        return Furthest(middle, float(edges.along.values[end]), words)
+        return Answer(middle, float(edges.along.values[end]), (words,), open_end=True)
+    found = edges.state == State.FOUND
     if not found.any():
         return None
     far = np.where(found, edges.nearest if edges.rising else -edges.nearest, -np.inf)
     index = tuple(int(i) for i in np.unravel_index(int(far.argmax()), far.shape))
     value = float(edges.nearest[index])
-    return Furthest(index, value, f"{edges.holds} up to {with_unit(value, edges.along.unit)}")
+    return Answer(index, value, (f"{edges.holds} up to {with_unit(value, edges.along.unit)}",), open_end=False)
 
 
-@dataclass(frozen=True)
-class StiffestSteady:
-    """A cell, as an index into the cells it was looked for in.
-
-    ``open_end``: no stiffer wall was tried with its other values.
-    """
-
-    index: tuple[int, ...]
-    stiffness_N_m: float
-    open_end: bool
-
-
-def stiffest_steady(axes: Sequence[Axis], cells: Cells) -> StiffestSteady | None:
+def stiffest_steady(axes: Sequence[Axis], cells: Cells) -> Answer | None:
     """Finds the stiffest steady wall below which every wall that was tried with the same other values is steady, too.
 
     Where several cells share it, the one in the middle of them is taken. None where the wall was not swept, or no
@@ -151,4 +148,7 @@ def stiffest_steady(axes: Sequence[Axis], cells: Cells) -> StiffestSteady | None
     best = np.argwhere(reached == stiffest)
     others = tuple(int(index) for index in best[len(best) // 2])
     index = (*others[:along], stiffest, *others[along:])
-    return StiffestSteady(index, float(axes[along].values[stiffest]), stiffest == held.shape[-1] - 1)
+    value = float(axes[along].values[stiffest])
+    open_end, words = stiffest == held.shape[-1] - 1, spring(value)
+    beyond, least = (" and perhaps beyond", "≥ ") if open_end else ("", "")
+    return Answer(index, value, (f"steady up to {words}{beyond}", f"{least}{words}"), open_end)

@@ -25,7 +25,7 @@ from haploop.tools.sweep.map.lines import (
 )
 from haploop.tools.sweep.map.looks import LOOKS, amplitude_scale, verdict_signs
 from haploop.tools.sweep.map.panels import SwingScale, count_disagreement, draw_cells, draw_swings, mark_disagreement
-from haploop.tools.sweep.map.sentences import description, edge_description, edge_notes, map_notes, star_words
+from haploop.tools.sweep.map.sentences import description, edge_description, edge_notes, map_notes
 from haploop.tools.sweep.map.sheet import Sheet, fit_title, panel_title
 from haploop.tools.sweep.table import NeedsPyarrow, TableError, read
 
@@ -98,7 +98,7 @@ def make_figure(data: MapData) -> Figure:
         if found := stiffest_steady(along, panel.cells):
             x, *rest = (axis.coordinates[index] for axis, index in zip(along, found.index, strict=True))
             y = rest[0] if rest else float(swings.place(panel.cells.amplitude_m)[found.index])
-            star = Star(x, y, star_words(found))
+            star = Star(x, y, found.words)
         write_names(ax, [over], styles, star, avoid_markers=layout.y is None)
     return sheet.figure
 
@@ -134,7 +134,7 @@ def bisect_figure(data: MapData) -> Figure:
         _draw_boundary(ax, edges, (slice(None), number) if second else (slice(None),), number, **look)
         signs.append(Line2D([], [], **look, label=second.word(number) if second else "boundary"))
     if best := furthest(edges):
-        star = Star(x.coordinates[best.index[0]], float(y.place([best.value])[0]), [best.words])
+        star = Star(x.coordinates[best.index[0]], float(y.place([best.value])[0]), best.words)
     else:
         star = None
     sheet.column.signs(signs, second.key if second else "")

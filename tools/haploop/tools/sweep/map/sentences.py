@@ -11,7 +11,7 @@ import numpy as np
 from haploop.tools.render.units import spring
 from haploop.tools.sweep.map.axis import Axis, short
 from haploop.tools.sweep.map.data import NOT_RUN, STIFFNESS, WIDTH, Cells, Layout, MapData, Verdict
-from haploop.tools.sweep.map.edges import Edges, Furthest, State, StiffestSteady, stiffest_steady
+from haploop.tools.sweep.map.edges import Answer, Edges, State, stiffest_steady
 from haploop.tools.sweep.map.lines import PanelLines
 from haploop.tools.sweep.map.looks import verdict_words
 
@@ -60,22 +60,14 @@ def _span(axis: Axis) -> str:
     return f"{first}–{last} {unit}".rstrip() + f" ({len(axis.planned)})"
 
 
-def star_words(found: StiffestSteady) -> tuple[str, ...]:
-    """Returns the label of the stiffest steady wall, and a shorter one: ``"steady up to 300 N/m"``, ``"300 N/m"``."""
-    words = spring(found.stiffness_N_m)
-    if found.open_end:
-        return f"steady up to {words} and perhaps beyond", f"≥ {words}"
-    return f"steady up to {words}", words
-
-
-def _answer(axes: Sequence[Axis], found: StiffestSteady | None) -> str:
+def _answer(axes: Sequence[Axis], found: Answer | None) -> str:
     if not any(axis.key == STIFFNESS for axis in axes):
         return ""
     if found is None:
         return "No wall is steady from the softest one on that was tried."
     others = _place(pair for pair in zip(axes, found.index, strict=True) if pair[0].key != STIFFNESS)
     more = "No stiffer one was tried." if found.open_end else "Every softer one tried there is steady, too."
-    return f"★ Stiffest steady wall: {spring(found.stiffness_N_m)}{others}. {more}"
+    return f"★ Stiffest steady wall: {spring(found.value)}{others}. {more}"
 
 
 def _place(at: Iterable[tuple[Axis, int]]) -> str:
@@ -117,13 +109,13 @@ def map_notes(data: MapData, cells: Cells, layout: Layout, lines: Sequence[Panel
     })  # fmt: skip
 
 
-def edge_notes(data: MapData, edges: Edges, best: Furthest | None, lines: Sequence[PanelLines]) -> list[str]:
+def edge_notes(data: MapData, edges: Edges, best: Answer | None, lines: Sequence[PanelLines]) -> list[str]:
     """Returns the notes beside the boundaries of a search, of which these lines are drawn; the answer first."""
     reasons, holds = _reasons(lines), edges.holds
     rows = len(edges.others[1].values) if len(edges.others) > 1 else 1
     more = f"; a point is the seed that is {holds} least far, its bar covers all seeds" if len(data.seeds) > 1 else ""
     return _those({
-        f"★ Furthest: {best.words}{_place(zip(edges.others, best.index, strict=True))}." if best else "": True,
+        f"★ Furthest: {best.words[0]}{_place(zip(edges.others, best.index, strict=True))}." if best else "": True,
         f"The first {len(lines)} of {rows} lines are drawn.": len(lines) < rows,
         f"Upright bars are the brackets{more}. Each boundary is the first change from {edges.begin} on.": True,
         f"{'▲' if edges.rising else '▼'} {holds} at every point that was tried.": State.ALL_HOLD in edges.state,
