@@ -208,3 +208,7 @@ def test_the_answer_says_who_takes_most_and_who_feeds(tmp_path: Path) -> None:
     )
     both = conclusion(outcome(slow, dampings=["2.7", "1.35"]))
     assert "2.00 times as much as damping 1.35 N s/m" in both
+
+
+def test_an_element_whose_quotation_does_not_end_is_refused(recording: Path) -> None:
+    refused(dissipate(recording, "--element", 'damping damping="0.5'), "a quotation mark is not closed")

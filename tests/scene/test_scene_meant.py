@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from haploop.launch.plan.effects import notes
 from haploop.launch.scene.file import load
 from haploop.launch.scene.mistakes import SceneError
 from haploop.protocol.quantity import MEANT, Quantity
@@ -54,8 +55,14 @@ def test_a_number_that_no_loop_has_is_refused_with_its_bound(overrides, sentence
     assert sentence in refused(FIG6C, *overrides)
 
 
-def test_five_seconds_of_delay_are_a_scene():
-    assert load(FIG6C, ["clock.round_trip_delay=5", "duration=20"]).clock.round_trip_delay == 5.0
+def test_a_number_that_hardly_any_loop_has_is_a_scene_and_asked_after():
+    assert not notes(load(FIG6C))
+    [slow] = notes(load(FIG6C, ["clock.round_trip_delay=5", "duration=20"]))
+    assert slow.startswith("clock.round_trip_delay is 5 s; is that the unit that was meant?")
+    assert "No force takes effect within the run" in notes(load(FIG6C, ["clock.round_trip_delay=5"]))[1]
+    [soft] = notes(load(FIG6C, ["wall.stiffness=0.15"]))
+    assert soft.startswith("wall.stiffness is 0.15 N/m; is that the unit that was meant?")
+    assert not notes(load(FIG6C, ["wall.stiffness=0.15 N/mm"]))
 
 
 @pytest.mark.parametrize("unit", MEANT)
@@ -72,7 +79,7 @@ def test_a_bound_by_unit_stands_in_where_a_quantity_declares_none_of_its_own(uni
 
 def test_every_shipped_scene_keeps_within_the_bounds():
     for path in SCENES.rglob("*.toml"):
-        load(path)
+        assert not [note for note in notes(load(path)) if "was meant" in note]
 
 
 def test_tables_lists_and_files_deep_in_one_another_are_refused(tmp_path):

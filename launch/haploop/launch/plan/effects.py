@@ -171,4 +171,5 @@ def effects_of(scene: Scene) -> tuple[Effect, ...]:
 
 def notes(scene: Scene) -> list[str]:
     """Returns what is in order in a resolved scene, but may not be what was meant; one sentence each."""
-    return [note for effect in all_effects() if effect.is_named(scene) for note in effect.note(scene)]
+    of_effects = [note for effect in all_effects() if effect.is_named(scene) for note in effect.note(scene)]
+    return rules.note_unusual(scene) + of_effects

@@ -204,7 +204,10 @@ def _make_scene(bare: Scene, selection: Selection, path: Path, kinds: Kinds) -> 
     for kind in ("bidirectional-inertia", "unidirectional-inertia"):
         elements += [{"kind": kind, "mass": _value(text)} for text in selection.masses]
     for text in selection.elements:
-        kind, *parameters = shlex.split(text) or [""]
+        try:
+            kind, *parameters = shlex.split(text) or [""]
+        except ValueError as error:
+            raise RecordingError(f"--element {text!r} cannot be read: a quotation mark is not closed.") from error
         elements.append({"kind": kind, **parse_assignments(parameters)})
     if "wall" not in layers.data:
         if any(table["kind"] == "unidirectional-damping" for table in elements):
