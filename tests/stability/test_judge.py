@@ -190,6 +190,17 @@ def test_a_slow_swing_that_grows_is_not_taken_for_one_that_dies_unfelt(frequency
             assert finding.word in ("undecided", "growing"), (seconds, phase, finding.sentence())
 
 
+@pytest.mark.parametrize("rate_1_s", [-0.0045, -0.0033, 0.0033])
+def test_a_swing_that_surely_changes_is_not_said_to_last_however_slowly_it_does(rate_1_s):
+    """Both copies swing alike, as where what the run had set going is wider than what the pushes add."""
+    for seconds in (4.0, 8.0, 16.0):
+        t = np.arange(round(1000.0 * seconds)) / 1000.0
+        x, one = 2e-2 * np.exp(rate_1_s * t) * np.sin(2 * np.pi * 7.9 * t)[None], np.ones(1)
+        alike = Pushed(0.75 * x, x, x, one, 0.0 * one, one > 0, one > 0, one > 0)
+        [swing] = measure(alike, 1000.0)
+        assert decide(swing, last=seconds == 16.0).word != "limit-cycle"
+
+
 def test_a_slow_creep_that_grows_is_not_taken_for_rest():
     """Its pieces are straight lines to less than a nanometre."""
     for seconds in (1.0, 2.0, 4.0):

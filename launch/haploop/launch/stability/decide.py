@@ -13,6 +13,8 @@ from haploop.launch.stability.traces import is_felt, smallest_felt_m
 _SMALL_M = 20e-6
 # So much may the logarithm of the width change over the second half where a swing is said to last.
 _LASTING, _LASTING_LONG = 0.05, 0.02
+# One that changes by more than this, and surely, is still on its way.
+_SETTLED = 0.002
 # After so long, and so many periods, a slow change counts as none, and a steady growth as one.
 _LONG_S = 8.0
 _COUNTED_PERIODS = 60.0
@@ -154,10 +156,12 @@ def decide(swing: Swing, *, last: bool) -> Finding:
     kept_ratio = swing.at_first > 2.0 and SAME[0] < swing.at_last / swing.at_first < SAME[1]
     clearly = swing.watched_s >= _ALIKE_S and all(abs(change) + 2 * error < _LASTING_LONG for change, error in changes)
     counted = swing.frequency_Hz * swing.watched_s >= _COUNTED_PERIODS
-    if (clearly or (is_long and counted and swing.lasts(_LASTING_LONG))) and not kept_ratio:
+    settled = all(abs(change) <= max(3 * error, _SETTLED) for change, error in changes)
+    if settled and (clearly or (is_long and counted and swing.lasts(_LASTING_LONG))) and not kept_ratio:
         return _finding(swing, "limit-cycle", "lasts")
     grows = all(change > 4 * error for change, error in changes)
-    if grows and (is_long or (swing.watched_s >= _ALIKE_S and min(swing.changes) > _LASTING and swing.is_alike())):
+    soon = swing.watched_s >= _ALIKE_S and min(swing.changes) > _LASTING and swing.is_alike()
+    if grows and (soon or (is_long and (min(swing.changes) > _LASTING_LONG or swing.is_alike()))):
         return _finding(swing, "growing", "grows")
     decays = last and all(change < -3 * error for change, error in changes) and swing.is_alike()
     if decays and swing.smooth and not is_felt(_COUNTS * swing.count_m, swing.frequency_Hz):

@@ -12,9 +12,9 @@ from haploop.launch.stability.traces import frequency_Hz, ripple, sizes, trend, 
 # Pieces in which the width of a swing is measured, and the periods that one covers at least.
 PIECES, FEW_PIECES = 24, 8
 LEAST_PERIODS = 2.0
-# What the place where pieces begin in a period makes of the change of the logarithm of the width, where a piece covers
-# one; it falls with the fourth power of the periods that a piece covers.
-_PHASE = 0.3
+# What the place where pieces begin in a period makes of the change of the logarithm of the width, times the eighth
+# power of the periods that a piece covers (found with sines); at least and at most.
+_PHASE, _UNSURE = 6.0, (1e-4, 1.0)
 # A swing this small is rounding: a thousand atoms would be wider.
 REST_M = 1e-9
 # Sizes whose ratio lies between these are the same; those of the pushes differ by ten.
@@ -114,7 +114,7 @@ def _measured(pushed: Pushed, rate: float, frequency: np.ndarray, pieces: int) -
     small, large = widths(small_x, size), widths(large_x, size)
     half, quarter = small.shape[-1] // 2, small.shape[-1] // 4
     covers = size * frequency / rate
-    unsure = np.where(frequency > 0.0, np.minimum(_PHASE / np.maximum(covers, 1e-3) ** 4, 1.0), 0.0)
+    unsure = np.where(frequency > 0.0, np.clip(_PHASE / np.maximum(covers, 0.1) ** 8, *_UNSURE), 0.0)
     trends = [trend(sizes(x[:, -half * size :], size), size / rate, unsure) for x in (small_x, large_x)]
     small_trend, large_trend = trends
     slower = np.where(np.abs(large_trend.rate_1_s) < np.abs(small_trend.rate_1_s), large_trend[:2], small_trend[:2])
