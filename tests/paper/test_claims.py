@@ -106,6 +106,17 @@ def test_a_figure_that_is_not_there_is_refused_with_those_that_are(
     assert not (tmp_path / "out").exists()
 
 
+def test_a_directory_that_cannot_be_used_is_refused_before_anything_is_made(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "answers").write_text("a file where a folder has to be", encoding="utf-8")
+    with pytest.raises(SystemExit) as left:
+        paper([3], tmp_path, small=True, workers=1)
+    assert left.value.code == 2
+    assert "cannot be used" in capsys.readouterr().err
+    assert not (tmp_path / "figure_3.png").exists()
+
+
 def test_data_of_a_figure_reads_back(tmp_path: Path) -> None:
     work = Work(tmp_path, 3)
     work.data("some", {"x_m": [1.0, 2.0]})

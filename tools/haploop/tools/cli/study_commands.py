@@ -89,7 +89,8 @@ def paper(
 ) -> None:
     """Make the figures of the paper and the table of its claims, with what holds here.
 
-    Each figure is a PNG with its data and scenes beside it. The last line names the page.
+    Each figure is a PNG with its data and scenes beside it. The last line names the page. Stopped, the same command
+    goes on where it was.
     """
     from haploop.tools.studies.choi2022.command import paper as make
 

@@ -61,9 +61,7 @@ class Answers:
             here / "interpretations.toml",
             *(one for of in scenes for one in of.rglob("*.toml")),
         ]
-        folder = self.out / FOLDER / source_digest(_PROGRAM, sorted(files))
-        folder.mkdir(parents=True, exist_ok=True)
-        return folder
+        return self.out / FOLDER / source_digest(_PROGRAM, sorted(files))
 
     def map_parallel(self, name: str, call: Callable[[Item], Answer], items: Sequence[Item]) -> list[Answer]:
         """Returns what a function returns for each item, in their order.
@@ -71,6 +69,7 @@ class Answers:
         Items are told apart by their ``repr``, which therefore has to say all of them: no arrays.
         """
         assert ".figures." not in call.__module__, "what figures/ computes is not known by its source"
+        self.folder.mkdir(parents=True, exist_ok=True)
         whose = f"{call.__module__}.{call.__qualname__}"
         files = [self.folder / sha256(f"{whose} {item!r}".encode()).hexdigest()[:32] for item in items]
         jobs = [Job(call, item, file) for item, file in zip(items, files, strict=True) if not file.exists()]

@@ -10,6 +10,7 @@ from pathlib import Path
 from haploop.tools.cli.options import WRONG_USE, leave, plain_errors
 from haploop.tools.figure.data import FigureError
 from haploop.tools.render.progress import bars
+from haploop.tools.studies.choi2022.answers import Answers
 from haploop.tools.studies.choi2022.figures import maker, numbers
 from haploop.tools.studies.choi2022.figures.page import made, write_pages
 from haploop.tools.studies.choi2022.figures.work import Kept, Work
@@ -25,7 +26,7 @@ def paper(wanted: Sequence[int], out: Path, small: bool, workers: int | None) ->
         if number not in there:
             leave(f"There is no figure {number} to make; there are {', '.join(map(str, there))}.", WRONG_USE)
     try:
-        out.mkdir(parents=True, exist_ok=True)
+        Answers(out).folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         leave(f"The directory {out} cannot be used: {error.strerror}.", WRONG_USE)
     with plain_errors(), bars() as stage:

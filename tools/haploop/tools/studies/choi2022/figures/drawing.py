@@ -95,13 +95,10 @@ def claims_table(
     for name, about in claims.items():
         held = ("yes" if holds(row, name) else "no" for row in alone.values())
         near = f"{sum(holds(row, name) for row in around)} of {len(around)}"
-        rows.append([f"*{name}*", about, *held, near, often(interval(random, name, space)), _most(options, name)])
+        shares = often(interval(random, name, space)), str(decider(options, name) or "")
+        rows.append([f"*{name}*", about, *held, near, *shares])
     heads = ["claim", "as tested", *alone, "its neighbours", "at random [95 %]", "most with, least with"]
     return markdown_table(heads, rows, numbers=range(2 + len(alone), len(heads) - 1))
-
-
-def _most(options: Sequence[Option], claim: str) -> str:
-    return str(decider(options, claim) or "")
 
 
 def open_table(space: InterpretationSpace, figure: int) -> str:
