@@ -254,3 +254,21 @@ def test_a_change_that_hangs_in_the_controller_alone_is_refused_at_its_tick_and_
     assert len(refused) == 1
     assert f"The change at tick {tick}" in refused[0]
     assert "DeadlineOver" in refused[0]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("statement", ["os._exit(0)", "os.kill(os.getpid(), signal.SIGKILL)", "pass"])
+def test_a_file_that_ends_the_process_that_judges_the_run_leaves_it_undecided(statement, running, scene, tmp_path):
+    """The judge goes on where the run has ended; nothing of the answer is lost."""
+    plugin = tmp_path / "brake.py"
+    making = "self.tick = 0"
+    plugin.write_text(source(at_making=making, at_force=f"self.tick += 1; self.tick > 1050 and {statement}"))
+    if statement == "pass":
+        plugin.write_text(source())
+    run = running(
+        "--plugin", str(plugin), scene=scene, sets=("duration=1", "wall.position=-0.001", "run.verdict=pushed"), pace=()
+    )
+    summary = run.summary()
+    assert summary["ended"] == "done"
+    assert ("ended with status" in summary["verdict_rule"]) == (statement != "pass")
+    assert (summary["verdict"] == "undecided") == (statement != "pass")

@@ -14,12 +14,14 @@ import os
 import queue
 import sys
 import threading
+from pathlib import Path
 from typing import Any, TextIO
 
 from haploop.controller.active_elements import make_element
 from haploop.controller.dissipation.element import Element, ElementError, Motion
 from haploop.controller.dissipation.registry import PluginError, load_source
 from haploop.protocol.scene.scene import ElementTable
+from haploop.protocol.transport.prints import keep_prints
 
 _MOST_BYTES = 4 << 30
 _MOST_CPU_S = 120
@@ -29,13 +31,11 @@ Reply = dict[str, Any]
 def main() -> None:
     """Answers requests until there are no more."""
     answers = os.fdopen(os.dup(1), "w", encoding="utf-8")
-    nowhere = os.open(os.devnull, os.O_RDWR)
-    os.dup2(nowhere, 1)  # what the file prints, it prints again where it is used
-    os.dup2(nowhere, 2)
+    keep_prints("trial", Path(os.devnull))  # what the file prints, it prints again where it is used
     _limit_memory()
     requests: queue.SimpleQueue[str] = queue.SimpleQueue()
     threading.Thread(target=_read, args=(sys.stdin, requests), daemon=True).start()
-    sys.stdin = os.fdopen(nowhere)
+    sys.stdin = Path(os.devnull).open()  # noqa: SIM115 (code that asks for input gets none)
     kinds: dict[str, type[Element]] = {}
     origin = ""
     while True:

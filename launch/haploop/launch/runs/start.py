@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
-from contextlib import ExitStack, redirect_stderr, redirect_stdout
+from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from haploop.controller.dissipation import Element, ElementError, PluginError, load_plugin, registry
+from haploop.controller.dissipation import Element, load_plugin, registry
 from haploop.launch.scene.events import elements_of, try_out
 from haploop.launch.scene.file import load
 from haploop.launch.spec import RunFailed, RunSpec, discard, keep_plugin, make_output, write_scene
 from haploop.protocol.scene.scene import Scene
 
 if TYPE_CHECKING:
+    from haploop.launch.stability.decide import Finding
     from haploop.logger.summary import Summary
     from haploop.protocol.changes import Event
 
@@ -154,16 +154,12 @@ def _judged(spec: RunSpec, summary: Summary, events: list[tuple[int, Event]]) ->
         summary["verdict_rule"] = f"{_NOT_REPEATED.format(REPEATED_S)} {summary['verdict_rule']}"
         write_summary(summary, spec.out)
         return summary
-    from haploop.launch.stability.decide import Finding
-    from haploop.launch.stability.judge import judge_scene, with_verdict
-    from haploop.launch.stability.looks import LOOKS_S
+    from haploop.launch.runs.judging import find, judge_elsewhere
+    from haploop.launch.stability.judge import with_verdict
 
-    def find() -> Finding:
-        try:
-            return judge_scene(spec.scene, _with_code(spec), events, LOOKS_S)
-        except (ElementError, PluginError, ArithmeticError) as error:
-            return Finding("undecided", "failed", detail=str(error))
+    def judged() -> Finding:
+        if spec.plugins:
+            return judge_elsewhere(spec.scene, spec.plugins, events)
+        return find(spec.scene, spec.kinds, events)
 
-    # What a plugin prints here it has printed before.
-    with Path(os.devnull).open("w") as nowhere, redirect_stdout(nowhere), redirect_stderr(nowhere):
-        return with_verdict(spec.scene, summary, find, spec.out)
+    return with_verdict(spec.scene, summary, judged, spec.out)

@@ -1,0 +1,62 @@
+"""Judging a run in a process of its own, ``python -m haploop.launch.runs.judging``, where the code of plugins runs."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import pickle
+import signal
+import subprocess
+import sys
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from haploop.controller.dissipation import Element, ElementError, registry
+from haploop.launch.stability.decide import Finding
+from haploop.launch.stability.judge import judge_scene
+from haploop.launch.stability.looks import LOOKS_S
+from haploop.protocol.changes import Event
+from haploop.protocol.scene.scene import Scene
+
+_DIED = "The process that judged it ended with status {}."
+
+
+def judge_elsewhere(scene: Scene, plugins: Sequence[Path], events: list[tuple[int, Event]]) -> Finding:
+    """Returns the finding of a run with these plugin files and events; undecided where its process dies."""
+    judging = subprocess.Popen(
+        [sys.executable, "-m", "haploop.launch.runs.judging"],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        process_group=0,
+    )
+    try:
+        answer, _ = judging.communicate(pickle.dumps((scene, list(plugins), events)))
+    finally:
+        with contextlib.suppress(ProcessLookupError, PermissionError):
+            os.killpg(judging.pid, signal.SIGKILL)
+    if judging.returncode or not answer:
+        return Finding("undecided", "failed", detail=_DIED.format(judging.returncode))
+    return pickle.loads(answer)
+
+
+def find(scene: Scene, kinds: Mapping[str, type[Element]], events: list[tuple[int, Event]]) -> Finding:
+    """Judges a run here, with the code of these kinds; undecided where it fails."""
+    try:
+        return judge_scene(scene, kinds, events, LOOKS_S)
+    except (ElementError, ArithmeticError) as error:
+        return Finding("undecided", "failed", detail=str(error))
+
+
+def main() -> None:
+    """Reads what is to be judged on stdin, writes the finding on what was stdout; what plugins print goes nowhere."""
+    scene, plugins, events = pickle.load(sys.stdin.buffer)
+    with os.fdopen(os.dup(1), "wb") as answers:
+        nowhere = os.open(os.devnull, os.O_RDWR)
+        os.dup2(nowhere, 1)
+        os.dup2(nowhere, 0)
+        pickle.dump(find(scene, registry(plugins), events), answers)
+
+
+if __name__ == "__main__":
+    main()
