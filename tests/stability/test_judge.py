@@ -85,6 +85,7 @@ def test_friction_that_holds_the_device_is_rest():
 def test_friction_that_stops_a_pushed_loop_is_told_to_let_a_blow_set_it_swinging(kinetic, blown):
     """A loop of rho(M) > 1 by its map: friction of 2 % of the hold stops what 0.3 of it set off, but not what 3 do."""
     loop = drawn(7026)
+    assert loop
     assert loop.rate_1_s > 0.0
     finding = found(replace(loop.scene, friction=Friction(kinetic=kinetic)))
     assert (finding.word, finding.blown) == ("steady", blown)
