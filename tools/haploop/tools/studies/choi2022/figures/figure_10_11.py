@@ -231,7 +231,7 @@ def _gate(setup: Setup) -> Figure:
         felt.plot(FREQUENCIES_HZ, damping, color=COLOURS[kind], label=SHORT[kind])
     felt.axhline(0.0, color=GREY, linewidth=0.6)
     dress(felt, "in the nearest interpretation", "frequency (Hz)", "felt damping / (m w)")
-    legend(felt, loc="lower right", **INSIDE)
+    legend(felt, loc="lower right", bbox_to_anchor=(1.0, 0.0), ncols=1, **INSIDE)
     headings = {0.0: "an ideal accelerometer", OLD_S: f"a reading {1e3 * OLD_S:.2f} ms old"}
     reach = (FREQUENCIES_HZ[0], FREQUENCIES_HZ[-1], 0.0, 1e3 * DELAYS_S[-1])
     colours = {"cmap": ListedColormap(list(_DAMPS.values())), "vmin": -0.5, "vmax": 3.5, "interpolation": "nearest"}
