@@ -25,6 +25,9 @@ class NoRuns:
     def live(self):
         return []
 
+    def has_launcher(self, run):
+        return False
+
     def ask(self, run, verb, arguments):
         self.asked.append((verb, arguments))
         raise CommandFailed("Nothing runs here.")
