@@ -147,8 +147,8 @@ class Commands:
         self, swap: Tables, element: int = 0, at: float | None = None, reload: bool = False
     ) -> Done | Generator[None, None, Done]:
         """A kind that came from a file is tried first, which takes time: the answer comes later."""
-        kind, change = swap.get("kind"), {"swap": swap, "element": element}
-        if kind in self._spec.plugin_sources:
+        kind, change = swap.get("kind") if isinstance(swap, dict) else None, {"swap": swap, "element": element}
+        if isinstance(kind, str) and kind in self._spec.plugin_sources:
             return self._swap_tried(change, at, reload)
         if reload:
             known = ", ".join(sorted(self._spec.plugin_sources)) or "none"
