@@ -207,3 +207,10 @@ def seeds_needed(defect: str, most: int) -> tuple[int, str] | None:
             if broken := play(draw(seed)).broken:
                 return seed, broken
     return None
+
+
+if __name__ == "__main__":
+    print("| defect put back | seeds | what it breaks |\n| --- | ---: | --- |")
+    for defect in DEFECTS:
+        seed, broken = seeds_needed(defect, 10_000) or ("none", "nothing")
+        print(f"| {defect} | {seed} | {broken.strip().splitlines()[-1]} |", flush=True)

@@ -95,6 +95,7 @@ class Stop(Fault):
         return self.seconds if role == self.role else 0.0
 
     def happen(self, sim: Sim) -> None:
+        sim.stopped_at[self.role] = sim.world.now
         sim.process(self.role).stop(self.seconds)
 
 

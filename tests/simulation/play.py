@@ -27,7 +27,7 @@ from simulation.world import Process, Stuck, World
 
 # What the start may take, and what a run may take to end after all that held it up.
 _START_S, _PATIENCE_S = 20.0, 30.0
-_NAMED_WITHIN_S, _ENDED_WITHIN_S = 1.05, 3.5
+_NAMED_WITHIN_S, _HUNG_WITHIN_S, _ENDED_WITHIN_S = 1.05, 1.3, 3.5
 # A logger that was killed leaves on disk what it had reported so long before: its log is flushed every 0.4 s, at the
 # next turn, which comes after 0.2 s at most.
 _FLUSHED_WITHIN_S = 0.65
@@ -46,7 +46,7 @@ class Sim:
         heard: (observer, events) of those that took part to the end.
         shown: (viewer, outcome) likewise.
         second_logs: directory and summary of second loggers that ended in order.
-        killed_at: role -> time at which one of its processes was killed.
+        killed_at, stopped_at: role -> time at which its process was killed, or last stopped.
         may_fail: whether anything has happened that may end the run.
     """
 
@@ -63,6 +63,7 @@ class Sim:
         self.run = SimRun(self.world, self.watch, Disk(), dict(plan.starts_s))
         self.visitors: list[Process] = []
         self.killed_at: dict[str, float] = {}
+        self.stopped_at: dict[str, float] = {}
         self.happened: list[Fault] = []
         self._busy_until = self.world.now
         for fault in plan.faults:
@@ -165,6 +166,12 @@ class Sim:
                 return f"the {role} was killed, and not named within {_NAMED_WITHIN_S:g} s"
             if self.over_at > at + _ENDED_WITHIN_S + spare_s:
                 return f"the {role} was killed, and the run went on for {self.over_at - at:.1f} s"
+        for role, at in self.stopped_at.items():
+            late_s = (self.run.named_at or at) - at - DEADLINE_S
+            named = re.match(f"The {role} has not answered for {DEADLINE_S:g} s", str(self.run.launcher.error))
+            alone = sum(fault.silences(role) > 0.0 for fault in self.plan.faults) == 1
+            if named and alone and late_s > _HUNG_WITHIN_S + spare_s:
+                return f"the {role} was stopped, and named {late_s:.2f} s after the deadline"
         return ""
 
     def _what_is_left(self) -> str:
