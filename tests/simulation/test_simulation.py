@@ -13,7 +13,7 @@ from simulation.defects import DEFECTS, put_back, seeds_needed
 from simulation.faults import Kill, LateStart, Stop, When
 from simulation.plan import Plan, draw, fewest, shrink, tell
 from simulation.play import play
-from simulation.visitors import Impostor, SecondLogger
+from simulation.visitors import Impostor, SecondLogger, Stranger
 
 _STARTS_S = {"plant": 0.1, "controller": 0.2, "logger": 0.3}
 _CALM = Plan(0, "wall", 0.0, 1e-4, math.inf, _STARTS_S, ())
@@ -28,6 +28,10 @@ _RECORDED = {
     "an impostor with the secret, and a death": (
         Impostor(When(-1, 0.4), _STAYS, "plant"),
         Kill(When(21, 0.002), "plant"),
+    ),
+    "false joins of a stranger, and a death": (
+        Stranger(When(-1, 0.1), _STAYS, "clock", 600, 452),
+        Kill(When(-1, 0.25), "logger"),
     ),
     "a second logger that joins as the run ends": (SecondLogger(When(69, 0.0), _STAYS),),
 }
@@ -47,9 +51,9 @@ def test_a_share_of_the_seeds_keeps_every_promise(part: int) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("part", range(9))
+@pytest.mark.parametrize("part", range(10))
 def test_two_thousand_seeds_keep_every_promise(part: int) -> None:
-    assert broken_in(range(200 + 200 * part, 400 + 200 * part)) == ""
+    assert broken_in(range(200 * part, 200 * part + 200)) == ""
 
 
 @pytest.mark.parametrize("pace", [math.inf, 0.5])

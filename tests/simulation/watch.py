@@ -111,7 +111,7 @@ class Watch:
         if self._last and (not last or until > self.granted):
             self.fail(f"after the last grant, up to {self.granted}, one up to {until} came")
         for process, tick in self.reported.items():
-            if until > tick + self._window and process.alive:
+            if until > max(tick + self._window, self.granted) and process.alive:
                 self.fail(f"{until} was granted, more than the window beyond {tick}, the tick of the {process.name}")
         self._told[identity] = until
         self.granted, self._last = until, self._last or bool(last)

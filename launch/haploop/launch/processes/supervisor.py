@@ -173,7 +173,8 @@ class Supervisor:
         self._server.serve()
         while not ((node := self._server.roster.own(child.role)) and node.done):
             if self._machine.now() > given_up:
-                refused = "" if node else self._server.roster.refused.get(child.role)
+                # Whoever was killed was not turned away: such a JOIN was somebody else's.
+                refused = self._server.roster.refused.get(child.role) if not node and child.exited() else None
                 raise RunFailed(f"The {child.role} {ended}; {refused or self._where()}")
             self._server.socket.poll(20)
             self._server.serve()
