@@ -8,6 +8,7 @@ import pytest
 
 from helpers.data.damaged_run import COMMANDS, DamagedRuns
 from helpers.data.mutated_words import MutatedWords
+from helpers.live.in_process import ask
 
 QUICK = ("check", "replay", "csv", "npz", "json-mcap")
 
@@ -39,6 +40,20 @@ def broken_lines(folder: Path, seeds: range) -> list[str]:
 
 def test_a_spoilt_command_line_is_answered_or_refused_with_a_sentence(tmp_path):
     assert not broken_lines(tmp_path, range(20))
+
+
+@pytest.mark.parametrize("command", ["check", "run", "replay", "plot", "export", "sweep", "advise", "status", "swap"])
+@pytest.mark.parametrize("word", ["caf\udce9", "a\0b"])
+def test_an_argument_that_is_no_text_is_refused_by_every_command(command, word):
+    answer = ask(command, word)
+    assert (answer.status, answer.broken()) == (2, "")
+    assert answer.stderr.startswith("Every argument, names of files too, must be UTF-8 text")
+
+
+def test_what_the_operating_system_refuses_is_a_sentence_where_a_command_has_none():
+    answer = ask("plot", "a" * 5000)
+    assert (answer.status, answer.broken()) == (1, "")
+    assert answer.stderr.endswith("cannot be used: File name too long.\n")
 
 
 @pytest.mark.slow

@@ -248,3 +248,13 @@ def test_a_damaged_table_is_refused_and_gives_no_other_number(tmp_path: Path) ->
             assert (found.units, found.sweep, list(found.columns)) == (whole.units, whole.sweep, list(whole.columns))
             assert all([*map(str, found[key])] == [*map(str, whole[key])] for key in whole.columns)
         (out / name).write_bytes(content)
+
+
+def test_a_finished_sweep_with_a_damaged_summary_is_told_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    axes, out = '[axes]\n"wall.stiffness" = [100, 200]\n', tmp_path / "out"
+    swept(tmp_path, axes, out=out)
+    for text, sentence in (("{}", "is none of a sweep: it lacks cells"), ("[", "is no JSON object that haploop wrote")):
+        (out / "summary.json").write_text(text)
+        with pytest.raises(SystemExit, match="1"):
+            swept(tmp_path, axes, out=out)
+        assert sentence in capsys.readouterr().err

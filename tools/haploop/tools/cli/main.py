@@ -21,9 +21,21 @@ def main() -> None:
         from haploop.tools.cli.app import app
     try:
         signal.signal(signal.SIGTERM, signal.default_int_handler)
+        _refuse_what_is_no_text(sys.argv[1:])
         app()
+    except OSError as error:  # one that no command has words of its own for
+        print(f"{error.filename or 'A file'} cannot be used: {error.strerror or error}.", file=sys.stderr)
+        sys.exit(1)
     except (KeyboardInterrupt, SystemExit) as error:
         if isinstance(error, SystemExit) and error.code != _OF_TYPER:
             raise
         print(SENTENCE if isinstance(error, KeyboardInterrupt) else "Interrupted.", file=sys.stderr)
         sys.exit(1)
+
+
+def _refuse_what_is_no_text(words: list[str]) -> None:
+    """Leaves with a sentence where an argument is not UTF-8, which no file and no message of a run could hold."""
+    for word in words:
+        if "\0" in word or (not word.isascii() and any("\ud800" <= letter <= "\udfff" for letter in word)):
+            print(f"Every argument, names of files too, must be UTF-8 text, but {word!r} was given.", file=sys.stderr)
+            sys.exit(2)

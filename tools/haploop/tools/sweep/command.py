@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import json
 import sys
 import time
 from collections.abc import Sequence
@@ -14,7 +13,8 @@ from typing import TYPE_CHECKING
 
 from haploop.launch.processes.children import interrupts
 from haploop.launch.spec import PLUGINS, OutputError, keep_plugin, kept_name, make_output
-from haploop.logger.summary import Summary, write
+from haploop.logger.log import LogError
+from haploop.logger.summary import Summary, read, write
 from haploop.tools.cli.options import FAILED, WRONG_USE, leave, plain_errors, print_json
 from haploop.tools.executor.executors import ExecutorError
 from haploop.tools.executor.pool import Pool, read_sources
@@ -29,6 +29,8 @@ if TYPE_CHECKING:
     from haploop.tools.sweep.cells import Sweep
 
 SUMMARY = "summary.json"
+# What is told of a sweep whose every cell is there.
+_NEEDED = {"title", "cells", "counts", "ended", "first_reason", "rate_1_s"}
 
 
 @dataclass(frozen=True)
@@ -83,14 +85,17 @@ def sweep(request: Request, as_json: bool) -> None:
 def _run(request: Request, made: Sweep, directory: Path) -> Summary:
     began, path = time.monotonic(), directory / SUMMARY
     try:
-        before_s = float(json.loads(path.read_text(encoding="utf-8"))["wall_s"])
-    except (OSError, ValueError, LookupError):  # no earlier call ended in order
+        before_s = float(read(path)["wall_s"])
+    except (LogError, TypeError, ValueError, LookupError):  # no earlier call ended in order
         before_s = 0.0
     schema = make_schema(made.columns(), made.toml())
     with interrupts(usual_from=2) as received, Store(directory, schema) as store:
         if store.finished:
             print("Every cell of this sweep is there already; nothing was run.", file=sys.stderr)
-            return json.loads(path.read_text(encoding="utf-8"))
+            summary = read(path)
+            if missing := _NEEDED - summary.keys():
+                raise LogError(f"The summary {path} is none of a sweep: it lacks {', '.join(sorted(missing))}.")
+            return summary
         with SweepProgress(made.title) as progress:
             ended, found = "done", []
             with Pool(request.workers, request.dask) as pool:

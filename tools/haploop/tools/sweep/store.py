@@ -77,7 +77,12 @@ class Store:
             try:
                 rows += read_part(file, self._sweep).select(list(columns)).to_pylist()
             except (TableError, KeyError):
-                file.unlink()
+                try:
+                    file.unlink()
+                except OSError as error:
+                    raise StoreError(
+                        f"{file} is no part of a sweep and cannot be removed: {error.strerror}."
+                    ) from error
         self.rows = len(rows)
         return rows
 
