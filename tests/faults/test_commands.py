@@ -74,7 +74,7 @@ def test_a_replay_says_so_when_the_log_is_not_what_ran(running):
     (run.out / "scene.toml").write_text(head + "mass = 0.011\n" + tail)
     replayed = command("replay", str(run.out))
     assert replayed.returncode == 1
-    assert "differs" in replayed.stdout
+    assert "is not the scene that the log holds" in replayed.stdout
 
 
 SWAP = {"kind": "damping", "damping": 0.8}

@@ -205,6 +205,7 @@ class SimSocket:
         lane = pipe.lane_from(self)
         while lane.is_full:
             if at_once:
+                self.context.watch.lost(self, pipe, frames)
                 raise zmq.Again
             self.process.sleep(0.001)
         self.context.watch.sent(self, pipe, frames)

@@ -89,6 +89,12 @@ class Watch:
         elif self._is_own(process):
             self._node_says(process, name, frames[-1])
 
+    def lost(self, socket: SimSocket, pipe: Pipe, frames: Frames) -> None:
+        """Notes an answer for which there was no room: whoever asks and does not read loses it."""
+        run = self._run
+        if run is not None and socket.process is run.launcher and name_of(frames[-1]) in ("REFUSED", "REPLY"):
+            self._owed[pipe] -= 1
+
     def _is_own(self, process: Process) -> bool:
         return self._run is not None and self._run.nodes.get(process.name) is process
 
