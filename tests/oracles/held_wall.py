@@ -87,17 +87,17 @@ def columns(of: Bodies, some: np.ndarray) -> Bodies:
 
 
 def press(
-    of: Bodies, holds: np.ndarray, stiffness: Any, elements: dict[str, Any], *, sway: float = 0.3,
-    sway_Hz: float = 0.5, speed: float = 0.2,
+    of: Bodies, holds: np.ndarray, stiffness: Any, elements: dict[str, Any], *, sway: Any = 0.3,
+    sway_Hz: Any = 0.5, speed: Any = 0.2,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:  # fmt: skip
     """Returns position at the encoder, counts and command at the ticks, each of shape (ticks, members).
 
-    Stiffness and elements, by their kind, are numbers or one for each member.
+    Stiffness, elements by their kind, and the hand are numbers or one for each member.
     """
     members, ticks = len(holds), round(LASTS_S / PERIOD_S)
     has_cable, h = bool(np.any(of.motor_mass)), STEP_S
     x = np.full(members, 2e-4)
-    v = np.full(members, -speed)
+    v = -speed + np.zeros(members)
     y, w, xm, vm = x.copy(), v.copy(), x.copy(), v.copy()
     late = round(of.delay_s / h)
     commands = [np.zeros(members)]
@@ -170,7 +170,7 @@ def _to_and_fro(piece: np.ndarray, seconds: float) -> tuple[float, float]:
 
 def _stiffness(of: Bodies, member: int, frequency: float) -> float:
     """Returns the force at the encoder that moves it by a metre at a frequency, hand and cable hanging on it, N/m."""
-    one = Bodies(*(np.broadcast_to(getattr(of, name), member + 1)[member] for name in _NUMBERS))
+    one = columns(of, np.array(member))
     s = 2j * np.pi * frequency
     grip, cable = one.grip_stiffness + one.grip_damping * s, one.cable_stiffness + one.cable_damping * s
     hand = one.hand_mass * s**2 + one.hand_damping * s + one.hand_stiffness

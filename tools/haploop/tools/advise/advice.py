@@ -24,6 +24,7 @@ UPPER_BOUND = (
     "as no device is. Give --delay and a [transmission]."
 )
 ADVICE = "Advice on {name}, as described and 20 % off."
+WIDE = "Advice on {name}, as described, 20 % off, and with half and twice of what is assumed."
 _RIGID = "There is no [transmission]: what a resonance of the structure takes is not in it."
 _PLUGIN = "The scene's own wall is not tried: its elements come from a plugin file."
 SAFE_MEANS = (
@@ -73,7 +74,8 @@ class Advice:
 
     @property
     def headline(self) -> str:
-        return (UPPER_BOUND if self.is_ideal else ADVICE).format(name=self.name)
+        words = UPPER_BOUND if self.is_ideal else WIDE if self.assumed else ADVICE
+        return words.format(name=self.name)
 
 
 def advice(subject: Subject, trial: Trial, stage: Callable[[str], object] = lambda name: None) -> Advice:

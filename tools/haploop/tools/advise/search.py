@@ -32,6 +32,9 @@ ROUGH, _FINE = 0.12, 0.02
 WORTH = 1.1
 # Softer walls that have to bear everything, too, as shares of the limit.
 _SOFTER = (0.8, 0.62, 0.48, 0.35, 0.25, 0.15, 0.08, 0.03)
+# Parameters that are tried in every corner, by their places among those that bear as much in the loop as described;
+# what suits a device of half the mass is smaller.
+_MANY, _WIDE, _ONE = (0.0, 0.5, 1.0), (-1.0, 0.0, 1.0), (0.5,)
 # A wall that does not withstand the attack is lowered by this, so often at most.
 _LOWER, _TIMES = 0.97, 60
 # So much stiffer walls have to withstand it, too: where a count lies in the hold is chance, and differs with each.
@@ -100,8 +103,8 @@ def search(
     known |= nominal([(BOTH, values) for values in pairs], rungs)
     stage("every corner")
     of, measured = ranges(loop, assumed), ranges(loop)
-    bests = _in_corners(loop, trial, known, of, (0.0, 0.5, 1.0))
-    as_assumed = None if of == measured else _advised(_in_corners(loop, trial, known, measured, (0.5,)))
+    bests = _in_corners(loop, trial, known, of, _MANY if of == measured else _WIDE)
+    as_assumed = None if of == measured else _advised(_in_corners(loop, trial, known, measured, _ONE))
     best = _advised(bests)
     values, safe = _refined(loop, trial, best, of)
     described = known.get((best.family, values)) or nominal([(best.family, values)], rungs)[best.family, values]
@@ -117,9 +120,18 @@ def search(
 
 def _equals(known: dict[Choice, Limit], family: Family) -> list[Values]:
     """Returns the parameters whose limits are, as closely as they are known, the largest, from small to large."""
-    tried = {values: limit.stiffness_N_m for (other, values), limit in known.items() if other is family}
+    tried = {values: known[family, values].stiffness_N_m for values in _values(known, family)}
     most = max(tried.values())
     return sorted(values for values, stiffness in tried.items() if stiffness >= most / (1.0 + ROUGH))
+
+
+def _values(known: dict[Choice, Limit], family: Family) -> list[Values]:
+    return [values for other, values in known if other is family]
+
+
+def _is_half(some: Values, of: Values) -> bool:
+    """Tells whether all parameters are about half of others, or less."""
+    return bool(some) and all(small <= 0.55 * large for small, large in zip(some, of, strict=True))
 
 
 def _in_corners(
@@ -128,7 +140,7 @@ def _in_corners(
     """Returns the best of each family; those worth it with their limit in every corner, at the holds tried first.
 
     Of parameters that bear as much in the loop as described those at these places, from the smallest, 0, to the
-    largest, 1.
+    largest, 1; below 0 the next that are half of the smallest or less.
     """
     bests: list[Best] = []
     candidates: list[Choice] = []
@@ -136,8 +148,9 @@ def _in_corners(
         equals = _equals(known, family)
         bests.append(Best(family, equals[0], known[family, equals[0]]))
         if not family.parts or bests[-1].nominal.stiffness_N_m > WORTH * bests[0].nominal.stiffness_N_m:
-            some = dict.fromkeys(equals[round(place * (len(equals) - 1))] for place in places)
-            candidates += [(family, values) for values in some]
+            smaller = max((each for each in _values(known, family) if _is_half(each, equals[0])), default=equals[0])
+            some = (equals[round(place * (len(equals) - 1))] if place >= 0.0 else smaller for place in places)
+            candidates += dict.fromkeys((family, values) for values in some)
     cases = every_case(of, FIRST_HOLDS)
     queries = []
     for family, values in candidates:
