@@ -43,8 +43,8 @@ class Brake(Element):
 SETS = ("duration=0.3", "run.verdict=window", 'dissipation=[{kind="brake", acts="always"}]')
 MARKED = re.compile(r"controller(, tick \d+)?: ")
 KINDS = {
-    "each tick": ("pass", "pass", "print('tick', self.tick)"),
     "everywhere": ("print('import')", "print('making')", "print('force')"),
+    "each tick": ("pass", "pass", "print('tick', self.tick)"),
     "megabytes": ("pass", "pass", "print('x' * 200_000)"),
     "no newline": ("sys.stdout.write('import')", "pass", "print('on', end=' ', flush=True)"),
     "binary": ("pass", "pass", "sys.stdout.buffer.write(bytes(range(256))); sys.stdout.flush()"),

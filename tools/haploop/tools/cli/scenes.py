@@ -49,7 +49,7 @@ def run(
     """Run a scene to its end; other terminals can steer and watch it meanwhile."""
     with LeavingAtOnce():
         from haploop.launch.runs import start
-        from haploop.launch.spec import RunFailed
+        from haploop.launch.spec import SCENE, RunFailed, discard
         from haploop.protocol.transport.sockets import Transport, TransportError
         from haploop.tools.cli.view import viewing
         from haploop.tools.render.progress import ProgressLine
@@ -66,8 +66,8 @@ def run(
         except TransportError as error:
             leave(str(error), WRONG_USE)
         prepared = start.prepare(scene, set or [], plugin or [], out)
-        print_notes(prepared.scene)
         try:
+            print_notes(prepared.scene)
             # What an element prints is no part of the answer.
             with ProgressLine(prepared.scene.title, prepared.scene.duration) as line, redirect_stdout(sys.stderr):
 
@@ -87,7 +87,8 @@ def run(
         except RunFailed as error:
             leave(f"{error}\nWhat was logged is in {prepared.out}.", FAILED)
         except KeyboardInterrupt:
-            begun = prepared.out.exists()
+            discard(prepared.out, prepared.is_new)  # where it never began
+            begun = (prepared.out / SCENE).exists()
             leave(
                 f"Interrupted at once; what was logged is in {prepared.out}."
                 if begun
