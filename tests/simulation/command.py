@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import hashlib
 import json
 import os
 import signal
@@ -14,6 +15,7 @@ from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
+import haploop
 from simulation.plan import draw, shrink, tell
 from simulation.play import play
 
@@ -45,6 +47,15 @@ def _play_piece(seeds: range) -> tuple[Counter[str], list[str]]:
     return tally, failures
 
 
+def digest_of_the_code() -> str:
+    """A digest of every module that is played or plays: what an older program kept says nothing of this one."""
+    digest = hashlib.sha256()
+    for folder in (*haploop.__path__, Path(__file__).parent):
+        for module in sorted(Path(folder).rglob("*.py")):
+            digest.update(module.read_bytes())
+    return digest.hexdigest()
+
+
 def pieces(first: int, last: int) -> Iterator[range]:
     for start in range(first, last, _PIECE):
         yield range(start, min(start + _PIECE, last))
@@ -58,11 +69,9 @@ def main() -> None:
     parser.add_argument("--state", type=Path, default=Path("runs/simulation.json"), help="what was tried so far")
     given = parser.parse_args()
     state = json.loads(given.state.read_text()) if given.state.exists() else {}
-    state = (
-        state
-        if state.get("first") == given.first
-        else {"first": given.first, "next": given.first, "tally": {}, "failures": []}
-    )
+    begun = {"first": given.first, "code": digest_of_the_code()}
+    if begun != {key: state.get(key) for key in begun}:  # other seeds, or another program
+        state = {**begun, "next": given.first, "tally": {}, "failures": []}
     tally, began, start = Counter(state["tally"]), time.monotonic(), state["next"]
     given.state.parent.mkdir(parents=True, exist_ok=True)
     with ProcessPoolExecutor(given.jobs) as pool:
@@ -85,7 +94,9 @@ def main() -> None:
         except KeyboardInterrupt:
             pool.shutdown(cancel_futures=True)
             print(f"\nstopped; the same command goes on from seed {state['next']}")
-    print()
+    print(f"\nseeds {given.first} to {state['next'] - 1}: {len(state['failures'])} fail")
+    for text in state["failures"]:
+        print(text.splitlines()[0])
     for what, count in sorted(tally.items()):
         print(f"{count:8d}  {what}")
     sys.exit(bool(state["failures"]))
