@@ -90,7 +90,7 @@ def test_what_a_stranger_sends_is_counted_and_dropped_and_the_answer_is_the_part
     stranger.close()
 
 
-NO_SAMPLES = [*junk(), *(pack(1, SAMPLES, 5, wrong) for wrong in ([["x"]], [None], "x")), pack(1, LAST, "x")]
+NO_SAMPLES = [*junk(), *(pack(1, SAMPLES, 5, wrong) for wrong in ("x", None, {1: 2})), pack(1, LAST, "x")]
 
 
 def test_whatever_comes_in_place_of_samples_is_a_named_error() -> None:
