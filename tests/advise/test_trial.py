@@ -142,7 +142,7 @@ def test_no_wall_that_a_trial_bears_is_a_felt_limit_cycle_or_grows_when_pushed_w
         of = ranges(loop)
         for _ in range(6):
             case = Case(float(rng.choice(HOLDS)), corner(of, int(rng.integers(2 ** len(of)))), sway=0.0)
-            stiffness = top * float(rng.uniform(0.6, 1.5))
+            stiffness = top * float(rng.uniform(0.6, 3.0))
             with Trial(Store()) as trial:
                 [failure] = trial.failures(loop, [Tried(stiffness, some)], [case])
             if failure is None:
