@@ -88,7 +88,7 @@ def test_any_text_is_a_number_or_a_sentence(text):
 
 
 def test_units_of_the_table_are_those_of_pint_to_the_last_digit():
-    units = pint.UnitRegistry(non_int_type=Decimal)
+    units = pint.UnitRegistry(non_int_type=Decimal)  # pyright: ignore[reportArgumentType]
     compound = ["N/mm", "mN s/m", "kg*m**2/s^2", "m s⁻²", "cm²/ms", "m/s^2/Hz^0.5"]
     for name in [*_UNITS, *compound]:
         exact = _exact(name)
