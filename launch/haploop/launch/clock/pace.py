@@ -12,6 +12,8 @@ SLOWEST, FASTEST = 1e-6, 1e6
 LEAST_GRANT_S = 0.0005
 # Ticks held up for no longer than this are made up for at once, s of wall time; the rest of the time is lost.
 CATCH_UP_S = 0.02
+# A tick counts as late that is done later than this after it was due, or than a period where that is longer.
+_LATE_S = 0.001
 # Lateness is counted in classes, each wider than the one before by this factor.
 _FINEST_S, _FACTOR = 1e-6, 1.05
 
@@ -45,7 +47,7 @@ class Pace:
         self._control_rate = control_rate
         self.lost_s = 0.0
         self._late: Counter[int] = Counter()
-        self._most_s, self._by_a_period = 0.0, 0
+        self._most_s, self._too_late = 0.0, 0
         self._awaited: deque[tuple[int, int, float]] = deque()
         self.set(rate)
 
@@ -53,6 +55,7 @@ class Pace:
         """Takes another rate, infinite for none; PaceError where it cannot be kept."""
         self.rate = rate if rate == math.inf else pace_of(rate)
         self._period_s = 1.0 / (rate * self._control_rate)
+        self._late_s = max(_LATE_S, self._period_s)
         self._least = self._ticks(LEAST_GRANT_S)
         self.most_at_once = max(self._least, self._ticks(CATCH_UP_S))
         self.anew()
@@ -102,22 +105,22 @@ class Pace:
             for late_s in (now - due - place * self._period_s for place in range(min(end, tick) - first)):
                 self._late[max(0, math.ceil(math.log(max(late_s, _FINEST_S) / _FINEST_S, _FACTOR)))] += 1
                 self._most_s = max(self._most_s, late_s)
-                self._by_a_period += late_s > self._period_s
+                self._too_late += late_s > self._late_s
             if end > tick:
                 self._awaited.appendleft((tick, end, due + (tick - first) * self._period_s))
 
     def lateness(self) -> dict[str, Any]:
         """Returns how late the ticks were done; {} where none was to keep a pace.
 
-        ``ticks`` of them, ``median_s``, ``percent_99_s`` (to 5 %) and ``most_s``, ``by_a_period`` how many were late by
-        more than a period, ``lost_s`` the real time lost.
+        ``ticks`` of them, ``median_s``, ``percent_99_s`` (to 5 %) and ``most_s``, ``late_ticks`` how many were late by
+        more than ``late_s``, a period or 1 ms if that is longer, and ``lost_s`` the real time lost.
         """
         ticks = self._late.total()
         if not ticks:
             return {}
         quantiles = {name: self._quantile(share * ticks) for name, share in (("median_s", 0.5), ("percent_99_s", 0.99))}
-        most_s = {"most_s": max(0.0, self._most_s)}
-        return {"ticks": ticks, **quantiles, **most_s, "by_a_period": self._by_a_period, "lost_s": self.lost_s}
+        late = {"late_ticks": self._too_late, "late_s": self._late_s, "lost_s": self.lost_s}
+        return {"ticks": ticks, **quantiles, "most_s": max(0.0, self._most_s), **late}
 
     def _quantile(self, rank: float) -> float:
         seen = 0

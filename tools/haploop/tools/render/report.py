@@ -96,7 +96,8 @@ def _lateness(of: Summary) -> list[tuple[str, str]]:
     by = ("median_s", "(median)"), ("percent_99_s", "(99 %)"), ("most_s", "at most")
     words = ", ".join(f"{amount(late[key], 's')} {which}" for key, which in by)
     lost = f"; {amount(late['lost_s'], 's')} of real time lost" if late["lost_s"] else ""
-    return [("ticks late by", f"{words}; {late['by_a_period']} of {late['ticks']} by more than a period{lost}")]
+    many = f"{late['late_ticks']} of {late['ticks']} by more than {amount(late['late_s'], 's')}"
+    return [("ticks late by", f"{words}; {many}{lost}")]
 
 
 def _books(energy: Summary, control_rate: float) -> Table:
