@@ -170,7 +170,7 @@ def test_the_verdict_comes_when_the_launcher_has_judged_the_run_and_until_then_i
             assert "without judging it" in state["why"]
             may_judge.set()
 
-    monkeypatch.setattr("haploop.launch.stability.judge.judge_scene", waits)
+    monkeypatch.setattr("haploop.launch.runs.judging.judge_scene", waits)
     sets = ("duration=0.5", "wall.position=-0.001", "run.verdict=pushed")
     follow(play, tmp_path, *sets, pauses=(200,), options={"runs": Launched()})
 

