@@ -35,8 +35,8 @@ WHY = {
     "{frequency_Hz:.3g} Hz, less than a hand feels ({felt_um:.3g} um).",
     "forgets": "Pushes of {push_N:.3g} N and a tenth of it end in the same swing, {width_mm:.3g} mm peak to peak at "
     "{frequency_Hz:.3g} Hz.",
-    "lasts": "A swing of {width_mm:.3g} mm peak to peak at {frequency_Hz:.3g} Hz lasted for {watched_s:g} s, its width "
-    "changing by less than 2 %.",
+    "lasts": "A swing of {width_mm:.3g} mm peak to peak at {frequency_Hz:.3g} Hz lasted for {watched_s:g} s, growing "
+    "or decaying by no more than {most_1_s:.2g} 1/s (two standard errors).",
     "decays": "Its swing of {width_mm:.3g} mm peak to peak at {frequency_Hz:.3g} Hz still decays, by {rate_1_s:.3g} +- "
     "{error_1_s:.1g} 1/s, and nothing in the loop makes small swings other than large ones.",
     "grows": "Its swing grew by {rate_1_s:.3g} +- {error_1_s:.2g} 1/s, at {frequency_Hz:.3g} Hz.",
@@ -122,6 +122,7 @@ class Finding:
         """Returns why, with its numbers."""
         numbers = {name: math.nan if value is None else value for name, value in vars(self).items()}
         sizes = {"width_mm": 1e3 * self.width_m, "width_um": 1e6 * self.width_m}
+        sizes["most_1_s"] = abs(numbers["rate_1_s"]) + 2.0 * numbers["error_1_s"]
         sentence = WHY[self.why].format(**numbers, **sizes, felt_um=2e6 * smallest_felt_m(self.frequency_Hz))
         return sentence + (AFTER_BLOW[self.blown].format(**numbers) if self.blown else "")
 
