@@ -111,7 +111,7 @@ def test_after_the_end_it_shows_what_came_of_the_run_and_its_last_snapshot(stand
     expect(page.locator("#phase")).to_have_text("ended")
     summary = page.locator("#summary")
     expect(summary).to_contain_text("Ended: limit-cycle")
-    for words in ("5.35 mm ± 420 µm", "at 7.10 Hz, felt, chaotic", "410 mN", "−0.0123 ± 0.02 1/s", "93 %"):
+    for words in ("5.35 mm ± 420 µm", "at 7.10 Hz, felt, chaotic", "410 mN", "−0.0123 ± 0.020 1/s", "93 %"):
         expect(summary).to_contain_text(words)
     expect(summary).to_contain_text("leak by delay")
     expect(summary).to_contain_text("−1.10 mJ")

@@ -191,6 +191,21 @@ def test_a_slow_swing_that_grows_is_not_taken_for_one_that_dies_unfelt(frequency
             assert finding.word in ("undecided", "growing"), (seconds, phase, finding.sentence())
 
 
+def test_a_swing_said_to_last_is_bounded_by_the_one_of_the_two_that_changes_more():
+    t = np.arange(8000) / 1000.0
+    sine, one = 2e-2 * np.sin(2 * np.pi * 7.9 * t)[None], np.ones(1)
+    small, is_so = np.exp(0.0009 * t) * sine, one > 0
+    [swing] = measure(Pushed(small, sine, sine, one, 0.0 * one, is_so, is_so, is_so), 1000.0)
+    finding = decide(swing, last=False)
+    assert finding.why == "lasts"
+    assert finding.rate_1_s is not None
+    assert finding.error_1_s is not None
+    assert finding.most_1_s is not None
+    of_the_steadier = abs(finding.rate_1_s) + 2.0 * finding.error_1_s
+    assert finding.most_1_s == pytest.approx(of_the_steadier + 0.0009, rel=0.02)
+    assert f"no more than {finding.most_1_s:.2g} 1/s" in finding.sentence()
+
+
 @pytest.mark.parametrize("rate_1_s", [-0.0045, -0.0033, 0.0033])
 def test_a_swing_that_surely_changes_is_not_said_to_last_however_slowly_it_does(rate_1_s):
     """Both copies swing alike, as where what the run had set going is wider than what the pushes add."""

@@ -35,16 +35,16 @@ WHY = {
     "{frequency_Hz:.3g} Hz, less than a hand feels ({felt_um:.3g} um).",
     "forgets": "Pushes of {push_N:.3g} N and a tenth of it end in the same swing, {width_mm:.3g} mm peak to peak at "
     "{frequency_Hz:.3g} Hz.",
-    "lasts": "A swing of {width_mm:.3g} mm peak to peak at {frequency_Hz:.3g} Hz lasted for {watched_s:g} s, growing "
+    "lasts": "Swings of {width_mm:.3g} mm peak to peak at {frequency_Hz:.3g} Hz lasted for {watched_s:g} s, growing "
     "or decaying by no more than {most_1_s:.2g} 1/s (two standard errors).",
     "decays": "Its swing of {width_mm:.3g} mm peak to peak at {frequency_Hz:.3g} Hz still decays, by {rate_1_s:.3g} +- "
-    "{error_1_s:.1g} 1/s, and nothing in the loop makes small swings other than large ones.",
+    "{error_1_s:.2g} 1/s, and nothing in the loop makes small swings other than large ones.",
     "grows": "Its swing grew by {rate_1_s:.3g} +- {error_1_s:.2g} 1/s, at {frequency_Hz:.3g} Hz.",
     "leaves the limit": "Its swing grew until the device was beyond its limit.",
     "failed": "The loop failed while it was watched: {detail}",
     "leaves the wall": "Held still, the hand does not keep the device at the wall.",
     "too slow": "Its swing of {width_mm:.3g} mm peak to peak at {frequency_Hz:.3g} Hz changes by {rate_1_s:.2g} +- "
-    "{error_1_s:.1g} 1/s, too slowly to tell within {watched_s:g} s; {needs_s:.3g} s would tell.",
+    "{error_1_s:.2g} 1/s, too slowly to tell within {watched_s:g} s; some {about_s:.0f} s might tell.",
 }
 # What is said beside that after a blow, and how the words for its finding are told.
 AFTER_BLOW = {
@@ -72,7 +72,9 @@ class Finding:
         felt: whether a hand feels the swing.
         chaotic: whether two copies started a thousandth apart ended apart by a fifth of the swing; None if not asked.
         detail: why the run itself ended, where it diverged, or what failed.
-        needs_s: time after which a swing that changes too slowly would be told; None otherwise.
+        needs_s: estimate of the time after which a swing that changes too slowly is told; None otherwise.
+        most_1_s: what either swing may grow or decay by: its rate and two standard errors, of the one that may change
+            most; None where it was not watched to an answer.
         blow_N: of a loop that rests after the push, a harder one; None if not asked.
         blown: what it does after that: rests, swings on, or undecided.
     """
@@ -90,6 +92,7 @@ class Finding:
     felt: bool = False
     chaotic: bool | None = None
     needs_s: float | None = None
+    most_1_s: float | None = None
     blow_N: float | None = None
     blown: str | None = None
     detail: str = ""
@@ -122,7 +125,7 @@ class Finding:
         """Returns why, with its numbers."""
         numbers = {name: math.nan if value is None else value for name, value in vars(self).items()}
         sizes = {"width_mm": 1e3 * self.width_m, "width_um": 1e6 * self.width_m}
-        sizes["most_1_s"] = abs(numbers["rate_1_s"]) + 2.0 * numbers["error_1_s"]
+        sizes["about_s"] = float(f"{numbers['needs_s']:.2g}")
         sentence = WHY[self.why].format(**numbers, **sizes, felt_um=2e6 * smallest_felt_m(self.frequency_Hz))
         return sentence + (AFTER_BLOW[self.blown].format(**numbers) if self.blown else "")
 
@@ -172,14 +175,16 @@ def decide(swing: Swing, *, last: bool) -> Finding:
 
 def _finding(swing: Swing, word: str, why: str) -> Finding:
     felt_m = 2.0 * smallest_felt_m(swing.frequency_Hz)
+    pairs = [*zip(swing.changes, swing.errors, strict=True)]
+    most_1_s = max(abs(change) + 2.0 * error for change, error in pairs) / (swing.watched_s / 2.0)
     needs_s = None
     if word == "undecided":
-        change, error = min(zip(swing.changes, swing.errors, strict=True), key=lambda each: abs(each[0]))
+        change, error = min(pairs, key=lambda each: abs(each[0]))
         needs_s = FEW_PIECES * LEAST_PERIODS / swing.frequency_Hz if swing.frequency_Hz else 0.0
         needs_s = max(needs_s, swing.watched_s * max(2.0, 4.0 * error / max(abs(change), 1e-12)))
         if swing.rate_1_s < 0.0:
             needs_s = max(needs_s, swing.watched_s + math.log(max(swing.width_m / felt_m, 1.0)) / -swing.rate_1_s)
     return Finding(
         word, why, swing.push_N, swing.watched_s, swing.rate_1_s, swing.error_1_s, swing.frequency_Hz, swing.width_m,
-        swing.spread_m, swing.ripple_N, swing.width_m >= felt_m, None, needs_s,
+        swing.spread_m, swing.ripple_N, swing.width_m >= felt_m, None, needs_s, most_1_s,
     )  # fmt: skip

@@ -118,7 +118,7 @@ def _passivity(force: ForceOutcome) -> str:
 
 def _naive(force: ForceOutcome) -> str:
     true_J, off_J = force.books.true_J, abs(force.naive_J - force.books.true_J)
-    share = f" ({100.0 * off_J / abs(true_J):.3g} % of it)" if true_J else ""
+    share = f" ({100.0 * off_J / abs(true_J):.0f} % of it)" if true_J else ""
     return _NAIVE.format(naive=amount(-force.naive_J, "J"), off=amount(off_J, "J"), share=share)
 
 

@@ -150,7 +150,7 @@ def _stability(found: Summary) -> list[tuple[str, str]]:
     rows = [
         ("pushed, it swings", f"{size}, {frequency}{felt}{chaotic}"),
         ("force ripple > 30 Hz", f"{amount(found['force_ripple_N'], 'N')} peak to peak"),
-        ("growth", f"{found['rate_1_s']:.3g} +- {found['error_1_s']:.1g} 1/s, watched for {found['watched_s']:g} s"),
+        ("growth", f"{found['rate_1_s']:.3g} +- {found['error_1_s']:.2g} 1/s, watched for {found['watched_s']:g} s"),
     ]
     if (share := found.get("own_share")) is not None:
         own = f"{100 * share:.0f} %" if share >= 0.01 else "less than 1 %"
@@ -196,11 +196,14 @@ def _nodes(nodes: list[Message], control_rate: float) -> Table:
 
 def plugins_table(kinds: Mapping[str, type[Element]]) -> Table:
     """Makes the table of element kinds: purpose, parameters with unit, bounds and default."""
+    from rich.text import Text
+
     table = make_table("kind", "what it does", "parameters", unbroken=("kind",))
     for kind, element in kinds.items():
         about = (element.__doc__ or "").strip().partition("\n")[0]
         lines = [_parameter(name, *declared) for name, declared in element.parameters().items()]
-        table.add_row(kind, about, "\n".join(lines) or "–")
+        # As text: a formula's v[k] is no markup.
+        table.add_row(kind, Text(about), Text("\n".join(lines) or "–"))
         table.add_section()
     return table
 

@@ -32,7 +32,7 @@ function pushed({ rate_1_s: rate, error_1_s: error, ...found }) {
     "pushed, it swings": `${amount(found.width_m, "m")} ± ${amount(found.spread_m, "m", 2)}`,
     "that is": [...how, found.chaotic && "chaotic"].filter(Boolean).join(", "),
     "force ripple > 30 Hz": amount(found.force_ripple_N, "N"),
-    growth: `${fixed(rate)} ± ${fixed(error, 1)} 1/s`,
+    growth: `${fixed(rate)} ± ${fixed(error, 2)} 1/s`,
     ...(found.blown ? { [`after a blow of ${amount(found.blow_N, "N")}`]: found.blown } : {}),
     "its own in the run's swing": isNumber(found.own_share) ? `${Math.round(100 * found.own_share)} %` : NONE,
   };
