@@ -71,8 +71,10 @@ def test_no_wall_with_any_element_of_a_grid_is_safe_that_is_more_than_a_tenth_st
     choices += [advised_sizes * factor for factor in (0.7, 0.84, 1.0, 1.19, 1.41)]
     stiffness = found.stiffness_N_m * 1.1 * 1.03 ** np.arange(5.0)
     walls = list(product(stiffness, choices))
-    good = safe(device, hold_N, np.array([k for k, _ in walls]), np.array([each for _, each in walls]), most=16)
-    assert not good.any(), [walls[place] for place in np.flatnonzero(good)]
+    for corners in (16, 64):  # few first; what passes there is met as the advised wall is
+        left = np.array([k for k, _ in walls]), np.array([each for _, each in walls]).reshape(-1, len(KIND))
+        walls = [wall for wall, good in zip(walls, safe(device, hold_N, *left, most=corners), strict=True) if good]
+    assert not walls
 
 
 def test_the_wall_that_was_once_advised_for_the_premium_buzzes_at_every_hold_in_nearly_every_corner():

@@ -21,7 +21,7 @@ def extreme(seed: int) -> Scene:
     has = lambda: bool(rng.random() < 0.6)  # noqa: E731
     mass, steps = log_uniform(rng, 1e-3, 10), int(rng.integers(30))
     # Slower than a hundred steps: how fast effects come and go is drawn against the plant rate.
-    stiffness = lambda: log_uniform(rng, 1.0, mass * (3 * rate) ** 2)  # noqa: E731
+    stiffness = lambda: min(log_uniform(rng, 1.0, mass * (3 * rate) ** 2), 1e9)  # noqa: E731
     damping = lambda: mass * log_uniform(rng, 1e-6, 1e4) if has() else 0.0  # noqa: E731
     kinetic = log_uniform(rng, 1e-4, 10)
     tables: dict[str, Any] = {
