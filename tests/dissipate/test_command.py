@@ -13,7 +13,7 @@ from haploop.launch.runs.in_process import run_in_process
 from haploop.launch.scene.toml_writer import to_toml
 from haploop.tools.cli.app import app
 from haploop.tools.dissipate.figure import make_figure
-from haploop.tools.dissipate.report import conclusion
+from haploop.tools.dissipate.report import conclusion, note_sentences
 from haploop.tools.figure.data import FigureError
 from helpers.data.recordings import outcome, write
 from helpers.scenes.least import KINDS, scene
@@ -206,6 +206,9 @@ def test_the_answer_says_who_takes_most_and_who_feeds(tmp_path: Path) -> None:
     assert conclusion(outcome(fast, dampings=["2.7"])) == (
         "none of these would have dissipated; all would have fed the motion."
     )
+    untouched = outcome(slow, dampings=["2.7"], wall="-20 mm")
+    assert conclusion(untouched) == "none of these would have given a force on this motion."
+    assert any("in contact with the wall only" in sentence for sentence in note_sentences(untouched))
     both = conclusion(outcome(slow, dampings=["2.7", "1.35"]))
     assert "2.00 times as much as damping 1.35 N s/m" in both
 

@@ -152,7 +152,8 @@ class Commands:
             return self._swap_tried(change, at, reload)
         if reload:
             known = ", ".join(sorted(self._spec.plugin_sources)) or "none"
-            raise ClockError(f"Only kinds from --plugin files can be reloaded ({known}), but {kind} was asked for.")
+            says = f"Only kinds from files that the run was started with by --plugin can be reloaded ({known})"
+            raise ClockError(f"{says}, but {kind} was asked for.")
         before = self._clock.scene_at(self._clock.tick_at(at)).dissipation
         return self._swapped(change, before, self._clock.change(change, at))
 

@@ -106,7 +106,8 @@ class LogStream:
         if not start:
             raise LogError(f"The log {self.path} is empty: the run ended before anything was written to it.")
         if start != MAGIC:
-            raise LogError(f"{self.path} is no MCAP file: it begins with {start!r}, not with {MAGIC!r}.")
+            begins = f"it begins with {start!r}, not with {MAGIC!r}"
+            raise LogError(f"{self.path} is no MCAP file: {begins}. Give a run's directory or log.")
 
     @property
     def cut(self) -> str:

@@ -74,8 +74,12 @@ def conclusion(outcome: Outcome) -> str:
     if not outcome.elements and outcome.force:
         return _passivity(outcome.force)
     best, *others = sorted(outcome.elements, key=lambda element: element.true_J, reverse=True)
+    if not any(element.strongest_N for element in outcome.elements):
+        return "none of these would have given a force on this motion."
     if best.true_J <= 0.0:
-        return "none of these would have dissipated; all would have fed the motion."
+        return "none of these would have dissipated" + (
+            "; all would have fed the motion." if best.true_J < 0.0 else "."
+        )
     words = f"{best.label} would have dissipated {amount(best.true_J, 'J')}"
     if taking := [f"{_times(best, other)} {other.label}" for other in others[:2] if other.true_J > 0.0]:
         words += f", {' and '.join(taking)}"
@@ -89,6 +93,9 @@ def _times(best: ElementOutcome, other: ElementOutcome) -> str:
     return "as much as" if ratio < 1.005 else f"{fixed(ratio)} times as much as" if ratio < 1e4 else "far more than"
 
 
+_IN_CONTACT = "Elements act in contact with the wall only; one with acts=always would everywhere."
+
+
 def note_sentences(outcome: Outcome) -> list[str]:
     """Returns notes on the recording and on the books, a sentence each."""
     recording, force, (from_s, to_s) = outcome.recording, outcome.force, outcome.span_s
@@ -98,6 +105,7 @@ def note_sentences(outcome: Outcome) -> list[str]:
         f"{notes.rows} samples at {1.0 / recording.period_s:.6g} Hz, {from_s:g} to {to_s:g} s.",
         (f"Taken as recorded: {taken}. " if taken else "") + _estimates(outcome.scene, estimated),
         _truth(outcome),
+        _IN_CONTACT if any(element.acts == "in-contact" for element in outcome.scene.dissipation) else "",
     ]
     if force and outcome.elements:
         said = _passivity(force)

@@ -144,11 +144,12 @@ def _stability(found: Summary) -> list[tuple[str, str]]:
     if found.get("rate_1_s") is None:
         return []
     felt = "felt" if found["felt"] else "not felt"
-    frequency = f"at {amount(found['frequency_Hz'], 'Hz')}, " if found["frequency_Hz"] else ""
+    rests = found["width_m"] < 1e-9  # what is left is rounding
+    frequency = "" if rests or not found["frequency_Hz"] else f"at {amount(found['frequency_Hz'], 'Hz')}, "
     chaotic = ", chaotic" if found["chaotic"] else ""
-    size = f"{amount(found['width_m'], 'm')} +- {amount(found['spread_m'], 'm', 2)} peak to peak"
+    size = "less than 1 nm" if rests else f"{amount(found['width_m'], 'm')} +- {amount(found['spread_m'], 'm', 2)}"
     rows = [
-        ("pushed, it swings", f"{size}, {frequency}{felt}{chaotic}"),
+        ("pushed, it swings", f"{size} peak to peak, {frequency}{felt}{chaotic}"),
         ("force ripple > 30 Hz", f"{amount(found['force_ripple_N'], 'N')} peak to peak"),
         ("growth", f"{found['rate_1_s']:.3g} +- {found['error_1_s']:.2g} 1/s, watched for {found['watched_s']:g} s"),
     ]

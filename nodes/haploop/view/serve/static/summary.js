@@ -29,13 +29,19 @@ function pushed({ rate_1_s: rate, error_1_s: error, ...found }) {
   if (!isNumber(rate)) return {};
   const how = [found.frequency_Hz && `at ${amount(found.frequency_Hz, "Hz")}`, found.felt ? "felt" : "not felt"];
   return {
-    "pushed, it swings": `${amount(found.width_m, "m")} ± ${amount(found.spread_m, "m", 2)}`,
+    "pushed, it swings":
+      found.width_m < 1e-9 ? "less than 1 nm" : `${amount(found.width_m, "m")} ± ${amount(found.spread_m, "m", 2)}`,
     "that is": [...how, found.chaotic && "chaotic"].filter(Boolean).join(", "),
     "force ripple > 30 Hz": amount(found.force_ripple_N, "N"),
     growth: `${fixed(rate)} ± ${fixed(error, 2)} 1/s`,
     ...(found.blown ? { [`after a blow of ${amount(found.blow_N, "N")}`]: found.blown } : {}),
-    "its own in the run's swing": isNumber(found.own_share) ? `${Math.round(100 * found.own_share)} %` : NONE,
+    "its own in the run's swing": share(found.own_share),
   };
+}
+
+function share(own) {
+  if (!isNumber(own)) return NONE;
+  return own < 0.01 ? "less than 1 %" : `${Math.round(100 * own)} %`;
 }
 
 function figures({ duration_s, ended, extremes = {}, real_time_factor: factor, lost = {} }) {
