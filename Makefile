@@ -3,6 +3,7 @@ PYTHON ?= python3
 UV ?= uv
 BIN := .venv/bin
 SEEDS ?= 2000
+N ?= 50
 FROM ?= 0
 PIP := $(PYTHON) -m pip --python $(BIN)/python -qq --disable-pip-version-check --no-input
 READY := .venv/.installed
@@ -12,7 +13,7 @@ QUICK := tests/scene tests/log tests/estimators tests/clock $(patsubst %,tests/p
   energy/test_leak energy/test_energy_per_sample sensing/test_random_stream)
 
 .DEFAULT_GOAL := help
-.PHONY: help demo quick test slow simulate check bench accuracy paper notebook lock clean
+.PHONY: help demo quick test slow simulate faults check bench accuracy paper notebook lock clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-8s %s\n", $$1, $$2 }' Makefile
@@ -34,6 +35,9 @@ slow: $(READY) ## run the slow tests (that there are none is no failure: pytest 
 
 simulate: $(READY) ## play SEEDS simulated histories from seed FROM on; stopped, it goes on where it was
 	@PYTHONPATH=tests $(BIN)/python -m simulation.command --seeds $(SEEDS) --from $(FROM)
+
+faults: $(READY) ## strike N real runs with faults from seed FROM on (about two seconds each)
+	@PYTHONPATH=tests $(BIN)/python -m faults.campaign.command $(FROM) $(N)
 
 check: $(READY) ## lint, format, types and the arrows between the packages
 	@$(BIN)/ruff check

@@ -182,3 +182,7 @@ def test_a_process_is_dead_when_it_has_ended_not_when_it_closes_its_output(has_p
     assert select.select([child.died], [], [], PATIENCE_S)[0] == [child.died]
     assert child.exit_description() == "was killed by SIGKILL"
     child.kill()
+    read_end, write_end = os.pipe()  # one of them has the number that was the child's
+    child.kill()
+    os.close(read_end)
+    os.close(write_end)

@@ -130,7 +130,12 @@ class Launched:
         """Tells whether the process has not ended yet."""
         return self._process.poll() is None
 
-    def end(self, status: int) -> str:
+    @property
+    def status(self) -> int | None:
+        """Its exit status, None while it runs."""
+        return self._process.poll()
+
+    def end(self, status: int | None) -> str:
         """Wait for the end, which must come with this exit status; returns stdout."""
         try:
             stdout, _ = self._process.communicate(timeout=PATIENCE_S)

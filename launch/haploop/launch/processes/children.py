@@ -84,15 +84,17 @@ class Child:
         return True
 
     def kill(self) -> None:
-        """Ends the process now, stopped or not, and reaps it."""
+        """Ends the process now, stopped or not, and reaps it; again, it does nothing more."""
+        if self.died < 0:  # by now another owner may have the number of the descriptor, as one of ZeroMQ's connections
+            return
         with contextlib.suppress(ProcessLookupError):
             self._process.kill()
         self._process.wait()
         if self._process.stdin:
             with contextlib.suppress(OSError):
                 self._process.stdin.close()
-        with contextlib.suppress(OSError):
-            os.close(self.died)
+        os.close(self.died)
+        self.died = -1
 
 
 def _has_pidfd() -> bool:
