@@ -43,8 +43,9 @@ WHY = {
     "leaves the limit": "Its swing grew until the device was beyond its limit.",
     "failed": "The loop failed while it was watched: {detail}",
     "leaves the wall": "Held still, the hand does not keep the device at the wall.",
-    "too slow": "Its swing of {width_mm:.3g} mm peak to peak at {frequency_Hz:.3g} Hz changes by {rate_1_s:.2g} +- "
-    "{error_1_s:.2g} 1/s, too slowly to tell within {watched_s:g} s; some {about_s:.0f} s might tell.",
+    "too slow": "Of its swings of {width_mm:.3g} mm peak to peak at {frequency_Hz:.3g} Hz the steadier changes by "
+    "{rate_1_s:.2g} +- {error_1_s:.2g} 1/s, too slowly, or too unlike the other, to tell within {watched_s:g} s; "
+    "some {about_s:.0f} s might tell.",
 }
 # What is said beside that after a blow, and how the words for its finding are told.
 AFTER_BLOW = {
