@@ -55,6 +55,7 @@ def test_loops_show_nothing_of_those_whose_memory_they_take_over(duration: float
     assert left.x.is_deleted()
 
 
+@pytest.mark.slow
 def test_put_together_for_a_gpu_the_loops_are_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
     """Its program is another, and all of it has a form for CUDA; where there is no GPU, the CPU runs it."""
     from haploop.launch.batch.jax import programs

@@ -17,6 +17,7 @@ FAR = 100_000_000  # steps: 10 000 s
 LONG = Clock(plant_rate=RATE, control_rate=CONTROL, round_trip_delay=0.0013)
 
 
+@pytest.mark.slow
 def test_every_tick_of_a_hundred_million_steps_falls_on_its_step_to_the_last_bit():
     """Step k n and tick k divide to the same float: both are the rounded value of one rational number."""
     ticks = np.arange(FAR // 10 + 1)

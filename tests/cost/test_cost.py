@@ -147,6 +147,7 @@ def test_the_command_measures_prints_and_then_only_prints(smooth, tmp_path):
     assert [p["error"]["rms_m"] < 1e-12 for p in data["scenes"][0]["points"]] == [False, False, True, True]
 
 
+@pytest.mark.slow
 def test_ctrl_c_leaves_what_was_measured_and_the_same_command_goes_on(smooth, tmp_path, monkeypatch):
     command = ["cost", str(smooth), "--rates", "5k", "--methods", "euler", "--repeats", "1", "--no-processes"]
     command += ["--out", str(tmp_path / "out")]

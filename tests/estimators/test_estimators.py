@@ -134,6 +134,7 @@ def test_only_an_estimate_that_reads_the_accelerometer_has_it_sampled():
     assert using == ["accelerometer", "fused"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "sets",
     [

@@ -89,7 +89,7 @@ REFUSED = [
     ("swap", {"swap": SWAP, "at": 0.001}, "is past"),
     ("swap", {"swap": SWAP, "at": 600.0}, "The run ends at tick 600000"),
     ("swap", {"swap": SWAP, "at": math.inf}, "a time from 0 to"),
-    ("swap", {"swap": SWAP, "reload": True}, "Only kinds from --plugin files"),
+    ("swap", {"swap": SWAP, "reload": True}, "Only kinds from files that the run was started with by --plugin"),
     ("swap", {"swap": "damping"}, "must be a table"),
     ("swap", {}, "cannot be used"),
     ("set", {"set": {"wall.stifness": 1.0}}, "wall.stiffness"),
@@ -133,6 +133,7 @@ def test_a_command_without_a_live_run_says_so():
     assert "No run is live" in answer.stderr
 
 
+@pytest.mark.slow
 def test_two_runs_side_by_side_each_give_the_bits_they_give_alone(running):
     """Different scenes at once; a command names the one it means, and the other does not notice."""
     sets = [("duration=3", "event=[{at=1.0, pause=true}]", f"wall.stiffness={k}") for k in (100.0, 200.0)]

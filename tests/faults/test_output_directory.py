@@ -143,6 +143,7 @@ def test_a_signal_in_the_first_half_second_is_never_a_traceback_and_leaves_nothi
         assert complaints.strip()
 
 
+@pytest.mark.slow
 def test_a_run_without_enough_open_files_is_a_sentence_and_leaves_nothing(tmp_path, live_runs_here):
     """As long as ZeroMQ itself does not end the process; what such an end leaves, the next command clears away."""
     limit = "import os, resource, sys; resource.setrlimit(resource.RLIMIT_NOFILE, (int(sys.argv[1]),) * 2)"

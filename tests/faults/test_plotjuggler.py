@@ -95,6 +95,7 @@ def test_every_sample_of_a_run_reaches_plotjuggler_bit_for_bit(pace, tmp_path, c
     assert "0 ticks skipped" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_a_viewer_that_comes_late_gets_everything_from_there_on(tmp_path):
     with going(tmp_path, "duration=1.2", pauses=(5,), pace=1.0) as subject:
         subject.stands_at(5)

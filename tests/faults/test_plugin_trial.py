@@ -137,6 +137,7 @@ def test_what_is_no_python_file_is_a_sentence(kind, scene, tmp_path):
 SWAP: dict[str, Any] = {"swap": {"kind": "brake", "damping": 0.05, "acts": "always"}}
 
 
+@pytest.mark.slow
 def test_a_reload_that_breaks_in_any_way_changes_nothing_and_time_goes_on(running, scene, tmp_path):
     """Neither the element at work, nor its file, nor the kinds at hand, nor one bit of the run."""
     plugin = tmp_path / "brake.py"

@@ -92,6 +92,7 @@ def test_an_observer_that_joins_a_run_in_motion_sees_what_is_logged_and_changes_
     assert_saw_the_log(run, seen)
 
 
+@pytest.mark.slow
 def test_observers_may_join_a_paused_run_leave_it_hold_it_up_and_be_killed_while_it_goes_on(tmp_path: Path) -> None:
     window_of_400 = ("run.block_ticks=100", "run.window_blocks=4")
     with going(tmp_path, "duration=1.5", *window_of_400, pauses=(200, 1400)) as run:

@@ -226,6 +226,7 @@ def test_a_failed_run_says_why(tmp_path):
     follow(play, tmp_path, pauses=(100,))
 
 
+@pytest.mark.slow
 def test_pages_that_come_go_and_say_nothing_leave_the_bits_of_the_run_alone(tmp_path):
     """Snapshots all the while, one page that reads nothing, one that leaves without a word."""
 

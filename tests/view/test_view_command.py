@@ -96,6 +96,7 @@ def test_the_browser_is_opened_with_a_link_that_holds_no_token(launched, tmp_pat
     assert token not in one_time_link
 
 
+@pytest.mark.slow
 def test_run_with_view_serves_the_run_and_stays_until_ctrl_c(launched, tmp_path, monkeypatch):
     """In real time; the run ends, the page shows its summary, and the viewer goes with the launcher."""
     monkeypatch.delenv("DISPLAY", raising=False)
@@ -115,6 +116,7 @@ def test_run_with_view_serves_the_run_and_stays_until_ctrl_c(launched, tmp_path,
     wait_for("the end of the viewer", lambda: not alive(viewers))
 
 
+@pytest.mark.slow
 def test_a_run_waits_for_its_viewer_and_is_shown_however_short_it_is(launched, tmp_path):
     """Twenty ticks at free pace end long before a viewer that started with them."""
     run = launched("run", str(SCENE), "--set", "duration=0.02", "--view", "--pace", "free", out=tmp_path / "out")

@@ -53,6 +53,7 @@ def energies(resolved, x: np.ndarray, v: np.ndarray) -> np.ndarray:
     return m.kinetic_J(v) + m.spring_J(x)
 
 
+@pytest.mark.slow
 def test_an_undamped_swing_keeps_its_energy_to_1e_14_over_a_million_steps():
     """355 swings of 10 N/m and 20 g. Plain addition drifts a hundred times as far."""
     resolved = scene(**SWINGING)
