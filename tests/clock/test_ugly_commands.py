@@ -1,4 +1,4 @@
-"""What a terminal, a page or a program may send as a command: refused with a sentence, or done with the way back."""
+"""Commands that a terminal, a page or a program may send: refused with a sentence, or done with the way back."""
 
 import subprocess
 import sys

@@ -1,4 +1,4 @@
-"""What goes wrong between the start of the processes and the first tick: it is waited for, or named."""
+"""Faults between the start of the processes and the first tick: each is waited for, or named."""
 
 import os
 import signal

@@ -1,4 +1,4 @@
-"""What may happen to processes, network and disk of a run: each with what it excuses, and how long it takes.
+"""Faults of processes, network and disk of a run: each with what it excuses, and how long it takes.
 
 A run may end as a failure only with a sentence that one of its faults excuses; all other histories end in order.
 """

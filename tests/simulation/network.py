@@ -1,4 +1,4 @@
-"""What ZeroMQ does with messages, in virtual time: in order on one connection, in any order between two.
+"""Sockets that treat messages as ZeroMQ does, in virtual time: in order on one connection, in any order between two.
 
 Nothing is lost but what ZeroMQ may lose: blocks of a publisher to a subscriber that is far behind, and what was still
 on its way when a socket was closed without waiting.

@@ -1,4 +1,4 @@
-"""What a seed draws: the scene, the temper of the network, and what happens when; and how little of it still fails.
+"""Plan that a seed draws: the scene, the temper of the network, what happens when; and how little of it still fails.
 
 A failing plan is shortened by delta debugging (Zeller & Hildebrandt 2002).
 """

@@ -1,4 +1,4 @@
-"""Who else comes to a run: people with commands, observers and second loggers, strangers and impostors."""
+"""Visitors of a run: people with commands, observers and second loggers, strangers and impostors."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What must hold after every message: the invariants of a run, read off the wire by one who sees all of it."""
+"""Invariants that must hold after every message: those of a run, read off the wire by one who sees all of it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What strikes a run of real processes: signals, strangers at its sockets, commands, visitors and a rival."""
+"""Faults that strike a run of real processes: signals, strangers at its sockets, commands, visitors and a rival."""
 
 from __future__ import annotations
 

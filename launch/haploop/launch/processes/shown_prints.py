@@ -1,4 +1,4 @@
-"""What the nodes print, on the terminal: the first lines as they come, then few; all of it stands in a file."""
+"""Prints of the nodes on the terminal: the first lines as they come, then few; all of it stands in a file."""
 
 from __future__ import annotations
 

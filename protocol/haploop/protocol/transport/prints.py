@@ -1,4 +1,4 @@
-"""What the code in a node prints: kept in a file of the run, every line marked with the node and its tick."""
+"""Prints of the code in a node: kept in a file of the run, every line marked with the node and its tick."""
 
 from __future__ import annotations
 
