@@ -64,6 +64,7 @@ class Logger:
             self._buffer(block)
         self._end_state = {name: np.array([plant[name]]) for name in ("x", "v", "force")}
         self._started = False
+        self._unlogged: list[Block] = []
 
     def plant_block(self, block: Block) -> None:
         self._plant.add(block)
@@ -71,8 +72,7 @@ class Logger:
 
     def controller_block(self, block: Block) -> None:
         self._buffer(block)
-        if self._channels:
-            self._channels.controller(block)
+        self._unlogged.append(block)
         self._book_common()
 
     def _buffer(self, block: Block) -> None:
@@ -101,6 +101,14 @@ class Logger:
             self.tick = self._first_tick = max(self.tick, self._plant.first_tick_from(self._controller.first))
         while (end := min(self._plant.end, self._controller.part_end(self.tick))) > self.tick:
             self._book(end)
+        if self._started:
+            self._log_controller()
+
+    def _log_controller(self) -> None:
+        """Logs what has come of the controller; one that joins knows its first tick only now."""
+        blocks, self._unlogged = self._unlogged, []
+        for block in blocks if self._channels else ():
+            self._channels.controller(block, self._first_tick)
 
     @np.errstate(over="ignore", invalid="ignore")  # where a force is no finite number, its books are none either
     def _book(self, end: int) -> None:

@@ -41,7 +41,7 @@ class Captured:
         return self.energy["residual_J"] / self.energy["moved_J"]
 
 
-class _CapturingLogger(Logger):
+class CapturingLogger(Logger):
     """A logger that also remembers the blocks it was given."""
 
     def __init__(self, scene: Scene, time: Timebase) -> None:
@@ -61,7 +61,7 @@ class _CapturingLogger(Logger):
 def run(scene: Scene) -> Captured:
     """Run a resolved scene in this process and keep everything."""
     time = Timebase.from_scene(scene)
-    logger = _CapturingLogger(scene, time)
+    logger = CapturingLogger(scene, time)
     loop = Loop(scene, time, KINDS, LogSession(logger, None, None))
     loop.schedule(sorted(scene_events(scene, time), key=lambda event: event[0]))
     while loop.block():

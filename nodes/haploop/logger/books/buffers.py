@@ -125,10 +125,14 @@ class ControllerBuffer:
         return Commanded(self.first, self.columns["x"], {"wall": self.columns["wall"]} | forces, wall)
 
     def forget_before(self, tick: int, command: int) -> None:
-        """Drops the rows before the last tick and before ``command``, in effect then, and books with no force left."""
+        """Drops the rows before the last tick and before ``command``, in effect then, and books with no force left.
+
+        A book that opens from ``tick`` on stays even without a force, so that it opens at its own tick.
+        """
         drop = max(0, min(tick - 1, command) - self.first)
         if drop:
             self.columns = {name: column[drop:] for name, column in self.columns.items()}
-            self.forces = {book: force[drop:] for book, force in self.forces.items() if force[drop:].any()}
+            kept = [book for book, force in self.forces.items() if force[drop:].any() or self._opened[book] >= tick]
+            self.forces = {book: self.forces[book][drop:] for book in kept}
             self.first += drop
         self._part_ends = [end for end in self._part_ends if end > tick]

@@ -64,12 +64,13 @@ class Channels:
         values = np.stack([t, t, *columns.values()], axis=1)
         self._log.write(channel, self._log_times_ns(first, ticks), values.reshape(ticks, samples, len(units)))
 
-    def controller(self, block: Block) -> None:
-        """Writes one message a tick: estimates, the force of wall and elements, their total."""
-        columns = {name: as_float64(data) for name, data in block["columns"].items()}
+    def controller(self, block: Block, since: int) -> None:
+        """Writes one message a tick from ``since`` on: estimates, the force of wall and elements, their total."""
+        first = max(since, block["from_tick"])
+        columns = {name: as_float64(data)[first - block["from_tick"] :] for name, data in block["columns"].items()}
         kinds = ", ".join(f"dissipation.{i} is {e['kind']}" for i, e in enumerate(block["elements"])) or "no element"
         units = {name: CONTROLLER_UNITS.get(name, "N") for name in columns}
-        self._ticks("/controller", f"the controller at every tick; {kinds}", units, block["from_tick"], columns)
+        self._ticks("/controller", f"the controller at every tick; {kinds}", units, first, columns)
 
     def energy(self, first: int, columns: dict[str, np.ndarray]) -> None:
         """Writes one message a tick: the books as they stand."""
@@ -78,6 +79,8 @@ class Channels:
     def _ticks(self, topic: str, title: str, units: dict[str, str], first: int, columns: dict[str, np.ndarray]) -> None:
         channel = self._log.channel(topic, {"timestamp": "s"} | units, title=title)
         ticks = len(next(iter(columns.values())))
+        if not ticks:
+            return
         stamps = np.arange(first, first + ticks) / self._time.control_rate
         self._log.write(channel, self._log_times_ns(first, ticks), np.stack([stamps, *columns.values()], axis=1))
 

@@ -195,7 +195,7 @@ class SampleStream:
             self._channels.plant(first, ticks, motion)
             self._reached = first + ticks, {name: column[-1:] for name, column in motion.items()}
         elif frame.name == "CONTROLLER_BLOCK":
-            self._channels.controller(block)
+            self._channels.controller(block, 0)
         elif frame.name == "ENERGY_BLOCK":
             books = {name: as_float64(data) for name, data in block["columns"].items()}
             self._channels.energy(block["from_tick"], books)
