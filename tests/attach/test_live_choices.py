@@ -5,7 +5,7 @@ import math
 
 import pytest
 
-from haploop.launch.clock.commands import capabilities
+from haploop.launch.clock.capabilities import capabilities
 from haploop.launch.processes.run_directory import CommandRefused
 from haploop.launch.runs.replay import replay
 from haploop.logger import read

@@ -158,6 +158,10 @@ def test_only_what_was_changed_is_set_and_a_number_in_mm_or_ms_goes_out_with_its
     expect(page.locator("#set-do")).to_be_disabled()
 
 
+def test_the_last_change_is_taken_back_by_one_click(stand_in, page):
+    assert order(stand_in, page, lambda: page.click("#undo-do")) == ("undo", {})
+
+
 def test_what_is_being_typed_survives_news_of_the_run_and_the_rest_follows_it(stand_in, page):
     page.fill("[id='set-wall.stiffness']", "180")
     settable = OPTIONS["settable"]
@@ -167,7 +171,7 @@ def test_what_is_being_typed_survives_news_of_the_run_and_the_rest_follows_it(st
     expect(page.locator("[id='set-dissipation.0.damping']")).to_have_value("0.7")
     assert page.input_value("[id='set-wall.stiffness']") == "180"
     expect(page.locator("[id='set-wall.stiffness']")).to_be_focused()
-    page.click("#set-undo")
+    page.click("#set-reset")
     assert page.input_value("[id='set-wall.stiffness']") == "160"
     assert stand_in.commands() == []
 

@@ -133,6 +133,32 @@ def test_the_answer_to_a_change_says_how_to_go_back_and_going_back_does(
     assert (now.wall, now.dissipation, now.clock) == (before.wall, before.dissipation, before.clock)
 
 
+def test_undo_takes_changes_back_one_by_one_the_last_first() -> None:
+    subject = clock()
+    granted(subject, 0)
+    steer = Commands(subject, RunSpec(subject.present(), dict(KINDS), Path("out")), Roster)
+    stood = [subject.scene_at(TICKS)]
+    told = []
+    for verb, arguments in (
+        ("set", {"set": {"wall.stiffness": 200.0}}),
+        ("swap", {"swap": {**DAMPING, "damping": 0.1}, "element": 1}),
+        ("set", {"set": {"wall.stiffness": 300.0, "clock.round_trip_delay": 0.001}, "at": 0.5}),
+        ("swap", {"swap": {"kind": "none"}, "element": 1, "at": 0.7}),
+    ):
+        assert at_once(steer, verb, arguments)[0]
+        stood.append(subject.scene_at(TICKS))
+        told += subject.take_events()
+    for before in reversed(stood[:-1]):
+        ok, text, _ = at_once(steer, "undo", {})
+        assert ok, text
+        now = subject.scene_at(TICKS)
+        assert (now.wall, now.dissipation, now.clock) == (before.wall, before.dissipation, before.clock)
+    assert told == subject.events[:2], "what no node knew of is gone"
+    assert [sorted(event.keys() & {"set", "swap"}) for _, event in subject.events[2:]] == [["swap"], ["set"]]
+    ok, text, _ = at_once(steer, "undo", {})
+    assert (ok, text) == (False, "There is nothing to undo: no swap and no set that a command asked for is left.")
+
+
 def test_no_way_back_is_told_where_one_swap_cannot_go_it() -> None:
     """Of two elements the first is taken out, and the second moves up: it would come back behind it."""
     subject = commands()
@@ -141,3 +167,6 @@ def test_no_way_back_is_told_where_one_swap_cannot_go_it() -> None:
     assert ok
     assert "go back" not in text
     assert "before" not in data
+    ok, text, _ = at_once(subject, "undo", {})
+    assert not ok
+    assert "cannot be undone" in text

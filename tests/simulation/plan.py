@@ -129,6 +129,8 @@ def _commands(dice: Random) -> Commands:
                 kind = dice.choice(({"kind": "none"}, {"kind": "damping", "damping": dice.random()}))
                 arguments = {"swap": kind, "element": dice.randint(0, 1)}
                 commands.append(("swap", arguments, dice.expovariate(100.0)))
+                if arguments["element"]:
+                    commands.append(("undo", {}, 0.003))
             case _:
                 commands.append((*dice.choice(_IMPOSSIBLE), 0.0))
     return Commands(_when(dice), _STAYS, tuple(commands))

@@ -39,6 +39,9 @@ class Clock:
     A tick may be worked on once it is granted; a change takes effect at a tick not yet granted, so every node knows
     of it in time. The grant is the least of: the end, the next pause, the target of a step, the pace, and the
     progress of the slowest lossless node plus the window; and no more than ``MOST_GRANTS`` lie ahead of that node.
+
+    Attributes:
+        newest: the event of the last change asked for; {} when there was none.
     """
 
     def __init__(
@@ -53,6 +56,7 @@ class Clock:
         self._step_target: int | None = None
         self.events: list[tuple[int, Event]] = []
         self._sent = self._settled = 0
+        self.newest: Event = {}
         for event in scene.event:
             self._insert(time.first_tick_at(event.at), event.as_dict())
         self._most_changes = len(scene.event) + MOST_CHANGES
@@ -144,8 +148,20 @@ class Clock:
         tick, event = self.resolved(change, at_s, self._kinds)
         try_out(swapped_in([event]), self._kinds)
         self._scene = replace(self._scene, event=(*self._scene.event, event))
-        self._insert(tick, event.as_dict() | extra)
+        self.newest = event.as_dict() | extra
+        self._insert(tick, self.newest)
         return tick
+
+    def withdraw(self, asked: Event) -> bool:
+        """Takes back what was once ``newest`` as if nobody had asked for it; False where nodes know of it already."""
+        place = next((i for i in range(self._sent, len(self.events)) if self.events[i][1] is asked), None)
+        if place is None:
+            return False
+        del self.events[place]
+        waiting = list(self._scene.event)
+        waiting.remove(next(event for event in reversed(waiting) if event.as_dict().items() <= asked.items()))
+        self._scene = replace(self._scene, event=tuple(waiting))
+        return True
 
     def resolved(self, change: Event, at_s: float | None, kinds: Mapping[str, type[Element]]) -> tuple[int, EventTable]:
         """Returns the tick of a change and the change itself, checked with these kinds; raises as ``change`` does."""

@@ -2,30 +2,27 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
-from collections.abc import Callable, Generator, Mapping, Sequence
+from collections.abc import Callable, Generator, Sequence
 from inspect import signature
 from typing import TYPE_CHECKING, Any
 
 from haploop.controller.dissipation import ElementError, PluginError
+from haploop.launch.clock.capabilities import capabilities
 from haploop.launch.clock.clock import Clock, ClockError
 from haploop.launch.clock.pace import PaceError, pace_of
 from haploop.launch.clock.plugin_swap import swap_plugin
 from haploop.launch.clock.roster import Roster
-from haploop.launch.scene.events import settable_keys
 from haploop.launch.scene.mistakes import SceneError
 from haploop.launch.scene.number import is_exotic
 from haploop.launch.spec import OutputError
-from haploop.protocol.changes import Event
-from haploop.protocol.quantity import Quantity
+from haploop.protocol.changes import Event, describe
 from haploop.protocol.scene.paths import value_at
-from haploop.protocol.scene.scene import NO_ELEMENT, ElementTable, Scene
+from haploop.protocol.scene.scene import NO_ELEMENT, ElementTable
 from haploop.protocol.scene.table import Tables
 from haploop.protocol.transport.wire import Message
 
 if TYPE_CHECKING:
-    from haploop.controller.dissipation import Element
     from haploop.launch.spec import RunSpec
 
 Done = tuple[str, Message]
@@ -51,6 +48,8 @@ class Commands:
         self._clock, self._spec, self._roster = clock, spec, roster
         self._rate = spec.scene.clock.control_rate
         self._is_trying = False
+        # Of each change: its event, and the change that would take it back, None where none can.
+        self._undo_by: list[tuple[Event, Event | None]] = []
         self._verbs = {
             "status": self._status,
             "options": self._options,
@@ -61,6 +60,7 @@ class Commands:
             "stop": self._stop,
             "swap": self._swap,
             "set": self._set,
+            "undo": self._undo,
         }
 
     def __call__(self, verb: str, arguments: Message) -> Answer | Generator[None, None, Answer]:
@@ -166,6 +166,7 @@ class Commands:
         finally:
             self._is_trying = False
         if reload:  # the code before is gone from here: no swap brings it back
+            self._undo_by.append((self._clock.newest, None))
             return f"element {change['element']} becomes {change['swap']['kind']} at {self._at(tick)}", {"tick": tick}
         return self._swapped(change, before, tick)
 
@@ -174,11 +175,14 @@ class Commands:
         swap, element = change["swap"], change["element"]
         text, data = f"element {element} becomes {swap['kind']} at {self._at(tick)}", {"tick": tick}
         if swap["kind"] == NO_ELEMENT and element < len(before) - 1:  # those after it move up: no swap brings it back
+            self._undo_by.append((self._clock.newest, None))
             return text, data
         back = before[element].as_dict() if element < len(before) else {"kind": NO_ELEMENT}
         words = " ".join([back["kind"], *(f"{key}={value}" for key, value in back.items() if key != "kind")])
         where = f" --element {element}" if element else ""
-        return f"{text}; to go back: swap {words}{where}", data | {"before": {"swap": back, "element": element}}
+        undo: Event = {"swap": back, "element": element}
+        self._undo_by.append((self._clock.newest, undo))
+        return f"{text}; to go back: swap {words}{where}", data | {"before": undo}
 
     def _set(self, set: dict[str, float], at: float | None = None) -> tuple[str, Message]:
         before = self._clock.scene_at(self._clock.tick_at(at))
@@ -186,7 +190,27 @@ class Commands:
         what = ", ".join(f"{key} = {value}" for key, value in set.items())
         back = {key: value_at(before, key) for key in set}
         words = " ".join(f"{key}={value}" for key, value in back.items())
+        self._undo_by.append((self._clock.newest, {"set": back}))
         return f"{what} from {self._at(tick)} on; to go back: set {words}", {"tick": tick, "before": {"set": back}}
+
+    def _undo(self) -> tuple[str, Message]:
+        """Takes the last swap or set back: out of the future where it still lies there, else by another change at once.
+
+        An element comes back with the parameters it had, and begins anew: what it remembered is gone.
+        """
+        if not self._undo_by:
+            raise ClockError("There is nothing to undo: no swap and no set that a command asked for is left.")
+        asked, back = self._undo_by[-1]
+        if back is None:
+            raise ClockError("The last change cannot be undone: no swap brings back what was there before it.")
+        what = describe(asked)
+        if self._clock.withdraw(asked):
+            text, data = f"{what} will not happen", {}
+        else:
+            tick = self._clock.change(back)
+            text, data = f"{what} is undone: {describe(back)} at {self._at(tick)}", {"tick": tick, **back}
+        self._undo_by.pop()
+        return text, data
 
 
 def _refusal(verb: str, error: Exception) -> Answer:
@@ -227,29 +251,3 @@ def _check_burden(arguments: Message) -> None:
         if isinstance(value, str) and is_exotic(value):
             raise ClockError(f"{value!r} has a unit that a running loop does not know; it knows {_UNITS}.")
         left += [(one, depth + 1) for one in inner]
-
-
-def capabilities(scene: Scene, kinds: Mapping[str, type[Element]]) -> Message:
-    """Returns the keys that can be set and the kinds that can be swapped in, as plain values.
-
-    Returns:
-        ``settable``: key -> unit, bounds and present value; ``kinds``: kind -> what it does and its parameters with
-        unit, bounds and default; ``elements``: those at work. A bound or default that is not there is None.
-    """
-    keys = settable_keys([element.name for element in scene.dissipation], scene.wall is not None, kinds)
-    return {
-        "settable": {key: {**number.quantity.as_dict(), "value": value_at(scene, key)} for key, number in keys.items()},
-        "kinds": {
-            kind: {"about": (element.__doc__ or "").strip().partition("\n")[0], "parameters": _parameters(element)}
-            for kind, element in kinds.items()
-        },
-        "elements": [element.as_dict() for element in scene.dissipation],
-    }
-
-
-def _parameters(element: type[Element]) -> dict[str, Message]:
-    declared: dict[str, tuple[Quantity, Any]] = element.parameters()
-    return {
-        name: {**quantity.as_dict(), "default": None if default is dataclasses.MISSING else default}
-        for name, (quantity, default) in declared.items()
-    }

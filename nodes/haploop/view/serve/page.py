@@ -25,7 +25,7 @@ _LONGEST_REASON = 120
 _FEWEST_POINTS, _MOST_POINTS = 50, 8000
 _LONGEST_S = 1e9
 # Commands that a page may send; the clock answers more.
-_VERBS = ("pause", "resume", "step", "stop", "swap", "set", "pace")
+_VERBS = ("pause", "resume", "step", "stop", "swap", "set", "undo", "pace")
 
 
 class Page:

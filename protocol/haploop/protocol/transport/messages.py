@@ -99,7 +99,7 @@ MESSAGES: dict[str, Message] = {
     "ABORT": _message(11, "clock", "clock", "node", "reason:text", "The run failed elsewhere: save what there is and leave."),
     "LEAVE": _message(12, "clock", "node", "clock", "tick:int", "An attached node goes; the run goes on."),
     # Commands from people
-    "COMMAND": _message(13, "clock", "client", "clock", "verb:text arguments:map", "status, options, pause, resume, step, pace, stop, swap, set."),
+    "COMMAND": _message(13, "clock", "client", "clock", "verb:text arguments:map", "status, options, pause, resume, step, pace, stop, swap, set, undo."),
     "REPLY": _message(14, "clock", "clock", "client", "ok:bool text:text data:map", "What became of the command."),
     # The loop itself
     "HELLO": _message(20, "loop", "controller", "plant", "secret:text", "The controller presents itself; answered with HELLO."),

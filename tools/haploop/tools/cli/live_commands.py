@@ -110,6 +110,11 @@ def set_(
     _ask(run, json, "set", set=parse_assignments(parameters), at=parse_seconds(at))
 
 
+def undo(run: Run = None, json: Json = False) -> None:
+    """Take back the last swap or set of a running loop that a command made."""
+    _ask(run, json, "undo")
+
+
 def attach(
     what: Annotated[str, typer.Argument(help="logger, print or plotjuggler", show_default=False)],
     out: Annotated[Path | None, typer.Option(help="directory of the attached logger [runs/RUN-TIME]")] = None,

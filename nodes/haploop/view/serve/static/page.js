@@ -39,6 +39,7 @@ const time = new TimeControls(steering);
 const view = new ViewControls(viewport);
 const swapForm = new SwapForm(steering);
 const setForm = new SetForm(steering);
+byId("undo-do").addEventListener("click", () => steering.order("undo"));
 
 function onConnection(isThere) {
   connected = isThere;
@@ -65,7 +66,7 @@ function showState() {
   showSummary(state);
   time.update(state);
   const goesOn = Boolean(state.options) && !state.summary;
-  byId("swap").hidden = byId("set").hidden = !goesOn;
+  byId("swap").hidden = byId("set").hidden = byId("undo").hidden = !goesOn;
   byId("nothing-yet").hidden = goesOn || Boolean(state.summary);
   if (state.options) {
     swapForm.update(state.options);

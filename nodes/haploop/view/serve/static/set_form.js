@@ -13,7 +13,7 @@ export class SetForm {
     form.addEventListener("input", () => this.note());
     form.addEventListener("reset", (event) => {
       event.preventDefault();
-      this.undo();
+      this.reset();
     });
     form.addEventListener("submit", (event) => {
       event.preventDefault();
@@ -51,10 +51,10 @@ export class SetForm {
   /** Mark what was changed, and allow setting it. */
   note() {
     for (const { element, touched } of this.fields) element.classList.toggle("changed", touched);
-    byId("set-do").disabled = byId("set-undo").disabled = this.changed().length === 0;
+    byId("set-do").disabled = byId("set-reset").disabled = this.changed().length === 0;
   }
 
-  undo() {
+  reset() {
     for (const field of this.fields) field.reset();
     put(byId("set-problem"), "");
     this.note();

@@ -1,0 +1,42 @@
+"""What a running loop lets itself be changed to: keys that can be set, kinds that can be swapped in."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from haploop.launch.scene.events import settable_keys
+from haploop.protocol.quantity import Quantity
+from haploop.protocol.scene.paths import value_at
+from haploop.protocol.scene.scene import Scene
+from haploop.protocol.transport.wire import Message
+
+if TYPE_CHECKING:
+    from haploop.controller.dissipation import Element
+
+
+def capabilities(scene: Scene, kinds: Mapping[str, type[Element]]) -> Message:
+    """Returns the keys that can be set and the kinds that can be swapped in, as plain values.
+
+    Returns:
+        ``settable``: key -> unit, bounds and present value; ``kinds``: kind -> what it does and its parameters with
+        unit, bounds and default; ``elements``: those at work. A bound or default that is not there is None.
+    """
+    keys = settable_keys([element.name for element in scene.dissipation], scene.wall is not None, kinds)
+    return {
+        "settable": {key: {**number.quantity.as_dict(), "value": value_at(scene, key)} for key, number in keys.items()},
+        "kinds": {
+            kind: {"about": (element.__doc__ or "").strip().partition("\n")[0], "parameters": _parameters(element)}
+            for kind, element in kinds.items()
+        },
+        "elements": [element.as_dict() for element in scene.dissipation],
+    }
+
+
+def _parameters(element: type[Element]) -> dict[str, Message]:
+    declared: dict[str, tuple[Quantity, Any]] = element.parameters()
+    return {
+        name: {**quantity.as_dict(), "default": None if default is dataclasses.MISSING else default}
+        for name, (quantity, default) in declared.items()
+    }
