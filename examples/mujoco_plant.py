@@ -9,7 +9,8 @@ Needs mujoco (pip install mujoco), pyzmq and msgpack. The joint is the device, a
 import argparse
 
 import mujoco
-from seat import hand_force, take_seat
+from hand import hand_force
+from seat import take_seat
 
 INTEGRATORS = {name: getattr(mujoco.mjtIntegrator, f"mjINT_{name.upper()}") for name in ("rk4", "euler", "implicit")}
 # The device of the scene: a mass on a rail, with its viscous damping.

@@ -6,18 +6,20 @@ A device is a function from the force held over a plant step, N, to position and
     seat.run(step, x, v)
 """
 
+import gc
 import json
 import math
 import os
+import select
 import sys
 import threading
 import time
 from array import array
-from bisect import bisect_right
 from collections import deque
 
 import msgpack
 import zmq
+from schedule import Schedule
 
 VERSION = 1
 JOIN, WELCOME, REFUSED, READY, GRANT, PROGRESS, WAITING, ENDED, DONE, FAILED, ABORT = range(1, 12)
@@ -28,6 +30,8 @@ KNOWN = {"title", "duration", "seed", "diverged_beyond", "clock", "device", "han
 KNOWN |= {"wall", "velocity", "acceleration", "dissipation", "event"}
 DELAY = "clock.round_trip_delay"
 BLOCK_S, SAY_MS = 0.01, 200
+# A controller that has not answered for so long does not lead a device any more.
+PATIENCE_S = 1.0
 
 
 class SeatError(Exception):
@@ -40,14 +44,14 @@ def take_seat(name, version):
     The last argument is the directory for sockets and stdin brings a line of JSON: address, secret, transport, cores.
     """
     directory, start = sys.argv.pop(), json.loads(sys.stdin.readline())
-    threading.Thread(target=_end_with_launcher, daemon=True).start()
-    if start.get("cores"):
-        os.sched_setaffinity(0, start["cores"])
-    return Seat(directory, start, {"name": name, "version": version, "command": " ".join(sys.argv)})
+    seat = Seat(directory, start, {"name": name, "version": version, "command": " ".join(sys.argv)})
+    threading.Thread(target=_end_with_launcher, args=(seat,), daemon=True).start()
+    return seat
 
 
-def _end_with_launcher():
+def _end_with_launcher(seat):
     sys.stdin.read()
+    seat.hold(0.0)
     os._exit(1)
 
 
@@ -60,7 +64,7 @@ class Seat:
     """
 
     def __init__(self, directory, start, program):
-        self._context, self._program = zmq.Context(), program
+        self._context, self._program, self.hold = zmq.Context(), program, lambda force: None
         self._clock = self._socket(zmq.DEALER)
         self._clock.connect(start["address"])
         self._loop, self._telemetry = self._socket(zmq.ROUTER), self._socket(zmq.XPUB)
@@ -112,6 +116,8 @@ class Seat:
         if self._tick >= self._until and not self._last:
             self._say(PROGRESS, self._tick, {})
         while self._tick >= self._until and not self._last:
+            if self._owns_time and self._tick and not self._listen():
+                raise SeatError(f"Tick {self._tick} was not granted in time; set run.window_blocks to more.")
             if not self._listen(SAY_MS if self._tick == self._first else int(BLOCK_S * 1000)):
                 self._flush()
                 self._idle("clock")
@@ -122,36 +128,47 @@ class Seat:
 
     # The run
 
-    def run(self, step, x, v):
-        """Goes through the run with a device at x, v (m, m/s) and reports to the clock how that ended."""
+    def run(self, step, x, v, hold=lambda force: None):
+        """Goes through the run with a device at x, v (m, m/s) and reports to the clock how that ended.
+
+        Args:
+            hold: called at every tick of a run whose plant owns the time, with the force from now on, N; and with 0
+                at the end, however that comes.
+        """
+        self.hold = hold
         try:
             if asked := _beyond(self.scene):
                 raise SeatError(f"This plant has one force in and one position out, but no {asked}; leave it out.")
             self._work(step, float(x), float(v))
         except Exception as error:
             self._say(FAILED, -1, str(error) if isinstance(error, SeatError) else f"{type(error).__name__}: {error}")
-            self._context.destroy(linger=1000)
             raise SystemExit(1) from error
-        self._say(DONE, self._tick, {})
-        self._context.destroy(linger=1000)
+        else:
+            self._say(DONE, self._tick, {"lateness": self._schedule.figures()} if self._owns_time else {})
+        finally:
+            hold(0.0)
+            self._context.destroy(linger=1000)
 
     def _work(self, step, x, v):
         self._tick, self._x, self._v, self._force, self._command = 0, x, v, 0.0, -1
+        self._coming, self._answered = deque(), 0  # [step of effect, force or None, tick] of the commands to come
+        self._owns_time = self._told.get("clock") == "plant"
+        if self._owns_time and (self._delay == 0 or self._delay % self._n):
+            raise SeatError("A plant that owns the time needs clock.round_trip_delay of whole control periods, not 0.")
+        self._schedule = Schedule(self._n * self.step_s, self._delay * self.step_s)
         self._begin_block()
         self._greet()
         self._serve_first()
         self._say(READY, 0)
-        coming, reason = deque(), ""  # (step of effect, force, tick) of the commands on their way
+        gc.freeze()
+        reason = ""
         while not reason:
             self._await_grant()
             if self._tick >= self._until:
                 break
-            tick, effect = self._tick, self._tick * self._n + self._delay_at(self._tick)
-            force = self._exchange(tick, self._measured())
-            while coming and coming[-1][0] > effect:
-                coming.pop()
-            coming.append((effect, force, tick))
-            reason = self._interval(step, coming)
+            self._sample()
+            reason = self._unusable() or (self._tick_in_time() if self._owns_time else self._await_answer())
+            reason = reason or self._interval(step)
             if self._tick - self._first >= self.scene["run"]["block_ticks"] or time.monotonic() - self._began > BLOCK_S:
                 self._flush()
                 self._listen()
@@ -172,21 +189,52 @@ class Seat:
         whole = round if encoder["rounding"] == "nearest" else math.floor
         return encoder["resolution"] * whole(self._x / encoder["resolution"])
 
-    def _interval(self, step, coming):
+    def _unusable(self):
+        for effect, force, command in self._coming:
+            if effect < (self._tick + 1) * self._n and force is not None and not math.isfinite(force):
+                return f"command {command} was {force}, which no device can apply, at tick {self._tick}"
+        return ""
+
+    def _take_due(self, now):
+        """Holds the command that takes effect at a plant step; where its answer has not come, the safe force, 0."""
+        while self._coming and self._coming[0][0] <= now:
+            _, force, command = self._coming.popleft()
+            self._force, self._command = (0.0, -1) if force is None else (force, command)
+
+    def _interval(self, step):
         """Moves the device from this tick to the next; returns why the run has to end there, "" where it need not."""
         limit, at = self.scene["diverged_beyond"], self._tick * self._n
-        for effect, force, command in coming:
-            if effect < at + self._n and not math.isfinite(force):
-                return f"command {command} was {force}, which no device can apply, at tick {self._tick}"
         for now in range(at, at + self._n):
-            while coming and coming[0][0] <= now:
-                _, self._force, self._command = coming.popleft()
+            self._take_due(now)
             self._note()
             self._x, self._v = step(self._force)
         self._tick += 1
         if -limit <= self._x <= limit:
             return ""
         return f"the device was at {self._x:g} m, beyond the limit of {limit:g} m, at tick {self._tick}"
+
+    def _tick_in_time(self):
+        """Holds the force of this tick and takes answers until the next is due; returns why the run has to end here."""
+        self._schedule.begin(self._tick)
+        while self._ready_by(0.0):
+            self._take_answer()
+        if self._tick - self._answered > PATIENCE_S / (self._n * self.step_s):
+            return f"the controller had not answered for {PATIENCE_S:g} s, at tick {self._tick}"
+        if reason := self._unusable():
+            return reason
+        self._take_due(self._tick * self._n)
+        self.hold(self._force)
+        while self._ready_by(self._schedule.due(self._tick + 1)):
+            self._take_answer()
+        return ""
+
+    def _ready_by(self, when):
+        """Waits for a message of the loop up to a time, to less than a ms; tells whether there is one."""
+        while not self._loop.getsockopt(zmq.EVENTS) & zmq.POLLIN:
+            if (left := when - time.monotonic()) <= 0.0:
+                return False
+            select.select([self._loop], [], [], left)
+        return True
 
     # The controller
 
@@ -213,14 +261,31 @@ class Seat:
         except zmq.ZMQError:  # the controller has gone, which the clock sees too
             self._idle("controller")
 
-    def _exchange(self, tick, measured):
-        self._send(SAMPLES, tick, [[measured]])
+    def _sample(self):
+        tick, effect = self._tick, self._tick * self._n + self._delay_at(self._tick)
+        while self._coming and self._coming[-1][0] > effect:
+            self._coming.pop()
+        self._coming.append([effect, None, tick])
+        self._send(SAMPLES, tick, [[self._measured()]])
+
+    def _await_answer(self):
+        while self._answered <= self._tick:
+            self._take_answer()
+        return self._unusable()
+
+    def _take_answer(self):
         sender, frame = self._hear()
-        while sender != self._partner:
-            sender, frame = self._hear()
+        if sender != self._partner:
+            return
+        tick = self._answered
         if not (isinstance(frame, list) and frame[:3] == [VERSION, COMMANDS, tick] and len(frame[3]) == 1):
             raise SeatError(f"A command of tick {tick} was expected of the controller, but {str(frame)[:80]} came.")
-        return float(frame[3][0])
+        self._answered += 1
+        awaited = [command for command in self._coming if command[2] == tick]
+        if awaited:
+            awaited[0][1] = float(frame[3][0])
+        if self._owns_time:
+            self._schedule.answered(tick, not awaited)
 
     # Telemetry
 
@@ -259,7 +324,8 @@ class Seat:
             self._note()
             columns = {name: column.tobytes() for name, column in self._rows.items()}
             self._publish(PLANT_BLOCK, self._first, ticks, columns | {"x_low": bytes(len(columns["x"]))})
-            self._say(PROGRESS, self._tick, {})
+            status = {"lateness": self._schedule.figures()} if self._owns_time and self._schedule.says_so() else {}
+            self._say(PROGRESS, self._tick, status)
         self._begin_block()
         self._serve()
 
@@ -272,36 +338,3 @@ def _beyond(scene):
         return "hand.grip"
     by_sensor = (scene.get("acceleration") or {}).get("source") == "accelerometer"
     return "accelerometer" if by_sensor or (scene.get("velocity") or {}).get("accelerometer") else None
-
-
-def hand_force(scene):
-    """Returns the force of the hand's muscles, N, as a function of the time in s, as [hand.force] of a scene has it."""
-    table = (scene.get("hand") or {}).get("force") or {"kind": "constant", "value": 0.0}
-    kind, value = table["kind"], table.get("value", 0.0)
-    if kind == "constant":
-        return lambda t: value
-    if kind == "step":
-        return lambda t: value if t >= table["at"] else 0.0
-    if kind == "ramp":
-        return lambda t: value * min(t / table["rise_time"], 1.0)
-    if kind == "minimum-jerk":
-        return lambda t: value * _minimum_jerk(min(t / table["rise_time"], 1.0))
-    if kind == "sine":
-        turn, phase = 2 * math.pi * table["frequency"], table.get("phase", 0.0)
-        return lambda t: table.get("offset", 0.0) + table["amplitude"] * math.sin(turn * t + phase)
-    if kind == "trace":
-        times, forces = table["time"], table["force"]
-        return lambda t: _between(t, times, forces)
-    raise SeatError(f"A hand's force of kind {kind!r} is not known here.")
-
-
-def _minimum_jerk(s):
-    return s**3 * (10.0 + s * (6.0 * s - 15.0))
-
-
-def _between(t, times, forces):
-    after = bisect_right(times, t)
-    if after in (0, len(times)):
-        return forces[min(after, len(times) - 1)]
-    share = (t - times[after - 1]) / (times[after] - times[after - 1])
-    return forces[after - 1] + share * (forces[after] - forces[after - 1])
