@@ -75,3 +75,9 @@ def test_a_logger_whose_plant_is_ahead_when_it_joins_logs_the_controller_from_it
     whole = logged(plant, controller, "c" * len(controller) + "p" * len(plant))
     for name, column in log["/controller"].items():
         np.testing.assert_array_equal(column, whole["/controller"][name][first:], err_msg=name)
+
+
+def test_what_the_controller_sent_is_logged_even_where_nothing_came_of_the_plant(sent):
+    plant, controller = sent
+    log = logged(plant, controller, "c" * len(controller))
+    assert len(log["/controller"]["x"]) == TIME.ticks

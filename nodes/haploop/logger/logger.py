@@ -151,7 +151,8 @@ class Logger:
         return f"{kind}{f'-{number}' if number > 1 else ''}{dot}{side}"
 
     def end(self) -> None:
-        """Writes the end state; call once, when no more blocks come."""
+        """Writes the end state, and what the controller sent though nothing was booked; call once, at the end."""
+        self._log_controller()
         if self._channels:
             self._channels.plant_end(self.tick, self._end_state)
 
