@@ -21,7 +21,7 @@ import msgpack
 import zmq
 from schedule import Schedule
 
-VERSION = 1
+VERSION = 2
 JOIN, WELCOME, REFUSED, READY, GRANT, PROGRESS, WAITING, ENDED, DONE, FAILED, ABORT = range(1, 12)
 HELLO, SAMPLES, COMMANDS, LAST = range(20, 24)
 STATE, PLANT_BLOCK, END = 30, 31, 34
@@ -73,7 +73,7 @@ class Seat:
         self._loop.bind(endpoints["loop"])
         self._telemetry.bind(endpoints["telemetry"])
         self._until, self._last, self._events, self._secret = 0, False, [], start["secret"]
-        self._say(JOIN, "plant", self._secret, os.getpid(), endpoints, True)
+        self._say(JOIN, "plant", self._secret, os.getpid(), endpoints, True, self._program)
         _, self.scene, timebase, _, _, self._told = self._welcome()
         self._ticks, self._delay = timebase["ticks"], timebase["delay_steps"]
         self._n, self.step_s = timebase["plant_rate"] // timebase["control_rate"], 1.0 / timebase["plant_rate"]

@@ -53,7 +53,7 @@ def test_the_deadline_of_a_running_loop_does_not_rule_its_start(tmp_path: Path) 
 def test_a_node_that_comes_with_a_wrong_secret_is_named_at_once(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def start(role: str, sockets: Path, told: dict[str, Any]) -> children.Child:
+    def start(role: str, sockets: Path, told: dict[str, Any], *_: Any) -> children.Child:
         return real(role, sockets, {**told, "secret": "0" * 32} if role == "controller" else told)
 
     real = children.Child

@@ -142,8 +142,8 @@ def test_nesting_of_any_depth_ends_in_nothing_but_a_refusal(depth: int, head: by
     deep = head * depth + b"\x01" * (depth + 1 if head == b"\x81" else 1)
     data = {
         "version": b"\x92" + deep + b"\x04",
-        "code": b"\x92\x01" + deep,
-        "field": b"\x93\x01\x04" + deep,
+        "code": b"\x92\x02" + deep,
+        "field": b"\x93\x02\x04" + deep,
         "whole": deep,
     }[place]
     with pytest.raises(WireError):
@@ -159,7 +159,7 @@ def test_the_largest_whole_numbers_of_the_wire_come_through_and_larger_ones_cann
 
 def test_keys_that_cannot_be_keys_are_refused() -> None:
     for key in ([], {}, [1, [2]]):
-        items = b"\x94\x01\x06\x00\x81" + pack(key) + b"\x00"
+        items = b"\x94\x02\x06\x00\x81" + pack(key) + b"\x00"
         with pytest.raises(WireError):
             decode(items)
 

@@ -244,6 +244,6 @@ class Impostor(Visit):
         context = sim.run.context(process)
         sender = context.socket(zmq.DEALER)
         sender.connect(sim.run.clock)
-        sender.send(encode("JOIN", self.role, sim.run.secret, 1, {}, True))
+        sender.send(encode("JOIN", self.role, sim.run.secret, 1, {}, True, {}))
         process.sleep(1.0)
         context.destroy(linger=0)

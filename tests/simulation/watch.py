@@ -10,7 +10,7 @@ import msgpack
 import zmq
 
 from haploop.protocol.changes import Event
-from haploop.protocol.transport.messages import BY_CODE
+from haploop.protocol.transport.messages import BY_CODE, VERSION
 from haploop.protocol.transport.wire import decode
 from simulation.world import Process
 
@@ -29,7 +29,7 @@ class Violation(Exception):
 
 def name_of(data: bytes) -> str:
     """Returns the name of the message in a frame, by its first bytes; "" for none."""
-    return BY_CODE.get(data[2], "") if len(data) > 2 and data[0] & 0xF0 == 0x90 and data[1] == 1 else ""
+    return BY_CODE.get(data[2], "") if len(data) > 2 and data[0] & 0xF0 == 0x90 and data[1] == VERSION else ""
 
 
 def ints(data: bytes, count: int) -> list[int]:

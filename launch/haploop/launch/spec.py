@@ -6,12 +6,13 @@ import contextlib
 import hashlib
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from itertools import chain, count
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from haploop.launch.processes.foreign import WAIT_S, Program
 from haploop.launch.scene.toml_writer import to_toml
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.transport.sockets import Transport
@@ -45,6 +46,9 @@ class RunSpec:
         plugin_files: kind -> the file within ``out`` that it is at work from; a reloaded one changes it.
         pace: simulated seconds per wall second; infinite for as fast as possible. For processes only.
         transport: addresses and keys of the sockets. For processes only.
+        programs: programs of others that take the place of plant or controller, by role; no scene names them. For
+            processes only.
+        wait_s: how long a program that somebody else starts is awaited, s.
         on_progress: called now and then with the logger's status.
         on_started: called once with the run's id, and the clock's address where that is one of TCP. For processes
             only.
@@ -61,6 +65,8 @@ class RunSpec:
     plugin_files: dict[str, Path] = field(default_factory=dict)
     pace: float = math.inf
     transport: Transport = field(default_factory=Transport)
+    programs: Mapping[str, Program] = field(default_factory=dict[str, Program])
+    wait_s: float = WAIT_S
     on_progress: Callable[[Message], None] = lambda status: None
     on_started: Callable[[str], None] = lambda run_id: None
     start_gate: Callable[[set[int]], bool] = lambda ready: True

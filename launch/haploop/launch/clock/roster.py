@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from haploop.launch.processes.foreign import NO_PROGRAMS, Program
 from haploop.protocol.transport.messages import PROCESSES
 from haploop.protocol.transport.wire import Message
 
@@ -16,6 +18,7 @@ class Node:
         role, pid, lossless: as it said when it joined; a lossless node holds the clock back.
         tick: every tick before it is done.
         heard: wall time of its last message, s.
+        program: name, version and command of what it is, as it said; each a text that may be missing.
     """
 
     identity: bytes
@@ -24,6 +27,7 @@ class Node:
     lossless: bool
     endpoints: dict[str, str]
     heard: float
+    program: dict[str, str] = field(default_factory=dict[str, str])
     tick: int = 0
     ready: bool = False
     done: bool = False
@@ -39,17 +43,25 @@ class Node:
 class Roster:
     """The nodes of a run by their identity on the clock's socket.
 
+    Args:
+        programs: programs of others that take the place of the run's own processes, by role.
+
     Attributes:
         refused: role -> why the last that asked to join as one was not let in; others than the run's are observers.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, programs: Mapping[str, Program] = NO_PROGRAMS) -> None:
+        self._programs = programs
         self.nodes: dict[bytes, Node] = {}
         self.refused: dict[str, str] = {}
 
     def own(self, role: str) -> Node | None:
         """Returns the run's own process of this role, None before it has joined."""
         return next((node for node in self.nodes.values() if node.role == role), None)
+
+    def label(self, role: str) -> str:
+        """Returns how people are told of a role: by its program, too, where that is somebody else's."""
+        return self._programs[role].label if role in self._programs else role
 
     def all_own(self, what: str) -> bool:
         """Tells whether all the run's own processes have joined and ``what`` ("ready", "done") holds for each."""

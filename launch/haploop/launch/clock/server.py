@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +10,7 @@ import zmq
 
 from haploop.launch.clock.clock import Clock
 from haploop.launch.clock.roster import Node, Roster
+from haploop.launch.processes.foreign import NO_PROGRAMS, Program
 from haploop.launch.spec import RunFailed
 from haploop.protocol.changes import refusals_of
 from haploop.protocol.transport.machine import machine_of
@@ -25,6 +26,7 @@ _AT_ONCE = 200
 # A frame of anybody but the run's own processes, bytes: what is larger takes ms to read.
 _LARGEST_OF_STRANGERS = 32 * 1024
 _LONGEST_ROLE = 40
+_PROGRAM_KEYS, _LONGEST_TEXT = ("name", "version", "command"), 200
 
 
 class ClockServer:
@@ -44,12 +46,13 @@ class ClockServer:
         welcome: tuple[str, Message, Message, Message],
         command: Command,
         start_gate: Callable[[set[int]], bool],
+        programs: Mapping[str, Program] = NO_PROGRAMS,
     ) -> None:
         self.socket = open_socket(context, zmq.ROUTER)
         self._machine = machine_of(context)
         self.address = bind(self.socket, sockets, "clock")
         self._secret, self._clock, self._welcome, self._command = secret, clock, welcome, command
-        self.roster = Roster()
+        self.roster = Roster(programs)
         self.results: dict[str, Message] = {}
         self.unknown_peers = 0
         self._sender = b""  # of a message of which frames are still to be taken
@@ -177,6 +180,7 @@ class ClockServer:
     def _join(self, sender: bytes, request: Message) -> None:
         role = request["role"]
         known = role in PROCESSES
+        program = {key: request["program"][key] for key in _PROGRAM_KEYS if key in request["program"]}
         reason = ""
         if known and request["secret"] != self._secret:
             reason = f"JOIN as {role}, a role of the run's own process, came with a wrong secret; join as an observer."
@@ -194,13 +198,15 @@ class ClockServer:
             reason = (
                 f"JOIN.endpoints of the {role} must have the address of its {' and '.join(sorted(missing))} socket."
             )
+        elif not all(isinstance(v, str) and len(v) <= _LONGEST_TEXT for v in program.values()):
+            reason = f"JOIN.program holds texts of at most {_LONGEST_TEXT} characters: {', '.join(_PROGRAM_KEYS)}."
         if reason:
             if known:
                 self.roster.refused[role] = reason
             self._send(sender, "REFUSED", reason)
             return
         lossless = request["lossless"] and role not in ("plant", "controller")
-        node = Node(sender, role, request["pid"], lossless, request["endpoints"], self._machine.now())
+        node = Node(sender, role, request["pid"], lossless, request["endpoints"], self._machine.now(), program)
         node.tick = 0 if known else self._clock.until
         self.roster.nodes[sender] = node
         if not known:
@@ -249,7 +255,7 @@ class ClockServer:
 
     def _on_failed(self, node: Node, tick: int, reason: str) -> None:
         if node.is_own:
-            raise RunFailed(f"The {node.role} failed: {reason}")
+            raise RunFailed(f"The {self.roster.label(node.role)} failed: {reason}")
         del self.roster.nodes[node.identity]
 
     def drop(self, node: Node, reason: str) -> None:

@@ -8,13 +8,17 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+from haploop.launch.processes.foreign import Program
 from haploop.launch.processes.one_thread import ask_for_one_thread
+from haploop.launch.spec import OutputError
 from haploop.protocol.transport.messages import PROCESSES
 from haploop.protocol.transport.wire import Message
+
+_NAMED = {int(number) for number in signal.Signals}
 
 
 class Child:
@@ -23,31 +27,50 @@ class Child:
     Its stdin is a line of life: it ends at once when the launcher is gone. What it prints before it keeps its prints in
     their file goes to the launcher's stderr, never to its stdout.
 
+    A program of somebody else's writes what it prints to the file of prints from the start, and ends with all that it
+    has started in its process group.
+
     Attributes:
         died: a file descriptor that becomes readable, without polling, when the process has ended.
     """
 
-    def __init__(self, role: str, sockets: Path, start: Message) -> None:
+    def __init__(self, role: str, sockets: Path, start: Message, program: Program | None = None) -> None:
         self.role = role
         environment = {**os.environ}
         ask_for_one_thread(environment)
-        command = [sys.executable, "-m", PROCESSES[role].module, str(sockets)]
+        words = program.words if program else (sys.executable, "-m", PROCESSES[role].module)
+        self._group = _Group() if program else None
+        prints = os.open(start["prints"], os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o666) if program else None
         # Where the kernel has no descriptor of a process: a pipe that is open as long as it lives.
         self.died, alive = (-1, -1) if _has_pidfd() else os.pipe()
-        self._process = subprocess.Popen(
-            command,
-            stdin=subprocess.PIPE,
-            stdout=_terminal(),
-            pass_fds=() if alive < 0 else (alive,),
-            # A group of its own, since Ctrl-C is for the launcher, which ends the run in order; but the same session:
-            # the kernel schedules sessions as groups, and two of them preempt each other at every message.
-            process_group=0,
-            env=environment,
-        )
+        try:
+            self._process = subprocess.Popen(
+                [*words, str(sockets)],
+                stdin=subprocess.PIPE,
+                stdout=_terminal() if prints is None else prints,
+                stderr=prints,
+                pass_fds=() if alive < 0 else (alive,),
+                # A group of its own, since Ctrl-C is for the launcher, which ends the run in order; but the same
+                # session: the kernel schedules sessions as groups, and two preempt each other at every message.
+                process_group=self._group.id if self._group else 0,
+                env=environment,
+            )
+        except OSError as error:
+            if self._group:
+                self._group.kill()
+            if self.died >= 0:
+                os.close(self.died)
+            label = program.label if program else role
+            raise OutputError(f"The {label} cannot be started: {error.strerror}.") from error
+        finally:
+            for descriptor in (prints, alive):
+                if descriptor is not None and descriptor >= 0:
+                    os.close(descriptor)
+        if program and start["cores"]:
+            with contextlib.suppress(OSError):
+                os.sched_setaffinity(self._process.pid, start["cores"])
         if alive < 0:
             self.died = os.pidfd_open(self._process.pid)
-        else:
-            os.close(alive)
         assert self._process.stdin
         with contextlib.suppress(BrokenPipeError):
             self._process.stdin.write(json.dumps(start).encode() + b"\n")
@@ -63,7 +86,7 @@ class Child:
         except subprocess.TimeoutExpired:
             return "closed what it was given but still runs"
         if code < 0:
-            return f"was killed by {signal.Signals(-code).name}"
+            return f"was killed by {signal.Signals(-code).name if -code in _NAMED else f'signal {-code}'}"
         return f"ended with exit status {code}"
 
     def exited(self) -> bool:
@@ -89,12 +112,35 @@ class Child:
             return
         with contextlib.suppress(ProcessLookupError):
             self._process.kill()
+        if self._group:
+            self._group.kill()
         self._process.wait()
         if self._process.stdin:
             with contextlib.suppress(OSError):
                 self._process.stdin.close()
         os.close(self.died)
         self.died = -1
+
+
+class _Group:
+    """A process group for a program of somebody else's: all of it ends with the launcher, whatever it does itself.
+
+    Its first process waits for the end of its stdin, which the launcher holds open, and then kills the group.
+
+    Attributes:
+        id: of the group, which no other can have before :meth:`kill`.
+    """
+
+    def __init__(self) -> None:
+        guard = ["/bin/sh", "-c", "read _; kill -9 0"]
+        nowhere = subprocess.DEVNULL
+        self._guard = subprocess.Popen(guard, stdin=subprocess.PIPE, stdout=nowhere, stderr=nowhere, process_group=0)
+        self.id = self._guard.pid
+
+    def kill(self) -> None:
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(self.id, signal.SIGKILL)
+        self._guard.communicate()
 
 
 def _has_pidfd() -> bool:
@@ -115,18 +161,34 @@ def _terminal() -> int:
     return 2
 
 
-def start_children(sockets: Path, start: Message, pin: bool, run_number: int) -> dict[str, Child]:
-    """Starts every process of the table.
+def start_children(
+    sockets: Path, start: Message, pin: bool, run_number: int, programs: Mapping[str, Program]
+) -> dict[str, Child]:
+    """Starts every process of the table but those that somebody else starts.
+
+    Args:
+        programs: programs that take the place of the table's, by role.
 
     Plant and controller wait for each other at every tick and gain nothing from two cores, but lose the wake-up from
     one to the other: they share a core, the others get the rest. Runs beside each other take different cores. A process
     goes to its cores when it has imported what it needs, which all of them do beside each other.
+
+    Raises OutputError where one cannot be started; none is left then.
     """
     loop_cores, other_cores = share_cores(run_number) if pin else (None, None)
-    return {
-        role: Child(role, sockets, {**start, "cores": loop_cores if process.on_loop_core else other_cores})
-        for role, process in PROCESSES.items()
-    }
+    children: dict[str, Child] = {}
+    try:
+        for role, process in PROCESSES.items():
+            program = programs.get(role)
+            if program and program.is_external:
+                continue
+            cores = loop_cores if process.on_loop_core else other_cores
+            children[role] = Child(role, sockets, {**start, "cores": cores}, program)
+    except BaseException:
+        for child in children.values():
+            child.kill()
+        raise
+    return children
 
 
 def share_cores(run_number: int) -> tuple[list[int] | None, list[int] | None]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import gc
 import math
 import secrets
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -19,6 +19,7 @@ from haploop.launch.clock.roster import Node
 from haploop.launch.clock.server import ClockServer
 from haploop.launch.processes import private_directory, run_directory
 from haploop.launch.processes.children import Child, interrupts, start_children
+from haploop.launch.processes.foreign import Program
 from haploop.launch.processes.shown_prints import PRINTS, ShownPrints
 from haploop.launch.spec import OutputError, RunFailed, RunSpec
 from haploop.protocol.changes import Event
@@ -30,8 +31,9 @@ from haploop.protocol.transport.wire import Message
 if TYPE_CHECKING:
     from haploop.logger.summary import Summary
 
-# From directory of sockets, what a node is told at its start, whether cores are pinned and the number of the run.
-Start = Callable[[Path, Message, bool, int], dict[str, Child]]
+# From directory of sockets, what a node is told at its start, whether cores are pinned, the number of the run, and
+# programs that take the place of its own.
+Start = Callable[[Path, Message, bool, int, Mapping[str, Program]], dict[str, Child]]
 
 _START_DEADLINE_S = 20.0
 # What the logger is given to save its files after another node has failed.
@@ -62,9 +64,13 @@ def run_processes(
         KeyboardInterrupt: the second signal came.
     """
     with interrupts(usual_from=3) as received, private_directory.made() as sockets:
+        context = make_context(spec.transport)
         try:
-            supervisor = Supervisor(spec, sockets, received, make_context(spec.transport), start_nodes)
-        except (OSError, zmq.ZMQError) as error:
+            supervisor = Supervisor(spec, sockets, received, context, start_nodes)
+        except BaseException as error:
+            context.destroy(linger=0)
+            if not isinstance(error, OSError | zmq.ZMQError):
+                raise
             reason = error.strerror or str(error)
             raise OutputError(f"Sockets and processes of the run cannot be made: {reason}.") from error
         return supervisor.run(), supervisor.events
@@ -101,7 +107,9 @@ class Supervisor:
         }
         welcome = sockets.name, scene.as_dict(), timebase.as_dict(), told
         commands = Commands(self._clock, spec, lambda: self._server.roster)
-        self._server = ClockServer(self._context, sockets, secret, self._clock, welcome, commands, spec.start_gate)
+        self._server = ClockServer(
+            self._context, sockets, secret, self._clock, welcome, commands, spec.start_gate, spec.programs
+        )
         keys = spec.transport.as_dict()["keys"]
         run_directory.announce(sockets, self._server.address, scene.title, str(spec.out), keys)
         run_number = len(run_directory.live_runs()) - 1
@@ -112,7 +120,7 @@ class Supervisor:
             "transport": spec.transport.as_dict(),
             "prints": str(spec.out.resolve() / PRINTS),
         }
-        self._children = start_nodes(sockets, start, scene.run.pin, run_number)
+        self._children = start_nodes(sockets, start, scene.run.pin, run_number, spec.programs)
         self._started = self._looked = self._machine.now()
         if not math.isinf(spec.pace):  # the nodes are loading
             self._clock.prepare()
@@ -175,7 +183,7 @@ class Supervisor:
             if self._machine.now() > given_up:
                 # Whoever was killed was not turned away: such a JOIN was somebody else's.
                 refused = self._server.roster.refused.get(child.role) if not node and child.exited() else None
-                raise RunFailed(f"The {child.role} {ended}; {refused or self._where()}")
+                raise RunFailed(f"The {self._server.roster.label(child.role)} {ended}; {refused or self._where()}")
             self._server.socket.poll(20)
             self._server.serve()
 
@@ -188,7 +196,9 @@ class Supervisor:
         if not roster.joined():
             if now - self._started > _START_DEADLINE_S:
                 missing = [role for role in self._children if not roster.own(role)]
-                sentence = f"The {' and the '.join(missing)} did not join within {_START_DEADLINE_S:g} s."
+                sentence = (
+                    f"The {' and the '.join(map(roster.label, missing))} did not join within {_START_DEADLINE_S:g} s."
+                )
                 raise RunFailed(
                     " ".join([sentence, *(roster.refused[role] for role in missing if role in roster.refused)])
                 )
@@ -198,8 +208,8 @@ class Supervisor:
         for node in roster.silent(now, self._deadline_s):
             if node.is_own and now - node.heard > deadline_s and not self._may_rouse(node, now):
                 raise RunFailed(
-                    f"The {node.role} has not answered for {deadline_s:g} s and was ended; {self._where()} "
-                    "A longer wait can be set with run.deadline."
+                    f"The {roster.label(node.role)} has not answered for {deadline_s:g} s and was ended; "
+                    f"{self._where()} A longer wait can be set with run.deadline."
                 )
             if not node.is_own and node.lossless and node.tick <= roster.slowest():
                 reason = f"Nothing was heard of you for {self._deadline_s:g} s; the run goes on without you."
@@ -210,7 +220,7 @@ class Supervisor:
 
     def _may_rouse(self, node: Node, now: float) -> bool:
         """Rouses a controller that hangs, once; tells whether a last word of it may still come."""
-        if node.role != "controller":
+        if node.role != "controller" or node.role in self._spec.programs:
             return False
         silence = (node.role, node.heard)
         if silence not in self._roused:

@@ -14,6 +14,7 @@ from haploop.protocol.transport.wire import Frame, Message, WireError, decode, e
 # A node that waits says so this often, so that the clock can tell who is being waited for.
 REPORT_MS = 200
 _JOIN_MS = 20_000
+_PROGRAM = {"name": "haploop"}
 
 
 class Aborted(Exception):
@@ -53,7 +54,7 @@ class ClockClient:
             Refused: the clock said no, or said nothing for 20 s.
             Aborted: the run failed before it began.
         """
-        self.socket.send(encode("JOIN", self.role, self._secret, os.getpid(), endpoints, lossless))
+        self.socket.send(encode("JOIN", self.role, self._secret, os.getpid(), endpoints, lossless, _PROGRAM))
         while self.socket.poll(_JOIN_MS):
             frame = self._receive()
             if frame and frame.name == "WELCOME":

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-VERSION = 1
+VERSION = 2
 
 # Field types: what msgpack must have unpacked. "number" is an int or a float.
 _TYPES: dict[str, tuple[type, ...]] = {
@@ -81,8 +81,9 @@ def _message(code: int, channel: str, sender: str, receiver: str, fields: str, m
 
 MESSAGES: dict[str, Message] = {
     # Joining
-    "JOIN": _message(1, "clock", "node", "clock", "role:text secret:text pid:int endpoints:map lossless:bool",
-                     "A node asks to take part. endpoints: channel -> address of each socket it has bound."),
+    "JOIN": _message(1, "clock", "node", "clock", "role:text secret:text pid:int endpoints:map lossless:bool program:map",
+                     "A node asks to take part. endpoints: channel -> address of each socket it has bound. "
+                     "program: name, version and command of what joins, texts that may be left out."),
     "WELCOME": _message(2, "clock", "clock", "node", "run:text scene:map timebase:map endpoints:map granted:int context:map",
                         "The node is part of the run: the resolved scene, its integers, every address, the tick granted."),
     "REFUSED": _message(3, "clock", "clock", "any", "reason:text", "The frame before could not be used, and why."),

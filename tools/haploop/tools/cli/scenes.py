@@ -44,10 +44,15 @@ def run(
     plugin: Plugin = None,
     tcp: Annotated[str | None, typer.Option(metavar="ADDRESS", help="TCP sockets, such as 127.0.0.1")] = None,
     keys: Annotated[Path | None, typer.Option(metavar="DIR", help="CURVE keys for TCP; made where missing")] = None,
+    node: Annotated[
+        list[str] | None,
+        typer.Option("--node", metavar="ROLE=COMMAND", help="a program of yours as plant or controller"),
+    ] = None,
     json: Json = False,
 ) -> None:
     """Run a scene to its end; other terminals can steer and watch it meanwhile."""
     with LeavingAtOnce():
+        from haploop.launch.processes.foreign import ProgramError, read_programs
         from haploop.launch.runs import start
         from haploop.launch.spec import SCENE, RunFailed, discard
         from haploop.protocol.transport.sockets import Transport, TransportError
@@ -61,9 +66,12 @@ def run(
             leave("--pace needs the clock of a run as processes; leave out --in-process.", WRONG_USE)
         if tcp and in_process:
             leave("--tcp needs the sockets of a run as processes; leave out --in-process.", WRONG_USE)
+        if node and in_process:
+            leave("--node needs the processes of a run; leave out --in-process.", WRONG_USE)
         try:
             transport = Transport.from_options(tcp, keys)
-        except TransportError as error:
+            programs = read_programs(node or [], [])
+        except (TransportError, ProgramError) as error:
             leave(str(error), WRONG_USE)
         prepared = start.prepare(scene, set or [], plugin or [], out)
         try:
@@ -80,6 +88,7 @@ def run(
                     in_process=in_process,
                     pace=math.inf if rate == "free" else rate,
                     transport=transport,
+                    programs=programs,
                     on_progress=line.update,
                     on_started=told,
                     start_gate=viewer.may_start,

@@ -1,0 +1,96 @@
+"""Programs of others that take the place of a run's plant or controller: what a command line asks for."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+# Roles that a program of somebody else's can take; the logger is what judges it.
+ROLES = ("plant", "controller")
+WAIT_S = 60.0
+_LONGEST_WAIT_S = 1e6
+
+
+class ProgramError(ValueError):
+    """A program that cannot take a role of the run; the message says what to do."""
+
+
+@dataclass(frozen=True)
+class Program:
+    """What takes the place of one of the run's own processes.
+
+    Attributes:
+        command: as it was given; "" for a program that somebody else starts.
+        words: the command split as a shell splits it; none is ever given to a shell.
+    """
+
+    role: str
+    command: str = ""
+    words: tuple[str, ...] = ()
+
+    @property
+    def is_external(self) -> bool:
+        """True for a program that the launcher does not start."""
+        return not self.words
+
+    @property
+    def label(self) -> str:
+        """The role and its program, for people."""
+        return f"{self.role} ({self.command or 'external'})"
+
+
+NO_PROGRAMS: Mapping[str, Program] = {}
+
+
+def read_programs(nodes: Sequence[str], externals: Sequence[str]) -> dict[str, Program]:
+    """Returns the programs by role.
+
+    Args:
+        nodes: texts ``ROLE=COMMAND``, each started by the launcher.
+        externals: roles for which a program is awaited.
+
+    Raises ProgramError where a role or a command cannot be used, or a role is given twice.
+    """
+    programs = [_read_node(text) for text in nodes] + [Program(role) for role in externals]
+    found: dict[str, Program] = {}
+    for program in programs:
+        if program.role not in ROLES:
+            raise ProgramError(
+                f"A program can take the place of the {' or the '.join(ROLES)}, but {program.role!r} was given."
+            )
+        if program.role in found:
+            raise ProgramError(f"The {program.role} was given twice; one program takes its place.")
+        found[program.role] = program
+    return found
+
+
+def _read_node(text: str) -> Program:
+    import shlex
+    import shutil
+
+    role, sign, command = text.partition("=")
+    if not sign:
+        raise ProgramError(f'--node expects ROLE=COMMAND, such as controller="node law.js", but {text!r} was given.')
+    try:
+        words = tuple(shlex.split(command))
+    except ValueError as error:
+        raise ProgramError(f"The command of the {role}, {command!r}, cannot be split into words: {error}.") from error
+    if not words or not words[0]:
+        raise ProgramError(f"The command of the {role} is empty; name the program that takes its place.")
+    if any("\0" in word for word in words):
+        raise ProgramError(f"The command of the {role} holds a character that no command can hold.")
+    if shutil.which(words[0]) is None:
+        raise ProgramError(
+            f"The program of the {role}, {words[0]!r}, is not there or cannot be executed; give its path."
+        )
+    return Program(role, command, words)
+
+
+def check_wait(seconds: float | None) -> float:
+    """Returns the time in s that an external program is awaited; ProgramError where it is no length of time."""
+    if seconds is None:
+        return WAIT_S
+    if not 0 < seconds <= _LONGEST_WAIT_S or math.isnan(seconds):
+        raise ProgramError(f"--wait must be above 0 and at most {_LONGEST_WAIT_S:g} s, but {seconds:g} s was given.")
+    return seconds
