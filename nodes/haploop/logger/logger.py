@@ -10,7 +10,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from haploop.logger.books.books import Books, moved_J, residual_J
+from haploop.logger.books.balance import balance_words
+from haploop.logger.books.books import Books, moved_J, residual_J, unexplained_J
 from haploop.logger.books.buffers import ControllerBuffer, PlantBuffer
 from haploop.logger.log.channels import Channels, motion_columns
 from haploop.logger.summary import Account, Summary, energy, note_accounts, outcome, versions
@@ -34,6 +35,7 @@ class Logger:
     Attributes:
         time: the integers of the run.
         tick: every interval before it is booked.
+        foreign: roles that programs of others have taken.
         booked: called with the first of some ticks and the running books at each, name -> array, once they are booked.
     """
 
@@ -48,6 +50,7 @@ class Logger:
         self._counted: Counter[str] = Counter()
         self._digest = hashlib.sha256()
         self.booked: Callable[[int, dict[str, np.ndarray]], object] = lambda first, books: None
+        self.foreign: tuple[str, ...] = ()
         self.tick = self._first_tick = 0
 
     def count_wall_time(self) -> None:
@@ -140,7 +143,7 @@ class Logger:
     def _named(self, rows: np.ndarray) -> dict[str, np.ndarray]:
         """Returns the running books by names for people: an element's by its kind, numbered where a kind recurs."""
         names = [self._account_name(name) for name in self.books.names]
-        return dict(zip(names, rows, strict=True)) | {"residual": self.books.residuals(rows)}
+        return dict(zip(names, rows, strict=True)) | self.books.residuals(rows)
 
     def _account_name(self, name: str) -> str:
         book, dot, side = name.partition(".")
@@ -197,7 +200,13 @@ class Logger:
             if f"{a.book}.true" in books.names
         ]
         has_wall = self._scene.wall is not None
-        return outcome(self._scene, ran, self._measured(), diverged) | {"energy": energy(books, accounts, has_wall)}
+        energies = energy(books, accounts, has_wall) | self._balance()
+        return outcome(self._scene, ran, self._measured(), diverged) | {"energy": energies}
+
+    def _balance(self) -> dict[str, str]:
+        """Returns what the books leave unexplained as the sentence ``balance``; nothing where it is not worth a word."""
+        words = balance_words(unexplained_J(self.books.state), moved_J(self.books.state), self.foreign)
+        return {"balance": words} if words else {}
 
     def _measured(self) -> RunMeasures:
         if self._measures is None:
@@ -218,4 +227,5 @@ class Logger:
             "displayed_stiffness_N_m": figures.displayed_stiffness_N_m,
             "residual_J": residual_J(books),
             "moved_J": moved_J(books),
+            **self._balance(),
         }

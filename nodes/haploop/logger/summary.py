@@ -80,8 +80,7 @@ def energy(books: BooksState, accounts: Sequence[Account], has_wall: bool) -> Su
             for book, kind, parameters, first, end in accounts
         ],
         "wall": wall,
-        "hand_work_J": total_J(books, "hand_work"),
-        **{f"{name}_J": total_J(books, name) for name in beside if name != "hand_work"},
+        **{f"{name}_J": total_J(books, name) for name in beside},
         "stored_J": stored_J(books),
         "moved_J": moved_J(books),
         "residual_J": residual_J(books),

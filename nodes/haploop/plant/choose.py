@@ -7,7 +7,7 @@ from typing import Any
 from haploop.plant.integrators.registry import find_integrator
 from haploop.plant.motion.one_mass import OneMassMotion
 from haploop.plant.sensing.encoder import PositionSensor
-from haploop.protocol.scene.scene import Scene, accelerometer_is_used
+from haploop.protocol.scene.scene import Scene, accelerometer_is_used, hand_is_unmodelled
 from haploop.protocol.ticks import Timebase
 
 
@@ -32,8 +32,10 @@ def needs_chain(scene: Scene) -> bool:
 def make_motion(scene: Scene, time: Timebase, members: int | None = None) -> Any:
     """Makes the least motion that moves a scene, or a batch of so many members; nothing else is even imported.
 
-    The integrator of a batch is exact.
+    The integrator of a batch is exact. Raises ValueError for a hand that is unmodelled.
     """
+    if hand_is_unmodelled(scene):
+        raise ValueError("An unmodelled hand cannot be moved: only a plant of somebody else's runs such a scene.")
     if not needs_chain(scene):
         return OneMassMotion(scene, time, members)
     if members is None:

@@ -14,6 +14,7 @@ from haploop.launch.scene.check import resolve
 from haploop.launch.scene.events import elements_of, try_out
 from haploop.launch.scene.layers import Layers, lay_overrides
 from haploop.launch.scene.toml_writer import inline, to_toml
+from haploop.launch.scene.unmodelled import demand_modelled
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.scene.table import Tables
 
@@ -112,7 +113,7 @@ class LoadedScene:
         return self._resolved(layers)
 
     def _resolved(self, layers: Layers) -> LoadedScene:
-        return replace(self, scene=resolve(layers, self.kinds).in_order())
+        return replace(self, scene=demand_modelled(layers, resolve(layers, self.kinds).in_order()))
 
 
 def load(

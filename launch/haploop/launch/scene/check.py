@@ -20,6 +20,7 @@ from haploop.launch.scene.mistakes import SceneError, nearest
 from haploop.launch.scene.models import Model, number_of, read_table, scene_model
 from haploop.launch.scene.schema import Schema, alternatives, schema_at, whole_schema
 from haploop.launch.scene.toml_writer import inline
+from haploop.launch.scene.unmodelled import check_hand
 from haploop.protocol.scene.scene import Clock, EventTable, Scene
 from haploop.protocol.scene.table import Tables
 from haploop.protocol.ticks import Timebase, TimebaseError
@@ -79,6 +80,7 @@ def with_rules(layers: Layers, scene: Scene | None, kinds: Mapping[str, type[Ele
     draft = Draft(layers.data, scene, read_table, layers.complain)
     for effect in all_effects():
         effect.check(draft)
+    check_hand(draft)
     check_estimators(layers)
     if scene:
         check_filter(layers, scene)

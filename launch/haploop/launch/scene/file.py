@@ -11,6 +11,7 @@ from haploop.launch.scene.check import resolve
 from haploop.launch.scene.layers import Layers, lay_overrides, read_layers
 from haploop.launch.scene.mistakes import COMMAND_LINE
 from haploop.launch.scene.models import fault
+from haploop.launch.scene.unmodelled import demand_modelled
 from haploop.protocol.files import read_text
 from haploop.protocol.scene.scene import Scene
 
@@ -18,21 +19,34 @@ if TYPE_CHECKING:
     from haploop.controller.dissipation import Element
 
 
-def load(path: Path | str, overrides: Sequence[str] = (), kinds: Mapping[str, type[Element]] | None = None) -> Scene:
+def load(
+    path: Path | str,
+    overrides: Sequence[str] = (),
+    kinds: Mapping[str, type[Element]] | None = None,
+    *,
+    any_hand: bool = False,
+) -> Scene:
     """Returns the resolved scene of a TOML file: in SI units, defaults filled in, events in order of time.
 
     Args:
         path: the scene file.
         overrides: ``KEY=VALUE`` with dotted keys, laid over what the file says.
         kinds: the dissipation elements at hand, by kind; the installed ones when None.
+        any_hand: whether its hand may be unmodelled: nothing here moves such a scene.
 
     Raises:
         SceneError: the scene cannot be run; it holds every mistake.
     """
-    return resolved(read_layers(Path(path)), overrides, kinds)
+    return resolved(read_layers(Path(path)), overrides, kinds, any_hand=any_hand)
 
 
-def resolved(layers: Layers, overrides: Sequence[str] = (), kinds: Mapping[str, type[Element]] | None = None) -> Scene:
+def resolved(
+    layers: Layers,
+    overrides: Sequence[str] = (),
+    kinds: Mapping[str, type[Element]] | None = None,
+    *,
+    any_hand: bool = False,
+) -> Scene:
     """Returns the resolved scene of layers that were read already; a SceneError holds every mistake."""
     lay_overrides(layers, overrides)
     layers.data.setdefault("title", layers.path.stem)
@@ -41,7 +55,8 @@ def resolved(layers: Layers, overrides: Sequence[str] = (), kinds: Mapping[str, 
         from haploop.controller.dissipation import registry
 
         kinds = registry()
-    return resolve(layers, kinds).in_order()
+    scene = resolve(layers, kinds).in_order()
+    return scene if any_hand else demand_modelled(layers, scene)
 
 
 def _read_recording(layers: Layers) -> None:

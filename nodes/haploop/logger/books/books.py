@@ -11,6 +11,7 @@ import numpy as np
 from haploop.logger.books.one_mass import OneMassBooks
 from haploop.logger.books.work import (
     CAUSES,
+    CLOSING,
     Displacement,
     Sums,
     add_columns,
@@ -27,13 +28,16 @@ from haploop.logger.books.work import (
     with_rows,
 )
 from haploop.protocol.arrays import first_row
-from haploop.protocol.scene.scene import Scene
+from haploop.protocol.scene.scene import Scene, hand_is_unmodelled
 from haploop.protocol.ticks import Timebase
 from haploop.protocol.trees import tree_select
 
 if TYPE_CHECKING:
     from haploop.logger.books.buffers import Commanded
     from haploop.logger.books.chain import ChainBooks
+    from haploop.logger.books.closing import ClosingBooks
+
+    PlantBooks = OneMassBooks | ChainBooks | ClosingBooks
 
 
 class BooksState(NamedTuple):
@@ -121,6 +125,8 @@ class Books:
         way = displacement(plant["x"], plant["x_low"], n, sum_steps)
         ticks = len(way.by_tick)
         flows: dict[str, np.ndarray] = dict(self._exchanged(tick, plant, way, commanded.first, forces))
+        if CLOSING in flows:
+            flows[CLOSING] = sum_rows(-sign * flow for name, flow in flows.items() if (sign := balance_sign(name)))
         flows["moved"] = _half_of_magnitudes(flows.values())
         if self._has_wall:
             at_ticks, (position, stiffness, into_wall) = plant["x"][::n], commanded.wall
@@ -176,17 +182,26 @@ class Books:
         self.state = tree_select(self.state, kept)
         self.plant.select(kept)
 
-    def residuals(self, at_ticks: np.ndarray) -> np.ndarray:
-        """Returns the signed residual at each tick from the rows that ``book`` returned, shape (ticks,), J."""
-        return sum_rows(sign * at_ticks[row] for sign, row in balance(self.state.names))
+    def residuals(self, at_ticks: np.ndarray) -> dict[str, np.ndarray]:
+        """Returns the signed ``residual`` at each tick from the rows that ``book`` returned, shape (ticks,), J.
+
+        Where one book is what closes the balance there is none.
+        """
+        if CLOSING in self.state.names:
+            return {}
+        return {"residual": sum_rows(sign * at_ticks[row] for sign, row in balance(self.state.names))}
 
 
-def plant_books(scene: Scene, time: Timebase, members: int | None = None) -> OneMassBooks | ChainBooks:
-    """Returns the books of a scene's plant: one mass under held forces, or a chain of bodies.
+def plant_books(scene: Scene, time: Timebase, members: int | None = None) -> PlantBooks:
+    """Returns the books of a scene's plant: one mass under held forces, a chain of bodies, or a device in some hand.
 
     Their integrals are those of the exact motion from each recorded state on. Where ``clock.integrator`` is another,
     what its next state has more or less is in no book: the residual is then the energy error of the method.
     """
+    if hand_is_unmodelled(scene):
+        from haploop.logger.books.closing import ClosingBooks
+
+        return ClosingBooks(scene, time)
     lags = scene.actuator is not None and scene.actuator.bandwidth is not None
     grips = scene.hand is not None and scene.hand.grip is not None
     if lags or grips or scene.friction or scene.transmission:
@@ -242,12 +257,23 @@ def moved_J(state: BooksState) -> Any:
 
 
 def residual_J(state: BooksState) -> Any:
-    """Returns what the books leave unexplained, in magnitude, J; infinite where a book is no finite number."""
+    """Returns what the books leave unexplained, in magnitude, J; None where one book is what closes the balance."""
+    unexplained = unexplained_J(state)
+    return None if unexplained is None else abs(unexplained)
+
+
+def unexplained_J(state: BooksState) -> Any:
+    """Returns what the books leave unexplained, J: above 0 what got lost, below 0 what came from nowhere.
+
+    Infinite where a book is no finite number; None where one book is what closes the balance.
+    """
+    if CLOSING in state.names:
+        return None
     parts = np.array([sign * of[row] for sign, row in balance(state.names) for of in state.sums])
     if parts.ndim == 1:
-        return _magnitude(parts.tolist())
-    return np.array([_magnitude(of_member) for of_member in parts.T.tolist()])
+        return _sum_exactly(parts.tolist())
+    return np.array([_sum_exactly(of_member) for of_member in parts.T.tolist()])
 
 
-def _magnitude(parts: list[float]) -> float:
-    return abs(math.fsum(parts)) if all(map(math.isfinite, parts)) else math.inf
+def _sum_exactly(parts: list[float]) -> float:
+    return math.fsum(parts) if all(map(math.isfinite, parts)) else math.inf

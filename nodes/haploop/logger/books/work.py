@@ -13,6 +13,8 @@ from haploop.protocol.arrays import each
 SumSteps = Callable[..., Any]
 # The springs whose books part the leak of a wall into its causes, as ``ideal_springs`` yields them.
 CAUSES = ("ideal", "sampled_and_held", "quantised")
+# The book of an unmodelled hand: what all others leave over, so that they have no residual.
+CLOSING = "unmodelled_work"
 
 
 class Displacement(NamedTuple):

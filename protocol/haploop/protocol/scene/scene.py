@@ -41,8 +41,13 @@ class Device(Table):
 
 
 class Hand(Table):
-    """The hand, attached rigidly (Choi et al. 2022, eq. 11) or by a grip, and the force of its muscles."""
+    """The hand, attached rigidly (Choi et al. 2022, eq. 11) or by a grip, and the force of its muscles.
 
+    One of kind "unmodelled" has no other key: only a program of somebody else's moves its device, and its work is
+    booked as what closes the balance.
+    """
+
+    kind: Literal["unmodelled"] | None = None  # pyright: ignore[reportIncompatibleVariableOverride]
     mass: Annotated[float, si("kg", "mass that moves with the device", at_least=0)] = 0.0
     damping: Annotated[float, si("N s/m", "viscous damping", at_least=0)] = 0.0
     stiffness: Annotated[float, si("N/m", "stiffness", at_least=0)] = 0.0
@@ -161,6 +166,11 @@ class Scene(OpenTable):
     def as_dict(self) -> Tables:
         """Returns the scene as nested dicts and lists, absent tables and empty lists left out."""
         return {key: value for key, value in super().as_dict().items() if value != []}
+
+
+def hand_is_unmodelled(scene: Scene) -> bool:
+    """Tells whether nothing but the device is known of what moves: no program here can move such a scene."""
+    return scene.hand is not None and scene.hand.kind is not None
 
 
 def accelerometer_is_used(scene: Scene) -> bool:

@@ -26,7 +26,7 @@ class LiveStatus:
         factor: simulated over wall time of the last 2 s; None while nothing moves.
         changes: every event so far, (tick, event) in order.
         skipped_ticks: telemetry that never came.
-        figures: verdict, oscillation_m and residual_J so far, in the end those of the summary; empty before any.
+        figures: verdict, oscillation_m, residual_J and perhaps balance so far, in the end those of the summary; empty before any.
         is_judged: whether the verdict is that of the ended run, held still and pushed.
         is_awaited: whether its launcher still is to judge it.
         ended: how the run ended, in a word; "" while it goes on.
@@ -95,9 +95,8 @@ class LiveStatus:
             return
         self.ended, self.why = summary["ended"], summary["why"] or failure
         self.is_judged, self.is_awaited = "stability" in summary, awaits_verdict(self._scene, summary)
-        verdict, window = summary["verdict"], summary["window"]
-        residual_J = summary["energy"]["residual_J"]
-        self.figures = {"verdict": verdict, "oscillation_m": window["oscillation_m"], "residual_J": residual_J}
+        self.figures = {"verdict": summary["verdict"], "oscillation_m": summary["window"]["oscillation_m"]}
+        self.figures |= {name: summary["energy"].get(name) for name in ("residual_J", "balance")}
 
     def last(self, frame: str) -> dict[str, float]:
         columns = self._newest.get(frame, {}).get("columns", {})

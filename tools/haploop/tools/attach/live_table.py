@@ -62,7 +62,7 @@ def live_line(run: LiveStatus) -> str:
         words += [f"x {amount(motion['x'], 'm')}", f"force {amount(motion['force'], 'N')}"]
     if figures:
         words += [_word(run), f"{amount(figures['oscillation_m'], 'm')} p-p"]
-        words.append(f"residual {amount(figures['residual_J'], 'J')}")
+        words.append(figures.get("balance") or f"residual {amount(figures['residual_J'], 'J')}")
     if run.factor is not None:
         words.append(f"{fixed(run.factor)}x real time")
     if run.skipped_ticks:
@@ -85,6 +85,8 @@ def _figures(run: LiveStatus) -> Table:
         word, swing = _word(run), f"  oscillation {amount(figures['oscillation_m'], 'm')} peak to peak"
         what = "verdict" if run.is_judged or run.is_awaited else "seen" if run.ended else "so far"
         grid.add_row(what, Text.assemble((word, verdict_style(word)), swing))
+    if balance := figures.get("balance"):
+        grid.add_row("energy", Text(balance, "yellow"))
     depth_m = run.penetration_m()
     side = "" if depth_m is None else f"  {amount(abs(depth_m), 'm')} {'inside' if depth_m > 0 else 'outside'} the wall"
     grid.add_row("position", amount(motion.get("x"), "m") + side)

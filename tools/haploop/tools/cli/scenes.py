@@ -124,6 +124,7 @@ def check(
     from haploop.launch.scene.file import load
     from haploop.launch.scene.schema import json_schema
     from haploop.launch.scene.toml_writer import to_toml
+    from haploop.protocol.scene.scene import hand_is_unmodelled
 
     with plain_errors():
         kinds = kinds_with(plugin or [])
@@ -132,13 +133,14 @@ def check(
             return
         if scene is None:
             raise typer.BadParameter("A scene file was expected, or --schema.")
-        resolved = load(scene, set or [], kinds)
+        resolved = load(scene, set or [], kinds, any_hand=True)
     print_notes(resolved)
     if json:
         print_json(resolved.as_dict())
     else:
         print(to_toml(resolved.as_dict()), end="")
-        print(f"{scene} can be run.", file=sys.stderr)
+        with_a = " with a plant of yours (--node plant=COMMAND)" if hand_is_unmodelled(resolved) else ""
+        print(f"{scene} can be run{with_a}.", file=sys.stderr)
 
 
 def plugins(plugin: Plugin = None, json: Json = False) -> None:

@@ -96,7 +96,8 @@ def key_numbers(run: RunData) -> list[str]:
         words.append(f"outside the wall {100 * window['outside_fraction']:.0f} %")
         displayed, wanted = window["displayed_stiffness_N_m"], run.history.walls[-1].wall.stiffness
         words += [f"displayed stiffness {spring(displayed)} of {spring(wanted)}"] if displayed is not None else []
-    words.append(f"residual {amount(energy['residual_J'], 'J')} of {amount(energy['moved_J'], 'J')} moved")
+    left = f"residual {amount(energy['residual_J'], 'J')} of " if "unmodelled_work_J" not in energy else ""
+    words.append(f"{left}{amount(energy['moved_J'], 'J')} moved")
     return words + [f"of a damaged log: {last - first:g} s"] * bool(run.cut)
 
 

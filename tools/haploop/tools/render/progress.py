@@ -88,7 +88,7 @@ class ProgressLine:
             f" {fixed(factor)}×" if factor else "",
             "  ", (word, verdict_style(word)),
             f"  {amount(status['oscillation_m'], 'm')} p-p",
-            f"  residual {status['residual_J']:.0e} J",
+            "" if status["residual_J"] is None else f"  residual {status['residual_J']:.0e} J",
             (f"  {self._title}", "dim"),
         )  # fmt: skip
         text.truncate(width, overflow="ellipsis")

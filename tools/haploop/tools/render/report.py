@@ -34,7 +34,7 @@ LEAK_CAUSES = {"sampling_and_hold_J": "sampling and hold", "quantisation_J": "qu
 
 def plant_books(energy: Summary) -> dict[str, str]:
     """Returns the words for each key of the summary's ``energy`` that is a book of the plant: work, then every heat."""
-    words = {"hand_work_J": "work of the hand"}
+    words = {"hand_work_J": "work of the hand", "unmodelled_work_J": "work of the hand, by what is left over"}
     words |= {key: f"heat in the {key.removesuffix('_heat_J')}" for key in energy if key.endswith("_heat_J")}
     words |= {"friction_heat_J": "heat of friction", "actuator_J": "kept back by the actuator's limits"}
     return {key: name for key, name in words.items() if key in energy}
@@ -63,6 +63,8 @@ def summary_table(summary: Summary) -> RenderableType:
     parts: list[RenderableType] = [head, Text(f"{rule[:1].upper()}{rule[1:]}.", style="dim")]
     if summary["ended"] not in ("done", "diverged"):
         parts.append(Text(f"ended early: {summary['ended']}", style="bold red"))
+    if balance := summary["energy"].get("balance"):
+        parts.append(Text(balance, style="bold yellow"))
     control_rate = summary["ticks"] / summary["duration_s"] if summary["duration_s"] else 1.0
     return Group(*parts, make_facts(_key_figures(summary)), _books(summary["energy"], control_rate))
 
@@ -122,7 +124,8 @@ def _books(energy: Summary, control_rate: float) -> Table:
     residual, moved = energy["residual_J"], energy["moved_J"]
     share = f", {residual / moved:.1e} of what moved" if residual is not None and moved else ""
     rows = {words: energy[key] for key, words in plant_books(energy).items()}
-    rows |= {"stored at the end": energy["stored_J"], "moved in total": moved, f"residual{share}": residual}
+    rows |= {"stored at the end": energy["stored_J"], "moved in total": moved}
+    rows |= {} if "unmodelled_work_J" in energy else {f"residual{share}": residual}
     for name, value in rows.items():
         table.add_row(name, "", amount(value, "J"), "")
     return table

@@ -26,6 +26,7 @@ export function showHeader(state, phase) {
   put(byId("oscillation"), amount(state.oscillation_m, "m"));
   put(byId("stiffness"), stiffness(state));
   put(byId("residual"), share(state));
+  byId("residual").title = state.balance ?? "";
   put(byId("factor"), factor(state));
   put(byId("skipped"), isNumber(state.skipped_ticks) ? `${state.skipped_ticks} ticks` : NONE);
   showTime(state);

@@ -18,6 +18,7 @@ export function showSummary(state) {
   panel.replaceChildren(
     make("h2", { id: "summary-title" }, `Ended: ${told(state)}`),
     make("p", { class: "about" }, summary.verdict_rule ?? ""),
+    make("p", { class: "balance" }, summary.energy?.balance ?? ""),
     rows({ ...pushed(summary.stability ?? {}), ...figures(summary) }),
     books(summary.energy ?? {}),
     make("p", { class: "about" }, "In ", make("code", {}, out)),
@@ -60,7 +61,7 @@ function rows(texts) {
 }
 
 /** Every book with what it took by its own account (sampled) and in truth. */
-function books({ wall = {}, elements = [], moved_J: moved, residual_J: residual }) {
+function books({ wall = {}, elements = [], moved_J: moved, residual_J: residual, unmodelled_work_J: unmodelled }) {
   const head = ["book", "sampled", "true"].map((text) => make("th", { scope: "col" }, text));
   const rows = [["wall", wall.sampled_J, wall.true_J]];
   for (const [key, words] of Object.entries(CAUSES)) {
@@ -69,7 +70,8 @@ function books({ wall = {}, elements = [], moved_J: moved, residual_J: residual 
   for (const { kind, from_tick: from, to_tick: to, sampled_J, true_J } of elements) {
     rows.push([`${kind}, ticks ${from} to ${to}`, sampled_J, true_J]);
   }
-  rows.push(["moved in all", undefined, moved], ["residual", undefined, residual]);
+  const left = isNumber(unmodelled) ? ["hand, by what is left over", undefined, unmodelled] : ["residual", undefined, residual];
+  rows.push(["moved in all", undefined, moved], left);
   const cell = (value) => make("td", {}, value === undefined ? "" : amount(value, "J"));
   const body = rows.map(([name, ...numbers]) => make("tr", {}, make("th", { scope: "row" }, name), ...numbers.map(cell)));
   return make("table", {}, make("thead", {}, make("tr", {}, ...head)), make("tbody", {}, ...body));

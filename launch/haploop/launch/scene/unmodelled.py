@@ -1,0 +1,38 @@
+"""The unmodelled hand: what a scene that has one cannot hold beside it, and who cannot use such a scene."""
+
+from __future__ import annotations
+
+from haploop.launch.plan.effect import Draft
+from haploop.launch.scene.layers import Layers
+from haploop.launch.scene.mistakes import SceneError
+from haploop.protocol.scene.paths import value_at
+from haploop.protocol.scene.scene import Hand, Scene, hand_is_unmodelled
+
+_KIND = "unmodelled"
+# What takes or keeps energy between the force that is held and the hand in a way that the device's rows do not tell.
+_NEED_A_MODEL = ("clock.integrator", "transmission", "friction", "actuator.bandwidth", "accelerometer.bandwidth")
+_CANNOT_MOVE = (
+    "What such a hand does no program here knows, so the device can be neither moved nor judged: only a run whose plant "
+    "is a program of yours can have it (haploop run --node plant=COMMAND, or --external plant)."
+)
+
+
+def check_hand(draft: Draft) -> None:
+    """Refuses, beside an unmodelled hand, what says how it moves and what is booked only where all that moves is."""
+    hand = draft.data.get("hand")
+    if not isinstance(hand, dict) or hand.get("kind") != _KIND:
+        return
+    for key in sorted(hand.keys() & {field.name for field in Hand.fields()} - {"kind"}):
+        draft.complain(("hand", key), "An unmodelled hand has no key but its kind; leave this out.", "is given")
+    for key in _NEED_A_MODEL:
+        if value_at(draft.data, key) not in (None, "exact"):
+            expected = "What it does to the energy is known only where the hand is modelled; leave one of them out."
+            draft.complain(tuple(key.split(".")), expected, "stands beside an unmodelled hand")
+
+
+def demand_modelled(layers: Layers, scene: Scene) -> Scene:
+    """Returns the resolved scene of some layers; SceneError where its hand is unmodelled, so that nothing moves it."""
+    if hand_is_unmodelled(scene):
+        layers.complain(("hand", "kind"), _CANNOT_MOVE)
+        raise SceneError(layers.mistakes)
+    return scene
