@@ -204,7 +204,7 @@ class Logger:
         return outcome(self._scene, ran, self._measured(), diverged) | {"energy": energies}
 
     def _balance(self) -> dict[str, str]:
-        """Returns what the books leave unexplained as the sentence ``balance``; nothing where it is not worth a word."""
+        """Returns what the books leave unexplained as the sentence ``balance``, where it is worth one."""
         words = balance_words(unexplained_J(self.books.state), moved_J(self.books.state), self.foreign)
         return {"balance": words} if words else {}
 

@@ -23,10 +23,16 @@ _NOT_REPEATED = "By its window alone, since the run is longer than {:g} s (haplo
 
 
 def prepare(
-    scene_path: Path, overrides: Sequence[str] = (), plugins: Sequence[Path] = (), out: Path | None = None
+    scene_path: Path,
+    overrides: Sequence[str] = (),
+    plugins: Sequence[Path] = (),
+    out: Path | None = None,
+    *,
+    any_hand: bool = False,
 ) -> RunSpec:
     """Reads and checks everything; only when all is well is anything written.
 
+    With ``any_hand`` the scene's may be unmodelled, which only a plant of somebody else's moves.
     Plugins are tried in processes of their own; ``kinds`` of what is returned are stand-ins of their elements.
 
     Raises:
@@ -36,17 +42,17 @@ def prepare(
         OutputError: the directory cannot be used.
     """
     if plugins:
-        scene, kinds, sources = _with_plugins(scene_path, overrides, plugins)
+        scene, kinds, sources = _with_plugins(scene_path, overrides, plugins, any_hand)
     else:
         kinds, sources = registry(), {}
-        scene = load(scene_path, overrides, kinds)
+        scene = load(scene_path, overrides, kinds, any_hand=any_hand)
         try_out(elements_of(scene), kinds)
     is_new = out is None or not out.exists()
     return lay_out(scene, kinds, make_output(out, scene_path), plugins, sources, is_new)
 
 
 def _with_plugins(
-    scene_path: Path, overrides: Sequence[str], plugins: Sequence[Path]
+    scene_path: Path, overrides: Sequence[str], plugins: Sequence[Path], any_hand: bool
 ) -> tuple[Scene, dict[str, type[Element]], dict[str, Path]]:
     """Returns the scene, every kind by name and the file of each that has one, all of them tried."""
     from haploop.launch.processes.plugin_trial import PluginTrial, read_source
@@ -57,7 +63,7 @@ def _with_plugins(
         for plugin, trial in trials.items():
             for kind, element in trial.wait(trial.load()).items():
                 kinds[kind], sources[kind] = element, plugin
-        scene = load(scene_path, overrides, kinds)
+        scene = load(scene_path, overrides, kinds, any_hand=any_hand)
         elements = elements_of(scene)
         try_out([element for element in elements if element.name not in sources], kinds)
         for plugin, trial in trials.items():

@@ -12,8 +12,8 @@ _KIND = "unmodelled"
 # What takes or keeps energy between the force that is held and the hand in a way that the device's rows do not tell.
 _NEED_A_MODEL = ("clock.integrator", "transmission", "friction", "actuator.bandwidth", "accelerometer.bandwidth")
 _CANNOT_MOVE = (
-    "What such a hand does no program here knows, so the device can be neither moved nor judged: only a run whose plant "
-    "is a program of yours can have it (haploop run --node plant=COMMAND, or --external plant)."
+    "What such a hand does no program here knows, so the device can be neither moved nor judged: only a run whose "
+    "plant is a program of yours can have it (haploop run --node plant=COMMAND, or --external plant)."
 )
 
 
@@ -22,7 +22,10 @@ def check_hand(draft: Draft) -> None:
     hand = draft.data.get("hand")
     if not isinstance(hand, dict) or hand.get("kind") != _KIND:
         return
-    for key in sorted(hand.keys() & {field.name for field in Hand.fields()} - {"kind"}):
+    known = Hand(kind=_KIND).as_dict()  # as a resolved scene has it
+    for key in [
+        field.name for field in Hand.fields() if field.name in hand and hand[field.name] != known.get(field.name)
+    ]:
         draft.complain(("hand", key), "An unmodelled hand has no key but its kind; leave this out.", "is given")
     for key in _NEED_A_MODEL:
         if value_at(draft.data, key) not in (None, "exact"):

@@ -25,7 +25,11 @@ _NO_VERDICT = {
     "unknown": "Its summary cannot be read from here, so that its verdict is not known.",
 }
 # Entries of the summary, of its window and of its energy; the logger's status has them side by side.
-_JUDGED = ("verdict", "verdict_rule"), ("oscillation_m", "displayed_stiffness_N_m"), ("residual_J", "moved_J", "balance")
+_JUDGED = (
+    ("verdict", "verdict_rule"),
+    ("oscillation_m", "displayed_stiffness_N_m"),
+    ("residual_J", "moved_J", "balance"),
+)
 
 
 class Column(NamedTuple):

@@ -26,7 +26,8 @@ class LiveStatus:
         factor: simulated over wall time of the last 2 s; None while nothing moves.
         changes: every event so far, (tick, event) in order.
         skipped_ticks: telemetry that never came.
-        figures: verdict, oscillation_m, residual_J and perhaps balance so far, in the end those of the summary; empty before any.
+        figures: verdict, oscillation_m, residual_J and balance so far, in the end those of the summary; empty before
+            any.
         is_judged: whether the verdict is that of the ended run, held still and pushed.
         is_awaited: whether its launcher still is to judge it.
         ended: how the run ended, in a word; "" while it goes on.

@@ -73,7 +73,7 @@ def run(
             programs = read_programs(node or [], [])
         except (TransportError, ProgramError) as error:
             leave(str(error), WRONG_USE)
-        prepared = start.prepare(scene, set or [], plugin or [], out)
+        prepared = start.prepare(scene, set or [], plugin or [], out, any_hand="plant" in programs)
         try:
             print_notes(prepared.scene)
             # What an element prints is no part of the answer.
