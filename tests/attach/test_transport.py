@@ -6,13 +6,14 @@ import threading
 from pathlib import Path
 
 import pytest
-import zmq
 
 from haploop.launch.processes import run_directory
-from haploop.launch.processes.run_directory import ask
+from haploop.launch.processes.run_directory import Elsewhere, RunNotFound, ask, find
 from haploop.launch.runs.start import prepare, run
-from haploop.protocol.transport.sockets import SecureContext, Transport, TransportError, open_socket
-from haploop.protocol.transport.wire import encode
+from haploop.protocol.transport.addresses import TransportError
+from haploop.protocol.transport.keys import make_keys
+from haploop.protocol.transport.messages import PROCESSES
+from haploop.protocol.transport.sockets import Transport
 
 SCENE = Path(__file__).parents[2] / "launch" / "scenes" / "fig6c.toml"
 
@@ -31,19 +32,12 @@ def test_a_loop_others_could_steer_is_refused(host, keys, why):
         Transport.from_options(host, keys and Path(keys))
 
 
-def test_keys_are_made_once_private_and_kept(tmp_path):
-    keys = tmp_path / "keys"
-    Transport.from_options("127.0.0.1", keys)
-    secret = (keys / "server.key_secret").read_bytes()
-    for private in (keys, keys / "server.key_secret", keys / "client.key_secret"):
-        assert private.stat().st_mode & 0o077 == 0
-    Transport.from_options("127.0.0.1", keys)
-    assert (keys / "server.key_secret").read_bytes() == secret
-
-
 @pytest.mark.parametrize("with_keys", [False, True])
 def test_a_run_over_tcp_gives_the_bits_of_one_process_and_answers_whoever_may_ask(tmp_path, with_keys):
-    transport = Transport.from_options("127.0.0.1", tmp_path / "keys" if with_keys else None)
+    keys = tmp_path / "keys" if with_keys else None
+    if keys:
+        make_keys(keys)
+    transport = Transport.from_options("127.0.0.1", keys)
     settings = ["duration=1.5", "run.pin=false"]
     alone = run(prepare(SCENE, settings, out=tmp_path / "alone"), in_process=True)
     results, identities = [], []
@@ -58,26 +52,33 @@ def test_a_run_over_tcp_gives_the_bits_of_one_process_and_answers_whoever_may_as
     assert address.startswith("tcp://127.0.0.1:")
     live = run_directory.find(identity)
     assert ask(live, "status")[1]["end"] == 1500
-    if with_keys:
-        assert not answers(address, Transport()), "a client without keys was answered"
-        Transport.from_options("127.0.0.1", tmp_path / "other")
-        assert not answers(address, stranger(tmp_path, tmp_path / "other")), "a stranger's key was let in"
+    assert find(Elsewhere(address, keys)).title == live.title
+    if keys:
+        with pytest.raises(RunNotFound, match="is guarded by keys"):
+            find(Elsewhere(address, None))
+        make_keys(tmp_path / "other")
+        with pytest.raises(RunNotFound, match=r"refuses this key"):
+            find(Elsewhere(address, stranger(keys, tmp_path / "other")))
+    else:
+        make_keys(tmp_path / "other")
+        with pytest.raises(RunNotFound, match="has no keys"):
+            find(Elsewhere(address, tmp_path / "other"))
     thread.join(60)
     assert results[0]["trajectory_sha256"] == alone["trajectory_sha256"]
 
 
-def stranger(tmp_path: Path, other: Path) -> Transport:
-    """Somebody who knows the server's public key but has a key of his own that nobody let in."""
-    (other / "server.key").write_bytes((tmp_path / "keys" / "server.key").read_bytes())
-    return Transport(keys=other)
+def stranger(keys: Path, other: Path) -> Path:
+    """Somebody who knows the clock's public key but has a key of his own that nobody let in."""
+    (other / "clock.key").write_bytes((keys / "clock.key").read_bytes())
+    return other
 
 
-def answers(address: str, transport: Transport) -> bool:
-    """Whether the clock at ``address`` answers a status command."""
-    context = SecureContext.from_transport(transport)
-    socket = open_socket(context, zmq.DEALER)
-    socket.connect(address)
-    socket.send(encode("COMMAND", "status", {}))
-    answered = bool(socket.poll(300))
-    context.destroy(linger=0)
-    return answered
+def test_each_process_is_given_its_own_certificate_and_no_other(tmp_path):
+    make_keys(tmp_path / "keys")
+    launcher = Transport.from_options("127.0.0.1", tmp_path / "keys")
+    told = {role: str(launcher.of(role).as_dict()) for role in PROCESSES}
+    secrets = {role: launcher.of(role).keys.secret for role in PROCESSES} | {"clock": launcher.keys.secret}
+    assert len(set(secrets.values())) == 4
+    for role, text in told.items():
+        assert [holder for holder, secret in secrets.items() if secret in text] == [role]
+    assert all(Transport.from_dict(launcher.of(role).as_dict()) == launcher.of(role) for role in PROCESSES)

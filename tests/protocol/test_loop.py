@@ -95,7 +95,7 @@ NO_SAMPLES = [*junk(), *(pack(2, SAMPLES, 5, wrong) for wrong in ("x", None, {1:
 
 def test_whatever_comes_in_place_of_samples_is_a_named_error() -> None:
     with zmq.Context() as context, context.socket(zmq.PAIR) as plant:
-        controller = ControllerEnd(context, "inproc://loop", lambda: None)
+        controller = ControllerEnd(context, {"loop": "inproc://loop"}, lambda: None)
         controller.socket.close()
         controller.socket = context.socket(zmq.PAIR)
         plant.bind("inproc://pair")

@@ -179,7 +179,8 @@ class SimRun:
     def make_context(self, _transport: Any) -> Any:
         return self.context(self.launcher, self.disk)
 
-    def start_nodes(self, sockets: Path, start: dict[str, Any], pin: bool, number: int, _programs: Any) -> Any:
+    def start_nodes(self, sockets: Path, told_to: Callable[[str], Any], pin: bool, number: int, _programs: Any) -> Any:
+        start = told_to("plant")
         self.sockets, self.clock, self.secret = sockets, start["address"], start["secret"]
         for role in PROCESSES:
             self.nodes[role] = Process(self.world, role, self._node(role, sockets, start), self.starts_s[role])

@@ -42,7 +42,7 @@ class ControllerNode:
         self._block = BlockLength(scene.run.block_ticks, machine_of(context).now)
         self._reported = self._idle_ms = 0
         self._secret = told["secret"]
-        self._loop = ControllerEnd(context, welcome["endpoints"]["plant"]["loop"], self._idle)
+        self._loop = ControllerEnd(context, welcome["endpoints"]["plant"], self._idle)
 
     def _state(self) -> tuple[int, Message]:
         return self._controller.tick, {"history": self._controller.recorder.history}

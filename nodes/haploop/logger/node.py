@@ -60,8 +60,7 @@ class LoggerNode:
     def start(self, welcome: Message, out: Path) -> None:
         """Subscribes to plant and controller, takes their state, and reports to be ready."""
         self.out = out
-        addresses = {role: welcome["endpoints"][role]["telemetry"] for role in _LISTENS}
-        self._streams = Subscriber(self._context, addresses)
+        self._streams = Subscriber(self._context, {role: welcome["endpoints"][role] for role in _LISTENS})
         attachments = welcome["context"].get("attachments", {})
         scene, time = Scene.from_dict(welcome["scene"]), Timebase(**welcome["timebase"])
         self.session = open_session(scene, time, out, attachments, machine=self._machine)

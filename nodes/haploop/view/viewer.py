@@ -130,7 +130,7 @@ class Viewer:
 
     async def _backfill(self, session: RunSession) -> None:
         """Puts what was logged before joining in front of what was received."""
-        if session.scene.run.log == "none":
+        if session.scene.run.log == "none" or not session.run.is_here:
             return
         backfill = Backfill(session.out, session.scene, session.time, session.events)
         while True:

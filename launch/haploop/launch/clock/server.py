@@ -15,7 +15,7 @@ from haploop.launch.spec import RunFailed
 from haploop.protocol.changes import refusals_of
 from haploop.protocol.transport.machine import machine_of
 from haploop.protocol.transport.messages import PROCESSES
-from haploop.protocol.transport.sockets import bind, has_message, open_socket
+from haploop.protocol.transport.sockets import bind, has_message, open_socket, transport_of
 from haploop.protocol.transport.wire import Frame, Message, WireError, decode, encode
 
 Answer = tuple[bool, str, Message]
@@ -49,7 +49,7 @@ class ClockServer:
         programs: Mapping[str, Program] = NO_PROGRAMS,
     ) -> None:
         self.socket = open_socket(context, zmq.ROUTER)
-        self._machine = machine_of(context)
+        self._machine, self._keys = machine_of(context), transport_of(context).keys
         self.address = bind(self.socket, sockets, "clock")
         self._secret, self._clock, self._welcome, self._command = secret, clock, welcome, command
         self.roster = Roster(programs)
@@ -216,6 +216,8 @@ class ClockServer:
         run, scene, timebase, context = self._welcome
         secret = {"secret": self._secret} if node.is_own else {}
         endpoints = self.roster.endpoints()
+        if self._keys:
+            endpoints = {role: {**addresses, "key": self._keys.known[role]} for role, addresses in endpoints.items()}
         self._send(node.identity, "WELCOME", run, scene, timebase, endpoints, self._clock.until, secret | context)
 
     # What nodes say

@@ -8,7 +8,7 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -162,11 +162,12 @@ def _terminal() -> int:
 
 
 def start_children(
-    sockets: Path, start: Message, pin: bool, run_number: int, programs: Mapping[str, Program]
+    sockets: Path, start: Callable[[str], Message], pin: bool, run_number: int, programs: Mapping[str, Program]
 ) -> dict[str, Child]:
     """Starts every process of the table but those that somebody else starts.
 
     Args:
+        start: what the process of a role is told at its start.
         programs: programs that take the place of the table's, by role.
 
     Plant and controller wait for each other at every tick and gain nothing from two cores, but lose the wake-up from
@@ -183,7 +184,7 @@ def start_children(
             if program and program.is_external:
                 continue
             cores = loop_cores if process.on_loop_core else other_cores
-            children[role] = Child(role, sockets, {**start, "cores": cores}, program)
+            children[role] = Child(role, sockets, {**start(role), "cores": cores}, program)
     except BaseException:
         for child in children.values():
             child.kill()

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import json
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import zmq
 
@@ -19,12 +19,15 @@ from haploop.launch.processes.private_directory import (
     read_entry,
 )
 from haploop.launch.spec import OutputError
-from haploop.protocol.transport.sockets import SecureContext, Transport, open_socket
+from haploop.protocol.transport.connection import Connection
+from haploop.protocol.transport.keys import CLIENT, KeysError, read_keys
+from haploop.protocol.transport.sockets import SecureContext, Transport, connect, open_socket
 from haploop.protocol.transport.wire import Message, WireError, decode, encode
 
 # A swap may try a plugin first.
 _ANSWER_MS, _SWAP_MS = 5000, 30_000
 _LOOK_MS = 250
+_HERE = " It may be in a network of its own, as that of a container is."
 
 
 class RunNotFound(Exception):
@@ -37,23 +40,47 @@ class CommandRefused(Exception):
 
 @dataclass(frozen=True)
 class LiveRun:
-    """A run as other terminals see it: its sockets, the launcher's process, the clock's address and keys."""
+    """A run as other terminals see it: its sockets, the launcher's process, the clock's address and keys.
+
+    Attributes:
+        sockets: its private directory; None for a run elsewhere.
+        pid_namespace: the numbering of processes that ``pid`` belongs to.
+    """
 
     id: str
-    sockets: Path
+    sockets: Path | None
     pid: int
     clock: str
     title: str
     out: str
     keys: str | None = None
+    pid_namespace: str = ""
+
+    @property
+    def is_here(self) -> bool:
+        """Tells whether the run is one of this machine, whose files can be read."""
+        return self.sockets is not None
 
     def make_context(self) -> SecureContext:
-        return SecureContext.from_transport(Transport(keys=Path(self.keys) if self.keys else None))
+        """Makes a context whose sockets may connect to the run; RunNotFound where its keys cannot be used."""
+        try:
+            keys = read_keys(Path(self.keys), CLIENT) if self.keys else None
+        except KeysError as error:
+            raise RunNotFound(f"Run {self.id} cannot be reached: {error}") from error
+        return SecureContext.from_transport(Transport(keys=keys))
+
+
+class Elsewhere(NamedTuple):
+    """A run on another host, or in another container: the address of its clock, and a copy of its keys."""
+
+    clock: str
+    keys: Path | None
 
 
 def announce(sockets: Path, clock: str, title: str, out: str, keys: str | None = None) -> None:
     """Writes the entry by which other terminals find the run; raises OutputError where that fails."""
     entry = {"pid": os.getpid(), "clock": clock, "title": title, "out": out, "keys": keys}
+    entry["pid_namespace"] = _pid_namespace()
     temporary = sockets / PART
     try:
         temporary.write_text(json.dumps(entry), encoding="utf-8")
@@ -75,11 +102,17 @@ def live_runs() -> list[LiveRun]:
 
 
 def is_live(run: LiveRun) -> bool:
-    return is_held(run.sockets)
+    """Tells whether a launcher holds a run; of one elsewhere, only the connection to its clock can tell."""
+    return run.sockets is None or is_held(run.sockets)
 
 
 def has_launcher(run: LiveRun) -> bool:
-    """Tells whether the process that leads a run is there: when the run is live no more, it judges it."""
+    """Tells whether the process that leads a run is there: when the run is live no more, it judges it.
+
+    One in another container, whose processes cannot be seen from here, is taken to be there.
+    """
+    if run.sockets is None or run.pid_namespace != _pid_namespace():
+        return True
     try:
         os.kill(run.pid, 0)
     except (ProcessLookupError, OverflowError):
@@ -89,9 +122,14 @@ def has_launcher(run: LiveRun) -> bool:
     return True
 
 
-def find(run_id: str | None) -> LiveRun:
-    """Returns the run with this id (or its beginning), or the only one there is; RunNotFound where not one fits."""
-    runs = live_runs()
+def find(which: str | Elsewhere | None) -> LiveRun:
+    """Returns the run with this id (or its beginning), the only one there is, or that which answers elsewhere.
+
+    Raises RunNotFound where not one fits, or the one elsewhere cannot be reached.
+    """
+    if isinstance(which, Elsewhere):
+        return _reach(which)
+    run_id, runs = which, live_runs()
     fitting = [run for run in runs if run_id is None or run.id.startswith(run_id)]
     if len(fitting) == 1:
         return fitting[0]
@@ -112,23 +150,29 @@ def ask(run: LiveRun, verb: str, **arguments: Any) -> tuple[str, Message]:
     """
     context = run.make_context()
     socket = open_socket(context, zmq.DEALER)
+    is_tcp = run.clock.startswith("tcp:")
+    connection = Connection(socket, run.clock, run.keys is not None) if is_tcp else None
     try:
-        socket.connect(run.clock)
+        connect(socket, run.clock)
         socket.send(encode("COMMAND", verb, arguments))
         answer_ms = _SWAP_MS if verb == "swap" else _ANSWER_MS
         for _ in range(answer_ms // _LOOK_MS):
             if socket.poll(_LOOK_MS):
                 break
             if not is_live(run):
-                raise RunNotFound(f"Run {run.id} ({run.title}) has ended.")
+                raise RunNotFound(f"Run {_named(run)} has ended.")
+            if connection and (why := connection.trouble()):
+                raise RunNotFound(why if run.sockets is None else f"Run {_named(run)} cannot be reached. {why}{_HERE}")
         else:
-            raise RunNotFound(f"Run {run.id} ({run.title}) has not answered for {answer_ms // 1000} s.")
+            raise RunNotFound(f"Run {_named(run)} has not answered for {answer_ms // 1000} s.")
         frame = decode(socket.recv())
     except WireError as error:
         raise RunNotFound(f"Run {run.id} answered with something else: {error}") from error
     except zmq.ZMQError as error:
         raise RunNotFound(f"Run {run.id} cannot be reached at {run.clock}: {error.strerror}.") from error
     finally:
+        if connection:
+            connection.close()
         context.destroy(linger=0)
     if frame.name == "REFUSED":
         raise CommandRefused(frame.fields[0])
@@ -138,11 +182,34 @@ def ask(run: LiveRun, verb: str, **arguments: Any) -> tuple[str, Message]:
     return text, data
 
 
+def _named(run: LiveRun) -> str:
+    return f"{run.id} ({run.title})" if run.title else run.id
+
+
+def _reach(place: Elsewhere) -> LiveRun:
+    """Asks the run at an address for its title; RunNotFound, and why, where none answers."""
+    keys = str(place.keys) if place.keys else None
+    run = LiveRun(place.clock.removeprefix("tcp://"), None, 0, place.clock, "", "", keys)
+    try:
+        data = ask(run, "status")[1]
+        return replace(run, title=str(data["title"]), out=str(data["out"]))
+    except (CommandRefused, LookupError) as error:
+        raise RunNotFound(f"What answers at {run.id} is no run of this version of haploop: {error}") from error
+
+
+def _pid_namespace() -> str:
+    """Returns what tells this numbering of processes from those of other containers; "" where there is none."""
+    try:
+        return os.readlink("/proc/self/ns/pid")  # noqa: PTH115 (no file that is there)
+    except OSError:
+        return ""
+
+
 def _read(path: Path) -> LiveRun | None:
     try:
         entry = json.loads(read_entry(path))
         run = LiveRun(path.name, path, **entry)
     except (OSError, ValueError, TypeError, RecursionError):  # not announced yet, removed, or no entry of ours
         return None
-    texts = (run.clock, run.title, run.out, run.keys or "")
+    texts = (run.clock, run.title, run.out, run.keys or "", run.pid_namespace)
     return run if isinstance(run.pid, int) and all(isinstance(text, str) for text in texts) else None

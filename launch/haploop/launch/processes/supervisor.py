@@ -7,6 +7,7 @@ import math
 import secrets
 from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -25,15 +26,15 @@ from haploop.launch.spec import OutputError, RunFailed, RunSpec
 from haploop.protocol.changes import Event
 from haploop.protocol.ticks import Timebase
 from haploop.protocol.transport.machine import Machine, machine_of
-from haploop.protocol.transport.sockets import SecureContext, Transport
+from haploop.protocol.transport.sockets import SecureContext, Transport, with_host_of
 from haploop.protocol.transport.wire import Message
 
 if TYPE_CHECKING:
     from haploop.logger.summary import Summary
 
-# From directory of sockets, what a node is told at its start, whether cores are pinned, the number of the run, and
-# programs that take the place of its own.
-Start = Callable[[Path, Message, bool, int, Mapping[str, Program]], dict[str, Child]]
+# From directory of sockets, what the node of a role is told at its start, whether cores are pinned, the number of the
+# run, and programs that take the place of its own.
+Start = Callable[[Path, Callable[[str], Message], bool, int, Mapping[str, Program]], dict[str, Child]]
 
 _START_DEADLINE_S = 20.0
 # What the logger is given to save its files after another node has failed.
@@ -64,7 +65,7 @@ def run_processes(
         KeyboardInterrupt: the second signal came.
     """
     with interrupts(usual_from=3) as received, private_directory.made() as sockets:
-        context = make_context(spec.transport)
+        context = make_context(replace(spec.transport, patience_s=spec.scene.run.deadline))
         try:
             supervisor = Supervisor(spec, sockets, received, context, start_nodes)
         except BaseException as error:
@@ -110,17 +111,23 @@ class Supervisor:
         self._server = ClockServer(
             self._context, sockets, secret, self._clock, welcome, commands, spec.start_gate, spec.programs
         )
-        keys = spec.transport.as_dict()["keys"]
-        run_directory.announce(sockets, self._server.address, scene.title, str(spec.out), keys)
+        transport = replace(spec.transport, patience_s=scene.run.deadline)
+        loopback = "tcp://[::1]:0" if ":" in (spec.transport.host or "") else "tcp://127.0.0.1:0"
+        here = with_host_of(self._server.address, loopback)
+        keys = str(spec.transport.directory) if spec.transport.directory else None
+        run_directory.announce(sockets, here, scene.title, str(spec.out), keys)
         run_number = len(run_directory.live_runs()) - 1
         self._prints = ShownPrints(spec.out.resolve() / PRINTS)
         start = {
-            "address": self._server.address,
+            "address": here,
             "secret": secret,
-            "transport": spec.transport.as_dict(),
             "prints": str(spec.out.resolve() / PRINTS),
         }
-        self._children = start_nodes(sockets, start, scene.run.pin, run_number, spec.programs)
+
+        def told_to(role: str) -> Message:
+            return {**start, "transport": transport.of(role).as_dict()}
+
+        self._children = start_nodes(sockets, told_to, scene.run.pin, run_number, spec.programs)
         self._started = self._looked = self._machine.now()
         if not math.isinf(spec.pace):  # the nodes are loading
             self._clock.prepare()

@@ -125,7 +125,9 @@ class RunSession:
         self._context.destroy(linger=200)
 
     def read_summary(self) -> None:
-        """Reads the run's summary if it is there; a run that failed may still be writing it."""
+        """Reads the run's summary if it is on this machine; a run that failed may still be writing it."""
+        if not self.run.is_here:
+            return
         with contextlib.suppress(LogError):
             self.summary = summary = read(self.out / SUMMARY)
             self.outcome = "failed" if summary.get("ended") == "failed" else self.outcome

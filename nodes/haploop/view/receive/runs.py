@@ -34,6 +34,11 @@ class Run(Protocol):
         """Address of the clock."""
         ...
 
+    @property
+    def is_here(self) -> bool:
+        """Whether its files are on this machine."""
+        ...
+
     def make_context(self) -> SecureContext:
         """Makes a context whose sockets may connect to the run."""
         ...

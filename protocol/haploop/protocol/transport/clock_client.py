@@ -8,12 +8,15 @@ from typing import Any
 import zmq
 
 from haploop.protocol.changes import Event
-from haploop.protocol.transport.sockets import has_message, open_socket
+from haploop.protocol.transport.connection import Connection
+from haploop.protocol.transport.messages import PROCESSES
+from haploop.protocol.transport.sockets import connect, has_message, open_socket, transport_of, with_host_of
 from haploop.protocol.transport.wire import Frame, Message, WireError, decode, encode
 
 # A node that waits says so this often, so that the clock can tell who is being waited for.
 REPORT_MS = 200
-_JOIN_MS = 20_000
+_JOIN_S = 20.0
+_LOOK_MS = 250
 _PROGRAM = {"name": "haploop"}
 
 
@@ -40,7 +43,14 @@ class ClockClient:
     def __init__(self, context: zmq.Context[zmq.Socket[bytes]], role: str, address: str, secret: str) -> None:
         self.role, self._secret = role, secret
         self.socket = open_socket(context, zmq.DEALER)
-        self.socket.connect(address)
+        self._address = address
+        transport = transport_of(context)
+        self._connection = None
+        if address.startswith("tcp:"):
+            self._connection = Connection(self.socket, address, transport.keys is not None)
+        # One of the run's own that is cut off is known no more; another may join anew.
+        self._patience_s = 0.0 if role in PROCESSES else transport.patience_s
+        connect(self.socket, address)
         self.until = 0
         self.last = False
         self.events: list[tuple[int, Event]] = []
@@ -54,21 +64,34 @@ class ClockClient:
             Refused: the clock said no, or said nothing for 20 s.
             Aborted: the run failed before it began.
         """
+        if any(with_host_of(address, "") != address for address in endpoints.values()):
+            from haploop.protocol.transport.addresses import own_address_towards
+
+            mine = own_address_towards(self._address)
+            endpoints = {channel: with_host_of(address, mine) for channel, address in endpoints.items()}
         self.socket.send(encode("JOIN", self.role, self._secret, os.getpid(), endpoints, lossless, _PROGRAM))
-        while self.socket.poll(_JOIN_MS):
+        for _ in range(int(_JOIN_S * 1000 / _LOOK_MS)):
+            if not self.socket.poll(_LOOK_MS):
+                if self._connection and (why := self._connection.trouble()):
+                    raise Refused(why)
+                continue
             frame = self._receive()
             if frame and frame.name == "WELCOME":
                 welcome = frame.as_dict()
                 self.until = welcome["granted"]
+                for addresses in welcome["endpoints"].values():
+                    addresses |= {name: with_host_of(text, self._address) for name, text in addresses.items()}
                 return welcome
             if frame and frame.name == "REFUSED":
                 raise Refused(frame.fields[0])
-        raise Refused(f"The clock did not answer within {_JOIN_MS // 1000} s; is the run still there?")
+        raise Refused(f"The clock did not answer within {_JOIN_S:g} s; is the run still there?")
 
     def poll(self) -> None:
-        """Takes what the clock has sent, without waiting."""
+        """Takes what the clock has sent, without waiting; raises Aborted where its host can no longer be reached."""
         while has_message(self.socket):
             self._receive()
+        if self._connection and (lost_s := self._connection.lost_s()) > self._patience_s:
+            raise Aborted(f"The connection to the clock at {self._address} was lost {lost_s:.0f} s ago.")
 
     def hears(self, most_ms: int) -> bool:
         """Waits for a message of the clock, and takes all there are; returns False when none came in time."""

@@ -10,7 +10,7 @@ import zmq
 
 from haploop.protocol.transport.clock_client import REPORT_MS
 from haploop.protocol.transport.messages import MESSAGES, VERSION
-from haploop.protocol.transport.sockets import bare_send, open_socket
+from haploop.protocol.transport.sockets import bare_send, connect, open_socket
 from haploop.protocol.transport.wire import Frame, WireError, decode, encode
 
 _COMMANDS = MESSAGES["COMMANDS"].code
@@ -104,14 +104,15 @@ class PlantEnd:
 class ControllerEnd:
     """The controller's end of the connection: a DEALER that knows only the plant.
 
-    ``idle`` is called every 20 ms while samples are awaited.
+    ``plant`` holds its ``loop`` address and, where there are keys, its public ``key``; ``idle`` is called every 20 ms
+    while samples are awaited.
     """
 
-    def __init__(self, context: zmq.Context[zmq.Socket[bytes]], address: str, idle: Idle) -> None:
+    def __init__(self, context: zmq.Context[zmq.Socket[bytes]], plant: dict[str, str], idle: Idle) -> None:
         self._idle = idle
         self.socket = open_socket(context, zmq.DEALER)
         self.socket.setsockopt(zmq.RCVTIMEO, IDLE_MS)
-        self.socket.connect(address)
+        connect(self.socket, plant["loop"], plant.get("key"))
         self._pack = msgpack.Packer(autoreset=True, default=float).pack  # an element may give a number of another type
         self._emit = bare_send(self.socket)
 

@@ -40,8 +40,7 @@ class Observer:
         self._taken = 0
         self._events: list[tuple[int, Event]] = []
         self.client = self._join()
-        addresses = {name: self.welcome["endpoints"][name]["telemetry"] for name in listens}
-        self._streams = Subscriber(context, addresses)
+        self._streams = Subscriber(context, {name: self.welcome["endpoints"][name] for name in listens})
         self.ended: dict[str, Frame] = {}
         self._report_due = 0.0
 

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-import ipaddress
 import os
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import zmq
 
+from haploop.protocol.transport.keys import CLOCK, Keys, read_keys
+from haploop.protocol.transport.messages import PROCESSES
 from haploop.protocol.transport.wire import MAX_FRAME_BYTES
 
-SERVER, CLIENT, CLIENTS = "server", "client", "clients"
+# The sockets of a run in the order of their TCP ports.
+_PORTS = (CLOCK, *(name for process in PROCESSES.values() for name in process.binds.values()))
 # A subscriber this many blocks behind starts to lose blocks; the grant window keeps lossless ones far below.
 TELEMETRY_BACKLOG_BLOCKS = 256
 # What comes in at sockets that are bound, where anyone may connect, is small: reports and commands, subscriptions to a
@@ -24,12 +26,10 @@ _OPTIONS: dict[int, tuple[tuple[int, int], ...]] = {
     zmq.XPUB: ((zmq.SNDHWM, TELEMETRY_BACKLOG_BLOCKS), (zmq.XPUB_VERBOSE, 1)),
     zmq.SUB: ((zmq.RCVHWM, TELEMETRY_BACKLOG_BLOCKS),),
 }
+# A peer that has connected must have shown its key by then.
+_HANDSHAKE_MS = 10_000
 # The kernel's limit on the path of an ipc socket.
 _LONGEST_PATH = 107
-
-
-class TransportError(ValueError):
-    """Raised for an address or keys that cannot be used; the message says what to do."""
 
 
 @dataclass(frozen=True)
@@ -37,59 +37,63 @@ class Transport:
     """The address at which sockets are bound, and the CURVE keys that guard them.
 
     Attributes:
-        host: address that TCP sockets are bound to, each at a port of its own; None for local (ipc) sockets.
-        keys: directory of CURVE keys (``server.key_secret``, ``client.key_secret``, public keys of those who may
-            connect in ``clients/``), or None for none.
+        host: numeric address that TCP sockets are bound to; None for local (ipc) sockets.
+        port: that of the clock, the other sockets of a run take those that follow; 0 for any that are free.
+        keys: those of the program whose sockets these are; None for sockets that anyone may connect to.
+        directory: of the keys of a whole run, for its launcher alone.
+        patience_s: after so long without a sign of life a connection to another host is given up.
     """
 
     host: str | None = None
-    keys: Path | None = None
+    port: int = 0
+    keys: Keys | None = None
+    directory: Path | None = None
+    patience_s: float = 5.0
 
     @classmethod
-    def from_options(cls, host: str | None, keys: Path | None) -> Transport:
-        """Makes the transport that a command's options ask for, and keys where the directory has none.
+    def from_options(cls, tcp: str | None, keys: Path | None) -> Transport:
+        """Makes the transport of a launcher that a command's options ask for: ADDRESS or ADDRESS:PORT, and keys.
 
         Raises:
-            TransportError: a host that others can reach without keys, no address at all, or keys without TCP.
+            TransportError: a host that others can reach without keys, no address of this machine, a port that is
+                taken, or keys without TCP.
+            KeysError: keys that are not there, not whole, or open to others.
         """
-        if host is None:
+        from haploop.protocol.transport.addresses import TransportError, address_to_bind
+
+        if tcp is None:
             if keys:
                 raise TransportError("Keys guard TCP; name the address to bind as well, or leave out the keys.")
             return cls()
-        try:
-            is_local = host == "localhost" or ipaddress.ip_address(host).is_loopback
-        except ValueError as error:
-            raise TransportError(
-                f"A numeric address such as 127.0.0.1 was expected for TCP, but {host!r} came."
-            ) from error
-        if not is_local and keys is None:
-            raise TransportError(
-                f"Anyone who reaches {host} could steer the loop: give a directory of keys as well, or use 127.0.0.1."
-            )
-        if keys:
-            _make_missing_keys(keys)
-        return cls("127.0.0.1" if host == "localhost" else host, keys and keys.resolve())
+        host, port = address_to_bind(tcp, len(_PORTS), is_guarded=keys is not None)
+        directory = keys and keys.resolve()
+        return cls(host, port, directory and read_keys(directory, CLOCK), directory)
 
-    def as_dict(self) -> dict[str, str | None]:
-        return {"host": self.host, "keys": str(self.keys) if self.keys else None}
+    def of(self, role: str, elsewhere: bool = False) -> Transport:
+        """Returns the transport of one of the run's processes: its own certificate, and an address on its host.
+
+        Args:
+            elsewhere: on another host, of which any address serves.
+
+        Raises:
+            KeysError: the certificate is gone.
+        """
+        any_host = "::" if ":" in (self.host or "") else "0.0.0.0"
+        return replace(
+            self,
+            host=any_host if elsewhere and self.host else self.host,
+            keys=self.directory and read_keys(self.directory, role),
+            directory=None,
+        )
+
+    def as_dict(self) -> dict[str, Any]:
+        """Returns what a process is told at its start; the launcher's directory of keys is no part of it."""
+        keys = self.keys and self.keys.as_dict()
+        return {"host": self.host, "port": self.port, "keys": keys, "patience_s": self.patience_s}
 
     @classmethod
-    def from_dict(cls, values: dict[str, str | None]) -> Transport:
-        keys = values.get("keys")
-        return cls(values.get("host"), Path(keys) if keys else None)
-
-    def guard(self, socket: zmq.Socket[bytes], binds: bool) -> None:
-        """Sets the keys of a socket that will be bound, or connected."""
-        if self.keys is None:
-            return
-        from zmq.auth import load_certificate
-
-        own, secret = load_certificate(self.keys / f"{SERVER if binds else CLIENT}.key_secret")
-        socket.curve_publickey, socket.curve_secretkey = own, secret
-        if binds:
-            socket.curve_server = True
-        else:
-            socket.curve_serverkey = load_certificate(self.keys / f"{SERVER}.key")[0]
+    def from_dict(cls, values: dict[str, Any]) -> Transport:
+        return cls(**{**values, "keys": Keys(**values["keys"]) if values["keys"] else None})
 
 
 class SecureContext(zmq.Context[zmq.Socket[bytes]]):
@@ -100,7 +104,7 @@ class SecureContext(zmq.Context[zmq.Socket[bytes]]):
 
     @classmethod
     def from_transport(cls, transport: Transport) -> SecureContext:
-        """Makes a context; with keys, only peers that hold one of those in ``clients/`` can connect to its sockets."""
+        """Makes a context; with keys, only peers that hold one that is known can connect to its bound sockets."""
         context = cls()
         context.transport = transport
         if transport.keys and transport.host:
@@ -108,7 +112,7 @@ class SecureContext(zmq.Context[zmq.Socket[bytes]]):
 
             context._authenticator = ThreadAuthenticator(context)
             context._authenticator.start()
-            context._authenticator.configure_curve(domain="*", location=str(transport.keys / CLIENTS))
+            context._authenticator.configure_curve_callback(credentials_provider=_Known(transport.keys))
         return context
 
     def destroy(self, linger: int | None = None) -> None:
@@ -119,11 +123,25 @@ class SecureContext(zmq.Context[zmq.Socket[bytes]]):
         super().destroy(linger)
 
 
+class _Known:
+    """Answers the authenticator whether a key is known."""
+
+    def __init__(self, keys: Keys) -> None:
+        self._known = {public.encode() for public in keys.known.values()}
+
+    def callback(self, domain: str, key: bytes) -> bool:
+        return key in self._known
+
+
 def open_socket(context: zmq.Context[zmq.Socket[bytes]], kind: int) -> zmq.Socket[bytes]:
     """Opens a socket of a type such as ``zmq.DEALER`` with the options every socket of a run has."""
     socket = context.socket(kind)
     socket.linger = 0
-    _transport(context).guard(socket, binds=kind in _LARGEST)
+    transport = transport_of(context)
+    if transport.keys:
+        socket.curve_publickey, socket.curve_secretkey = transport.keys.public.encode(), transport.keys.secret.encode()
+        socket.curve_server = kind in _LARGEST
+        _watch_peers(socket, transport.patience_s)
     socket.setsockopt(zmq.MAXMSGSIZE, _LARGEST.get(kind, MAX_FRAME_BYTES))
     socket.setsockopt(zmq.RECONNECT_IVL, 20)
     for option, value in _OPTIONS.get(kind, ()):
@@ -136,8 +154,27 @@ def bare_send(socket: zmq.Socket[bytes]) -> Callable[..., Any]:
     return super(zmq.Socket, socket).send if isinstance(socket, zmq.Socket) else socket.send
 
 
-def _transport(context: zmq.Context[zmq.Socket[bytes]]) -> Transport:
+def transport_of(context: zmq.Context[zmq.Socket[bytes]]) -> Transport:
     return context.transport if isinstance(context, SecureContext) else Transport()
+
+
+def _watch_peers(socket: zmq.Socket[bytes], patience_s: float) -> None:
+    """Has the library give up a connection of which nothing is heard, and one that never says who it is."""
+    milliseconds = max(1, int(patience_s * 1000))
+    socket.setsockopt(zmq.HEARTBEAT_IVL, min(1000, milliseconds))
+    socket.setsockopt(zmq.HEARTBEAT_TIMEOUT, milliseconds)
+    socket.setsockopt(zmq.HANDSHAKE_IVL, _HANDSHAKE_MS)
+    socket.setsockopt(zmq.RECONNECT_IVL_MAX, 1000)
+
+
+def connect(socket: zmq.Socket[bytes], address: str, key: str | None = None) -> None:
+    """Connects to an address, whose holder has the public key ``key``: that of the clock where None is given."""
+    keys = transport_of(socket.context).keys
+    if keys:
+        socket.curve_serverkey = (key or keys.clock).encode()
+    if "[" in address:
+        socket.setsockopt(zmq.IPV6, 1)
+    socket.connect(address)
 
 
 def has_message(socket: zmq.Socket[bytes]) -> bool:
@@ -150,9 +187,12 @@ def bind(socket: zmq.Socket[bytes], directory: Path, name: str) -> str:
 
     Raises OSError where the path is longer than the kernel allows, or is taken.
     """
-    host = _transport(socket.context).host
-    if host:
-        socket.bind(f"tcp://{host}:*")
+    transport = transport_of(socket.context)
+    if transport.host:
+        socket.setsockopt(zmq.IPV6, int(":" in transport.host))
+        port = transport.port + _PORTS.index(name) if transport.port else "*"
+        host = f"[{transport.host}]" if ":" in transport.host else transport.host
+        socket.bind(f"tcp://{host}:{port}")
         return bytes(socket.getsockopt(zmq.LAST_ENDPOINT)).rstrip(b"\0").decode()
     path = directory / f"{name}.sock"
     if len(os.fsencode(path)) > _LONGEST_PATH:
@@ -167,17 +207,9 @@ def bind(socket: zmq.Socket[bytes], directory: Path, name: str) -> str:
     return address
 
 
-def _make_missing_keys(keys: Path) -> None:
-    from zmq.auth import create_certificates
-
-    try:
-        keys.mkdir(mode=0o700, parents=True, exist_ok=True)
-        (keys / CLIENTS).mkdir(mode=0o700, exist_ok=True)
-        for name in (SERVER, CLIENT):
-            if not (keys / f"{name}.key_secret").exists():
-                public, secret = create_certificates(keys, name)
-                Path(secret).chmod(0o600)
-                if name == CLIENT:
-                    (keys / CLIENTS / f"{CLIENT}.key").write_bytes(Path(public).read_bytes())
-    except OSError as error:
-        raise TransportError(f"Keys could not be made in {keys}: {error.strerror}.") from error
+def with_host_of(address: str, other: str) -> str:
+    """Returns an address that is bound at every one of its host as whoever has reached ``other`` there reaches it."""
+    for wildcard in ("tcp://0.0.0.0:", "tcp://[::]:"):
+        if address.startswith(wildcard):
+            return f"{other.rpartition(':')[0]}:{address.removeprefix(wildcard)}"
+    return address

@@ -8,7 +8,7 @@ from typing import Any
 import zmq
 
 from haploop.protocol.transport.machine import machine_of
-from haploop.protocol.transport.sockets import has_message, open_socket
+from haploop.protocol.transport.sockets import connect, has_message, open_socket
 from haploop.protocol.transport.wire import Frame, Message, WireError, decode, encode
 
 # A block of telemetry: from_tick, ticks, columns and what its sender adds (messages.py).
@@ -65,21 +65,24 @@ class Publisher:
 class Subscriber:
     """Receives from several publishers over one socket each; detects gaps by the ticks of the blocks.
 
+    Args:
+        endpoints: role -> its ``telemetry`` address and, where there are keys, its public ``key``.
+
     Attributes:
         gaps: number of ticks that never came, by role.
         malformed: frames that were no messages.
     """
 
-    def __init__(self, context: zmq.Context[zmq.Socket[bytes]], addresses: dict[str, str]) -> None:
+    def __init__(self, context: zmq.Context[zmq.Socket[bytes]], endpoints: dict[str, dict[str, str]]) -> None:
         self._machine = machine_of(context)
         self._sockets: dict[zmq.Socket[bytes], str] = {}
-        for role, address in addresses.items():
+        for role, of in endpoints.items():
             socket = open_socket(context, zmq.SUB)
-            socket.connect(address)
+            connect(socket, of["telemetry"], of.get("key"))
             socket.subscribe(role.encode())
             self._sockets[socket] = role
         self._next_tick: dict[str, int] = {}
-        self.gaps = dict.fromkeys(addresses, 0)
+        self.gaps = dict.fromkeys(endpoints, 0)
         self.malformed = 0
 
     @property

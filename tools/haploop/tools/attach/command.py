@@ -8,7 +8,7 @@ from pathlib import Path
 
 from haploop.launch.processes import run_directory
 from haploop.launch.processes.children import interrupts
-from haploop.launch.processes.run_directory import LiveRun
+from haploop.launch.processes.run_directory import Elsewhere, LiveRun
 from haploop.launch.spec import discard, make_output, write_scene
 from haploop.logger.books.buffers import TelemetryGap
 from haploop.logger.node import LoggerNode
@@ -25,7 +25,7 @@ from haploop.tools.render.report import print_summary
 TARGETS = ("logger", "print", "plotjuggler")
 
 
-def attach_to(target: str, out: Path | None, run_id: str | None, port: int | None) -> None:
+def attach_to(target: str, out: Path | None, run_id: str | Elsewhere | None, port: int | None) -> None:
     """Joins the run and stays until it ends or Ctrl-C; PlotJuggler's node stays for the runs to come."""
     if target not in TARGETS:
         leave(f"{', '.join(TARGETS[:-1])} or {TARGETS[-1]} was expected, but {target!r} was given.", WRONG_USE)
@@ -43,11 +43,12 @@ def attach_to(target: str, out: Path | None, run_id: str | None, port: int | Non
                 attach_plotjuggler(run_id, PORT if port is None else port)
 
 
-def attach_logger(run_id: str | None, out: Path | None) -> None:
+def attach_logger(run_id: str | Elsewhere | None, out: Path | None) -> None:
     """Logs a run from its present tick on, with a log and a summary of its own; lossless, so it may slow the run."""
     run = run_directory.find(run_id)
     is_new = out is None or not out.exists()
-    directory = make_output(out, Path(f"attached-{run.id}"))
+    name = "".join(letter if letter.isalnum() or letter in ".-" else "_" for letter in run.id)
+    directory = make_output(out, Path(f"attached-{name}"))
     context = run.make_context()
     try:
         with interrupts(usual_from=2) as received:

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING
 
 from haploop.launch.processes import run_directory
-from haploop.launch.processes.run_directory import LiveRun
+from haploop.launch.processes.run_directory import Elsewhere, LiveRun
 from haploop.protocol.changes import describe
 from haploop.protocol.transport.clock_client import Refused
 from haploop.tools.attach.live_status import LiveStatus
@@ -115,7 +115,7 @@ def _books(run: LiveStatus) -> Table:
     return table
 
 
-def attach_print(run_id: str | None) -> None:
+def attach_print(run_id: str | Elsewhere | None) -> None:
     """Shows a run until it ends or Ctrl-C; lossy, so it never holds the run up."""
     try:
         live_run = run_directory.find(run_id)
@@ -128,7 +128,7 @@ def attach_print(run_id: str | None) -> None:
                     run.note_event(tick, event)
                 run.skipped_ticks = observed.skipped_ticks
                 show(run)
-            run.end(observed.failure, read_summary(observer.welcome))
+            run.end(observed.failure, read_summary(live_run, observer.welcome))
             show(run)
             if run.is_awaited:
                 _await_verdict(run, live_run, observed)
@@ -148,7 +148,7 @@ def _await_verdict(run: LiveStatus, live_run: LiveRun, observed: ObservedRun) ->
     while run.is_awaited and is_there:
         time.sleep(_DRAWN_S)
         is_there = run_directory.has_launcher(live_run)
-        run.end(observed.failure, read_summary(observed.observer.welcome))
+        run.end(observed.failure, read_summary(live_run, observed.observer.welcome))
     run.is_awaited = False
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Self
 
 from haploop.launch.processes import run_directory
-from haploop.launch.processes.run_directory import LiveRun, RunNotFound
+from haploop.launch.processes.run_directory import Elsewhere, LiveRun, RunNotFound
 from haploop.logger.log import LogError
 from haploop.logger.summary import SUMMARY, Summary, read
 from haploop.protocol.transport.clock_client import Aborted, Refused
@@ -24,7 +24,7 @@ _BEGINS_WITHIN_S = 30.0
 _IDLE_MS = 200
 
 
-def iterate_runs(run_id: str | None) -> Iterator[LiveRun]:
+def iterate_runs(run_id: str | Elsewhere | None) -> Iterator[LiveRun]:
     """Yields the run with this id alone; without one, the run that is live or starts next, and then all later ones.
 
     Raises RunNotFound where no run has the id, or several are live and none was named.
@@ -44,7 +44,7 @@ def iterate_runs(run_id: str | None) -> Iterator[LiveRun]:
 
 def is_over(run: LiveRun) -> bool:
     """Tells whether a run's launcher has gone, or has removed the run's directory."""
-    return not (run_directory.is_live(run) and (run.sockets / "run.json").exists())
+    return run.sockets is not None and not (run_directory.is_live(run) and (run.sockets / "run.json").exists())
 
 
 class ObservedRun:
@@ -111,7 +111,7 @@ class ObservedRun:
 
     def _count_missed(self) -> None:
         """Counts what was missed of a run whose END never came; its summary tells how long it was."""
-        summary = read_summary(self.observer.welcome)
+        summary = read_summary(self._run, self.observer.welcome)
         if summary is None:
             self.failure = "Its launcher has gone without a word."
             return
@@ -128,8 +128,10 @@ class ObservedRun:
         self._context.destroy(linger=0)
 
 
-def read_summary(welcome: Message) -> Summary | None:
+def read_summary(run: LiveRun, welcome: Message) -> Summary | None:
     """Returns the summary that a run has written; None where there is none, or it is on another machine."""
+    if not run.is_here:
+        return None
     try:
         return read(Path(welcome["context"]["out"]) / SUMMARY)
     except LogError:

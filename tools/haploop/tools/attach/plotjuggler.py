@@ -21,7 +21,7 @@ import numpy as np
 import zmq
 from numpy.typing import NDArray
 
-from haploop.launch.processes.run_directory import LiveRun, RunNotFound
+from haploop.launch.processes.run_directory import Elsewhere, LiveRun, RunNotFound
 from haploop.logger.books.buffers import as_float64
 from haploop.logger.log.channels import Channels, motion_columns
 from haploop.logger.log.table import Floats, TableLayout
@@ -143,7 +143,7 @@ class Outlet:
         self._context.destroy(linger=500)
 
 
-def attach_plotjuggler(run_id: str | None, port: int) -> None:
+def attach_plotjuggler(run_id: str | Elsewhere | None, port: int) -> None:
     """Publishes runs until Ctrl-C; a run that was named, until it ends."""
     try:
         outlet = Outlet(port)

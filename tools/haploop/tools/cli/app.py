@@ -5,7 +5,7 @@ from __future__ import annotations
 import typer
 
 from haploop.tools.cli.explain import explain
-from haploop.tools.cli.live_commands import attach, pace, pause, resume, set_, status, step, stop, swap, undo
+from haploop.tools.cli.live_commands import attach, keys, pace, pause, resume, set_, status, step, stop, swap, undo
 from haploop.tools.cli.scenes import check, export, judge, plot, plugins, replay, run
 from haploop.tools.cli.study_commands import advise, dissipate, paper, sweep
 from haploop.tools.cli.view import view
@@ -20,7 +20,7 @@ app = typer.Typer(
 )
 # In the order in which the help lists them.
 for command in (
-    run, check, explain, plugins, status, pause, resume, step, pace, stop, swap, set_, undo, attach, view,
+    run, check, explain, plugins, status, pause, resume, step, pace, stop, swap, set_, undo, attach, view, keys,
     plot, replay, judge, export, cost, sweep, dissipate, paper, advise,
 ):  # fmt: skip
     app.command(command.__name__.rstrip("_"))(command)

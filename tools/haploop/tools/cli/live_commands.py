@@ -9,17 +9,17 @@ from typing import Annotated, Any
 import typer
 
 from haploop.tools.cli.options import (
-    At,
     Json,
     Run,
     parse_assignments,
     parse_pace,
-    parse_seconds,
     plain_errors,
     print_json,
 )
+from haploop.tools.cli.which_run import for_a_run
 
 
+@for_a_run
 def status(run: Run = None, json: Json = False) -> None:
     """Show the live runs: every node, its tick, its lag, whom it waits for, what it skipped."""
     from haploop.launch.processes import run_directory
@@ -27,14 +27,15 @@ def status(run: Run = None, json: Json = False) -> None:
 
     answers = {}
     with plain_errors():
-        for live in [run_directory.find(run)] if run else run_directory.live_runs():
+        runs = [run_directory.find(run)] if run else run_directory.live_runs()
+        for live in runs:
             try:
                 answers[live.id] = ask(live, "status")[1]
             except run_directory.RunNotFound as error:  # it ended just now, or its launcher hangs
                 print(error, file=sys.stderr)
     if json:
         print_json(answers)
-    elif not answers:
+    elif not runs:
         print("No run is live.")
     else:
         from haploop.tools.render.report import status_table
@@ -44,7 +45,7 @@ def status(run: Run = None, json: Json = False) -> None:
             console().print(status_table({**data, "run": identity}))
 
 
-def _ask(run_id: str | None, as_json: bool, verb: str, **arguments: Any) -> None:
+def _ask(run_id: Any, as_json: bool, verb: str, **arguments: Any) -> None:
     """Has a live run do something and prints its answer."""
     from haploop.launch.processes import run_directory
     from haploop.launch.processes.run_directory import ask
@@ -57,21 +58,25 @@ def _ask(run_id: str | None, as_json: bool, verb: str, **arguments: Any) -> None
         print(text)
 
 
+@for_a_run
 def pause(run: Run = None, json: Json = False) -> None:
     """Stand still at the next tick that can."""
     _ask(run, json, "pause")
 
 
+@for_a_run
 def resume(run: Run = None, json: Json = False) -> None:
     """Go on after a pause."""
     _ask(run, json, "resume")
 
 
+@for_a_run
 def step(ticks: Annotated[int, typer.Argument(help="control ticks")] = 1, run: Run = None, json: Json = False) -> None:
     """Go on for some ticks, then stand still."""
     _ask(run, json, "step", ticks=ticks)
 
 
+@for_a_run
 def pace(
     rate: Annotated[str, typer.Argument(help="free, or simulated seconds per second", show_default=False)],
     run: Run = None,
@@ -81,40 +86,45 @@ def pace(
     _ask(run, json, "pace", pace=parse_pace(rate))
 
 
+@for_a_run
 def stop(run: Run = None, json: Json = False) -> None:
     """End the run in order, with a summary of what ran."""
     _ask(run, json, "stop")
 
 
+@for_a_run
 def swap(
     kind: Annotated[str, typer.Argument(help='kind of element, or "none" to remove', show_default=False)],
     parameters: Annotated[list[str] | None, typer.Argument(metavar="[KEY=VALUE]...", show_default=False)] = None,
     element: Annotated[int, typer.Option(help="which element; one past the end adds one")] = 0,
-    at: At = None,
+    at: float | None = None,
     reload: Annotated[bool, typer.Option("--reload", help="load the kind's --plugin file anew first")] = False,
     run: Run = None,
     json: Json = False,
 ) -> None:
     """Replace a dissipation element of a running loop."""
     table = {"kind": kind, **parse_assignments(parameters or [])}
-    _ask(run, json, "swap", swap=table, element=element, at=parse_seconds(at), reload=reload)
+    _ask(run, json, "swap", swap=table, element=element, at=at, reload=reload)
 
 
+@for_a_run
 def set_(
     parameters: Annotated[list[str], typer.Argument(metavar="KEY=VALUE...", show_default=False)],
-    at: At = None,
+    at: float | None = None,
     run: Run = None,
     json: Json = False,
 ) -> None:
     """Change numbers of a running loop: wall.stiffness, wall.position, dissipation.0.mass ..."""
-    _ask(run, json, "set", set=parse_assignments(parameters), at=parse_seconds(at))
+    _ask(run, json, "set", set=parse_assignments(parameters), at=at)
 
 
+@for_a_run
 def undo(run: Run = None, json: Json = False) -> None:
     """Take back the last swap or set of a running loop that a command made."""
     _ask(run, json, "undo")
 
 
+@for_a_run
 def attach(
     what: Annotated[str, typer.Argument(help="logger, print or plotjuggler", show_default=False)],
     out: Annotated[Path | None, typer.Option(help="directory of the attached logger [runs/RUN-TIME]")] = None,
@@ -130,3 +140,18 @@ def attach(
     from haploop.tools.attach.command import attach_to
 
     attach_to(what, out, run, port)
+
+
+def keys(
+    directory: Annotated[Path, typer.Argument(help="new, or one that lacks some", show_default=False)],
+) -> None:
+    """Make the keys of runs that other hosts can reach: a certificate for each process, and one for clients."""
+    from haploop.protocol.transport.keys import make_keys
+
+    with plain_errors():
+        made = make_keys(directory)
+    print(f"{directory} has keys for the {', '.join(made)} now." if made else f"{directory} had all keys already.")
+    print(
+        f"It stays on the host of the run. A host to watch and steer from gets {directory / 'clock.key'} and "
+        f"{directory / 'client.key_secret'} alone, by a way that nobody else can read."
+    )

@@ -18,7 +18,6 @@ Set = Annotated[list[str] | None, typer.Option("--set", metavar="KEY=VALUE", hel
 Plugin = Annotated[list[Path] | None, typer.Option("--plugin", metavar="FILE", help="Python file with elements")]
 Run = Annotated[str | None, typer.Option("--run", metavar="ID", help="which run, when several are live")]
 Json = Annotated[bool, typer.Option("--json", help="one JSON object on stdout")]
-At = Annotated[str | None, typer.Option("--at", metavar="TIME", help='simulated time, s or "1500 ms"; at once without')]
 
 
 def parse_assignments(texts: list[str]) -> dict[str, Any]:
@@ -85,13 +84,14 @@ def plain_errors() -> Iterator[None]:
     from haploop.launch.scene.mistakes import SceneError
     from haploop.launch.spec import OutputError
     from haploop.logger.log import LogError
+    from haploop.protocol.transport.keys import KeysError
 
     try:
         yield
     except SceneError as error:
         count = len(error.mistakes)
         leave(f"{error}\n{count} mistake{'s' * (count != 1)}; nothing was started.", WRONG_USE)
-    except (PluginError, ElementError, OutputError, CommandRefused, RunNotFound) as error:
+    except (PluginError, ElementError, OutputError, CommandRefused, RunNotFound, KeysError) as error:
         leave(str(error), WRONG_USE)
     except LogError as error:
         leave(str(error), FAILED)

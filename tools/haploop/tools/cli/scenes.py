@@ -42,8 +42,10 @@ def run(
     ] = None,
     view: Annotated[bool, typer.Option("--view", help="show it in the browser, which may steer it")] = False,
     plugin: Plugin = None,
-    tcp: Annotated[str | None, typer.Option(metavar="ADDRESS", help="TCP sockets, such as 127.0.0.1")] = None,
-    keys: Annotated[Path | None, typer.Option(metavar="DIR", help="CURVE keys for TCP; made where missing")] = None,
+    tcp: Annotated[
+        str | None, typer.Option(metavar="ADDRESS[:PORT]", help="TCP sockets, such as 127.0.0.1; others need keys")
+    ] = None,
+    keys: Annotated[Path | None, typer.Option(metavar="DIR", help="keys for TCP, as haploop keys makes them")] = None,
     node: Annotated[
         list[str] | None,
         typer.Option("--node", metavar="ROLE=COMMAND", help="a program of yours as plant or controller"),
@@ -55,7 +57,9 @@ def run(
         from haploop.launch.processes.foreign import ProgramError, read_programs
         from haploop.launch.runs import start
         from haploop.launch.spec import SCENE, RunFailed, discard
-        from haploop.protocol.transport.sockets import Transport, TransportError
+        from haploop.protocol.transport.addresses import TransportError
+        from haploop.protocol.transport.keys import KeysError
+        from haploop.protocol.transport.sockets import Transport
         from haploop.tools.cli.view import viewing
         from haploop.tools.render.progress import ProgressLine
         from haploop.tools.render.report import print_summary
@@ -71,7 +75,7 @@ def run(
         try:
             transport = Transport.from_options(tcp, keys)
             programs = read_programs(node or [], [])
-        except (TransportError, ProgramError) as error:
+        except (TransportError, KeysError, ProgramError) as error:
             leave(str(error), WRONG_USE)
         prepared = start.prepare(scene, set or [], plugin or [], out, any_hand="plant" in programs)
         try:

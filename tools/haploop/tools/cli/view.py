@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from haploop.tools.cli.options import WRONG_USE, leave, plain_errors
+from haploop.tools.cli.which_run import for_a_run
 
 if TYPE_CHECKING:
     import asyncio
@@ -29,13 +30,16 @@ _HELD_S = 10.0
 
 
 class LiveRuns:
-    """The live runs of this user, as a viewer finds and steers them."""
+    """The live runs of this user, as a viewer finds and steers them; or one run elsewhere alone."""
+
+    def __init__(self, only: LiveRun | None = None) -> None:
+        self._only = only
 
     def live(self) -> Sequence[LiveRun]:
         """Returns the runs that live now, the oldest first."""
         from haploop.launch.processes import run_directory
 
-        return run_directory.live_runs()
+        return [self._only] if self._only else run_directory.live_runs()
 
     def has_launcher(self, run: LiveRun) -> bool:
         """Returns whether the process that started a run is there, which judges it in the end."""
@@ -56,6 +60,7 @@ class LiveRuns:
             raise CommandFailed(f"The arguments of {verb} cannot be used: {error}.") from error
 
 
+@for_a_run
 def view(
     run: Annotated[str | None, typer.Option("--run", metavar="ID", help="which run to show first [the newest]")] = None,
     port: Annotated[int, typer.Option(min=0, max=65535, metavar="PORT", help="of this machine; 0: any free one")] = 0,
@@ -63,7 +68,7 @@ def view(
     browser: Annotated[bool, typer.Option("--browser/--no-browser", help="open the page")] = True,
     led: Annotated[bool, typer.Option("--led", hidden=True)] = False,
 ) -> None:
-    """Look at runs of this machine in the browser as they go, and steer them; until Ctrl-C."""
+    """Look at runs of this machine, or one elsewhere, in the browser as they go, and steer them; until Ctrl-C."""
     # One led by another process gives it the link on stdout and ends with stdin.
     if since not in SINCE:
         leave(f"--since must be {' or '.join(SINCE)}, but {since!r} was given.", WRONG_USE)
@@ -74,7 +79,8 @@ def view(
     from haploop.view.serve.server import PortTaken, listen, serve
 
     with plain_errors():
-        first = run_directory.find(run).id if run else None
+        shown = run_directory.find(run) if run else None
+    only = shown if shown and not shown.is_here else None
     try:
         listening = listen(port)
     except PortTaken as error:
@@ -92,7 +98,14 @@ def view(
         end = asyncio.Event()
         if led:
             _at_eof(asyncio.get_running_loop(), end.set)
-        await serve(LiveRuns(), listening, first=first, from_start=since == "start", on_serving=serving, end=end)
+        await serve(
+            LiveRuns(only),
+            listening,
+            first=shown and shown.id,
+            from_start=since == "start",
+            on_serving=serving,
+            end=end,
+        )
 
     with contextlib.suppress(KeyboardInterrupt):
         asyncio.run(main())

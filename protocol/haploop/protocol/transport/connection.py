@@ -1,0 +1,90 @@
+"""What becomes of a TCP connection to a clock, from the library's events: why it fails, and when it is lost."""
+
+from __future__ import annotations
+
+import struct
+import time
+
+import zmq
+
+from haploop.protocol.transport.sockets import has_message
+
+_EVENTS = (
+    zmq.EVENT_CONNECTED
+    | zmq.EVENT_CLOSED
+    | zmq.EVENT_DISCONNECTED
+    | zmq.EVENT_HANDSHAKE_SUCCEEDED
+    | zmq.EVENT_HANDSHAKE_FAILED_AUTH
+    | zmq.EVENT_HANDSHAKE_FAILED_PROTOCOL
+    | zmq.EVENT_HANDSHAKE_FAILED_NO_DETAIL
+)
+# A failure that may pass is told when it has lasted so long, s, and silence, which a bad network makes, later.
+_TOLD_AFTER_S, _SILENCE_AFTER_S = 2.0, 5.0
+
+_UNKNOWN_KEY = (
+    "The run at {} refuses this key: it is none of its clients', or was made anew since. "
+    "Copy client.key_secret from its keys."
+)
+_OTHER_KEYS = (
+    "The program at {} broke the handshake off: clock.key is not that of its keys, or it is no run of haploop. "
+    "Copy clock.key and client.key_secret from the keys of this run."
+)
+_NEEDS_KEYS = "The run at {} is guarded by keys, or it is no run of haploop; name a copy of its keys with --keys."
+_HAS_NO_KEYS = "The run at {} has no keys, or it is no run of haploop; leave out --keys if you meant it."
+_NO_RUN = "What answers at {} is no run of haploop; look at the port."
+_SILENT = "What listens at {} says nothing: it is no run of haploop, or the network loses most of what is sent."
+_NOBODY = "Nobody listens at {}: the run has ended, or address or port are wrong."
+_NO_ANSWER = "Nothing comes back from {}: the host is off, there is no way to it, or a firewall holds it back."
+
+
+class Connection:
+    """The connection of one socket that is about to connect to a TCP address.
+
+    Args:
+        has_keys: whether the socket has a certificate.
+    """
+
+    def __init__(self, socket: zmq.Socket[bytes], address: str, has_keys: bool) -> None:
+        self._address, self._has_keys = address, has_keys
+        self._monitor = socket.get_monitor_socket(_EVENTS)
+        self._began = time.monotonic()
+        self._stands = self._has_stood = False
+        self._since = self._began  # when it began to be as it is now
+        self._why, self._is_final = _NO_ANSWER, False
+
+    def trouble(self) -> str:
+        """Returns why the connection does not come to stand, as a sentence; "" while it may still, and once it has."""
+        self._take()
+        patience_s = _SILENCE_AFTER_S if self._why in (_NO_ANSWER, _SILENT) else _TOLD_AFTER_S
+        if self._has_stood or not (self._is_final or time.monotonic() - self._began > patience_s):
+            return ""
+        return self._why.format(self._address.removeprefix("tcp://"))
+
+    def lost_s(self) -> float:
+        """Returns how long a connection that stood has been gone, s; 0 while it stands, or never has."""
+        self._take()
+        return 0.0 if self._stands or not self._has_stood else time.monotonic() - self._since
+
+    def close(self) -> None:
+        """Ends the watch; the socket itself stays open."""
+        self._monitor.close(linger=0)
+
+    def _take(self) -> None:
+        while has_message(self._monitor):
+            event = struct.unpack("=hi", self._monitor.recv_multipart()[0])[0]
+            stood, self._stands = self._stands, event == zmq.EVENT_HANDSHAKE_SUCCEEDED
+            self._has_stood |= self._stands
+            if stood != self._stands:
+                self._since = time.monotonic()
+            if event == zmq.EVENT_HANDSHAKE_FAILED_AUTH:
+                self._why, self._is_final = _UNKNOWN_KEY, True
+            elif event == zmq.EVENT_HANDSHAKE_FAILED_PROTOCOL:
+                self._why, self._is_final = _HAS_NO_KEYS if self._has_keys else _NEEDS_KEYS, True
+            elif event == zmq.EVENT_HANDSHAKE_FAILED_NO_DETAIL:
+                self._why = _OTHER_KEYS if self._has_keys else _NEEDS_KEYS
+            elif event == zmq.EVENT_CLOSED:
+                self._why = _NOBODY
+            elif event == zmq.EVENT_CONNECTED and self._why is _NO_ANSWER:
+                self._why = _SILENT
+            elif event == zmq.EVENT_DISCONNECTED and self._why in (_NO_ANSWER, _SILENT):
+                self._why = _NO_RUN
