@@ -109,8 +109,11 @@ def _check(played: Played) -> None:
         assert changed or rows < TICKS or summary["trajectory_sha256"] == _undisturbed()[1]
 
 
-def play(seed: int) -> tuple[list[str], str]:
-    """Returns the kinds of faults that struck the run of a seed, and the promise it broke, "" for none."""
+def play(seed: int) -> tuple[list[str], str, tuple[float, float] | None]:
+    """Returns the kinds of faults that struck the run of a seed, and the promise it broke, "" for none.
+
+    And in s, where a node was killed, how long it took to name it and to end the run.
+    """
     dice = random.Random(seed)
     kinds = dice.sample(KINDS, dice.choice((1, 2)))
     options, sets, excuses = list(dice.choice(((), ("--pace", "3")))), list(_SETS), list[str]()
@@ -145,25 +148,31 @@ def play(seed: int) -> tuple[list[str], str]:
             _check(played)
         except Exception as error:
             where = traceback.extract_tb(error.__traceback__)[-1].line
-            return played.kinds, f"{where}: {error!r:.600}\n{run.stderr[-600:]}"
+            return played.kinds, f"{where}: {error!r:.600}\n{run.stderr[-600:]}", None
         finally:
             run.nodes |= {str(pid): pid for pid in _left(folder)}
             run.clear_away()
-        return played.kinds, ""
+        return played.kinds, "", played.took_s
 
 
 def main(first: int, count: int) -> None:
     signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background job ignores Ctrl-C
     seeds, tried, broken = range(first, first + count), Counter[str](), Counter[str]()
+    times: list[tuple[float, float]] = []
     with ProcessPoolExecutor(os.cpu_count()) as pool:
-        for seed, (kinds, why) in zip(seeds, pool.map(play, seeds), strict=True):
+        for seed, (kinds, why, took_s) in zip(seeds, pool.map(play, seeds), strict=True):
             tried.update(kinds)
             broken.update(kinds if why else ())
+            times += [took_s] if took_s else []
             if why:
                 print(f"seed {seed} ({', '.join(kinds)}) breaks a promise: {why}", flush=True)
                 print(f"again: make faults N=1 FROM={seed}", flush=True)
     print("| fault | tried | broken |\n| --- | ---: | ---: |")
     print("\n".join(f"| {kind} | {tried[kind]} | {broken[kind]} |" for kind in KINDS))
+    if times:
+        named_s, ended_s = (sorted(column) for column in zip(*times, strict=True))
+        for what, column in (("named", named_s), ("and the run ended", ended_s)):
+            print(f"{what} {column[len(column) // 2]:.2f} s (median) to {column[-1]:.2f} s after a node was killed")
     sys.exit(bool(broken))
 
 

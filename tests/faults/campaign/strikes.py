@@ -31,12 +31,18 @@ _NOBODY = 2**22 + 1  # no process has this number
 
 @dataclass
 class Played:
-    """One run, as what it may fail (``excuses``, patterns of sentences), and the kinds of faults that struck it."""
+    """One run, as what it may fail (``excuses``, patterns of sentences), and the kinds of faults that struck it.
+
+    Attributes:
+        took_s: wall time from the death of a node to the sentence that names it, and to the end of the run; None where
+            none was killed.
+    """
 
     run: Run
     deadline_s: float
     excuses: list[str]
     kinds: list[str] = field(default_factory=list)
+    took_s: tuple[float, float] | None = None
 
     def live(self) -> run_directory.LiveRun | None:
         """The run as other terminals find it; None once it has ended."""
@@ -80,8 +86,15 @@ def _stop(pid: int, seconds: float) -> None:
 
 def _kill_a_node(played: Played, dice: random.Random, live: run_directory.LiveRun) -> None:
     role, pid = played.draw_node(dice)
-    played.excuses.append(f"The {role} was killed by SIGKILL; the last tick all nodes had done is ")
+    sentence = f"The {role} was killed by SIGKILL; the last tick all nodes had done is "
+    played.excuses.append(sentence)
+    struck = time.monotonic()
     _signal(pid, signal.SIGKILL)
+    wait_for("the end of the run", lambda: sentence in played.run.stderr or not played.run.is_there())
+    if sentence in played.run.stderr:  # else it had ended before
+        named_s = time.monotonic() - struck
+        wait_for("the end of the run", lambda: not played.run.is_there())
+        played.took_s = named_s, time.monotonic() - struck
 
 
 def _stop_a_node(played: Played, dice: random.Random, live: run_directory.LiveRun) -> None:

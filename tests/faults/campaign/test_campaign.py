@@ -17,7 +17,7 @@ def place_of_its_own(monkeypatch):
 
 @pytest.mark.parametrize("seed", range(8))
 def test_a_real_run_that_is_struck_keeps_what_is_promised(seed):
-    _kinds, why = command.play(seed)
+    _kinds, why, _took_s = command.play(seed)
     assert not why
 
 
@@ -28,6 +28,6 @@ def test_a_run_that_fails_with_no_excuse_is_told(monkeypatch):
     monkeypatch.setattr(command, "KINDS", ("a node killed", "`haploop status`"))
     monkeypatch.setattr(command, "_SETS", ("duration=60", "run.verdict=window"))
     monkeypatch.setitem(command.STRIKES, "a node killed", kill)
-    kinds, why = command.play(1)
+    kinds, why, _took_s = command.play(1)
     assert "a node killed" in kinds
     assert "status 1 with no excuse" in why
