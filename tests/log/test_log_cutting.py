@@ -39,9 +39,9 @@ def sent():
     return logger.plant_blocks, logger.controller_blocks
 
 
-def logged(plant, controller, order, history=()):
+def logged(plant, controller, order, history=(), log=None):
     """The log of a logger that is given the blocks in an order: a sequence of "p" and "c"."""
-    log = MemoryLog()
+    log = log or MemoryLog()
     logger = Logger(SCENE, TIME, Channels(log, TIME, every_step=True))
     begins = {name: np.frombuffer(plant[0]["columns"][name])[0] for name in ("x", "v", "force")}
     logger.start(begins | {"tick": plant[0]["from_tick"]}, list(history))
@@ -75,6 +75,34 @@ def test_a_logger_whose_plant_is_ahead_when_it_joins_logs_the_controller_from_it
     whole = logged(plant, controller, "c" * len(controller) + "p" * len(plant))
     for name, column in log["/controller"].items():
         np.testing.assert_array_equal(column, whole["/controller"][name][first:], err_msg=name)
+
+
+class Reached(MemoryLog):
+    """A log that looks, at every message, that it could be replayed if it were cut off there."""
+
+    def __init__(self):
+        super().__init__()
+        self.topics, self.ticks = [], {"/controller": 0, "/plant": 0}
+
+    def channel(self, topic, columns, **options):
+        number = super().channel(topic, columns, **options)
+        self.topics += [topic] if number == len(self.topics) else []
+        return number
+
+    def write(self, channel, log_times_ns, values):
+        super().write(channel, log_times_ns, values)
+        if values.shape[1:2] == (1,):  # the end state, a message of one sample
+            return
+        self.ticks[self.topics[channel]] = self.ticks.get(self.topics[channel], 0) + len(values)
+        assert self.ticks["/plant"] <= self.ticks["/controller"]
+
+
+@pytest.mark.parametrize("order", ["cp", "pc"])
+def test_a_log_cut_off_anywhere_holds_the_controller_as_far_as_the_plant(sent, order):
+    plant, controller = sent
+    log = Reached()
+    logged(plant, controller, order * len(plant), log=log)
+    assert log.ticks["/plant"] == log.ticks["/controller"] == TIME.ticks
 
 
 def test_what_the_controller_sent_is_logged_even_where_nothing_came_of_the_plant(sent):

@@ -102,13 +102,17 @@ class Logger:
         """
         if not self._started and self._plant.end > self._plant.tick:
             self.tick = self._first_tick = max(self.tick, self._plant.first_tick_from(self._controller.first))
-        while (end := min(self._plant.end, self._controller.part_end(self.tick))) > self.tick:
-            self._book(end)
-        if self._started:
+        if self._started or self._bookable > self.tick:  # one that joins knows its first tick only now
             self._log_controller()
+        while (end := self._bookable) > self.tick:
+            self._book(end)
+
+    @property
+    def _bookable(self) -> int:
+        return min(self._plant.end, self._controller.part_end(self.tick))
 
     def _log_controller(self) -> None:
-        """Logs what has come of the controller; one that joins knows its first tick only now."""
+        """Logs what has come of the controller, before the plant: a log cut off anywhere can be replayed."""
         blocks, self._unlogged = self._unlogged, []
         for block in blocks if self._channels else ():
             self._channels.controller(block, self._first_tick)
