@@ -64,7 +64,7 @@ class Seat:
     """
 
     def __init__(self, directory, start, program):
-        self._context, self._program, self.hold = zmq.Context(), program, lambda force: None
+        self._context, self.hold = zmq.Context(), lambda force: None
         self._clock = self._socket(zmq.DEALER)
         self._clock.connect(start["address"])
         self._loop, self._telemetry = self._socket(zmq.ROUTER), self._socket(zmq.XPUB)
@@ -73,7 +73,7 @@ class Seat:
         self._loop.bind(endpoints["loop"])
         self._telemetry.bind(endpoints["telemetry"])
         self._until, self._last, self._events, self._secret = 0, False, [], start["secret"]
-        self._say(JOIN, "plant", self._secret, os.getpid(), endpoints, True, self._program)
+        self._say(JOIN, "plant", self._secret, os.getpid(), endpoints, True, program)
         _, self.scene, timebase, _, _, self._told = self._welcome()
         self._ticks, self._delay = timebase["ticks"], timebase["delay_steps"]
         self._n, self.step_s = timebase["plant_rate"] // timebase["control_rate"], 1.0 / timebase["plant_rate"]

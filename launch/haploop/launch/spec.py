@@ -45,6 +45,7 @@ class RunSpec:
         plugin_sources: kind -> the user's file it came from, for reloading.
         plugin_files: kind -> the file within ``out`` that it is at work from; a reloaded one changes it.
         pace: simulated seconds per wall second; infinite for as fast as possible. For processes only.
+        clock: who owns the time: ``run``, or ``plant`` where a program in its place keeps it as a device does.
         transport: addresses and keys of the sockets. For processes only.
         programs: programs of others that take the place of plant or controller, by role; no scene names them. For
             processes only.
@@ -64,6 +65,7 @@ class RunSpec:
     plugin_sources: dict[str, Path] = field(default_factory=dict)
     plugin_files: dict[str, Path] = field(default_factory=dict)
     pace: float = math.inf
+    clock: str = "run"
     transport: Transport = field(default_factory=Transport)
     programs: Mapping[str, Program] = field(default_factory=dict[str, Program])
     wait_s: float = WAIT_S

@@ -8,6 +8,7 @@ from inspect import signature
 from typing import TYPE_CHECKING, Any
 
 from haploop.controller.dissipation import ElementError, PluginError
+from haploop.launch.clock import device_time
 from haploop.launch.clock.capabilities import capabilities
 from haploop.launch.clock.clock import Clock, ClockError
 from haploop.launch.clock.pace import PaceError, pace_of
@@ -66,6 +67,8 @@ class Commands:
     def __call__(self, verb: str, arguments: Message) -> Answer | Generator[None, None, Answer]:
         """Returns the answer, or steps to be gone through one by one while time goes on, which return it."""
         act = self._verbs.get(verb)
+        if self._spec.clock == device_time.PLANT and verb in device_time.REFUSED:
+            return False, device_time.GOES_ON, {}
         if act is None:
             return False, f"{verb[:40]!r} is no command; these are: {', '.join(self._verbs)}.", {}
         try:
@@ -98,7 +101,7 @@ class Commands:
             "control_rate": self._rate,
             "paused": clock.paused,
             "pace": in_words(clock.pace.rate),
-            "lateness": clock.pace.lateness(),
+            "lateness": self._lateness(roster),
             "nodes": roster.table(),
             "refused": roster.refused,
             "telemetry": {role: addresses["telemetry"] for role, addresses in roster.endpoints().items()},
@@ -106,6 +109,12 @@ class Commands:
         }
         state = "paused" if clock.paused else "running"
         return f"{state} at {self._at(data['tick'])} of {clock.end}", data
+
+    def _lateness(self, roster: Roster) -> Message:
+        if self._spec.clock != device_time.PLANT:
+            return self._clock.pace.lateness()
+        plant = roster.own("plant")
+        return device_time.lateness_told(plant.status) if plant else {}
 
     def _options(self) -> tuple[str, Message]:
         data = capabilities(self._clock.present(), self._spec.kinds)

@@ -16,6 +16,7 @@ import zmq
 from haploop.controller.dissipation.registry import installed
 from haploop.launch.clock.clock import Clock
 from haploop.launch.clock.commands import Commands
+from haploop.launch.clock.device_time import PLANT, lateness_told
 from haploop.launch.clock.roster import Node
 from haploop.launch.clock.server import ClockServer
 from haploop.launch.processes import private_directory, run_directory
@@ -78,7 +79,7 @@ def run_processes(
 
 
 def _with_lateness(summary: Summary, lateness: Message, out: Path, machine: Machine) -> Summary:
-    """Puts into the summary of a run, on disk, too, how late its ticks were; leaves that of a run without a pace."""
+    """Puts into the summary of a run, on disk, too, how late its ticks were; leaves that of a run in no real time."""
     if lateness:
         from haploop.logger.session import write_summary
 
@@ -105,6 +106,7 @@ class Supervisor:
             "plugins": [str(path.resolve()) for path in spec.plugins],
             "elements": installed(),
             "attachments": spec.attachments,
+            "clock": spec.clock,
         }
         welcome = sockets.name, scene.as_dict(), timebase.as_dict(), told
         commands = Commands(self._clock, spec, lambda: self._server.roster)
@@ -144,7 +146,9 @@ class Supervisor:
             self._lead()
             failed = False
             summary = self._server.results["logger"]
-            return _with_lateness(summary, self._clock.pace.lateness(), self._spec.out, self._machine)
+            of_plant = self._spec.clock == PLANT
+            late = lateness_told(self._server.results["plant"]) if of_plant else self._clock.pace.lateness()
+            return _with_lateness(summary, late, self._spec.out, self._machine)
         except RunFailed as error:
             self._save(str(error))
             raise

@@ -117,15 +117,17 @@ def run(spec: RunSpec, *, in_process: bool = False, **options: Any) -> Summary:
 
     Raises:
         RunFailed: a process was killed, hung or could not go on, or an element raised.
-        OutputError: the run's sockets cannot be made.
+        OutputError: the run's sockets cannot be made, or its plant cannot own the time.
         LogError: the log could not be written (in one process).
         KeyboardInterrupt: the second signal came.
     """
     spec = replace(spec, **options)
     if not in_process:
         try:
+            from haploop.launch.clock.device_time import check_owner
             from haploop.launch.processes.supervisor import run_processes
 
+            check_owner(spec)
             made = run_processes(spec)
         except RunFailed:
             raise

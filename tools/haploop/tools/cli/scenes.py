@@ -40,6 +40,9 @@ def run(
     pace: Annotated[
         str | None, typer.Option(help="free, or simulated seconds per second [free; 1 with --view]", show_default=False)
     ] = None,
+    clock: Annotated[
+        str, typer.Option(metavar="run|plant", help="who owns the time; plant: a device that goes on by itself")
+    ] = "run",
     view: Annotated[bool, typer.Option("--view", help="show it in the browser, which may steer it")] = False,
     plugin: Plugin = None,
     tcp: Annotated[
@@ -65,13 +68,15 @@ def run(
         from haploop.tools.render.report import print_summary
 
     with viewing(view, in_process) as viewer, plain_errors():
-        rate = parse_pace(pace or ("1" if view else "free"))
+        rate = parse_pace(pace or ("1" if view and clock == "run" else "free"))
         if rate != "free" and in_process:
             leave("--pace needs the clock of a run as processes; leave out --in-process.", WRONG_USE)
         if tcp and in_process:
             leave("--tcp needs the sockets of a run as processes; leave out --in-process.", WRONG_USE)
-        if node and in_process:
-            leave("--node needs the processes of a run; leave out --in-process.", WRONG_USE)
+        if clock not in ("run", "plant"):
+            leave(f"--clock is run or plant, but {clock!r} was given.", WRONG_USE)
+        if (node or clock == "plant") and in_process:
+            leave("--node and --clock need the processes of a run; leave out --in-process.", WRONG_USE)
         try:
             transport = Transport.from_options(tcp, keys)
             programs = read_programs(node or [], [])
@@ -91,6 +96,7 @@ def run(
                     prepared,
                     in_process=in_process,
                     pace=math.inf if rate == "free" else rate,
+                    clock=clock,
                     transport=transport,
                     programs=programs,
                     on_progress=line.update,

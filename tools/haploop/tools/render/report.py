@@ -92,13 +92,17 @@ def _key_figures(summary: Summary) -> list[tuple[str, str]]:
 
 
 def _lateness(of: Summary) -> list[tuple[str, str]]:
-    """Returns how late the ticks of a paced run were; nothing for one without a pace."""
+    """Returns how late the ticks of a run in real time were, or the answers to its device; nothing for any other."""
     if not (late := of.get("lateness")):
         return []
     by = ("median_s", "(median)"), ("percent_99_s", "(99 %)"), ("most_s", "at most")
     words = ", ".join(f"{amount(late[key], 's')} {which}" for key, which in by)
     lost = f"; {amount(late['lost_s'], 's')} of real time lost" if late["lost_s"] else ""
     many = f"{late['late_ticks']} of {late['ticks']} by more than {amount(late['late_s'], 's')}"
+    if late.get("clock") == "plant":
+        words = f"{words} after the sample"
+        many = f"{late['late_ticks']} of {late['ticks']} too late, after {amount(late['late_s'], 's')}"
+        return [("answers came", f"{words}; {many}{lost}")]
     return [("ticks late by", f"{words}; {many}{lost}")]
 
 

@@ -1,0 +1,42 @@
+"""A run whose plant owns the time, as a device does: what it needs, what it refuses, and the lateness that it tells."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from haploop.launch.spec import OutputError, RunSpec
+from haploop.protocol.transport.wire import Message
+
+PLANT = "plant"
+# Commands that would hold a device's time or hurry it.
+REFUSED = ("pause", "resume", "step", "pace")
+GOES_ON = "The plant owns the time of this run, which goes on by its own clock; `haploop stop` ends it."
+_SECONDS = ("median_s", "percent_99_s", "percent_99_9_s", "most_s", "late_s", "lost_s")
+_COUNTS = ("ticks", "late_ticks")
+
+
+def check_owner(spec: RunSpec) -> None:
+    """Raises OutputError where the plant of a run is to own the time, but cannot."""
+    if spec.clock != PLANT:
+        return
+    if PLANT not in spec.programs:
+        raise OutputError(
+            "--clock plant needs a plant that keeps the time, by --node plant=COMMAND or --external plant; the run's "
+            "own plant keeps none, but --pace 1 does."
+        )
+    if not math.isinf(spec.pace):
+        raise OutputError("--clock plant leaves the time to the plant, --pace keeps it; leave out one of them.")
+    if any(event.pause for event in spec.scene.event):
+        raise OutputError("--clock plant was asked for, but an [[event]] of the scene pauses; a device does not.")
+
+
+def lateness_told(told: Message) -> dict[str, Any]:
+    """Returns the figures of ``lateness`` that a plant has told; {} where it told none, or what are none."""
+    late = told.get("lateness")
+    if not isinstance(late, dict):
+        return {}
+    figures: dict[str, Any] = {key: late.get(key) for key in (*_COUNTS, *_SECONDS)}
+    are_counts = all(type(figures[key]) is int and figures[key] >= 0 for key in _COUNTS)
+    are_seconds = all(type(figures[key]) in (int, float) and 0.0 <= figures[key] < math.inf for key in _SECONDS)
+    return {**figures, "clock": PLANT} if are_counts and are_seconds and figures["ticks"] else {}

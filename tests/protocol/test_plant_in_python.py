@@ -1,0 +1,168 @@
+"""Plants in Python on the seat of examples/, which imports nothing of haploop: in lockstep, and by their own time."""
+
+import shlex
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import haploop.logger
+from haploop.launch.clock.device_time import GOES_ON, PLANT, REFUSED, lateness_told
+from haploop.launch.processes.foreign import read_programs
+from haploop.launch.processes.run_directory import CommandRefused
+from haploop.launch.runs.start import prepare, run
+from haploop.launch.spec import OutputError
+from helpers.live.live_run import going
+
+HOUSE = Path(__file__).parents[2]
+SCENE = HOUSE / "launch/scenes/fig6b.toml"
+PLAIN = HOUSE / "tests/oracles/plain_plant.py"
+BY_PLANT = {"clock": "plant"}
+# An element that keeps the controller for 30 ms at tick 500: no answer of then comes within the delay of 2 ms.
+SLEEPER = """
+import time
+from haploop.controller.dissipation import Element
+
+ticks = []
+
+class Sleeper(Element):
+    "0.1 N, at once but for one tick."
+
+    kind = "sleeper"
+
+    def force(self, motion):
+        ticks.append(motion)
+        if len(ticks) == 500:
+            time.sleep(0.03)
+        return 0.1
+"""
+TOLD = {"ticks": 3, "late_ticks": 1, "median_s": 1e-4, "percent_99_s": 1e-3, "percent_99_9_s": 1e-3, "most_s": 2e-3}
+TOLD |= {"late_s": 2e-3, "lost_s": 0}
+
+
+def plant(script: Path = PLAIN, *options: str) -> dict[str, Any]:
+    return {"programs": read_programs([f"plant={shlex.join([sys.executable, str(script), *options])}"], [])}
+
+
+def ran(out: Path, *overrides: str, plugins: tuple[Path, ...] = (), **options: Any) -> tuple[dict[str, Any], Any]:
+    """The summary and the log of figure 6(b), 1 s of it, by window."""
+    spec = prepare(SCENE, ("run.verdict=window", "duration=1", *overrides), plugins, out=out)
+    return run(spec, **options), haploop.logger.read(out)
+
+
+def test_a_plant_in_python_moves_as_the_runs_own_and_its_books_close(tmp_path: Path) -> None:
+    summary, log = ran(tmp_path / "foreign", **plant())
+    _, own = ran(tmp_path / "own", in_process=True)
+    assert np.abs(log["/plant"]["x"] - own["/plant"]["x"]).max() < 1e-9
+    assert abs(summary["energy"]["residual_J"]) < 1e-9 * summary["energy"]["moved_J"]
+
+
+@pytest.mark.slow
+def test_a_delay_set_in_mid_run_reaches_a_plant_in_python(tmp_path: Path) -> None:
+    shorter = "encoder.resolution=1e-9", 'event=[{at=0.95, set={"clock.round_trip_delay"=0.0007}}]'
+    _, log = ran(tmp_path / "foreign", *shorter, **plant())
+    _, own = ran(tmp_path / "own", *shorter, in_process=True)
+    _, longer = ran(tmp_path / "longer", shorter[0], in_process=True)
+    assert np.abs(log["/plant"]["force"] - own["/plant"]["force"]).max() < 1e-5
+    assert np.abs(longer["/plant"]["force"] - own["/plant"]["force"]).max() > 1e-3
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "keys",
+    [["friction.kinetic=0.1"], ["noise.deviation=1e-6", "noise.cutoff=100"], ['acceleration.source="accelerometer"']],
+)
+def test_a_scene_beyond_the_seat_is_refused_by_name(tmp_path: Path, keys: list[str]) -> None:
+    with pytest.raises(Exception, match=r"no (friction|noise|accelerometer); leave it out"):
+        ran(tmp_path / "out", *keys, **plant())
+
+
+@pytest.mark.slow
+def test_without_late_answers_a_run_by_the_devices_time_has_the_bits_of_any_run(tmp_path: Path) -> None:
+    summary, log = ran(tmp_path / "timed", **BY_PLANT, **plant())
+    _, free = ran(tmp_path / "free", **plant())
+    late = summary["lateness"]
+    assert late["ticks"] > 900
+    assert late["clock"] == PLANT
+    same = [
+        np.array_equal(log["/plant"][name], free["/plant"][name])
+        for name in (
+            "x",
+            "v",
+            "force",
+        )
+    ]
+    assert all(same) or late["late_ticks"], "only a late answer can change a bit"
+
+
+def test_an_answer_that_is_late_is_counted_and_the_device_is_without_force_for_that_period(tmp_path: Path) -> None:
+    (tmp_path / "sleeper.py").write_text(SLEEPER)
+    alone = 'dissipation=[{kind="sleeper", acts="always"}]', "wall.stiffness=0"
+    summary, log = ran(tmp_path / "out", *alone, plugins=(tmp_path / "sleeper.py",), **BY_PLANT, **plant())
+    late, forces = summary["lateness"]["late_ticks"], np.asarray(log["/plant"]["force"])[20:-1]
+    assert late >= 20
+    assert set(forces) == {0.0, 0.1}
+    assert late - 2 <= np.count_nonzero(forces == 0.0) / 10 <= late, "what came after the end was late for nothing"
+
+
+@pytest.mark.slow
+def test_a_devices_time_is_neither_held_nor_hurried(tmp_path: Path) -> None:
+    with going(tmp_path, "duration=2", **BY_PLANT, **plant()) as live:
+        for verb in REFUSED:
+            with pytest.raises(CommandRefused, match=GOES_ON):
+                live.ask(verb, **({"pace": "free"} if verb == "pace" else {}))
+        live.ask("stop")
+
+
+@pytest.mark.parametrize(
+    ("options", "why"),
+    [
+        (lambda: BY_PLANT, "own plant keeps none"),
+        (lambda: BY_PLANT | plant() | {"pace": 1.0}, "leave out one of them"),
+    ],
+)
+def test_time_is_left_to_the_plant_only_where_one_can_keep_it(
+    tmp_path: Path, options: Callable[[], dict[str, Any]], why: str
+) -> None:
+    with pytest.raises(OutputError, match=why):
+        ran(tmp_path / "out", **options())
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_scene_that_pauses_is_not_run_by_a_devices_time(tmp_path: Path) -> None:
+    with pytest.raises(OutputError, match="pauses; a device does not"):
+        ran(tmp_path / "out", "event=[{at=0.5, pause=true}]", **BY_PLANT, **plant())
+
+
+@pytest.mark.slow
+def test_a_delay_of_no_whole_periods_is_refused_by_a_plant_that_owns_the_time(tmp_path: Path) -> None:
+    with pytest.raises(Exception, match="whole control periods"):
+        ran(tmp_path / "out", "clock.round_trip_delay=0.0015", **BY_PLANT, **plant())
+
+
+@pytest.mark.parametrize("key", sorted(TOLD))
+@pytest.mark.parametrize("value", [None, "1", float("nan"), float("inf"), -1, True, [1]])
+def test_figures_of_lateness_that_are_none_are_not_shown(key: str, value: Any) -> None:
+    assert lateness_told({"lateness": TOLD}) == {**TOLD, "clock": PLANT}
+    assert lateness_told({"lateness": TOLD | {key: value}}) == {}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("integrator", "most_m", "residual"),
+    [("rk4", 1e-8, (1e-9, 1e-7)), ("euler", 3e-5, (1e-5, 2e-4)), ("implicit", 3e-5, (1e-5, 2e-4))],
+)
+@pytest.mark.parametrize("device", ["slider", "arm"])
+def test_the_books_tell_mujocos_integrators_apart(
+    tmp_path: Path, integrator: str, device: str, most_m: float, residual: tuple[float, float]
+) -> None:
+    pytest.importorskip("mujoco")
+    options = ("--integrator", integrator, "--device", device)
+    summary, log = ran(tmp_path / "foreign", "duration=3", **plant(HOUSE / "examples/mujoco_plant.py", *options))
+    _, own = ran(tmp_path / "own", "duration=3", in_process=True)
+    assert np.abs(log["/plant"]["x"] - own["/plant"]["x"]).max() < most_m
+    low, high = residual
+    assert low < summary["energy"]["residual_J"] / summary["energy"]["moved_J"] < high
