@@ -10,6 +10,7 @@ from haploop.tools.cli.scenes import check, export, judge, plot, plugins, replay
 from haploop.tools.cli.study_commands import advise, dissipate, paper, sweep
 from haploop.tools.cli.view import view
 from haploop.tools.cost.command import cost
+from haploop.tools.fmu.command import export_fmu
 
 app = typer.Typer(
     help="Simulate a haptic loop: a device in a hand, a sampled controller with a virtual wall, a line with delay.",
@@ -21,6 +22,6 @@ app = typer.Typer(
 # In the order in which the help lists them.
 for command in (
     run, check, explain, plugins, status, pause, resume, step, pace, stop, swap, set_, undo, attach, view, keys,
-    plot, replay, judge, export, cost, sweep, dissipate, paper, advise,
+    plot, replay, judge, export, export_fmu, cost, sweep, dissipate, paper, advise,
 ):  # fmt: skip
-    app.command(command.__name__.rstrip("_"))(command)
+    app.command(command.__name__.rstrip("_").replace("_", "-"))(command)

@@ -1,0 +1,45 @@
+"""``haploop export-fmu``: a scene's controller for Simulink, Modelica tools and other importers of FMUs."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from haploop.tools.cli.options import FAILED, WRONG_USE, SceneFile, Set, leave, plain_errors
+
+
+def export_fmu(
+    scene: SceneFile,
+    set: Set = None,
+    out: Annotated[Path | None, typer.Option(metavar="FILE.fmu", help="file, or directory [SCENE.fmu here]")] = None,
+    force: Annotated[bool, typer.Option("--force", help="write over a file that exists")] = False,
+) -> None:
+    """Write the controller of a scene as an FMU (FMI 3.0, co-simulation), in C: position in, force out.
+
+    Wall, elements, estimators and delay, without Python, to the bits of a run. It takes a C compiler.
+    """
+    from haploop.launch.scene.file import load
+    from haploop.protocol.ticks import Timebase
+    from haploop.tools.export.command import ExportFailed, new_files
+    from haploop.tools.fmu.package import NotCompiled, write_fmu
+    from haploop.tools.fmu.variables import NotExportable, step_count
+
+    target = Path(f"{scene.stem}.fmu") if out is None else out / f"{scene.stem}.fmu" if out.is_dir() else out
+    if target.suffix != ".fmu":
+        leave(f"The name of an FMU must end in .fmu, but {target.name} was given.", WRONG_USE)
+    with plain_errors():
+        resolved = load(scene, set or [])
+        try:
+            with new_files([target], force) as [file]:
+                write_fmu(resolved, scene.stem, file)
+        except NotExportable as error:
+            leave(str(error), WRONG_USE)
+        except (NotCompiled, ExportFailed) as error:
+            leave(str(error), FAILED)
+    time = Timebase.from_scene(resolved)
+    longest, least = step_count(time) / time.plant_rate, 1.0 / time.plant_rate
+    print(f"Communication step: {longest:g} s, or whole plant steps of {least:g} s up to a tick.", file=sys.stderr)
+    print(target)

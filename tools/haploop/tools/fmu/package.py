@@ -1,0 +1,97 @@
+"""The FMU of a scene's controller: model description, sources and the library compiled of them, in one archive."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import platform
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+import tempfile
+import zipfile
+from importlib.resources import files
+from pathlib import Path
+from typing import IO
+
+from haploop.protocol.scene.scene import Scene
+from haploop.tools.fmu.description import build_description, model_description
+from haploop.tools.fmu.variables import controller_of, header, variables_of
+
+SOURCES = ("fmi3.c", "controller.h")
+# No multiply-add in one rounding, which Python does not do either.
+_FLAGS = ("-O2", "-std=c99", "-ffp-contract=off", "-fPIC", "-shared", "-fvisibility=hidden")
+_MACHINES = {"x86_64": "x86_64", "amd64": "x86_64", "aarch64": "aarch64", "arm64": "aarch64"}
+_SYSTEMS = {"linux": ("linux", ".so"), "darwin": ("darwin", ".dylib")}
+_COMPILE_S = 120.0
+
+
+class NotCompiled(Exception):
+    """There is no C compiler, or it failed; the message says what to do."""
+
+
+def write_fmu(scene: Scene, stem: str, target: IO[bytes]) -> None:
+    """Writes the FMU of a resolved scene's controller; the same scene and ``stem`` of its identifier, the same bytes.
+
+    Raises:
+        NotExportable: no FMU can be made of this scene.
+        NotCompiled: no library could be made.
+    """
+    params = controller_of(scene)
+    variables = variables_of(scene, params)
+    sources = {name: files("haploop.tools.fmu").joinpath(name).read_text(encoding="utf-8") for name in SOURCES}
+    identifier = re.sub(r"\W|^(?=\d)", "_", stem, flags=re.ASCII)
+    without_token = [header(scene, params, variables, ""), *sources.values()]
+    digest = hashlib.sha256("\0".join([*without_token, model_description(scene, variables, identifier, "")]).encode())
+    token = f"{{{digest.hexdigest()}}}"
+    sources["scene.h"] = header(scene, params, variables, token)
+    tuple_, suffix = _platform()
+    library = _library(sources, suffix)
+    contents = {
+        "modelDescription.xml": model_description(scene, variables, identifier, token).encode(),
+        f"binaries/{tuple_}/{identifier}{suffix}": library,
+        "sources/buildDescription.xml": build_description(identifier).encode(),
+        **{f"sources/{name}": text.encode() for name, text in sources.items()},
+    }
+    with zipfile.ZipFile(target, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, data in contents.items():
+            entry = zipfile.ZipInfo(name)  # of 1980, whenever it is made
+            entry.compress_type, entry.external_attr = zipfile.ZIP_DEFLATED, 0o644 << 16
+            archive.writestr(entry, data)
+
+
+def _platform() -> tuple[str, str]:
+    machine, system = _MACHINES.get(platform.machine().lower()), _SYSTEMS.get(sys.platform)
+    if machine is None or system is None:
+        here = f"{platform.machine()} with {sys.platform}"
+        raise NotCompiled(f"Libraries are made on x86_64 or aarch64 with Linux or macOS, but this machine is {here}.")
+    return f"{machine}-{system[0]}", system[1]
+
+
+def _library(sources: dict[str, str], suffix: str) -> bytes:
+    """Returns the shared library of these sources."""
+    compiler = shlex.split(os.environ.get("CC", "")) or [next(filter(shutil.which, ("cc", "gcc", "clang")), "cc")]
+    with tempfile.TemporaryDirectory() as folder:
+        for name, text in sources.items():
+            Path(folder, name).write_text(text, encoding="utf-8")
+        library = Path(folder, f"fmu{suffix}")
+        command = [*compiler, *_FLAGS, "-o", library.name, "fmi3.c", "-lm"]
+        try:
+            done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=_COMPILE_S)
+        except OSError as error:
+            raise NotCompiled(
+                f"A C compiler was expected, but {compiler[0]} cannot be started ({error.strerror}). Install one "
+                "(Debian, Ubuntu: apt install gcc; Fedora: dnf install gcc; macOS: xcode-select --install), or name "
+                "one that is there: CC=/path/to/compiler haploop export-fmu ..."
+            ) from error
+        except subprocess.TimeoutExpired as error:
+            raise NotCompiled(f"The C compiler {compiler[0]} was not done after {_COMPILE_S:g} s.") from error
+        if done.returncode or not library.exists():
+            said = "\n".join((done.stderr or done.stdout).strip().splitlines()[:8]) or "it said nothing"
+            raise NotCompiled(
+                f"The C compiler made no library (exit status {done.returncode}): {shlex.join(command)}\n{said}\n"
+                "Another compiler can be named: CC=gcc haploop export-fmu ..."
+            )
+        return library.read_bytes()
