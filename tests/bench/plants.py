@@ -1,0 +1,89 @@
+"""Other people's solvers as plants of figure 6(b), judged by the books: a table of docs/accuracy.md.
+
+usage: python tests/bench/plants.py PAGE, by `make accuracy`. What is not installed is left out, with a word.
+"""
+
+import importlib.util
+import shlex
+import sys
+import tempfile
+from importlib.metadata import version
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+import haploop.logger
+from haploop.launch.processes.foreign import read_programs
+from haploop.launch.runs.start import prepare, run
+from haploop.tools.render.terminal import markdown_table
+from haploop.tools.render.units import amount
+
+HOUSE = Path(__file__).parents[2]
+SCENE = HOUSE / "launch/scenes/fig6b.toml"
+TITLE = "Plants of others, judged by the books"
+INTRO = """\
+The scene of figure 6(b), 3 s with a plant step of 0.1 ms, with other people's solvers in place of the plant
+(`haploop run --node`). *Distance* is the largest between their position and that of the exact flow at any plant step;
+*residual* is what the books cannot account for, as a share of the energy that moved; that of
+the exact flow is rounding."""
+NOTE = """\
+MuJoCo holds every applied force over a step. The hand's is given as its mean over the step, and that is what is left of
+RK4: with a constant force its residual is 2e-13. For one joint, Euler takes the damping
+implicitly, as `implicit` does, and both come to the same."""
+
+
+class Solver(NamedTuple):
+    """A plant of examples/: what it is called, the package it needs, and its words on the command line."""
+
+    name: str
+    package: str
+    words: tuple[str, ...]
+
+
+SOLVERS = [
+    Solver(f"MuJoCo {name}, {device}", "mujoco", ("mujoco_plant.py", "--integrator", key, "--device", device))
+    for device in ("slider", "arm")
+    for key, name in (("rk4", "RK4"), ("euler", "Euler"), ("implicit", "implicit"))
+]
+
+
+def measured(solver: Solver | None, out: Path) -> tuple[np.ndarray, float]:
+    """Returns x at every plant step, m, and the residual as a share of what moved; None: of the run's own plant."""
+    script = [] if solver is None else [sys.executable, str(HOUSE / "examples" / solver.words[0]), *solver.words[1:]]
+    programs = read_programs([f"plant={shlex.join(script)}"] if script else [], [])
+    summary = run(prepare(SCENE, ["run.verdict=window"], out=out), programs=programs)
+    energy = summary["energy"]
+    return np.asarray(haploop.logger.read(out)["/plant"]["x"]), abs(energy["residual_J"]) / energy["moved_J"]
+
+
+def section(directory: Path) -> str:
+    """Returns the section: intro, table and note."""
+    exact, residual = measured(None, directory / "exact")
+    rows = [("haploop, exact flow", "–", f"{residual:.1e}")]
+    missing: dict[str, list[str]] = {}
+    for number, solver in enumerate(SOLVERS):
+        if importlib.util.find_spec(solver.package) is None:
+            missing.setdefault(solver.package, []).append(solver.name)
+            continue
+        x, residual = measured(solver, directory / str(number))
+        rows.append((solver.name, amount(float(np.abs(x - exact).max()), "m", 2), f"{residual:.1e}"))
+    left_out = [f"Left out, since there is no {package}: {', '.join(names)}." for package, names in missing.items()]
+    there = sorted({solver.package for solver in SOLVERS} - missing.keys())
+    made = f"Measured with {', '.join(f'{package} {version(package)}' for package in there)}." if there else ""
+    table = markdown_table(("plant", "distance", "residual"), rows)
+    return "\n\n".join([TITLE, INTRO, table, NOTE, *left_out, *([made] if made else [])]) + "\n"
+
+
+def main() -> None:
+    page = Path(sys.argv[1])
+    with tempfile.TemporaryDirectory() as directory:
+        made = section(Path(directory))
+    sections = [one for one in page.read_text(encoding="utf-8").split("\n## ") if not one.startswith(TITLE)]
+    sections.insert(-1, made)  # the last one tells the machine
+    page.write_text("\n## ".join(sections), encoding="utf-8")
+    print(made)
+
+
+if __name__ == "__main__":
+    main()
