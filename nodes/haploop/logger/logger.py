@@ -114,8 +114,9 @@ class Logger:
     def _log_controller(self) -> None:
         """Logs what has come of the controller, before the plant: a log cut off anywhere can be replayed."""
         blocks, self._unlogged = self._unlogged, []
-        for block in blocks if self._channels else ():
-            self._channels.controller(block, self._first_tick)
+        for block in blocks:
+            if self._channels:
+                self._channels.controller(block, self._first_tick)
 
     @np.errstate(over="ignore", invalid="ignore")  # where a force is no finite number, its books are none either
     def _book(self, end: int) -> None:
