@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import dataclasses
 import tempfile
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 import haploop.logger
 from haploop.controller.dissipation import Element, load_plugin, registry
+from haploop.launch.runs.half_replay import foreign_programs, named, repeat_controller, repeat_plant, why_no_samples
 from haploop.launch.runs.in_process import run_in_process
 from haploop.launch.runs.run_files import recorded_log, recorded_scene, recorded_summary
 from haploop.launch.spec import PLUGINS, SCENE, RunFailed, kept_name
@@ -19,6 +22,7 @@ from haploop.logger.summary import Summary, finite
 from haploop.protocol.changes import Event
 from haploop.protocol.files import read_file
 from haploop.protocol.scene.scene import Scene
+from haploop.protocol.transport.wire import Message
 
 
 class ReplayError(Exception):
@@ -33,17 +37,21 @@ class Replay:
         summary: of the repetition.
         differences: where recorded and repeated run disagree, as sentences; empty when every bit agreed.
         cut: where the log ends if it was cut off, else "".
+        half: of a run of which but one half was haploop's own, which one was repeated and whose the other was; else "".
     """
 
     summary: Summary
     differences: list[str]
     cut: str
+    half: str = ""
 
 
 def replay(directory: Path) -> Replay:
     """Repeats a run from its log, in one process, and compares bit by bit.
 
-    The whole trajectory is compared where the summary holds its digest, and every logged step, tick and book.
+    The whole trajectory is compared where the summary holds its digest, and every logged step, tick and book. Where a
+    program of somebody else's was the plant, the controller is repeated from the recorded samples; where one was the
+    controller, the plant from the recorded commands.
 
     Raises:
         ReplayError, LogError, SceneError: the directory does not hold a run that can be repeated.
@@ -51,6 +59,8 @@ def replay(directory: Path) -> Replay:
     recorded = logged_run(directory)
     scene, kinds, events = repeatable(directory, recorded)
     before = recorded_summary(directory)
+    if foreign := foreign_programs(recorded):
+        return _replay_half(scene, kinds, events, recorded, before, foreign)
     with tempfile.TemporaryDirectory(prefix="haploop-replay-") as scratch:
         try:
             summary = run_in_process(scene, kinds, out=Path(scratch), events=events)
@@ -67,6 +77,35 @@ def replay(directory: Path) -> Replay:
     if before and not failed:
         differences += _compare_summaries(before, finite(summary))
     return Replay(summary, differences, recorded.cut)
+
+
+def _replay_half(
+    scene: Scene,
+    kinds: dict[str, type[Element]],
+    events: list[tuple[int, Event]],
+    recorded: Recording,
+    before: Summary | None,
+    foreign: dict[str, Message],
+) -> Replay:
+    others = " and ".join(named(role, program) for role, program in foreign.items())
+    if len(foreign) > 1:
+        raise ReplayError(f"Neither half of this run was haploop's own, so there is nothing to repeat: {others}.")
+    failed, rows = before is not None and before["ended"] == "failed", recorded["/controller"]
+    summary: Summary = {"ticks": len(rows["x"])}
+    if "plant" in foreign:
+        if why := why_no_samples(scene):
+            raise ReplayError(f"The controller of this run cannot be repeated; {others}. {why}")
+        half = repeat_controller(scene, kinds, events, recorded)
+        differences = _compare({"/controller": rows}, half, failed)
+        return Replay(summary, differences, recorded.cut, f"The controller was repeated from its samples; {others}.")
+    half, digest = repeat_plant(scene, events, recorded)
+    samples = {"/controller": {name: rows[name] for name in ("timestamp", "x")}}
+    plant = {topic: recorded[topic] for topic in ("/plant",) if topic in recorded}
+    differences = _compare(samples | plant, half, failed)
+    if before and not failed:
+        summary["trajectory_sha256"] = digest
+        differences += ["trajectory_sha256 of the summary differs."] * (before["trajectory_sha256"] != digest)
+    return Replay(summary, differences, recorded.cut, f"The plant was repeated from its commands; {others}.")
 
 
 def logged_run(directory: Path) -> Recording:
@@ -144,7 +183,7 @@ def _event(event: Event, directory: Path) -> tuple[int, Event]:
     return tick, event
 
 
-def _compare(recorded: Recording, repeated: Recording, failed: bool) -> list[str]:
+def _compare(recorded: Mapping[str, Any], repeated: Mapping[str, Any], failed: bool) -> list[str]:
     """Differences between two logs as far as the recorded one goes, one sentence a column.
 
     Where a failed run broke off, the force of its end state is the one held before, not the one that would follow.
@@ -155,7 +194,7 @@ def _compare(recorded: Recording, repeated: Recording, failed: bool) -> list[str
             continue
         for name, whole in recorded[topic].items():
             before = whole[:-1] if failed and (topic, name) == ("/plant", "force") else whole
-            after = repeated[topic].get(name, np.zeros(0))[: len(before)]
+            after = repeated.get(topic, {}).get(name, np.zeros(0))[: len(before)]
             differs = np.ones(len(before), bool)
             differs[: len(after)] = before[: len(after)].view(np.uint64) != after.view(np.uint64)
             if differs.any():

@@ -202,9 +202,12 @@ def replay(directory: Directory, json: Json = False) -> None:
             leave(str(error), WRONG_USE)
     print_note(result.cut)
     if json:
-        print_json({"agrees": not result.differences, "differences": result.differences, **result.summary})
+        half = {"half": result.half} if result.half else {}
+        print_json({"agrees": not result.differences, "differences": result.differences, **half, **result.summary})
     elif result.differences:
-        print("\n".join(result.differences))
+        print("\n".join([*result.differences, *filter(None, [result.half])]))
+    elif result.half:
+        print(f"Every bit of {result.summary['ticks']} ticks agreed. {result.half}")
     else:
         print(f"Every bit of {result.summary['steps']} steps agreed: {result.summary['trajectory_sha256']}")
     if result.differences:

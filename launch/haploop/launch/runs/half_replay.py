@@ -1,0 +1,111 @@
+"""Repeating the half of a run that was haploop's own, where a program of somebody else's took the other's place."""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import json
+from collections.abc import Mapping
+
+import numpy as np
+
+from haploop.controller.controller import Controller
+from haploop.controller.dissipation import Element, ElementError
+from haploop.launch.spec import PROGRAMS
+from haploop.logger.books.buffers import as_float64
+from haploop.logger.log import LogError
+from haploop.logger.log.channels import Channels, motion_columns
+from haploop.logger.log.recording import MemoryLog, Recording
+from haploop.logger.log.table import Floats
+from haploop.logger.summary import misfit
+from haploop.plant.plant import Plant
+from haploop.protocol.changes import Event, is_change
+from haploop.protocol.scene.scene import Scene, accelerometer_is_used
+from haploop.protocol.ticks import Timebase
+from haploop.protocol.transport.wire import Message
+
+_NO_PROGRAMS = f"What the log holds as {PROGRAMS} is none of a run: it should name its programs by role."
+_PROGRAM = {"name": str, "version": str, "command": str, "own": bool}
+
+
+def foreign_programs(recorded: Recording) -> dict[str, Message]:
+    """Returns the programs that took the place of plant or controller by role, as the log of a run names them.
+
+    Raises LogError where what the log holds of them is something else.
+    """
+    try:
+        programs = json.loads(recorded.attachments.get(PROGRAMS, b"{}"))
+    except (ValueError, RecursionError) as error:
+        raise LogError(_NO_PROGRAMS) from error
+    if not isinstance(programs, dict) or misfit(programs, dict.fromkeys(programs, _PROGRAM)):
+        raise LogError(_NO_PROGRAMS)
+    return {role: program for role, program in programs.items() if not program["own"]}
+
+
+def named(role: str, program: Message) -> str:
+    """Returns a role and whose program had it, for people."""
+    words = " ".join(filter(None, (program["name"], program["version"]))) or "a program without a name"
+    command = f" ({program['command']})" if program["command"] else ""
+    return f"the {role} was {words}{command}"
+
+
+def why_no_samples(scene: Scene) -> str:
+    """Returns why the log of a scene does not hold all that a controller is sent, as a sentence; "" where it does."""
+    table = scene.acceleration
+    if not accelerometer_is_used(scene) or (table and table.source == "accelerometer" and table.cutoff is None):
+        return ""
+    return (
+        "The readings of the accelerometer, which it was sent, are not in the log, only what its estimators made of "
+        "them: acceleration.source must be the accelerometer, without a cutoff."
+    )
+
+
+def repeat_controller(
+    scene: Scene, kinds: Mapping[str, type[Element]], events: list[tuple[int, Event]], recorded: Recording
+) -> Recording:
+    """Computes our controller again from the recorded samples and returns what it would have logged.
+
+    That is as far as it comes, where an element gives no force.
+    """
+    rows, time = recorded["/controller"], Timebase.from_scene(scene)
+    controller, memory = Controller(scene, time, dict(kinds)), MemoryLog()
+    for tick, event in events:
+        if is_change(event):
+            controller.schedule(tick, event)
+    columns = (rows["x"], rows["a"]) if accelerometer_is_used(scene) else (rows["x"],)
+    with contextlib.suppress(ElementError):  # then ticks are missing, and the comparison says so
+        controller.answer(list(zip(*(column.tolist() for column in columns), strict=True)))
+    channels = Channels(memory, time, every_step=False)
+    for block in controller.recorder.take():
+        channels.controller(block, 0)
+    return memory.recording()
+
+
+def repeat_plant(
+    scene: Scene, events: list[tuple[int, Event]], recorded: Recording
+) -> tuple[dict[str, dict[str, Floats]], str]:
+    """Moves our plant again under the recorded commands, up to where the log of the controller ends.
+
+    Returns:
+        What it would have logged, with its samples as ``x`` of ``/controller``; and the SHA-256 of the trajectory.
+    """
+    commands, time = recorded["/controller"]["total"].tolist(), Timebase.from_scene(scene)
+    plant, memory, samples = Plant(scene, time), MemoryLog(), []
+    for tick, event in events:
+        if is_change(event):
+            plant.schedule(tick, event)
+
+    def exchange(tick: int, sent: list[tuple[float, ...]]) -> list[float]:
+        samples.extend(sample[0] for sample in sent)
+        return commands[tick : tick + len(sent)]
+
+    with contextlib.suppress(ArithmeticError):  # then steps are missing
+        plant.run_until(len(commands), exchange)
+    first, ticks, columns = plant.take_block()
+    motion = {name: as_float64(data) for name, data in columns.items()}
+    channels, logged = Channels(memory, time, every_step="/plant" in recorded), motion_columns(motion)
+    channels.plant(first, ticks, logged)
+    channels.plant_end(first + ticks, {name: column[-1:] for name, column in logged.items()})
+    states = np.stack([motion["x"], motion["v"]], axis=1)
+    seen = {"timestamp": np.arange(len(samples)) / time.control_rate, "x": np.array(samples)}
+    return {**memory.recording(), "/controller": seen}, hashlib.sha256(states.tobytes()).hexdigest()
