@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from haploop.controller.dissipation import Element
 
 
-SCENE, PLUGINS = "scene.toml", "plugins"
+SCENE, PLUGINS, PROGRAMS = "scene.toml", "plugins", "programs.json"
 
 
 class OutputError(Exception):

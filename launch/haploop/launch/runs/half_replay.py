@@ -42,11 +42,13 @@ def foreign_programs(recorded: Recording) -> dict[str, Message]:
     return {role: program for role, program in programs.items() if not program["own"]}
 
 
-def named(role: str, program: Message) -> str:
-    """Returns a role and whose program had it, for people."""
-    words = " ".join(filter(None, (program["name"], program["version"]))) or "a program without a name"
-    command = f" ({program['command']})" if program["command"] else ""
-    return f"the {role} was {words}{command}"
+def named(foreign: Mapping[str, Message]) -> str:
+    """Returns whose programs had these roles, for people: "the plant was Bench 2.1 (./bench --fast)"."""
+    words = []
+    for role, program in foreign.items():
+        name = " ".join(filter(None, (program["name"], program["version"]))) or "a program without a name"
+        words.append(f"the {role} was {name}" + (f" ({program['command']})" if program["command"] else ""))
+    return " and ".join(words)
 
 
 def why_no_samples(scene: Scene) -> str:

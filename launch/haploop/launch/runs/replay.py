@@ -87,7 +87,7 @@ def _replay_half(
     before: Summary | None,
     foreign: dict[str, Message],
 ) -> Replay:
-    others = " and ".join(named(role, program) for role, program in foreign.items())
+    others = named(foreign)
     if len(foreign) > 1:
         raise ReplayError(f"Neither half of this run was haploop's own, so there is nothing to repeat: {others}.")
     failed, rows = before is not None and before["ended"] == "failed", recorded["/controller"]
@@ -125,6 +125,15 @@ def logged_run(directory: Path) -> Recording:
     if seen[0] > 0.0:
         raise ReplayError(f"{directory} was logged from {seen[0]:g} s on; replay the directory of the run itself.")
     return recorded
+
+
+def demand_own(recorded: Recording) -> None:
+    """Raises ReplayError where plant or controller of a run was somebody else's, so that its loop cannot be judged."""
+    if foreign := foreign_programs(recorded):
+        raise ReplayError(
+            f"Whether this loop is stable cannot be said: {named(foreign)}, "
+            "which cannot be held still and pushed here. What its last half second showed is in its summary."
+        )
 
 
 def repeatable(directory: Path, recorded: Recording) -> tuple[Scene, dict[str, type[Element]], list[tuple[int, Event]]]:

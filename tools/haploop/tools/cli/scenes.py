@@ -220,7 +220,7 @@ def judge(directory: Directory, json: Json = False) -> None:
     The run is repeated from its log, the hand then held still without noise, pushed hard and softly, and watched for
     up to 64 s of simulated time. The word is steady, limit-cycle, growing, diverged, no-contact or undecided.
     """
-    from haploop.launch.runs.replay import ReplayError, logged_run, repeatable
+    from haploop.launch.runs.replay import ReplayError, demand_own, logged_run, repeatable
     from haploop.launch.stability.judge import judge_scene
     from haploop.tools.render.report import finding_table
     from haploop.tools.render.terminal import console
@@ -229,6 +229,7 @@ def judge(directory: Directory, json: Json = False) -> None:
         try:
             recorded = logged_run(directory)
             print_note(recorded.cut)
+            demand_own(recorded)
             finding = judge_scene(*repeatable(directory, recorded))
         except ReplayError as error:
             leave(str(error), WRONG_USE)
