@@ -127,6 +127,9 @@ class Supervisor:
         }
 
         def told_to(role: str) -> Message:
+            if role in spec.programs and spec.programs[role].is_external:  # perhaps on another host
+                own = {"address": self._server.address, "transport": transport.of(role, elsewhere=True).as_dict()}
+                return start | own
             return {**start, "transport": transport.of(role).as_dict()}
 
         self._children = start_nodes(sockets, told_to, scene.run.pin, run_number, spec.programs)

@@ -17,6 +17,8 @@ from haploop.protocol.transport.wire import Frame, Message, WireError, decode, e
 REPORT_MS = 200
 _JOIN_S = 20.0
 _LOOK_MS = 250
+_GRACE_S = 2.0
+_LOST = "Nothing has come from the run at {} for {:g} s: the network between is cut, or its launcher was ended."
 _PROGRAM = {"name": "haploop"}
 
 
@@ -48,8 +50,10 @@ class ClockClient:
         self._connection = None
         if address.startswith("tcp:"):
             self._connection = Connection(self.socket, address, transport.keys is not None)
-        # One of the run's own that is cut off is known no more; another may join anew.
-        self._patience_s = 0.0 if role in PROCESSES else transport.patience_s
+        # One of the run's own that is cut off is known no more; the last words of a run may still be on their way to
+        # any other.
+        self._grace_s = 0.0 if role in PROCESSES else _GRACE_S
+        self._lost = _LOST.format(address.removeprefix("tcp://"), transport.patience_s)
         connect(self.socket, address)
         self.until = 0
         self.last = False
@@ -90,8 +94,8 @@ class ClockClient:
         """Takes what the clock has sent, without waiting; raises Aborted where its host can no longer be reached."""
         while has_message(self.socket):
             self._receive()
-        if self._connection and (lost_s := self._connection.lost_s()) > self._patience_s:
-            raise Aborted(f"The connection to the clock at {self._address} was lost {lost_s:.0f} s ago.")
+        if self._connection and self._connection.lost_s() > self._grace_s:
+            raise Aborted(self._lost)
 
     def hears(self, most_ms: int) -> bool:
         """Waits for a message of the clock, and takes all there are; returns False when none came in time."""

@@ -128,14 +128,14 @@ def _load(path: Path) -> tuple[str, str | None]:
     from zmq.auth import load_certificate
     from zmq.utils import z85
 
+    if not path.exists():
+        raise KeysError(_missing(path))
     try:
         public, secret = load_certificate(path)
         if any(len(key) != 40 or len(z85.decode(key)) != 32 for key in (public, secret) if key is not None):
             raise ValueError
-    except FileNotFoundError as error:
-        raise KeysError(_missing(path)) from error
     except OSError as error:
-        raise KeysError(f"{path} cannot be read: {error.strerror}.") from error
+        raise KeysError(f"{path} cannot be read: {error.strerror or error}.") from error
     except (ValueError, KeyError, LookupError) as error:
         raise KeysError(f"{path} is no certificate of CURVE; take it away and make or copy it anew.") from error
     return public.decode(), secret.decode() if secret else None

@@ -160,9 +160,10 @@ def transport_of(context: zmq.Context[zmq.Socket[bytes]]) -> Transport:
 
 def _watch_peers(socket: zmq.Socket[bytes], patience_s: float) -> None:
     """Has the library give up a connection of which nothing is heard, and one that never says who it is."""
-    milliseconds = max(1, int(patience_s * 1000))
-    socket.setsockopt(zmq.HEARTBEAT_IVL, min(1000, milliseconds))
-    socket.setsockopt(zmq.HEARTBEAT_TIMEOUT, milliseconds)
+    milliseconds = max(2, int(patience_s * 1000))
+    asks_ms = min(1000, milliseconds // 2)
+    socket.setsockopt(zmq.HEARTBEAT_IVL, asks_ms)
+    socket.setsockopt(zmq.HEARTBEAT_TIMEOUT, milliseconds - asks_ms)
     socket.setsockopt(zmq.HANDSHAKE_IVL, _HANDSHAKE_MS)
     socket.setsockopt(zmq.RECONNECT_IVL_MAX, 1000)
 
