@@ -1,4 +1,5 @@
 """Many scenes at once: members of one structure as arrays, all others one by one, with the bits of a single run.
 
-``run.batch_results`` is the way in; ``jax`` holds the compiled form (extra ``haploop[jax]``).
+``run.batch_results`` is the way in; ``loops`` sums the books by machine code where numba is installed (extra
+``haploop[numba]``), ``jax`` holds the compiled form (extra ``haploop[jax]``).
 """

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import gc
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from functools import lru_cache
+from importlib import import_module
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -18,6 +20,7 @@ from haploop.launch.batch.stacking import stacked
 from haploop.launch.scene.events import scene_events
 from haploop.logger.batch import BatchLogger, MemberEnd
 from haploop.logger.summary import Summary
+from haploop.plant.motion.one_mass import OneMassMotion
 from haploop.plant.plant import beyond
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
@@ -35,6 +38,27 @@ _BUFFER = 512
 # Members that have ended are computed on, unheeded, until they are more than this share; not with friction, which might
 # switch in them for ever.
 _UNHEEDED = 0.25
+
+
+# numba is loaded once so many ticks of members were to be booked in this process: sooner it takes longer than it saves.
+PAYS = 6_000_000
+_asked = Counter[str]()
+
+
+def _loops_for(ticks: int) -> Any:
+    """Returns the module of compiled loops where it pays for a batch of so many ticks in all, and works; else None."""
+    _asked["ticks"] += ticks
+    return _loops() if _asked["ticks"] >= PAYS else None
+
+
+@lru_cache(maxsize=1)
+def _loops() -> Any:
+    try:
+        loops = import_module("haploop.launch.batch.loops")
+        loops.try_out()
+    except Exception:  # not installed, or not for this version of NumPy, or broken: NumPy does the same
+        return None
+    return loops
 
 
 class BatchEnd(NamedTuple):
@@ -91,6 +115,10 @@ class Batch(BatchLoop):
         rows = BatchRecorder()
         super().__init__(scene, time, Controller(scene, time, kinds, rows), rows, len(scenes))
         self._logger = BatchLogger(scene, time, len(scenes), energy=energy, trajectories=trajectories)
+        if self._logger.books and (loops := _loops_for(len(scenes) * time.ticks)):
+            self._logger.books.sum_by(loops.SUMS)
+            if isinstance(self._motion, OneMassMotion):
+                self._motion.fill = loops.fill
         self._positions_only = not (energy or trajectories)
         self._in_flight: deque[Any] = deque(maxlen=time.lookahead_ticks + 1)
         self._limit_m, self._usual_buffer = scene.diverged_beyond, np.getbufsize()

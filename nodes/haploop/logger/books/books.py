@@ -12,6 +12,7 @@ from haploop.logger.books.one_mass import OneMassBooks
 from haploop.logger.books.work import (
     CAUSES,
     CLOSING,
+    BatchSums,
     Displacement,
     Sums,
     add_columns,
@@ -75,6 +76,7 @@ class Books:
     def __init__(self, scene: Scene, time: Timebase, members: int | None = None) -> None:
         self._time = time
         self.plant = plant_books(scene, time, members)
+        self._displacement, self._add_ticks = displacement, add_ticks_of_batch
         self._has_wall = scene.wall is not None
         names = [*self.plant.names, *(CAUSES if self._has_wall else ()), "moved"]
         self.state = BooksState((), no_sums(0, members), 0.0, None, 0.0)
@@ -84,6 +86,12 @@ class Books:
     def names(self) -> tuple[str, ...]:
         """All books, in the order of the rows of the sums."""
         return self.state.names
+
+    def sum_by(self, loops: BatchSums) -> None:
+        """Has the books of a batch summed by loops to the same bits; call before anything is booked."""
+        self._displacement, self._add_ticks = loops.displacement, loops.add_ticks
+        if isinstance(self.plant, OneMassBooks):
+            self.plant.energies = loops.energies
 
     def _open(self, names: Sequence[str]) -> None:
         all_names = (*self.state.names, *names)
@@ -114,7 +122,7 @@ class Books:
     def book_batch(self, tick: int, plant: dict[str, np.ndarray], commanded: Commanded) -> None:
         """Books the intervals of a batch from ``tick`` on; columns have a last axis for the members."""
         flows = self._flows(tick, plant, commanded)
-        self.state = self.state._replace(sums=add_ticks_of_batch(self.state.sums, np.stack(flows, axis=1)))
+        self.state = self.state._replace(sums=self._add_ticks(self.state.sums, np.stack(flows, axis=1)))
 
     def _flows(self, tick: int, plant: dict[str, np.ndarray], commanded: Commanded) -> list[np.ndarray]:
         """Returns the energy each tick adds to each book, shape (ticks,), or (ticks, batch), ordered as ``names``."""
@@ -122,7 +130,7 @@ class Books:
         for account in forces:
             if f"{account}.true" not in self.state.names:
                 self._open(_of_account(account))
-        way = displacement(plant["x"], plant["x_low"], n, sum_steps)
+        way = self._displacement(plant["x"], plant["x_low"], n, sum_steps)
         ticks = len(way.by_tick)
         flows: dict[str, np.ndarray] = dict(self._exchanged(tick, plant, way, commanded.first, forces))
         if CLOSING in flows:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,6 +15,9 @@ from haploop.protocol.arrays import each, first_row
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
 from haploop.protocol.trees import tree_select
+
+# A stand-in for ``step_energies``.
+Energies = Callable[..., tuple[Any, Any]]
 
 
 class OneMassParams(NamedTuple):
@@ -76,7 +79,12 @@ def one_mass_params(scene: Scene, time: Timebase, members: int | None = None) ->
 
 
 def increments(
-    params: OneMassParams, steps: Steps, ticks: Ticks, commanded: Iterable[Any] | None, summed: SumSteps
+    params: OneMassParams,
+    steps: Steps,
+    ticks: Ticks,
+    commanded: Iterable[Any] | None,
+    summed: SumSteps,
+    energies: Energies | None = None,
 ) -> Iterator[Any]:
     """Yields the energy every interval moves between the hand's muscles, the dampers, the mass and the spring, J.
 
@@ -93,32 +101,44 @@ def increments(
 
     Args:
         commanded: the force of the wall and of every element over each step, N; None without an actuator's limits.
+        energies: does what ``step_energies`` does.
 
     Yields:
         Shape (ticks,), or (ticks, batch), each, ordered as ``OneMassBooks.names``.
     """
-    m, (x, v, force, tau, rise, dx) = params.mechanics, steps
-    net = force + tau
-    net -= m.damping * v
-    beyond = x - m.rest_m
-    beyond *= m.stiffness
-    net -= beyond
-    rates = [v, net] if rise is None else [v, net, rise]
-    works = [force_N * ticks.dx for force_N in params.constant_N]
-    work = summed(_hand_work(params.lag, tau, rise, dx, rates))
+    m, works = params.mechanics, [force_N * ticks.dx for force_N in params.constant_N]
+    work, square = (energies or step_energies)(params, steps, summed)
     yield work - sum(works) if works else work
-    square = summed(sum_squares(params.square, rates))
     for damping in m.dampers.values():
         yield damping * square
     start, change = ticks.v[:-1], ticks.v[1:] - ticks.v[:-1]
     yield m.mass_kg * change * (start + change * 0.5)
     yield m.stiffness * ticks.dx * (ticks.x[:-1] - m.rest_m + ticks.dx * 0.5)
     if commanded is not None:
-        yield summed(beyond_limits(commanded, force) * dx)
+        yield summed(beyond_limits(commanded, steps.force) * steps.dx)
     yield from works
 
 
-def _hand_work(lag: np.ndarray, tau: Any, rise: Any, dx: Any, rates: Sequence[Any]) -> Any:
+def step_energies(params: OneMassParams, steps: Steps, summed: SumSteps) -> tuple[Any, Any]:
+    """Returns the work of tau in J and the integral of v^2 in m^2/s, summed over the steps of every interval."""
+    m, (x, v, force, tau, rise, dx) = params.mechanics, steps
+    net = net_force(m.damping, m.stiffness, m.rest_m, x, v, force, tau)
+    rates = [v, net] if rise is None else [v, net, rise]
+    return summed(hand_work(params.lag, tau, rise, dx, rates)), summed(sum_squares(params.square, rates))
+
+
+def net_force(damping: Any, stiffness: Any, rest_m: Any, x: Any, v: Any, force: Any, tau: Any) -> Any:
+    """Returns mass times acceleration, N."""
+    net = force + tau
+    net -= damping * v
+    beyond = x - rest_m
+    beyond *= stiffness
+    net -= beyond
+    return net
+
+
+def hand_work(lag: np.ndarray, tau: Any, rise: Any, dx: Any, rates: Sequence[Any]) -> Any:
+    """Returns the work of tau over a step, J; see ``increments``."""
     if rise is None:
         return tau * dx
     of_v, of_net, of_rise = lag
@@ -166,7 +186,13 @@ def sum_squares(factors: np.ndarray, w: Sequence[Any]) -> Any:
 
 
 class OneMassBooks:
-    """The books of one mass by ``names``, in the order in which ``increments`` yields them; heats end in ``_heat``."""
+    """The books of one mass by ``names``, in the order in which ``increments`` yields them; heats end in ``_heat``.
+
+    Attributes:
+        energies: in a batch, in the place of ``step_energies``.
+    """
+
+    energies: Energies | None = None
 
     def __init__(self, scene: Scene, time: Timebase, members: int | None = None) -> None:
         self.params = one_mass_params(scene, time, members)
@@ -196,7 +222,7 @@ class OneMassBooks:
         steps = Steps(*starts, rise=by_interval(rise, n) if rise.any() else None, dx=moved.by_step)
         ticks = Ticks(x[::n], v[::n], moved.by_tick)
         limited = (by_interval(force, n) for force in commanded) if self._is_limited else None
-        return increments(self.params, steps, ticks, limited, sum_steps)
+        return increments(self.params, steps, ticks, limited, sum_steps, self.energies)
 
     def select(self, kept: np.ndarray) -> None:
         """Drops the members of a batch for which ``kept``, shape (members,), is false."""

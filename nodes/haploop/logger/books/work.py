@@ -17,6 +17,19 @@ CAUSES = ("ideal", "sampled_and_held", "quantised")
 CLOSING = "unmodelled_work"
 
 
+class BatchSums(NamedTuple):
+    """The sums of the books of a batch that take longest; each does what the function of NumPy does.
+
+    Attributes:
+        displacement, add_ticks: as ``displacement`` and ``add_ticks_of_batch``.
+        energies: as ``step_energies`` of one mass.
+    """
+
+    displacement: Callable[..., Displacement]
+    energies: Callable[..., tuple[Any, Any]]
+    add_ticks: Callable[[Sums, np.ndarray], Sums]
+
+
 class Displacement(NamedTuple):
     """The way of the device, with the digits that the difference of two positions has lost, m.
 
@@ -37,11 +50,17 @@ def displacement(x: Any, x_low: Any, steps_per_tick: int | None, sum_steps: SumS
         x_low: what rounding left of them, m.
         steps_per_tick: n; None where the steps are those of one interval and have no axis for ticks.
     """
-    dx = x[1:] - x[:-1]
-    dx += x_low[1:] - x_low[:-1]
+    dx = way(x[:-1], x[1:], x_low[:-1], x_low[1:])
     if steps_per_tick is not None:
         dx = by_interval(dx, steps_per_tick)
     return Displacement(dx, sum_steps(dx))
+
+
+def way(start: Any, end: Any, start_low: Any, end_low: Any) -> Any:
+    """Returns the displacement between two positions, each with what rounding left of it, m."""
+    dx = end - start
+    dx += end_low - start_low
+    return dx
 
 
 def by_interval(column: np.ndarray, steps_per_tick: int) -> np.ndarray:
@@ -138,9 +157,8 @@ def sum_steps(flow: np.ndarray, first: int = 0, end: int | None = None) -> np.nd
 class Sums(NamedTuple):
     """Running sums, each a float and the sum of the rounding errors of its additions.
 
-    Each addition s + a = s' leaves the error e = (s - (s' - b)) + (a - b), b = s' - s, exactly (Knuth's TwoSum);
-    the errors are summed beside (Ogita, Rump and Oishi 2005, cascaded summation), so that sum + error carries about
-    twice the digits of a float.
+    The errors of the additions, each exact, are summed beside (Ogita, Rump and Oishi 2005, cascaded summation), so that
+    sum + error carries about twice the digits of a float.
 
     Attributes:
         sums, errors: shape (rows,), or (rows, batch).
@@ -148,6 +166,12 @@ class Sums(NamedTuple):
 
     sums: np.ndarray
     errors: np.ndarray
+
+
+def lost(before: Any, added: Any, after: Any) -> Any:
+    """Returns the error of s' = s + a, exactly: (s - (s' - b)) + (a - b), b = s' - s (Knuth's TwoSum)."""
+    part = after - before
+    return (before - (after - part)) + (added - part)
 
 
 def no_sums(rows: int = 0, members: int | None = None) -> Sums:
@@ -171,23 +195,16 @@ def add_columns(state: Sums, increments: np.ndarray) -> tuple[Sums, np.ndarray]:
     """
     sums = np.add.accumulate(np.concatenate([state.sums[:, None], increments], axis=1), axis=1)
     before, after = sums[:, :-1], sums[:, 1:]
-    added = after - before
-    lost = (before - (after - added)) + (increments - added)
-    errors = np.add.accumulate(np.concatenate([state.errors[:, None], lost], axis=1), axis=1)
+    of_each = lost(before, increments, after)
+    errors = np.add.accumulate(np.concatenate([state.errors[:, None], of_each], axis=1), axis=1)
     return Sums(sums[:, -1].copy(), errors[:, -1].copy()), sums + errors
 
 
 def add_ticks_of_batch(state: Sums, increments: np.ndarray) -> Sums:
     """Adds tick after tick, shape (ticks, rows, batch), for every member to the same bits as :func:`add_columns`."""
-    sums, errors = (part.copy() for part in state)
-    after, added, lost = (np.empty_like(sums) for _ in range(3))
+    sums, errors = state.sums, state.errors.copy()
     for increment in increments:
-        np.add(sums, increment, out=after)
-        np.subtract(after, sums, out=added)
-        np.subtract(increment, added, out=lost)
-        np.subtract(after, added, out=added)
-        np.subtract(sums, added, out=added)
-        lost += added
-        errors += lost
-        sums, after = after, sums
+        after = sums + increment
+        errors += lost(sums, increment, after)
+        sums = after
     return Sums(sums, errors)

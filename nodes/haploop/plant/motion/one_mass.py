@@ -11,7 +11,7 @@ import numpy as np
 from haploop.plant.line import Hold
 from haploop.plant.motion.forced_response import ForcedResponse
 from haploop.plant.motion.hand_force import make_hand_force
-from haploop.plant.motion.record import record_of_holds
+from haploop.plant.motion.record import Fill, record_of_holds
 from haploop.plant.motion.transition import make_foh_transition, make_zoh_transitions
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
@@ -113,7 +113,10 @@ class OneMassMotion:
 
     Attributes:
         held: coefficients of ``make_zoh_transitions``; in a batch with a last axis, of length 1 where all share them.
+        fill: fills in the record of a batch in the place of ``fill_steps``.
     """
+
+    fill: Fill | None = None
 
     def __init__(self, scene: Scene, time: Timebase, members: int | None = None) -> None:
         self.mechanics = m = Mechanics.from_scene(scene)
@@ -182,7 +185,7 @@ class OneMassMotion:
         """
         noted, self._noted = self._noted, []
         held, response, tail = self.held, self.response, np.shape(self._state[0])
-        record = record_of_holds(noted, held, response, tick, tail, positions_only=positions_only)
+        record = record_of_holds(noted, held, response, tick, tail, positions_only=positions_only, fill=self.fill)
         (x, v, x_comp, _), (_, force, command) = self._state, self.last
         for name, end in (("x", x), ("v", v), ("x_low", x_comp), ("force", force), ("command", command)):
             if name in record:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from array import array
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from itertools import groupby
 from typing import Any
 
@@ -14,7 +14,9 @@ from haploop.protocol.arrays import rows_of
 
 # Entries noted of every hold: steps, x, v, x_comp and v_comp at its beginning, force, command.
 NOTED = 7
-_COLUMNS = ("x", "v", "x_low", "force")
+COLUMNS = ("x", "v", "x_low", "force")
+Rows = dict[str, np.ndarray]
+Fill = Callable[[np.ndarray, np.ndarray, Sequence[np.ndarray], Rows, int, int], None]
 
 
 def change_over(held: Any, response: Any, x: Any, v: Any, force: Any, comp: Any) -> Any:
@@ -39,6 +41,41 @@ def change_over(held: Any, response: Any, x: Any, v: Any, force: Any, comp: Any)
     return change
 
 
+def fill_steps(
+    held: np.ndarray,
+    response: np.ndarray,
+    hold: Sequence[np.ndarray],
+    rows: dict[str, np.ndarray],
+    first: int,
+    count: int,
+) -> None:
+    """Fills in one hold of many intervals: ``count`` steps from ``first`` on of each.
+
+    Step i of a hold that began at y is y plus the transition of i steps, plus the forced response. An interval begins
+    with a known state: where the one before ended.
+
+    Args:
+        response: of these intervals, shape (2, n + 1, intervals, ...).
+        hold: x, v, x_comp, v_comp and force at the beginning of every hold, shape (intervals, ...).
+        rows: what is filled in, x alone or x, v, x_low and force, shape (n, intervals, ...).
+    """
+    x, v, x_comp, v_comp, force = hold
+    known, end = int(not first), first + count
+    over, during = held[known:count, :, None], slice(first + known, end)
+    dx = change_over(over[:, :3].swapaxes(0, 1), response[0, during], x, v, force, x_comp)
+    at_x = np.add(x, dx, out=rows["x"][during])
+    if known:
+        rows["x"][0] = x
+    if len(rows) == 1:
+        return
+    dv = change_over(over[:, 3:].swapaxes(0, 1), response[1, during], x, v, force, v_comp)
+    np.add(v, dv, out=rows["v"][during])
+    np.subtract(dx, at_x - x, out=rows["x_low"][during])
+    if known:
+        rows["v"][0], rows["x_low"][0] = v, x_comp
+    rows["force"][first:end] = force
+
+
 def record_of_holds(
     noted: list[Any],
     held: np.ndarray,
@@ -47,6 +84,7 @@ def record_of_holds(
     tail: tuple[int, ...],
     *,
     positions_only: bool = False,
+    fill: Fill | None = None,
 ) -> dict[str, np.ndarray]:
     """Returns x, v, x_low (x_comp), force and command at every plant step from interval ``tick`` on.
 
@@ -54,6 +92,7 @@ def record_of_holds(
         noted: seven entries of every hold, one after the other.
         held: coefficients of ``make_zoh_transitions``; in a batch with a last axis for the members.
         tail: (members,) in a batch, () for one run.
+        fill: does what ``fill_steps`` does.
 
     Returns:
         Shape (steps + 1, *tail) each, the last row left to be filled in, but for ``command``, of shape (steps + 1,); in
@@ -63,11 +102,11 @@ def record_of_holds(
     width = _width(noted, 0, n)
     cut = noted[:width:NOTED]
     if noted[::NOTED] == cut * (len(noted) // (width or 1)):
-        return _alike(noted, cut, held, response.between(tick, len(noted) // (width or 1)), tail, positions_only)
+        return _alike(noted, cut, held, response.between(tick, len(noted) // (width or 1)), tail, positions_only, fill)
     parts, first = [], tick
     for cut, some in _by_cut(noted, n):
         ticks = len(some) // (NOTED * len(cut))
-        parts.append(_alike(some, cut, held, response.between(first, ticks), tail, positions_only))
+        parts.append(_alike(some, cut, held, response.between(first, ticks), tail, positions_only, fill))
         first += ticks
     return {name: np.concatenate([*(part[name][:-1] for part in parts), [0.0]]) for name in parts[0]}
 
@@ -98,33 +137,18 @@ def _alike(
     response: np.ndarray,
     tail: tuple[int, ...],
     positions_only: bool,
+    fill: Fill | None,
 ) -> dict[str, np.ndarray]:
-    """Returns the record of intervals that are cut alike.
-
-    Step i of a hold that began at y is y plus the transition of i steps, plus the forced response. The i-th holds of
-    all intervals are filled in at once. An interval begins with a known state: where the one before ended.
-    """
+    """Returns the record of intervals that are cut alike; the i-th holds of all of them are filled in at once."""
     ticks, n = response.shape[2], len(held) - 1
-    record = {name: np.empty((ticks * n + 1, *tail)) for name in _COLUMNS[: 1 if positions_only else 4]}
+    record = {name: np.empty((ticks * n + 1, *tail)) for name in COLUMNS[: 1 if positions_only else 4]}
     rows = {name: column[:-1].reshape(ticks, n, *tail).swapaxes(0, 1) for name, column in record.items()}
     command, forces, first = np.empty((ticks, n)), [], 0
-    for (x, v, x_comp, v_comp, force, of_command), count in zip(_columns(noted, len(cut), tail), cut, strict=True):
-        known, end = int(not first), first + count
-        over, during = held[known:count, :, None], slice(first + known, end)
-        dx = change_over(over[:, :3].swapaxes(0, 1), response[0, during], x, v, force, x_comp)
-        at_x = np.add(x, dx, out=rows["x"][during])
-        if known:
-            rows["x"][0] = x
-        if not positions_only:
-            dv = change_over(over[:, 3:].swapaxes(0, 1), response[1, during], x, v, force, v_comp)
-            np.add(v, dv, out=rows["v"][during])
-            np.subtract(dx, at_x - x, out=rows["x_low"][during])
-            if known:
-                rows["v"][0], rows["x_low"][0] = v, x_comp
-            rows["force"][first:end] = force
-        command[:, first:end] = of_command[:, None]
-        forces.append(force)
-        first = end
+    for (*hold, of_command), count in zip(_columns(noted, len(cut), tail), cut, strict=True):
+        (fill or fill_steps)(held, response, hold, rows, first, count)
+        command[:, first : first + count] = of_command[:, None]
+        forces.append(hold[-1])
+        first += count
     record["command"] = np.append(command.ravel(), -1.0)
     return record | ({"held_N": np.concatenate(forces)} if tail else {})
 

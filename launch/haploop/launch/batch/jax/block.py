@@ -21,6 +21,7 @@ from haploop.launch.batch.jax.tick import (
     added_in_tick,
     batch_tick,
 )
+from haploop.logger.books.work import lost
 from haploop.protocol.trees import tree_leaves, tree_map, tree_unflatten
 
 # Rings of the window that are written at every tick, beside that of x.
@@ -198,5 +199,4 @@ def _add(book: tuple[Any, Any], added: Any) -> tuple[Any, Any]:
     """Returns the sum, and the sum of what each addition loses."""
     before, errors = book
     after = before + added
-    part = after - before
-    return after, errors + ((before - (after - part)) + (added - part))
+    return after, errors + lost(before, added, after)

@@ -1,0 +1,127 @@
+"""Batches that are booked by loops of machine code have the bits of NumPy, and do without numba where there is none."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from haploop.controller.dissipation import registry
+from haploop.launch.batch import batch
+from haploop.launch.batch.run import run_batch
+from haploop.protocol.scene.scene import Scene
+from haploop.tools.sweep.sweep_file import load
+from helpers.runs.batches import alone, diverging, pressed, together
+from helpers.scenes.varied_scenes import drawn_base, varied
+
+SWEEPS = sorted((Path(__file__).parents[2] / "launch/sweeps").glob("*.toml"))
+# What comes of a scene and its variations as numba compiles for the processor that is named to it.
+BARE = "import test_loops as t; t.batch.PAYS = 0; print(t.batch._loops_for(0) is not None, t.digest_of(7))"
+
+
+@pytest.fixture
+def by_loops(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Loops from the first batch on; where numba is there they must work."""
+    pytest.importorskip("numba")
+    monkeypatch.setattr(batch, "PAYS", 0)
+    assert batch._loops_for(0) is not None
+
+
+def drawn(seed: int, count: int = 20) -> list[Scene]:
+    rng, base = np.random.default_rng(seed), drawn_base(seed)
+    return [varied(base, rng) for _ in range(count)]
+
+
+def digest_of(seed: int) -> str:
+    return hashlib.sha256(json.dumps(together(drawn(seed))).encode()).hexdigest()
+
+
+def cells(path: Path) -> list[Scene]:
+    """Scenes from all over a shipped sweep, for a short while."""
+    sweep = load(path)
+    return [replace(sweep.scene(cell), duration=0.2) for cell in range(0, sweep.count, -(-sweep.count // 40))]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(40))
+def test_a_scene_out_of_a_batch_with_loops_has_every_bit_of_the_scene_alone(seed: int, by_loops: None) -> None:
+    scenes = drawn(seed, 6)
+    assert together(scenes) == [alone(each) for each in scenes]
+
+
+@pytest.mark.slow
+def test_so_have_loops_that_diverge_and_those_that_stay(by_loops: None) -> None:
+    scenes = diverging()
+    assert together(scenes) == [alone(each) for each in scenes]
+
+
+@pytest.mark.slow
+def test_a_loop_that_leaves_out_what_rounding_left_is_seen(by_loops: None, monkeypatch: pytest.MonkeyPatch) -> None:
+    from haploop.launch.batch import loops
+
+    def shorter(x: np.ndarray, x_low: np.ndarray, *of: Any) -> Any:
+        return loops.displacement(x, 0.0 * x_low, *of)
+
+    monkeypatch.setattr(loops, "SUMS", loops.SUMS._replace(displacement=shorter))
+    scenes = drawn(7)
+    assert together(scenes) != [alone(each) for each in scenes]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("path", SWEEPS, ids=lambda path: path.stem)
+def test_a_shipped_sweep_has_the_same_results_with_loops_and_without(
+    path: Path, by_loops: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scenes, kinds = cells(path), registry()
+    found = run_batch(scenes, kinds, trajectories=True, fewest=2)
+    monkeypatch.setattr(batch, "PAYS", float("inf"))
+    assert run_batch(scenes, kinds, trajectories=True, fewest=2) == found
+
+
+@pytest.mark.slow
+def test_compiled_for_any_processor_the_loops_have_the_same_bits(by_loops: None) -> None:
+    generic = {**os.environ, "NUMBA_CPU_NAME": "generic", "PYTHONPATH": os.pathsep.join(sys.path)}
+    here = Path(__file__).parent
+    said = subprocess.run(
+        [sys.executable, "-c", BARE], cwd=here, env=generic, capture_output=True, text=True, check=True
+    )
+    assert said.stdout.split() == ["True", digest_of(7)]
+
+
+@pytest.mark.slow
+def test_machine_code_of_other_formulas_is_not_taken_for_that_of_these(
+    by_loops: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from haploop.launch.batch import loops
+
+    now, source = loops._cache(), Path(str(loops.work.__file__)).read_text(encoding="utf-8")
+    (tmp_path / "work.py").write_text(source.replace("dx = end - start", "dx = start - end"), encoding="utf-8")
+    monkeypatch.setattr(loops.work, "__file__", str(tmp_path / "work.py"))
+    assert loops._cache() != now
+
+
+def test_without_numba_a_batch_is_booked_by_numpy(monkeypatch: pytest.MonkeyPatch) -> None:
+    scenes = [pressed(wall={"position": -0.002, "stiffness": 300.0 + i}) for i in range(3)]
+    monkeypatch.setattr(batch, "PAYS", 0)
+    monkeypatch.setitem(sys.modules, "numba", None)
+    monkeypatch.delitem(sys.modules, "haploop.launch.batch.loops", raising=False)
+    batch._loops.cache_clear()
+    try:
+        assert batch._loops_for(0) is None
+        assert together(scenes) == [alone(each) for each in scenes]
+    finally:
+        batch._loops.cache_clear()
+
+
+def test_a_batch_too_small_to_pay_for_it_asks_for_no_loops(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(batch, "_asked", batch.Counter())
+    monkeypatch.setattr(batch, "_loops", lambda: "loops")
+    assert [batch._loops_for(batch.PAYS // 2) for _ in range(3)] == [None, "loops", "loops"]
