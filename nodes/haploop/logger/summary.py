@@ -109,8 +109,11 @@ def outcome(scene: Scene, ran: Summary, measures: RunMeasures, diverged: str | N
 def awaits_verdict(scene: Scene, summary: Summary) -> bool:
     """Tells whether the summary of a run of processes has the word of its window only until its launcher has judged it.
 
-    A loop is judged where its scene asks for that, and its run ended by itself and was not too long to be repeated.
+    A loop is judged where its scene asks for that, and its run ended by itself and was not too long to be repeated. One
+    of which a half was a program of somebody else's is not: copies of our own would say nothing of it.
     """
+    if "programs" in summary:
+        return False
     by_itself = summary["ended"] in ("done", "stopped", "diverged") and 0.0 < summary["duration_s"] <= REPEATED_S
     return scene.run.verdict == "pushed" and by_itself and "stability" not in summary
 

@@ -22,6 +22,7 @@ _NO_VERDICT = {
     "awaited": "It is gone through again, held still and pushed at its end, for its verdict.",
     "abandoned": "Its launcher has ended without judging it: haploop judge does.",
     "unjudged": "It was too long to be judged by itself: haploop judge does.",
+    "foreign": "Not all of it was haploop's own, so that nothing can hold it still and push it: this is what was seen.",
     "unknown": "Its summary cannot be read from here, so that its verdict is not known.",
 }
 # Entries of the summary, of its window and of its energy; the logger's status has them side by side.

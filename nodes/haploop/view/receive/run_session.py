@@ -138,11 +138,13 @@ class RunSession:
         """Returns what there is of a verdict.
 
         ``seen`` in the last half second, ``judged`` once the run has ended; between the two ``awaited``, or
-        ``abandoned`` where its launcher has gone; ``unjudged`` of a run that was too long, ``unknown`` where no summary
-        can be read.
+        ``abandoned`` where its launcher has gone; ``unjudged`` of a run that was too long, ``foreign`` of one of which
+        a half was not haploop's own; ``unknown`` where no summary can be read.
         """
         if not self.summary:
             return "unknown" if self.outcome == "ended" else "seen"
+        if "programs" in self.summary:
+            return "foreign"
         if awaits_verdict(self.scene, self.summary):
             return "abandoned" if self.given_up else "awaited"
         if "stability" in self.summary:
