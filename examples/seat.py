@@ -44,7 +44,7 @@ def take_seat(name, version):
     The last argument is the directory for sockets and stdin brings a line of JSON: address, secret, transport, cores.
     """
     directory, start = sys.argv.pop(), json.loads(sys.stdin.readline())
-    seat = Seat(directory, start, {"name": name, "version": version, "command": " ".join(sys.argv)})
+    seat = Seat(directory, start, {"name": name[:200], "version": version, "command": " ".join(sys.argv)[:200]})
     threading.Thread(target=_end_with_launcher, args=(seat,), daemon=True).start()
     return seat
 

@@ -47,7 +47,7 @@ def write_fmu(scene: Scene, stem: str, target: IO[bytes]) -> None:
     digest = hashlib.sha256("\0".join([*without_token, model_description(scene, variables, identifier, "")]).encode())
     token = f"{{{digest.hexdigest()}}}"
     sources["scene.h"] = header(scene, params, variables, token)
-    tuple_, suffix = _platform()
+    tuple_, suffix = host_platform()
     library = _library(sources, suffix)
     contents = {
         "modelDescription.xml": model_description(scene, variables, identifier, token).encode(),
@@ -62,7 +62,8 @@ def write_fmu(scene: Scene, stem: str, target: IO[bytes]) -> None:
             archive.writestr(entry, data)
 
 
-def _platform() -> tuple[str, str]:
+def host_platform() -> tuple[str, str]:
+    """Returns this machine's platform tuple, as FMI 3.0 names it, and the suffix of its libraries."""
     machine, system = _MACHINES.get(platform.machine().lower()), _SYSTEMS.get(sys.platform)
     if machine is None or system is None:
         here = f"{platform.machine()} with {sys.platform}"
