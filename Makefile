@@ -55,7 +55,6 @@ bench: $(READY) ## measure speed, memory, what each effect and the live page cos
 
 accuracy: $(READY) ## measure what accuracy costs and write docs/accuracy.md (four minutes on two idle cores; stopped, it goes on where it was)
 	@$(BIN)/haploop cost --out runs/accuracy
-	@$(BIN)/python -m haploop.tools.cost.solvers runs/accuracy examples
 	@$(BIN)/python -m haploop.tools.cost.page runs/accuracy docs
 	@$(BIN)/python tests/bench/plants.py docs/accuracy.md
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
 from itertools import groupby
 from pathlib import Path
 
@@ -23,7 +22,6 @@ from haploop.tools.cost.findings import (
     sum_sentence,
     takes_away,
 )
-from haploop.tools.cost.solvers import Measured, read_measured, section
 from haploop.tools.figure.data import FigureError
 from haploop.tools.figure.style import write_figure
 from haploop.tools.render.terminal import make_table, markdown_table
@@ -165,12 +163,12 @@ def write(directory: Path, docs: Path) -> Path:
     if cost.prices:
         write_figure(prices_figure.figure_of(cost.prices), docs / PRICES_FIGURE)
     target = docs / PAGE
-    target.write_text(page(cost, read_measured(directory)), encoding="utf-8")
+    target.write_text(page(cost), encoding="utf-8")
     return target
 
 
-def page(cost: Cost, others: Sequence[Measured] = ()) -> str:
-    """Returns the page in Markdown, with what was measured of ``others``, solvers of other programs."""
+def page(cost: Cost) -> str:
+    """Returns the page in Markdown."""
     parts = ["# What accuracy costs", _INTRO]
     for table in findings(cost):
         above = {"digits": takes_away, "alike": alike_sentence}.get(table.kind)
@@ -181,7 +179,7 @@ def page(cost: Cost, others: Sequence[Measured] = ()) -> str:
             markdown_table(table.heads, table.rows),
             _BELOW[table.kind],
         ]
-    parts += [*section(others), *_prices(cost.prices), "## Measured on", f"{yardstick(cost)} {made_with(cost)}"]
+    parts += [*_prices(cost.prices), "## Measured on", f"{yardstick(cost)} {made_with(cost)}"]
     return "\n\n".join(parts) + "\n"
 
 
