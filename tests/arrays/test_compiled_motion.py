@@ -94,6 +94,7 @@ def test_drawn_loops_move_as_in_arrays(seed: int) -> None:
         pytest.param((6.3, 6.58), 2.0, 0.9, id="late"),
     ],
 )
+@pytest.mark.slow
 def test_loops_that_diverge_stand_still_where_they_did(
     damping: tuple[float, float], duration: float, diverged_beyond: float
 ) -> None:

@@ -13,6 +13,7 @@ import pytest
 from haploop.controller.dissipation import Element, Motion, Quantity, where
 from haploop.launch.batch.jax.run import compiled_results, compiling
 from haploop.launch.batch.run import run_batch
+from helpers.live.launched import first_and_slowly
 from helpers.runs.batches import PUSH, Stiffening, alone, pressed, with_element
 from helpers.runs.compiled import agree, compiled, jax, many
 from helpers.scenes.least import KINDS
@@ -41,6 +42,7 @@ def test_a_program_serves_all_scenes_of_its_structure_and_jax_stays_as_it_was() 
         pytest.param(1.2, 0.0021, marks=pytest.mark.slow),
     ],
 )
+@pytest.mark.slow
 def test_loops_show_nothing_of_those_whose_memory_they_take_over(duration: float, diverged_beyond: float) -> None:
     """Few ticks, the last half second, a divergence; the memory comes full of what is no number."""
     from haploop.launch.batch.jax.programs import PROGRAMS, in_double
@@ -130,7 +132,7 @@ class Counting(Element):
         return motion.v * (-self.force_N if self.tick % 3 == 0 else 0.0)
 
 
-@pytest.mark.parametrize("element", [Gripping, Stiffening, Counting])
+@pytest.mark.parametrize("element", first_and_slowly(Stiffening, Gripping, Counting))
 def test_an_element_of_any_kind_comes_to_what_it_comes_to_alone(element: type[Element]) -> None:
     """One that cannot be compiled, or whose code goes another way at every tick, is run by arrays or alone."""
     kinds, count = KINDS | {element.kind: element}, compiling()[0]

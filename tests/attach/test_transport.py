@@ -14,6 +14,7 @@ from haploop.protocol.transport.addresses import TransportError
 from haploop.protocol.transport.keys import make_keys
 from haploop.protocol.transport.messages import PROCESSES
 from haploop.protocol.transport.sockets import Transport
+from helpers.live.launched import first_and_slowly
 
 SCENE = Path(__file__).parents[2] / "launch" / "scenes" / "fig6c.toml"
 
@@ -32,7 +33,7 @@ def test_a_loop_others_could_steer_is_refused(host, keys, why):
         Transport.from_options(host, keys and Path(keys))
 
 
-@pytest.mark.parametrize("with_keys", [False, True])
+@pytest.mark.parametrize("with_keys", first_and_slowly(True, False))
 def test_a_run_over_tcp_gives_the_bits_of_one_process_and_answers_whoever_may_ask(tmp_path, with_keys):
     keys = tmp_path / "keys" if with_keys else None
     if keys:

@@ -1,5 +1,6 @@
 """Steering from the page: orders that go out as they were meant, and what is refused is told and changes nothing."""
 
+import pytest
 from playwright.sync_api import expect
 
 from helpers.live.browser import order
@@ -40,6 +41,7 @@ def test_every_button_orders_what_it_says(stand_in, page):
         assert order(stand_in, page, lambda what=selector: page.click(what)) == expected
 
 
+@pytest.mark.slow
 def test_a_paused_run_is_resumed_by_the_same_button_and_key(stand_in, page):
     stand_in.state(phase="paused")
     expect(page.locator("#pause")).to_have_text("Resume")
@@ -70,6 +72,7 @@ def test_a_swap_sends_kind_where_it_acts_and_its_parameters_and_the_answer_is_to
     expect(page.locator("#said")).to_have_text("element 1 becomes damping at tick 1500 (1.5 s)")
 
 
+@pytest.mark.slow
 def test_one_can_be_added_past_the_end_and_one_removed(stand_in, page):
     page.select_option("#swap-element", "2")
     assert "none" not in page.locator("#swap-kind option").evaluate_all("all => all.map(o => o.value)")
@@ -81,6 +84,7 @@ def test_one_can_be_added_past_the_end_and_one_removed(stand_in, page):
     assert order(stand_in, page, lambda: page.click("#swap-do")) == ("swap", {"swap": {"kind": "none"}, "element": 0})
 
 
+@pytest.mark.slow
 def test_the_form_starts_from_the_element_as_it_is_and_says_what_a_kind_does(stand_in, page):
     assert page.input_value("#swap-kind") == "damping"
     assert page.input_value("#swap-damping") == "0.4"
@@ -115,6 +119,7 @@ def test_a_wrong_value_is_refused_beside_its_field_before_anything_is_sent(stand
         expect(problem).to_be_empty()
 
 
+@pytest.mark.slow
 def test_whatever_the_run_may_understand_is_sent(stand_in, page):
     for text in ("0.8 N s/m", "800 mN s/m", ".5", "1e-3", "+2"):
         page.fill("#swap-damping", text)
@@ -131,6 +136,7 @@ def test_what_the_run_refuses_is_told_beside_the_field_that_it_names(stand_in, p
     assert page.input_value("#swap-kind") == "damping"
 
 
+@pytest.mark.slow
 def test_what_the_run_refuses_without_naming_a_field_is_told_in_the_form(stand_in, page):
     stand_in.answer = lambda command: (False, "The run ends at tick 3000, 3 s; nothing can change from there on.")
     page.click("#swap-do")
@@ -162,6 +168,7 @@ def test_the_last_change_is_taken_back_by_one_click(stand_in, page):
     assert order(stand_in, page, lambda: page.click("#undo-do")) == ("undo", {})
 
 
+@pytest.mark.slow
 def test_what_is_being_typed_survives_news_of_the_run_and_the_rest_follows_it(stand_in, page):
     page.fill("[id='set-wall.stiffness']", "180")
     settable = OPTIONS["settable"]
@@ -176,6 +183,7 @@ def test_what_is_being_typed_survives_news_of_the_run_and_the_rest_follows_it(st
     assert stand_in.commands() == []
 
 
+@pytest.mark.slow
 def test_a_field_that_has_gone_with_its_element_takes_nothing_else_with_it(stand_in, page):
     """After a swap there are other keys; what is typed in those that stay is kept, and so is the place of the caret."""
     page.fill("[id='set-wall.stiffness']", "180")
@@ -187,6 +195,7 @@ def test_a_field_that_has_gone_with_its_element_takes_nothing_else_with_it(stand
     expect(page.locator("#swap-element option")).to_have_text(["0: damping", "1: add one"])
 
 
+@pytest.mark.slow
 def test_a_refused_set_leaves_what_was_typed_and_names_the_field(stand_in, page):
     key = "live event: event.0.set.clock.round_trip_delay"
     said = f"{key} is 0.00025. It is no whole number of plant steps; 0.0002 s or 0.0003 s is."
@@ -201,6 +210,7 @@ def test_a_refused_set_leaves_what_was_typed_and_names_the_field(stand_in, page)
     expect(page.locator("#set-do")).to_be_enabled()
 
 
+@pytest.mark.slow
 def test_what_was_set_is_not_taken_back_on_the_page_by_older_news(stand_in, page):
     """The run tells of the new number a moment after it took the order; until then the page shows what was ordered."""
     page.fill("[id='set-wall.stiffness']", "180")
@@ -214,6 +224,7 @@ def test_what_was_set_is_not_taken_back_on_the_page_by_older_news(stand_in, page
     expect(page.locator("[id='set-wall.stiffness']")).to_have_value("180.5")
 
 
+@pytest.mark.slow
 def test_a_pace_that_is_refused_shows_the_pace_as_it_is(stand_in, page):
     stand_in.answer = lambda command: (False, "A pace is a number above 0, or free.")
     page.click("label:has([name=pace][value='free'])")
@@ -253,6 +264,7 @@ def test_spans_freezing_and_scrolling_ask_for_that_stretch_of_time(stand_in, pag
     assert RUNNING["first_s"] == 0.0
 
 
+@pytest.mark.slow
 def test_a_link_of_an_earlier_server_is_told_apart(stand_in, page):
     """The server refuses the token; the page says what it said."""
     stand_in.answer = lambda command: (False, "This link is of an earlier haploop view; open the one it printed last.")

@@ -43,6 +43,7 @@ def test_a_run_is_printed_to_its_end_with_its_changes_and_final_verdict(running,
     assert "Traceback" not in printer.stderr
 
 
+@pytest.mark.slow
 def test_a_printer_costs_the_run_no_bit_and_leaves_at_an_interrupt(running, printing):
     run = running(sets=SHORT, pace=())
     run.reaches(500)

@@ -39,7 +39,7 @@ def broken_lines(folder: Path, seeds: range) -> list[str]:
 
 
 def test_a_spoilt_command_line_is_answered_or_refused_with_a_sentence(tmp_path):
-    assert not broken_lines(tmp_path, range(20))
+    assert not broken_lines(tmp_path, range(8))
 
 
 @pytest.mark.parametrize("command", ["check", "run", "replay", "plot", "export", "sweep", "advise", "status", "swap"])

@@ -21,7 +21,7 @@ def common_tick(role, stderr):
     return int(found[1])
 
 
-@pytest.mark.parametrize("role", ROLES)
+@pytest.mark.parametrize("role", first_and_slowly(*ROLES))
 def test_a_node_killed_in_mid_run_ends_the_run_is_named_with_the_last_common_tick_and_leaves_nothing(
     role, running, undisturbed
 ):
@@ -43,7 +43,7 @@ def test_a_node_killed_in_mid_run_ends_the_run_is_named_with_the_last_common_tic
         assert not log.truncated
 
 
-@pytest.mark.parametrize("role", ROLES)
+@pytest.mark.parametrize("role", first_and_slowly(*ROLES))
 def test_a_node_killed_as_it_starts_ends_the_run_and_is_named(role, running):
     run = running()
     run.nodes_started(role)
@@ -53,7 +53,7 @@ def test_a_node_killed_as_it_starts_ends_the_run_and_is_named(role, running):
     assert common_tick(role, run.stderr) == 0
 
 
-@pytest.mark.parametrize("role", ROLES)
+@pytest.mark.parametrize("role", first_and_slowly(*ROLES))
 def test_a_node_killed_at_the_end_when_the_others_have_done_their_last_tick_is_named(role, running):
     run = running()
     run.has_logged(200)
@@ -79,6 +79,7 @@ def test_a_node_that_hangs_is_named_after_the_deadline_the_user_has_set(role, ru
     assert same_bits(haploop.logger.read(run.out), undisturbed) >= 200
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("role", first_and_slowly(*reversed(ROLES)))
 def test_a_node_that_hangs_for_less_than_the_deadline_costs_time_but_not_one_tick(role, running, undisturbed):
     """At a slow pace time is granted, and telemetry sent, in small pieces, and many can come together meanwhile."""
@@ -107,6 +108,7 @@ def test_when_the_launcher_is_killed_the_nodes_end_by_themselves_and_the_next_co
     assert same_bits(haploop.logger.read(run.out), undisturbed) >= flushed
 
 
+@pytest.mark.slow
 def test_when_the_launcher_is_killed_as_the_nodes_start_they_end_by_themselves(running):
     run = running()
     run.nodes_started()

@@ -57,7 +57,7 @@ def crowd(cwd: Path, out: str, there: bool = False) -> list[list[str]]:
     return [line.split("|") for line in done.stdout.splitlines()]
 
 
-@pytest.mark.parametrize("there", [False, True])
+@pytest.mark.parametrize("there", first_and_slowly(False, True))
 def test_of_many_that_start_at_once_into_one_directory_only_one_gets_it(there, tmp_path):
     rounds = crowd(tmp_path, str(tmp_path / "out"), there)
     assert len(rounds) == ROUNDS

@@ -15,7 +15,7 @@ from haploop.launch.processes.run_directory import LiveRun
 from haploop.logger.log.recording import Recording
 from haploop.tools.attach import plotjuggler
 from haploop.tools.attach.plotjuggler import Outlet, publish
-from helpers.live.launched import command, wait_for
+from helpers.live.launched import command, first_and_slowly, wait_for
 from helpers.live.live_run import Going, going, undisturbed
 from oracles.plotjuggler_rules import Viewer
 
@@ -75,7 +75,7 @@ def assert_rows(viewer: Viewer, log: Recording, first_tick: int) -> None:
         assert {type(value) for sample in parser.samples for value in sample.values()} == {float}
 
 
-@pytest.mark.parametrize("pace", [{}, {"pace": 2.0}], ids=["free", "at a pace"])
+@pytest.mark.parametrize("pace", first_and_slowly({}, {"pace": 2.0}), ids=["free", "at a pace"])
 def test_every_sample_of_a_run_reaches_plotjuggler_bit_for_bit(pace, tmp_path, capsys):
     """From the tick on at which the node joined; an element that is added on the way makes no gap."""
     with going(tmp_path, "duration=0.8", "wall.position=-0.001", pauses=(5,), **pace) as subject:

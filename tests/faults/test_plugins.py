@@ -198,6 +198,7 @@ def test_a_plugin_that_fails_in_the_controllers_process_alone_ends_the_run(state
     assert "Traceback" not in run.stderr
 
 
+@pytest.mark.slow
 def test_an_element_that_refuses_its_parameters_in_the_controllers_process_alone_ends_the_run(running, brake):
     source = SOUND.replace("self.tick = -1", f"self.tick = 1 / (not {IN_THE_CONTROLLER}) - 2")
     run = started(running, brake, source)

@@ -12,7 +12,7 @@ import pytest
 
 from haploop.launch.processes import private_directory, run_directory
 from haploop.launch.spec import OutputError
-from helpers.live.launched import LONG, SCENE, command, wait_for
+from helpers.live.launched import LONG, SCENE, command, first_and_slowly, wait_for
 
 LONG_AGO = (0, 0)
 # Holds a directory's lock until its standard input closes, as a launcher does that nobody's list of processes shows.
@@ -131,7 +131,7 @@ def test_a_base_directory_that_is_a_link_is_refused_with_a_sentence(tmp_path, li
     assert "Traceback" not in answer.stderr
 
 
-@pytest.mark.parametrize("of", ["mode", "file", "closed"])
+@pytest.mark.parametrize("of", first_and_slowly("mode", "file", "closed"))
 def test_a_base_directory_that_cannot_be_used_is_a_sentence_and_no_run_is_started(
     of, live_runs_here, tmp_path, monkeypatch
 ):

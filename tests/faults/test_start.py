@@ -39,6 +39,7 @@ def test_a_node_that_hangs_before_the_first_tick_is_named_after_the_deadline_of_
             run.result()
 
 
+@pytest.mark.slow
 def test_the_deadline_of_a_running_loop_does_not_rule_its_start(tmp_path: Path) -> None:
     """A logger that is busy for three deadlines before the first tick, as on a loaded machine."""
     with going(tmp_path, "duration=0.2", "run.deadline=0.5", start_gate=never) as run:

@@ -78,17 +78,17 @@ def assert_saw_the_log(run: Going, seen: dict[str, Any]) -> None:
 
 
 def test_an_observer_that_joins_a_run_in_motion_sees_what_is_logged_and_changes_nothing(tmp_path: Path) -> None:
-    with going(tmp_path, "duration=2.0", pauses=(1999,), pace=2.0) as run:
+    with going(tmp_path, "duration=1.0", pauses=(999,), pace=2.0) as run:
         observer = Observer(run)
         first = observer.line()["first"]
-        run.stands_at(1999)
+        run.stands_at(999)
         run.ask("resume")
         seen = observer.leave()
         summary = run.result()
     assert summary["ended"] == "done"
     assert summary["trajectory_sha256"] == undisturbed(run.prepared)["trajectory_sha256"]
     assert {role: seen[role]["first"] for role in first} == first
-    assert seen["plant"]["tick"] == seen["controller"]["tick"] == 2000
+    assert seen["plant"]["tick"] == seen["controller"]["tick"] == 1000
     assert_saw_the_log(run, seen)
 
 

@@ -20,6 +20,7 @@ from haploop.tools.figure.data import TOGETHER, FigureError, History, RunData
 from haploop.tools.figure.loops import force_position_loop, momentum_loop
 from haploop.tools.figure.run_figure import draw, event_lines, key_numbers, make_figure
 from haploop.tools.figure.time import extremes
+from helpers.live.launched import first_and_slowly
 from helpers.scenes.least import scene
 from helpers.shown import artists
 
@@ -76,11 +77,14 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     }
 
 
+OTHERS = ("busy", "no-wall", "diverged", "no-hand", "ticks")
+
+
 def axes(figure: Any) -> list[Any]:
     return [ax for part in figure.subfigs for ax in part.axes if ax.axison]
 
 
-@pytest.mark.parametrize("name", ["swap", "tap", "busy", "no-wall", "diverged", "no-hand", "ticks", "never-there"])
+@pytest.mark.parametrize("name", ["never-there", *first_and_slowly("swap", "tap", *OTHERS)])
 def test_every_kind_of_run_draws_and_every_axis_has_its_unit(runs: dict[str, Path], name: str) -> None:
     figure = make_figure(RunData.from_directory(runs[name]))
     assert len(axes(figure)) >= 6

@@ -16,6 +16,7 @@ from haploop.tools.cli.view import LiveRuns
 from haploop.view.receive.run_session import RunSession
 from helpers.live.browsing import site, to_its_end
 from helpers.live.followed import follow, has_logged, same, stands, whole
+from helpers.live.launched import first_and_slowly
 from helpers.live.live_run import going, undisturbed
 
 
@@ -137,7 +138,7 @@ def test_the_end_is_told_with_the_summary_and_what_was_seen_can_still_be_looked_
     follow(play, tmp_path, "duration=0.5", "wall.position=-0.001", pauses=(200,))
 
 
-@pytest.mark.parametrize("is_judged", [True, False], ids=["judged", "abandoned"])
+@pytest.mark.parametrize("is_judged", first_and_slowly(True, False), ids=["judged", "abandoned"])
 def test_the_verdict_comes_when_the_launcher_has_judged_the_run_and_until_then_it_is_awaited(
     tmp_path, monkeypatch, is_judged
 ):

@@ -184,7 +184,7 @@ def test_friction_never_gives_heat_back_in_any_step(name):
     assert heat.min() > -1e-15 * heat.max()
 
 
-@pytest.mark.parametrize("name", ["everything", "late and lost", "cable"])
+@pytest.mark.parametrize("name", ["late and lost", "cable", pytest.param("everything", marks=pytest.mark.slow)])
 def test_a_logger_that_joins_begins_where_it_knows_every_command_and_its_books_close(name):
     """Where nine of ten commands are lost, the one in effect is often older than what the controller hands over."""
     resolved = replace(resolved_of(name), duration=0.2)

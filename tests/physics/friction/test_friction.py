@@ -67,7 +67,7 @@ def test_a_stopped_mass_stays_stopped_bit_by_bit():
 
 
 @pytest.mark.parametrize("load", [0.06, *slowly([-0.06, 0.0, 1e-12, 0.0599999])])
-@pytest.mark.parametrize("hand", [{}, {"mass": 0.02, "damping": 0.3, "stiffness": 200.0, "rest": 0.01}])
+@pytest.mark.parametrize("hand", [{"mass": 0.02, "damping": 0.3, "stiffness": 200.0, "rest": 0.01}, *slowly([{}])])
 def test_what_is_loaded_by_no_more_than_the_breakaway_force_does_not_move_by_a_bit_for_ten_seconds(load, hand):
     force = {"kind": "constant", "value": load}
     device = {"mass": 0.05, "damping": 0.1, "position": 0.01}

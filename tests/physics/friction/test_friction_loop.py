@@ -11,6 +11,7 @@ import pytest
 
 from haploop.protocol.scene.paths import with_value
 from haploop.protocol.scene.scene import Scene
+from helpers.live.launched import first_and_slowly
 from helpers.runs.captured import run
 from helpers.scenes.effect_tables import slowly
 from helpers.scenes.least import scene
@@ -143,7 +144,7 @@ def pushed_to_and_fro(shape: str) -> Scene:
     )
 
 
-@pytest.mark.parametrize("shape", ["kinetic", "breakaway"])
+@pytest.mark.parametrize("shape", first_and_slowly("kinetic", "breakaway"))
 def test_motion_with_stops_and_slips_is_that_of_the_reference(shape):
     pushed = pushed_to_and_fro(shape)
     ran, truth = run(pushed), follow(pushed, [0.0] * 2000)

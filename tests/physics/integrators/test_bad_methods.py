@@ -10,6 +10,7 @@ import pytest
 
 from haploop.protocol.scene.paths import value_at
 from haploop.protocol.scene.scene import Scene
+from helpers.live.launched import first_and_slowly
 from helpers.runs.captured import run
 from helpers.scenes.least import scene
 from oracles.effects_reference import Bodies
@@ -114,7 +115,7 @@ def test_runge_kutta_within_its_region_still_loses_energy_that_no_damper_took():
 LOADED = {"kinetic": 0.05}
 
 
-@pytest.mark.parametrize("creep", [1e-2, 1e-4])
+@pytest.mark.parametrize("creep", first_and_slowly(1e-2, 1e-4))
 def test_friction_by_tanh_creeps_under_a_load_that_haploop_holds_without_moving_a_bit(creep):
     """It never sticks: it slides on at creep atanh(load / f)."""
     push = {"kind": "constant", "value": 0.03}

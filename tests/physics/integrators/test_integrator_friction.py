@@ -14,6 +14,7 @@ from haploop.launch.plan.effects import notes
 from haploop.plant.integrators.stepwise import growth
 from haploop.protocol.scene.scene import Scene
 from haploop.tools.cli.app import app
+from helpers.live.launched import first_and_slowly
 from helpers.runs.captured import in_blocks, run, summarise
 from helpers.scenes.effect_tables import EFFECTS, tap
 from helpers.scenes.every_effect import EVERYTHING, METHODS
@@ -138,7 +139,7 @@ def test_all_effects_at_once_run_by_every_method_and_blocks_change_no_bit(method
     assert one["verdict"] in ("steady", "limit-cycle")
 
 
-@pytest.mark.parametrize("method", ["rk4", "dop853"])
+@pytest.mark.parametrize("method", first_and_slowly("rk4", "dop853"))
 def test_processes_give_the_bits_of_one_process(method, tmp_path):
     sets = [f"clock.integrator={method}", "duration=0.05"]
     digests = [

@@ -26,10 +26,7 @@ def test_blocks_and_windows_of_any_size_give_the_same_summary_of_drawn_scenes(se
 
 @pytest.mark.parametrize(
     "path",
-    [
-        pytest.param(p, marks=[pytest.mark.slow] * (p.stem in ("all_effects", "premium_press")), id=p.stem)
-        for p in SCENES
-    ],
+    [pytest.param(p, marks=[pytest.mark.slow] * (p.stem not in ("fig6c", "swap")), id=p.stem) for p in SCENES],
 )
 @pytest.mark.parametrize("delay", [13, *(pytest.param(d, marks=pytest.mark.slow) for d in (0, 3, 10, 20, 50))])
 def test_blocks_of_any_size_give_the_same_summary_of_every_shipped_scene(path, delay):

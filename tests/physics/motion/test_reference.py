@@ -17,6 +17,7 @@ from haploop.launch.scene.file import load
 from haploop.protocol.scene.paths import value_at
 from haploop.protocol.scene.scene import Scene
 from helpers.runs.captured import Captured, run
+from helpers.scenes.effect_tables import slowly
 from helpers.scenes.random_scenes import drawn, is_comparable
 from oracles.reference_run import Truth, simulate
 
@@ -87,7 +88,7 @@ def test_two_hundred_more_drawn_scenes_do(decade):
     both.cache_clear()
 
 
-@pytest.mark.parametrize("path", SCENES, ids=lambda path: path.stem)
+@pytest.mark.parametrize("path", [*SCENES[:2], *slowly(SCENES[2:])], ids=lambda path: path.stem)
 @pytest.mark.parametrize("delay", [20, *(pytest.param(d, marks=pytest.mark.slow) for d in (0, 3, 10, 25, 50))])
 def test_every_shipped_scene_runs_its_whole_length_as_the_reference_does(path, delay):
     """Limit cycles with an encoder too: no decision in these runs hangs on a last bit."""
