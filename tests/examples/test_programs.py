@@ -1,0 +1,214 @@
+"""Programs of other languages, written from protocol/README.md alone, take part in runs as haploop's own nodes do."""
+
+from __future__ import annotations
+
+import json
+import re
+import signal
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import haploop.logger
+from haploop.controller.dissipation import registry
+from haploop.launch.runs.in_process import run_in_process
+from haploop.launch.runs.replay import replay
+from haploop.launch.scene.file import load
+from haploop.logger.log.recording import Recording
+from helpers.live import attacks
+from helpers.live.launched import SCENES, Run, alive, wait_for
+from helpers.live.programs import compiled, in_node, program, seat
+
+pytestmark = pytest.mark.slow
+
+CONTROLLERS = [("controller.js", "fig6b.toml"), ("wall.c", "fig6a.toml")]
+SEATS = [("controller", *controller) for controller in CONTROLLERS] + [("plant", "plant.js", "fig6b.toml")]
+FREE = ("--pace", "free")
+PATIENT = "run.deadline=30"
+Start = Callable[..., Run]
+
+
+def own(tmp_path: Path, scene: str, *sets: str) -> Recording:
+    """The log of the same run in one process, by haploop's own code alone."""
+    kinds = registry()
+    (tmp_path / "own").mkdir()
+    run_in_process(load(SCENES / scene, ["run.verdict=window", *sets], kinds), kinds, out=tmp_path / "own")
+    return haploop.logger.read(tmp_path / "own")
+
+
+def assert_same(log: Recording, truth: Recording) -> None:
+    """Every number of every column of a log is that of another one, to the bit."""
+    assert log.keys() == truth.keys()
+    for topic in truth.keys() - {"/events"}:
+        assert set(log[topic]) == set(truth[topic]), topic
+        for name, column in truth[topic].items():
+            assert np.asarray(log[topic][name]).tobytes() == np.asarray(column).tobytes(), (topic, name)
+
+
+@pytest.mark.parametrize(("name", "scene"), CONTROLLERS)
+def test_a_controller_of_another_language_gives_every_column_of_our_own_to_the_bit(
+    name: str, scene: str, tmp_path: Path, running: Start
+) -> None:
+    run = running(*seat("controller", program(name, tmp_path)), scene=SCENES / scene, sets=(PATIENT,), pace=FREE)
+    run.end(0)
+    log = haploop.logger.read(run.out_directory)
+    assert_same(log, own(tmp_path, scene))
+    assert replay(run.out_directory).differences == []
+
+
+@pytest.mark.parametrize(("name", "scene"), CONTROLLERS)
+def test_a_controller_of_another_language_carries_out_what_is_set_at_the_tick_that_our_own_does(
+    name: str, scene: str, tmp_path: Path, running: Start
+) -> None:
+    changes = '[{at = 1.0, set = {"wall.stiffness" = 120.0, "clock.round_trip_delay" = 0.0035}},'
+    changes += '{at = 1.5, set = {"wall.position" = -0.0601}}]'
+    words = seat("controller", program(name, tmp_path))
+    run = running(*words, scene=SCENES / scene, sets=(f"event={changes}", PATIENT), pace=FREE)
+    run.end(0)
+    assert_same(haploop.logger.read(run.out_directory), own(tmp_path, scene, f"event={changes}"))
+
+
+@pytest.mark.parametrize(("name", "scene"), CONTROLLERS)
+def test_a_swap_that_a_controller_cannot_make_stands_in_the_log_as_refused_and_changes_nothing(
+    name: str, scene: str, tmp_path: Path, running: Start
+) -> None:
+    swap = 'event=[{at = 1.5, swap = {kind = "damping", damping = 5.0}}]'
+    run = running(*seat("controller", program(name, tmp_path)), scene=SCENES / scene, sets=(swap, PATIENT), pace=FREE)
+    run.end(0)
+    log = haploop.logger.read(run.out_directory)
+    (refused,) = [event for event in log["/events"] if "refused" in event]
+    assert refused["change"]["tick"] == 1500
+    assert refused["change"]["swap"]["kind"] == "damping"
+    truth = own(tmp_path, scene)
+    assert log["/plant"]["x"].tobytes() == truth["/plant"]["x"].tobytes()
+
+
+def test_a_plant_of_another_language_moves_as_the_exact_flow_and_the_books_find_no_energy_of_its_own(
+    tmp_path: Path, running: Start
+) -> None:
+    run = running(*seat("plant", in_node("plant.js")), scene=SCENES / "fig6b.toml", sets=(PATIENT,), pace=FREE)
+    summary = run.summary()
+    log, truth = haploop.logger.read(run.out_directory), own(tmp_path, "fig6b.toml")
+    assert np.abs(log["/plant"]["x"] - truth["/plant"]["x"]).max() < 1e-13
+    assert log["/plant"]["x"].tobytes() != truth["/plant"]["x"].tobytes()
+    assert abs(summary["energy"]["residual_J"]) < 1e-12 * summary["energy"]["moved_J"]
+
+
+@pytest.mark.parametrize(("role", "name", "scene"), SEATS)
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP])
+def test_a_program_that_is_killed_or_hangs_ends_the_run_by_name_and_leaves_nothing(
+    number: signal.Signals, role: str, name: str, scene: str, tmp_path: Path, running: Start
+) -> None:
+    deadline = "run.deadline=3" if number == signal.SIGSTOP else PATIENT
+    run = running(*seat(role, program(name, tmp_path)), scene=SCENES / scene, sets=("duration=600", deadline))
+    run.reaches(100)
+    run.send(role, number)
+    run.end(1)
+    run.leaves_nothing()
+    assert Path(name).stem in run.stderr
+    assert ("killed by SIGKILL" if number == signal.SIGKILL else "has not answered") in run.stderr
+    assert len(haploop.logger.read(run.out_directory)["/controller"]["x"]) >= 100
+
+
+@pytest.mark.parametrize(("role", "name", "scene"), SEATS)
+def test_a_program_ends_with_the_launcher(role: str, name: str, scene: str, tmp_path: Path, running: Start) -> None:
+    run = running(*seat(role, program(name, tmp_path)), scene=SCENES / scene, sets=("duration=600", PATIENT))
+    run.reaches(100)
+    run.signal(signal.SIGKILL)
+    wait_for("the end of the nodes", lambda: not alive(list(run.nodes.values())))
+
+
+@pytest.mark.parametrize(("role", "name", "scene"), SEATS)
+def test_what_strangers_send_changes_no_bit_of_a_run_with_a_program_of_another_language(
+    role: str, name: str, scene: str, tmp_path: Path, running: Start
+) -> None:
+    words = seat(role, program(name, tmp_path))
+    undisturbed = running(*words, scene=SCENES / scene, sets=(PATIENT,), pace=FREE).summary()
+    run = running(*words, scene=SCENES / scene, sets=(PATIENT,), pace=("--pace", "1"))
+    run.reaches(100)
+    flood = subprocess.Popen([sys.executable, attacks.__file__, str(run.live.sockets)], stdout=subprocess.PIPE)
+    assert flood.stdout
+    with flood.stdout:
+        flood.stdout.readline()
+        context = attacks.zmq.Context()
+        senders = [each for file in run.live.sockets.glob("*.sock") for each in attacks.send_unasked(context, file)]
+        summary = run.summary()
+        flood.kill()
+        flood.wait()
+    assert senders
+    context.destroy(linger=0)
+    assert summary["trajectory_sha256"] == undisturbed["trajectory_sha256"]
+
+
+@pytest.mark.parametrize(
+    ("role", "name", "scene", "says"),
+    [
+        ("controller", "controller.js", "fig6c.toml", "a wall with one damping"),
+        ("controller", "wall.c", "fig6b.toml", "a wall alone"),
+        ("plant", "plant.js", "all_effects.toml", "knows nothing of"),
+    ],
+)
+def test_a_scene_that_asks_for_more_than_a_program_can_ends_the_run_with_its_sentence(
+    role: str, name: str, scene: str, says: str, tmp_path: Path, running: Start
+) -> None:
+    run = running(*seat(role, program(name, tmp_path)), scene=SCENES / scene, sets=(PATIENT,), pace=FREE)
+    run.end(1)
+    assert says in run.stderr
+
+
+def test_the_observer_in_c_misses_nothing_changes_nothing_and_ends_with_the_run(tmp_path: Path, running: Start) -> None:
+    observer = compiled("observer.c", tmp_path)
+    run = running(scene=SCENES / "fig6b.toml", sets=(PATIENT,), pace=("--pace", "2"))
+    run.reaches(1)
+    said = subprocess.run([*observer, str(run.live.sockets)], capture_output=True, text=True, timeout=60)
+    assert said.returncode == 0, said.stderr
+    run.end(0)
+    log, truth = haploop.logger.read(run.out_directory), own(tmp_path, "fig6b.toml")
+    assert_same(log, truth)
+    x, force = truth["/plant"]["x"], truth["/plant"]["force"]
+    attached, ended = said.stdout.splitlines()
+    seen = slice(int(attached.split()[-1]) * 10, None)
+    assert ended.startswith("to tick 3000: ")
+    assert ended.endswith(" 0 ticks missed")
+    numbers = [float(number) for number in re.findall(r"-?\d\S*(?= to| m| N)", ended.partition(":")[2])]
+    assert numbers == [x[seen].min(), x[seen].max(), force[seen].min(), force[seen].max()]
+
+
+def test_the_observer_in_c_notices_that_the_launcher_was_killed(tmp_path: Path, running: Start) -> None:
+    observer = compiled("observer.c", tmp_path)
+    run = running()
+    run.reaches(10)
+    with subprocess.Popen([*observer, str(run.live.sockets)], stderr=subprocess.PIPE, text=True) as process:
+        wait_for("the observer", lambda: len(run.ask("status")["nodes"]) == 4)
+        run.signal(signal.SIGKILL)
+        run.end(-signal.SIGKILL)
+        try:
+            assert process.wait(30) == 1
+        finally:
+            process.kill()
+        assert process.stderr
+        assert "launcher is gone" in process.stderr.read()
+
+
+def test_the_steering_client_says_what_became_of_a_command_and_exits_by_it(tmp_path: Path, running: Start) -> None:
+    run = running(scene=SCENES / "fig6b.toml")
+    run.reaches(1)
+    client = [*in_node("steer.js"), str(run.live.sockets / "run.json")]
+
+    def say(*words: str) -> subprocess.CompletedProcess[str]:
+        return subprocess.run([*client, *words], capture_output=True, text=True, timeout=30)
+
+    done = say("set", json.dumps({"set": {"wall.stiffness": 200}}))
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.startswith("wall.stiffness = 200 from tick ")
+    refused = say("set", json.dumps({"set": {"wall.stiffnes": 200}}))
+    assert refused.returncode == 1
+    assert "did you mean wall.stiffness?" in refused.stdout
+    assert say("stop").returncode == 0
+    run.end(0)
+    late = say("status")
+    assert late.returncode == 1
