@@ -98,6 +98,7 @@ def stepped(path: Path, start_s: float = 0.0) -> Iterator[Stepped]:
     from fmpy.fmi3 import FMU3Slave
 
     description, folder = read_model_description(str(path)), extract(str(path))
+    assert description.coSimulation
     identifier = description.coSimulation.modelIdentifier
     token = description.instantiationToken or description.guid
     slave = FMU3Slave(guid=token, unzipDirectory=folder, modelIdentifier=identifier, instanceName="one")
