@@ -2,10 +2,10 @@
 
     haploop run scene.toml --node plant="python examples/fmu_plant.py device.fmu --force F --position x --velocity v"
 
-Needs fmpy (the extra `fmu`), pyzmq and msgpack. The FMU is the device with the hand's mass, damper and spring; the
-force of the hand's muscles, where the scene has one, is added to the force. An element of an array is named by its
-number from 1 on, as in y[2]. Without --velocity it is the difference of positions over a plant step, which the books
-will tell. A step of co-simulation is a plant step of the scene; an FMU for model exchange is moved by one of
+Needs fmpy (pip install 'haploop[fmu]' brings it), pyzmq and msgpack. The FMU is the device with the hand's mass, damper
+and spring; the force of the hand's muscles, where the scene has one, is added to the force. An element of an array is
+named by its number from 1 on, as in y[2]. Without --velocity it is the difference of positions over a plant step, which
+the books will tell. A step of co-simulation is a plant step of the scene; an FMU for model exchange is moved by one of
 Runge-Kutta 4.
 """
 

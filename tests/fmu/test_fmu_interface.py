@@ -65,7 +65,8 @@ def test_it_says_what_it_takes_gives_and_is_made_of(tmp_path: Path) -> None:
         "dissipation.0.mass": ("parameter", "tunable", "kg", "0.01"),
     }
     assert description.modelName == NASTY.replace("\x01", "\ufffd")
-    assert description.coSimulation and description.coSimulation.fixedInternalStepSize == "0.001"
+    assert description.coSimulation
+    assert description.coSimulation.fixedInternalStepSize == "0.001"
     assert description.outputs[0].dependencies == []
 
 
