@@ -1,9 +1,11 @@
 """Other people's solvers as plants of figure 6(b), judged by the books: a table of docs/accuracy.md.
 
-usage: python tests/bench/plants.py PAGE, by `make accuracy`. What is not installed is left out, with a word.
+usage: python tests/bench/plants.py PAGE, by `make accuracy`. What is not installed is left out, with a word. The
+environment's STATE_SPACE_FMU names the Reference FMUs' StateSpace.fmu, built with FIXED_SOLVER_STEP 1e-3.
 """
 
 import importlib.util
+import os
 import shlex
 import sys
 import tempfile
@@ -26,52 +28,71 @@ INTRO = """\
 The scene of figure 6(b), 3 s with a plant step of 0.1 ms, with other people's solvers in place of the plant
 (`haploop run --node`). *Distance* is the largest between their position and that of the exact flow at any plant step;
 *residual* is what the books cannot account for, as a share of the energy that moved; that of
-the exact flow is rounding."""
+the exact flow is rounding, and beyond a thousandth every run says in words what its plant makes of the energy."""
 NOTE = """\
 MuJoCo holds every applied force over a step. The hand's is given as its mean over the step, and that is what is left of
-RK4: with a constant force its residual is 2e-13. For one joint, Euler takes the damping
-implicitly, as `implicit` does, and both come to the same."""
+RK4: with a constant force its residual is 2e-13. For one joint, Euler takes the damping implicitly, as `implicit`
+does, and both come to the same. StateSpace moves by explicit Euler, here with steps of 1 ms."""
 
 
 class Solver(NamedTuple):
-    """A plant of examples/: what it is called, the package it needs, and its words on the command line."""
+    """A plant of examples/: what it is called, the package it needs, and its words on the command line.
+
+    ``given`` is the variable of the environment that must name a file, the second word; "" where there is none.
+    """
 
     name: str
     package: str
     words: tuple[str, ...]
+    given: str = ""
+
+    @property
+    def lacks(self) -> str:
+        """What there is none of here, "" for nothing."""
+        if importlib.util.find_spec(self.package) is None:
+            return self.package
+        return "" if not self.given or Path(os.environ.get(self.given, "")).is_file() else self.given
+
+    @property
+    def script(self) -> list[str]:
+        file = [os.environ[self.given]] if self.given else []
+        return [sys.executable, str(HOUSE / "examples" / self.words[0]), *file, *self.words[1:]]
 
 
 SOLVERS = [
     Solver(f"MuJoCo {name}, {device}", "mujoco", ("mujoco_plant.py", "--integrator", key, "--device", device))
     for device in ("slider", "arm")
     for key, name in (("rk4", "RK4"), ("euler", "Euler"), ("implicit", "implicit"))
-]
+] + [Solver("StateSpace of the Reference FMUs", "fmpy", ("fmu_plant.py", "--state-space"), "STATE_SPACE_FMU")]
 
 
-def measured(solver: Solver | None, out: Path) -> tuple[np.ndarray, float]:
-    """Returns x at every plant step, m, and the residual as a share of what moved; None: of the run's own plant."""
-    script = [] if solver is None else [sys.executable, str(HOUSE / "examples" / solver.words[0]), *solver.words[1:]]
-    programs = read_programs([f"plant={shlex.join(script)}"] if script else [], [])
+def measured(solver: Solver | None, out: Path) -> tuple[np.ndarray, float, str]:
+    """Returns x at every plant step, m, the residual as a share of what moved, and what is said of it.
+
+    ``solver`` is None for the run's own plant.
+    """
+    programs = read_programs([f"plant={shlex.join(solver.script)}"] if solver else [], [])
     summary = run(prepare(SCENE, ["run.verdict=window"], out=out), programs=programs)
     energy = summary["energy"]
-    return np.asarray(haploop.logger.read(out)["/plant"]["x"]), abs(energy["residual_J"]) / energy["moved_J"]
+    said = energy.get("balance", "").partition(":")[0] or "–"
+    return np.asarray(haploop.logger.read(out)["/plant"]["x"]), energy["residual_J"] / energy["moved_J"], said
 
 
 def section(directory: Path) -> str:
     """Returns the section: intro, table and note."""
-    exact, residual = measured(None, directory / "exact")
-    rows = [("haploop, exact flow", "–", f"{residual:.1e}")]
+    exact, residual, said = measured(None, directory / "exact")
+    rows = [("haploop, exact flow", "–", f"{residual:.1e}", said)]
     missing: dict[str, list[str]] = {}
     for number, solver in enumerate(SOLVERS):
-        if importlib.util.find_spec(solver.package) is None:
-            missing.setdefault(solver.package, []).append(solver.name)
+        if lacks := solver.lacks:
+            missing.setdefault(lacks, []).append(solver.name)
             continue
-        x, residual = measured(solver, directory / str(number))
-        rows.append((solver.name, amount(float(np.abs(x - exact).max()), "m", 2), f"{residual:.1e}"))
-    left_out = [f"Left out, since there is no {package}: {', '.join(names)}." for package, names in missing.items()]
-    there = sorted({solver.package for solver in SOLVERS} - missing.keys())
+        x, residual, said = measured(solver, directory / str(number))
+        rows.append((solver.name, amount(float(np.abs(x - exact).max()), "m", 2), f"{residual:.1e}", said))
+    left_out = [f"Left out, since there is no {lacks}: {', '.join(names)}." for lacks, names in missing.items()]
+    there = sorted({solver.package for solver in SOLVERS if not solver.lacks})
     made = f"Measured with {', '.join(f'{package} {version(package)}' for package in there)}." if there else ""
-    table = markdown_table(("plant", "distance", "residual"), rows)
+    table = markdown_table(("plant", "distance", "residual", "said of it"), rows)
     return "\n\n".join([TITLE, INTRO, table, NOTE, *left_out, *([made] if made else [])]) + "\n"
 
 

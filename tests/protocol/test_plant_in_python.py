@@ -19,7 +19,7 @@ from helpers.live.live_run import going
 
 HOUSE = Path(__file__).parents[2]
 SCENE = HOUSE / "launch/scenes/fig6b.toml"
-PLAIN = HOUSE / "tests/oracles/plain_plant.py"
+PLAIN = HOUSE / "tests/oracles/own_plant.py", "rk4"
 BY_PLANT = {"clock": "plant"}
 # An element that keeps the controller for 30 ms at tick 500: no answer of then comes within the delay of 2 ms.
 SLEEPER = """
@@ -43,8 +43,8 @@ TOLD = {"ticks": 3, "late_ticks": 1, "median_s": 1e-4, "percent_99_s": 1e-3, "pe
 TOLD |= {"late_s": 2e-3, "lost_s": 0}
 
 
-def plant(script: Path = PLAIN, *options: str) -> dict[str, Any]:
-    return {"programs": read_programs([f"plant={shlex.join([sys.executable, str(script), *options])}"], [])}
+def plant(*script: Path | str) -> dict[str, Any]:
+    return {"programs": read_programs([f"plant={shlex.join([sys.executable, *map(str, script or PLAIN)])}"], [])}
 
 
 def ran(out: Path, *overrides: str, plugins: tuple[Path, ...] = (), **options: Any) -> tuple[dict[str, Any], Any]:
