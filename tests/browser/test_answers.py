@@ -69,7 +69,8 @@ def test_what_the_window_sees_is_an_outline_and_says_that_nothing_is_known_of_st
         page.wait_for_timeout(200)
         assert style(page, "backgroundColor") == "rgba(0, 0, 0, 0)"
     by_window = {key: value for key, value in SUMMARY.items() if key != "stability"}
-    for verdict_is, told in {"awaited": "being judged", "abandoned": "no swing seen", "seen": "no swing seen"}.items():
+    unseen = dict.fromkeys(("abandoned", "foreign", "seen"), "no swing seen")
+    for verdict_is, told in {"awaited": "being judged", **unseen}.items():
         stand_in.state(**ENDED | {"summary": by_window, "verdict": "steady", "verdict_is": verdict_is})
         expect(page.locator("#verdict")).to_have_text(told)
         expect(page.locator("#summary-title")).to_have_text(f"Ended: {told}")
@@ -91,6 +92,24 @@ def test_the_header_has_the_numbers_with_their_units(stand_in, open_page):
     stand_in.state(displayed_stiffness_N_m=None, oscillation_m=None, real_time_factor=None, pace="free")
     expect(page.locator("#stiffness")).to_have_text("–")
     expect(page.locator("#oscillation")).to_have_text("–")
+
+
+def test_what_a_plant_of_somebody_elses_makes_of_the_energy_is_told_in_words(stand_in, open_page):
+    words = "This plant invents 27 % of the energy: 0.00162 J of the 0.006 J that moved came from nowhere."
+    made = {"residual_J": 1.62e-3, "moved_J": 6e-3, "balance": words}
+    stand_in.state(**made)
+    stand_in.show(contact())
+    page = open_page(stand_in.url)
+    expect(page.locator("#energy")).to_contain_text("This plant invents 27 %")
+    assert page.get_attribute("#residual", "title") == words
+    energy = SUMMARY["energy"] | made
+    stand_in.state(**ENDED | made | {"summary": SUMMARY | {"energy": energy}})
+    expect(page.locator("#summary .balance")).to_have_text(words)
+    left_over = {**SUMMARY["energy"], "residual_J": None, "unmodelled_work_J": 2.5e-3}
+    stand_in.state(**ENDED | {"summary": SUMMARY | {"energy": left_over, "trajectory_sha256": "cd" * 32}})
+    expect(page.locator("#summary")).to_contain_text("hand, by what is left over2.50 mJ")
+    expect(page.locator("#summary .balance")).to_be_hidden()
+    expect(page.locator("#summary")).not_to_contain_text("residual")
 
 
 def test_it_shows_who_waits_for_whom_and_what_each_node_skipped(stand_in, open_page):

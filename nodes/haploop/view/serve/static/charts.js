@@ -65,8 +65,8 @@ function wallOf(lines, { wall }) {
   return face && wall?.into_wall ? { values: face.values, side: Math.sign(wall.into_wall) } : null;
 }
 
-/** The residual, in words where it is worth them: "This plant invents 27 % of the energy". */
+/** The residual, in words where it is worth them: "This plant invents 27 %". */
 function residual({ residual_J: rest, balance }) {
-  if (balance) return balance.split(":")[0];
+  if (balance) return balance.split(" of the energy")[0];
   return isNumber(rest) ? `residual ${amount(rest, "J", 2)}` : "";
 }
