@@ -11,7 +11,7 @@ const COLUMNS = ["x", "v", "a", "wall", "dissipation.0", "total", "in_contact"];
 const CAN_SET = ["wall.stiffness", "wall.position", "dissipation.0.damping", "clock.round_trip_delay"]; // the last is the plant's
 
 class Law {
-  constructor({ wall, dissipation: [element, ...others], velocity, acceleration }, rate) {
+  constructor({ wall, dissipation: [element, ...others] = [], velocity, acceleration }, rate) {
     if (!wall || element?.kind !== "damping" || others.length || velocity || acceleration)
       throw new Error("This controller is a wall with one damping and plain differences, but the scene asks for another.");
     this.wall = { position: wall.position, stiffness: wall.stiffness, into_wall: wall.occupies === "below" ? -1 : 1 };
