@@ -132,3 +132,12 @@ def test_judge_says_that_it_cannot_say(tmp_path: Path, foreign: str):
     assert answer.exit_code == 2
     assert f"the {foreign} was Bench 2.1" in answer.stderr
     assert answer.stdout == ""
+
+
+def test_a_plant_whose_hand_nobody_has_modelled_was_not_ours_though_the_log_names_no_program(tmp_path: Path):
+    hidden = scene(**{**TAP, "hand": {"kind": "unmodelled"}})
+    out = left(tmp_path / "run", scene(**TAP), told=hidden, programs="{}")
+    found = replay(out)
+    assert found.differences == []
+    assert found.half.endswith("the plant was a program without a name.")
+    assert CliRunner().invoke(app, ["judge", str(out)]).exit_code == 2

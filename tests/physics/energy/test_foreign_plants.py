@@ -11,6 +11,7 @@ import pytest
 from haploop.controller.controller import Controller
 from haploop.logger.books import closing
 from haploop.logger.books.balance import balance_words
+from haploop.protocol.scene.paths import with_value
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
 from helpers.runs.captured import Captured, run
@@ -113,7 +114,8 @@ def around_euler() -> tuple[dict[str, np.ndarray], dict[str, Any]]:
         (0.0, 0.0, (), ""),
         (1e-3, 1.0, ("plant",), ""),
         (-0.27, 1.0, ("plant",),
-         "This plant invents 27 % of the energy: 0.27 J of the 1 J that moved came from nowhere."),
+         "This plant invents 27 % of the energy: 0.27 J of the 1 J that moved came from nowhere, "
+         "if its device and hand are those of the scene."),
         (2e-3, 1.0, (), "This plant loses 0.2 % of the energy: 0.002 J of the 1 J that moved went nowhere."),
         (math.inf, 1.0, (), ""),
         (math.nan, 1.0, (), ""),
@@ -129,6 +131,15 @@ def test_a_residual_is_not_laid_at_the_door_of_a_plant_that_is_ours_where_the_co
     assert whose[()] == "This plant"
     assert whose[("controller",)].startswith("This controller")
     assert balance_words(1.0, 2.0, ("plant", "controller")).startswith("Plant and controller together")
+
+
+def test_a_controller_that_tells_other_forces_than_it_sent_is_what_the_books_of_our_plant_complain_of():
+    known = scene(**TAP, hand=HAND)
+    ran, told = run(known), with_value(known, "wall.stiffness", 110.0)
+    controller = Controller(told, Timebase.from_scene(told), KINDS)
+    controller.answer([(float(x),) for x in ran.plant["x"][:-1:10]])
+    energy = booked(known, ran.plant, controller, ("controller",))["energy"]
+    assert energy["balance"].startswith("This controller, by what it says of its forces, ")
 
 
 def unmodelled(**more: Any) -> Scene:

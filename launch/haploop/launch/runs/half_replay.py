@@ -20,16 +20,19 @@ from haploop.logger.log.table import Floats
 from haploop.logger.summary import misfit
 from haploop.plant.plant import Plant
 from haploop.protocol.changes import Event, is_change
-from haploop.protocol.scene.scene import Scene, accelerometer_is_used
+from haploop.protocol.scene.scene import Scene, accelerometer_is_used, hand_is_unmodelled
 from haploop.protocol.ticks import Timebase
 from haploop.protocol.transport.wire import Message
 
 _NO_PROGRAMS = f"What the log holds as {PROGRAMS} is none of a run: it should name its programs by role."
+_UNKNOWN: Message = {"name": "", "version": "", "command": ""}
 _PROGRAM = {"name": str, "version": str, "command": str, "own": bool}
 
 
-def foreign_programs(recorded: Recording) -> dict[str, Message]:
+def foreign_programs(recorded: Recording, scene: Scene) -> dict[str, Message]:
     """Returns the programs that took the place of plant or controller by role, as the log of a run names them.
+
+    The plant of a scene whose hand is unmodelled was none of haploop's, whatever the log says.
 
     Raises LogError where what the log holds of them is something else.
     """
@@ -39,7 +42,8 @@ def foreign_programs(recorded: Recording) -> dict[str, Message]:
         raise LogError(_NO_PROGRAMS) from error
     if not isinstance(programs, dict) or misfit(programs, dict.fromkeys(programs, _PROGRAM)):
         raise LogError(_NO_PROGRAMS)
-    return {role: program for role, program in programs.items() if not program["own"]}
+    unknown = {"plant": _UNKNOWN} if hand_is_unmodelled(scene) else {}
+    return unknown | {role: program for role, program in programs.items() if not program["own"]}
 
 
 def named(foreign: Mapping[str, Message]) -> str:

@@ -59,7 +59,7 @@ def replay(directory: Path) -> Replay:
     recorded = logged_run(directory)
     scene, kinds, events = repeatable(directory, recorded)
     before = recorded_summary(directory)
-    if foreign := foreign_programs(recorded):
+    if foreign := foreign_programs(recorded, scene):
         return _replay_half(scene, kinds, events, recorded, before, foreign)
     with tempfile.TemporaryDirectory(prefix="haploop-replay-") as scratch:
         try:
@@ -127,9 +127,9 @@ def logged_run(directory: Path) -> Recording:
     return recorded
 
 
-def demand_own(recorded: Recording) -> None:
+def demand_own(recorded: Recording, scene: Scene) -> None:
     """Raises ReplayError where plant or controller of a run was somebody else's, so that its loop cannot be judged."""
-    if foreign := foreign_programs(recorded):
+    if foreign := foreign_programs(recorded, scene):
         raise ReplayError(
             f"Whether this loop is stable cannot be said: {named(foreign)}, "
             "which cannot be held still and pushed here. What its last half second showed is in its summary."

@@ -7,12 +7,14 @@ from collections.abc import Collection
 
 # A residual is told in words beyond this share of the energy that moved.
 _TOLD = 1e-3
-# Whose doing it is, by the roles that programs of others had: the books rest on what plant and controller tell.
+# Whose doing it is and on which condition, by the roles that programs of others had: the books rest on what plant and
+# controller tell, and on the scene.
+_IF = ", if its device and hand are those of the scene"
 _WHOSE = {
-    (): "This plant",
-    ("plant",): "This plant",
-    ("controller",): "This controller, by what it says of its forces,",
-    ("controller", "plant"): "Plant and controller together, by what they say of themselves,",
+    (): ("This plant", ""),
+    ("plant",): ("This plant", _IF),
+    ("controller",): ("This controller, by what it says of its forces,", ""),
+    ("controller", "plant"): ("Plant and controller together, by what they say of themselves,", _IF),
 }
 
 
@@ -28,5 +30,6 @@ def balance_words(unexplained_J: float | None, moved_J: float, foreign: Collecti
         return ""
     does, where = ("loses", "went nowhere") if unexplained_J > 0.0 else ("invents", "came from nowhere")
     percent = float(f"{100.0 * abs(unexplained_J) / moved_J:.2g}") if moved_J else math.inf
+    whose, condition = _WHOSE[tuple(sorted(foreign))]
     amount = f"{abs(unexplained_J):.3g} J of the {moved_J:.3g} J that moved {where}"
-    return f"{_WHOSE[tuple(sorted(foreign))]} {does} {percent:g} % of the energy: {amount}."
+    return f"{whose} {does} {percent:g} % of the energy: {amount}{condition}."

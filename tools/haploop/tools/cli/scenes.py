@@ -229,8 +229,9 @@ def judge(directory: Directory, json: Json = False) -> None:
         try:
             recorded = logged_run(directory)
             print_note(recorded.cut)
-            demand_own(recorded)
-            finding = judge_scene(*repeatable(directory, recorded))
+            scene, kinds, events = repeatable(directory, recorded)
+            demand_own(recorded, scene)
+            finding = judge_scene(scene, kinds, events)
         except ReplayError as error:
             leave(str(error), WRONG_USE)
     if json:
