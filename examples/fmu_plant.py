@@ -14,6 +14,7 @@ import math
 import sys
 from ctypes import c_double
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from fmpy import extract, read_model_description
 from fmpy.fmi3 import FMU3Model, FMU3Slave
@@ -32,11 +33,12 @@ def main():
     parser.add_argument("--state-space", action="store_true", help="the Reference FMUs' StateSpace, made the scene's")
     options = parser.parse_args(sys.argv[1:-1])  # the last word is the directory of sockets, for take_seat
     seat = take_seat(f"FMU {Path(options.fmu).name}", "3.0")
-    seat.run(*device(seat.scene, seat.step_s, options))
+    with TemporaryDirectory() as folder:
+        seat.run(*device(seat.scene, seat.step_s, options, folder))
 
 
-def device(scene, step_s, options):
-    """Returns the function of a plant step, and the position and velocity at the start."""
+def device(scene, step_s, options, folder):
+    """Returns the function of a plant step, and position and velocity at the start; the FMU is unpacked in a folder."""
     values, bias = dict(map(assignment, options.set)), 0.0
     if options.state_space:
         options.force, options.position, options.velocity = "u[1]", "y[1]", "y[2]"
@@ -49,7 +51,9 @@ def device(scene, step_s, options):
     found = description.coSimulation if kind == "cs" else description.modelExchange
     if found is None:
         raise SystemExit(f"{options.fmu} is not for {'co-simulation' if kind == 'cs' else 'model exchange'}.")
-    unit = (CoSimulation if kind == "cs" else ModelExchange)(description, found.modelIdentifier, options, values)
+    unit = (CoSimulation if kind == "cs" else ModelExchange)(
+        description, found.modelIdentifier, options, values, folder
+    )
     tau = hand_force(scene)
     now, before = 0, unit.position()
 
@@ -84,12 +88,12 @@ def state_space(scene):
 class Unit:
     """An FMU by the names of its variables, up to the end of its initialization."""
 
-    def __init__(self, made, description, identifier, options, values):
+    def __init__(self, made, description, identifier, options, values, folder):
         self._variables = {variable.name: variable for variable in description.modelVariables}
         self._options = options
         self.fmu = made(
             guid=description.guid or description.instantiationToken,
-            unzipDirectory=extract(options.fmu),
+            unzipDirectory=extract(options.fmu, unzipdir=folder),
             modelIdentifier=identifier,
             instanceName="plant",
         )

@@ -13,9 +13,13 @@ import pytest
 from typer.testing import CliRunner, Result
 
 from haploop.controller.dissipation.damping import Damping
+from haploop.controller.estimators.base import Unchanged
+from haploop.controller.estimators.choose import ESTIMATORS as NAMES_OF_ESTIMATORS
+from haploop.controller.estimators.choose import estimator_class
 from haploop.tools.cli.app import app
-from haploop.tools.fmu.variables import NotExportable, controller_of
-from helpers.scenes.least import LEAST_TOML, scene
+from haploop.tools.fmu import package
+from haploop.tools.fmu.variables import ELEMENTS, ESTIMATORS, NotExportable, controller_of
+from helpers.scenes.least import KINDS, LEAST_TOML, scene
 
 WALL_TOML = LEAST_TOML + "[wall]\nposition = -0.06\nstiffness = 150\n"
 
@@ -129,3 +133,11 @@ def test_an_element_of_a_plugin_is_refused_though_it_has_the_name_of_one_that_is
     monkeypatch.setattr("haploop.tools.fmu.variables.registry", lambda: {"damping": Mine})
     with pytest.raises(NotExportable, match=r"dissipation\.0 is damping, which is Python; an FMU holds damping, "):
         controller_of(one)
+
+
+def test_every_element_and_estimator_that_comes_with_haploop_has_its_words_in_c() -> None:
+    assert set(KINDS.values()) <= ELEMENTS.keys()
+    named = {estimator_class(name) for name in NAMES_OF_ESTIMATORS}
+    assert named | {Unchanged} | {made for kind in named for made in kind.__subclasses__()} == ESTIMATORS.keys()
+    written = Path(package.__file__).with_name("controller.h").read_text(encoding="utf-8")
+    assert [word for word in (*ELEMENTS.values(), *ESTIMATORS.values()) if f"case {word}:" not in written] == []

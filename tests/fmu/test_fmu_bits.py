@@ -86,7 +86,13 @@ def assert_same_bits(ours: np.ndarray, theirs: np.ndarray) -> None:
     assert not len(parts), f"{len(parts)} of {len(ours)} forces part, the first at plant step {parts[0]}"
 
 
-@pytest.mark.parametrize("name", SCENES)
+# Scenes that together have every branch of the C; the others are slow tests.
+QUICK = {"a wall above, read by floor", "ticks and a part", "an actuator", "an end-fit", "a best fit", "a fused filter"}
+
+
+@pytest.mark.parametrize(
+    "name", [name if name in QUICK else pytest.param(name, marks=pytest.mark.slow) for name in SCENES]
+)
 def test_the_force_of_an_fmu_is_that_of_the_run_at_every_plant_step_to_the_bit(name: str, tmp_path: Path) -> None:
     needs_fmus()
     loop = tapping(**SCENES[name])
@@ -116,7 +122,8 @@ def test_an_exported_controller_and_the_exact_plant_give_the_trajectory_of_figur
 
 def test_measured_positions_give_the_same_forces_where_the_fmu_is_told_not_to_round(tmp_path: Path) -> None:
     needs_fmus()
-    loop = tapping(encoder={"resolution": 3e-6, "rounding": "floor"}, dissipation=ELEMENTS)
+    noise = {"deviation": 1e-5, "cutoff": 300}
+    loop = tapping(encoder={"resolution": 3e-6, "rounding": "floor"}, noise=noise, dissipation=ELEMENTS)
     run = recorded(loop)
     measured = [sample[0] for sample in run.samples]
     assert np.any(run.true_m != measured)
@@ -142,6 +149,7 @@ def test_a_parameter_set_between_two_steps_acts_as_the_same_change_of_a_run_does
     assert np.any(recorded(plain).force_N != run.force_N)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("delay_s", "steps"), [(0.002, 10), (0.002, 5), (0.0025, 5), (0.0004, 2), (0.0004, 1)])
 def test_longer_communication_steps_give_the_same_forces_at_their_beginnings(
     delay_s: float, steps: int, tmp_path: Path
@@ -154,6 +162,7 @@ def test_longer_communication_steps_give_the_same_forces_at_their_beginnings(
     assert_same_bits(forces, run.force_N[::steps])
 
 
+@pytest.mark.slow
 def test_an_importer_that_reads_the_force_a_step_late_has_another_loop(tmp_path: Path) -> None:
     needs_fmus()
     loop = tapping(clock={**CLOCK, "round_trip_delay": 0.002}, dissipation=ELEMENTS)
@@ -172,3 +181,21 @@ def test_an_importer_of_no_words_simulates_it_with_the_forces_of_the_run(tmp_pat
     signal = np.array(list(zip(ticks, run.true_m, strict=True)), [("time", float), ("position", float)])
     result = simulate_fmu(str(made(loop, tmp_path)), stop_time=0.299, input=signal, output=["force"])
     assert_same_bits(np.ascontiguousarray(result["force"]), run.force_N[::10])
+
+
+@pytest.mark.slow
+def test_without_delay_an_importer_that_sets_steps_and_reads_has_a_loop_of_one_communication_step_of_delay(
+    tmp_path: Path,
+) -> None:
+    needs_fmus()
+    prompt, late = (tapping(clock={**CLOCK, "round_trip_delay": d}, dissipation=ELEMENTS) for d in (0.0, 0.001))
+    positions = recorded(prompt).true_m
+    with stepped(made(late, tmp_path, "late")) as one:
+        expected = forces_of(one, late, positions, steps=10)
+    with stepped(made(prompt, tmp_path)) as one:
+        forces = [0.0]
+        for tick, x in enumerate(positions):
+            one.set(position=x)
+            one.slave.doStep(tick / 1000, 0.001)
+            forces.append(one.force())
+    assert_same_bits(np.array(forces[:-1]), expected)

@@ -42,9 +42,14 @@ def fmus() -> None:
     ids=["a loop", "every variable", "the least scene", "a nasty title", "no delay"],
 )
 def test_fmpy_finds_nothing_wrong_with_it(tables: dict[str, Any], tmp_path: Path) -> None:
+    import fmpy
     from fmpy.validation import validate_fmu
+    from lxml.etree import XMLSchema, fromstring
 
-    assert validate_fmu(str(made(scene(**tables), tmp_path, "2 a-b"))) == []
+    path = made(scene(**tables), tmp_path, "2 a-b")
+    assert validate_fmu(str(path)) == []
+    schema = XMLSchema(file=str(Path(fmpy.__file__).parent / "schema" / "fmi3" / "fmi3BuildDescription.xsd"))
+    schema.assertValid(fromstring(zipfile.ZipFile(path).read("sources/buildDescription.xml")))
 
 
 def test_it_says_what_it_takes_gives_and_is_made_of(tmp_path: Path) -> None:

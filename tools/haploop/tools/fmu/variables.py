@@ -160,10 +160,10 @@ def header(scene: Scene, params: ControllerParams, variables: list[Variable], to
         "VARIABLES": len(variables),
         **references,
     }
-    first = len(variables) - len(params.elements)  # one parameter each
+    places = [place for place, variable in enumerate(variables) if variable.name.startswith("dissipation.")]
     elements = [
         f"{{{ELEMENTS[type(active.element)]}, {int(active.acts == 'always')}, {place}}}"
-        for place, active in enumerate(params.elements, first)
+        for place, active in zip(places, params.elements, strict=True)  # one parameter each
     ]
     known = [f'{{"{v.name}", {float(v.start).hex()}, {v.bounds[0].hex()}, {v.bounds[1].hex()}}}' for v in variables]
     return "\n".join(
