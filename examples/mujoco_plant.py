@@ -2,7 +2,7 @@
 
     haploop run scene.toml --node plant="python examples/mujoco_plant.py --integrator rk4"
 
-Needs mujoco (pip install 'haploop[mujoco]' brings it), pyzmq and msgpack. The joint is the device, at
+Needs mujoco, pyzmq and msgpack (pip install 'haploop[mujoco]' brings them). The joint is the device, at
 x = radius * angle; the scene's hand (mass, damper, spring, force) is attached to it rigidly. MuJoCo's step is the plant
 step of the scene.
 """

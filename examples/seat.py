@@ -69,6 +69,7 @@ class Seat:
         self._clock.connect(start["address"])
         self._loop, self._telemetry = self._socket(zmq.ROUTER), self._socket(zmq.XPUB)
         self._loop.router_mandatory, self._telemetry.xpub_verbose, self._telemetry.sndhwm = True, True, 256
+        self._loop.sndhwm = self._loop.rcvhwm = 0  # a plant that owns the time sends on while answers are late
         endpoints = {"loop": f"ipc://{directory}/loop.sock", "telemetry": f"ipc://{directory}/plant.sock"}
         self._loop.bind(endpoints["loop"])
         self._telemetry.bind(endpoints["telemetry"])
@@ -251,8 +252,8 @@ class Seat:
             self._idle("controller")
         sender, *frames = self._loop.recv_multipart()
         try:
-            return sender, msgpack.unpackb(frames[0])
-        except ValueError:
+            return sender, msgpack.unpackb(frames[-1])
+        except Exception:  # anything may come from a stranger
             return sender, None
 
     def _send(self, *message):
@@ -278,12 +279,15 @@ class Seat:
         if sender != self._partner:
             return
         tick = self._answered
-        if not (isinstance(frame, list) and frame[:3] == [VERSION, COMMANDS, tick] and len(frame[3]) == 1):
-            raise SeatError(f"A command of tick {tick} was expected of the controller, but {str(frame)[:80]} came.")
+        match frame:
+            case [version, code, of, [int() | float() as force]] if [version, code, of] == [VERSION, COMMANDS, tick]:
+                pass
+            case _:
+                raise SeatError(f"A command of tick {tick} was expected of the controller, but {str(frame)[:80]} came.")
         self._answered += 1
         awaited = [command for command in self._coming if command[2] == tick]
         if awaited:
-            awaited[0][1] = float(frame[3][0])
+            awaited[0][1] = float(force)
         if self._owns_time:
             self._schedule.answered(tick, not awaited)
 

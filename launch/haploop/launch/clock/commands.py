@@ -100,7 +100,7 @@ class Commands:
             "end": clock.end,
             "control_rate": self._rate,
             "paused": clock.paused,
-            "pace": in_words(clock.pace.rate),
+            "pace": device_time.PLANT if self._spec.clock == device_time.PLANT else in_words(clock.pace.rate),
             "lateness": self._lateness(roster),
             "nodes": roster.table(),
             "refused": roster.refused,

@@ -174,7 +174,8 @@ def status_table(data: Message) -> RenderableType:
     from rich.text import Text
 
     rate, pace = data["control_rate"], data.get("pace", "free")
-    at_pace = "as fast as it goes" if pace == "free" else f"at pace {pace:g}"
+    unpaced = {"free": "as fast as it goes", "plant": "by the plant's own time"}
+    at_pace = unpaced[pace] if isinstance(pace, str) else f"at pace {pace:g}"
     state = ("paused", "bold yellow") if data["paused"] else ("running", "bold green")
     where = f"  {data['tick'] / rate:g} s of {data['end'] / rate:g} s, tick {data['tick']} of {data['end']}, {at_pace}"
     head = Text.assemble((data.get("run", ""), "bold"), "  " if data.get("run") else "", data["title"])

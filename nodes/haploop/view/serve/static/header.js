@@ -28,6 +28,7 @@ export function showHeader(state, phase) {
   put(byId("residual"), share(state));
   byId("residual").title = state.balance ?? "";
   put(byId("factor"), factor(state));
+  byId("factor").title = lateness(state);
   put(byId("skipped"), isNumber(state.skipped_ticks) ? `${state.skipped_ticks} ticks` : NONE);
   showTime(state);
 }
@@ -55,10 +56,17 @@ function share({ residual_J: residual, moved_J: moved }) {
   return isNumber(residual) && moved > 0 ? power(Math.abs(residual) / moved) : NONE;
 }
 
-function factor({ real_time_factor: now, pace, summary }) {
+function factor({ real_time_factor: now, pace, summary, lateness: late }) {
   const real = summary?.real_time_factor ?? now;
   if (!isNumber(real)) return NONE;
-  return `${fixed(real)}×${isNumber(pace) && pace !== 1 ? ` of ${fixed(pace, 2)}×` : ""}`;
+  return `${fixed(real)}×${isNumber(pace) && pace !== 1 ? ` of ${fixed(pace, 2)}×` : ""}${late ? `, ${late.late_ticks} late` : ""}`;
+}
+
+function lateness({ lateness: late }) {
+  if (!late) return "";
+  const [half, most, all] = [late.median_s, late.percent_99_s, late.most_s].map((seconds) => amount(seconds, "s"));
+  const what = late.clock === "plant" ? "answers came" : "ticks were late by";
+  return `${what} ${half} (median), ${most} (99 %), ${all} at most; ${late.late_ticks} of ${late.ticks} too late`;
 }
 
 function showTime({ tick, end_tick: end, control_rate: rate }) {
