@@ -1,12 +1,14 @@
 """Plants of a device and a hand as one mass, by an integrator of one's choice; nothing of haploop is imported.
 
-usage (as the plant of a run): own_plant.py METHOD [SHARE] DIRECTORY
+usage (as the plant of a run): own_plant.py METHOD [SHARE [HELD]] DIRECTORY
 
 m a + b v + k (x - rest) = f + tau, f held over a plant step, tau a straight line over it.
 METHOD: exact, rk4, euler (explicit), semi (semi-implicit Euler), or gain: exact, but for the velocity after each step,
 which is made larger by SHARE (smaller where it is below 0), so that it invents energy on purpose.
+HELD: a file for the force that a device would be given at every tick, one a line.
 """
 
+import os
 import sys
 from pathlib import Path
 
@@ -77,4 +79,5 @@ if __name__ == "__main__":
     chosen = sys.argv[1:-1]
     seat = take_seat("own plant", "1")
     plant = OnePart(seat.scene, seat.step_s, chosen[0], float(chosen[1]) if len(chosen) > 1 else 0.0)
-    seat.run(plant.step, plant.x, plant.v)
+    with Path(chosen[2] if len(chosen) > 2 else os.devnull).open("w", buffering=1, encoding="utf-8") as held:
+        seat.run(plant.step, plant.x, plant.v, lambda force: print(force, file=held))

@@ -1,8 +1,13 @@
 """Plants in Python on the seat of examples/, which imports nothing of haploop: in lockstep, and by their own time."""
 
+import os
 import shlex
+import signal
+import subprocess
 import sys
+import time
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +19,8 @@ from haploop.launch.clock.device_time import GOES_ON, PLANT, REFUSED, lateness_t
 from haploop.launch.processes.foreign import read_programs
 from haploop.launch.processes.run_directory import CommandRefused
 from haploop.launch.runs.start import prepare, run
-from haploop.launch.spec import OutputError
+from haploop.launch.spec import OutputError, RunFailed
+from helpers.live.launched import HAPLOOP
 from helpers.live.live_run import going
 
 HOUSE = Path(__file__).parents[2]
@@ -45,6 +51,20 @@ TOLD |= {"late_s": 2e-3, "lost_s": 0}
 
 def plant(*script: Path | str) -> dict[str, Any]:
     return {"programs": read_programs([f"plant={shlex.join([sys.executable, *map(str, script or PLAIN)])}"], [])}
+
+
+def last(held: Path) -> float:
+    """The force that a device was given last, N."""
+    lines = held.read_text().splitlines() if held.exists() else []
+    return float(lines[-1]) if lines and lines[-1] else 0.0
+
+
+def wait_for(condition: Callable[[], bool]) -> None:
+    for _ in range(400):
+        if condition():
+            return
+        time.sleep(0.05)
+    raise AssertionError("It has not come to that.")
 
 
 def ran(out: Path, *overrides: str, plugins: tuple[Path, ...] = (), **options: Any) -> tuple[dict[str, Any], Any]:
@@ -115,6 +135,36 @@ def test_a_devices_time_is_neither_held_nor_hurried(tmp_path: Path) -> None:
             with pytest.raises(CommandRefused, match=GOES_ON):
                 live.ask(verb, **({"pace": "free"} if verb == "pace" else {}))
         live.ask("stop")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("role", "fault"), [("controller", signal.SIGSTOP), ("controller", signal.SIGKILL), ("logger", signal.SIGKILL)]
+)
+def test_a_device_is_given_no_force_when_the_rest_of_its_run_fails(tmp_path: Path, role: str, fault: int) -> None:
+    held = tmp_path / "held"
+    with going(tmp_path, "wall.position=0.1", "duration=30", **BY_PLANT, **plant(*PLAIN, "0", held)) as live:
+        wait_for(lambda: last(held) != 0.0)
+        pids = {node["role"]: node["pid"] for node in live.ask("status")[1]["nodes"]}
+        os.kill(pids[role], fault)
+        with suppress(RunFailed):
+            live.result()
+    assert last(held) == 0.0
+
+
+@pytest.mark.slow
+def test_a_device_is_given_no_force_when_the_launcher_is_killed(tmp_path: Path) -> None:
+    held = tmp_path / "held"
+    words = [*HAPLOOP, "run", str(SCENE), "--clock", "plant", "--set", "wall.position=0.1", "--set", "duration=30"]
+    command = shlex.join([sys.executable, *map(str, PLAIN), "0", str(held)])
+    words += ["--out", str(tmp_path / "out"), "--node", f"plant={command}"]
+    launcher = subprocess.Popen(words, stderr=subprocess.DEVNULL)
+    try:
+        wait_for(lambda: last(held) != 0.0)
+    finally:
+        launcher.kill()
+        launcher.wait()
+    wait_for(lambda: last(held) == 0.0)
 
 
 @pytest.mark.parametrize(

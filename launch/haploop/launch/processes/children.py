@@ -18,6 +18,8 @@ from haploop.launch.spec import OutputError
 from haploop.protocol.transport.messages import PROCESSES
 from haploop.protocol.transport.wire import Message
 
+# What a program of somebody else's is given after the end of its stdin to bring its device to rest.
+_TO_REST_S = 0.1
 _NAMED = {int(number) for number in signal.Signals}
 
 
@@ -107,17 +109,22 @@ class Child:
         return True
 
     def kill(self) -> None:
-        """Ends the process now, stopped or not, and reaps it; again, it does nothing more."""
+        """Ends the process, stopped or not, and reaps it; again, it does nothing more.
+
+        One of the run's own ends now, a program of somebody else's 0.1 s after the end of its stdin.
+        """
         if self.died < 0:  # by now another owner may have the number of the descriptor, as one of ZeroMQ's connections
             return
+        if self._process.stdin:
+            with contextlib.suppress(OSError):
+                self._process.stdin.close()
+        if self._group:
+            self.wait(_TO_REST_S)
         with contextlib.suppress(ProcessLookupError):
             self._process.kill()
         if self._group:
             self._group.kill()
         self._process.wait()
-        if self._process.stdin:
-            with contextlib.suppress(OSError):
-                self._process.stdin.close()
         os.close(self.died)
         self.died = -1
 
@@ -125,14 +132,14 @@ class Child:
 class _Group:
     """A process group for a program of somebody else's: all of it ends with the launcher, whatever it does itself.
 
-    Its first process waits for the end of its stdin, which the launcher holds open, and then kills the group.
+    Its first process waits for the end of its stdin, which the launcher holds open, and kills the group 0.1 s later.
 
     Attributes:
         id: of the group, which no other can have before :meth:`kill`.
     """
 
     def __init__(self) -> None:
-        guard = ["/bin/sh", "-c", "read _; kill -9 0"]
+        guard = ["/bin/sh", "-c", f"read _; sleep {_TO_REST_S}; kill -9 0"]
         nowhere = subprocess.DEVNULL
         self._guard = subprocess.Popen(guard, stdin=subprocess.PIPE, stdout=nowhere, stderr=nowhere, process_group=0)
         self.id = self._guard.pid
