@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from haploop.launch.scene.bundled import bundled
 from haploop.launch.scene.file import load
 from haploop.launch.scene.mistakes import SceneError
 from haploop.launch.spec import OutputError
@@ -26,7 +27,6 @@ from haploop.tools.advise.subject import (
     apply_events,
     assumptions,
     make_subject,
-    presets,
 )  # fmt: skip
 from haploop.tools.advise.walls.cases import (
     HOLDS,
@@ -120,7 +120,7 @@ def test_every_corner_takes_every_quantity_both_ways_and_the_attack_has_other_ca
 
 def test_of_many_corners_the_search_takes_32_in_which_no_two_quantities_go_together_and_the_attack_takes_all():
     loop = loop_of("premium15_cable")
-    of = ranges(loop, [key.key for key in assumptions(presets("devices")["premium15_cable"])])
+    of = ranges(loop, [key.key for key in assumptions(bundled("devices")["premium15_cable"])])
     corners = {case.corner for case in every_case(of)} - {()}
     signs = np.array([[factor > 1.0 for _, factor in one] for one in corners]) * 2.0 - 1.0
     assert signs.shape == (32, len(of))
@@ -165,7 +165,7 @@ def test_the_formulas_of_abbott_and_okamura_come_one_by_one_with_the_numbers_of_
 
 
 def test_what_a_device_file_assumes_is_known_and_what_a_file_built_on_it_measures_is_not():
-    files = presets("devices")
+    files = bundled("devices")
     assert {of.key for of in assumptions(files["omega3"])} == {"device.mass", "device.damping", "friction.kinetic"}
     assert {of.key for of in assumptions(files["falcon"])} == {"device.mass", "device.damping", "friction.kinetic"}
     assert not assumptions(files["premium15"])
@@ -175,7 +175,7 @@ def test_what_a_device_file_assumes_is_known_and_what_a_file_built_on_it_measure
 
 
 def test_every_published_value_is_of_a_device_that_comes_with_haploop_and_has_a_source():
-    assert set(PUBLISHED) <= set(presets("devices"))
+    assert set(PUBLISHED) <= set(bundled("devices"))
     assert all(value.source and value.stiffness_N_m > 0.0 for values in PUBLISHED.values() for value in values)
 
 
@@ -205,7 +205,7 @@ def test_an_advice_says_first_that_it_is_an_upper_bound_goes_on_when_stopped_and
 def test_a_device_of_ones_own_is_taken_as_the_presets_are_and_a_scene_with_a_wall_as_a_task(tmp_path):
     mine = tmp_path / "mine.toml"
     mine.write_text('extends = "omega3.toml"\n[device]\nmass = 0.3  # weighed\n')
-    (tmp_path / "omega3.toml").write_text(presets("devices")["omega3"].read_text())
+    (tmp_path / "omega3.toml").write_text(bundled("devices")["omega3"].read_text())
     asked = make_subject(str(mine), None, None, None, [], KINDS)
     assert not asked.has_task
     assert asked.scene.device.mass == 0.3

@@ -12,9 +12,9 @@ import pytest
 
 from haploop.controller.dissipation import registry
 from haploop.launch.runs.in_process import run_in_process
+from haploop.launch.scene.bundled import bundled_folder
 from haploop.launch.scene.file import load
 from haploop.protocol.scene.estimators import Velocity
-from haploop.tools.cost.grid import scenes_folder
 from haploop.tools.linear.one_tick import OneTickMap
 from haploop.tools.linear.stiffness_limit import smooth
 from haploop.tools.search.random import Point
@@ -50,13 +50,13 @@ def point_of(setup: Setup) -> Point:
 
 def test_the_scene_file_is_the_nearest_interpretation() -> None:
     """Written by the search, and read back to the same setup, whatever it chooses."""
-    assert (scenes_folder() / SCENE_FILE).read_text(encoding="utf-8") == file_text(nearest())
+    assert (bundled_folder("scenes") / SCENE_FILE).read_text(encoding="utf-8") == file_text(nearest())
 
 
 @pytest.mark.parametrize("setup", [SETUP, replace(SETUP, unit="ideal", velocity="50 Hz", hand=0.7, mount="motor")])
 def test_a_setup_as_a_scene_file_reads_back(setup: Setup, tmp_path: Path) -> None:
     for folder in ("devices", "hands"):
-        shutil.copytree(scenes_folder().parent / folder, tmp_path / folder)
+        shutil.copytree(bundled_folder(folder), tmp_path / folder)
     file = tmp_path / "scenes" / SCENE_FILE
     file.parent.mkdir()
     file.write_text(file_text(setup), encoding="utf-8")

@@ -10,7 +10,8 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from haploop.launch.scene.mistakes import COMMAND_LINE, Mistake, SceneError, counted, shown
+from haploop.launch.scene.bundled import bundled, found
+from haploop.launch.scene.mistakes import COMMAND_LINE, Mistake, SceneError, counted, nearest, shown
 from haploop.launch.scene.toml_writer import inline
 from haploop.protocol.files import read_text
 from haploop.protocol.scene.table import Tables
@@ -96,8 +97,12 @@ class Layers:
 def read_layers(path: Path) -> Layers:
     """Returns the scene file at ``path`` laid over all that it extends; of several the later wins.
 
+    Where there is no such file, a path is the name of one that comes with haploop: a scene, or for ``extends`` one
+    with its folder, ``devices/premium15.toml``.
+
     Raises SceneError for a file that cannot be read, or that extends itself.
     """
+    path = found(path, "scenes")
     layers = Layers(path)
     _read(layers, path, ())
     if layers.mistakes:
@@ -130,7 +135,7 @@ def _read(layers: Layers, path: Path, chain: tuple[Path, ...]) -> None:
         layers.mistakes.append(Mistake(shown(path), "extends", f"is {_quoted(below)}", expected))
         return
     for name in names:
-        _read(layers, path.parent / name, (*chain, here))
+        _read(layers, found(Path(name), "scenes", path.parent), (*chain, here))
     layers.lay(table, str(path))
 
 
@@ -145,7 +150,7 @@ def parse(path: Path, what: str = "scene", needs: str = "a duration and a [devic
         elif not (problem := _excess(table)):
             return table
     except FileNotFoundError:
-        problem = "There is no such file."
+        problem = _absent(path, what)
     except IsADirectoryError:
         problem = f"This is a directory; a {what} is a TOML file."
     except OSError as error:
@@ -157,6 +162,14 @@ def parse(path: Path, what: str = "scene", needs: str = "a duration and a [devic
     except RecursionError:
         problem = _TOO_DEEP
     raise SceneError([Mistake(shown(path), "", "", problem)])
+
+
+def _absent(path: Path, what: str) -> str:
+    """Returns the sentence on a file that is not there; a name without folder may have been meant for a bundled one."""
+    names = bundled(f"{what}s")
+    meant = nearest(path.stem, names) if path.name == str(path) else None
+    hint = f", and no {what} of that name comes with haploop" if path.name == str(path) else ""
+    return f"There is no such file{hint}{f'; did you mean {meant}?' if meant else '.'}"
 
 
 _TOO_DEEP = f"Tables and lists may lie at most {_DEEPEST} deep in one another."

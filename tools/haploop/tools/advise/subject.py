@@ -11,13 +11,13 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from haploop.controller.dissipation import Element
+from haploop.launch.scene.bundled import bundled, found
 from haploop.launch.scene.file import resolved
 from haploop.launch.scene.layers import Layers, read_layers
 from haploop.launch.scene.mistakes import nearest
 from haploop.protocol.changes import Change, at_work
 from haploop.protocol.scene.scene import Scene
 from haploop.tools.advise.walls.cases import MOST_DELAY_S
-from haploop.tools.cost.grid import scenes_folder
 
 # The only measured hand there is, along the axis of Choi et al. 2022.
 DEFAULT_HAND = "fu_cavusoglu_y"
@@ -117,8 +117,10 @@ def assumptions(path: Path) -> tuple[Assumed, ...]:
 def _by_key(path: Path) -> dict[str, Assumed]:
     """Returns the numbers of a device file by key, with no words where they are not assumed."""
     text = path.read_text(encoding="utf-8")
-    extends = tomllib.loads(text).get("extends")
-    found = _by_key(path.parent / extends) if isinstance(extends, str) else {}
+    extends = tomllib.loads(text).get("extends", [])
+    known: dict[str, Assumed] = {}
+    for name in [extends] if isinstance(extends, str) else extends:
+        known |= _by_key(found(Path(name), "scenes", path.parent))
     table = ""
     for line in text.splitlines():
         if match := _TABLE.match(line):
@@ -126,8 +128,8 @@ def _by_key(path: Path) -> dict[str, Assumed]:
         elif (match := _VALUE.match(line)) and table.split(".")[0] in _TABLES:
             key, comment = f"{table}.{match[1]}", match[2]
             words = comment.partition(f"{_MARK}: ")[2] if _MARK in comment else ""
-            found[key] = Assumed(key, words)
-    return found
+            known[key] = Assumed(key, words)
+    return known
 
 
 def apply_events(scene: Scene) -> Scene:
@@ -138,17 +140,12 @@ def apply_events(scene: Scene) -> Scene:
     return replace(at_work(scene, changes), event=())
 
 
-def presets(folder: str) -> dict[str, Path]:
-    """Returns the files of launch/devices, hands or scenes, by name."""
-    return {path.stem: path for path in sorted(scenes_folder().with_name(folder).glob("*.toml"))}
-
-
 def _device(name: str) -> Path:
     """Returns the file that a name means."""
     path = Path(name)
     if path.suffix == ".toml" or path.exists():
         return path
-    known = presets("devices") | presets("scenes")
+    known = bundled("devices") | bundled("scenes")
     if name not in known:
         raise InvalidRequest(_unknown("DEVICE", name, list(known), "the path of a file with a device or a scene"))
     return known[name]
@@ -162,7 +159,7 @@ def _lay_hand(layers: Layers, name: str) -> None:
         if kept:
             layers.lay({"hand": kept}, "--hand")
         return
-    path, hands = Path(name), presets("hands")
+    path, hands = Path(name), bundled("hands")
     if path.suffix != ".toml":
         if name not in hands:
             raise InvalidRequest(_unknown("--hand", name, [*hands, "none"], "the path of a file with a [hand]"))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import typer
 
+from haploop.tools.cli.bundled import new, scenes
 from haploop.tools.cli.explain import explain
 from haploop.tools.cli.live_commands import attach, keys, pace, pause, resume, set_, status, step, stop, swap, undo
 from haploop.tools.cli.scenes import check, export, judge, plot, plugins, replay, run
@@ -21,7 +22,7 @@ app = typer.Typer(
 )
 # In the order in which the help lists them.
 for command in (
-    run, check, explain, plugins, status, pause, resume, step, pace, stop, swap, set_, undo, attach, view, keys,
-    plot, replay, judge, export, export_fmu, cost, sweep, dissipate, paper, advise,
+    run, scenes, new, check, explain, plugins, status, pause, resume, step, pace, stop, swap, set_, undo, attach, view,
+    keys, plot, replay, judge, export, export_fmu, cost, sweep, dissipate, paper, advise,
 ):  # fmt: skip
     app.command(command.__name__.rstrip("_").replace("_", "-"))(command)

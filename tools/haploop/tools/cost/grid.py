@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from haploop.controller.dissipation import ElementError
+from haploop.launch.scene.bundled import bundled_folder
 from haploop.launch.scene.file import load
 from haploop.launch.scene.mistakes import COMMAND_LINE, SceneError
 from haploop.plant.integrators.registry import INTEGRATORS
@@ -112,17 +113,8 @@ def times_made_with() -> list[Any]:
     return [machine(), *errors_made_with(), source_digest((), [tools / name for name in _OF_TIMES])]
 
 
-def scenes_folder() -> Path:
-    """Returns the folder of haploop's own scenes: in a wheel inside haploop.launch, in a checkout beside it."""
-    import haploop.launch
-
-    package = Path(haploop.launch.__path__[0])
-    inside = package / "scenes"
-    return inside if inside.is_dir() else package.parents[1] / "scenes"
-
-
 def accuracy_scenes() -> list[Path]:
-    return sorted((scenes_folder() / "accuracy").glob("*.toml"))
+    return sorted((bundled_folder("scenes") / "accuracy").glob("*.toml"))
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,7 @@ from typing import Any
 from haploop.controller.controller import Controller
 from haploop.controller.dissipation import registry
 from haploop.launch.plan.effects import EFFECTS, effects_of
+from haploop.launch.scene.bundled import bundled_folder
 from haploop.launch.scene.file import load
 from haploop.plant.plant import Plant
 from haploop.protocol.scene.effects import Accelerometer
@@ -21,7 +22,7 @@ from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import BlockLength, Timebase
 from haploop.tools.cost.data import Price, PriceGroup, Spread
 from haploop.tools.cost.findings import AGAIN
-from haploop.tools.cost.grid import digest, scenes_folder, times_made_with
+from haploop.tools.cost.grid import digest, times_made_with
 from haploop.tools.cost.reference import difference_m
 from haploop.tools.cost.times import IN_PROCESS, PROCESSES, Job, Store, loop_us, measure, run_us, tick_us
 from haploop.tools.linear.stiffness_limit import StiffnessLimit, stiffness_limit
@@ -80,7 +81,7 @@ def price_jobs(depends_on: Sequence[Any]) -> Jobs:
     They are runs of the paper's wall, fig6a.toml, without delay, and of all_effects.toml in a hand that leads it;
     ``depends_on`` is what times depend on beside the scenes, as JSON can hold it.
     """
-    scenes = scenes_folder()
+    scenes = bundled_folder("scenes")
     wall = scenes / "fig6a.toml"
 
     def in_process(*settings: str) -> Job:

@@ -27,6 +27,7 @@ import numpy as np
 from haploop.controller.dissipation import ElementError, registry
 from haploop.launch.runs.in_process import Loop
 from haploop.launch.runs.start import prepare, run
+from haploop.launch.scene.bundled import bundled_folder
 from haploop.launch.scene.events import scene_events
 from haploop.launch.scene.file import load
 from haploop.launch.spec import RunFailed
@@ -34,7 +35,6 @@ from haploop.logger.session import open_session
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
 from haploop.tools.cost.data import Load
-from haploop.tools.cost.grid import scenes_folder
 from haploop.tools.render.progress import Stage
 
 T = TypeVar("T")
@@ -190,7 +190,7 @@ def measure(store: Store, jobs: Sequence[Job], repeats: int, name: str, stage: S
 
 def yardstick() -> Scene:
     overrides = [f"duration={_YARDSTICK_S}", "diverged_beyond=1e9", "clock.round_trip_delay=0.0", "run.log=none"]
-    return load(scenes_folder() / "fig6a.toml", overrides)
+    return load(bundled_folder("scenes") / "fig6a.toml", overrides)
 
 
 @contextmanager

@@ -203,6 +203,16 @@ def _nodes(nodes: list[Message], control_rate: float) -> Table:
     return table
 
 
+def bundled_table(listed: Mapping[str, Mapping[str, str]]) -> Table:
+    """Makes the table of what comes with haploop: folder, name, and what it is."""
+    table = make_table("", "name", "what it is", unbroken=("", "name"))
+    for folder, files in listed.items():
+        for number, (name, about) in enumerate(files.items()):
+            table.add_row("" if number else folder, name, about)
+        table.add_section()
+    return table
+
+
 def plugins_table(kinds: Mapping[str, type[Element]]) -> Table:
     """Makes the table of element kinds: purpose, parameters with unit, bounds and default."""
     from rich.text import Text

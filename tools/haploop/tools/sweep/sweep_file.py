@@ -13,6 +13,7 @@ from pydantic_core import PydanticCustomError
 
 from haploop.launch.runs.loaded_scene import texts
 from haploop.launch.scene import file as scene_file
+from haploop.launch.scene.bundled import found
 from haploop.launch.scene.check import complain
 from haploop.launch.scene.layers import KeyPath, Layers, key_path, lay_overrides, parse
 from haploop.launch.scene.mistakes import COMMAND_LINE, SceneError, nearest, shown
@@ -74,6 +75,7 @@ class _Reader:
 
     def __init__(self, path: Path, sources: Sources) -> None:
         self._kinds, self._sources = load_kinds(sources), sources
+        path = found(path, "sweeps")
         self._layers = Layers(path)
         self._layers.lay(parse(path, "sweep", "a scene and [axes]"), str(path))
         self._data = self._layers.data
@@ -108,7 +110,7 @@ class _Reader:
         try:
             laid = [*texts(self._changes), *overrides]
             if isinstance(name := self._data.get("scene"), str):
-                return scene_file.load(self._layers.path.parent / name, laid, self._kinds)
+                return scene_file.load(self._scene_path(name), laid, self._kinds)
             if isinstance(table := self._data.get("base"), dict):
                 return scene_file.resolved(Layers(self._layers.path, table), laid, self._kinds)
         except SceneError as error:
@@ -120,10 +122,13 @@ class _Reader:
             self._layers.complain(("set",), str(error), "cannot be used")
         return None
 
+    def _scene_path(self, name: str) -> Path:
+        return found(Path(name), "scenes", self._layers.path.parent)
+
     def _unchanged(self) -> Scene | None:
         """Returns the scene without what is laid over it, where that is all that is wrong with it."""
         try:
-            return scene_file.load(self._layers.path.parent / self._data["scene"], (), self._kinds)
+            return scene_file.load(self._scene_path(self._data["scene"]), (), self._kinds)
         except (SceneError, LookupError, TypeError):
             return None
 

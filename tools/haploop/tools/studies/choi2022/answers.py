@@ -10,7 +10,7 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
-from haploop.tools.cost.grid import scenes_folder
+from haploop.launch.scene.bundled import bundled_folder
 from haploop.tools.executor.executors import make_executor, map_parallel
 from haploop.tools.machine import source_digest
 from haploop.tools.render.progress import Stage, silent
@@ -55,7 +55,7 @@ class Answers:
     def folder(self) -> Path:
         """The folder of this program's answers: another program's are another's."""
         here = Path(__file__).parent
-        scenes = (scenes_folder().parent / name for name in ("scenes", "hands", "devices"))
+        scenes = (bundled_folder(name) for name in ("scenes", "hands", "devices"))
         files = [
             *here.glob("*.py"),
             here / "interpretations.toml",

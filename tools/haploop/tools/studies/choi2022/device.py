@@ -12,11 +12,11 @@ from functools import cache
 from pathlib import Path
 from typing import Any, Self
 
+from haploop.launch.scene.bundled import bundled_folder
 from haploop.protocol.scene.effects import Friction, Transmission
 from haploop.protocol.scene.estimators import Acceleration, Velocity
 from haploop.protocol.scene.hand_force import Constant
 from haploop.protocol.scene.scene import Device, ElementTable, Hand, Scene
-from haploop.tools.cost.grid import scenes_folder
 from haploop.tools.linear.stiffness_limit import smooth
 from haploop.tools.search.random import Row
 from haploop.tools.studies.choi2022.runs import hand_of, shipped, wall_of
@@ -180,7 +180,7 @@ def _rounded(value: float, digits: int = 3) -> float:
 @cache
 def _hand_times(share: float) -> Hand:
     """Makes the published hand, so many times as heavy, damped and stiff."""
-    file = scenes_folder().parent / "hands" / "fu_cavusoglu_y.toml"
+    file = bundled_folder("hands") / "fu_cavusoglu_y.toml"
     table = tomllib.loads(file.read_text(encoding="utf-8"))["hand"]
     grip, hand = ({key: share * value for key, value in of.items() if key != "grip"} for of in (table["grip"], table))
     base = hand_of(shipped(SCENE_FILE))

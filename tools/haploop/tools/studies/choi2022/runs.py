@@ -9,11 +9,11 @@ import numpy as np
 
 from haploop.controller.dissipation import registry
 from haploop.launch.runs.in_process import run_in_process
+from haploop.launch.scene.bundled import bundled_folder
 from haploop.launch.scene.file import load
 from haploop.logger.log.recording import MemoryLog, Recording
 from haploop.logger.summary import Summary
 from haploop.protocol.scene.scene import Hand, Scene, Wall, by_window
-from haploop.tools.cost.grid import scenes_folder
 
 _LAST_S = 0.5
 
@@ -21,7 +21,7 @@ _LAST_S = 0.5
 @cache
 def shipped(name: str) -> Scene:
     """Returns a scene that comes with haploop, by the name of its file."""
-    return load(scenes_folder() / name)
+    return load(bundled_folder("scenes") / name)
 
 
 def fig6(panel: str) -> Scene:

@@ -1,0 +1,49 @@
+"""The scenes, devices, hands and sweeps that come with haploop, found by name wherever one is."""
+
+from __future__ import annotations
+
+import os
+import re
+from pathlib import Path
+
+import haploop.launch
+
+FOLDERS = ("scenes", "devices", "hands", "sweeps")
+
+
+def bundled_folder(folder: str) -> Path:
+    """Returns one of ``FOLDERS``: in a wheel inside haploop.launch, in a checkout beside it."""
+    package = Path(haploop.launch.__path__[0])
+    inside = package / folder
+    return inside if inside.is_dir() else package.parents[1] / folder
+
+
+def bundled(folder: str) -> dict[str, Path]:
+    """Returns the files of one of ``FOLDERS`` by name: ``fig6a``, ``accuracy/stick_slip``."""
+    root = bundled_folder(folder)
+    return {path.relative_to(root).with_suffix("").as_posix(): path for path in sorted(root.rglob("*.toml"))}
+
+
+def of_name(name: str, folder: str) -> Path | None:
+    """Returns the bundled file of a name, which may have its suffix and its folder (``devices/premium15.toml``)."""
+    first, _, rest = name.removesuffix(".toml").partition("/")
+    return bundled(first).get(rest) if rest and first in FOLDERS else bundled(folder).get(name.removesuffix(".toml"))
+
+
+def found(path: Path, folder: str, beside: Path = Path()) -> Path:
+    """Returns one's own file if there is one, relative to ``beside``, else the bundled one of this name.
+
+    Either may be named without its suffix.
+    """
+    own = beside / path
+    for file in (own, own.with_name(f"{own.name}.toml")):
+        if os.path.exists(file) and not os.path.isdir(file):  # noqa: PTH110, PTH112 (false, not an error, for any name)
+            return file
+    return of_name(path.as_posix(), folder) or own
+
+
+def about(path: Path) -> str:
+    """Returns what a bundled file is, in a line: its title, else the comment that it begins with."""
+    text = path.read_text(encoding="utf-8")
+    title = re.search(r'^title = "(.*)"$', text, re.MULTILINE)
+    return title[1] if title else text.partition("\n")[0].lstrip("# ")

@@ -1,0 +1,134 @@
+"""What comes with haploop is found by its name wherever one is, one's own files first."""
+
+import tomllib
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from haploop.launch.scene.bundled import FOLDERS, about, bundled
+from haploop.launch.scene.file import load
+from haploop.launch.scene.mistakes import SceneError
+from haploop.protocol.scene.hand_force import Ramp
+from haploop.tools.advise.subject import assumptions
+from haploop.tools.cli.app import app
+from haploop.tools.sweep import sweep_file
+from helpers.scenes.least import LEAST_TOML
+
+OWN = 'title = "my own"\n' + LEAST_TOML
+
+
+def call(*arguments: str):
+    return CliRunner().invoke(app, arguments)
+
+
+@pytest.fixture(autouse=True)
+def elsewhere(tmp_path, monkeypatch):
+    """Every test is somewhere else, where no file of haploop is."""
+    monkeypatch.chdir(tmp_path)
+
+
+@pytest.mark.parametrize("name", ["fig6c", "fig6c.toml", "scenes/fig6c.toml"])
+def test_a_scene_that_comes_with_haploop_is_found_by_its_name(name):
+    assert load(name) == load(bundled("scenes")["fig6c"])
+
+
+@pytest.mark.parametrize("name", ["fig6c", "fig6c.toml"])
+def test_ones_own_file_is_taken_before_that_of_the_same_name(name):
+    Path("fig6c.toml").write_text(OWN)
+    assert load(name).title == "my own"
+
+
+def test_a_directory_of_that_name_is_no_file_of_ones_own():
+    Path("fig6c").mkdir()
+    assert load("fig6c") == load(bundled("scenes")["fig6c"])
+
+
+def test_a_scene_extends_what_comes_with_haploop_and_what_lies_beside_it_comes_first():
+    folder = Path("deep", "devices")
+    folder.mkdir(parents=True)
+    scene = Path("deep", "mine.toml")
+    scene.write_text('extends = ["devices/premium15.toml", "hands/fu_cavusoglu_y"]\nduration = 1.0\n')
+    taken = load(scene)
+    assert taken.hand
+    assert (taken.device.mass, taken.hand.stiffness) == (0.0525, 105.3)
+    (folder / "premium15.toml").write_text(OWN)
+    assert load(scene).device.mass == 0.01
+
+
+def test_what_a_device_assumes_is_known_to_a_scene_that_names_it():
+    Path("mine.toml").write_text('extends = "devices/omega3.toml"\nduration = 1.0\n')
+    assert assumptions(Path("mine.toml")) == assumptions(bundled("devices")["omega3"])
+    assert assumptions(Path("mine.toml"))
+
+
+def test_a_sweep_is_found_by_its_name_and_names_its_scene_so():
+    assert sweep_file.load(Path("elements")).title == "Elements against stiffness, with a noisy position"
+    Path("mine.toml").write_text('scene = "fig6b"\n[axes]\n"wall.stiffness" = [100, 200]\n')
+    assert sweep_file.load(Path("mine.toml")).base.title.startswith("Fig. 6(b)")
+
+
+@pytest.mark.parametrize(
+    ("name", "told"),
+    [
+        (
+            "premium_tip",
+            "There is no such file, and no scene of that name comes with haploop; did you mean premium_tap?",
+        ),
+        ("some/fig6c.toml", "There is no such file."),
+        ("../scenes/fig6c.toml", "There is no such file."),
+        ("x" * 5000, "The file cannot be read: File name too long."),
+    ],
+)
+def test_a_name_that_is_none_is_told_with_the_nearest(name, told):
+    with pytest.raises(SceneError) as caught:
+        load(name)
+    assert str(caught.value).endswith(told)
+
+
+def test_all_that_comes_with_haploop_is_listed_with_what_it_is():
+    listed = call("scenes")
+    assert listed.exit_code == 0
+    for folder in FOLDERS:
+        for name, path in bundled(folder).items():
+            assert name in listed.stdout
+            assert len(about(path)) > 20
+
+
+@pytest.mark.parametrize("device", bundled("devices"))
+@pytest.mark.parametrize("hand", bundled("hands"))
+def test_a_new_scene_of_every_device_and_hand_can_be_run_and_asks_for_the_wall_it_was_made_for(device, hand):
+    made = call("new", "my.toml", "--device", device, "--hand", hand, "--wall", "0.25 N/mm")
+    assert made.exit_code == 0
+    scene = load("my.toml")
+    assert scene.wall
+    assert scene.hand
+    assert (scene.wall.stiffness, scene.hand.force) == (250.0, Ramp(value=-1.0, rise_time=0.3))
+
+
+def test_what_its_comments_offer_can_be_run_too():
+    call("new", "my.toml")
+    text = Path("my.toml").read_text()
+    Path("my.toml").write_text(
+        "".join(f"{line.removeprefix('# ') if _is_toml(line[2:]) else line}\n" for line in text.splitlines())
+    )
+    scene = load("my.toml")
+    assert (len(scene.dissipation), len(scene.event)) == (1, 1)
+
+
+def _is_toml(line: str) -> bool:
+    try:
+        return bool(tomllib.loads(line))
+    except tomllib.TOMLDecodeError:
+        return False
+
+
+def test_a_new_scene_never_takes_the_place_of_a_file_and_a_mistake_leaves_none():
+    Path("kept.toml").write_text("kept")
+    assert call("new", "kept.toml").exit_code == 2
+    assert Path("kept.toml").read_text() == "kept"
+    assert call("new", "my.toml", "--wall", "stiff").exit_code == 2
+    assert not Path("my.toml").exists()
+    refused = call("new", "my.toml", "--device", "premium")
+    assert refused.exit_code == 2
+    assert "did you mean premium15?" in refused.stderr

@@ -1,0 +1,54 @@
+"""The commands for a first scene: what comes with haploop, and a scene of one's own made of it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from haploop.tools.cli.options import FAILED, WRONG_USE, Json, leave, plain_errors, print_json
+
+
+def scenes(json: Json = False) -> None:
+    """List the scenes, devices, hands and sweeps that come with haploop; each is found by its name."""
+    from haploop.launch.scene.bundled import FOLDERS, about, bundled
+
+    listed = {folder: {name: about(path) for name, path in bundled(folder).items()} for folder in FOLDERS}
+    if json:
+        print_json(listed)
+        return
+    from haploop.tools.render.report import bundled_table
+    from haploop.tools.render.terminal import console
+
+    console().print(bundled_table(listed))
+
+
+def new(
+    file: Annotated[Path, typer.Argument(help="scene file to write, not there yet", show_default=False)],
+    device: Annotated[str, typer.Option(metavar="NAME", help="a device that haploop scenes lists")] = "premium15",
+    hand: Annotated[str, typer.Option(metavar="NAME", help="a hand that haploop scenes lists")] = "fu_cavusoglu_y",
+    wall: Annotated[str, typer.Option(metavar="STIFFNESS", help="stiffness of the wall")] = "0.5 N/mm",
+) -> None:
+    """Write a commented scene to start from: a hand moves a device into a wall and holds it there."""
+    from haploop.launch.scene.file import load
+    from haploop.launch.scene.mistakes import SceneError
+    from haploop.tools.cli.first_scene import FirstSceneError, first_scene
+
+    with plain_errors():
+        try:
+            text = first_scene(device, hand, wall)
+            with file.open("x", encoding="utf-8") as new_file:
+                new_file.write(text)
+        except FirstSceneError as error:
+            leave(str(error), WRONG_USE)
+        except FileExistsError:
+            leave(f"{file} is there already; name a file that is not.", WRONG_USE)
+        except OSError as error:
+            leave(f"{file} cannot be written: {error.strerror}.", FAILED)
+        try:
+            load(file)
+        except SceneError:
+            file.unlink()
+            raise
+    print(f"Next: haploop run {file}, haploop explain {file}, haploop advise {file}.")

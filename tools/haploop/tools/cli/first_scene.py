@@ -1,0 +1,63 @@
+"""The text of a first scene: a device, a hand and a wall, with comments that say what else there is."""
+
+from __future__ import annotations
+
+from haploop.launch.scene.bundled import bundled
+from haploop.launch.scene.mistakes import nearest
+from haploop.launch.scene.toml_writer import inline
+
+_TEXT = """\
+# A scene for haploop. What it does not say it takes from the files it extends; what they do not say is left out of the
+# simulation. `haploop check THIS --json` prints all of it, resolved; `haploop check --schema` every key there is.
+title = {title}
+extends = [{device}, {hand}]  # haploop scenes lists them; a file of yours is named by its path
+duration = 3.0  # s
+
+[clock]
+control_rate = 1000  # Hz, of the controller; the plant moves at 10 kHz
+round_trip_delay = "0 ms"  # from a sample to its force; a multiple of 0.1 ms
+
+[hand.force]  # what the muscles do: press with 1 N, reached after 0.3 s
+kind = "ramp"
+value = "-1 N"
+rise_time = "0.3 s"
+
+[wall]
+position = "-5 mm"  # below this the wall pushes back
+stiffness = {wall}
+
+# An element that takes energy out while the device is in the wall; haploop plugins lists them.
+# [[dissipation]]
+# kind = "damping"
+# damping = "1 N s/m"
+
+# A swap in mid-run; haploop swap does the same to a running loop.
+# [[event]]
+# at = "2 s"
+# swap = {{ kind = "unidirectional-inertia", mass = "2 g" }}
+"""
+
+
+class FirstSceneError(ValueError):
+    """A device or hand that does not come with haploop; the message says which do."""
+
+
+def first_scene(device: str, hand: str, wall: str) -> str:
+    """Returns a scene in which a hand moves a device into a wall and holds it there.
+
+    Args:
+        device, hand: names that ``haploop scenes`` lists.
+        wall: stiffness with its unit, not checked.
+    """
+    for option, name, folder in (("--device", device, "devices"), ("--hand", hand, "hands")):
+        known = bundled(folder)
+        if name not in known:
+            meant = nearest(name, known)
+            hint = f"; did you mean {meant}?" if meant else "."
+            raise FirstSceneError(f"{option} {name!r} does not come with haploop{hint} These do: {', '.join(known)}.")
+    return _TEXT.format(
+        title=inline(f"{device} held by {hand} against a wall of {wall}"),
+        device=inline(f"devices/{device}.toml"),
+        hand=inline(f"hands/{hand}.toml"),
+        wall=inline(wall),
+    )
