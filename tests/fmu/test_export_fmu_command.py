@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import re
-import shutil
 import stat
 import zipfile
 from pathlib import Path
@@ -19,6 +18,7 @@ from haploop.controller.estimators.choose import estimator_class
 from haploop.tools.cli.app import app
 from haploop.tools.fmu import package
 from haploop.tools.fmu.variables import ELEMENTS, ESTIMATORS, NotExportable, controller_of
+from helpers.runs.fmus import compiler
 from helpers.scenes.least import KINDS, LEAST_TOML, scene
 
 WALL_TOML = LEAST_TOML + "[wall]\nposition = -0.06\nstiffness = 150\n"
@@ -42,10 +42,9 @@ def wall(tmp_path: Path) -> Path:
     return path
 
 
-@pytest.fixture
-def compiler() -> str:
-    found = next(filter(shutil.which, ("cc", "gcc", "clang")), None)
-    return found or pytest.skip("there is no C compiler")
+@pytest.fixture(name="compiler")
+def there_is_a_compiler() -> str:
+    return compiler()
 
 
 @pytest.mark.usefixtures("compiler")

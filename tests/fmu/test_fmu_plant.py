@@ -18,7 +18,7 @@ from haploop.launch.processes.foreign import read_programs
 from haploop.launch.runs.start import prepare, run
 from haploop.launch.spec import RunFailed
 from haploop.tools.fmu.package import host_platform
-from helpers.runs.fmus import needs_fmus
+from helpers.runs.fmus import compiler, needs_fmus
 
 HOUSE = Path(__file__).parents[2]
 SCENE = """
@@ -79,7 +79,7 @@ def fmu(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "mass.c").write_text(source, encoding="utf-8")
     machine, suffix = host_platform()
     flags = ["-O2", "-fPIC", "-shared", f"-I{headers}", "-o", f"mass{suffix}"]
-    subprocess.run(["cc", *flags, "mass.c", "stubs.c"], cwd=folder, check=True)
+    subprocess.run([compiler(), *flags, "mass.c", "stubs.c"], cwd=folder, check=True)
     variables = "".join(VARIABLE.format(name=name, at=at, rest=ROLES[name]) for at, name in enumerate(NAMES))
     with zipfile.ZipFile(folder / "mass.fmu", "w") as archive:
         archive.writestr("modelDescription.xml", DESCRIPTION.format(variables=variables))

@@ -6,7 +6,6 @@ import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -19,15 +18,19 @@ from haploop.plant.plant import Plant
 from haploop.protocol.changes import is_change
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
-from haploop.tools.fmu.package import write_fmu
+from haploop.tools.fmu.package import make_fmu
 from helpers.scenes.least import KINDS
+
+
+def compiler() -> str:
+    """Returns the C compiler that there is; skips the test where there is none."""
+    return next(filter(shutil.which, ("cc", "gcc", "clang")), None) or pytest.skip("there is no C compiler")
 
 
 def needs_fmus() -> None:
     """Skips a test where FMUs cannot be made or loaded."""
     pytest.importorskip("fmpy", reason="FMPy is not installed")
-    if not any(map(shutil.which, ("cc", "gcc", "clang"))):
-        pytest.skip("there is no C compiler")
+    compiler()
 
 
 @dataclass(frozen=True)
@@ -85,8 +88,7 @@ def made(scene: Scene, folder: Path, stem: str = "controller") -> Path:
     """Returns the file of a scene's FMU, which is compiled once."""
     path, key = folder / f"{stem}.fmu", (repr(scene), stem)
     if key not in _MADE:
-        write_fmu(scene, stem, file := BytesIO())
-        _MADE[key] = file.getvalue()
+        _MADE[key] = make_fmu(scene, stem)
     path.write_bytes(_MADE[key])
     return path
 

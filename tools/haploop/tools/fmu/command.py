@@ -24,7 +24,7 @@ def export_fmu(
     from haploop.launch.scene.file import load
     from haploop.protocol.ticks import Timebase
     from haploop.tools.export.command import ExportFailed, new_files
-    from haploop.tools.fmu.package import NotCompiled, write_fmu
+    from haploop.tools.fmu.package import NotCompiled, make_fmu
     from haploop.tools.fmu.variables import NotExportable, step_count
 
     target = Path(f"{scene.stem}.fmu") if out is None else out / f"{scene.stem}.fmu" if out.is_dir() else out
@@ -33,8 +33,9 @@ def export_fmu(
     with plain_errors():
         resolved = load(scene, set or [])
         try:
+            made = make_fmu(resolved, scene.stem)
             with new_files([target], force) as [file]:
-                write_fmu(resolved, scene.stem, file)
+                file.write(made)
         except NotExportable as error:
             leave(str(error), WRONG_USE)
         except (NotCompiled, ExportFailed) as error:

@@ -13,11 +13,11 @@ import sys
 import tempfile
 import zipfile
 from importlib.resources import files
+from io import BytesIO
 from pathlib import Path
-from typing import IO
 
 from haploop.protocol.scene.scene import Scene
-from haploop.tools.fmu.description import build_description, model_description
+from haploop.tools.fmu.description import BUILD, model_description
 from haploop.tools.fmu.variables import controller_of, header, variables_of
 
 SOURCES = ("fmi3.c", "controller.h")
@@ -32,8 +32,8 @@ class NotCompiled(Exception):
     """There is no C compiler, or it failed; the message says what to do."""
 
 
-def write_fmu(scene: Scene, stem: str, target: IO[bytes]) -> None:
-    """Writes the FMU of a resolved scene's controller; the same scene and ``stem`` of its identifier, the same bytes.
+def make_fmu(scene: Scene, stem: str) -> bytes:
+    """Makes the FMU of a resolved scene's controller; the same scene and ``stem`` of its identifier, the same bytes.
 
     Raises:
         NotExportable: no FMU can be made of this scene.
@@ -52,14 +52,16 @@ def write_fmu(scene: Scene, stem: str, target: IO[bytes]) -> None:
     contents = {
         "modelDescription.xml": model_description(scene, variables, identifier, token).encode(),
         f"binaries/{tuple_}/{identifier}{suffix}": library,
-        "sources/buildDescription.xml": build_description(identifier).encode(),
+        "sources/buildDescription.xml": BUILD.format(identifier=identifier).encode(),
         **{f"sources/{name}": text.encode() for name, text in sources.items()},
     }
-    with zipfile.ZipFile(target, "w", zipfile.ZIP_DEFLATED) as archive:
+    made = BytesIO()
+    with zipfile.ZipFile(made, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, data in contents.items():
             entry = zipfile.ZipInfo(name)  # of 1980, whenever it is made
             entry.compress_type, entry.external_attr = zipfile.ZIP_DEFLATED, 0o644 << 16
             archive.writestr(entry, data)
+    return made.getvalue()
 
 
 def host_platform() -> tuple[str, str]:
