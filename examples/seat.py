@@ -16,10 +16,12 @@ import threading
 import time
 from array import array
 from collections import deque
+from pathlib import Path
 
 import msgpack
 import zmq
 from schedule import Schedule
+from sockets import Sockets
 
 VERSION = 2
 JOIN, WELCOME, REFUSED, READY, GRANT, PROGRESS, WAITING, ENDED, DONE, FAILED, ABORT = range(1, 12)
@@ -41,11 +43,18 @@ class SeatError(Exception):
 def take_seat(name, version):
     """Starts as a node of a run is started, joins it, and returns the seat.
 
-    The last argument is the directory for sockets and stdin brings a line of JSON: address, secret, transport, cores.
+    The last argument is the directory for sockets, and stdin brings a line of JSON (--node); or it is the file
+    external-plant.json that a run with --external plant has written.
     """
-    directory, start = sys.argv.pop(), json.loads(sys.stdin.readline())
-    seat = Seat(directory, start, {"name": name[:200], "version": version, "command": " ".join(sys.argv)[:200]})
-    threading.Thread(target=_end_with_launcher, args=(seat,), daemon=True).start()
+    if len(sys.argv) < 2:
+        raise SystemExit(f'This is started by: haploop run SCENE --node plant="python {sys.argv[0]} ..."')
+    last = sys.argv.pop()
+    is_external = last.endswith(".json")
+    start = json.loads(Path(last).read_text(encoding="utf-8") if is_external else sys.stdin.readline())
+    program = {"name": name[:200], "version": version, "command": " ".join(sys.argv)[:200]}
+    seat = Seat(start["directory"] if is_external else last, start, program, is_external)
+    if not is_external:
+        threading.Thread(target=_end_with_launcher, args=(seat,), daemon=True).start()
     return seat
 
 
@@ -63,26 +72,24 @@ class Seat:
         step_s: the plant step h, s.
     """
 
-    def __init__(self, directory, start, program):
-        self._context, self.hold = zmq.Context(), lambda force: None
-        self._clock = self._socket(zmq.DEALER)
-        self._clock.connect(start["address"])
-        self._loop, self._telemetry = self._socket(zmq.ROUTER), self._socket(zmq.XPUB)
+    def __init__(self, directory, start, program, is_external):
+        self._sockets, self.hold = Sockets(directory, start["transport"]), lambda force: None
+        self._clock = self._sockets.open(zmq.DEALER)
+        self._sockets.connect(self._clock, start["address"])
+        self._loop, self._telemetry = self._sockets.open(zmq.ROUTER), self._sockets.open(zmq.XPUB)
         self._loop.router_mandatory, self._telemetry.xpub_verbose, self._telemetry.sndhwm = True, True, 256
         self._loop.sndhwm = self._loop.rcvhwm = 0  # a plant that owns the time sends on while answers are late
-        endpoints = {"loop": f"ipc://{directory}/loop.sock", "telemetry": f"ipc://{directory}/plant.sock"}
-        self._loop.bind(endpoints["loop"])
-        self._telemetry.bind(endpoints["telemetry"])
+        endpoints = {
+            "loop": self._sockets.bind(self._loop, "loop"),
+            "telemetry": self._sockets.bind(self._telemetry, "plant"),
+        }
         self._until, self._last, self._events, self._secret = 0, False, [], start["secret"]
         self._say(JOIN, "plant", self._secret, os.getpid(), endpoints, True, program)
         _, self.scene, timebase, _, _, self._told = self._welcome()
-        self._ticks, self._delay = timebase["ticks"], timebase["delay_steps"]
+        # The end of stdin tells of the end of a run; without it only silence does.
+        self._heard, self._silence_s = time.monotonic(), self.scene["run"]["deadline"] if is_external else math.inf
+        self._delay = timebase["delay_steps"]
         self._n, self.step_s = timebase["plant_rate"] // timebase["control_rate"], 1.0 / timebase["plant_rate"]
-
-    def _socket(self, kind):
-        socket = self._context.socket(kind)
-        socket.linger = 1000
-        return socket
 
     # The clock
 
@@ -110,7 +117,7 @@ class Seat:
                 self._events += [(tick, event["set"][DELAY]) for tick, event in events if DELAY in event.get("set", {})]
             elif code == ABORT:
                 raise SystemExit(fields[0])
-            wait_ms, heard = 0, True
+            wait_ms, heard, self._heard = 0, True, time.monotonic()
         return heard
 
     def _await_grant(self):
@@ -126,6 +133,8 @@ class Seat:
     def _idle(self, on):
         self._say(WAITING, self._tick, on)
         self._listen()
+        if time.monotonic() - self._heard > self._silence_s:
+            raise SystemExit(f"Nothing was heard of the clock for {self._silence_s:g} s; is the run still there?")
 
     # The run
 
@@ -148,7 +157,7 @@ class Seat:
             self._say(DONE, self._tick, {"lateness": self._schedule.figures()} if self._owns_time else {})
         finally:
             hold(0.0)
-            self._context.destroy(linger=1000)
+            self._sockets.close()
 
     def _work(self, step, x, v):
         self._tick, self._x, self._v, self._force, self._command = 0, x, v, 0.0, -1
