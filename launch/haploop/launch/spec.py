@@ -29,6 +29,10 @@ class OutputError(Exception):
     """The directory cannot be used; the message says why and what to do."""
 
 
+class NeverBegan(Exception):
+    """A run for which no program came to take part; the message says for whom it waited."""
+
+
 class RunFailed(Exception):
     """A run that could not go on; the message names the node and the last common tick."""
 

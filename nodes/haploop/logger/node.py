@@ -52,6 +52,7 @@ class LoggerNode:
         self._status_due = 0.0
         self._judged_at = 0
         self._started = False
+        self._foreign: dict[str, bool] = {}
 
     @property
     def _tick(self) -> int:
@@ -64,12 +65,16 @@ class LoggerNode:
         attachments = welcome["context"].get("attachments", {})
         scene, time = Scene.from_dict(welcome["scene"]), Timebase(**welcome["timebase"])
         self.session = open_session(scene, time, out, attachments, machine=self._machine)
+        self.session.programs = welcome["context"].get("programs", {})
+        self._foreign = {role: not program["own"] for role, program in self.session.programs.items()}
+        self._time = time
         self.session.logger.booked = self._publish_energy
         states: dict[str, Message] = {}
         early: list[tuple[str, Frame]] = []
         while len(states) < len(_LISTENS):
             received = self._streams.receive(REPORT_MS)
             for role, frame in received:
+                self._check(role, frame)
                 if frame.name == "STATE":
                     states[role] = frame.fields[1]
                 else:
@@ -96,7 +101,7 @@ class LoggerNode:
             if not self._client.until:  # the run has not begun
                 self.session.logger.count_wall_time()
             if idle:
-                self._client.waiting(self._tick, "plant")
+                self._client.waiting(self._tick, self._streams.slowest)
             self._drain()
             self._client.poll()
             self._note_events()
@@ -112,7 +117,19 @@ class LoggerNode:
 
     def _drain(self) -> None:
         for role, frame in self._streams.drain():
+            self._check(role, frame)
             self._take(role, frame)
+
+    def _check(self, role: str, frame: Frame) -> None:
+        """Looks through what a program of somebody else's has sent.
+
+        Raises NodeError where it cannot be booked.
+        """
+        if self._foreign.get(role):
+            from haploop.logger.foreign import complaint
+
+            if why := complaint(frame, role, self._time):
+                raise NodeError(why)
 
     def _take(self, role: str, frame: Frame) -> None:
         if frame.name == "PLANT_BLOCK":
@@ -145,7 +162,7 @@ class LoggerNode:
         """Finishes because of what ``failed`` says, with the blocks that have come; None if nothing has begun."""
         if not self._started:
             return None
-        with contextlib.suppress(TelemetryGap):
+        with contextlib.suppress(TelemetryGap, NodeError):
             self._drain()
         return self.finish(failed)[1]
 
@@ -171,7 +188,7 @@ def work(client: ClockClient, context: zmq.Context[zmq.Socket[bytes]], directory
         try:
             node.start(welcome, Path(welcome["context"]["out"]))
             return node.run()
-        except Aborted as error:
+        except (Aborted, NodeError) as error:
             node.save(str(error))
             raise
     except LogError as error:

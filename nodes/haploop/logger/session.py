@@ -12,6 +12,7 @@ from haploop.logger.summary import Summary, finite, write_summary
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
 from haploop.protocol.transport.machine import MACHINE, Machine
+from haploop.protocol.transport.wire import Message
 
 LOG = "log.mcap"
 # The log is at most this far behind on disk, in wall time.
@@ -19,12 +20,17 @@ _FLUSH_S = 0.4
 
 
 class LogSession:
-    """Keeps a logger's log flushed and closes everything in order."""
+    """Keeps a logger's log flushed and closes everything in order.
+
+    Attributes:
+        programs: what plant and controller are, by role, for the summary; empty where both are haploop's own.
+    """
 
     def __init__(self, logger: Logger, log: Log | None, out: Path | None, machine: Machine = MACHINE) -> None:
         self.logger = logger
         self._log, self._out, self._machine = log, out, machine
         self._flush_due = self._machine.now() + _FLUSH_S
+        self.programs: Message = {}
 
     def flush_when_due(self) -> None:
         """Hands the log to the operating system if the last time is too long ago."""
@@ -39,6 +45,8 @@ class LogSession:
         if self._log:
             self._log.close()
         summary = finite(self.logger.summary(failed, reason, trouble, telemetry_gaps))
+        if self.programs:
+            summary["programs"] = self.programs
         if self._out:
             write_summary(summary, self._out, self._machine)
         return summary

@@ -19,6 +19,7 @@ from haploop.protocol.transport.telemetry import Publisher
 from haploop.protocol.transport.wire import Message
 
 ROLE = "plant"
+_NO_FORCE = "the controller gave a force that is no finite number"
 
 
 class PlantNode:
@@ -37,6 +38,7 @@ class PlantNode:
         self._block = BlockLength(scene.run.block_ticks, machine_of(context).now)
         self._flushed = 0
         self._secret = welcome["context"]["secret"]
+        self._is_controller_foreign = not welcome["context"].get("programs", {}).get("controller", {"own": True})["own"]
 
     def _state(self) -> tuple[int, Message]:
         state = self._plant.state()
@@ -71,7 +73,8 @@ class PlantNode:
         plant = self._plant
         self._loop.close(plant.reached)
         self._flush()
-        self._publisher.publish("END", plant.reached, plant.stop_reason or "", None)
+        trouble = _NO_FORCE if self._is_controller_foreign and plant.has_no_force else None
+        self._publisher.publish("END", plant.reached, plant.stop_reason or "", trouble)
         if plant.stop_reason:
             self._client.ended(plant.reached, plant.stop_reason)
         return plant.reached, {"strangers": self._loop.unknown_peers + self._publisher.unknown_peers}

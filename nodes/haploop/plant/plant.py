@@ -128,6 +128,11 @@ class Plant:
             self._unusable = True
 
     @property
+    def has_no_force(self) -> bool:
+        """True once a command came that is no finite number."""
+        return self._unusable
+
+    @property
     def reached(self) -> int:
         """The tick whose state is the present one: every interval before it has been stepped."""
         return self.tick - self._interval_due

@@ -103,6 +103,7 @@ class Commands:
             "pace": device_time.PLANT if self._spec.clock == device_time.PLANT else in_words(clock.pace.rate),
             "lateness": self._lateness(roster),
             "nodes": roster.table(),
+            **({"programs": programs} if (programs := roster.provenance()) else {}),
             "refused": roster.refused,
             "telemetry": {role: addresses["telemetry"] for role, addresses in roster.endpoints().items()},
             **({"status": logger.status} if logger else {}),

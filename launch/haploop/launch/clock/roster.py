@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from haploop.launch.processes.foreign import NO_PROGRAMS, Program
+from haploop.launch.processes.foreign import NO_PROGRAMS, ROLES, Program
+from haploop.launch.spec import PROGRAMS
 from haploop.protocol.transport.messages import PROCESSES
 from haploop.protocol.transport.wire import Message
 
@@ -18,6 +20,7 @@ class Node:
         role, pid, lossless: as it said when it joined; a lossless node holds the clock back.
         tick: every tick before it is done.
         heard: wall time of its last message, s.
+        is_gone: whether a message could not be sent to it, since its connection has ended.
         program: name, version and command of what it is, as it said; each a text that may be missing.
     """
 
@@ -31,6 +34,7 @@ class Node:
     tick: int = 0
     ready: bool = False
     done: bool = False
+    is_gone: bool = False
     waits_for: str = ""
     status: Message = field(default_factory=dict)
 
@@ -63,6 +67,42 @@ class Roster:
         """Returns how people are told of a role: by its program, too, where that is somebody else's."""
         return self._programs[role].label if role in self._programs else role
 
+    def others_than(self, role: str) -> str:
+        """Returns a sentence that names the programs of somebody else's in other roles; "" for none."""
+        labels = [program.label for program in self._programs.values() if program.role != role]
+        return f" With it ran the {' and the '.join(labels)}, not haploop's own." if labels else ""
+
+    def is_external(self, role: str) -> bool:
+        """Tells whether a program that the launcher does not start takes this role."""
+        return role in self._programs and self._programs[role].is_external
+
+    def provenance(self) -> dict[str, Message]:
+        """Returns what plant and controller are, by role, where one of them is not haploop's own; else nothing.
+
+        Each has ``name``, ``version`` and ``command``, "" where unknown, and ``own``: whether it is haploop's.
+        """
+        if not self._programs:
+            return {}
+        from importlib.metadata import version
+
+        found = {}
+        for role in ROLES:
+            said, foreign = (node.program if (node := self.own(role)) else {}), self._programs.get(role)
+            own = {"name": "haploop", "version": version("haploop"), "command": f"python -m {PROCESSES[role].module}"}
+            found[role] = {key: said.get(key, "") for key in own} if foreign else own
+            if foreign and foreign.command:
+                found[role]["command"] = foreign.command
+            found[role]["own"] = not foreign
+        return found
+
+    def with_provenance(self, context: Message) -> Message:
+        """Returns the context of WELCOME with what plant and controller are, for the log, too, unless both are own."""
+        programs = self.provenance()
+        if not programs:
+            return context
+        attachments = context.get("attachments", {}) | {PROGRAMS: json.dumps(programs, indent=1)}
+        return context | {"programs": programs, "attachments": attachments}
+
     def all_own(self, what: str) -> bool:
         """Tells whether all the run's own processes have joined and ``what`` ("ready", "done") holds for each."""
         return all((node := self.own(role)) is not None and getattr(node, what) for role in PROCESSES)
@@ -92,7 +132,11 @@ class Roster:
             node.heard += seconds
 
     def table(self) -> list[Message]:
-        """Returns role, pid, tick, lag behind the first, whom it waits for and skipped ticks of every node."""
+        """Returns role, pid, tick, lag behind the first, whom it waits for and skipped ticks of every node.
+
+        One that is no program of haploop's has its ``program`` beside, as in :meth:`provenance`.
+        """
+        programs = self.provenance()
         first = max((node.tick for node in self.nodes.values()), default=0)
         return [
             {
@@ -103,6 +147,7 @@ class Roster:
                 "waits_for": node.waits_for,
                 "lossless": node.lossless or node.is_own,
                 "skipped_ticks": node.status.get("skipped_ticks", 0),
+                **({"program": programs[node.role]} if not programs.get(node.role, {"own": True})["own"] else {}),
             }
             for node in self.nodes.values()
         ]

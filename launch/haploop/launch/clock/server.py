@@ -61,6 +61,11 @@ class ClockServer:
         self._last_sent = False
         self._awaited: list[tuple[bytes, Generator[None, None, Answer]]] = []
 
+    @property
+    def is_stopped(self) -> bool:
+        """True once the clock will grant no further tick."""
+        return self._clock.is_last
+
     def close(self) -> None:
         """Stops listening; what was sent still goes out, and what is still being tried for an answer is given up."""
         for _, steps in self._awaited:
@@ -80,6 +85,7 @@ class ClockServer:
             self._reply(sender, steps)
         if not self._greeted and self.roster.joined():
             self._greeted = True
+            self._welcome = (*self._welcome[:3], self.roster.with_provenance(self._welcome[3]))
             for node in list(self.roster.nodes.values()):
                 self._greet(node)
         if self.roster.all_own("ready"):
@@ -123,9 +129,9 @@ class ClockServer:
                 self._send_frame(node.identity, grant)
 
     def probe(self, nodes: list[Node]) -> None:
-        """Repeats the grant to attached nodes; one to which it cannot be sent is gone and is taken off."""
+        """Repeats the grant to nodes that the launcher did not start; one to which it cannot be sent is gone."""
         for node in nodes:
-            if not node.is_own:
+            if not node.is_own or self.roster.is_external(node.role):
                 self._send(node.identity, "GRANT", self._clock.until, self._clock.is_last, [])
 
     def _send(self, identity: bytes, name: str, *fields: Any) -> None:
@@ -134,10 +140,12 @@ class ClockServer:
     def _send_frame(self, identity: bytes, frame: bytes) -> None:
         try:
             self.socket.send_multipart([identity, frame], flags=zmq.DONTWAIT)
-        except zmq.ZMQError:  # gone, or so far behind that its queue is full
+        except zmq.ZMQError as error:  # gone, or so far behind that its queue is full
             node = self.roster.nodes.get(identity)
             if node and not node.is_own:
                 del self.roster.nodes[identity]
+            elif node:
+                node.is_gone = error.errno == zmq.EHOSTUNREACH
 
     def _reply(self, sender: bytes, answer: Answer | Generator[None, None, Answer]) -> None:
         """Sends an answer, or goes one step further towards it."""
@@ -257,7 +265,7 @@ class ClockServer:
 
     def _on_failed(self, node: Node, tick: int, reason: str) -> None:
         if node.is_own:
-            raise RunFailed(f"The {self.roster.label(node.role)} failed: {reason}")
+            raise RunFailed(f"The {self.roster.label(node.role)} failed: {reason}{self.roster.others_than(node.role)}")
         del self.roster.nodes[node.identity]
 
     def drop(self, node: Node, reason: str) -> None:

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 ROLES = ("plant", "controller")
 WAIT_S = 60.0
 _LONGEST_WAIT_S = 1e6
+_LONGEST_TOLD = 100
 
 
 class ProgramError(ValueError):
@@ -37,7 +38,13 @@ class Program:
     @property
     def label(self) -> str:
         """The role and its program, for people."""
-        return f"{self.role} ({self.command or 'external'})"
+        command = self.command if len(self.command) <= _LONGEST_TOLD else f"{self.command[:_LONGEST_TOLD]} ..."
+        return f"{self.role} ({command or 'external'})"
+
+
+def seat_file(role: str) -> str:
+    """Returns the name of the file by which a program that somebody else starts finds the run."""
+    return f"external-{role}.json"
 
 
 NO_PROGRAMS: Mapping[str, Program] = {}

@@ -12,13 +12,14 @@ import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
+from haploop.launch.processes.foreign import ROLES, seat_file
 from haploop.launch.spec import OutputError
 from haploop.protocol.transport.messages import PROCESSES
 
 ENTRY, PART, LOCK = "run.json", "run.part", "lock"
 # Every name that may stand in a private directory; the lock goes last, since it says that the directory is ours.
 _SOCKETS = ("clock", *(name for process in PROCESSES.values() for name in process.binds.values()))
-_OURS = (*(f"{name}.sock" for name in _SOCKETS), PART, ENTRY, LOCK)
+_OURS = (*(f"{name}.sock" for name in _SOCKETS), *map(seat_file, ROLES), PART, ENTRY, LOCK)
 _OWNER = b"haploop"
 _NAME = re.compile(r"[0-9a-f]{6}")
 # A socket's path must stay below the kernel's 107 bytes; this leaves room for the run and the socket's name.

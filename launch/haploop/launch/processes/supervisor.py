@@ -8,6 +8,7 @@ import secrets
 from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -20,9 +21,11 @@ from haploop.launch.clock.device_time import PLANT, lateness_told
 from haploop.launch.clock.roster import Node
 from haploop.launch.clock.server import ClockServer
 from haploop.launch.processes import private_directory, run_directory
+from haploop.launch.processes.awaited import Awaited
 from haploop.launch.processes.children import Child, interrupts, start_children
 from haploop.launch.processes.foreign import Program
 from haploop.launch.processes.shown_prints import PRINTS, ShownPrints
+from haploop.launch.processes.standstill import START_DEADLINE_S, Standstill
 from haploop.launch.spec import OutputError, RunFailed, RunSpec
 from haploop.protocol.changes import Event
 from haploop.protocol.ticks import Timebase
@@ -37,7 +40,6 @@ if TYPE_CHECKING:
 # run, and programs that take the place of its own.
 Start = Callable[[Path, Callable[[str], Message], bool, int, Mapping[str, Program]], dict[str, Child]]
 
-_START_DEADLINE_S = 20.0
 # What the logger is given to save its files after another node has failed.
 _SAVING_S = 0.7
 # How long the last message of a process that has exited may still be on its way.
@@ -61,6 +63,7 @@ def run_processes(
     The first SIGINT or SIGTERM ends the run in order, with a summary of what ran; the second at once.
 
     Raises:
+        NeverBegan: no program joined that somebody else was to start.
         RunFailed: a process was killed, hung or could not go on; nothing of the run is left but its files.
         OutputError: sockets or processes cannot be made.
         KeyboardInterrupt: the second signal came.
@@ -132,8 +135,12 @@ class Supervisor:
                 return start | own
             return {**start, "transport": transport.of(role).as_dict()}
 
-        self._children = start_nodes(sockets, told_to, scene.run.pin, run_number, spec.programs)
+        self._told_to = told_to
+        self._start_nodes = partial(start_nodes, sockets, told_to, scene.run.pin, run_number, spec.programs)
+        self._external = [program for program in spec.programs.values() if program.is_external]
+        self._children: dict[str, Child] = {} if self._external else self._start_nodes()
         self._started = self._looked = self._machine.now()
+        self._standstill = Standstill(self._server.roster, self._clock, self._deadline_s)
         if not math.isinf(spec.pace):  # the nodes are loading
             self._clock.prepare()
         self._probe_due = 0.0
@@ -146,6 +153,11 @@ class Supervisor:
         try:
             address = f" at {self._server.address}" if self._spec.transport.host else ""
             self._spec.on_started(self._sockets.name + address)
+            if self._external:
+                awaited = Awaited(self._sockets, self._external, self._server, self._machine)
+                awaited.wait(self._told_to, self._spec.wait_s, self._interrupts)
+                self._children = self._start_nodes()
+                self._started = self._looked = self._machine.now()
             self._lead()
             failed = False
             summary = self._server.results["logger"]
@@ -206,23 +218,27 @@ class Supervisor:
         held_up_s, self._looked = now - self._looked, now
         if held_up_s > _HELD_UP_S:
             self._started += held_up_s
+            self._standstill.discount(held_up_s)
             roster.discount_silence(held_up_s)
         if not roster.joined():
-            if now - self._started > _START_DEADLINE_S:
+            if now - self._started > START_DEADLINE_S:
                 missing = [role for role in self._children if not roster.own(role)]
-                sentence = (
-                    f"The {' and the '.join(map(roster.label, missing))} did not join within {_START_DEADLINE_S:g} s."
-                )
-                raise RunFailed(
-                    " ".join([sentence, *(roster.refused[role] for role in missing if role in roster.refused)])
-                )
+                names = " and the ".join(map(roster.label, missing))
+                refused = [roster.refused[role] for role in missing if role in roster.refused]
+                raise RunFailed(" ".join([f"The {names} did not join within {START_DEADLINE_S:g} s.", *refused]))
             return
+        for node in roster.nodes.values():
+            if node.is_gone and roster.is_external(node.role) and not node.done:
+                raise RunFailed(f"The {roster.label(node.role)} is gone; {self._where()}")
+        if self._spec.programs:
+            self._standstill.check(now)
         # Nodes may still load and a machine be busy with it; the deadline of the scene is that of a loop that runs.
-        deadline_s = self._deadline_s if roster.common_tick() else max(self._deadline_s, _START_DEADLINE_S)
+        deadline_s = self._deadline_s if roster.common_tick() else max(self._deadline_s, START_DEADLINE_S)
         for node in roster.silent(now, self._deadline_s):
             if node.is_own and now - node.heard > deadline_s and not self._may_rouse(node, now):
+                ended = "given up" if roster.is_external(node.role) else "ended"
                 raise RunFailed(
-                    f"The {roster.label(node.role)} has not answered for {deadline_s:g} s and was ended; "
+                    f"The {roster.label(node.role)} has not answered for {deadline_s:g} s and was {ended}; "
                     f"{self._where()} A longer wait can be set with run.deadline."
                 )
             if not node.is_own and node.lossless and node.tick <= roster.slowest():
@@ -261,6 +277,6 @@ class Supervisor:
         for role, child in self._children.items():
             if role != "logger":
                 child.kill()
+        self._server.abort(reason)
         if self._server.roster.own("logger"):
-            self._server.abort(reason)
             self._children["logger"].wait(_SAVING_S)

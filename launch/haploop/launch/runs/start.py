@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from haploop.logger.summary import Summary
     from haploop.protocol.changes import Event
 
+_NOT_OURS = "By its window alone, since the {} was not haploop's own and cannot be gone through again here."
 _NOT_REPEATED = "By its window alone, since the run is longer than {:g} s (haploop judge goes through it again)."
 
 
@@ -116,6 +117,7 @@ def run(spec: RunSpec, *, in_process: bool = False, **options: Any) -> Summary:
         options: fields of ``RunSpec`` that take the place of those of ``spec``.
 
     Raises:
+        NeverBegan: no program joined that somebody else was to start.
         RunFailed: a process was killed, hung or could not go on, or an element raised.
         OutputError: the run's sockets cannot be made, or its plant cannot own the time.
         LogError: the log could not be written (in one process).
@@ -158,8 +160,9 @@ def _judged(spec: RunSpec, summary: Summary, events: list[tuple[int, Event]]) ->
         return summary
     from haploop.logger.summary import REPEATED_S, write_summary
 
-    if summary["duration_s"] > REPEATED_S:
-        summary["verdict_rule"] = f"{_NOT_REPEATED.format(REPEATED_S)} {summary['verdict_rule']}"
+    if spec.programs or summary["duration_s"] > REPEATED_S:
+        why = _NOT_OURS.format(" and the ".join(spec.programs)) if spec.programs else _NOT_REPEATED.format(REPEATED_S)
+        summary["verdict_rule"] = f"{why} {summary['verdict_rule']}"
         write_summary(summary, spec.out)
         return summary
     from haploop.launch.runs.judging import find, judge_elsewhere

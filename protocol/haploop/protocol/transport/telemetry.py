@@ -90,6 +90,11 @@ class Subscriber:
         """Returns the tick before which everything has come from every publisher, or never will."""
         return min(self._next_tick.values(), default=0) if len(self._next_tick) == len(self.gaps) else 0
 
+    @property
+    def slowest(self) -> str:
+        """The publisher of which least has come."""
+        return min(self.gaps, key=lambda role: self._next_tick.get(role, -1))
+
     def register(self, poller: zmq.Poller) -> None:
         for socket in self._sockets:
             poller.register(socket, zmq.POLLIN)

@@ -7,7 +7,8 @@ import typer
 from haploop.tools.cli.bundled import new, scenes
 from haploop.tools.cli.explain import explain
 from haploop.tools.cli.live_commands import attach, keys, pace, pause, resume, set_, status, step, stop, swap, undo
-from haploop.tools.cli.scenes import check, export, judge, plot, plugins, replay, run
+from haploop.tools.cli.run_command import run
+from haploop.tools.cli.scenes import check, export, judge, plot, plugins, replay
 from haploop.tools.cli.study_commands import advise, dissipate, paper, sweep
 from haploop.tools.cli.view import view
 from haploop.tools.cost.command import cost

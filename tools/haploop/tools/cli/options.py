@@ -82,7 +82,7 @@ def plain_errors() -> Iterator[None]:
     from haploop.controller.dissipation import ElementError, PluginError
     from haploop.launch.processes.run_directory import CommandRefused, RunNotFound
     from haploop.launch.scene.mistakes import SceneError
-    from haploop.launch.spec import OutputError
+    from haploop.launch.spec import NeverBegan, OutputError
     from haploop.logger.log import LogError
     from haploop.protocol.transport.keys import KeysError
 
@@ -93,5 +93,5 @@ def plain_errors() -> Iterator[None]:
         leave(f"{error}\n{count} mistake{'s' * (count != 1)}; nothing was started.", WRONG_USE)
     except (PluginError, ElementError, OutputError, CommandRefused, RunNotFound, KeysError) as error:
         leave(str(error), WRONG_USE)
-    except LogError as error:
+    except (LogError, NeverBegan) as error:
         leave(str(error), FAILED)

@@ -77,6 +77,7 @@ def _key_figures(summary: Summary) -> list[tuple[str, str]]:
     figures = [
         ("ran", ran),
         *_lateness(summary),
+        *_programs(summary),
         ("oscillation", f"{amount(window['oscillation_m'], 'm')} peak to peak at its end"),
     ]
     figures += _stability(summary.get("stability", {}))
@@ -186,7 +187,17 @@ def status_table(data: Message) -> RenderableType:
         parts.append(Text.assemble((word, verdict_style(word)), looks))
     parts += [Text(f"{words} {late}") for words, late in _lateness(data)]
     parts += [Text(reason, "yellow") for reason in data.get("refused", {}).values()]
+    parts += [Text(f"{words}: {what}") for words, what in _programs(data)]
     return Group(*parts, _nodes(data["nodes"], rate))
+
+
+def _programs(data: Message) -> list[tuple[str, str]]:
+    """Returns role and program of what is not haploop's own, of a status or a summary."""
+    return [
+        (f"{role} not haploop's own", f"{' '.join(filter(None, (p['name'], p['version'])))} ({p['command']})")
+        for role, p in data.get("programs", {}).items()
+        if not p["own"]
+    ]
 
 
 def _nodes(nodes: list[Message], control_rate: float) -> Table:

@@ -9,10 +9,12 @@ export function showNodes(nodes) {
   while (body.rows.length > nodes.length) body.deleteRow(-1);
   nodes.forEach((node, i) => {
     const row = body.rows[i] ?? body.appendChild(emptyRow());
-    row.title = `process ${node.pid}; ${node.lossless ? "the run waits for it" : "the run never waits for it"}`;
+    const { name, version, command } = node.program ?? {};
+    const foreign = node.program ? `${[name, version].filter(Boolean).join(" ")} (${command}), not haploop's own; ` : "";
+    row.title = `${foreign}process ${node.pid}; ${node.lossless ? "the run waits for it" : "the run never waits for it"}`;
     row.classList.toggle("waits", Boolean(node.waits_for));
     const waits = node.waits_for ? `→ ${node.waits_for}` : "";
-    const texts = [node.role, node.tick, node.behind_ticks, waits, node.skipped_ticks ?? 0];
+    const texts = [node.program ? `${node.role}: ${name || command}` : node.role, node.tick, node.behind_ticks, waits, node.skipped_ticks ?? 0];
     texts.forEach((text, cell) => put(row.cells[cell], String(text)));
   });
 }

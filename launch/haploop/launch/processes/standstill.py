@@ -1,0 +1,48 @@
+"""The end of a run in which every node speaks, but a program of somebody else's lets no tick be done."""
+
+from __future__ import annotations
+
+from haploop.launch.clock.clock import Clock
+from haploop.launch.clock.roster import Node, Roster
+from haploop.launch.spec import RunFailed
+
+# What a node may take to start, s.
+START_DEADLINE_S = 20.0
+
+
+class Standstill:
+    """Watches that what is granted is done, which haploop's own nodes see to, but a program of another's may not.
+
+    Args:
+        deadline_s: how long nothing may be done once a tick has been.
+    """
+
+    def __init__(self, roster: Roster, clock: Clock, deadline_s: float) -> None:
+        self._roster, self._clock, self._deadline_s = roster, clock, deadline_s
+        self._seen: object = None
+        self._since = 0.0
+
+    def discount(self, seconds: float) -> None:
+        """Leaves some time out."""
+        self._since += seconds
+
+    def check(self, now: float) -> None:
+        """Raises RunFailed where nothing that is due was done for longer than the deadline; ``now`` is wall time, s."""
+        roster, clock = self._roster, self._clock
+        own = [node for node in roster.nodes.values() if node.is_own]
+        is_due = not roster.all_own("ready") or roster.common_tick() < clock.until or clock.is_last
+        seen = clock.until, clock.is_last, [(node.tick, node.ready, node.done) for node in own]
+        if not is_due or seen != self._seen or any(node.is_own for node in roster.silent(now, self._deadline_s / 2)):
+            self._seen, self._since = seen, now
+            return
+        deadline_s = self._deadline_s if roster.common_tick() else max(self._deadline_s, START_DEADLINE_S)
+        if now - self._since > deadline_s:
+            raise RunFailed(
+                f"For {deadline_s:g} s no tick was done, though all nodes speak: {'; '.join(map(self._told, own))}. "
+                "protocol/README.md says what a node owes the others."
+            )
+
+    def _told(self, node: Node) -> str:
+        state = "has done" if node.done else "is at" if node.ready else "is not ready at"
+        waits = f" and waits for the {node.waits_for}" if node.waits_for and not node.done else ""
+        return f"the {self._roster.label(node.role)} {state} tick {node.tick}{waits}"

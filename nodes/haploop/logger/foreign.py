@@ -1,0 +1,67 @@
+"""Telemetry of a plant or controller that is not haploop's own: checked before it is booked."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from haploop.logger.books.buffers import PIECES
+from haploop.protocol.ticks import Timebase
+from haploop.protocol.transport.wire import Frame, Message
+
+_PLANT = ("x", "v", "x_low", "force", "command")
+_CONTROLLER = ("x", "v", "a", "wall", "total", "in_contact")
+_STATE = ("tick", "x", "v", "force", "command")
+_WALL = ("position", "stiffness", "into_wall")
+_ELEMENT = {"book": int, "kind": str, "parameters": dict, "from_tick": int}
+
+
+def complaint(frame: Frame, role: str, time: Timebase) -> str:
+    """Returns what is wrong with a STATE or a block of one of these, as a sentence; "" for nothing."""
+    message = frame.as_dict()
+    if frame.name == "STATE":
+        wrong = _state(message["state"], role)
+    elif frame.name == "PLANT_BLOCK":
+        wrong = _columns(message, _PLANT, message["ticks"] * time.steps_per_tick + 1)
+    elif frame.name == "CONTROLLER_BLOCK":
+        wrong = _parts(message)
+        names = (*_CONTROLLER, *(f"dissipation.{index}" for index in range(len(message["elements"]))))
+        wrong = wrong or _columns(message, names, message["ticks"])
+    else:
+        return ""
+    return wrong and f"A {frame.name} of the {role} from tick {frame.fields[0]} cannot be booked: {wrong}."
+
+
+def _state(state: Message, role: str) -> str:
+    if role == "plant":
+        missing = [name for name in _STATE if not _is_number(state.get(name))]
+        return f"its state has no number for {' and '.join(missing)}" if missing else ""
+    history = state.get("history")
+    return "" if isinstance(history, list) else "its state has no list for history"
+
+
+def _columns(block: Message, names: tuple[str, ...], rows: int) -> str:
+    columns = block["columns"]
+    if block["ticks"] < 1 or block["from_tick"] < 0:
+        return f"it is of {block['ticks']} ticks"
+    if missing := [name for name in names if name not in columns]:
+        return f"it has no column {' and '.join(missing)}"
+    for name, data in columns.items():
+        if not isinstance(data, bytes) or len(data) % 8:
+            return f"column {name} is not the bytes of float64 numbers"
+        if len(data) != 8 * rows and not name.startswith(PIECES):
+            return f"column {name} has {len(data) // 8} rows, but {rows} were expected"
+    return ""
+
+
+def _parts(block: Message) -> str:
+    if missing := [name for name in _WALL if not _is_number(block["wall"].get(name))]:
+        return f"its wall has no number for {' and '.join(missing)}"
+    for index, element in enumerate(block["elements"]):
+        for key, kind in _ELEMENT.items():
+            if not isinstance(element, dict) or not isinstance(element.get(key), kind):
+                return f"element {index} has no {kind.__name__} for {key}"
+    return ""
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)

@@ -1,0 +1,224 @@
+"""Programs of somebody else's as controller of a run: their bits, their names, and how a run ends with them."""
+
+from __future__ import annotations
+
+import json
+import shlex
+import signal
+import stat
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from haploop.launch.processes import private_directory
+from haploop.launch.processes.foreign import ProgramError, check_wait, read_programs
+from haploop.logger import read
+from helpers.live.launched import SCENE, Launched, Run, alive, command, first_and_slowly, processes, same_bits, wait_for
+
+CONTROLLER = Path(__file__).parents[1] / "oracles/plain_controller.py"
+PLAIN = shlex.join([sys.executable, "-I", str(CONTROLLER)])
+SOON = ("run.deadline=1",)
+Started = Callable[..., Run]
+
+
+@pytest.fixture
+def started(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Started]:
+    """Starts runs of figure 6(c) with the plain controller, and leaves none behind."""
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(base := Path(f"/tmp/hf{tmp_path.name[-8:]}")))
+    base.mkdir(mode=0o700, exist_ok=True)
+    runs: list[Run] = []
+
+    def start(*options: str, node: str | None = PLAIN, sets: tuple[str, ...] = SOON, **more: Any) -> Run:
+        nodes = ("--node", f"controller={node}") if node else ()
+        runs.append(Run(tmp_path / f"out{len(runs)}", *nodes, *options, sets=("duration=3", *sets), pace=(), **more))
+        return runs[-1]
+
+    yield start
+    for run in runs:
+        run.clear_away()
+    for path in sorted(base.rglob("*"), reverse=True):
+        path.rmdir() if path.is_dir() else path.unlink()
+    base.rmdir()
+
+
+def test_a_foreign_controller_gives_the_bits_of_our_own_and_is_told_as_foreign(started: Started) -> None:
+    own, foreign = started(node=None), started(sets=("run.verdict=pushed", *SOON))
+    theirs, ours = foreign.summary(), own.summary()
+    assert theirs["trajectory_sha256"] == ours["trajectory_sha256"]
+    log, truth = foreign.log(), own.log()
+    for topic in ("/plant", "/controller", "/energy"):
+        assert {name: log[topic][name].tobytes() for name in log[topic]} == {
+            name: truth[topic][name].tobytes() for name in truth[topic]
+        }
+    assert "programs" not in ours
+    assert "programs.json" not in truth.attachments
+    program = theirs["programs"]["controller"]
+    assert program == {"name": "plain controller", "version": "1.5", "command": PLAIN, "own": False}
+    assert theirs["programs"]["plant"]["own"]
+    assert json.loads(log.attachments["programs.json"]) == theirs["programs"]
+    assert theirs["verdict_rule"].startswith("By its window alone, since the controller was not haploop's own")
+
+
+@pytest.mark.parametrize(
+    ("how", "words"),
+    [
+        ("die", "was killed by SIGKILL; the last tick all nodes had done is"),
+        pytest.param("exit", "ended with exit status 3; the last tick all nodes", marks=pytest.mark.slow),
+        pytest.param("hang", "has not answered for 1 s and was ended", marks=pytest.mark.slow),
+        pytest.param("silent", "no tick was done, though all nodes speak", marks=pytest.mark.slow),
+        ("nan", "the controller gave a force that is no finite number"),
+        pytest.param("text", "In the loop commands from tick", marks=pytest.mark.slow),
+        ("garbage", "something else (A frame of 10 bytes is no msgpack"),
+        pytest.param("mute", "the logger is at tick", marks=pytest.mark.slow),
+        ("cut", "column wall has"),
+        pytest.param("unfinished", "has done tick 3000", marks=pytest.mark.slow),
+    ],
+)
+def test_however_a_foreign_controller_fails_the_run_ends_names_it_and_keeps_its_log(
+    how: str, words: str, started: Started
+) -> None:
+    run = started(node=f"{PLAIN} --misbehave {how}")
+    run.end(1)
+    assert words in run.stderr
+    assert "plain_controller.py" in run.stderr or how == "nan"
+    assert same_bits(run.log(), run.log()) > 100
+    summary = json.loads((run.out_directory / "summary.json").read_text())
+    assert summary["ended"] == "failed"
+    assert summary["programs"]["controller"]["name"] == "plain controller"
+    run.leaves_nothing()
+
+
+def test_a_program_that_ignores_every_end_and_its_children_end_with_the_run(started: Started, tmp_path: Path) -> None:
+    script = tmp_path / "stubborn.sh"
+    script.write_text("trap '' TERM INT HUP\nsleep 977 &\nsleep 978\n")
+    run = started(node=f"sh {script}", sets=())
+
+    def asleep() -> list[int]:
+        return [pid for pid, _, _, words in processes() if words in ("sleep 977", "sleep 978")]
+
+    wait_for("both sleepers", lambda: len(asleep()) == 2)
+    run.signal(signal.SIGKILL)
+    wait_for("their end", lambda: not asleep())
+    run.end(-signal.SIGKILL)
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    first_and_slowly(
+        (["--node", "controller=no-such-program-9"], "'no-such-program-9', is not there or cannot be executed"),
+        (["--node", "controller=sh 'x"], "cannot be split into words: No closing quotation"),
+        (["--node", "controller="], "is empty"),
+        (["--node", "controller"], "--node expects ROLE=COMMAND"),
+        (["--node", "logger=sh"], "the plant or the controller, but 'logger' was given"),
+        (["--node", "plant=sh", "--node", "plant=sh"], "The plant was given twice"),
+        (["--node", "plant=sh", "--external", "plant"], "The plant was given twice"),
+        (["--external", "view"], "but 'view' was given"),
+        (["--external", "plant", "--in-process"], "leave out --in-process"),
+        (["--external", "plant", "--wait", "-1"], "--wait"),
+        (["--external", "plant", "--wait", "nan"], "--wait"),
+        (["--external", "plant", "--wait", "1e300"], "--wait"),
+        (["--wait", "3"], "--wait is for --external"),
+    ),
+)
+def test_what_cannot_be_a_program_is_refused_before_anything_is_written(
+    options: list[str], words: str, tmp_path: Path
+) -> None:
+    out = tmp_path / "out"
+    done = command("run", str(SCENE), *options, "--out", str(out))
+    assert (done.returncode, done.stdout) == (2, "")
+    assert words in done.stderr
+    assert "Traceback" not in done.stderr
+    assert not out.exists()
+
+
+def test_a_command_is_split_as_a_shell_splits_it_but_given_to_none() -> None:
+    (program,) = read_programs([r'plant=sh -c "a b" $HOME `x` ; "c d"\ e'], []).values()
+    assert program.words == ("sh", "-c", "a b", "$HOME", "`x`", ";", "c d e")
+    assert check_wait(None) == 60.0
+    for wait in (0.0, float("nan"), float("inf")):
+        with pytest.raises(ProgramError):
+            check_wait(wait)
+
+
+def test_no_scene_can_name_a_program(tmp_path: Path) -> None:
+    for key in ("run.node", "run.nodes", "node", "external", "run.external", "run.programs"):
+        done = command("check", str(SCENE), "--set", f'{key}="sh"')
+        assert done.returncode == 2, key
+    assert not any(
+        "node" in key or "external" in key for key in json.loads(command("check", "--schema").stdout)["$defs"]
+    )
+
+
+def seat_of(run: Launched, role: str = "controller") -> Path:
+    """The file by which a program finds the run."""
+    return wait_for("the file", lambda: next(private_directory.base_directory().glob(f"*/external-{role}.json"), None))
+
+
+def joined(seat: Path, *options: str) -> subprocess.Popen[bytes]:
+    return subprocess.Popen([sys.executable, "-I", str(CONTROLLER), *options, "--seat", str(seat)])
+
+
+def test_a_run_waits_for_an_external_controller_and_gives_the_same_bits(started: Started) -> None:
+    own, run = started(node=None), started("--external", "controller", node=None)
+    seat = seat_of(run)
+    assert stat.S_IMODE(seat.stat().st_mode) == 0o600
+    assert "Waiting 60 s for a controller to join" in run.stderr
+    controller = joined(seat)
+    assert run.summary()["trajectory_sha256"] == own.summary()["trajectory_sha256"]
+    assert controller.wait(30) == 0
+    assert not seat.exists()
+    assert read(run.out_directory).attachments.keys() == {"scene.toml", "programs.json"}
+    run.leaves_nothing()
+
+
+def test_an_external_controller_that_dies_is_noticed_at_once(started: Started) -> None:
+    run = started("--external", "controller", node=None, sets=("run.deadline=30",))
+    controller = joined(seat_of(run), "--misbehave", "die")
+    run.end(1)
+    assert "The controller (external) is gone; the last tick all nodes had done is" in run.stderr
+    assert controller.wait(30) == -signal.SIGKILL
+
+
+def test_of_two_programs_for_one_role_the_second_is_turned_away(started: Started, tmp_path: Path) -> None:
+    run = started("--external", "controller", "--external", "plant", node=None, sets=())
+    seat = seat_of(run)
+    first = joined(seat)
+    wait_for("the first", lambda: any(node["role"] == "controller" for node in run.ask("status")["nodes"]))
+    second = joined(seat)
+    assert second.wait(30) == 1
+    assert run.ask("status")["refused"] == {"controller": "The role controller is taken."}
+    run.signal(signal.SIGINT)
+    run.end(1)
+    assert "Interrupted before the run began; nothing is left of it." in run.stderr
+    assert not run.out_directory.exists()
+    first.kill()
+    first.wait()
+
+
+@pytest.mark.parametrize("end", first_and_slowly("wait", "stop", "interrupt"))
+def test_a_run_that_nobody_joins_leaves_nothing(end: str, started: Started) -> None:
+    run = started("--external", "controller", *(("--wait", "0.5") if end == "wait" else ()), node=None)
+    if end != "wait":
+        seat_of(run)
+        run.ask("stop") if end == "stop" else run.signal(signal.SIGINT)
+    run.end(1)
+    words = {"wait": "No program joined as the controller within 0.5 s", "stop": "The run was stopped before"}
+    assert words.get(end, "Interrupted before the run began") in run.stderr
+    assert not run.out_directory.exists()
+    assert not alive([run.pid])
+    run.leaves_nothing()
+
+
+def test_binary_on_stdout_from_the_start_harms_nobody_and_stands_in_the_prints(
+    started: Started, tmp_path: Path
+) -> None:
+    script = tmp_path / "loud.sh"
+    script.write_text(f'printf "\\377\\376\\033[2J\\000" ; exec {PLAIN} "$@"\n')
+    run = started(node=f"sh {script}")
+    assert run.summary()["ended"] == "done"
+    assert (run.out_directory / "prints.txt").read_bytes().startswith(b"\xff\xfe\x1b[2J\0")
+    assert "\x1b" not in run.stderr
