@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+from importlib.metadata import version
 from pathlib import Path
 
 import pytest
@@ -144,3 +145,8 @@ def test_help_imports_none_of_the_heavy_packages():
     code = "import sys, haploop.tools.cli.app; print(*sys.modules)"
     loaded = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True).stdout.split()
     assert not {"numpy", "scipy", "pydantic", "pint", "zmq", "msgpack", "matplotlib", "mcap"} & set(loaded)
+
+
+def test_version_and_both_forms_of_help_are_answered():
+    assert haploop("--version").stdout == f"haploop {version('haploop')}\n"
+    assert haploop("run", "-h").stdout == haploop("run", "--help").stdout

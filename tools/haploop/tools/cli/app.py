@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
 import typer
 
 from haploop.tools.cli.bundled import new, scenes
@@ -15,12 +17,30 @@ from haploop.tools.cost.command import cost
 from haploop.tools.fmu.command import export_fmu
 
 app = typer.Typer(
-    help="Simulate a haptic loop: a device in a hand, a sampled controller with a virtual wall, a line with delay.",
     no_args_is_help=True,
-    add_completion=False,
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
 )
+
+
+def _tell_version(is_asked: bool) -> None:
+    if is_asked:
+        from importlib.metadata import version
+
+        print(f"haploop {version('haploop')}")
+        raise typer.Exit
+
+
+@app.callback()
+def haploop(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_tell_version, is_eager=True, help="print the version and leave")
+    ] = False,
+) -> None:
+    """Simulate a haptic loop: a device in a hand, a sampled controller with a virtual wall, a line with delay."""
+
+
 # In the order in which the help lists them.
 for command in (
     run, scenes, new, check, explain, plugins, status, pause, resume, step, pace, stop, swap, set_, undo, attach, view,
