@@ -3,7 +3,9 @@ background; and every test has a place of its own for live runs, so that none me
 
 from __future__ import annotations
 
+import os
 import signal
+import sys
 import tempfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -17,6 +19,10 @@ from helpers.live.launched import Launched, Run
 settings.register_profile("haploop", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.register_profile("quick", settings.get_profile("haploop"), max_examples=20)
 settings.load_profile("haploop")
+# Tests start hundreds of processes. Where the environment forbids bytecode, as container images do, each of them would
+# compile all of haploop anew, a third of the time of a short run.
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+sys.dont_write_bytecode = False
 # A shell has its background jobs ignore Ctrl-C, and what they start inherits that.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
