@@ -100,7 +100,9 @@ class Seat {
 // Reads what the launcher says on stdin, or the file of `--external` named last; ends with the launcher.
 function take_seat(role, work) {
   const begin = async (text) => {
-    const seat = new Seat(role, JSON.parse(text));
+    const start = JSON.parse(text);
+    if (start.transport.keys) console.error("This program knows nothing of keys; run it without --keys."), process.exit(1);
+    const seat = new Seat(role, start);
     try {
       await Promise.race([work(seat), seat.failed]);
       await seat.tell("DONE", seat.tick, {});

@@ -194,6 +194,7 @@ int main(void) {
   if (!fgets(line, sizeof line, stdin)) return 1;
   from_json(line, "address", address, sizeof address), from_json(line, "secret", secret, sizeof secret);
   from_json(line, "host", host, sizeof host);
+  if (strstr(line, "\"keys\": {")) return fprintf(stderr, "This program knows nothing of keys; run it without --keys.\n"), 1;
   if (*host)
     snprintf(own, sizeof own, "tcp://%s:*", host);
   else
