@@ -90,7 +90,7 @@ static void flush(void) {
   bool asked = false, news = held || refused;
   unsigned char request[64];
   int size;
-  while ((size = zmq_recv(telemetry, request, sizeof request, ZMQ_DONTWAIT)) >= 0)
+  for (int taken = 0; taken < 200 && (size = zmq_recv(telemetry, request, sizeof request, ZMQ_DONTWAIT)) >= 0; taken++)
     if (size && request[0] == 1 && size <= 11 && !memcmp("controller", request + 1, size - 1)) asked = true;
   cut();
   if (news) {
