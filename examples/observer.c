@@ -11,7 +11,7 @@
 struct stream {
   const char *role;
   void *socket;
-  int64_t tick;
+  int64_t first, tick; // of its STATE; up to which all has come
   bool known, ended;
 };
 
@@ -34,7 +34,7 @@ static void take_column(msgpack_object columns, const char *name, struct range *
 
 static void take(struct stream *stream, int code, struct frame *frame) {
   int64_t tick = (int64_t)number(frame->field[0]);
-  if (code == STATE && !stream->known) stream->known = true, stream->tick = tick;
+  if (code == STATE && !stream->known) stream->known = true, stream->first = stream->tick = tick;
   if (code == STATE || !stream->known || tick < stream->tick) return; // another's state, or from before ours
   gap_ticks += tick - stream->tick, stream->tick = tick;
   if (code == END) {
@@ -83,7 +83,8 @@ int main(int argc, char **argv) {
     if (!streams[0].known || !streams[1].known) continue;
     int64_t done = streams[0].tick < streams[1].tick ? streams[0].tick : streams[1].tick;
     if (reported < 0) {
-      printf("attached at tick %lld\n", (long long)done), fflush(stdout);
+      printf("attached: controller from tick %lld, plant from tick %lld\n", (long long)streams[1].first, (long long)streams[0].first);
+      fflush(stdout);
       begin(READY, 1), put_int(done), send_frame(clock);
     } else if (done > reported) {
       begin(PROGRESS, 2), put_int(done), put_map(0), send_frame(clock);
