@@ -11,7 +11,6 @@ Runge-Kutta 4.
 
 import argparse
 import math
-import sys
 from ctypes import c_double
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -29,9 +28,11 @@ def main():
     parser.add_argument("--position", default="position", metavar="NAME", help="output, m [position]")
     parser.add_argument("--velocity", metavar="NAME", help="output, m/s")
     parser.add_argument("--interface", choices=("cs", "me"), help="co-simulation or model exchange [cs]")
-    parser.add_argument("--set", action="append", default=[], metavar="NAME=VALUE[,VALUE ...]", help="start values")
+    parser.add_argument("--set", action="append", default=[], type=assignment, metavar="NAME=VALUE[,VALUE ...]")
     parser.add_argument("--state-space", action="store_true", help="the Reference FMUs' StateSpace, made the scene's")
-    options = parser.parse_args(sys.argv[1:-1])  # the last word is the directory of sockets, for take_seat
+    options, rest = parser.parse_known_args()
+    if len(rest) != 1:  # the directory of sockets, for take_seat
+        parser.error(f"haploop run --node starts this program and adds one word, but there were {rest}.")
     seat = take_seat(f"FMU {Path(options.fmu).name}", "3.0")
     with TemporaryDirectory() as folder:
         seat.run(*device(seat.scene, seat.step_s, options, folder))
@@ -39,7 +40,7 @@ def main():
 
 def device(scene, step_s, options, folder):
     """Returns the function of a plant step, and position and velocity at the start; the FMU is unpacked in a folder."""
-    values, bias = dict(map(assignment, options.set)), 0.0
+    values, bias = dict(options.set), 0.0
     if options.state_space:
         options.force, options.position, options.velocity = "u[1]", "y[1]", "y[2]"
         system, bias = state_space(scene)
