@@ -34,7 +34,11 @@ def main():
     parser.add_argument("--radius", type=float, default=0.2, help="distance of the hand from the axis of a hinge, m")
     options, _ = parser.parse_known_args()
     seat = take_seat("MuJoCo", mujoco.__version__)
-    seat.run(*device(seat.scene, seat.step_s, options))
+    try:
+        made = device(seat.scene, seat.step_s, options)
+    except (ValueError, KeyError) as error:
+        seat.fail(f"{options.device} cannot be the device: {error}")
+    seat.run(*made)
 
 
 def device(scene, step_s, options):

@@ -149,15 +149,20 @@ class Seat:
         try:
             if asked := _beyond(self.scene):
                 raise SeatError(f"This plant has one force in and one position out, but no {asked}; leave it out.")
-            self._work(step, float(x), float(v))
+            try:
+                self._work(step, float(x), float(v))
+            finally:
+                hold(0.0)  # first of all
         except Exception as error:
-            self._say(FAILED, -1, str(error) if isinstance(error, SeatError) else f"{type(error).__name__}: {error}")
-            raise SystemExit(1) from error
-        else:
-            self._say(DONE, self._tick, {"lateness": self._schedule.figures()} if self._owns_time else {})
-        finally:
-            hold(0.0)
-            self._sockets.close()
+            self.fail(str(error) if isinstance(error, SeatError) else f"{type(error).__name__}: {error}")
+        self._say(DONE, self._tick, {"lateness": self._schedule.figures()} if self._owns_time else {})
+        self._sockets.close()
+
+    def fail(self, why):
+        """Tells the clock why there is no going on, and ends this process."""
+        self._say(FAILED, -1, why)
+        self._sockets.close()
+        raise SystemExit(1)
 
     def _work(self, step, x, v):
         self._tick, self._x, self._v, self._force, self._command = 0, x, v, 0.0, -1

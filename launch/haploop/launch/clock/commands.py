@@ -115,7 +115,7 @@ class Commands:
         if self._spec.clock != device_time.PLANT:
             return self._clock.pace.lateness()
         plant = roster.own("plant")
-        return device_time.lateness_told(plant.status) if plant else {}
+        return device_time.lateness_told(plant.status if plant else {})
 
     def _options(self) -> tuple[str, Message]:
         data = capabilities(self._clock.present(), self._spec.kinds)

@@ -32,11 +32,11 @@ def check_owner(spec: RunSpec) -> None:
 
 
 def lateness_told(told: Message) -> dict[str, Any]:
-    """Returns the figures of ``lateness`` that a plant has told; {} where it told none, or what are none."""
+    """Returns the figures of ``lateness`` that a plant has told, marked by ``clock``; that alone where it told none."""
     late = told.get("lateness")
     if not isinstance(late, dict):
-        return {}
+        return {"clock": PLANT}
     figures: dict[str, Any] = {key: late.get(key) for key in (*_COUNTS, *_SECONDS)}
     are_counts = all(type(figures[key]) is int and figures[key] >= 0 for key in _COUNTS)
     are_seconds = all(type(figures[key]) in (int, float) and 0.0 <= figures[key] < math.inf for key in _SECONDS)
-    return {**figures, "clock": PLANT} if are_counts and are_seconds and figures["ticks"] else {}
+    return {**(figures if are_counts and are_seconds and figures["ticks"] else {}), "clock": PLANT}

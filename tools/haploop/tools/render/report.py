@@ -96,6 +96,8 @@ def _lateness(of: Summary) -> list[tuple[str, str]]:
     """Returns how late the ticks of a run in real time were, or the answers to its device; nothing for any other."""
     if not (late := of.get("lateness")):
         return []
+    if "ticks" not in late:
+        return [("answers came", "when is not told: the plant was to keep the time, but has said nothing of it")]
     by = ("median_s", "(median)"), ("percent_99_s", "(99 %)"), ("most_s", "at most")
     words = ", ".join(f"{amount(late[key], 's')} {which}" for key, which in by)
     lost = f"; {amount(late['lost_s'], 's')} of real time lost" if late["lost_s"] else ""

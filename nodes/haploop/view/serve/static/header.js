@@ -59,11 +59,11 @@ function share({ residual_J: residual, moved_J: moved }) {
 function factor({ real_time_factor: now, pace, summary, lateness: late }) {
   const real = summary?.real_time_factor ?? now;
   if (!isNumber(real)) return NONE;
-  return `${fixed(real)}×${isNumber(pace) && pace !== 1 ? ` of ${fixed(pace, 2)}×` : ""}${late ? `, ${late.late_ticks} late` : ""}`;
+  return `${fixed(real)}×${isNumber(pace) && pace !== 1 ? ` of ${fixed(pace, 2)}×` : ""}${late?.ticks ? `, ${late.late_ticks} late` : ""}`;
 }
 
 function lateness({ lateness: late }) {
-  if (!late) return "";
+  if (!late?.ticks) return "";
   const [half, most, all] = [late.median_s, late.percent_99_s, late.most_s].map((seconds) => amount(seconds, "s"));
   const what = late.clock === "plant" ? "answers came" : "ticks were late by";
   return `${what} ${half} (median), ${most} (99 %), ${all} at most; ${late.late_ticks} of ${late.ticks} too late`;
