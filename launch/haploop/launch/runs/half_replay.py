@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 
@@ -79,12 +79,23 @@ def repeat_controller(
         if is_change(event):
             controller.schedule(tick, event)
     columns = (rows["x"], rows["a"]) if accelerometer_is_used(scene) else (rows["x"],)
+    samples, channels = np.stack(columns, axis=1), Channels(memory, time, every_step=False)
     with contextlib.suppress(ElementError):  # then ticks are missing, and the comparison says so
-        controller.answer(list(zip(*(column.tolist() for column in columns), strict=True)))
-    channels = Channels(memory, time, every_step=False)
+        for part in _blocks(scene, len(samples)):
+            controller.answer(samples[part].tolist())
+            _log(channels, controller)
+    _log(channels, controller)
+    return memory.recording()
+
+
+def _log(channels: Channels, controller: Controller) -> None:
     for block in controller.recorder.take():
         channels.controller(block, 0)
-    return memory.recording()
+
+
+def _blocks(scene: Scene, ticks: int) -> Iterator[slice]:
+    for first in range(0, ticks, scene.run.block_ticks):
+        yield slice(first, min(first + scene.run.block_ticks, ticks))
 
 
 def repeat_plant(
@@ -105,13 +116,20 @@ def repeat_plant(
         samples.extend(sample[0] for sample in sent)
         return commands[tick : tick + len(sent)]
 
+    channels, digest = Channels(memory, time, every_step="/plant" in recorded), hashlib.sha256()
+    reached, end = 0, dict[str, Floats]()
     with contextlib.suppress(ArithmeticError):  # then steps are missing
-        plant.run_until(len(commands), exchange)
-    first, ticks, columns = plant.take_block()
-    motion = {name: as_float64(data) for name, data in columns.items()}
-    channels, logged = Channels(memory, time, every_step="/plant" in recorded), motion_columns(motion)
-    channels.plant(first, ticks, logged)
-    channels.plant_end(first + ticks, {name: column[-1:] for name, column in logged.items()})
-    states = np.stack([motion["x"], motion["v"]], axis=1)
+        for part in _blocks(scene, len(commands)):
+            plant.run_until(part.stop, exchange)
+            first, ticks, columns = plant.take_block()
+            motion = {name: as_float64(data) for name, data in columns.items()}
+            logged, reached = motion_columns(motion), first + ticks
+            channels.plant(first, ticks, logged)
+            states = np.stack([logged["x"], logged["v"]], axis=1)
+            digest.update(states[bool(first) :].tobytes())
+            end = {name: column[-1:] for name, column in logged.items()}
+            if plant.stop_reason:
+                break
+        channels.plant_end(reached, end)
     seen = {"timestamp": np.arange(len(samples)) / time.control_rate, "x": np.array(samples)}
-    return {**memory.recording(), "/controller": seen}, hashlib.sha256(states.tobytes()).hexdigest()
+    return {**memory.recording(), "/controller": seen}, digest.hexdigest()
