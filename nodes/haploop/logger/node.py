@@ -67,6 +67,7 @@ class LoggerNode:
         self.session = open_session(scene, time, out, attachments, machine=self._machine)
         self.session.programs = welcome["context"].get("programs", {})
         self._foreign = {role: not program["own"] for role, program in self.session.programs.items()}
+        self.session.logger.foreign = tuple(role for role, is_foreign in self._foreign.items() if is_foreign)
         self._time = time
         self.session.logger.booked = self._publish_energy
         states: dict[str, Message] = {}

@@ -206,8 +206,9 @@ class ClockServer:
             reason = (
                 f"JOIN.endpoints of the {role} must have the address of its {' and '.join(sorted(missing))} socket."
             )
-        elif not all(isinstance(v, str) and len(v) <= _LONGEST_TEXT for v in program.values()):
-            reason = f"JOIN.program holds texts of at most {_LONGEST_TEXT} characters: {', '.join(_PROGRAM_KEYS)}."
+        elif not all(isinstance(v, str) and v.isprintable() and len(v) <= _LONGEST_TEXT for v in program.values()):
+            keys = ", ".join(_PROGRAM_KEYS)
+            reason = f"JOIN.program holds printable texts of at most {_LONGEST_TEXT} characters: {keys}."
         if reason:
             if known:
                 self.roster.refused[role] = reason
