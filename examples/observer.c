@@ -48,11 +48,8 @@ static void take(struct stream *stream, int code, struct frame *frame) {
 int main(int argc, char **argv) {
   if (argc != 2) return fprintf(stderr, "usage: observer DIRECTORY_OF_THE_RUN\n"), 2;
   char address[512];
-  int pid = 0;
-  snprintf(address, sizeof address, "%s/run.json", argv[1]);
-  FILE *file = fopen(address, "r");
-  if (!file || fscanf(file, "{\"pid\": %d", &pid) != 1) return fprintf(stderr, "There is no run in %s.\n", argv[1]), 1;
-  fclose(file);
+  int pid = launcher(argv[1]);
+  if (!pid) return fprintf(stderr, "There is no run in %s.\n", argv[1]), 1;
   void *context = zmq_ctx_new();
   snprintf(address, sizeof address, "ipc://%s/clock.sock", argv[1]);
   void *clock = open_socket(context, ZMQ_DEALER, 1000, address);

@@ -25,8 +25,8 @@ const column = (rows, i) => Buffer.from(Float64Array.from(rows, (row) => row[i])
 
 class Seat {
   // Binds the sockets of a role, channel -> type, and connects to the clock.
-  constructor(role, start) {
-    Object.assign(this, { role, start, until: 0, last: false, events: [], subscribers: 0, answered: 0, told: Date.now() });
+  constructor(role, start, directory) {
+    Object.assign(this, { role, start, directory, until: 0, last: false, events: [], subscribers: 0, answered: 0, told: Date.now() });
     this.clock = new zmq.Dealer({ linger: 1000 });
     this.telemetry = new zmq.XPublisher({ linger: 1000, sendHighWaterMark: 256, verbosity: "allSubs", maxMessageSize: 1024 });
     this.sent = Promise.resolve();
@@ -93,16 +93,27 @@ class Seat {
       this.publish("STATE", ...this.state());
       this.wake();
     }
+    if (this.directory && !is_led(this.directory)) process.exit(1); // no stdin ends with the launcher
     if (Date.now() - this.told > SAY_MS) this.tell("WAITING", this.tick ?? 0, this.awaits ?? "clock");
+  }
+}
+
+// Tells whether the launcher of a run on this host is there.
+function is_led(directory) {
+  try {
+    return process.kill(JSON.parse(fs.readFileSync(`${directory}/run.json`)).pid, 0);
+  } catch {
+    return false;
   }
 }
 
 // Reads what the launcher says on stdin, or the file of `--external` named last; ends with the launcher.
 function take_seat(role, work) {
-  const begin = async (text) => {
+  const last = process.argv.at(-1);
+  const begin = async (text, directory) => {
     const start = JSON.parse(text);
     if (start.transport.keys) console.error("This program knows nothing of keys; run it without --keys."), process.exit(1);
-    const seat = new Seat(role, start);
+    const seat = new Seat(role, start, directory);
     try {
       await Promise.race([work(seat), seat.failed]);
       await seat.tell("DONE", seat.tick, {});
@@ -114,7 +125,7 @@ function take_seat(role, work) {
     seat.clock.close(), seat.telemetry.close();
     setTimeout(() => process.exit(), 100); // what was sent still goes out
   };
-  if (process.argv.at(-1).endsWith(".json")) return begin(fs.readFileSync(process.argv.at(-1), "utf8"));
+  if (last.endsWith(".json")) return begin(fs.readFileSync(last, "utf8"), is_led(path.dirname(last)) && path.dirname(last));
   let line = "";
   process.stdin.setEncoding("utf8").on("end", () => process.exit(1)).on("data", (text) => {
     const begun = line.includes("\n");

@@ -5,6 +5,8 @@
 //
 // Written from protocol/README.md; examples/README.md says what to install. A `set` of the wall is carried out, every other
 // change is refused, and a scene that asks for more than this law ends the run with a sentence.
+#include <signal.h>
+
 #include "wire.h"
 
 enum { WIDTH = 6, MOST_ROWS = 1000, FLUSH_MS = 10, SAY_MS = 200 };
@@ -188,10 +190,15 @@ static void from_json(const char *line, const char *key, char *value, size_t siz
   snprintf(value, size, "%.*s", (int)strcspn(from, "\""), from);
 }
 
-int main(void) {
+int main(int argc, char **argv) {
   char line[65536], address[512], secret[64], host[64], own[600];
   size_t size = sizeof own;
-  if (!fgets(line, sizeof line, stdin)) return 1;
+  const char *last = argc > 1 ? argv[argc - 1] : "";
+  bool external = strlen(last) > 5 && !strcmp(last + strlen(last) - 5, ".json"); // the file of --external
+  FILE *told = external ? fopen(last, "r") : stdin;
+  if (!told || !fgets(line, sizeof line, told)) return fprintf(stderr, "There is no run to join here.\n"), 1;
+  const char *slash = strrchr(last, '/');
+  int pid = external ? launcher(slash ? strndup(last, slash - last) : ".") : 0; // of a run on another host 0
   from_json(line, "address", address, sizeof address), from_json(line, "secret", secret, sizeof secret);
   from_json(line, "host", host, sizeof host);
   if (strstr(line, "\"keys\": {")) return fprintf(stderr, "This program knows nothing of keys; run it without --keys.\n"), 1;
@@ -219,8 +226,9 @@ int main(void) {
   int pending = 0; // code of a message of the plant that waits for the clock
   while (!ended) {
     zmq_pollitem_t items[] = {{NULL, 0, ZMQ_POLLIN, 0}, {clock_socket, 0, ZMQ_POLLIN, 0}, {loop, 0, ZMQ_POLLIN, 0}};
-    zmq_poll(items, loop && !pending ? 3 : 2, FLUSH_MS);
+    zmq_poll(items + external, (loop && !pending ? 3 : 2) - external, FLUSH_MS);
     if (items[0].revents && read(0, line, sizeof line) <= 0) return 1; // the launcher is gone
+    if (pid && kill(pid, 0)) return 1;
     heed_clock(&from_clock);
     if (!loop && from_clock.fields >= 6) { // WELCOME
       begin_law(from_clock.field[1], from_clock.field[2]);
