@@ -31,8 +31,8 @@ def main():
     parser.add_argument("--set", action="append", default=[], type=assignment, metavar="NAME=VALUE[,VALUE ...]")
     parser.add_argument("--state-space", action="store_true", help="the Reference FMUs' StateSpace, made the scene's")
     options, rest = parser.parse_known_args()
-    if len(rest) != 1:  # the directory of sockets, for take_seat
-        parser.error(f"haploop run --node starts this program and adds one word, but there were {rest}.")
+    if len(rest) != 1:  # for take_seat
+        parser.error(f"One word more was expected, that of haploop run --node or the file of --external, not {rest}.")
     seat = take_seat(f"FMU {Path(options.fmu).name}", "3.0")
     with TemporaryDirectory() as folder:
         seat.run(*device(seat.scene, seat.step_s, options, folder))
