@@ -15,10 +15,16 @@ import haploop.logger
 from haploop.launch.processes.foreign import read_programs
 from haploop.launch.runs.replay import replay
 from haploop.launch.runs.start import prepare, run
-from haploop.logger.summary import awaits_verdict
+from haploop.logger.foreign import complaint, plant_columns
+from haploop.logger.summary import awaits_verdict, read
 from haploop.protocol.scene.scene import Scene
+from haploop.protocol.ticks import Timebase
+from haploop.protocol.transport.wire import Frame
 from haploop.tools.render.report import summary_table
 from helpers.live.launched import first_and_slowly
+from helpers.runs.captured import run as run_captured
+from helpers.scenes.every_effect import EVERYTHING
+from helpers.scenes.least import scene
 from helpers.shown import shown
 
 HOUSE = Path(__file__).parents[2]
@@ -32,11 +38,11 @@ class Ran(NamedTuple):
     summary: dict[str, Any]
 
 
-def ran(out: Path, scene: Path, role: str, oracle: str, *overrides: str) -> Ran:
+def ran(out: Path, file: Path, role: str, oracle: str, *overrides: str) -> Ran:
     """A run judged as scenes ask for, with an oracle in the place of this role."""
     script, *options = oracle.split()
     words = [sys.executable, str(HOUSE / "tests/oracles" / script), *options]
-    spec = prepare(scene, overrides, out=out, any_hand=True)
+    spec = prepare(file, overrides, out=out, any_hand=True)
     return Ran(spec.scene, out, run(spec, programs=read_programs([f"{role}={shlex.join(words)}"], [])))
 
 
@@ -73,7 +79,7 @@ def test_the_word_of_a_run_with_a_half_of_somebody_elses_is_that_of_its_window_a
     assert "stability" not in of.summary
     role = "plant" if which == "inventing" else "controller"
     assert of.summary["verdict_rule"].startswith(f"By its window alone, since the {role} was not haploop's own")
-    assert haploop.logger.summary.read(of.out / "summary.json")["verdict_rule"] == of.summary["verdict_rule"]
+    assert read(of.out / "summary.json")["verdict_rule"] == of.summary["verdict_rule"]
     assert not awaits_verdict(of.scene, of.summary)
     assert "steady" not in shown(summary_table(of.summary), 100).splitlines()[0]
 
@@ -115,3 +121,18 @@ def test_an_unmodelled_hand_runs_with_a_plant_that_knows_it_and_claims_no_residu
     assert "work of the hand, by what is left over" in " ".join(text.split())
     assert "residual" not in text
     assert replay(of.out).differences == []
+
+
+def test_a_plant_that_leaves_out_what_its_scene_moves_is_not_booked_as_if_that_stood_still() -> None:
+    """Every scene's own plant has all of the columns that are asked of one of somebody else's."""
+    for tables in (EVERYTHING, {"friction": {"kinetic": 0.1}}, {}):
+        made = scene(**{**tables, "duration": 0.01})
+        columns = run_captured(made).plant
+        assert set(plant_columns(made)) <= columns.keys()
+        time = Timebase.from_scene(made)
+        blocks = {name: column.tobytes() for name, column in columns.items()}
+        assert complaint(Frame("PLANT_BLOCK", [0, time.ticks, blocks]), "plant", made, time) == ""
+        for name in plant_columns(made):
+            less = {other: data for other, data in blocks.items() if other != name}
+            why = complaint(Frame("PLANT_BLOCK", [0, time.ticks, less]), "plant", made, time)
+            assert why.endswith(f"it has no column {name}.")

@@ -50,6 +50,14 @@ def test_a_command_that_would_have_to_move_the_device_refuses_and_says_why(comma
     assert f"mine.toml: {WHY}" in answer.stderr
 
 
+def test_a_sweep_of_such_a_scene_is_refused_before_its_first_run(file: Path, tmp_path: Path):
+    sweep = tmp_path / "sweep.toml"
+    sweep.write_text(f'scene = "{file}"\n[axes]\n"wall.stiffness" = [100, 200]\n', encoding="utf-8")
+    answer = CliRunner().invoke(app, ["sweep", str(sweep), "--out", str(tmp_path / "out")])
+    assert answer.exit_code == 2
+    assert WHY in answer.stderr
+
+
 REFUSING: dict[str, Callable[[Path], object]] = {
     "load": load,
     "prepare": prepare,

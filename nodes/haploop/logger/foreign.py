@@ -5,6 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 from haploop.logger.books.buffers import PIECES
+from haploop.plant.chain.chain import Chain
+from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
 from haploop.protocol.transport.wire import Frame, Message
 
@@ -15,13 +17,13 @@ _WALL = ("position", "stiffness", "into_wall")
 _ELEMENT = {"book": int, "kind": str, "parameters": dict, "from_tick": int}
 
 
-def complaint(frame: Frame, role: str, time: Timebase) -> str:
+def complaint(frame: Frame, role: str, scene: Scene, time: Timebase) -> str:
     """Returns what is wrong with a STATE or a block of one of these, as a sentence; "" for nothing."""
     message = frame.as_dict()
     if frame.name == "STATE":
         wrong = _state(message["state"], role)
     elif frame.name == "PLANT_BLOCK":
-        wrong = _columns(message, _PLANT, message["ticks"] * time.steps_per_tick + 1)
+        wrong = _columns(message, plant_columns(scene), message["ticks"] * time.steps_per_tick + 1)
     elif frame.name == "CONTROLLER_BLOCK":
         wrong = _parts(message)
         names = (*_CONTROLLER, *(f"dissipation.{index}" for index in range(len(message["elements"]))))
@@ -29,6 +31,13 @@ def complaint(frame: Frame, role: str, time: Timebase) -> str:
     else:
         return ""
     return wrong and f"A {frame.name} of the {role} from tick {frame.fields[0]} cannot be booked: {wrong}."
+
+
+def plant_columns(scene: Scene) -> tuple[str, ...]:
+    """Returns the columns without which the books of a scene's plant know less than what moves."""
+    chain, friction = Chain.from_scene(scene), ("friction", "stuck") if scene.friction else ()
+    lows = (f"{name}_low" for name in chain.positions)
+    return tuple(dict.fromkeys((*_PLANT, *chain.states, *lows, *friction)))
 
 
 def _state(state: Message, role: str) -> str:

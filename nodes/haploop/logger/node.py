@@ -68,7 +68,7 @@ class LoggerNode:
         self.session.programs = welcome["context"].get("programs", {})
         self._foreign = {role: not program["own"] for role, program in self.session.programs.items()}
         self.session.logger.foreign = tuple(role for role, is_foreign in self._foreign.items() if is_foreign)
-        self._time = time
+        self._scene, self._time = scene, time
         self.session.logger.booked = self._publish_energy
         states: dict[str, Message] = {}
         early: list[tuple[str, Frame]] = []
@@ -129,7 +129,7 @@ class LoggerNode:
         if self._foreign.get(role):
             from haploop.logger.foreign import complaint
 
-            if why := complaint(frame, role, self._time):
+            if why := complaint(frame, role, self._scene, self._time):
                 raise NodeError(why)
 
     def _take(self, role: str, frame: Frame) -> None:
