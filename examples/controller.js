@@ -48,7 +48,7 @@ class Law {
 }
 
 take_seat("controller", async (seat) => {
-  await seat.join({}, { name: "controller.js", version: "1", command: process.argv.slice(1, -1).join(" ") });
+  await seat.join({}, { name: "controller.js", version: "1" });
   const { scene, timebase: time } = seat;
   const law = new Law(scene, time.control_rate);
   let rows = [], history = [], refused = [], delay = time.delay_steps;

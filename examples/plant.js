@@ -44,7 +44,7 @@ function encoded(x, { resolution, rounding } = {}) {
 take_seat("plant", async (seat) => {
   const loop = new zmq.Router({ linger: 1000, mandatory: true, maxMessageSize: 4 * 1024 * 1024 });
   const binds = { loop: await seat.bind(loop, "loop") };
-  await seat.join(binds, { name: "plant.js", version: "1", command: process.argv.slice(1, -1).join(" ") });
+  await seat.join(binds, { name: "plant.js", version: "1" });
   const { scene, timebase: time } = seat, n = time.plant_rate / time.control_rate;
   const strange = Object.keys(scene).find((key) => !KNOWN.includes(key) && scene[key] != null);
   if (strange || scene.acceleration?.source) throw new Error(`This plant knows nothing of ${strange ?? "an accelerometer"}.`);
@@ -106,7 +106,7 @@ take_seat("plant", async (seat) => {
     }
     if (reason) break;
     seat.tick++;
-    if (!(Math.abs(motion.x) <= scene.diverged_beyond)) reason = `the device was at ${motion.x} m, at tick ${seat.tick}`;
+    if (!(Math.abs(motion.x) <= scene.diverged_beyond)) reason = `the device was at ${motion.x} m, beyond the limit of ${scene.diverged_beyond} m, at tick ${seat.tick}`;
     if (rows.length >= n * scene.run.block_ticks) seat.flush();
   }
   await say(frame("LAST", seat.tick));

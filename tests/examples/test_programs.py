@@ -54,9 +54,10 @@ def test_a_controller_of_another_language_gives_every_column_of_our_own_to_the_b
     name: str, scene: str, tmp_path: Path, running: Start
 ) -> None:
     run = running(*seat("controller", program(name, tmp_path)), scene=SCENES / scene, sets=(PATIENT,), pace=FREE)
-    run.end(0)
-    log = haploop.logger.read(run.out_directory)
-    assert_same(log, own(tmp_path, scene))
+    programs = run.summary()["programs"]
+    assert (programs["controller"]["name"], programs["controller"]["own"]) == (name, False)
+    assert programs["plant"]["own"]
+    assert_same(haploop.logger.read(run.out_directory), own(tmp_path, scene))
     assert replay(run.out_directory).differences == []
 
 
@@ -96,6 +97,45 @@ def test_a_plant_of_another_language_moves_as_the_exact_flow_and_the_books_find_
     assert np.abs(log["/plant"]["x"] - truth["/plant"]["x"]).max() < 1e-13
     assert log["/plant"]["x"].tobytes() != truth["/plant"]["x"].tobytes()
     assert abs(summary["energy"]["residual_J"]) < 1e-12 * summary["energy"]["moved_J"]
+
+
+def test_a_plant_that_diverges_ends_the_run_at_the_tick_at_which_our_own_does(tmp_path: Path, running: Start) -> None:
+    wild = ("dissipation.0.damping=60", "diverged_beyond=0.07")
+    words = seat("plant", in_node("plant.js"))
+    summary = running(*words, scene=SCENES / "fig6b.toml", sets=(*wild, PATIENT), pace=FREE).summary()
+    assert summary["ended"] == "diverged"
+    assert "beyond the limit of 0.07 m" in summary["why"]
+    assert summary["ticks"] == len(own(tmp_path, "fig6b.toml", *wild)["/controller"]["x"])
+
+
+@pytest.mark.parametrize("how", ["to its end", "killed", "without its launcher"])
+@pytest.mark.parametrize(("role", "name", "scene"), SEATS)
+def test_a_program_joins_a_run_that_waits_for_it_and_neither_outlives_the_other(
+    role: str, name: str, scene: str, how: str, tmp_path: Path, running: Start
+) -> None:
+    words = program(name, tmp_path)
+    sets = (PATIENT,) if how == "to its end" else (PATIENT, "duration=600")
+    run = running("--external", role, scene=SCENES / scene, sets=sets, pace=FREE)
+    file = wait_for("its file", lambda: next(iter(run.live.sockets.glob(f"external-{role}.json")), None))
+    wait_for("its content", lambda: file.read_text(encoding="utf-8").endswith("}"))
+    assert file.stat().st_mode & 0o777 == 0o600
+    with subprocess.Popen([*words, str(file)]) as joined:
+        try:
+            if how == "to its end":
+                assert run.summary()["programs"][role]["name"] == name
+                assert joined.wait(30) == 0
+                return
+            run.reaches(100)
+            if how == "killed":
+                joined.kill()
+                run.end(1)
+                assert "is gone" in run.stderr
+            else:
+                run.signal(signal.SIGKILL)
+                run.end(-signal.SIGKILL)
+                assert joined.wait(30) == 1
+        finally:
+            joined.kill()
 
 
 @pytest.mark.parametrize(("role", "name", "scene"), SEATS)
