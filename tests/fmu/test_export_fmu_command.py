@@ -97,10 +97,14 @@ def test_where_there_is_no_compiler_it_says_what_to_install(
     refused(export(wall, "--out", tmp_path / "mine.fmu"), 1, "A C compiler was expected", "apt install gcc", "CC=")
     monkeypatch.setenv("CC", "no-such-compiler -O0")
     refused(export(wall, "--out", tmp_path / "mine.fmu"), 1, "no-such-compiler cannot be started")
+    monkeypatch.setenv("CC", "'gcc")
+    refused(export(wall, "--out", tmp_path / "mine.fmu"), 1, "CC must be a command, but 'gcc was given")
     assert list(tmp_path.glob("*.fmu*")) == []
 
 
-@pytest.mark.parametrize(("script", "words"), [("echo broken >&2; exit 3", "broken"), ("exit 0", "it said nothing")])
+@pytest.mark.parametrize(
+    ("script", "words"), [("printf 'broken \\377' >&2; exit 3", "broken \ufffd"), ("exit 0", "it said nothing")]
+)
 def test_a_compiler_that_fails_is_quoted_and_leaves_nothing(
     script: str, words: str, wall: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

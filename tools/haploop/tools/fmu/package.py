@@ -75,14 +75,17 @@ def host_platform() -> tuple[str, str]:
 
 def _library(sources: dict[str, str], suffix: str) -> bytes:
     """Returns the shared library of these sources."""
-    compiler = shlex.split(os.environ.get("CC", "")) or [next(filter(shutil.which, ("cc", "gcc", "clang")), "cc")]
+    try:
+        compiler = shlex.split(os.environ.get("CC", "")) or [next(filter(shutil.which, ("cc", "gcc", "clang")), "cc")]
+    except ValueError as error:
+        raise NotCompiled(f"CC must be a command, but {os.environ['CC']} was given: {error}.") from error
     with tempfile.TemporaryDirectory() as folder:
         for name, text in sources.items():
             Path(folder, name).write_text(text, encoding="utf-8")
         library = Path(folder, f"fmu{suffix}")
         command = [*compiler, *_FLAGS, "-o", library.name, "fmi3.c", "-lm"]
         try:
-            done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=_COMPILE_S)
+            done = subprocess.run(command, cwd=folder, capture_output=True, timeout=_COMPILE_S)
         except OSError as error:
             raise NotCompiled(
                 f"A C compiler was expected, but {compiler[0]} cannot be started ({error.strerror}). Install one "
@@ -92,7 +95,8 @@ def _library(sources: dict[str, str], suffix: str) -> bytes:
         except subprocess.TimeoutExpired as error:
             raise NotCompiled(f"The C compiler {compiler[0]} was not done after {_COMPILE_S:g} s.") from error
         if done.returncode or not library.exists():
-            said = "\n".join((done.stderr or done.stdout).strip().splitlines()[:8]) or "it said nothing"
+            told = (done.stderr or done.stdout).decode(errors="replace").strip()
+            said = "\n".join(told.splitlines()[:8]) or "it said nothing"
             raise NotCompiled(
                 f"The C compiler made no library (exit status {done.returncode}): {shlex.join(command)}\n{said}\n"
                 "Another compiler can be named: CC=gcc haploop export-fmu ..."
