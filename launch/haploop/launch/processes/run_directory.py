@@ -27,7 +27,6 @@ from haploop.protocol.transport.wire import Message, WireError, decode, encode
 # A swap may try a plugin first.
 _ANSWER_MS, _SWAP_MS = 5000, 30_000
 _LOOK_MS = 250
-_HERE = " It may be in a network of its own, as that of a container is."
 
 
 class RunNotFound(Exception):
@@ -151,7 +150,7 @@ def ask(run: LiveRun, verb: str, **arguments: Any) -> tuple[str, Message]:
     context = run.make_context()
     socket = open_socket(context, zmq.DEALER)
     is_tcp = run.clock.startswith("tcp:")
-    connection = Connection(socket, run.clock, run.keys is not None) if is_tcp else None
+    connection = Connection(context, socket, run.clock) if is_tcp else None
     try:
         connect(socket, run.clock)
         socket.send(encode("COMMAND", verb, arguments))
@@ -162,7 +161,8 @@ def ask(run: LiveRun, verb: str, **arguments: Any) -> tuple[str, Message]:
             if not is_live(run):
                 raise RunNotFound(f"Run {_named(run)} has ended.")
             if connection and (why := connection.trouble()):
-                raise RunNotFound(why if run.sockets is None else f"Run {_named(run)} cannot be reached. {why}{_HERE}")
+                is_known = "" if run.sockets is None else f"Run {_named(run)} is live but cannot be reached from here. "
+                raise RunNotFound(is_known + why)
         else:
             raise RunNotFound(f"Run {_named(run)} has not answered for {answer_ms // 1000} s.")
         frame = decode(socket.recv())
@@ -171,8 +171,6 @@ def ask(run: LiveRun, verb: str, **arguments: Any) -> tuple[str, Message]:
     except zmq.ZMQError as error:
         raise RunNotFound(f"Run {run.id} cannot be reached at {run.clock}: {error.strerror}.") from error
     finally:
-        if connection:
-            connection.close()
         context.destroy(linger=0)
     if frame.name == "REFUSED":
         raise CommandRefused(frame.fields[0])

@@ -10,7 +10,14 @@ import zmq
 from haploop.protocol.changes import Event
 from haploop.protocol.transport.connection import Connection
 from haploop.protocol.transport.messages import PROCESSES
-from haploop.protocol.transport.sockets import connect, has_message, open_socket, transport_of, with_host_of
+from haploop.protocol.transport.sockets import (
+    SecureContext,
+    connect,
+    has_message,
+    open_socket,
+    transport_of,
+    with_host_of,
+)
 from haploop.protocol.transport.wire import Frame, Message, WireError, decode, encode
 
 # A node that waits says so this often, so that the clock can tell who is being waited for.
@@ -48,8 +55,8 @@ class ClockClient:
         self._address = address
         transport = transport_of(context)
         self._connection = None
-        if address.startswith("tcp:"):
-            self._connection = Connection(self.socket, address, transport.keys is not None)
+        if address.startswith("tcp:") and isinstance(context, SecureContext):
+            self._connection = Connection(context, self.socket, address)
         # One of the run's own that is cut off is known no more; the last words of a run may still be on their way to
         # any other.
         self._grace_s = 0.0 if role in PROCESSES else _GRACE_S

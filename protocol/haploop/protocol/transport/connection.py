@@ -7,7 +7,7 @@ import time
 
 import zmq
 
-from haploop.protocol.transport.sockets import has_message
+from haploop.protocol.transport.sockets import SecureContext, has_message
 
 _EVENTS = (
     zmq.EVENT_CONNECTED
@@ -33,20 +33,22 @@ _NEEDS_KEYS = "The run at {} is guarded by keys, or it is no run of haploop; nam
 _HAS_NO_KEYS = "The run at {} has no keys, or it is no run of haploop; leave out --keys if you meant it."
 _NO_RUN = "What answers at {} is no run of haploop; look at the port."
 _SILENT = "What listens at {} says nothing: it is no run of haploop, or the network loses most of what is sent."
-_NOBODY = "Nobody listens at {}: the run has ended, or address or port are wrong."
+_NOBODY = (
+    "Nobody listens at {}: the run there has ended, it is in a network of its own (as that of a container), or the "
+    "address is wrong."
+)
 _NO_ANSWER = "Nothing comes back from {}: the host is off, there is no way to it, or a firewall holds it back."
 
 
 class Connection:
     """The connection of one socket that is about to connect to a TCP address.
 
-    Args:
-        has_keys: whether the socket has a certificate.
+    It is watched until the context is destroyed.
     """
 
-    def __init__(self, socket: zmq.Socket[bytes], address: str, has_keys: bool) -> None:
-        self._address, self._has_keys = address, has_keys
-        self._monitor = socket.get_monitor_socket(_EVENTS)
+    def __init__(self, context: SecureContext, socket: zmq.Socket[bytes], address: str) -> None:
+        self._address, self._has_keys = address, context.transport.keys is not None
+        self._monitor = context.watch(socket, _EVENTS)
         self._began = time.monotonic()
         self._stands = self._has_stood = False
         self._since = self._began  # when it began to be as it is now
@@ -64,10 +66,6 @@ class Connection:
         """Returns how long a connection that stood has been gone, s; 0 while it stands, or never has."""
         self._take()
         return 0.0 if self._stands or not self._has_stood else time.monotonic() - self._since
-
-    def close(self) -> None:
-        """Ends the watch; the socket itself stays open."""
-        self._monitor.close(linger=0)
 
     def _take(self) -> None:
         while has_message(self._monitor):

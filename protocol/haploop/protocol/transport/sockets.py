@@ -101,6 +101,7 @@ class SecureContext(zmq.Context[zmq.Socket[bytes]]):
 
     transport: Transport = Transport()
     _authenticator: Any = None
+    _watched: tuple[zmq.Socket[bytes], ...] = ()
 
     @classmethod
     def from_transport(cls, transport: Transport) -> SecureContext:
@@ -115,8 +116,17 @@ class SecureContext(zmq.Context[zmq.Socket[bytes]]):
             context._authenticator.configure_curve_callback(credentials_provider=_Known(transport.keys))
         return context
 
+    def watch(self, socket: zmq.Socket[bytes], events: int) -> zmq.Socket[bytes]:
+        """Returns a socket that tells of events of another's connections, (event, value) as 2 and 4 bytes."""
+        self._watched = *(one for one in self._watched if not one.closed), socket
+        return socket.get_monitor_socket(events)
+
     def destroy(self, linger: int | None = None) -> None:
         """Stops the authenticator, closes all sockets and ends the context."""
+        for socket in self._watched:  # one that still told of events would wait for whom it tells, for ever
+            if not socket.closed:
+                socket.disable_monitor()
+        self._watched = ()
         if self._authenticator:
             self._authenticator.stop()
             self._authenticator = None

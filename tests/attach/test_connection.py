@@ -1,0 +1,123 @@
+"""Why a run elsewhere cannot be reached is told in one sentence that fits, soon, and by whoever asks."""
+
+from __future__ import annotations
+
+import contextlib
+import socket
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+import zmq
+
+from haploop.launch.processes.run_directory import Elsewhere, RunNotFound, find
+from haploop.protocol.transport.clock_client import ClockClient, Refused
+from haploop.protocol.transport.keys import CLIENT, CLOCK, make_keys, read_keys
+from haploop.protocol.transport.sockets import SecureContext, Transport, connect, open_socket
+
+
+@pytest.fixture
+def keys(tmp_path) -> Path:
+    make_keys(tmp_path / "keys")
+    return tmp_path / "keys"
+
+
+@contextlib.contextmanager
+def listening(keys: Path | None) -> Iterator[str]:
+    """The address of a ROUTER as that of a clock."""
+    context = SecureContext.from_transport(Transport("127.0.0.1", keys=keys and read_keys(keys, CLOCK)))
+    router = open_socket(context, zmq.ROUTER)
+    port = router.bind_to_random_port("tcp://127.0.0.1")
+    try:
+        yield f"tcp://127.0.0.1:{port}"
+    finally:
+        context.destroy(linger=0)
+
+
+def why(address: str, keys: Path | None) -> str:
+    """What a command says; a node says the same."""
+    with pytest.raises(RunNotFound) as found:
+        find(Elsewhere(address, keys))
+    context = SecureContext.from_transport(Transport(keys=keys and read_keys(keys, CLIENT)))
+    client = ClockClient(context, "observer", address, "")
+    try:
+        with pytest.raises(Refused) as refused:
+            client.join({})
+    finally:
+        context.destroy(linger=0)
+    assert str(refused.value) == str(found.value)
+    return str(found.value)
+
+
+def test_a_key_that_the_run_does_not_know_is_told_so(keys, tmp_path):
+    make_keys(tmp_path / "mine")
+    (tmp_path / "mine/clock.key").write_bytes((keys / "clock.key").read_bytes())
+    with listening(keys) as address:
+        assert "refuses this key" in why(address, tmp_path / "mine")
+
+
+def test_whoever_comes_without_keys_is_told_that_the_run_has_some(keys):
+    with listening(keys) as address:
+        assert "is guarded by keys" in why(address, None)
+
+
+def test_whoever_comes_with_keys_to_a_run_without_is_told_so(keys):
+    with listening(None) as address:
+        assert "has no keys" in why(address, keys)
+
+
+@pytest.mark.slow  # what may pass is told after some seconds
+def test_the_keys_of_another_run_are_told_from_a_key_that_is_not_known(keys, tmp_path):
+    make_keys(tmp_path / "other")
+    with listening(keys) as address:
+        assert "clock.key is not that of its keys" in why(address, tmp_path / "other")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("with_keys", [True, False])
+@pytest.mark.parametrize(
+    ("says", "words"),
+    [(b"HTTP/1.0 400\r\n\r\n", "is no run of haploop"), (b"", "says nothing"), (None, "Nobody listens")],
+)
+def test_what_is_no_run_at_all_is_told_so(keys, says, words, with_keys):
+    with socket.create_server(("127.0.0.1", 0)) as other:
+        address = f"tcp://127.0.0.1:{other.getsockname()[1]}"
+        if says is None:
+            other.close()
+        elif says:
+            threading.Thread(target=answer_all, args=(other, says), daemon=True).start()
+        assert words in why(address, keys if with_keys else None)
+
+
+def answer_all(server: socket.socket, says: bytes) -> None:
+    with contextlib.suppress(OSError):
+        while True:
+            peer, _ = server.accept()
+            with peer:
+                peer.sendall(says)
+
+
+def test_a_client_may_connect_to_what_a_node_binds_and_a_stranger_may_not(keys, tmp_path):
+    """With the key of the one whose socket it is, as WELCOME brings it; a node has a pair of its own."""
+    make_keys(tmp_path / "other")
+    launcher = Transport("127.0.0.1", keys=read_keys(keys, CLOCK), directory=keys)
+    node = SecureContext.from_transport(launcher.of("plant"))
+    known = SecureContext.from_transport(Transport(keys=read_keys(keys, CLIENT)))
+    stranger = SecureContext.from_transport(Transport(keys=read_keys(tmp_path / "other", CLIENT)))
+    try:
+        publisher = open_socket(node, zmq.XPUB)
+        address = f"tcp://127.0.0.1:{publisher.bind_to_random_port('tcp://127.0.0.1')}"
+        subscribers = [open_socket(context, zmq.SUB) for context in (known, stranger)]
+        for subscriber in subscribers:
+            connect(subscriber, address, launcher.keys.known["plant"])
+            subscriber.subscribe(b"plant")
+        assert publisher.poll(10_000)
+        assert publisher.recv() == b"\x01plant"
+        publisher.send_multipart([b"plant", b"block"])
+        assert subscribers[0].poll(10_000)
+        assert not publisher.poll(200), "a stranger's subscription came through"
+        assert not subscribers[1].poll(0)
+    finally:
+        for context in (known, stranger, node):
+            context.destroy(linger=0)
