@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 import subprocess
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -35,9 +34,9 @@ class Hosts:
             (directory / "copy" / name).write_bytes((directory / "keys" / name).read_bytes())
             (directory / "copy" / name).chmod(0o600)
 
-    def begin(self, host: str, *words: str, stdin: int | None = None) -> subprocess.Popen[str]:
+    def begin(self, host: str, *words: str) -> subprocess.Popen[str]:
         pipe = subprocess.PIPE
-        process = subprocess.Popen(on(host, list(words)), stdin=stdin, stdout=pipe, stderr=pipe, text=True)
+        process = subprocess.Popen(on(host, list(words)), stdout=pipe, stderr=pipe, text=True)
         self.begun.append(process)
         return process
 
@@ -78,17 +77,12 @@ def bits_of(*sets: str, directory: Path) -> str:
 
 
 def join_from(hosts: Hosts, role: str, base: Path) -> subprocess.Popen[str]:
-    """Starts haploop's own node on host b from the file that the run on host a waits with."""
+    """Takes part from host b in the run on host a that waits, by a copy of the file it wrote."""
     file = wait_for("the file", lambda: next(iter(base.glob(f"haploop/*/external-{role}.json")), None))
-    told = json.loads(wait_for("what it says", file.read_text))
-    sockets = hosts.directory / "b"
-    sockets.mkdir()
-    told["prints"] = str(sockets / "prints.txt")
-    node = hosts.begin("b", sys.executable, "-m", f"haploop.{role}.node", str(sockets), stdin=subprocess.PIPE)
-    assert node.stdin
-    node.stdin.write(json.dumps(told) + "\n")
-    node.stdin.flush()
-    return node
+    wait_for("what it says", file.read_text)
+    copy = hosts.directory / "copy" / file.name
+    copy.write_bytes(file.read_bytes())
+    return hosts.begin("b", *HAPLOOP, "join", str(copy))
 
 
 @pytest.mark.parametrize("role", ["controller", "plant"])

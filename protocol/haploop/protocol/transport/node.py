@@ -56,21 +56,31 @@ def run_node(role: str, work: Work) -> None:
     sys.exit(take_part(context, role, work, start, directory))
 
 
-def take_part(context: zmq.Context[zmq.Socket[bytes]], role: str, work: Work, start: Message, directory: Path) -> int:
+def take_part(
+    context: zmq.Context[zmq.Socket[bytes]],
+    role: str,
+    work: Work,
+    start: Message,
+    directory: Path,
+    tell: Callable[[str], None] = lambda why: None,
+) -> int:
     """Works, reports to the clock how that ended, ends the context, and returns the exit status: 0 after DONE, else 1.
 
     Args:
         start: address of the clock and secret of the run.
+        tell: is told why it did not end with DONE.
     """
     client = ClockClient(context, role, start["address"], start["secret"])
     try:
         tick, result = work(client, context, directory)
         client.leave("DONE", tick, result)
         status = 0
-    except Aborted:
+    except Aborted as error:
+        tell(str(error))
         status = 1
     except (Refused, NodeError, LoopError) as error:
         client.leave("FAILED", -1, str(error))
+        tell(str(error))
         status = 1
     except Exception as error:
         import traceback

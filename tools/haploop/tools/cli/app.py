@@ -8,6 +8,7 @@ import typer
 
 from haploop.tools.cli.bundled import new, scenes
 from haploop.tools.cli.explain import explain
+from haploop.tools.cli.join import join
 from haploop.tools.cli.live_commands import attach, keys, pace, pause, resume, set_, status, step, stop, swap, undo
 from haploop.tools.cli.run_command import run
 from haploop.tools.cli.scenes import check, export, judge, plot, plugins, replay
@@ -44,6 +45,6 @@ def haploop(
 # In the order in which the help lists them.
 for command in (
     run, scenes, new, check, explain, plugins, status, pause, resume, step, pace, stop, swap, set_, undo, attach, view,
-    keys, plot, replay, judge, export, export_fmu, cost, sweep, dissipate, paper, advise,
+    keys, join, plot, replay, judge, export, export_fmu, cost, sweep, dissipate, paper, advise,
 ):  # fmt: skip
     app.command(command.__name__.rstrip("_").replace("_", "-"))(command)
