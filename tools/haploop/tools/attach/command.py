@@ -58,16 +58,14 @@ def attach_logger(run_id: str | Elsewhere | None, out: Path | None) -> None:
     finally:
         context.destroy(linger=500)
         discard(directory, is_new)  # where nothing was logged
-    if summary is None:
-        leave(f"Run {run.id} ended before anything could be logged.", FAILED)
     print_summary(summary)
     print(directory, file=sys.stderr)
     if summary["ended"] == "failed":
         leave(summary["why"], FAILED)
 
 
-def _log(run: LiveRun, context: SecureContext, directory: Path, received: list[int]) -> Summary | None:
-    """Logs until the run ends or a signal comes; returns the summary, or None if no telemetry came."""
+def _log(run: LiveRun, context: SecureContext, directory: Path, received: list[int]) -> Summary:
+    """Logs until the run ends or a signal comes, and returns the summary; leaves where no telemetry came."""
 
     def reason_to_leave() -> str | None:
         if received:
@@ -85,4 +83,7 @@ def _log(run: LiveRun, context: SecureContext, directory: Path, received: list[i
         client.leave("LEAVE", tick)
         return summary
     except (Aborted, TelemetryGap) as error:
-        return node.save(str(error))
+        summary = node.save(str(error))
+        if summary is None:
+            leave(f"Run {run.id} ended before anything could be logged. {error}", FAILED)
+        return summary
