@@ -5,6 +5,8 @@ import time
 from collections import Counter
 from itertools import accumulate
 
+# Ticks held up for no longer than this are made up for at once, s; the rest of the time is lost.
+CATCH_UP_S = 0.02
 # Figures go out so often, s.
 EVERY_S = 1.0
 
@@ -12,7 +14,8 @@ EVERY_S = 1.0
 class Schedule:
     """When each tick is due, and how long after its tick each answer was there, in classes 5 % wide.
 
-    Time in which this process was held up for more than a period is lost: ticks to come are due later by it.
+    Ticks are due every period, whatever becomes of them. What this process was held up for beyond CATCH_UP_S is lost:
+    all ticks to come are due later by it.
     """
 
     def __init__(self, period_s, late_s):
@@ -25,9 +28,9 @@ class Schedule:
         now = time.monotonic()
         if self._began is None:
             self._began = now - tick * self._period_s
-        elif now > self.due(tick + 1):
-            self._lost_s += now - self.due(tick)
-            self._began += now - self.due(tick)
+        lost_s = max(0.0, now - self.due(tick) - CATCH_UP_S)
+        self._began += lost_s
+        self._lost_s += lost_s
 
     def due(self, tick):
         """Returns when a tick is due, s of time.monotonic()."""
