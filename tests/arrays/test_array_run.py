@@ -25,11 +25,12 @@ from haploop.protocol.scene.estimators import Velocity
 from haploop.protocol.scene.paths import with_value
 from haploop.protocol.scene.scene import ElementTable, EventTable, Scene
 from helpers.runs.batches import PUSH, Stiffening, alone, diverging, pressed, together, with_element, with_stiffness
+from helpers.scenes.effect_tables import slowly
 from helpers.scenes.least import KINDS
 from helpers.scenes.varied_scenes import drawn_base, varied
 
 
-@pytest.mark.parametrize("seed", range(40))
+@pytest.mark.parametrize("seed", [*range(20), *slowly(range(20, 40))])
 def test_a_scene_out_of_an_array_has_every_bit_of_the_scene_alone(seed: int) -> None:
     rng = np.random.default_rng(1000 + seed)
     base = drawn_base(seed)
@@ -39,7 +40,7 @@ def test_a_scene_out_of_an_array_has_every_bit_of_the_scene_alone(seed: int) -> 
     assert together(scenes) == [alone(each) for each in scenes]
 
 
-@pytest.mark.parametrize("seed", [3, 10])
+@pytest.mark.parametrize("seed", [3, *slowly([10])])
 def test_so_has_one_of_many_in_blocks_of_few_ticks(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(batch, "BLOCK", 3_000)
     rng = np.random.default_rng(seed)

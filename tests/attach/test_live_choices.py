@@ -90,6 +90,7 @@ def test_a_run_takes_pace_and_delay_while_it_goes_records_them_and_replays_to_th
     assert replay(subject.prepared.out).differences == []
 
 
+@pytest.mark.slow
 def test_a_paced_run_tells_how_late_its_ticks_were_and_has_the_bits_of_a_free_one(tmp_path):
     with going(tmp_path, "duration=0.5", pauses=(250,), pace=1.0) as subject:
         subject.stands_at(250)

@@ -1,5 +1,6 @@
 """Answers of the page at once: verdict, state and numbers, with and without a run, with and without a server."""
 
+import pytest
 from playwright.sync_api import expect
 
 from helpers.live.stand_in import RUNNING, WAITING
@@ -59,6 +60,7 @@ def style(page, name):
     return page.evaluate("name => getComputedStyle(document.querySelector('#verdict'))[name]", name)
 
 
+@pytest.mark.slow
 def test_what_the_window_sees_is_an_outline_and_says_that_nothing_is_known_of_stability(stand_in, open_page):
     page = open_page(stand_in.url)
     shown = {"steady": "no swing seen", "limit-cycle": "swinging", "diverged": "diverged", "no-contact": "no-contact"}
@@ -80,6 +82,7 @@ def test_what_the_window_sees_is_an_outline_and_says_that_nothing_is_known_of_st
     expect(page.locator("#notice")).to_contain_text("Its summary cannot be read.")
 
 
+@pytest.mark.slow
 def test_the_header_has_the_numbers_with_their_units(stand_in, open_page):
     stand_in.state()
     page = open_page(stand_in.url)
@@ -165,6 +168,7 @@ def test_a_lost_server_is_told_and_taken_up_again_with_the_same_question(stand_i
     assert stand_in.asked(lambda _: True) == asked
 
 
+@pytest.mark.slow
 def test_the_next_run_takes_the_place_of_the_one_that_has_ended_and_is_shown_live(stand_in, open_page):
     stand_in.state(**ENDED)
     stand_in.show(contact())

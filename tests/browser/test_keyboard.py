@@ -1,5 +1,6 @@
 """The page from the keyboard: every key, every control, and what is typed into a field."""
 
+import pytest
 from playwright.sync_api import expect
 
 from helpers.live.browser import order
@@ -20,6 +21,7 @@ def test_every_key_orders_what_the_help_says(stand_in, page):
         assert order(stand_in, page, lambda what=key: page.keyboard.press(what)) == expected
 
 
+@pytest.mark.slow
 def test_a_key_that_is_typed_into_a_field_steers_nothing(stand_in, page):
     page.fill("#swap-fields input", "")
     page.locator("#swap-fields input").press_sequentially("0.123 kg")

@@ -90,7 +90,7 @@ def test_on_a_desk_the_answer_the_charts_and_the_controls_are_there_without_scro
         assert 0.5 < box["width"] / box["height"] < 2, loop
 
 
-@pytest.mark.parametrize("viewport", [DESK, *first_and_slowly(PHONE, TABLET, LARGE)])
+@pytest.mark.parametrize("viewport", first_and_slowly(DESK, PHONE, TABLET, LARGE))
 def test_nothing_covers_anything_and_no_text_is_cut_off(viewport, stand_in, open_page, scheme):
     page = shown(stand_in, open_page, viewport, scheme)
     assert page.evaluate(OVERLAPS) == []

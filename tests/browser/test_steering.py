@@ -127,6 +127,7 @@ def test_whatever_the_run_may_understand_is_sent(stand_in, page):
         assert sent == (text if "N" in text else float(text))
 
 
+@pytest.mark.slow
 def test_what_the_run_refuses_is_told_beside_the_field_that_it_names(stand_in, page):
     stand_in.answer = lambda command: (False, 'live event: event.0.swap.damping is "1 kg". kg has another dimension.')
     page.fill("#swap-damping", "1 kg")
@@ -233,6 +234,7 @@ def test_a_pace_that_is_refused_shows_the_pace_as_it_is(stand_in, page):
     expect(page.locator("[name=pace][value='1']")).to_be_checked()
 
 
+@pytest.mark.slow
 def test_an_order_whose_answer_never_comes_is_told(stand_in, page):
     stand_in.answer = lambda command: None
     page.click("#pause")

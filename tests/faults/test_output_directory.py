@@ -66,6 +66,7 @@ def test_of_many_that_start_at_once_into_one_directory_only_one_gets_it(there, t
         assert all("must be new or empty" in words for words in said if words.startswith("refused"))
 
 
+@pytest.mark.slow
 def test_many_that_start_at_once_without_a_directory_get_one_each(tmp_path):
     said = [words for one in crowd(tmp_path, "-") for words in one]
     assert len(set(said)) == ROUNDS * SIZE

@@ -171,6 +171,7 @@ def test_an_element_that_leaves_is_named_with_its_tick(statement, reason, runnin
     assert replay(run.out).differences == []
 
 
+@pytest.mark.slow
 def test_a_force_that_never_returns_in_one_process_is_ended_by_the_second_interrupt(launched, brake, tmp_path):
     made = brake(ELEMENT.format(at_150=f"open({str(tmp_path / 'here')!r}, 'w')\n            while True: pass"))
     options = ("--plugin", str(made["plugin"]), "--in-process")

@@ -176,6 +176,7 @@ def test_the_verdict_comes_when_the_launcher_has_judged_the_run_and_until_then_i
     follow(play, tmp_path, *sets, pauses=(200,), options={"runs": Launched()})
 
 
+@pytest.mark.slow
 def test_the_verdict_of_a_run_whose_summary_cannot_be_read_is_not_known(tmp_path, monkeypatch):
     """As on another machine."""
     monkeypatch.setattr(RunSession, "read_summary", lambda self: None)

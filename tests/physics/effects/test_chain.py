@@ -203,7 +203,10 @@ LOOPS: dict[str, dict[str, Any]] = {
 }
 
 
-@pytest.mark.parametrize("loop", LOOPS)
+QUICK = ("transmission", "friction", "all")
+
+
+@pytest.mark.parametrize("loop", [*QUICK, *slowly(name for name in LOOPS if name not in QUICK)])
 def test_every_body_moves_as_in_an_independent_program_of_the_whole_loop(loop):
     pressed = scene(**PRESSED | LOOPS[loop])
     assert_same_motion(run(pressed), simulate(pressed))

@@ -10,6 +10,7 @@ import pytest
 
 from haploop.logger.log.channels import motion_columns
 from haploop.protocol.scene.scene import Scene
+from helpers.live.launched import first_and_slowly
 from helpers.runs.captured import Captured, run
 from helpers.scenes.least import scene
 from oracles.effects_run import follow
@@ -67,7 +68,7 @@ def error(method: str, plant_rate: int, name: str) -> float:
     return float((np.abs(found - expected).max(axis=1) / np.abs(expected).max(axis=1)).max())
 
 
-@pytest.mark.parametrize("name", SMOOTH)
+@pytest.mark.parametrize("name", first_and_slowly(*SMOOTH))
 @pytest.mark.parametrize("method", ONE_STEP)
 def test_the_error_falls_with_the_step_by_the_order_of_the_method(method, name):
     coarse, fine = (error(method, rate, name) for rate in (8000, 16000))
