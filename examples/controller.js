@@ -8,14 +8,22 @@ const zmq = require("zeromq");
 const { take_seat, frame, floats, read, column } = require("./seat.js");
 
 const COLUMNS = ["x", "v", "a", "wall", "dissipation.0", "total", "in_contact"];
-const CAN_SET = ["wall.stiffness", "wall.position", "dissipation.0.damping", "clock.round_trip_delay"]; // the last is the plant's
+// The last is the plant's to do.
+const CAN_SET = ["wall.stiffness", "wall.position", "dissipation.0.damping", "clock.round_trip_delay"];
 
 class Law {
   constructor({ wall, dissipation: [element, ...others] = [], velocity, acceleration }, rate) {
     if (!wall || element?.kind !== "damping" || others.length || velocity || acceleration)
-      throw new Error("This controller is a wall with one damping and plain differences, but the scene asks for another.");
+      throw new Error(
+        "This controller is a wall with one damping and plain differences, but the scene asks for another.",
+      );
     this.wall = { position: wall.position, stiffness: wall.stiffness, into_wall: wall.occupies === "below" ? -1 : 1 };
-    this.element = { book: 0, kind: "damping", parameters: { damping: element.damping, acts: element.acts }, from_tick: 0 };
+    this.element = {
+      book: 0,
+      kind: "damping",
+      parameters: { damping: element.damping, acts: element.acts },
+      from_tick: 0,
+    };
     this.T = 1 / rate;
     this.v = 0;
   }
@@ -42,7 +50,12 @@ class Law {
       const [table, name] = key.split(".");
       if (table === "wall") this.wall = { ...this.wall, [name]: value };
       if (table === "dissipation")
-        this.element = { ...this.element, book: this.element.book + 1, parameters: { ...this.element.parameters, damping: value }, from_tick: tick };
+        this.element = {
+          ...this.element,
+          book: this.element.book + 1,
+          parameters: { ...this.element.parameters, damping: value },
+          from_tick: tick,
+        };
     }
   }
 }
@@ -51,22 +64,37 @@ take_seat("controller", async (seat) => {
   await seat.join({}, { name: "controller.js", version: "1" });
   const { scene, timebase: time } = seat;
   const law = new Law(scene, time.control_rate);
-  let rows = [], history = [], refused = [], delay = time.delay_steps;
+  let rows = [],
+    history = [],
+    refused = [],
+    delay = time.delay_steps;
   seat.tick = 0;
   seat.state = () => [seat.tick, { history }];
-  const block = () => { // wall and elements hold for the whole of a block
+  const block = () => {
+    // wall and elements hold for the whole of a block
     if (!rows.length) return;
     const columns = Object.fromEntries(COLUMNS.map((name, i) => [name, column(rows, i)]));
-    const made = { from_tick: seat.tick - rows.length, ticks: rows.length, columns, elements: [law.element], wall: law.wall };
+    const made = {
+      from_tick: seat.tick - rows.length,
+      ticks: rows.length,
+      columns,
+      elements: [law.element],
+      wall: law.wall,
+    };
     seat.publish("CONTROLLER_BLOCK", ...Object.values(made));
     history.push(made); // all that may still be on its way
-    while (history.length > 1 && seat.tick - history[1].from_tick > 2 + delay / (time.plant_rate / time.control_rate)) history.shift();
+    while (history.length > 1 && seat.tick - history[1].from_tick > 2 + delay / (time.plant_rate / time.control_rate))
+      history.shift();
     rows = [];
   };
   seat.cut = () => {
     if (!rows.length && !refused.length) return;
     block();
-    seat.tell("PROGRESS", seat.tick, refused.length ? { refused: refused.map((r) => r.why), refused_changes: refused.map((r) => r.change) } : {});
+    seat.tell(
+      "PROGRESS",
+      seat.tick,
+      refused.length ? { refused: refused.map((r) => r.why), refused_changes: refused.map((r) => r.change) } : {},
+    );
     refused = [];
   };
 
@@ -74,7 +102,8 @@ take_seat("controller", async (seat) => {
   loop.connect(seat.endpoints.plant.loop);
   await loop.send(frame("HELLO", seat.start.secret));
   const [answer] = await loop.receive();
-  if (read(answer)[1] !== seat.start.secret) throw new Error("The plant's greeting did not carry the secret of this run.");
+  if (read(answer)[1] !== seat.start.secret)
+    throw new Error("The plant's greeting did not carry the secret of this run.");
   seat.awaits = "logger";
   await seat.news(() => seat.answered);
   seat.tell("READY", 0);
@@ -82,11 +111,12 @@ take_seat("controller", async (seat) => {
   for await (const [data] of loop) {
     const [name, from, samples] = read(data);
     if (name === "LAST") break;
-    if (name !== "SAMPLES" || from !== seat.tick) throw new Error(`Samples of tick ${seat.tick} were expected, but ${name} of tick ${from} came.`);
+    if (name !== "SAMPLES" || from !== seat.tick)
+      throw new Error(`Samples of tick ${seat.tick} were expected, but ${name} of tick ${from} came.`);
     await seat.news(() => seat.until >= from + samples.length); // the changes of these ticks come with the grant
     const forces = [];
     for (const [x] of samples) {
-      for (let due; (due = seat.due(seat.tick)); ) {
+      for (let due; (due = seat.due(seat.tick));) {
         const [tick, event] = due;
         if (!event.set && !event.swap) continue;
         block();

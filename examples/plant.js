@@ -1,4 +1,5 @@
-// A plant in Node.js: device and hand as one mass on a spring with dampers, stepped by Runge and Kutta's method of order 4.
+// A plant in Node.js: device and hand as one mass on a spring with dampers, stepped by Runge and Kutta's method of
+// order 4.
 //
 //   haploop run fig6b.toml --node plant="node examples/plant.js"
 //
@@ -7,23 +8,40 @@
 const zmq = require("zeromq");
 const { take_seat, frame, floats, read, column } = require("./seat.js");
 
-const KNOWN = ["title", "duration", "seed", "diverged_beyond", "clock", "device", "hand", "encoder", "wall", "dissipation",
-  "velocity", "acceleration", "event", "run"];
+const KNOWN = [
+  "title",
+  "duration",
+  "seed",
+  "diverged_beyond",
+  "clock",
+  "device",
+  "hand",
+  "encoder",
+  "wall",
+  "dissipation",
+  "velocity",
+  "acceleration",
+  "event",
+  "run",
+];
 const DELAY = "clock.round_trip_delay";
 
 class Motion {
   constructor({ device, hand }, h) {
     const { mass = 0, damping = 0, stiffness = 0, rest = 0, force } = hand ?? {};
-    if (force && !["constant", "ramp"].includes(force.kind)) throw new Error(`This plant knows no hand's force of kind ${force.kind}.`);
+    if (force && !["constant", "ramp"].includes(force.kind))
+      throw new Error(`This plant knows no hand's force of kind ${force.kind}.`);
     this.h = h;
     [this.x, this.v] = [device.position, device.velocity];
     const push = (t) => (force ? force.value * (force.kind === "ramp" ? Math.min(t / force.rise_time, 1) : 1) : 0);
-    this.rate = (x, v, t, f) => (f + push(t) + stiffness * (rest - x) - (device.damping + damping) * v) / (device.mass + mass);
+    this.rate = (x, v, t, f) =>
+      (f + push(t) + stiffness * (rest - x) - (device.damping + damping) * v) / (device.mass + mass);
   }
 
   // Goes on by one plant step under a force that is held.
   step(number, f) {
-    const { x, v, h } = this, t = number * h;
+    const { x, v, h } = this,
+      t = number * h;
     const a1 = this.rate(x, v, t, f);
     const [v2, a2] = [v + (h / 2) * a1, this.rate(x + (h / 2) * v, v + (h / 2) * a1, t + h / 2, f)];
     const [v3, a3] = [v + (h / 2) * a2, this.rate(x + (h / 2) * v2, v + (h / 2) * a2, t + h / 2, f)];
@@ -36,7 +54,9 @@ class Motion {
 // To whole counts; halves go to the even one, as IEEE 754 rounds.
 function encoded(x, { resolution, rounding } = {}) {
   if (!resolution) return x;
-  const counts = x / resolution, down = Math.floor(counts), half = counts - down;
+  const counts = x / resolution,
+    down = Math.floor(counts),
+    half = counts - down;
   if (rounding === "floor") return resolution * down;
   return resolution * (half < 0.5 || (half === 0.5 && down % 2 === 0) ? down : down + 1);
 }
@@ -45,11 +65,16 @@ take_seat("plant", async (seat) => {
   const loop = new zmq.Router({ linger: 1000, mandatory: true, maxMessageSize: 4 * 1024 * 1024 });
   const binds = { loop: await seat.bind(loop, "loop") };
   await seat.join(binds, { name: "plant.js", version: "1" });
-  const { scene, timebase: time } = seat, n = time.plant_rate / time.control_rate;
+  const { scene, timebase: time } = seat,
+    n = time.plant_rate / time.control_rate;
   const strange = Object.keys(scene).find((key) => !KNOWN.includes(key) && scene[key] != null);
-  if (strange || scene.acceleration?.source) throw new Error(`This plant knows nothing of ${strange ?? "an accelerometer"}.`);
+  if (strange || scene.acceleration?.source)
+    throw new Error(`This plant knows nothing of ${strange ?? "an accelerometer"}.`);
   const motion = new Motion(scene, 1 / time.plant_rate);
-  let rows = [], force = 0, command = -1, delay = time.delay_steps;
+  let rows = [],
+    force = 0,
+    command = -1,
+    delay = time.delay_steps;
   const coming = []; // commands on their way: [step from which on, force, tick]
   seat.tick = 0;
   seat.state = () => [seat.tick, { tick: seat.tick, x: motion.x, v: motion.v, force, command }];
@@ -57,7 +82,9 @@ take_seat("plant", async (seat) => {
     const ticks = rows.length / n;
     if (!ticks) return;
     const all = [...rows, [motion.x, motion.v, 0, force, command]]; // a block ends with the state that the next begins with
-    const columns = Object.fromEntries(["x", "v", "x_low", "force", "command"].map((name, i) => [name, column(all, i)]));
+    const columns = Object.fromEntries(
+      ["x", "v", "x_low", "force", "command"].map((name, i) => [name, column(all, i)]),
+    );
     seat.publish("PLANT_BLOCK", seat.tick - ticks, ticks, columns);
     seat.tell("PROGRESS", seat.tick, {});
     rows = [];
@@ -74,7 +101,8 @@ take_seat("plant", async (seat) => {
   const hear = async () => {
     for (;;) {
       const [sender, ...frames] = await loop.receive();
-      if (partner ? sender.equals(partner) : is_hello(frames.at(-1), seat.start.secret)) return [sender, read(frames.at(-1))];
+      if (partner ? sender.equals(partner) : is_hello(frames.at(-1), seat.start.secret))
+        return [sender, read(frames.at(-1))];
     }
   };
   seat.awaits = "controller";
@@ -89,14 +117,16 @@ take_seat("plant", async (seat) => {
     await seat.news(() => seat.until > seat.tick || seat.last);
     if (seat.tick >= seat.until) break;
     const tick = seat.tick;
-    for (let due; (due = seat.due(tick)); ) if (due[1].set?.[DELAY] !== undefined) delay = Math.round(due[1].set[DELAY] * time.plant_rate);
+    for (let due; (due = seat.due(tick));)
+      if (due[1].set?.[DELAY] !== undefined) delay = Math.round(due[1].set[DELAY] * time.plant_rate);
     await say(floats("SAMPLES", tick, [[encoded(motion.x, scene.encoder)]]));
     seat.awaits = "controller";
     const [, [name, from, forces]] = await hear();
     seat.awaits = "clock";
     if (name !== "COMMANDS" || from !== tick || forces?.length !== 1)
       throw new Error(`A command of tick ${tick} was expected, but ${name} of tick ${from} came.`);
-    if (!Number.isFinite(forces[0])) reason = `command ${tick} was ${forces[0]}, which no device can apply, at tick ${tick}`;
+    if (!Number.isFinite(forces[0]))
+      reason = `command ${tick} was ${forces[0]}, which no device can apply, at tick ${tick}`;
     coming.push([tick * n + delay, forces[0], tick]);
     for (let step = tick * n; !reason && step < (tick + 1) * n; step++) {
       for (const [from, f, of] of coming) if (from <= step && of > command) [force, command] = [f, of];
@@ -106,7 +136,8 @@ take_seat("plant", async (seat) => {
     }
     if (reason) break;
     seat.tick++;
-    if (!(Math.abs(motion.x) <= scene.diverged_beyond)) reason = `the device was at ${motion.x} m, beyond the limit of ${scene.diverged_beyond} m, at tick ${seat.tick}`;
+    if (!(Math.abs(motion.x) <= scene.diverged_beyond))
+      reason = `the device was at ${motion.x} m, beyond the limit of ${scene.diverged_beyond} m, at tick ${seat.tick}`;
     if (rows.length >= n * scene.run.block_ticks) seat.flush();
   }
   await say(frame("LAST", seat.tick));

@@ -1,4 +1,5 @@
-// A seat in a run for programs in Node.js: starts, joins, hears the clock, publishes, ends. From protocol/README.md alone.
+// A seat in a run for programs in Node.js: starts, joins, hears the clock, publishes, ends. From protocol/README.md
+// alone.
 "use strict";
 const fs = require("node:fs");
 const path = require("node:path");
@@ -6,19 +7,45 @@ const { encode, decode } = require("@msgpack/msgpack");
 const zmq = require("zeromq");
 
 const VERSION = 2;
-const CODE = { JOIN: 1, WELCOME: 2, REFUSED: 3, READY: 4, GRANT: 5, PROGRESS: 6, WAITING: 7, ENDED: 8, DONE: 9, FAILED: 10,
-  ABORT: 11, COMMAND: 13, REPLY: 14, HELLO: 20, SAMPLES: 21, COMMANDS: 22, LAST: 23, STATE: 30, PLANT_BLOCK: 31,
-  CONTROLLER_BLOCK: 32, END: 34 };
+const CODE = {
+  JOIN: 1,
+  WELCOME: 2,
+  REFUSED: 3,
+  READY: 4,
+  GRANT: 5,
+  PROGRESS: 6,
+  WAITING: 7,
+  ENDED: 8,
+  DONE: 9,
+  FAILED: 10,
+  ABORT: 11,
+  COMMAND: 13,
+  REPLY: 14,
+  HELLO: 20,
+  SAMPLES: 21,
+  COMMANDS: 22,
+  LAST: 23,
+  STATE: 30,
+  PLANT_BLOCK: 31,
+  CONTROLLER_BLOCK: 32,
+  END: 34,
+};
 const NAME = Object.fromEntries(Object.entries(CODE).map(([name, code]) => [code, name]));
 const [FLUSH_MS, SAY_MS] = [10, 200];
 
 const frame = (name, ...fields) => encode([VERSION, CODE[name], ...fields]);
-// JavaScript's numbers travel as integers where they are whole, -0 as 0: numbers of the loop are written as floats instead.
+// JavaScript's numbers travel as integers where they are whole, -0 as 0: numbers of the loop are written as floats
+// instead.
 const floats = (name, tick, numbers) =>
-  Buffer.concat([Buffer.of(0x94), ...[VERSION, CODE[name], tick].map((n) => encode(n)), encode(numbers, { forceIntegerToFloat: true })]);
+  Buffer.concat([
+    Buffer.of(0x94),
+    ...[VERSION, CODE[name], tick].map((n) => encode(n)),
+    encode(numbers, { forceIntegerToFloat: true }),
+  ]);
 const read = (data) => {
   const [version, code, ...fields] = decode(data);
-  if (version !== VERSION) throw new Error(`Protocol version ${VERSION} was expected, but a frame of version ${version} came.`);
+  if (version !== VERSION)
+    throw new Error(`Protocol version ${VERSION} was expected, but a frame of version ${version} came.`);
   return [NAME[code], ...fields];
 };
 const column = (rows, i) => Buffer.from(Float64Array.from(rows, (row) => row[i]).buffer); // little-endian on nearly all machines
@@ -26,9 +53,24 @@ const column = (rows, i) => Buffer.from(Float64Array.from(rows, (row) => row[i])
 class Seat {
   // Binds the sockets of a role, channel -> type, and connects to the clock.
   constructor(role, start, directory) {
-    Object.assign(this, { role, start, directory, until: 0, last: false, events: [], subscribers: 0, answered: 0, told: Date.now() });
+    Object.assign(this, {
+      role,
+      start,
+      directory,
+      until: 0,
+      last: false,
+      events: [],
+      subscribers: 0,
+      answered: 0,
+      told: Date.now(),
+    });
     this.clock = new zmq.Dealer({ linger: 1000 });
-    this.telemetry = new zmq.XPublisher({ linger: 1000, sendHighWaterMark: 256, verbosity: "allSubs", maxMessageSize: 1024 });
+    this.telemetry = new zmq.XPublisher({
+      linger: 1000,
+      sendHighWaterMark: 256,
+      verbosity: "allSubs",
+      maxMessageSize: 1024,
+    });
     this.sent = Promise.resolve();
     this.wake = () => {};
     this.failed = new Promise((_, reject) => (this.fail = reject));
@@ -49,7 +91,8 @@ class Seat {
     this.tell("JOIN", this.role, this.start.secret, process.pid, { ...binds, telemetry }, true, program);
     await this.news(() => this.scene);
     (async () => {
-      for await (const [request] of this.telemetry) if (request[0] === 1 && this.role.startsWith(request.subarray(1))) this.subscribers++;
+      for await (const [request] of this.telemetry)
+        if (request[0] === 1 && this.role.startsWith(request.subarray(1))) this.subscribers++;
     })();
     // What the owner of the seat gives: `cut` publishes what it holds back and reports it, `state` is what STATE says.
     this.timer = setInterval(() => this.flush(), FLUSH_MS);
@@ -69,7 +112,7 @@ class Seat {
     for await (const [data] of this.clock) {
       const [name, ...fields] = read(data);
       if (name === "WELCOME") [, this.scene, this.timebase, this.endpoints, , this.context] = fields;
-      if (name === "GRANT") [this.until, this.last] = fields, this.events.push(...fields[2]);
+      if (name === "GRANT") (([this.until, this.last] = fields), this.events.push(...fields[2]));
       if (name === "REFUSED") throw new Error(fields[0]);
       if (name === "ABORT") process.exit(1);
       this.wake();
@@ -112,7 +155,8 @@ function take_seat(role, work) {
   const last = process.argv.at(-1);
   const begin = async (text, directory) => {
     const start = JSON.parse(text);
-    if (start.transport.keys) console.error("This program knows nothing of keys; run it without --keys."), process.exit(1);
+    if (start.transport.keys)
+      (console.error("This program knows nothing of keys; run it without --keys."), process.exit(1));
     const seat = new Seat(role, start, directory);
     try {
       await Promise.race([work(seat), seat.failed]);
@@ -122,16 +166,20 @@ function take_seat(role, work) {
       process.exitCode = 1;
     }
     clearInterval(seat.timer);
-    seat.clock.close(), seat.telemetry.close();
+    (seat.clock.close(), seat.telemetry.close());
     setTimeout(() => process.exit(), 100); // what was sent still goes out
   };
-  if (last.endsWith(".json")) return begin(fs.readFileSync(last, "utf8"), is_led(path.dirname(last)) && path.dirname(last));
+  if (last.endsWith(".json"))
+    return begin(fs.readFileSync(last, "utf8"), is_led(path.dirname(last)) && path.dirname(last));
   let line = "";
-  process.stdin.setEncoding("utf8").on("end", () => process.exit(1)).on("data", (text) => {
-    const begun = line.includes("\n");
-    line += text;
-    if (!begun && line.includes("\n")) begin(line);
-  });
+  process.stdin
+    .setEncoding("utf8")
+    .on("end", () => process.exit(1))
+    .on("data", (text) => {
+      const begun = line.includes("\n");
+      line += text;
+      if (!begun && line.includes("\n")) begin(line);
+    });
 }
 
 module.exports = { take_seat, frame, floats, read, column };

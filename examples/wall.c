@@ -3,30 +3,30 @@
 //   cc -O2 -ffp-contract=off -o wall examples/wall.c $(pkg-config --cflags --libs libzmq msgpack)
 //   haploop run fig6a.toml --node controller=./wall
 //
-// Written from protocol/README.md; examples/README.md says what to install. A `set` of the wall is carried out, every other
-// change is refused, and a scene that asks for more than this law ends the run with a sentence.
+// Written from protocol/README.md; examples/README.md says what to install. A `set` of the wall is carried out, every
+// other change is refused, and a scene that asks for more than this law ends the run with a sentence.
 #include <signal.h>
 
 #include "wire.h"
 
 enum { WIDTH = 6, MOST_ROWS = 1000, FLUSH_MS = 10, SAY_MS = 200 };
-static const char *const COLUMNS[WIDTH] = {"x", "v", "a", "wall", "total", "in_contact"};
+static const char* const COLUMNS[WIDTH] = {"x", "v", "a", "wall", "total", "in_contact"};
 
 static struct {
   double position, stiffness, into_wall, period, x, v;
 } law;
 static double rows[MOST_ROWS][WIDTH];
-static int held;                       // rows since the last block
-static int64_t tick, told_ms;          // the next tick to answer; when the clock last heard of us
-static msgpack_sbuffer *history;       // the newest blocks, packed as maps
-static int64_t *ends, covered;         // tick after each; ticks that a command may be on its way
+static int held;                  // rows since the last block
+static int64_t tick, told_ms;     // the next tick to answer; when the clock last heard of us
+static msgpack_sbuffer* history;  // the newest blocks, packed as maps
+static int64_t *ends, covered;    // tick after each; ticks that a command may be on its way
 static size_t blocks;
-static msgpack_sbuffer refusals[2];    // sentences and changes, packed
+static msgpack_sbuffer refusals[2];  // sentences and changes, packed
 static int refused;
 static bool subscribed;
 static void *clock_socket, *telemetry, *loop;
 
-static void fail(const char *reason) {
+static void fail(const char* reason) {
   begin(FAILED, 2), put_int(-1), put_text(reason), send_frame(clock_socket);
   zmq_close(clock_socket), zmq_close(telemetry);
   fprintf(stderr, "%s\n", reason);
@@ -35,7 +35,7 @@ static void fail(const char *reason) {
 
 // One tick: the row of what was seen and done. The order of every sum and product is the page's.
 static double answer(double x) {
-  double *row = rows[held++];
+  double* row = rows[held++];
   double v = (x - (tick ? law.x : x)) / law.period, a = (v - law.v) / law.period, gap = law.position - x;
   bool contact = gap * law.into_wall < 0;
   double force = contact ? law.stiffness * gap : 0;
@@ -44,8 +44,8 @@ static double answer(double x) {
   return force;
 }
 
-static void put_block(msgpack_packer *to, bool as_map) {
-  const char *names[] = {"from_tick", "ticks", "columns", "elements", "wall"};
+static void put_block(msgpack_packer* to, bool as_map) {
+  const char* names[] = {"from_tick", "ticks", "columns", "elements", "wall"};
   if (as_map) msgpack_pack_map(to, 5);
   for (int part = 0; part < 5; part++) {
     if (as_map) msgpack_pack_str_with_body(to, names[part], strlen(names[part]));
@@ -69,9 +69,7 @@ static void put_block(msgpack_packer *to, bool as_map) {
   }
 }
 
-static void publish(void) {
-  zmq_send(telemetry, "controller", 10, ZMQ_SNDMORE), send_frame(telemetry);
-}
+static void publish(void) { zmq_send(telemetry, "controller", 10, ZMQ_SNDMORE), send_frame(telemetry); }
 
 // Ends a block: publishes its rows and keeps them for those who subscribe later.
 static void cut(void) {
@@ -118,10 +116,10 @@ static int64_t until;
 static struct change {
   int64_t tick;
   msgpack_sbuffer packed;
-} *changes;
+}* changes;
 static size_t waiting;
 
-static void heed_clock(struct frame *frame) {
+static void heed_clock(struct frame* frame) {
   for (int code; (code = receive(clock_socket, frame));) {
     if (code == ABORT) exit(1);
     if (code == REFUSED) fail(text(frame->field[0]));
@@ -130,7 +128,7 @@ static void heed_clock(struct frame *frame) {
     until = (int64_t)number(frame->field[0]);
     msgpack_object_array events = frame->field[2].via.array;
     for (size_t i = 0; i < events.size; i++) {
-      msgpack_object *pair = events.ptr[i].via.array.ptr;
+      msgpack_object* pair = events.ptr[i].via.array.ptr;
       if (at(pair[1], "set").type == MSGPACK_OBJECT_NIL && at(pair[1], "swap").type == MSGPACK_OBJECT_NIL) continue;
       changes = realloc(changes, (waiting + 1) * sizeof *changes);
       changes[waiting].tick = (int64_t)number(pair[0]);
@@ -147,13 +145,16 @@ static void make_change(void) {
   msgpack_unpacked_init(&in);
   msgpack_unpack_next(&in, changes[0].packed.data, changes[0].packed.size, NULL);
   msgpack_object event = in.data, set = at(event, "set");
-  msgpack_object stiffness = at(set, "wall.stiffness"), position = at(set, "wall.position"), delay = at(set, "clock.round_trip_delay");
-  size_t known = (stiffness.type != MSGPACK_OBJECT_NIL) + (position.type != MSGPACK_OBJECT_NIL) + (delay.type != MSGPACK_OBJECT_NIL);
+  msgpack_object stiffness = at(set, "wall.stiffness"), position = at(set, "wall.position"),
+                 delay = at(set, "clock.round_trip_delay");
+  size_t known = (stiffness.type != MSGPACK_OBJECT_NIL) + (position.type != MSGPACK_OBJECT_NIL) +
+                 (delay.type != MSGPACK_OBJECT_NIL);
   cut();
   if (set.type != MSGPACK_OBJECT_MAP || known < set.via.map.size) {
     msgpack_packer sentence = {&refusals[0], msgpack_sbuffer_write}, change = {&refusals[1], msgpack_sbuffer_write};
     char why[120];
-    int length = snprintf(why, sizeof why, "The change at tick %lld was refused: this controller is a wall alone.", (long long)tick);
+    int length = snprintf(why, sizeof why, "The change at tick %lld was refused: this controller is a wall alone.",
+                          (long long)tick);
     msgpack_pack_str_with_body(&sentence, why, length);
     msgpack_pack_map(&change, event.via.map.size + 1);
     msgpack_pack_str_with_body(&change, "tick", 4), msgpack_pack_int64(&change, changes[0].tick);
@@ -163,7 +164,7 @@ static void make_change(void) {
   } else {
     if (stiffness.type != MSGPACK_OBJECT_NIL) law.stiffness = number(stiffness);
     if (position.type != MSGPACK_OBJECT_NIL) law.position = number(position);
-    int64_t on_the_way = (int64_t)(number(delay) / law.period) + 3; // the delay itself is the plant's to change
+    int64_t on_the_way = (int64_t)(number(delay) / law.period) + 3;  // the delay itself is the plant's to change
     if (on_the_way > covered) covered = on_the_way;
   }
   msgpack_unpacked_destroy(&in), msgpack_sbuffer_destroy(&changes[0].packed);
@@ -178,36 +179,37 @@ static void begin_law(msgpack_object scene, msgpack_object timebase) {
   law.position = number(at(wall, "position")), law.stiffness = number(at(wall, "stiffness"));
   law.into_wall = strcmp(text(at(wall, "occupies")), "below") ? 1 : -1;
   law.period = 1 / number(at(timebase, "control_rate"));
-  covered = (int64_t)(number(at(timebase, "delay_steps")) * number(at(timebase, "control_rate")) / number(at(timebase, "plant_rate"))) + 2;
+  covered = (int64_t)(number(at(timebase, "delay_steps")) * number(at(timebase, "control_rate")) /
+                      number(at(timebase, "plant_rate"))) +
+            2;
 }
 
 // Copies the text that follows "key": in a line of JSON, "" for none; addresses and secrets need no escapes.
-static void from_json(const char *line, const char *key, char *value, size_t size) {
+static void from_json(const char* line, const char* key, char* value, size_t size) {
   char quoted[32];
   snprintf(quoted, sizeof quoted, "\"%s\": \"", key);
-  const char *from = strstr(line, quoted);
+  const char* from = strstr(line, quoted);
   from = from ? from + strlen(quoted) : "\"";
   snprintf(value, size, "%.*s", (int)strcspn(from, "\""), from);
 }
 
-int main(int argc, char **argv) {
+int main(int argc, char** argv) {
   char line[65536], address[512], secret[64], host[64], own[600];
   size_t size = sizeof own;
-  const char *last = argc > 1 ? argv[argc - 1] : "";
-  bool external = strlen(last) > 5 && !strcmp(last + strlen(last) - 5, ".json"); // the file of --external
-  FILE *told = external ? fopen(last, "r") : stdin;
+  const char* last = argc > 1 ? argv[argc - 1] : "";
+  bool external = strlen(last) > 5 && !strcmp(last + strlen(last) - 5, ".json");  // the file of --external
+  FILE* told = external ? fopen(last, "r") : stdin;
   if (!told || !fgets(line, sizeof line, told)) return fprintf(stderr, "There is no run to join here.\n"), 1;
-  const char *slash = strrchr(last, '/');
-  int pid = external ? launcher(slash ? strndup(last, slash - last) : ".") : 0; // of a run on another host 0
+  const char* slash = strrchr(last, '/');
+  int pid = external ? launcher(slash ? strndup(last, slash - last) : ".") : 0;  // of a run on another host 0
   from_json(line, "address", address, sizeof address), from_json(line, "secret", secret, sizeof secret);
   from_json(line, "host", host, sizeof host);
-  if (strstr(line, "\"keys\": {")) return fprintf(stderr, "This program knows nothing of keys; run it without --keys.\n"), 1;
-  if (*host)
-    snprintf(own, sizeof own, "tcp://%s:*", host);
-  else
-    snprintf(own, sizeof own, "%.*s/controller.sock", (int)(strrchr(address, '/') - address), address);
+  if (strstr(line, "\"keys\": {"))
+    return fprintf(stderr, "This program knows nothing of keys; run it without --keys.\n"), 1;
+  if (*host) snprintf(own, sizeof own, "tcp://%s:*", host);
+  else snprintf(own, sizeof own, "%.*s/controller.sock", (int)(strrchr(address, '/') - address), address);
 
-  void *context = zmq_ctx_new();
+  void* context = zmq_ctx_new();
   static struct frame from_clock, from_plant;
   msgpack_sbuffer_init(&refusals[0]), msgpack_sbuffer_init(&refusals[1]);
   clock_socket = open_socket(context, ZMQ_DEALER, 1000, address);
@@ -223,14 +225,14 @@ int main(int argc, char **argv) {
 
   int64_t flushed_ms = told_ms = now_ms();
   bool greeted = false, ready = false, ended = false;
-  int pending = 0; // code of a message of the plant that waits for the clock
+  int pending = 0;  // code of a message of the plant that waits for the clock
   while (!ended) {
     zmq_pollitem_t items[] = {{NULL, 0, ZMQ_POLLIN, 0}, {clock_socket, 0, ZMQ_POLLIN, 0}, {loop, 0, ZMQ_POLLIN, 0}};
     zmq_poll(items + external, (loop && !pending ? 3 : 2) - external, FLUSH_MS);
-    if (items[0].revents && read(0, line, sizeof line) <= 0) return 1; // the launcher is gone
+    if (items[0].revents && read(0, line, sizeof line) <= 0) return 1;  // the launcher is gone
     if (pid && kill(pid, 0)) return 1;
     heed_clock(&from_clock);
-    if (!loop && from_clock.fields >= 6) { // WELCOME
+    if (!loop && from_clock.fields >= 6) {  // WELCOME
       begin_law(from_clock.field[1], from_clock.field[2]);
       loop = open_socket(context, ZMQ_DEALER, 0, text(at(at(from_clock.field[3], "plant"), "loop")));
       begin(HELLO, 1), put_text(secret), send_frame(loop);
@@ -240,18 +242,20 @@ int main(int argc, char **argv) {
     if (pending == LAST) {
       ended = true;
     } else if (pending) {
-      msgpack_object *field = from_plant.field;
-      if (pending != SAMPLES || from_plant.fields < 2 || number(field[0]) != (double)tick || field[1].type != MSGPACK_OBJECT_ARRAY)
+      msgpack_object* field = from_plant.field;
+      if (pending != SAMPLES || from_plant.fields < 2 || number(field[0]) != (double)tick ||
+          field[1].type != MSGPACK_OBJECT_ARRAY)
         fail("The plant sent something else than the samples of the next tick.");
       msgpack_object_array samples = field[1].via.array;
-      if (until >= tick + samples.size) { // so that the changes of these ticks are known
+      if (until >= tick + samples.size) {  // so that the changes of these ticks are known
         int64_t from = tick;
-        double *forces = malloc((samples.size + 1) * sizeof *forces);
+        double* forces = malloc((samples.size + 1) * sizeof *forces);
         for (size_t i = 0; i < samples.size; i++) {
           if (held == MOST_ROWS) cut();
           while (waiting && changes[0].tick <= tick) make_change();
-          msgpack_object sample = samples.ptr[i]; // [x_m], or [x_m, acceleration], which this law does not use
-          forces[i] = answer(number(sample.type == MSGPACK_OBJECT_ARRAY && sample.via.array.size ? sample.via.array.ptr[0] : sample));
+          msgpack_object sample = samples.ptr[i];  // [x_m], or [x_m, acceleration], which this law does not use
+          forces[i] = answer(
+              number(sample.type == MSGPACK_OBJECT_ARRAY && sample.via.array.size ? sample.via.array.ptr[0] : sample));
         }
         begin(COMMANDS, 2), put_int(from), msgpack_pack_array(&out, samples.size);
         for (size_t i = 0; i < samples.size; i++) msgpack_pack_double(&out, forces[i]);

@@ -27,6 +27,7 @@ pytestmark = pytest.mark.slow
 
 CONTROLLERS = [("controller.js", "fig6b.toml"), ("wall.c", "fig6a.toml")]
 SEATS = [("controller", *controller) for controller in CONTROLLERS] + [("plant", "plant.js", "fig6b.toml")]
+PAGE = Path(__file__).parents[2] / "protocol/README.md"
 FREE = ("--pace", "free")
 PATIENT = "run.deadline=30"
 Start = Callable[..., Run]
@@ -47,6 +48,28 @@ def assert_same(log: Recording, truth: Recording) -> None:
         assert set(log[topic]) == set(truth[topic]), topic
         for name, column in truth[topic].items():
             assert np.asarray(log[topic][name]).tobytes() == np.asarray(column).tobytes(), (topic, name)
+
+
+@pytest.mark.parametrize("given", ["--node", "--external"])
+def test_the_protocols_page_names_what_a_program_is_told_at_its_start_and_nothing_else(
+    given: str, tmp_path: Path, running: Start
+) -> None:
+    _, _, after = PAGE.read_text(encoding="utf-8").partition("The JSON holds")
+    rows = [line for line in after.split("\n\n")[1].splitlines() if line.startswith("| `")]
+    named = {key for row in rows for key in re.findall(r"`(\w+)`", row.split("|")[1])}
+    external = {"role", "run", "directory"}
+    if given == "--node":
+        script = "import json, sys; print(*json.loads(sys.stdin.readline()), sys.argv[1])"
+        run = running(*seat("controller", [sys.executable, "-c", script]), pace=FREE)
+        run.end(1)
+        *told, directory = (run.out_directory / "prints.txt").read_text(encoding="utf-8").split()
+        assert set(told) == named - external
+        assert re.fullmatch(r".*/haploop(-\d+)?/[0-9a-f]{6}", directory)
+        return
+    run = running("--external", "controller", pace=FREE)
+    file = wait_for("its file", lambda: next(iter(run.live.sockets.glob("external-controller.json")), None))
+    wait_for("its content", lambda: file.read_text(encoding="utf-8").endswith("}"))
+    assert set(json.loads(file.read_text(encoding="utf-8"))) == named
 
 
 @pytest.mark.parametrize(("name", "scene"), CONTROLLERS)

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from haploop.protocol import document
+from haploop.protocol import changes, document
 from haploop.protocol.transport.messages import BY_CODE, CHANNELS, MESSAGES, PROCESSES, VERSION, complaint
 
 README = Path(__file__).parents[2] / "protocol" / "README.md"
@@ -72,6 +72,12 @@ def test_the_readme_explains_every_message_beyond_its_row_and_no_other() -> None
     assert f"version {VERSION}" in prose
     table = rest.partition(document.END)[0]
     assert set(re.findall(r"\| `([A-Z_]+)` \|", table)) == set(MESSAGES)
+
+
+def test_the_readme_tells_every_kind_of_event() -> None:
+    _, _, after = README.read_text(encoding="utf-8").partition("An event is a map with one of these keys.")
+    rows = [line for line in after.split("\n\n")[1].splitlines() if line.startswith("| `")]
+    assert {key for row in rows for key in re.findall(r"`(\w+)`", row.split("|")[1])} == set(changes.KINDS)
 
 
 def test_the_tables_hold_every_process_channel_and_field() -> None:
