@@ -20,6 +20,8 @@ from haploop.launch.processes.foreign import read_programs
 from haploop.launch.processes.run_directory import CommandRefused
 from haploop.launch.runs.start import prepare, run
 from haploop.launch.spec import OutputError, RunFailed
+from haploop.protocol.transport.keys import make_keys
+from haploop.protocol.transport.sockets import Transport
 from helpers.live.launched import HAPLOOP
 from helpers.live.live_run import going
 
@@ -171,6 +173,21 @@ def test_a_device_is_given_no_force_when_the_launcher_is_killed(tmp_path: Path) 
         launcher.kill()
         launcher.wait()
     wait_for(lambda: last(held) == 0.0)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("tcp", "guarded"), [(None, False), ("127.0.0.1", False), ("127.0.0.1", True)])
+def test_a_plant_in_python_takes_a_seat_that_waits_for_it(tmp_path: Path, tcp: str | None, guarded: bool) -> None:
+    if guarded:
+        make_keys(tmp_path / "keys")
+    transport = Transport.from_options(tcp, tmp_path / "keys" if guarded else None)
+    with going(tmp_path, "duration=1", programs=read_programs([], ["plant"]), transport=transport) as live:
+        told = live.run_json.with_name("external-plant.json")
+        wait_for(told.exists)
+        subprocess.run([sys.executable, *map(str, PLAIN), str(told)], check=True, timeout=60)
+        summary = live.result()
+    assert summary["ticks"] == 1000
+    assert abs(summary["energy"]["residual_J"]) < 1e-9 * summary["energy"]["moved_J"]
 
 
 @pytest.mark.parametrize(

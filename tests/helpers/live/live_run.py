@@ -51,7 +51,7 @@ class Going:
             self._announced.set()
 
     def _note(self, run_id: str) -> None:
-        self.live: LiveRun = run_directory.find(run_id)
+        self.live: LiveRun = run_directory.find(run_id.partition(" ")[0])
         self._tell(self.live.sockets)
         self._announced.set()
 
