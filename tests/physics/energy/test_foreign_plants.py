@@ -167,6 +167,15 @@ def test_an_unmodelled_hand_is_booked_with_all_that_the_device_does_not_explain(
     assert "hand_work_J" not in energy
 
 
+def test_an_unmodelled_hand_that_is_not_there_is_found_to_have_given_nothing():
+    thrown = {**TAP, "device": {"mass": 0.01, "damping": 0.3, "velocity": -0.3}}
+    hidden = scene(**thrown, hand={"kind": "unmodelled"})
+    plant = OnePart(scene(**thrown).as_dict(), 1e-4, "exact")
+    _, summary = run_around(hidden, plant.step, plant.x, plant.v)
+    assert abs(summary["energy"]["unmodelled_work_J"]) < 1e-12 * summary["energy"]["moved_J"]
+    assert summary["energy"]["wall"]["true_J"]
+
+
 def test_the_heat_of_a_device_in_an_unmodelled_hand_needs_the_parabola(monkeypatch):
     """Without the bend of the velocity, or with its first value alone, the heat is seen to be wrong."""
     ran, _ = seen_with(HAND)

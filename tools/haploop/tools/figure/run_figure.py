@@ -98,6 +98,7 @@ def key_numbers(run: RunData) -> list[str]:
         words += [f"displayed stiffness {spring(displayed)} of {spring(wanted)}"] if displayed is not None else []
     left = f"residual {amount(energy['residual_J'], 'J')} of " if "unmodelled_work_J" not in energy else ""
     words.append(f"{left}{amount(energy['moved_J'], 'J')} moved")
+    words += [energy["balance"].partition(" of the energy")[0]] if "balance" in energy else []
     return words + [f"of a damaged log: {last - first:g} s"] * bool(run.cut)
 
 
