@@ -1,5 +1,6 @@
 """Plants in Python on the seat of examples/, which imports nothing of haploop: in lockstep, and by their own time."""
 
+import importlib
 import os
 import shlex
 import signal
@@ -9,6 +10,7 @@ import time
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -214,6 +216,29 @@ def test_a_scene_that_pauses_is_not_run_by_a_devices_time(tmp_path: Path) -> Non
 def test_a_delay_of_no_whole_periods_is_refused_by_a_plant_that_owns_the_time(tmp_path: Path) -> None:
     with pytest.raises(Exception, match="whole control periods"):
         ran(tmp_path / "out", "clock.round_trip_delay=0.0015", **BY_PLANT, **plant())
+
+
+def test_a_plant_that_owns_the_time_makes_up_for_20_ms_and_what_is_beyond_is_lost(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.syspath_prepend(HOUSE / "examples")
+    schedule = importlib.import_module("schedule")
+    now = 100.0
+    monkeypatch.setattr(schedule, "time", SimpleNamespace(monotonic=lambda: now))
+    subject = schedule.Schedule(0.001, 0.002)
+    subject.begin(0)
+    now = 100.015
+    subject.begin(1)
+    assert subject.due(2) == pytest.approx(100.002), "made up for"
+    now = 100.051
+    subject.begin(1)
+    subject.answered(1, True)
+    assert subject.due(2) == pytest.approx(100.032)
+    told = subject.figures()
+    assert told["lost_s"] == pytest.approx(0.03)
+    assert told["most_s"] == pytest.approx(0.02)
+    assert (told["ticks"], told["late_ticks"], told["late_s"]) == (1, 1, 0.002)
+    assert lateness_told({"lateness": told}) == {**told, "clock": PLANT}
 
 
 @pytest.mark.parametrize("key", sorted(TOLD))

@@ -52,11 +52,13 @@ class Going:
 
     def _note(self, run_id: str) -> None:
         self.live: LiveRun = run_directory.find(run_id.partition(" ")[0])
+        assert self.live.sockets
         self._tell(self.live.sockets)
         self._announced.set()
 
     @property
     def run_json(self) -> Path:
+        assert self.live.sockets
         return self.live.sockets / "run.json"
 
     def ask(self, verb: str, **arguments: Any) -> tuple[str, dict[str, Any]]:
