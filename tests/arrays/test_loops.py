@@ -17,6 +17,7 @@ import pytest
 from haploop.controller.dissipation import registry
 from haploop.launch.batch import batch
 from haploop.launch.batch.run import run_batch
+from haploop.logger.books.work import BatchSums
 from haploop.protocol.scene.scene import Scene
 from haploop.tools.sweep.sweep_file import load
 from helpers.runs.batches import alone, diverging, pressed, together
@@ -29,10 +30,17 @@ BARE = "import test_loops as t; t.batch.PAYS = 0; print(t.batch._loops_for(0) is
 
 @pytest.fixture
 def by_loops(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Loops from the first batch on; where numba is there they must work."""
+    """Loops from the first batch on; where numba is there they must work, and nothing else does in their place."""
     pytest.importorskip("numba")
     monkeypatch.setattr(batch, "PAYS", 0)
-    assert batch._loops_for(0) is not None
+    loops = batch._loops_for(0)
+    assert loops is not None
+    monkeypatch.setattr(loops, "SUMS", BatchSums(loops.displacement, loops.energies, loops.add_ticks))
+    monkeypatch.setattr(loops, "fill", loops.filled)
+
+
+def damaged(*_of: Any) -> None:
+    raise EOFError("Ran out of input")
 
 
 def drawn(seed: int, count: int = 20) -> list[Scene]:
@@ -94,6 +102,30 @@ def test_compiled_for_any_processor_the_loops_have_the_same_bits(by_loops: None)
         [sys.executable, "-c", BARE], cwd=here, env=generic, capture_output=True, text=True, check=True
     )
     assert said.stdout.split() == ["True", digest_of(7)]
+
+
+@pytest.mark.slow
+def test_a_loop_that_cannot_be_loaded_in_mid_run_is_done_by_numpy(monkeypatch: pytest.MonkeyPatch) -> None:
+    loops = pytest.importorskip("haploop.launch.batch.loops")
+    monkeypatch.setattr(batch, "PAYS", 0)
+    for name in ("_ways", "_energies", "_add", "_fill"):
+        monkeypatch.setattr(loops, name, damaged)
+    scenes = drawn(7)
+    assert together(scenes) == [alone(each) for each in scenes]
+
+
+@pytest.mark.slow
+def test_machine_code_that_is_damaged_is_made_anew_by_the_next_process(
+    by_loops: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from haploop.launch.batch import loops
+
+    (tmp_path / "kept").mkdir()
+    monkeypatch.setattr(loops, "_CACHE", str(tmp_path / "kept"))
+    monkeypatch.setattr(loops, "_ways", damaged)
+    with pytest.raises(EOFError):
+        loops.try_out()
+    assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.slow

@@ -10,6 +10,7 @@ import os
 from collections.abc import Callable, Sequence
 from hashlib import sha256
 from pathlib import Path
+from shutil import rmtree
 from typing import Any
 
 import numba.core.config  # pyright: ignore[reportMissingImports]
@@ -168,7 +169,7 @@ def add_ticks(state: Sums, increments: np.ndarray) -> Sums:
     return sums
 
 
-def fill(
+def filled(
     held: np.ndarray, response: np.ndarray, hold: Sequence[np.ndarray], rows: record.Rows, first: int, count: int
 ) -> None:
     """Does what ``record.fill_steps`` does."""
@@ -185,10 +186,36 @@ def fill(
     return None
 
 
+def _or_numpy(loop: Callable[..., Any], plain: Callable[..., Any]) -> Callable[..., Any]:
+    """Returns a function that does what ``plain`` does, by a loop where numba can compile or load it.
+
+    Both make all of their results anew, so that what a loop left half done does no harm.
+    """
+
+    def does(*of: Any) -> Any:
+        try:
+            return loop(*of)
+        except Exception:  # numba's own, and those of a cache that is damaged
+            return plain(*of)
+
+    return does
+
+
 def try_out() -> None:
-    """Compiles the loops, or loads them, for numbers that all members share; raises whatever numba does."""
+    """Compiles the loops, or loads them, for numbers that all members share.
+
+    Raises whatever numba does; the next process then finds no machine code kept, which may be damaged.
+    """
+    try:
+        _try_out()
+    except Exception:
+        rmtree(_CACHE, ignore_errors=True)
+        raise
+
+
+def _try_out() -> None:
     rows = {name: np.zeros((2, 2, 2)).swapaxes(0, 1) for name in record.COLUMNS}
-    fill(np.zeros((3, 6, 1)), np.zeros((2, 3, 2, 1)), [np.zeros((2, 2))] * 5, rows, 0, 2)
+    filled(np.zeros((3, 6, 1)), np.zeros((2, 3, 2, 1)), [np.zeros((2, 2))] * 5, rows, 0, 2)
     moved = displacement(np.zeros((2, 2)), np.zeros((2, 2)), 1, work.sum_steps)
     mechanics = Mechanics(1.0, {}, 0.0, 0.0, (0.0, 0.0))
     x, tau = np.zeros((1, 1, 2)), np.zeros((1, 1, 1))
@@ -197,4 +224,9 @@ def try_out() -> None:
     add_ticks(work.no_sums(1, 2), np.zeros((1, 1, 2)))
 
 
-SUMS = BatchSums(displacement, energies, add_ticks)
+SUMS = BatchSums(
+    _or_numpy(displacement, work.displacement),
+    _or_numpy(energies, one_mass.step_energies),
+    _or_numpy(add_ticks, work.add_ticks_of_batch),
+)
+fill = _or_numpy(filled, record.fill_steps)
