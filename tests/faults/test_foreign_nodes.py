@@ -17,6 +17,7 @@ from typer.testing import CliRunner
 
 from haploop.launch.processes import private_directory
 from haploop.launch.processes.foreign import ProgramError, check_wait, read_programs
+from haploop.launch.processes.run_directory import CommandRefused
 from haploop.logger import read
 from haploop.tools.cli.app import app
 from helpers.live.launched import SCENE, Launched, Run, alive, command, first_and_slowly, processes, same_bits, wait_for
@@ -36,7 +37,8 @@ def started(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Started
 
     def start(*options: str, node: str | None = PLAIN, sets: tuple[str, ...] = SOON, **more: Any) -> Run:
         nodes = ("--node", f"controller={node}") if node else ()
-        runs.append(Run(tmp_path / f"out{len(runs)}", *nodes, *options, sets=("duration=3", *sets), pace=(), **more))
+        sets = ("duration=3", *sets)
+        runs.append(Run(tmp_path / f"out{len(runs)}", *nodes, *options, sets=sets, **{"pace": (), **more}))
         return runs[-1]
 
     yield start
@@ -231,3 +233,17 @@ def test_binary_on_stdout_from_the_start_harms_nobody_and_stands_in_the_prints(
     assert run.summary()["ended"] == "done"
     assert (run.out_directory / "prints.txt").read_bytes().startswith(b"\xff\xfe\x1b[2J\0")
     assert "\x1b" not in run.stderr
+
+
+def test_a_change_that_a_foreign_controller_passes_over_is_refused_and_one_it_makes_is_not(started: Started) -> None:
+    run = started(node=f"{PLAIN} --changes make", sets=("duration=600",), pace=("--pace", "2"))
+    run.reaches(100)
+    assert run.ask("set", set={"wall.stiffness": 200.0})["tick"] > 0
+    with pytest.raises(CommandRefused, match=r"element 0 becomes damping .*, was refused: the controller's telemetry"):
+        run.ask("swap", swap={"kind": "damping", "damping": 1.0})
+    run.ask("stop")
+    run.summary()
+    made, passed_over, refusal, stop = run.log()["/events"]
+    assert made["set"] == {"wall.stiffness": 200.0}
+    assert (passed_over["swap"]["kind"], refusal["change"]["tick"]) == ("damping", passed_over["tick"])
+    assert stop["stop"]

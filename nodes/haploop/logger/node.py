@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Callable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import zmq
@@ -13,6 +14,7 @@ from haploop.logger.books.buffers import TelemetryGap
 from haploop.logger.log import LogError
 from haploop.logger.session import open_session
 from haploop.logger.summary import Summary
+from haploop.protocol.changes import refusals_as_status
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
 from haploop.protocol.transport.clock_client import REPORT_MS, Aborted, ClockClient
@@ -22,6 +24,9 @@ from haploop.protocol.transport.node import NodeError, run_node
 from haploop.protocol.transport.sockets import bind
 from haploop.protocol.transport.telemetry import Publisher, Subscriber
 from haploop.protocol.transport.wire import Frame, Message
+
+if TYPE_CHECKING:
+    from haploop.logger.carried_out import CarriedOut
 
 ROLE = "logger"
 _LISTENS = ("plant", "controller")
@@ -53,6 +58,7 @@ class LoggerNode:
         self._judged_at = 0
         self._started = False
         self._foreign: dict[str, bool] = {}
+        self._carried_out: CarriedOut | None = None
 
     @property
     def _tick(self) -> int:
@@ -69,6 +75,10 @@ class LoggerNode:
         self._foreign = {role: not program["own"] for role, program in self.session.programs.items()}
         self.session.logger.foreign = tuple(role for role, is_foreign in self._foreign.items() if is_foreign)
         self._scene, self._time = scene, time
+        if self._foreign.get("controller") and self._publisher:  # the run's own logger
+            from haploop.logger.carried_out import CarriedOut
+
+            self._carried_out = CarriedOut(scene)
         self.session.logger.booked = self._publish_energy
         states: dict[str, Message] = {}
         early: list[tuple[str, Frame]] = []
@@ -97,7 +107,8 @@ class LoggerNode:
         poller.register(self._client.socket, zmq.POLLIN)
         self._streams.register(poller)
         reported = -1
-        while len(self._ended) < len(_LISTENS) or not self._client.last:  # the last grant brings the last events
+        # The last grant brings the last events.
+        while len(self._ended) < len(_LISTENS) or not self._client.last or self._awaits_refusals:
             idle = not poller.poll(REPORT_MS)
             if not self._client.until:  # the run has not begun
                 self.session.logger.count_wall_time()
@@ -108,13 +119,30 @@ class LoggerNode:
             self._note_events()
             if (why := self._leave()) is not None:
                 return self.finish(why)
-            if self._tick != reported or (idle and self._tick != self._judged_at):
-                reported = self._tick
+            if self._carried_out:
+                self._report_refusals(self._carried_out)
+            if self._reached != reported or (idle and self._tick != self._judged_at):
+                reported = self._reached
                 self._report(reported)
             if self._publisher:
                 self._publisher.serve()
             self.session.flush_when_due()
         return self.finish("")
+
+    @property
+    def _reached(self) -> int:
+        """The tick up to which all is booked, and all changes were looked for."""
+        return min(self._tick, self._carried_out.tick) if self._carried_out else self._tick
+
+    @property
+    def _awaits_refusals(self) -> bool:
+        return self._carried_out is not None and bool(self._carried_out.awaited)
+
+    def _report_refusals(self, carried_out: CarriedOut) -> None:
+        """Tells the clock of changes that the controller did not carry out; they come back as events."""
+        refused = carried_out.judge(self._client.until)
+        if refused:
+            self._client.progress(self._reached, self._status | (refusals_as_status(refused) or {}))
 
     def _drain(self) -> None:
         for role, frame in self._streams.drain():
@@ -137,6 +165,8 @@ class LoggerNode:
             self.session.logger.plant_block(frame.as_dict())
         elif frame.name == "CONTROLLER_BLOCK":
             self.session.logger.controller_block(frame.as_dict())
+            if self._carried_out:
+                self._carried_out.add(frame.as_dict())
         elif frame.name == "END":
             tick, reason, trouble = frame.fields
             self._ended[role] = tick, reason, trouble
@@ -144,6 +174,8 @@ class LoggerNode:
     def _note_events(self) -> None:
         for tick, event in self._client.take_events():
             self.session.logger.event(tick, event)
+            if self._carried_out:
+                self._carried_out.note(tick, event)
 
     def _report(self, tick: int) -> None:
         now = self._machine.now()

@@ -101,6 +101,12 @@ class Change:
         words += ["always"] * (self.swap.acts == "always")
         return f"element {self.element} becomes {kind}" + (f" ({', '.join(words)})" if words else "")
 
+    def is_as(self, other: Change | None) -> bool:
+        """Tells whether another is the same change, whatever became of it."""
+        return other is not None and replace(self, plugin=None, refused=None) == replace(
+            other, plugin=None, refused=None
+        )
+
     def refuse(self, error: BaseException) -> Change:
         """Returns the change as one that could not be carried out."""
         sentence = f"The change at tick {self.tick}, {self.describe()}, was refused: {type(error).__name__}: {error}"
@@ -133,13 +139,35 @@ def refusals_as_status(refused: Iterable[Change]) -> Event | None:
     return {key: [event[name] for event in events] for key, name in named.items()} if events else None
 
 
-def refusals_of(status: Event) -> list[Event]:
-    """Returns the events that put on record what a PROGRESS reported, which need not tell the changes themselves."""
-    changes = status.get("refused_changes", [])
-    return [
-        {"refused": sentence, **({"change": changes[number]} if number < len(changes) else {})}
-        for number, sentence in enumerate(status.get("refused", []))
-    ]
+def refused_change(event: Event) -> Change | None:
+    """Returns the change that a refusal names, None where it names none."""
+    try:
+        return Change.from_dict(
+            int(event["change"]["tick"]), {**event["change"], "set": dict(event["change"].get("set", {}))}
+        )
+    except (AttributeError, KeyError, TypeError, ValueError):
+        return None
+
+
+def refusals_of(status: Event, events: Iterable[tuple[int, Event]] = ()) -> list[Event]:
+    """Returns the events that put on record what a PROGRESS reported, which need not tell the changes themselves.
+
+    What is no refusal is left out, as are refusals of changes that ``events``, (tick, event), hold already.
+    """
+    sentences, changes = status.get("refused"), status.get("refused_changes")
+    known = [refused_change(event) for _, event in events if "refused" in event]
+    found: list[Event] = []
+    for number, sentence in enumerate(sentences if isinstance(sentences, list) else ()):
+        event: Event = {"refused": str(sentence)}
+        if isinstance(changes, list) and number < len(changes):
+            event["change"] = changes[number]
+            change = refused_change(event)
+            if change is None:
+                del event["change"]
+            elif any(change.is_as(other) for other in known):
+                continue
+        found.append(event)
+    return found
 
 
 def changes_of(events: Iterable[tuple[int, Event]]) -> list[Change]:
@@ -147,7 +175,10 @@ def changes_of(events: Iterable[tuple[int, Event]]) -> list[Change]:
     events = list(events)
     refusals = [event for _, event in events if "refused" in event]
     changes = [Change.from_dict(tick, event) for tick, event in events if is_change(event)]
-    sentences = [next((event["refused"] for event in refusals if _refuses(event, change)), None) for change in changes]
+    sentences = [
+        next((event["refused"] for event in refusals if change.is_as(refused_change(event))), None)
+        for change in changes
+    ]
     return [replace(change, refused=why or change.refused) for change, why in zip(changes, sentences, strict=True)]
 
 
@@ -183,10 +214,3 @@ def describe(event: Event, units: Mapping[str, str] = _NO_UNITS) -> str:
 def _amount(value: Any, unit: str | None) -> str:
     is_number = isinstance(value, int | float) and not isinstance(value, bool)
     return f"{value:g} {unit or ''}".rstrip() if is_number else str(value)
-
-
-def _refuses(event: Event, change: Change) -> bool:
-    if "change" not in event:
-        return False
-    other = Change.from_dict(event["change"]["tick"], event["change"])
-    return replace(other, plugin=None, refused=None) == replace(change, plugin=None, refused=None)

@@ -14,6 +14,7 @@ from haploop.launch.clock.clock import Clock, ClockError
 from haploop.launch.clock.pace import PaceError, pace_of
 from haploop.launch.clock.plugin_swap import swap_plugin
 from haploop.launch.clock.roster import Roster
+from haploop.launch.clock.seen import when_seen
 from haploop.launch.scene.mistakes import SceneError
 from haploop.launch.scene.number import is_exotic
 from haploop.launch.spec import OutputError
@@ -31,6 +32,7 @@ Answer = tuple[bool, str, Message]
 # What one command may carry, so that none holds time up: keys and values, tables in each other, letters of a text.
 _MOST_VALUES, _DEEPEST, _LONGEST = 64, 3, 200
 _MOST_TOLD = 5
+_CHANGES = ("swap", "set", "undo")
 _UNITS = "Hz, J, N, Pa, W, g, m, min, rad, s and %, with n, u, m, c, k or M before them"
 
 
@@ -77,6 +79,8 @@ class Commands:
             done = act(**arguments)
         except Exception as error:
             return _refusal(verb, error)
+        if isinstance(done, tuple) and verb in _CHANGES and "tick" in done[1] and self._roster().witness == "logger":
+            return self._later(verb, when_seen(self._clock, self._roster, *done))
         return (True, *done) if isinstance(done, tuple) else self._later(verb, done)
 
     def _later(self, verb: str, steps: Generator[None, None, Done]) -> Generator[None, None, Answer]:

@@ -67,6 +67,11 @@ class Roster:
         """Returns how people are told of a role: by its program, too, where that is somebody else's."""
         return self._programs[role].label if role in self._programs else role
 
+    @property
+    def witness(self) -> str:
+        """The role whose progress tells that changes were made: the logger sees it, where the controller is not own."""
+        return "logger" if "controller" in self._programs else "controller"
+
     def others_than(self, role: str) -> str:
         """Returns a sentence that names the programs of somebody else's in other roles; "" for none."""
         labels = [program.label for program in self._programs.values() if program.role != role]

@@ -57,8 +57,7 @@ class ClockServer:
         self.unknown_peers = 0
         self._sender = b""  # of a message of which frames are still to be taken
         self._greeted, self._start_gate = False, start_gate
-        self._granted = -1
-        self._last_sent = False
+        self._granted, self._last_sent = -1, False
         self._awaited: list[tuple[bytes, Generator[None, None, Answer]]] = []
 
     @property
@@ -238,13 +237,14 @@ class ClockServer:
 
     def _on_progress(self, node: Node, tick: int, status: Message) -> None:
         node.tick = max(node.tick, tick)
-        node.status = status or node.status
+        node.status = {key: told for key, told in status.items() if not key.startswith("refused")} or node.status
         if node.role == "plant":
             self._clock.pace.done(tick, node.heard)
-        elif node.role == "controller":
-            for refusal in refusals_of(status):
+        elif node.is_own:
+            for refusal in refusals_of(status, self._clock.events):
                 self._clock.note(refusal)
-            self._clock.settle(node.tick)
+            if node.role == self.roster.witness:
+                self._clock.settle(node.tick)
 
     def _on_waiting(self, node: Node, tick: int, on: str) -> None:
         node.waits_for = on

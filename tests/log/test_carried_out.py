@@ -1,0 +1,80 @@
+"""What a foreign controller's blocks show of the changes it was told of."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from haploop.launch.scene.file import load
+from haploop.logger.carried_out import CarriedOut
+from haploop.protocol.changes import Change, Event, refusal, refusals_of
+from helpers.live.launched import SCENE
+
+STIFFER: Event = {"set": {"wall.stiffness": 300.0}}
+HEAVIER: Event = {"set": {"dissipation.0.mass": 0.02}}
+DAMPED: Event = {"swap": {"kind": "damping", "damping": 1.0, "acts": "always"}, "element": 0}
+GONE: Event = {"swap": {"kind": "none"}, "element": 0}
+INERTIA = {"kind": "unidirectional-inertia", "parameters": {"mass": 0.01, "acts": "in-contact"}}
+
+
+def block(first: int, end: int, stiffness: float = 150.0, *elements: dict[str, Any]) -> dict[str, Any]:
+    wall = {"position": -0.06, "stiffness": stiffness, "into_wall": -1.0}
+    return {"from_tick": first, "ticks": end - first, "elements": list(elements), "wall": wall}
+
+
+def refused(event: Event, *blocks: dict[str, Any]) -> list[int]:
+    """Ticks of the changes refused when one is made at tick 100."""
+    seen = CarriedOut(load(SCENE))
+    seen.note(100, event)
+    for each in blocks:
+        seen.add(each)
+    return [change.tick for change in seen.judge(1000)]
+
+
+@pytest.mark.parametrize(
+    ("event", "shown"),
+    [
+        (STIFFER, (300.0, INERTIA)),
+        (HEAVIER, (150.0, INERTIA | {"parameters": {"mass": 0.02, "acts": "in-contact"}})),
+        (DAMPED, (150.0, {"kind": "damping", "parameters": {"damping": 1.0, "acts": "always"}})),
+        (GONE, (150.0,)),
+    ],
+)
+def test_a_change_is_taken_as_made_only_where_a_block_begins_with_it_and_shows_it(
+    event: Event, shown: tuple[Any, ...]
+) -> None:
+    before = block(0, 100, 150.0, INERTIA)
+    assert refused(event, before, block(100, 200, *shown)) == []
+    assert refused(event, before, block(100, 200, 150.0, INERTIA)) == [100]
+    assert refused(event, block(0, 90, 150.0, INERTIA), block(90, 200, *shown)) == [100]
+    assert refused(event, before, block(100, 110, 150.0, INERTIA), block(110, 200, *shown)) == [100]
+    assert refused(event, before) == []  # not known yet
+
+
+def test_a_set_of_what_is_there_and_one_of_the_delay_are_no_business_of_the_blocks() -> None:
+    for event in ({"set": {"wall.stiffness": 150.0}}, {"set": {"clock.round_trip_delay": 0.003}}):
+        assert refused(event, block(0, 100, 150.0, INERTIA), block(100, 200, 150.0, INERTIA)) == []
+
+
+def test_blocks_wait_until_all_events_in_them_are_known_and_a_refusal_of_its_own_is_enough() -> None:
+    seen = CarriedOut(load(SCENE))
+    seen.add(block(0, 200, 150.0, INERTIA))
+    assert seen.judge(199) == []
+    assert seen.tick == 0
+    seen.note(100, STIFFER)
+    seen.note(150, refusal(Change.from_dict(100, {**STIFFER, "refused": "I do not."})))
+    assert seen.judge(200) == []
+    assert seen.tick == 200
+    assert not seen.awaited
+
+
+def test_a_refusal_is_put_on_record_once_whoever_tells_it_and_nonsense_never() -> None:
+    event = {"refused": "No.", "change": {"tick": 5, **STIFFER}}
+    status = {"refused": ["No."], "refused_changes": [{"tick": 5, **STIFFER}]}
+    assert refusals_of(status) == [event]
+    assert refusals_of(status, [(7, {"refused": "Never.", "change": {"tick": 5, "at": 0.005, **STIFFER}})]) == []
+    for told in (5, "x", {"a": 1}, None):
+        assert refusals_of({"refused": told, "refused_changes": told}) == []
+    for change in (5, None, {}, {"tick": "x"}, {"tick": 1, "swap": 3}, {"tick": 1, "set": 3}):
+        assert refusals_of({"refused": ["No."], "refused_changes": [change]}) == [{"refused": "No."}]
