@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 import haploop.logger
-from haploop.launch.clock.device_time import GOES_ON, PLANT, REFUSED, lateness_told
+from haploop.launch.clock.device_time import DELAY_STAYS, GOES_ON, PLANT, REFUSED, lateness_told
 from haploop.launch.processes.foreign import read_programs
 from haploop.launch.processes.run_directory import CommandRefused
 from haploop.launch.runs.start import prepare, run
@@ -138,6 +138,9 @@ def test_a_devices_time_is_neither_held_nor_hurried(tmp_path: Path) -> None:
         for verb in REFUSED:
             with pytest.raises(CommandRefused, match=GOES_ON):
                 live.ask(verb, **({"pace": "free"} if verb == "pace" else {}))
+        with pytest.raises(CommandRefused, match=DELAY_STAYS):
+            live.ask("set", set={"clock.round_trip_delay": 0.0})
+        live.ask("set", set={"wall.stiffness": 100.0})
         live.ask("stop")
 
 
@@ -178,6 +181,18 @@ def test_a_device_is_given_no_force_when_the_launcher_is_killed(tmp_path: Path) 
 
 
 @pytest.mark.slow
+def test_who_attaches_and_hangs_does_not_hold_a_device_up(tmp_path: Path) -> None:
+    observer = HOUSE / "tests/oracles/plain_observer.py"
+    with going(tmp_path, "duration=6", **BY_PLANT, **plant()) as live:
+        command = [sys.executable, str(observer), str(live.run_json), "--dwell"]
+        with subprocess.Popen(command, stdout=subprocess.DEVNULL) as attached:
+            try:
+                assert live.result()["ticks"] == 6000
+            finally:
+                attached.kill()
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize(("tcp", "guarded"), [(None, False), ("127.0.0.1", False), ("127.0.0.1", True)])
 def test_a_plant_in_python_takes_a_seat_that_waits_for_it(tmp_path: Path, tcp: str | None, guarded: bool) -> None:
     if guarded:
@@ -207,9 +222,13 @@ def test_time_is_left_to_the_plant_only_where_one_can_keep_it(
     assert not (tmp_path / "out").exists()
 
 
-def test_a_scene_that_pauses_is_not_run_by_a_devices_time(tmp_path: Path) -> None:
-    with pytest.raises(OutputError, match="pauses; a device does not"):
-        ran(tmp_path / "out", "event=[{at=0.5, pause=true}]", **BY_PLANT, **plant())
+@pytest.mark.parametrize(
+    ("event", "why"),
+    [("pause=true", "pauses; a device does not"), ('set={"clock.round_trip_delay"=0.001}', DELAY_STAYS)],
+)
+def test_a_scene_that_changes_a_devices_time_is_not_run(tmp_path: Path, event: str, why: str) -> None:
+    with pytest.raises(OutputError, match=why):
+        ran(tmp_path / "out", f"event=[{{at=0.5, {event}}}]", **BY_PLANT, **plant())
 
 
 @pytest.mark.slow

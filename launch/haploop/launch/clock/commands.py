@@ -69,8 +69,8 @@ class Commands:
     def __call__(self, verb: str, arguments: Message) -> Answer | Generator[None, None, Answer]:
         """Returns the answer, or steps to be gone through one by one while time goes on, which return it."""
         act = self._verbs.get(verb)
-        if self._spec.clock == device_time.PLANT and verb in device_time.REFUSED:
-            return False, device_time.GOES_ON, {}
+        if self._spec.clock == device_time.PLANT and (why := device_time.refusal(verb, arguments)):
+            return False, why, {}
         if act is None:
             return False, f"{verb[:40]!r} is no command; these are: {', '.join(self._verbs)}.", {}
         try:

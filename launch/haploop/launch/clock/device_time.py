@@ -6,12 +6,14 @@ import math
 from typing import Any
 
 from haploop.launch.spec import OutputError, RunSpec
+from haploop.protocol.ticks import DELAY
 from haploop.protocol.transport.wire import Message
 
 PLANT = "plant"
 # Commands that would hold a device's time or hurry it.
 REFUSED = ("pause", "resume", "step", "pace")
 GOES_ON = "The plant owns the time of this run, which goes on by its own clock; `haploop stop` ends it."
+DELAY_STAYS = "The delay is the time that the answers to a device have; it stays what the run began with."
 _SECONDS = ("median_s", "percent_99_s", "percent_99_9_s", "most_s", "late_s", "lost_s")
 _COUNTS = ("ticks", "late_ticks")
 
@@ -29,6 +31,16 @@ def check_owner(spec: RunSpec) -> None:
         raise OutputError("--clock plant leaves the time to the plant, --pace keeps it; leave out one of them.")
     if any(event.pause for event in spec.scene.event):
         raise OutputError("--clock plant was asked for, but an [[event]] of the scene pauses; a device does not.")
+    if any(DELAY in (event.set or {}) for event in spec.scene.event):
+        raise OutputError(f"--clock plant was asked for, but an [[event]] sets {DELAY}. {DELAY_STAYS}")
+
+
+def refusal(verb: str, arguments: Message) -> str:
+    """Returns why a command cannot be carried out while the plant owns the time; "" for one that can."""
+    if verb in REFUSED:
+        return GOES_ON
+    values = arguments.get("set")
+    return DELAY_STAYS if verb == "set" and isinstance(values, dict) and DELAY in values else ""
 
 
 def lateness_told(told: Message) -> dict[str, Any]:

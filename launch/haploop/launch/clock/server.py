@@ -9,6 +9,7 @@ from typing import Any
 import zmq
 
 from haploop.launch.clock.clock import Clock
+from haploop.launch.clock.device_time import PLANT
 from haploop.launch.clock.roster import Node, Roster
 from haploop.launch.processes.foreign import NO_PROGRAMS, Program
 from haploop.launch.spec import RunFailed
@@ -213,7 +214,8 @@ class ClockServer:
                 self.roster.refused[role] = reason
             self._send(sender, "REFUSED", reason)
             return
-        lossless = request["lossless"] and role not in ("plant", "controller")
+        can_hold = role == "logger" or (not known and self._welcome[3].get("clock") != PLANT)  # no device waits
+        lossless = request["lossless"] and can_hold
         node = Node(sender, role, request["pid"], lossless, request["endpoints"], self._machine.now(), program)
         node.tick = 0 if known else self._clock.until
         self.roster.nodes[sender] = node
