@@ -55,17 +55,6 @@ def named(foreign: Mapping[str, Message]) -> str:
     return " and ".join(words)
 
 
-def why_no_samples(scene: Scene) -> str:
-    """Returns why the log of a scene does not hold all that a controller is sent, as a sentence; "" where it does."""
-    table = scene.acceleration
-    if not accelerometer_is_used(scene) or (table and table.source == "accelerometer" and table.cutoff is None):
-        return ""
-    return (
-        "The readings of the accelerometer, which it was sent, are not in the log, only what its estimators made of "
-        "them: acceleration.source must be the accelerometer, without a cutoff."
-    )
-
-
 def repeat_controller(
     scene: Scene, kinds: Mapping[str, type[Element]], events: list[tuple[int, Event]], recorded: Recording
 ) -> Recording:

@@ -12,17 +12,22 @@ import numpy as np
 
 import haploop.logger
 from haploop.controller.dissipation import Element, load_plugin, registry
-from haploop.launch.runs.half_replay import foreign_programs, named, repeat_controller, repeat_plant, why_no_samples
+from haploop.launch.runs.half_replay import foreign_programs, named, repeat_controller, repeat_plant
 from haploop.launch.runs.in_process import run_in_process
-from haploop.launch.runs.run_files import recorded_log, recorded_scene, recorded_summary
+from haploop.launch.runs.run_files import holds_readings, recorded_log, recorded_scene, recorded_summary
 from haploop.launch.spec import PLUGINS, SCENE, RunFailed, kept_name
 from haploop.logger.log import LogError
 from haploop.logger.log.recording import Recording
 from haploop.logger.summary import Summary, finite
 from haploop.protocol.changes import Event
 from haploop.protocol.files import read_file
-from haploop.protocol.scene.scene import Scene
+from haploop.protocol.scene.scene import Scene, accelerometer_is_used
 from haploop.protocol.transport.wire import Message
+
+_NO_READINGS = (
+    "The controller of this run cannot be repeated: what it was sent of the accelerometer is not in the log, which "
+    'holds the readings only with acceleration.source = "accelerometer" and no cutoff'
+)
 
 
 class ReplayError(Exception):
@@ -93,8 +98,8 @@ def _replay_half(
     failed, rows = before is not None and before["ended"] == "failed", recorded["/controller"]
     summary: Summary = {"ticks": len(rows["x"])}
     if "plant" in foreign:
-        if why := why_no_samples(scene):
-            raise ReplayError(f"The controller of this run cannot be repeated; {others}. {why}")
+        if accelerometer_is_used(scene) and not holds_readings(scene):
+            raise ReplayError(f"{_NO_READINGS} ({others}).")
         half = repeat_controller(scene, kinds, events, recorded)
         differences = _compare({"/controller": rows}, half, failed)
         return Replay(summary, differences, recorded.cut, f"The controller was repeated from its samples; {others}.")

@@ -73,6 +73,12 @@ def _elements(tables: Tables) -> Iterator[Tables]:
             yield table
 
 
+def holds_readings(scene: Scene) -> bool:
+    """Tells whether the accelerations in a run's log are readings of an accelerometer, unfiltered."""
+    table = scene.acceleration
+    return table is not None and table.source == "accelerometer" and table.cutoff is None
+
+
 # Columns that every run logs, by topic.
 _COLUMNS = {
     "/plant": {"timestamp", "t", "x", "v", "force"},

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from haploop.controller.dissipation import Element
+from haploop.launch.runs.run_files import holds_readings
 from haploop.launch.scene.file import resolved
 from haploop.launch.scene.layers import Layers, key_path
 from haploop.protocol.scene.scene import Clock, Device, Scene, accelerometer_is_used
@@ -20,7 +21,7 @@ from haploop.tools.dissipate.booking import Booking
 from haploop.tools.dissipate.figure import make_figure
 from haploop.tools.dissipate.outcome import Outcome, Recording, Trace, make_outcome
 from haploop.tools.dissipate.report import make_report
-from haploop.tools.dissipate.samples import LogRecording, RecordingError, holds_readings, read_scene
+from haploop.tools.dissipate.samples import LogRecording, RecordingError, read_scene
 from haploop.tools.dissipate.text_recording import Layout, TextRecording
 from haploop.tools.figure.data import FigureError
 from haploop.tools.figure.style import write_figure

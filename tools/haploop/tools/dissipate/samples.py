@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from haploop.launch.runs.run_files import recorded_scene
+from haploop.launch.runs.run_files import holds_readings, recorded_scene
 from haploop.logger.log.recording import Table
 from haploop.logger.log.stream import Batch, LogStream
 from haploop.protocol.scene.effects import Actuator
@@ -94,12 +94,6 @@ def read_scene(path: Path) -> Scene:
     if (scene := recorded_scene(log.path.parent, log.attachments)) is None:
         raise RecordingError(f"The log {log.path} holds no scene, so its rates and estimates are not known.")
     return scene
-
-
-def holds_readings(scene: Scene) -> bool:
-    """Tells whether the accelerations in a run's log are readings of an accelerometer, unfiltered."""
-    table = scene.acceleration
-    return table is not None and table.source == "accelerometer" and table.cutoff is None
 
 
 class LogRecording:
