@@ -19,6 +19,8 @@ from haploop.protocol.scene.scene import NO_ELEMENT, ElementTable, Scene
 Event = dict[str, Any]
 
 KINDS = ("swap", "set", "pause", "resume", "step", "stop", "pace", "refused")
+# What the status of a PROGRESS tells of changes that were not made.
+REFUSALS = ("refused", "refused_changes")
 _NO_UNITS: Mapping[str, str] = {}
 
 

@@ -13,7 +13,7 @@ from haploop.launch.clock.device_time import PLANT
 from haploop.launch.clock.roster import Node, Roster
 from haploop.launch.processes.foreign import NO_PROGRAMS, Program
 from haploop.launch.spec import RunFailed
-from haploop.protocol.changes import refusals_of
+from haploop.protocol.changes import REFUSALS, refusals_of
 from haploop.protocol.transport.machine import machine_of
 from haploop.protocol.transport.messages import PROCESSES
 from haploop.protocol.transport.sockets import bind, has_message, open_socket, transport_of
@@ -239,7 +239,7 @@ class ClockServer:
 
     def _on_progress(self, node: Node, tick: int, status: Message) -> None:
         node.tick = max(node.tick, tick)
-        node.status = {key: told for key, told in status.items() if not key.startswith("refused")} or node.status
+        node.status = {key: told for key, told in status.items() if key not in REFUSALS} or node.status
         if node.role == "plant":
             self._clock.pace.done(tick, node.heard)
         elif node.is_own:
