@@ -215,3 +215,9 @@ def test_the_answer_says_who_takes_most_and_who_feeds(tmp_path: Path) -> None:
 
 def test_an_element_whose_quotation_does_not_end_is_refused(recording: Path) -> None:
     refused(dissipate(recording, "--element", 'damping damping="0.5'), "a quotation mark is not closed")
+
+
+def test_an_element_that_answers_to_the_forces_of_its_loop_is_refused(recording: Path) -> None:
+    kind = "passivity-controller"
+    result = dissipate(recording, "--element", f"{kind} damping=2")
+    refused(result, kind, "forces and energies", "haploop run")

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from haploop.controller.active_elements import ActiveElement, make_element
+from haploop.controller.asked import Declared, first_memory
 from haploop.controller.dissipation import Element, ElementError, Motion, load_plugin
 from haploop.controller.estimators.base import Sample
 from haploop.controller.estimators.choose import make_estimators
@@ -53,7 +54,7 @@ def _swapped(
     else:
         active = ActiveElement(*make_element(table, kinds), books, change.tick)
         elements[place : place + 1] = [active]
-        memories[place : place + 1] = [active.element.memory]
+        memories[place : place + 1] = [first_memory(active.element, params.declared)]
         books += 1
     return replace(params, elements=tuple(elements), books=books), state._replace(elements=tuple(memories))
 
@@ -62,8 +63,9 @@ def _set(params: ControllerParams, tick: int, path: list[str], value: float) -> 
     match path:
         case ["wall", "stiffness" | "position" as name]:
             return replace(params, wall=replace(params.wall, **{name: value}))
-        case ["clock", "round_trip_delay"]:
-            return params  # the plant's to do
+        case ["clock", "round_trip_delay"]:  # the plant's to do; elements that ask are told
+            steps = round(value * params.declared.steps / params.motion.period_s)
+            return replace(params, declared=params.declared.delayed(steps))
         case ["dissipation", place, name]:
             elements = list(params.elements)
             active = elements[int(place)]
@@ -83,7 +85,9 @@ def make_params(scene: Scene, period_s: float, kinds: Kinds) -> ControllerParams
     elements = tuple(ActiveElement(element, acts, book, 0) for book, (element, acts) in enumerate(made))
     wall = Wall.from_scene(scene)
     motion = Motion(period_s, wall.inward)
-    return ControllerParams(*make_estimators(scene, period_s), wall, elements, len(elements), motion)
+    return ControllerParams(
+        *make_estimators(scene, period_s), wall, elements, len(elements), motion, Declared.from_scene(scene)
+    )
 
 
 class Controller:

@@ -7,11 +7,12 @@ import signal
 from types import FrameType
 
 from haploop.controller.active_elements import make_element
+from haploop.controller.asked import answer_of
 from haploop.controller.dissipation.registry import load_source
 from haploop.controller.tick import tick
 
 # Where code of elements is called from, and what it raises becomes a sentence.
-_CALLERS = {tick.__code__, make_element.__code__, load_source.__code__}
+_CALLERS = {tick.__code__, answer_of.__code__, make_element.__code__, load_source.__code__}
 
 
 class DeadlineOver(SystemExit):

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from haploop.controller.active_elements import ActiveElement
-from haploop.controller.dissipation import Motion
+from haploop.controller.asked import Declared, Told, answer_of, first_memory
+from haploop.controller.dissipation.element import ASKABLE, Motion
 from haploop.controller.estimators.base import Estimator, Sample
 from haploop.protocol.arrays import where
 from haploop.protocol.scene.scene import Scene
@@ -47,6 +48,7 @@ class ControllerParams:
         input: that input: "encoder": v[k]; "accelerometer": the reading; "kalman": what the velocity's filter found.
         elements: the active elements, in the order in which their forces are added.
         motion: what elements are given; written anew at every tick.
+        declared: what the scene says of device and delay, for elements that ask.
     """
 
     velocity: Estimator
@@ -56,6 +58,7 @@ class ControllerParams:
     elements: tuple[ActiveElement, ...]
     books: int
     motion: Motion
+    declared: Declared
 
 
 class ControllerState(NamedTuple):
@@ -86,7 +89,9 @@ class NoForce(Exception):
     def sentence(self, params: ControllerParams, tick: int) -> str:
         """Returns what happened at this tick, with the element's kind and what it raised."""
         kind, cause = params.elements[self.index].element.kind, self.__cause__
-        return f"Element {self.index} ({kind}) gave no force at tick {tick}: {type(cause).__name__}: {cause}."
+        name = getattr(cause, "name", None)
+        hint = f' It is told what it names in its class: asks = ("{name}",).' if name in ASKABLE else ""
+        return f"Element {self.index} ({kind}) gave no force at tick {tick}: {type(cause).__name__}: {cause}.{hint}"
 
 
 def initial_state(params: ControllerParams, sample: Sample) -> ControllerState:
@@ -97,7 +102,7 @@ def initial_state(params: ControllerParams, sample: Sample) -> ControllerState:
         u = 0.0 * x
     else:
         u = sample[1] if params.input == "accelerometer" else velocity.acceleration(velocity.step(memory, x, sample)[0])
-    elements = tuple([active.element.memory for active in params.elements])
+    elements = tuple([first_memory(active.element, params.declared) for active in params.elements])
     return ControllerState(memory, params.acceleration.start(u, sample), 0.0, elements)
 
 
@@ -127,7 +132,11 @@ def tick(params: ControllerParams, state: StateTuple, sample: Sample) -> tuple[S
             if memory is None:
                 force = active.element.force(motion)
             else:
-                force, memory = active.element.force(motion, memory)
+                if memory.__class__ is Told:
+                    wall = params.wall.position, params.wall.stiffness
+                    force, memory = answer_of(active, memory, motion, row, total, wall, params.declared)
+                else:
+                    force, memory = active.element.force(motion, memory)
                 memories = (*memories[:index], memory, *memories[index + 1 :])
             if one_loop:
                 force = float(force) if contact or active.acts == "always" else 0.0

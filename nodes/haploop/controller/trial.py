@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any, TextIO
 
 from haploop.controller.active_elements import make_element
-from haploop.controller.dissipation.element import Element, ElementError, Motion
+from haploop.controller.dissipation.element import ASKABLE, Element, ElementError, Motion
 from haploop.controller.dissipation.registry import PluginError, load_source
 from haploop.protocol.scene.scene import ElementTable
 from haploop.protocol.transport.prints import keep_prints
@@ -81,7 +81,7 @@ def _declaration(element: type[Element], origin: str) -> Reply:
                 defaults[name] = float(default)
             except (TypeError, ValueError):
                 raise PluginError(f"{origin}: the default of {name} must be a number, but is {default!r}.") from None
-    words = {"name": element.__name__, "about": element.__doc__, "linear": bool(element.linear)}
+    words = {"name": element.__name__, "about": element.__doc__, "linear": bool(element.linear) and not element.asks}
     return {**words, "parameters": parameters, "defaults": defaults}
 
 
@@ -91,7 +91,7 @@ def _make(elements: list[tuple[str, dict[str, float]]], kinds: dict[str, type[El
         element, _ = make_element(ElementTable(name=kind, parameters=parameters), kinds)
         memory = element.memory
         for contact in (False, True):
-            motion = Motion(0.001, -1.0)
+            motion = Motion(0.001, -1.0).telling(dict.fromkeys(ASKABLE, 0.0), element.asks)
             motion.contact = contact
             try:
                 force = element.force(motion) if memory is None else element.force(motion, memory)[0]

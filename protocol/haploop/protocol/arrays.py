@@ -33,6 +33,11 @@ def floor(value: Any) -> Any:
     return value.__array_namespace__().floor(value) + 0.0
 
 
+def root(value: Any) -> Any:
+    """Returns the square root, correctly rounded for floats and arrays alike; a float must not be negative."""
+    return math.sqrt(value) if isinstance(value, float) else value.__array_namespace__().sqrt(value)
+
+
 def nearest_multiple(value: Any, unit: Any) -> Any:
     """Returns ``unit * rint(value / unit)``; a value without a finite count of units (infinite, NaN) stays."""
     counts = value / unit

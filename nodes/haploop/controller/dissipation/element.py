@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from abc import ABC, abstractmethod
+from collections.abc import Iterable, Mapping
 from typing import Annotated, Any, ClassVar, dataclass_transform, get_args, get_origin, get_type_hints
 
 from haploop.protocol.quantity import Quantity
@@ -11,6 +12,27 @@ from haploop.protocol.quantity import Quantity
 
 class ElementError(Exception):
     """An element that cannot be made of its parameters, or gave no force; the message names it and what it raised."""
+
+
+# What an element may ask for beside the motion, which it is told then.
+ASKABLE = (
+    "force",
+    "wall_force",
+    "wall_stored",
+    "wall_position",
+    "wall_stiffness",
+    "way",
+    "force_before",
+    "output_before",
+    "total_before",
+    "acted",
+    "wall_energy",
+    "own_energy",
+    "output_energy",
+    "total_energy",
+    "device_mass",
+    "device_damping",
+)
 
 
 class Motion:
@@ -24,9 +46,41 @@ class Motion:
         contact: whether x is strictly inside the wall.
         inward: direction that leads into the wall, +1.0 or -1.0 (0.0 in a scene without a wall).
         period_s: the control period T.
+
+    What only an element is told that names it in ``asks``; energies are sampled books, E += -f[k-1] (x_m[k] - x_m[k-1])
+    in J, positive taken out of the device, since the element came into the list:
+
+    Attributes:
+        force: of the wall and of all elements before this one in the list, at this tick, N.
+        wall_force, wall_stored: of the wall alone, N; what its ideal spring holds at this penetration, J.
+        wall_position, wall_stiffness: as they are at this tick, m and N/m.
+        way: x_m[k] - x_m[k-1], m; 0 at the first tick.
+        force_before, output_before, total_before: what was commanded at tick k - 1, N: of this element; with the wall
+            and all before it; in all.
+        acted: mean force held over the last period, N, as the round-trip delay of the scene has it; of commands given
+            before the element came, of jitter, loss and the actuator it knows nothing.
+        wall_energy, own_energy, output_energy, total_energy: of the wall; of this element; of it, the wall and all
+            before it; of all.
+        device_mass, device_damping: as the scene declares them, kg and N s/m.
     """
 
-    __slots__ = ("a", "a_before", "contact", "inward", "period_s", "v", "x")
+    __slots__ = ("a", "a_before", "contact", "inward", "period_s", "v", "x", *ASKABLE)
+    force: Any
+    wall_force: Any
+    wall_stored: Any
+    wall_position: Any
+    wall_stiffness: Any
+    way: Any
+    force_before: Any
+    output_before: Any
+    total_before: Any
+    acted: Any
+    wall_energy: Any
+    own_energy: Any
+    output_energy: Any
+    total_energy: Any
+    device_mass: Any
+    device_damping: Any
 
     def __init__(self, period_s: float, inward: float) -> None:
         self.x: Any = 0.0
@@ -36,6 +90,14 @@ class Motion:
         self.contact: Any = False
         self.inward = inward
         self.period_s = period_s
+
+    def telling(self, known: Mapping[str, Any], asks: Iterable[str]) -> Motion:
+        """Returns the same motion with what an element asks for."""
+        told = Motion(self.period_s, self.inward)
+        told.x, told.v, told.a, told.a_before, told.contact = self.x, self.v, self.a, self.a_before, self.contact
+        for name in asks:
+            setattr(told, name, known[name])
+        return told
 
     @property
     def into_wall(self) -> float:
@@ -57,15 +119,24 @@ class Element(ABC):
     its own, set in ``__post_init__``, works too, but one loop at a time: it has no part in batches. A swap makes a new
     object, so either is fresh after it.
 
+    An element that needs more than the motion names it in ``asks``: forces of wall and other elements, energies, the
+    device (``Motion`` lists them). One that limits the total returns the change that it makes, and is booked with that
+    as every other with its force.
+
     Attributes:
         memory: the declared memory at the first tick; None where ``force`` depends on the motion alone.
         linear: whether the force is a linear function of the motion, past ticks included; a loop of such elements
             has an exact limit of stability.
+        asks: names of what it is told beside the motion.
+        limits: whether its force is a change of what the wall and all before it give; what comes after it in the list
+            is not limited.
     """
 
     kind: ClassVar[str]
     memory: ClassVar[Any] = None
     linear: ClassVar[bool] = False
+    asks: ClassVar[tuple[str, ...]] = ()
+    limits: ClassVar[bool] = False
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)

@@ -11,7 +11,7 @@ from pkgutil import resolve_name
 from types import ModuleType
 from typing import Any
 
-from haploop.controller.dissipation.element import Element
+from haploop.controller.dissipation.element import ASKABLE, Element
 from haploop.protocol.files import read_text
 from haploop.protocol.installed import entry_points_of
 
@@ -108,6 +108,11 @@ def checked(element: object, origin: str) -> type[Element]:
         raise PluginError(f'{element.__name__} in {origin} names no kind; write kind = "my-element" in the class.')
     if inspect.isabstract(element):
         raise PluginError(f"{element.__name__} in {origin} has no method force(self, motion).")
+    if unknown := [name for name in element.asks if name not in ASKABLE]:
+        raise PluginError(
+            f"{element.__name__} in {origin} asks for {unknown[0]!r}, which is not known; it may ask for "
+            f"{', '.join(ASKABLE)}."
+        )
     try:
         element.parameters()
     except TypeError as error:

@@ -117,6 +117,12 @@ def compute_outcome(request: Request, kinds: dict[str, type[Element]]) -> Outcom
     """
 
     recording, scene = _open(request, kinds)
+    for kind in (table.name for table in scene.dissipation):
+        if set(kinds[kind].asks) - {"way"}:
+            raise RecordingError(
+                f"The element {kind} answers to forces and energies of its loop, which a recorded motion has not; with "
+                "them it would have moved otherwise. Run it in a scene: haploop run."
+            )
     booking = Booking(scene, recording.period_s, recording.delay_s, kinds, recording.recorded, recording.has_force)
     trace = Trace(recording.period_s, 2 + 2 * len(scene.dissipation) + 3 * recording.has_force)
     end_x_m, shown = None, console(stderr=True)

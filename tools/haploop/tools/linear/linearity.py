@@ -45,7 +45,12 @@ def why_not_linear(scene: Scene, kinds: Kinds | None = None) -> list[str]:
     kinds = installed_kinds() if kinds is None else kinds
     curved = [effect.written for effect in all_effects() if not effect.linear and effect.is_named(scene)]
     elements = {table.name: make_element(table, kinds)[0] for table in scene.dissipation}
-    return curved + [f"the element {kind}" for kind, one in elements.items() if not one.linear or keeps_attributes(one)]
+    return curved + [f"the element {kind}" for kind, one in elements.items() if not _is_linear(one)]
+
+
+def _is_linear(element: Element) -> bool:
+    """Tells whether the force is linear in the motion alone; the wall's, which some ask for, is added only later."""
+    return element.linear and not element.asks and not keeps_attributes(element)
 
 
 def left_out(scene: Scene) -> list[str]:

@@ -1,0 +1,65 @@
+"""Adaptive damping: a passivity observer, and the damper that it asks to take what is missing."""
+
+from typing import Annotated, Any
+
+from haploop.controller.dissipation.element import Element, Motion
+from haploop.protocol.arrays import clipped, where
+from haploop.protocol.quantity import Quantity
+
+
+def taken_by_damper(energy: Any, damping: Any, motion: Motion) -> Any:
+    """Returns the force -alpha v, with alpha = -W / (T v^2) at most ``damping`` where the energy W < 0, else 0.
+
+    T v is the way since the last sample, which is not 0 where the damper acts; so -alpha v = W / (T v).
+    """
+    moves = motion.way != 0.0
+    wanted = where(energy < 0.0, energy, 0.0) / where(moves, motion.way, 1.0)
+    return where(moves, clipped(wanted, damping * abs(motion.way) / motion.period_s), 0.0)
+
+
+class PassivityController(Element):
+    """f = -alpha v, alpha = -W / (T v^2) where W < 0 and v != 0, at most ``damping``; else 0 (Hannaford & Ryu 2002).
+
+    W[k] = W[k-1] - f_out[k-1] (x_m[k] - x_m[k-1]), of f_out: the force of the wall, of all before it in the list and
+    its own; v = (x_m[k] - x_m[k-1]) / T. The source books f[k] v[k]; this is what a held force does. The next sample
+    takes -W v[k+1] / v[k]: all that is missing where the speed has not fallen, less where it has; turned round, it
+    gives.
+    """
+
+    kind = "passivity-controller"
+    asks = ("way", "output_energy")
+    damping: Annotated[float, Quantity("N s/m", at_least=0, about="most damping")]
+
+    def force(self, motion: Motion):
+        return taken_by_damper(motion.output_energy, self.damping, motion)
+
+
+class PassivityControllerReset(Element):
+    """``PassivityController`` that books every contact by itself: W = 0 at the last tick before it.
+
+    So what earlier contacts took is no credit for this one; what they still owe is let off.
+    """
+
+    kind = "passivity-controller-reset"
+    asks = ("way", "output_energy")
+    memory = 0.0
+    damping: Annotated[float, Quantity("N s/m", at_least=0, about="most damping")]
+
+    def force(self, motion: Motion, memory: Any):
+        before_contact = where(motion.contact, memory, motion.output_energy)
+        return taken_by_damper(motion.output_energy - before_contact, self.damping, motion), before_contact
+
+
+class PassivityControllerReference(Element):
+    """``PassivityController`` that keeps W above K p^2 / 2, what an ideal spring holds at the penetration p.
+
+    After Ryu, Preusche, Hannaford & Hirzinger 2005 (reference energy following): it acts as soon as the sampled wall
+    takes less than a spring would, also on the way in.
+    """
+
+    kind = "passivity-controller-reference"
+    asks = ("way", "output_energy", "wall_stored")
+    damping: Annotated[float, Quantity("N s/m", at_least=0, about="most damping")]
+
+    def force(self, motion: Motion):
+        return taken_by_damper(motion.output_energy - motion.wall_stored, self.damping, motion)

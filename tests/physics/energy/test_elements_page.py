@@ -1,0 +1,66 @@
+"""docs/elements.md: its three files run as they stand, and its table is what the elements do."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from haploop.controller.dissipation.registry import load_source
+from helpers.runs.batches import alone, pressed, together, with_element
+from helpers.scenes.least import KINDS, scene
+
+PAGE = (Path(__file__).parents[3] / "docs/elements.md").read_text(encoding="utf-8")
+FILES = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
+VALUES = [{"coefficient": 5.0}, {"damping": 0.3}, {"most": 4.0}]
+ROWS = re.findall(r"^\| (none|`[^|]*) \| ([\d.]+) \| ([\d.]+) \| ([\d.]+) \|$", PAGE, re.MULTILINE)
+NAMES = {"N s/m": ("damping", 1.0), "N/m": ("stiffness", 1.0), "g": ("mass", 1e-3), "ms": ("time", 1e-3)}
+
+
+@pytest.mark.parametrize("place", range(3))
+def test_a_file_of_the_page_runs_alone_and_has_the_same_bits_in_a_batch(place: int) -> None:
+    found = load_source(FILES[place], "page.py")
+    kinds, (kind,) = KINDS | found, found
+    made = [with_element(pressed(wall={"position": -0.002, "stiffness": k}), kind, **VALUES[place]) for k in (9e2, 1e3)]
+    expected = [alone(each, kinds) for each in made]
+    assert all(result["energy"]["elements"][0]["true_J"] for result in expected)
+    assert together(made, kinds) == expected
+
+
+def test_the_pages_passivity_controller_does_what_the_one_of_the_package_does() -> None:
+    made = pressed(wall={"position": -0.002, "stiffness": 2000.0})
+    kinds = KINDS | load_source(FILES[2], "page.py")
+    own = alone(with_element(made, "own-passivity-controller", most=4.0), kinds)
+    ours = alone(with_element(made, "passivity-controller", damping=4.0))
+    assert own["final"] == pytest.approx(ours["final"], rel=1e-9)
+    assert own["energy"]["elements"][0]["true_J"] > 1e-6
+
+
+def element_of(words: str) -> list[dict[str, object]]:
+    """The element that a row names: `kind` 20 N s/m, tool 10 g, always."""
+    kind, _, rest = words.strip("`").partition("`")
+    if kind == "none":
+        return []
+    named = {NAMES[unit][0]: float(size) * NAMES[unit][1] for size, unit in re.findall(r"(\d+) (N s/m|N/m|ms|g)", rest)}
+    return [{"kind": kind, "acts": "always" if "always" in rest else "in-contact", **named}]
+
+
+@pytest.mark.parametrize("row", ROWS, ids=lambda row: row[0])
+def test_a_tap_leaves_as_fast_as_the_table_says(row: tuple[str, ...]) -> None:
+    words, *speeds = row
+    for late, speed in enumerate(speeds):
+        made = scene(
+            duration=0.15,
+            clock={"round_trip_delay": late * 1e-3},
+            device={"mass": 0.05, "damping": 0.0, "position": 0.002, "velocity": -0.2},
+            wall={"position": 0.0, "stiffness": 2000.0},
+            dissipation=element_of(words),
+        )
+        assert alone(made)["final"]["v_m_s"] == pytest.approx(float(speed), abs=5.1e-4)
+
+
+def test_the_table_has_a_row_of_every_kind_that_is_listed_but_where_one_needs_a_damped_device() -> None:
+    listed = set(re.findall(r"^\| `([a-z-]+)` \| [^|]* \| [^|]*[a-z]", PAGE.split("## Stabilizers")[1], re.MULTILINE))
+    shown = {re.sub(r"`.*", "", row[0].lstrip("`")) for row in ROWS}
+    assert {kind for kind in listed if kind in KINDS} - shown <= {"force-bounding", "passivity-controller-reset"}
