@@ -17,6 +17,7 @@ from rich.console import Console
 from rich.table import Table
 
 from haploop.controller.dissipation import Element, registry
+from haploop.launch.batch import batch
 from haploop.launch.batch.run import run_batch
 from haploop.launch.runs.in_process import run_in_process
 from haploop.launch.scene.file import load
@@ -44,6 +45,15 @@ def measured_us(run: Callable[[], Any], ticks: int) -> float:
     began = time.process_time()
     run()
     return (time.process_time() - began) / ticks * 1e6
+
+
+def by_numpy(scenes: list[Scene], kinds: dict[str, type[Element]]) -> None:
+    """The arrays as they are where numba is not installed."""
+    pays, batch.PAYS = batch.PAYS, sys.maxsize
+    try:
+        run_batch(scenes, kinds)
+    finally:
+        batch.PAYS = pays
 
 
 def check_kernel(scenes: list[Scene], kinds: dict[str, type[Element]]) -> None:
@@ -75,6 +85,7 @@ def main() -> None:
     rows: dict[str, tuple[Callable[[], Any], int]] = {
         "one process, with the books": (lambda: [run_in_process(scene, kinds) for scene in few], len(few)),
         "arrays, with the books": (lambda: run_batch(scenes, kinds), len(scenes)),
+        "arrays, with the books, by NumPy alone": (lambda: by_numpy(scenes, kinds), len(scenes)),
         "arrays, without": (lambda: run_batch(scenes, kinds, energy=False), len(scenes)),
     }
     if importlib.util.find_spec("numba"):
