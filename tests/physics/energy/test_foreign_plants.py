@@ -140,6 +140,11 @@ def test_a_controller_that_tells_other_forces_than_it_sent_is_what_the_books_of_
     controller.answer([(float(x),) for x in ran.plant["x"][:-1:10]])
     energy = booked(known, ran.plant, controller, ("controller",))["energy"]
     assert energy["balance"].startswith("This controller, by what it says of its forces, ")
+    crude = with_value(known, "clock.integrator", "euler")
+    controller = Controller(told, Timebase.from_scene(told), KINDS)
+    controller.answer([(float(x),) for x in ran.plant["x"][:-1:10]])
+    energy = booked(crude, ran.plant, controller, ("controller",))["energy"]
+    assert energy["balance"].startswith("Plant and controller together, by what they say of themselves, ")
 
 
 def unmodelled(**more: Any) -> Scene:

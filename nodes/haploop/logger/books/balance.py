@@ -24,7 +24,7 @@ def balance_words(unexplained_J: float | None, moved_J: float, foreign: Collecti
     Args:
         unexplained_J: above 0 what got lost, below 0 what came from nowhere; None where none is claimed.
         moved_J: energy that changed its place.
-        foreign: roles that were taken by programs of others.
+        foreign: roles that were taken by programs of others, or may make energy beside them.
     """
     if unexplained_J is None or not math.isfinite(unexplained_J) or not abs(unexplained_J) > _TOLD * moved_J:
         return ""
