@@ -10,8 +10,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from haploop.logger.books.balance import balance_words
-from haploop.logger.books.books import Books, moved_J, residual_J, unexplained_J
+from haploop.logger.books.balance import balance_words, moved_J, residual_J, unexplained_J
+from haploop.logger.books.books import Books
 from haploop.logger.books.buffers import ControllerBuffer, PlantBuffer
 from haploop.logger.log.channels import Channels, motion_columns
 from haploop.logger.summary import Account, Summary, energy, note_accounts, outcome, versions

@@ -12,7 +12,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from haploop.logger.books.books import BooksState, moved_J, residual_J, stored_J, total_J
+from haploop.logger.books.balance import BooksState, moved_J, residual_J, stored_J, total_J
 from haploop.logger.log import LogError
 from haploop.logger.verdict.measures import RunMeasures
 from haploop.protocol.files import read_text

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from haploop.logger.books import books, one_mass
+from haploop.logger.books import balance, one_mass
 from haploop.plant.motion import one_mass as of_plant
 from haploop.plant.motion.transition import FohTransition
 from haploop.protocol.scene.paths import with_value
@@ -42,21 +42,21 @@ BOOKS = ["hand_work", "device_heat", "hand_heat", "kinetic", "spring", "wall.tru
 
 @pytest.mark.parametrize("book", BOOKS)
 def test_a_flipped_sign_in_any_book_leaves_a_huge_residual(book, monkeypatch):
-    sign = books.balance_sign
-    monkeypatch.setattr(books, "balance_sign", lambda name: sign(name) * (-1.0 if name == book else 1.0))
+    sign = balance.balance_sign
+    monkeypatch.setattr(balance, "balance_sign", lambda name: sign(name) * (-1.0 if name == book else 1.0))
     assert run(busy()).relative_residual > 1e-5
 
 
 @pytest.mark.parametrize("book", BOOKS)
 def test_a_book_left_out_leaves_a_huge_residual(book, monkeypatch):
-    sign = books.balance_sign
-    monkeypatch.setattr(books, "balance_sign", lambda name: 0.0 if name == book else sign(name))
+    sign = balance.balance_sign
+    monkeypatch.setattr(balance, "balance_sign", lambda name: 0.0 if name == book else sign(name))
     assert run(busy()).relative_residual > 1e-5
 
 
 def test_a_part_in_a_billion_missing_from_the_hand_work_is_seen(monkeypatch):
-    sign = books.balance_sign
-    monkeypatch.setattr(books, "balance_sign", lambda name: sign(name) * (1 - 1e-9 * (name == "hand_work")))
+    sign = balance.balance_sign
+    monkeypatch.setattr(balance, "balance_sign", lambda name: sign(name) * (1 - 1e-9 * (name == "hand_work")))
     assert run(busy()).relative_residual > 1e-11
 
 

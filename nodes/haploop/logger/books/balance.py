@@ -1,9 +1,14 @@
-"""The balance of the books in words: what a plant, or a program that came in its place, makes of the energy."""
+"""The balance of the books: how they stand, what they leave over, and in words what that makes of a plant."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from haploop.logger.books.work import CLOSING, Sums
 
 # A residual is told in words beyond this share of the energy that moved.
 _TOLD = 1e-3
@@ -16,6 +21,80 @@ _WHOSE = {
     ("controller",): ("This controller, by what it says of its forces,", ""),
     ("controller", "plant"): ("Plant and controller together, by what they say of themselves,", _IF),
 }
+
+
+class BooksState(NamedTuple):
+    """All that books remember; in a batch, arrays have the members as their last axis.
+
+    Attributes:
+        names: the books, in the order of the rows of the sums: the plant's, the causes of the wall's leak where there
+            is a wall, ``moved``, then ``<b>.sampled`` and ``<b>.true`` for the wall and for every element's book b.
+        sums: how they stand, J.
+        stored_at_start_J: kinetic and spring energy at the start.
+        wall: position in m and stiffness in N/m where the last intervals were booked; None before the first.
+        wall_changes_J: what changes of the wall in contact would have put into an ideal spring.
+    """
+
+    names: tuple[str, ...]
+    sums: Sums
+    stored_at_start_J: Any
+    wall: tuple[Any, Any] | None
+    wall_changes_J: Any
+
+
+# How books count in the balance: what the hand gave less what is elsewhere.
+_SIGNS = {"kinetic": -1.0, "spring": -1.0, "actuator": -1.0}
+_ENDINGS = {"_work": 1.0, "_heat": -1.0, ".true": -1.0}
+
+
+def balance_sign(name: str) -> float:
+    """Returns 0 for a book that is no part of the balance."""
+    return _SIGNS.get(name) or next((sign for ending, sign in _ENDINGS.items() if name.endswith(ending)), 0.0)
+
+
+def balance(names: Sequence[str]) -> list[tuple[float, int]]:
+    """Returns the sign and the row of every book of the balance."""
+    return [(sign, row) for row, name in enumerate(names) if (sign := balance_sign(name))]
+
+
+def total_J(state: BooksState, name: str) -> Any:
+    """Returns one book as it stands, J; shape (batch,) for a batch."""
+    row = state.names.index(name)
+    total = state.sums.sums[row] + state.sums.errors[row]
+    return total if total.shape else float(total)
+
+
+def stored_J(state: BooksState) -> Any:
+    """Returns kinetic and spring energy now, J."""
+    return state.stored_at_start_J + total_J(state, "kinetic") + total_J(state, "spring")
+
+
+def moved_J(state: BooksState) -> Any:
+    """Returns the energy that changed its place so far, J."""
+    return abs(state.stored_at_start_J) + total_J(state, "moved")
+
+
+def residual_J(state: BooksState) -> Any:
+    """Returns what the books leave unexplained, in magnitude, J; None where one book is what closes the balance."""
+    unexplained = unexplained_J(state)
+    return None if unexplained is None else abs(unexplained)
+
+
+def unexplained_J(state: BooksState) -> Any:
+    """Returns what the books leave unexplained, J: above 0 what got lost, below 0 what came from nowhere.
+
+    Infinite where a book is no finite number; None where one book is what closes the balance.
+    """
+    if CLOSING in state.names:
+        return None
+    parts = np.array([sign * of[row] for sign, row in balance(state.names) for of in state.sums])
+    if parts.ndim == 1:
+        return _sum_exactly(parts.tolist())
+    return np.array([_sum_exactly(of_member) for of_member in parts.T.tolist()])
+
+
+def _sum_exactly(parts: list[float]) -> float:
+    return math.fsum(parts) if all(map(math.isfinite, parts)) else math.inf
 
 
 def balance_words(unexplained_J: float | None, moved_J: float, foreign: Collection[str] = ()) -> str:
