@@ -14,7 +14,7 @@ from haploop.protocol.transport.loop import PlantEnd
 from haploop.protocol.transport.machine import machine_of
 from haploop.protocol.transport.messages import PROCESSES
 from haploop.protocol.transport.node import NodeError, run_node
-from haploop.protocol.transport.sockets import bind
+from haploop.protocol.transport.sockets import bind, transport_of
 from haploop.protocol.transport.telemetry import Publisher
 from haploop.protocol.transport.wire import Message
 
@@ -34,8 +34,11 @@ class PlantNode:
         endpoints = {channel: bind(socket, directory, names[channel]) for channel, socket in sockets.items()}
         welcome = client.join(endpoints)
         scene = Scene.from_dict(welcome["scene"])
-        self._plant = Plant(scene, Timebase(**welcome["timebase"]))
-        self._block = BlockLength(scene.run.block_ticks, machine_of(context).now)
+        timebase = Timebase(**welcome["timebase"])
+        self._plant = Plant(scene, timebase)
+        # Over a network a message takes its time, however few samples it holds.
+        least_ticks = timebase.lookahead_ticks + 1 if transport_of(context).host else 1
+        self._block = BlockLength(scene.run.block_ticks, machine_of(context).now, least_ticks)
         self._flushed = 0
         self._secret = welcome["context"]["secret"]
         self._is_controller_foreign = not welcome["context"].get("programs", {}).get("controller", {"own": True})["own"]

@@ -153,11 +153,16 @@ class BlockLength:
     """Adapts the length of blocks so that each takes 0.05 to 0.1 s of wall time, up to the scene's ``block_ticks``.
 
     No bit of a run depends on it.
+
+    Args:
+        least_ticks: of a block, where fewer would cost as much time.
     """
 
-    def __init__(self, most_ticks: int, wall_clock: Callable[[], float] = time.perf_counter) -> None:
-        self._most = most_ticks
-        self.ticks = min(most_ticks, _FIRST_TICKS)
+    def __init__(
+        self, most_ticks: int, wall_clock: Callable[[], float] = time.perf_counter, least_ticks: int = 1
+    ) -> None:
+        self._most, self._least = most_ticks, min(least_ticks, most_ticks)
+        self.ticks = max(min(most_ticks, _FIRST_TICKS), self._least)
         self._wall_clock = wall_clock
         self._began = wall_clock()
 
@@ -172,4 +177,4 @@ class BlockLength:
         if took_s < AT_MOST_S / 2:
             self.ticks = min(2 * self.ticks, self._most)
         elif took_s > AT_MOST_S:
-            self.ticks = max(self.ticks // 2, 1)
+            self.ticks = max(self.ticks // 2, self._least)
