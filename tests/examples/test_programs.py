@@ -41,6 +41,18 @@ def own(tmp_path: Path, scene: str, *sets: str) -> Recording:
     return haploop.logger.read(tmp_path / "own")
 
 
+def sockets(run: Run) -> Path:
+    assert run.live.sockets
+    return run.live.sockets
+
+
+def awaited(run: Run, role: str) -> Path:
+    """The file of a run that waits for a program, once it is whole."""
+    file = sockets(run) / f"external-{role}.json"
+    wait_for("its file", lambda: file.is_file() and file.read_text(encoding="utf-8").endswith("}"))
+    return file
+
+
 def assert_same(log: Recording, truth: Recording) -> None:
     """Every number of every column of a log is that of another one, to the bit."""
     assert log.keys() == truth.keys()
@@ -67,8 +79,7 @@ def test_the_protocols_page_names_what_a_program_is_told_at_its_start_and_nothin
         assert re.fullmatch(r".*/haploop(-\d+)?/[0-9a-f]{6}", directory)
         return
     run = running("--external", "controller", pace=FREE)
-    file = wait_for("its file", lambda: next(iter(run.live.sockets.glob("external-controller.json")), None))
-    wait_for("its content", lambda: file.read_text(encoding="utf-8").endswith("}"))
+    file = awaited(run, "controller")
     assert set(json.loads(file.read_text(encoding="utf-8"))) == named
 
 
@@ -139,8 +150,7 @@ def test_a_program_joins_a_run_that_waits_for_it_and_neither_outlives_the_other(
     words = program(name, tmp_path)
     sets = (PATIENT,) if how == "to its end" else (PATIENT, "duration=600")
     run = running("--external", role, scene=SCENES / scene, sets=sets, pace=FREE)
-    file = wait_for("its file", lambda: next(iter(run.live.sockets.glob(f"external-{role}.json")), None))
-    wait_for("its content", lambda: file.read_text(encoding="utf-8").endswith("}"))
+    file = awaited(run, role)
     assert file.stat().st_mode & 0o777 == 0o600
     with subprocess.Popen([*words, str(file)]) as joined:
         try:
@@ -193,12 +203,12 @@ def test_what_strangers_send_changes_no_bit_of_a_run_with_a_program_of_another_l
     undisturbed = running(*words, scene=SCENES / scene, sets=(PATIENT,), pace=FREE).summary()
     run = running(*words, scene=SCENES / scene, sets=(PATIENT,), pace=("--pace", "1"))
     run.reaches(100)
-    flood = subprocess.Popen([sys.executable, attacks.__file__, str(run.live.sockets)], stdout=subprocess.PIPE)
+    flood = subprocess.Popen([sys.executable, attacks.__file__, str(sockets(run))], stdout=subprocess.PIPE)
     assert flood.stdout
     with flood.stdout:
         flood.stdout.readline()
         context = attacks.zmq.Context()
-        senders = [each for file in run.live.sockets.glob("*.sock") for each in attacks.send_unasked(context, file)]
+        senders = [each for file in sockets(run).glob("*.sock") for each in attacks.send_unasked(context, file)]
         summary = run.summary()
         flood.kill()
         flood.wait()
@@ -227,7 +237,7 @@ def test_the_observer_in_c_misses_nothing_changes_nothing_and_ends_with_the_run(
     observer = compiled("observer.c", tmp_path)
     run = running(scene=SCENES / "fig6b.toml", sets=(PATIENT,), pace=("--pace", "2"))
     run.reaches(1)
-    said = subprocess.run([*observer, str(run.live.sockets)], capture_output=True, text=True, timeout=60)
+    said = subprocess.run([*observer, str(sockets(run))], capture_output=True, text=True, timeout=60)
     assert said.returncode == 0, said.stderr
     run.end(0)
     log, truth = haploop.logger.read(run.out_directory), own(tmp_path, "fig6b.toml")
@@ -245,7 +255,7 @@ def test_the_observer_in_c_notices_that_the_launcher_was_killed(tmp_path: Path, 
     observer = compiled("observer.c", tmp_path)
     run = running()
     run.reaches(10)
-    with subprocess.Popen([*observer, str(run.live.sockets)], stderr=subprocess.PIPE, text=True) as process:
+    with subprocess.Popen([*observer, str(sockets(run))], stderr=subprocess.PIPE, text=True) as process:
         wait_for("the observer", lambda: len(run.ask("status")["nodes"]) == 4)
         run.signal(signal.SIGKILL)
         run.end(-signal.SIGKILL)
@@ -260,7 +270,7 @@ def test_the_observer_in_c_notices_that_the_launcher_was_killed(tmp_path: Path, 
 def test_the_steering_client_says_what_became_of_a_command_and_exits_by_it(tmp_path: Path, running: Start) -> None:
     run = running(scene=SCENES / "fig6b.toml")
     run.reaches(1)
-    client = [*in_node("steer.js"), str(run.live.sockets / "run.json")]
+    client = [*in_node("steer.js"), str(sockets(run) / "run.json")]
 
     def say(*words: str) -> subprocess.CompletedProcess[str]:
         return subprocess.run([*client, *words], capture_output=True, text=True, timeout=30)
