@@ -33,6 +33,15 @@ def test_a_loop_others_could_steer_is_refused(host, keys, why):
         Transport.from_options(host, keys and Path(keys))
 
 
+def test_a_program_that_somebody_else_starts_binds_beyond_this_host_only_with_keys(tmp_path):
+    assert Transport.from_options("127.0.0.1", None).of("controller", elsewhere=True).host == "127.0.0.1"
+    assert Transport.from_options("::1", None).of("controller", elsewhere=True).host == "::1"
+    make_keys(tmp_path)
+    guarded = Transport.from_options("127.0.0.1", tmp_path)
+    assert guarded.of("controller", elsewhere=True).host == "0.0.0.0"
+    assert guarded.of("controller").host == "127.0.0.1"
+
+
 @pytest.mark.parametrize("with_keys", first_and_slowly(True, False))
 def test_a_run_over_tcp_gives_the_bits_of_one_process_and_answers_whoever_may_ask(tmp_path, with_keys):
     keys = tmp_path / "keys" if with_keys else None

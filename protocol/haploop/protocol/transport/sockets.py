@@ -73,7 +73,7 @@ class Transport:
         """Returns the transport of one of the run's processes: its own certificate, and an address on its host.
 
         Args:
-            elsewhere: on another host, of which any address serves.
+            elsewhere: perhaps on another host, of which any address serves; without keys it can only be this one.
 
         Raises:
             KeysError: the certificate is gone.
@@ -81,7 +81,7 @@ class Transport:
         any_host = "::" if ":" in (self.host or "") else "0.0.0.0"
         return replace(
             self,
-            host=any_host if elsewhere and self.host else self.host,
+            host=any_host if elsewhere and self.directory else self.host,
             keys=self.directory and read_keys(self.directory, role),
             directory=None,
         )
