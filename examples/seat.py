@@ -14,24 +14,22 @@ import select
 import sys
 import threading
 import time
-from array import array
 from collections import deque
 from pathlib import Path
 
 import msgpack
 import zmq
 from schedule import Schedule
-from sockets import Sockets
+from sockets import VERSION, Sockets, pack
+from telemetry import BLOCK_S, Telemetry
 
-VERSION = 2
 JOIN, WELCOME, REFUSED, READY, GRANT, PROGRESS, WAITING, ENDED, DONE, FAILED, ABORT = range(1, 12)
 HELLO, SAMPLES, COMMANDS, LAST = range(20, 24)
-STATE, PLANT_BLOCK, END = 30, 31, 34
 # What of a scene is not the plant's, or needs no more of it than one force in and one position out.
 KNOWN = {"title", "duration", "seed", "diverged_beyond", "clock", "device", "hand", "encoder", "run"}
 KNOWN |= {"wall", "velocity", "acceleration", "dissipation", "event"}
 DELAY = "clock.round_trip_delay"
-BLOCK_S, SAY_MS = 0.01, 200
+SAY_MS = 200
 # A controller that has not answered for so long does not lead a device any more.
 PATIENCE_S = 1.0
 
@@ -76,12 +74,12 @@ class Seat:
         self._sockets, self.hold = Sockets(directory, start["transport"]), lambda force: None
         self._clock = self._sockets.open(zmq.DEALER)
         self._sockets.connect(self._clock, start["address"])
-        self._loop, self._telemetry = self._sockets.open(zmq.ROUTER), self._sockets.open(zmq.XPUB)
-        self._loop.router_mandatory, self._telemetry.xpub_verbose, self._telemetry.sndhwm = True, True, 256
+        self._loop, self._publisher = self._sockets.open(zmq.ROUTER), self._sockets.open(zmq.XPUB)
+        self._loop.router_mandatory, self._publisher.xpub_verbose, self._publisher.sndhwm = True, True, 256
         self._loop.sndhwm = self._loop.rcvhwm = 0  # a plant that owns the time sends on while answers are late
         endpoints = {
             "loop": self._sockets.bind(self._loop, "loop"),
-            "telemetry": self._sockets.bind(self._telemetry, "plant"),
+            "telemetry": self._sockets.bind(self._publisher, "plant"),
         }
         self._until, self._last, self._events, self._secret = 0, False, [], start["secret"]
         self._say(JOIN, "plant", self._secret, os.getpid(), endpoints, True, program)
@@ -94,7 +92,7 @@ class Seat:
     # The clock
 
     def _say(self, code, *fields):
-        self._clock.send(msgpack.packb([VERSION, code, *fields]))
+        self._clock.send(pack(code, *fields))
 
     def _welcome(self):
         while True:
@@ -126,7 +124,7 @@ class Seat:
         while self._tick >= self._until and not self._last:
             if self._owns_time and self._tick and not self._listen():
                 raise SeatError(f"Tick {self._tick} was not granted in time; set run.window_blocks to more.")
-            if not self._listen(SAY_MS if self._tick == self._first else int(BLOCK_S * 1000)):
+            if not self._listen(SAY_MS if self._tick == self._telemetry.first else int(BLOCK_S * 1000)):
                 self._flush()
                 self._idle("clock")
 
@@ -171,7 +169,7 @@ class Seat:
         if self._owns_time and (self._delay == 0 or self._delay % self._n):
             raise SeatError("A plant that owns the time needs clock.round_trip_delay of whole control periods, not 0.")
         self._schedule = Schedule(self._n * self.step_s, self._delay * self.step_s)
-        self._begin_block()
+        self._telemetry = Telemetry(self._publisher, self.scene["run"]["block_ticks"], self._state)
         self._greet()
         self._serve_first()
         self._say(READY, 0)
@@ -184,12 +182,12 @@ class Seat:
             self._sample()
             reason = self._unusable() or (self._tick_in_time() if self._owns_time else self._await_answer())
             reason = reason or self._interval(step)
-            if self._tick - self._first >= self.scene["run"]["block_ticks"] or time.monotonic() - self._began > BLOCK_S:
+            if self._telemetry.is_due():
                 self._flush()
                 self._listen()
         self._send(LAST, self._tick)
         self._flush()
-        self._publish(END, self._tick, reason, None)
+        self._telemetry.end(self._tick, reason)
         if reason:
             self._say(ENDED, self._tick, reason)
 
@@ -221,7 +219,7 @@ class Seat:
         limit, at = self.scene["diverged_beyond"], self._tick * self._n
         for now in range(at, at + self._n):
             self._take_due(now)
-            self._note()
+            self._telemetry.note()
             self._x, self._v = step(self._force)
         self._tick += 1
         if -limit <= self._x <= limit:
@@ -272,7 +270,7 @@ class Seat:
 
     def _send(self, *message):
         try:
-            self._loop.send_multipart([self._partner, msgpack.packb([VERSION, *message])])
+            self._loop.send_multipart([self._partner, pack(*message)])
         except zmq.ZMQError:  # the controller has gone, which the clock sees too
             self._idle("controller")
 
@@ -307,45 +305,18 @@ class Seat:
 
     # Telemetry
 
-    def _publish(self, *message):
-        self._telemetry.send_multipart([b"plant", msgpack.packb([VERSION, *message])])
-
-    def _serve(self):
-        """Answers new subscriptions with the present state; only between two blocks."""
-        asked = False
-        while self._telemetry.poll(0):
-            request = self._telemetry.recv()
-            asked |= request[:1] == b"\x01" and b"plant".startswith(request[1:])
-        if asked:
-            names = ("tick", "x", "v", "force", "command")
-            state = self._tick, self._x, self._v, self._force, self._command
-            self._publish(STATE, self._tick, dict(zip(names, state, strict=True)))
-        return asked
+    def _state(self):
+        return self._tick, self._x, self._v, self._force, self._command
 
     def _serve_first(self):
-        while not self._serve():
-            self._telemetry.poll(SAY_MS)
+        while not self._telemetry.serve(SAY_MS):
             self._idle("logger")
 
-    def _begin_block(self):
-        self._first, self._began = self._tick, time.monotonic()
-        self._rows = {name: array("d") for name in ("x", "v", "force", "command")}
-
-    def _note(self):
-        rows, state = self._rows, (self._x, self._v, self._force, self._command)
-        for column, value in zip(rows.values(), state, strict=True):
-            column.append(value)
-
     def _flush(self):
-        """Publishes the steps since the last block and the state at their end, and reports the progress."""
-        if ticks := self._tick - self._first:
-            self._note()
-            columns = {name: column.tobytes() for name, column in self._rows.items()}
-            self._publish(PLANT_BLOCK, self._first, ticks, columns | {"x_low": bytes(len(columns["x"]))})
+        """Publishes what was done since the last block, and reports it to the clock."""
+        if self._telemetry.flush():
             status = {"lateness": self._schedule.figures()} if self._owns_time and self._schedule.says_so() else {}
             self._say(PROGRESS, self._tick, status)
-        self._begin_block()
-        self._serve()
 
 
 def _beyond(scene):

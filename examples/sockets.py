@@ -1,11 +1,18 @@
 """Sockets of a seat: local files, or TCP with or without CURVE keys, as the line that starts a node says."""
 
+import msgpack
 import zmq
 from zmq.auth.thread import ThreadAuthenticator
 
+VERSION = 2
 # With a port in the transport each socket has its own, in this order from that one on.
 PORTS = ("clock", "loop", "plant", "controller", "logger")
 BINDS = (zmq.ROUTER, zmq.XPUB)
+
+
+def pack(*message):
+    """Returns the frame of a message: its code and fields."""
+    return msgpack.packb([VERSION, *message])
 
 
 class Sockets:
