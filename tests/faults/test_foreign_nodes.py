@@ -247,3 +247,42 @@ def test_a_change_that_a_foreign_controller_passes_over_is_refused_and_one_it_ma
     assert made["set"] == {"wall.stiffness": 200.0}
     assert (passed_over["swap"]["kind"], refusal["change"]["tick"]) == ("damping", passed_over["tick"])
     assert stop["stop"]
+
+
+PLANT = """
+import math, sys
+sys.path.insert(0, {examples!r})
+import seat
+
+class Odd(seat.Seat):
+    def _measured(self, *_):
+        return {value} if self._tick >= 300 else 0.0
+
+seat.Seat = Odd
+seat.take_seat("odd plant", "1").run(lambda force: (0.0, 0.0), 0.0, 0.0)
+"""
+
+
+@pytest.mark.parametrize("value", first_and_slowly("math.nan", "'x'", "[0.0]", "None", "-math.inf"))
+def test_a_foreign_plant_whose_sample_is_no_number_ends_the_run_by_name(
+    value: str, started: Started, tmp_path: Path
+) -> None:
+    script = tmp_path / "plant.py"
+    examples = str(Path(__file__).parents[2] / "examples")
+    script.write_text(PLANT.format(examples=examples, value=value))
+    run = started("--node", f"plant={shlex.join([sys.executable, str(script)])}", node=None)
+    run.end(1)
+    assert "The plant's sample of tick 300 must be a list of 1 finite number, but [" in run.stderr
+    assert "not haploop's own" in run.stderr
+    assert json.loads((run.out_directory / "summary.json").read_text())["ended"] == "failed"
+
+
+def test_a_program_that_cannot_be_started_leaves_nothing(started: Started, tmp_path: Path) -> None:
+    program = tmp_path / "program"
+    program.write_text("no program")
+    program.chmod(0o700)
+    run = started(node=str(program))
+    run.end(2)
+    assert f"The controller ({program}) cannot be started: Exec format error." in run.stderr
+    assert not run.out_directory.exists()
+    run.leaves_nothing()

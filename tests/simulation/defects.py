@@ -46,7 +46,7 @@ def _without_endpoints(kept: Method) -> Method:
     def join(self: Any, sender: bytes, request: dict[str, Any]) -> None:
         asked = dict(request["endpoints"])
         binds = PROCESSES[request["role"]].binds if request["role"] in PROCESSES else {}
-        kept(self, sender, {**request, "endpoints": {**dict.fromkeys(binds, ""), **asked}})
+        kept(self, sender, {**request, "endpoints": {**dict.fromkeys(binds, "ipc://"), **asked}})
         if sender in self.roster.nodes:
             self.roster.nodes[sender].endpoints = asked
 

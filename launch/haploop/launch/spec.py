@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from haploop.launch.processes.foreign import WAIT_S, Program
+from haploop.launch.processes.shown_prints import PRINTS
 from haploop.launch.scene.toml_writer import to_toml
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.transport.sockets import Transport
@@ -122,6 +123,8 @@ def discard(out: Path, is_new: bool) -> None:
     A directory that holds anything else stays as it is.
     """
     with contextlib.suppress(OSError):
+        if (prints := out / PRINTS).is_file() and not prints.stat().st_size:
+            prints.unlink()
         kept = list((out / PLUGINS).glob("*-????????????.py"))
         if {path.name for path in out.iterdir()} <= {SCENE, PLUGINS}:
             for path in (out / SCENE, *kept):

@@ -11,10 +11,10 @@ from haploop.controller.controller import Controller
 from haploop.controller.deadline import heed_deadline
 from haploop.controller.dissipation import ElementError, PluginError, registry
 from haploop.protocol.changes import is_change, refusals_as_status
-from haploop.protocol.scene.scene import Scene
+from haploop.protocol.scene.scene import Scene, accelerometer_is_used
 from haploop.protocol.ticks import BlockLength, Timebase
 from haploop.protocol.transport.clock_client import REPORT_MS, ClockClient
-from haploop.protocol.transport.loop import IDLE_MS, ControllerEnd
+from haploop.protocol.transport.loop import IDLE_MS, ControllerEnd, check_samples
 from haploop.protocol.transport.machine import machine_of
 from haploop.protocol.transport.messages import PROCESSES
 from haploop.protocol.transport.node import NodeError, run_node
@@ -42,6 +42,8 @@ class ControllerNode:
         self._block = BlockLength(scene.run.block_ticks, machine_of(context).now)
         self._reported = self._idle_ms = 0
         self._secret = told["secret"]
+        is_foreign = not told.get("programs", {}).get("plant", {"own": True})["own"]
+        self._checked_values = 1 + accelerometer_is_used(scene) if is_foreign else 0
         self._loop = ControllerEnd(context, welcome["endpoints"]["plant"], self._idle)
 
     def _state(self) -> tuple[int, Message]:
@@ -57,6 +59,8 @@ class ControllerNode:
         """Answers until the plant ends the run; returns the number of ticks answered."""
         controller, client, loop = self._controller, self._client, self._loop
         while (samples := loop.samples(controller.tick)) is not None:
+            if self._checked_values:
+                check_samples(controller.tick, samples, self._checked_values)
             end = controller.tick + len(samples)
             while client.until < end:
                 client.wait(controller.tick)

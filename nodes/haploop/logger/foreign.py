@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from haploop.logger.books.buffers import PIECES
+import numpy as np
+
+from haploop.logger.books.buffers import PIECES, as_float64
 from haploop.plant.chain.chain import Chain
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
@@ -12,6 +14,8 @@ from haploop.protocol.transport.wire import Frame, Message
 
 _PLANT = ("x", "v", "x_low", "force", "command")
 _CONTROLLER = ("x", "v", "a", "wall", "total", "in_contact")
+# Where the device is, as told by the plant, or measured: without it nothing is known.
+_MOTION = ("x", "v")
 _STATE = ("tick", "x", "v", "force", "command")
 _WALL = ("position", "stiffness", "into_wall")
 _ELEMENT = {"book": int, "kind": str, "parameters": dict, "from_tick": int}
@@ -59,6 +63,8 @@ def _columns(block: Message, names: tuple[str, ...], rows: int) -> str:
             return f"column {name} is not the bytes of float64 numbers"
         if len(data) != 8 * rows and not name.startswith(PIECES):
             return f"column {name} has {len(data) // 8} rows, but {rows} were expected"
+        if name in _MOTION and not np.isfinite(as_float64(data)).all():
+            return f"column {name} holds what is no finite number"
     return ""
 
 

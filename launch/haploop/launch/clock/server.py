@@ -10,6 +10,7 @@ import zmq
 
 from haploop.launch.clock.clock import Clock
 from haploop.launch.clock.device_time import PLANT
+from haploop.launch.clock.joining import what_joins, why_refused
 from haploop.launch.clock.roster import Node, Roster
 from haploop.launch.processes.foreign import NO_PROGRAMS, Program
 from haploop.launch.spec import RunFailed
@@ -26,8 +27,6 @@ Command = Callable[[str, Message], Answer | Generator[None, None, Answer]]
 _AT_ONCE = 200
 # A frame of anybody but the run's own processes, bytes: what is larger takes ms to read.
 _LARGEST_OF_STRANGERS = 32 * 1024
-_LONGEST_ROLE = 40
-_PROGRAM_KEYS, _LONGEST_TEXT = ("name", "version", "command"), 200
 
 
 class ClockServer:
@@ -188,27 +187,10 @@ class ClockServer:
     def _join(self, sender: bytes, request: Message) -> None:
         role = request["role"]
         known = role in PROCESSES
-        program = {key: request["program"][key] for key in _PROGRAM_KEYS if key in request["program"]}
-        reason = ""
-        if known and request["secret"] != self._secret:
-            reason = f"JOIN as {role}, a role of the run's own process, came with a wrong secret; join as an observer."
-        elif known and self.roster.own(role):
-            reason = f"The role {role} is taken."
-        elif not known and not self._greeted:
-            reason = "The run has not begun; try again in a moment."
-        elif sender in self.roster.nodes:
+        program = what_joins(request)
+        reason = why_refused(request, program, self._secret, self.roster, self._greeted)
+        if sender in self.roster.nodes and not (known and reason):
             reason = "You have joined already."
-        elif not (role.isprintable() and 0 < len(role) <= _LONGEST_ROLE):
-            reason = f"JOIN.role must be a printable name of at most {_LONGEST_ROLE} characters."
-        elif not all(isinstance(v, str) for pair in request["endpoints"].items() for v in pair):
-            reason = "JOIN.endpoints must be a map from channel to address."
-        elif known and (missing := PROCESSES[role].binds.keys() - request["endpoints"]):
-            reason = (
-                f"JOIN.endpoints of the {role} must have the address of its {' and '.join(sorted(missing))} socket."
-            )
-        elif not all(isinstance(v, str) and v.isprintable() and len(v) <= _LONGEST_TEXT for v in program.values()):
-            keys = ", ".join(_PROGRAM_KEYS)
-            reason = f"JOIN.program holds printable texts of at most {_LONGEST_TEXT} characters: {keys}."
         if reason:
             if known:
                 self.roster.refused[role] = reason

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from reprlib import repr as shortened
 
@@ -148,6 +149,17 @@ class ControllerEnd:
                 return self.socket.recv()
             except zmq.Again:
                 self._idle()
+
+
+def check_samples(tick: int, samples: list[list[float]], values: int) -> None:
+    """Raises LoopError where a sample of a plant that is not haploop's own is no list of so many finite numbers."""
+    for at, sample in enumerate(samples, tick):
+        is_list = type(sample) is list and len(sample) == values
+        if not is_list or not all(type(value) in (int, float) and math.isfinite(value) for value in sample):
+            raise LoopError(
+                f"The plant's sample of tick {at} must be a list of {values} finite number{'s' * (values > 1)}, "
+                f"but {shortened(sample)[:80]} came."
+            )
 
 
 def _raise_unless_gone(error: zmq.ZMQError) -> None:
