@@ -12,7 +12,7 @@ BLOCK_S = 0.01
 
 
 class Telemetry:
-    """The stream of blocks of a plant, on an XPUB; `state` returns tick, x, v, force held and its command, as they are."""
+    """A plant's stream of blocks, on an XPUB; `state` returns tick, x, v, force held and its command, as they are."""
 
     def __init__(self, socket, most_ticks, state):
         self._socket, self._most_ticks, self._state = socket, most_ticks, state
