@@ -64,8 +64,9 @@ def test_a_log_that_is_not_there_yet_is_looked_for_again(tmp_path, monkeypatch):
     live, prepended = History(TIME, 0), []
     for series in live.all_series:
         series.begin(300)
+    here = SimpleNamespace(is_here=True)
     session: Any = SimpleNamespace(
-        out=tmp_path, scene=typed(), time=TIME, events=[], outcome="", history=live, prepend=prepended.append
+        run=here, out=tmp_path, scene=typed(), time=TIME, events=[], outcome="", history=live, prepend=prepended.append
     )
 
     async def play():
