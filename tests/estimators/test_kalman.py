@@ -39,13 +39,18 @@ def model(period_s: float, jerk_density: float) -> tuple[np.ndarray, np.ndarray]
 def test_the_steady_gain_is_where_the_recursion_of_the_textbook_settles(noises, corner_Hz):
     jerk = (2 * np.pi * corner_Hz) ** 3 * noises[0] * np.sqrt(T)
     gain, covariance = steady_state(jerk, noises, T)
-    step, process = model(T, jerk)
-    reads, noise = np.eye(3)[[0, 2][: len(noises)]], np.diag(np.square(noises))
+    # The recursion as it stands in the textbook keeps its digits in units in which no number is far from 1.
+    unit_s, measured = 1 / (2 * np.pi * corner_Hz), [0, 2][: len(noises)]
+    units = noises[0] / np.array([1.0, unit_s, unit_s**2])
+    gain, covariance = gain * units[measured] / units[:, None], covariance / np.outer(units, units)
+    step, process = model(T / unit_s, jerk / noises[0] * unit_s**2.5)
+    reads, noise = np.eye(3)[measured], np.diag(np.square(np.array(noises) / units[measured]))
     P, K, settled = process, np.zeros((3, len(noises))), process
     for _ in range(3000):
         K = P @ reads.T @ np.linalg.inv(reads @ P @ reads.T + noise)
         settled = (np.eye(3) - K @ reads) @ P @ (np.eye(3) - K @ reads).T + K @ noise @ K.T
         P = step @ settled @ step.T + process
+        P = (P + P.T) / 2.0
     scale = np.sqrt(np.diag(P))
     per_surprise = np.sqrt(np.diag(reads @ P @ reads.T + noise))
     assert gain * per_surprise / scale[:, None] == pytest.approx(K * per_surprise / scale[:, None], rel=1e-6, abs=1e-9)

@@ -143,7 +143,9 @@ def steady_state(jerk_density: float, noises: list[float], period_s: float) -> t
     noise = np.diag(deviation**2)
     predicted = solve_discrete_are(step.T, reads.T, process, noise)
     gain = np.linalg.solve(reads @ predicted @ reads.T + noise, reads @ predicted).T
-    estimated = (np.eye(3) - gain @ reads) @ predicted
+    # Joseph's form: a sum of squares, so that no variance is below 0 where the filter takes nearly all of one away.
+    kept = np.eye(3) - gain @ reads
+    estimated = kept @ predicted @ kept.T + gain @ noise @ gain.T
     surprise = np.maximum(deviation, 1.0)
     gain = np.round(gain * surprise, _DECIMALS) / surprise
     return gain * units[:, None] / units[measured], estimated * np.outer(units, units) * noises[0] ** 2
