@@ -18,7 +18,7 @@ import zmq
 from haploop.protocol.transport.clock_client import Aborted, ClockClient, Refused
 from haploop.protocol.transport.loop import LoopError
 from haploop.protocol.transport.prints import keep_prints
-from haploop.protocol.transport.sockets import SecureContext, Transport
+from haploop.protocol.transport.sockets import BindError, SecureContext, Transport
 from haploop.protocol.transport.wire import Message
 
 # work(client, context, directory of sockets) -> (tick reached, result for the clock)
@@ -78,7 +78,7 @@ def take_part(
     except Aborted as error:
         tell(str(error))
         status = 1
-    except (Refused, NodeError, LoopError) as error:
+    except (Refused, NodeError, LoopError, BindError) as error:
         client.leave("FAILED", -1, str(error))
         tell(str(error))
         status = 1

@@ -32,6 +32,10 @@ _HANDSHAKE_MS = 10_000
 _LONGEST_PATH = 107
 
 
+class BindError(OSError):
+    """Raised for an address of this machine at which no socket can be bound."""
+
+
 @dataclass(frozen=True)
 class Transport:
     """The address at which sockets are bound, and the CURVE keys that guard them.
@@ -196,14 +200,19 @@ def has_message(socket: zmq.Socket[bytes]) -> bool:
 def bind(socket: zmq.Socket[bytes], directory: Path, name: str) -> str:
     """Binds in the run's directory of sockets, or to a free port of the transport's TCP host; returns the address.
 
-    Raises OSError where the path is longer than the kernel allows, or is taken.
+    Raises OSError where the path is longer than the kernel allows, or is taken; BindError where the port is.
     """
     transport = transport_of(socket.context)
     if transport.host:
         socket.setsockopt(zmq.IPV6, int(":" in transport.host))
         port = transport.port + _PORTS.index(name) if transport.port else "*"
         host = f"[{transport.host}]" if ":" in transport.host else transport.host
-        socket.bind(f"tcp://{host}:{port}")
+        try:
+            socket.bind(f"tcp://{host}:{port}")
+        except zmq.ZMQError as error:
+            raise BindError(
+                f"Port {port} at {host} cannot be bound for the {name} socket: {error.strerror}."
+            ) from error
         return bytes(socket.getsockopt(zmq.LAST_ENDPOINT)).rstrip(b"\0").decode()
     path = directory / f"{name}.sock"
     if len(os.fsencode(path)) > _LONGEST_PATH:

@@ -25,6 +25,8 @@ def join(
     try:
         told = json.loads(file.read_text(encoding="utf-8"))
         role, directory = told["role"], told["directory"]
+        if not all(isinstance(told[key], str) for key in ("address", "secret", "run", "directory")):
+            raise ValueError
         work = import_module(PROCESSES[role].module).work
         context = SecureContext.from_transport(Transport.from_dict(told["transport"]))
     except OSError as error:
