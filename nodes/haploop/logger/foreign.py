@@ -10,6 +10,8 @@ from haploop.logger.books.buffers import PIECES, as_float64
 from haploop.plant.chain.chain import Chain
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
+from haploop.protocol.transport.messages import MESSAGES
+from haploop.protocol.transport.messages import complaint as message_complaint
 from haploop.protocol.transport.wire import Frame, Message
 
 _PLANT = ("x", "v", "x_low", "force", "command")
@@ -24,14 +26,14 @@ _ELEMENT = {"book": int, "kind": str, "parameters": dict, "from_tick": int}
 def complaint(frame: Frame, role: str, scene: Scene, time: Timebase) -> str:
     """Returns what is wrong with a STATE or a block of one of these, as a sentence; "" for nothing."""
     message = frame.as_dict()
+    if frame.name not in ("STATE", "END", f"{role.upper()}_BLOCK"):
+        return f"{frame.name} is no telemetry of a {role}, but came from it."
     if frame.name == "STATE":
         wrong = _state(message["state"], role)
     elif frame.name == "PLANT_BLOCK":
         wrong = _columns(message, plant_columns(scene), message["ticks"] * time.steps_per_tick + 1)
     elif frame.name == "CONTROLLER_BLOCK":
-        wrong = _parts(message)
-        names = (*_CONTROLLER, *(f"dissipation.{index}" for index in range(len(message["elements"]))))
-        wrong = wrong or _columns(message, names, message["ticks"])
+        wrong = _controller_block(message)
     else:
         return ""
     return wrong and f"A {frame.name} of the {role} from tick {frame.fields[0]} cannot be booked: {wrong}."
@@ -49,7 +51,19 @@ def _state(state: Message, role: str) -> str:
         missing = [name for name in _STATE if not _is_number(state.get(name))]
         return f"its state has no number for {' and '.join(missing)}" if missing else ""
     history = state.get("history")
-    return "" if isinstance(history, list) else "its state has no list for history"
+    if not isinstance(history, list):
+        return "its state has no list for history"
+    names = [name for name, _ in MESSAGES["CONTROLLER_BLOCK"].fields]
+    for block in history:
+        fields: list[object] = [block.get(name) for name in names] if isinstance(block, dict) else []
+        if wrong := message_complaint("CONTROLLER_BLOCK", fields) or _controller_block(block):
+            return f"in its history {wrong}"
+    return ""
+
+
+def _controller_block(block: Message) -> str:
+    names = (*_CONTROLLER, *(f"dissipation.{index}" for index in range(len(block["elements"]))))
+    return _parts(block) or _columns(block, names, block["ticks"])
 
 
 def _columns(block: Message, names: tuple[str, ...], rows: int) -> str:
@@ -69,12 +83,20 @@ def _columns(block: Message, names: tuple[str, ...], rows: int) -> str:
 
 
 def _parts(block: Message) -> str:
-    if missing := [name for name in _WALL if not _is_number(block["wall"].get(name))]:
+    wall, elements = block["wall"], block["elements"]
+    if missing := [name for name in _WALL if not _is_number(wall.get(name))]:
         return f"its wall has no number for {' and '.join(missing)}"
-    for index, element in enumerate(block["elements"]):
+    if wall["into_wall"] not in (-1, 0, 1):
+        return f"into_wall of its wall is {wall['into_wall']:g}, not -1, 0 or 1"
+    for index, element in enumerate(elements):
         for key, kind in _ELEMENT.items():
             if not isinstance(element, dict) or not isinstance(element.get(key), kind):
                 return f"element {index} has no {kind.__name__} for {key}"
+        parameters = element["parameters"].items()
+        if not all(isinstance(name, str) and isinstance(value, int | float | str) for name, value in parameters):
+            return f"a parameter of element {index} is neither number nor text"
+    if len({element["book"] for element in elements}) < len(elements):
+        return "two elements have the same book"
     return ""
 
 

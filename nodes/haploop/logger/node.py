@@ -147,7 +147,13 @@ class LoggerNode:
     def _drain(self) -> None:
         for role, frame in self._streams.drain():
             self._check(role, frame)
-            self._take(role, frame)
+            try:
+                self._take(role, frame)
+            except (ArithmeticError, LookupError, RuntimeError, TypeError, ValueError) as error:
+                if not self._foreign or isinstance(error, TelemetryGap):
+                    raise
+                what = f"{frame.name} of the {role} from tick {frame.fields[0]}"
+                raise NodeError(f"{what} cannot be booked: {type(error).__name__}: {error}.") from error
 
     def _check(self, role: str, frame: Frame) -> None:
         """Looks through what a program of somebody else's has sent.

@@ -19,7 +19,7 @@ export function showSummary(state) {
     make("h2", { id: "summary-title" }, `Ended: ${told(state)}`),
     make("p", { class: "about" }, summary.verdict_rule ?? ""),
     make("p", { class: "balance" }, summary.energy?.balance ?? ""),
-    rows({ ...pushed(summary.stability ?? {}), ...figures(summary) }),
+    rows({ ...pushed(summary.stability ?? {}), ...figures(summary), ...foreign(summary.programs) }),
     books(summary.energy ?? {}),
     make("p", { class: "about" }, "In ", make("code", {}, out)),
   );
@@ -53,6 +53,13 @@ function figures({ duration_s, ended, extremes = {}, real_time_factor: factor, l
     "real time": isNumber(factor) ? `${fixed(factor)}×` : NONE,
     "commands lost, dropped": `${lost.commands_lost ?? 0}, ${lost.commands_dropped ?? 0}`,
   };
+}
+
+/** Plant and controller where they are not haploop's own. */
+function foreign(programs = {}) {
+  const told = ({ name, version, command }) => `${[name, version].filter(Boolean).join(" ")} (${command})`;
+  const strangers = Object.entries(programs).filter(([, program]) => !program.own);
+  return Object.fromEntries(strangers.map(([role, program]) => [`${role} not haploop's own`, told(program)]));
 }
 
 function rows(texts) {
