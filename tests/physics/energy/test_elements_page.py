@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from haploop.controller.dissipation.registry import load_source
+from haploop.launch.batch.run import run_batch
 from helpers.runs.batches import alone, pressed, together, with_element
 from helpers.scenes.least import KINDS, scene
 
@@ -64,3 +65,30 @@ def test_the_table_has_a_row_of_every_kind_that_is_listed_but_where_one_needs_a_
     listed = set(re.findall(r"^\| `([a-z-]+)` \| [^|]* \| [^|]*[a-z]", PAGE.split("## Stabilizers")[1], re.MULTILINE))
     shown = {re.sub(r"`.*", "", row[0].lstrip("`")) for row in ROWS}
     assert {kind for kind in listed if kind in KINDS} - shown <= {"force-bounding", "passivity-controller-reset"}
+
+
+def swings_on(delay: float, *elements: tuple[str, dict[str, float]]) -> list[float]:
+    """Width of the swing in m, a second and a half after a device is pressed on 3600 N/m, with each element."""
+    made = [
+        scene(
+            duration=1.5,
+            clock={"round_trip_delay": delay},
+            device={"mass": 0.05, "damping": 0.05, "position": 0.001},
+            encoder={"resolution": 1e-5},
+            hand={"mass": 0.01, "stiffness": 10.0, "damping": 0.05, "force": {"kind": "constant", "value": -1.0}},
+            wall={"position": 0.0, "stiffness": 3600.0},
+            dissipation=[{"kind": kind, **values}],
+        )
+        for kind, values in elements
+    ]
+    return [result["window"]["oscillation_m"] for result in run_batch(made, KINDS, energy=False)]
+
+
+def test_adaptive_inertia_helps_where_the_damper_is_at_its_limit_and_there_alone() -> None:
+    weak, strong = ("passivity-controller", {"damping": 1.0}), ("passivity-controller", {"damping": 20.0})
+    helped, plain = ("adaptive-inertia", {"damping": 1.0, "mass": 0.02}), ("damping", {"damping": 5.0})
+    of_weak, of_helped, of_strong, of_plain = swings_on(0.0, weak, helped, strong, plain)
+    assert of_weak > 0.01
+    assert max(of_helped, of_strong) < 0.001
+    assert of_plain < 1e-5
+    assert min(swings_on(0.001, weak, helped, strong)) > 0.1
