@@ -11,6 +11,7 @@ from haploop.launch.plan.effects import notes
 from haploop.launch.scene.file import load
 from haploop.launch.scene.mistakes import SceneError
 from haploop.protocol.quantity import MEANT, Quantity
+from helpers.scenes.least import KINDS, scene
 
 SCENES = Path(__file__).parents[2] / "launch" / "scenes"
 FIG6C = SCENES / "fig6c.toml"
@@ -133,3 +134,12 @@ def test_of_thousands_of_mistakes_fifty_are_told(tmp_path):
     assert (len(told), told[-1]) == (51, "... and 950 more mistakes.")
     path.write_text(BASE + "\n".join(f"k{number} = 1" for number in range(20_000)))
     assert "There are 20001 keys, and 2000 at most were expected." in refused(path)
+
+
+def test_what_stands_after_an_element_that_limits_is_noted_and_nothing_else_is() -> None:
+    bounding, damping = {"kind": "force-bounding"}, {"kind": "damping", "damping": 1.0}
+    wall = {"position": -0.06, "stiffness": 150.0}
+    assert not notes(scene(wall=wall, dissipation=[damping, bounding]), KINDS)
+    [note] = notes(scene(wall=wall, dissipation=[bounding, damping]), KINDS)
+    assert note.startswith("dissipation.0 (force-bounding) changes the force of the wall")
+    assert "dissipation.1 (damping) stands after it" in note

@@ -130,6 +130,10 @@ class Controller:
         self._changes = tree_select(self._changes, kept)
         self.recorder.open(self.params)
 
+    def learn(self, kinds: Kinds) -> None:
+        """Takes in kinds that a swap to come names; those of plugins stay what they are."""
+        self._kinds = kinds | self._kinds
+
     def schedule(self, tick: int, event: Event) -> None:
         """Has a checked swap or set take effect at ``tick``, before that tick's force."""
         change = Change.from_dict(tick, event)

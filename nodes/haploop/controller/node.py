@@ -10,7 +10,7 @@ import zmq
 from haploop.controller.controller import Controller
 from haploop.controller.deadline import heed_deadline
 from haploop.controller.dissipation import ElementError, PluginError, registry
-from haploop.protocol.changes import is_change, refusals_as_status
+from haploop.protocol.changes import Event, is_change, refusals_as_status
 from haploop.protocol.scene.scene import Scene, accelerometer_is_used
 from haploop.protocol.ticks import BlockLength, Timebase
 from haploop.protocol.transport.clock_client import REPORT_MS, ClockClient
@@ -36,7 +36,9 @@ class ControllerNode:
         welcome = client.join({"telemetry": address})
         scene = Scene.from_dict(welcome["scene"])
         told = welcome["context"]
-        kinds = registry([Path(path) for path in told["plugins"]], told["elements"])
+        self._installed: dict[str, str] = told["elements"]
+        named = {table.name for table in scene.dissipation}
+        kinds = registry([Path(path) for path in told["plugins"]], self._places(named))
         self._controller = Controller(scene, Timebase(**welcome["timebase"]), kinds)
         mark_ticks(lambda: self._controller.tick)
         self._block = BlockLength(scene.run.block_ticks, machine_of(context).now)
@@ -45,6 +47,15 @@ class ControllerNode:
         is_foreign = not told.get("programs", {}).get("plant", {"own": True})["own"]
         self._checked_values = 1 + accelerometer_is_used(scene) if is_foreign else 0
         self._loop = ControllerEnd(context, welcome["endpoints"]["plant"], self._idle)
+
+    def _places(self, names: set[str]) -> dict[str, str]:
+        """Returns where installed kinds are; those that nobody names are not loaded."""
+        return {name: place for name, place in self._installed.items() if name in names}
+
+    def _schedule(self, tick: int, event: Event) -> None:
+        if kind := (event.get("swap") or {}).get("kind"):
+            self._controller.learn(registry(places=self._places({kind})))
+        self._controller.schedule(tick, event)
 
     def _state(self) -> tuple[int, Message]:
         return self._controller.tick, {"history": self._controller.recorder.history}
@@ -66,7 +77,7 @@ class ControllerNode:
                 client.wait(controller.tick)
             for tick, event in client.take_events() if client.events else ():
                 if is_change(event):
-                    controller.schedule(tick, event)
+                    self._schedule(tick, event)
             try:
                 loop.answer(controller.tick, controller.answer(samples))
             except ElementError:

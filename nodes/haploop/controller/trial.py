@@ -81,8 +81,8 @@ def _declaration(element: type[Element], origin: str) -> Reply:
                 defaults[name] = float(default)
             except (TypeError, ValueError):
                 raise PluginError(f"{origin}: the default of {name} must be a number, but is {default!r}.") from None
-    words = {"name": element.__name__, "about": element.__doc__, "linear": bool(element.linear) and not element.asks}
-    return {**words, "parameters": parameters, "defaults": defaults}
+    says = {"linear": bool(element.linear) and not element.asks, "limits": bool(element.limits)}
+    return {"name": element.__name__, "about": element.__doc__, **says, "parameters": parameters, "defaults": defaults}
 
 
 def _make(elements: list[tuple[str, dict[str, float]]], kinds: dict[str, type[Element]]) -> Reply:

@@ -5,9 +5,10 @@ An effect that is not named is not there: its modules are not imported and no in
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from functools import cache, partial
+from typing import TYPE_CHECKING
 
 from haploop.controller.estimators.choose import estimator_class, estimators_for
 from haploop.launch.plan import rules
@@ -20,6 +21,9 @@ from haploop.protocol.scene.paths import value_at, without
 from haploop.protocol.scene.scene import Scene, accelerometer_is_used
 from haploop.protocol.ticks import Timebase
 from haploop.protocol.trees import tree_leaves
+
+if TYPE_CHECKING:
+    from haploop.controller.dissipation import Element
 
 # Other packages name theirs in this group of entry points.
 _GROUP = "haploop.effects"
@@ -169,7 +173,10 @@ def effects_of(scene: Scene) -> tuple[Effect, ...]:
     return tuple(effect for effect in all_effects() if effect.is_in(scene))
 
 
-def notes(scene: Scene) -> list[str]:
-    """Returns what is in order in a resolved scene, but may not be what was meant; one sentence each."""
+def notes(scene: Scene, kinds: Mapping[str, type[Element]] | None = None) -> list[str]:
+    """Returns what is in order in a resolved scene, but may not be what was meant; one sentence each.
+
+    ``kinds`` are those of its elements; nothing is said of these without.
+    """
     of_effects = [note for effect in all_effects() if effect.is_named(scene) for note in effect.note(scene)]
-    return rules.note_unusual(scene) + of_effects
+    return rules.note_unusual(scene) + of_effects + rules.note_order(scene, kinds or {})

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
+from itertools import pairwise
+from typing import TYPE_CHECKING
 
 from haploop.launch.plan.effect import Draft
 from haploop.plant.integrators.registry import find_integrator
@@ -11,6 +13,9 @@ from haploop.protocol.scene.effects import Accelerometer, Actuator, Friction, Un
 from haploop.protocol.scene.paths import value_at, without
 from haploop.protocol.scene.scene import Clock, Hand, Scene
 from haploop.protocol.ticks import whole_count
+
+if TYPE_CHECKING:
+    from haploop.controller.dissipation import Element
 
 # Beyond these a number is in order, but more often a slip of the unit: key, least, most, unit.
 _USUAL = (
@@ -147,6 +152,17 @@ def note_unusual(scene: Scene) -> list[str]:
     if scene.clock.round_trip_delay >= scene.duration:
         asked.append("No force takes effect within the run, since clock.round_trip_delay is no shorter than duration.")
     return asked
+
+
+def note_order(scene: Scene, kinds: Mapping[str, type[Element]]) -> list[str]:
+    """Tells of elements that change what stands before them and are not the last."""
+    names = [table.name for table in scene.dissipation]
+    return [
+        f"dissipation.{place} ({name}) changes the force of the wall and of what stands before it; "
+        f"dissipation.{place + 1} ({after}) stands after it and is not limited. Put what limits at the end."
+        for place, (name, after) in enumerate(pairwise(names))
+        if name in kinds and kinds[name].limits
+    ]
 
 
 def unrounded(scene: Scene) -> Scene:

@@ -146,4 +146,5 @@ def _stand_in(kind: str, declared: Mapping[str, Any]) -> type[Element]:
     annotations = {name: Annotated[float, Quantity(**of)] for name, of in declared["parameters"].items()}
     defaults = declared["defaults"]
     about = {"__doc__": declared["about"], "__module__": __name__, "__annotations__": annotations}
-    return type(declared["name"], (StandIn,), about | defaults | {"kind": kind, "linear": declared["linear"]})
+    says = {"kind": kind, "linear": declared["linear"], "limits": declared["limits"]}
+    return type(declared["name"], (StandIn,), about | defaults | says)

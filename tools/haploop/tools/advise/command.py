@@ -46,7 +46,7 @@ def advise(
         except InvalidRequest as error:
             leave(str(error), WRONG_USE)
         try_out(elements_of(asked.scene), kinds)
-        print_notes(asked.scene)
+        print_notes(asked.scene, kinds)
         out = _output(out, asked.name)
         store = Store(out / WALLS)
         try:

@@ -35,7 +35,7 @@ def explain(scene: SceneFile, set: Set = None, plugin: Plugin = None, json: Json
         kinds = kinds_with(plugin or [])
         resolved = load(scene, set or [], kinds)
         try_out(elements_of(resolved), kinds)
-        print_notes(resolved)
+        print_notes(resolved, kinds)
         planned = plan(resolved)
         costs = bill(resolved, planned.named, kinds)
     if json:

@@ -86,7 +86,7 @@ def run(
             leave(str(error), WRONG_USE)
         prepared = start.prepare(scene, set or [], plugin or [], out, any_hand="plant" in programs)
         try:
-            print_notes(prepared.scene)
+            print_notes(prepared.scene, prepared.kinds)
             # What an element prints is no part of the answer.
             with ProgressLine(prepared.scene.title, prepared.scene.duration) as line, redirect_stdout(sys.stderr):
 

@@ -24,6 +24,8 @@ from haploop.tools.cli.options import (
 )
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from haploop.controller.dissipation import Element
     from haploop.protocol.scene.scene import Scene
 
@@ -49,7 +51,7 @@ def check(
         if scene is None:
             raise typer.BadParameter("A scene file was expected, or --schema.")
         resolved = load(scene, set or [], kinds, any_hand=True)
-    print_notes(resolved)
+    print_notes(resolved, kinds)
     if json:
         print_json(resolved.as_dict())
     else:
@@ -177,9 +179,9 @@ def print_note(note: str) -> None:
         print(f"Note: {note}", file=sys.stderr)
 
 
-def print_notes(scene: Scene) -> None:
+def print_notes(scene: Scene, kinds: Mapping[str, type[Element]]) -> None:
     """Prints on stderr what in a resolved scene may not be what was meant."""
     from haploop.launch.plan.effects import notes
 
-    for note in notes(scene):
+    for note in notes(scene, kinds):
         print_note(note)
