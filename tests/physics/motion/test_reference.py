@@ -105,6 +105,7 @@ def test_the_scenes_of_the_paper_are_among_them():
     assert {path.stem for path in SCENES} >= {"fig6a", "fig6b", "fig6c", "tap", "swap"}
 
 
+@pytest.mark.slow
 def test_the_drawn_scenes_hold_everything_a_scene_can_hold():
     scenes = [both(seed)[0] for seed in SEEDS]
 
