@@ -21,7 +21,7 @@ import msgpack
 import zmq
 from schedule import Schedule
 from sockets import VERSION, Sockets, pack
-from telemetry import BLOCK_S, Telemetry
+from telemetry import BLOCK_S, LONG_BLOCK_S, Telemetry
 
 JOIN, WELCOME, REFUSED, READY, GRANT, PROGRESS, WAITING, ENDED, DONE, FAILED, ABORT = range(1, 12)
 HELLO, SAMPLES, COMMANDS, LAST = range(20, 24)
@@ -169,7 +169,8 @@ class Seat:
         if self._owns_time and (self._delay == 0 or self._delay % self._n):
             raise SeatError("A plant that owns the time needs clock.round_trip_delay of whole control periods, not 0.")
         self._schedule = Schedule(self._n * self.step_s, self._delay * self.step_s)
-        self._telemetry = Telemetry(self._publisher, self.scene["run"]["block_ticks"], self._state)
+        block_s = LONG_BLOCK_S if self._owns_time else BLOCK_S
+        self._telemetry = Telemetry(self._publisher, self.scene["run"]["block_ticks"], self._state, block_s)
         self._greet()
         self._serve_first()
         self._say(READY, 0)

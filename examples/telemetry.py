@@ -7,15 +7,16 @@ from sockets import pack
 
 STATE, PLANT_BLOCK, END = 30, 31, 34
 NAMES = ("x", "v", "force", "command")
-# A block holds the ticks of so much wall time, s, if not the most that the scene allows.
-BLOCK_S = 0.01
+# A block holds the ticks of so much wall time, s, if not the most that the scene allows; of more where the plant owns
+# the time, since the logger may then be behind by a whole window of blocks.
+BLOCK_S, LONG_BLOCK_S = 0.01, 0.05
 
 
 class Telemetry:
     """A plant's stream of blocks, on an XPUB; `state` returns tick, x, v, force held and its command, as they are."""
 
-    def __init__(self, socket, most_ticks, state):
-        self._socket, self._most_ticks, self._state = socket, most_ticks, state
+    def __init__(self, socket, most_ticks, state, block_s):
+        self._socket, self._most_ticks, self._state, self._block_s = socket, most_ticks, state, block_s
         self.begin()
 
     def begin(self):
@@ -30,7 +31,7 @@ class Telemetry:
 
     def is_due(self):
         """Tells whether what was noted makes a block."""
-        return self._state()[0] - self.first >= self._most_ticks or time.monotonic() - self._began > BLOCK_S
+        return self._state()[0] - self.first >= self._most_ticks or time.monotonic() - self._began > self._block_s
 
     def flush(self):
         """Publishes the steps since the last block and the state at their end; tells whether there were any."""

@@ -6,9 +6,11 @@ from typing import Any
 from hypothesis import given
 from hypothesis import strategies as st
 
-from haploop.launch.clock.clock import MOST_GRANTS, ClockError
+from haploop.launch.clock.clock import MOST_GRANTS, Clock, ClockError
 from haploop.launch.scene.mistakes import SceneError
+from haploop.protocol.ticks import Timebase
 from helpers.runs.clocks import DAMPING, SWAP, TICKS, WINDOW, clock, granted, sent
+from helpers.scenes.least import KINDS, scene
 
 # How far
 
@@ -183,3 +185,15 @@ def test_a_node_behind_holds_the_grants_once_seventy_of_them_lie_ahead_of_it_ten
     assert slow.until == MOST_GRANTS
     assert slow.wait_s(100.0) is None
     assert slow.grant(1, 100.0) > MOST_GRANTS
+
+
+def least_lead(in_leaps: bool) -> int:
+    """Ticks that are granted ahead of a plant that keeps the time, 1000 ticks a second, when they are fewest."""
+    resolved = scene(duration=30.0, run={"block_ticks": 1000, "window_blocks": 5})
+    subject = Clock(resolved, Timebase.from_scene(resolved), KINDS, in_leaps=in_leaps)
+    return min(subject.grant(tick, tick / 1000) - tick for tick in range(0, 20_000, 10))
+
+
+def test_a_plant_that_keeps_the_time_has_most_of_the_window_ahead_of_it_at_any_time() -> None:
+    assert least_lead(in_leaps=True) >= 0.75 * 5000 - 10
+    assert least_lead(in_leaps=False) < 0.2 * 5000, "grants as they come are too many long before the window is full"

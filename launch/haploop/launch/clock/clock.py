@@ -40,16 +40,25 @@ class Clock:
     of it in time. The grant is the least of: the end, the next pause, the target of a step, the pace, and the
     progress of the slowest lossless node plus the window; and no more than ``MOST_GRANTS`` lie ahead of that node.
 
+    ``in_leaps``: of a quarter of the window at least, for a plant that keeps the time: many small grants would come to
+    ``MOST_GRANTS`` long before they come to the window, and a device cannot wait.
+
     Attributes:
         newest: the event of the last change asked for; {} when there was none.
     """
 
     def __init__(
-        self, scene: Scene, time: Timebase, kinds: Mapping[str, type[Element]], pace: float = math.inf
+        self,
+        scene: Scene,
+        time: Timebase,
+        kinds: Mapping[str, type[Element]],
+        pace: float = math.inf,
+        in_leaps: bool = False,
     ) -> None:
         self._scene = scene
         self._time, self._kinds = time, kinds
         self._window = scene.run.window_blocks * scene.run.block_ticks
+        self._leap = self._window // 4 if in_leaps else 1
         self.until = 0
         self.end = time.ticks
         self.paused = False
@@ -89,7 +98,8 @@ class Clock:
         is_paced = not math.isinf(self.pace.rate)
         if is_paced and plant is not None:
             limit = min(limit, plant + self.pace.most_at_once)
-        self._held = limit <= self.until or len(self._ahead) >= MOST_GRANTS
+        is_leap = limit >= min(self.end, self.until + self._leap)
+        self._held = limit <= self.until or not is_leap or len(self._ahead) >= MOST_GRANTS
         if not self._held and is_paced:
             limit = self.pace.grant(self.until, limit, now)
         if limit > self.until and not self._held:

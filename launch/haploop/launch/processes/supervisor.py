@@ -100,7 +100,7 @@ class Supervisor:
         self._spec, self._sockets, self._interrupts = spec, sockets, received
         scene = spec.scene
         timebase = Timebase.from_scene(scene)
-        self._clock = Clock(scene, timebase, spec.kinds, spec.pace)
+        self._clock = Clock(scene, timebase, spec.kinds, spec.pace, in_leaps=spec.clock == PLANT)
         self._deadline_s = scene.run.deadline
         self._context, self._machine = context, machine_of(context)
         secret = secrets.token_hex(16)
