@@ -17,7 +17,7 @@ from haploop.launch.spec import RunFailed
 from haploop.protocol.scene.scene import ElementTable, EventTable, Scene
 from haploop.protocol.ticks import Timebase
 from haploop.tools.linear.linearity import why_not_linear
-from helpers.runs.batches import alone, pressed, together, with_element
+from helpers.runs.batches import alone, diverging, pressed, together, with_element
 from helpers.scenes.least import KINDS
 
 T, TICKS = 1e-3, 200
@@ -67,9 +67,7 @@ def scenes(kind: str, values: dict[str, list[float]], events: tuple[EventTable, 
 
 @pytest.mark.parametrize("delay_steps", [0, 7, 10, 23])
 def test_an_element_is_told_forces_and_energies_as_the_rows_of_the_run_give_them(delay_steps: int) -> None:
-    (scene,) = scenes("damping", {"damping": [0.0]})
-    table = replace(scene.dissipation[1], name="keeping", parameters={})
-    scene = replace(scene, dissipation=(scene.dissipation[0], table, scene.dissipation[2]))
+    (scene,) = scenes("keeping", {})
     scene = replace(scene, clock=replace(scene.clock, round_trip_delay=delay_steps * T / 10))
     controller = Controller(scene, Timebase.from_scene(scene), KINDS | {"keeping": Keeping})
     x = -0.003 + 0.002 * np.cos(0.07 * np.arange(TICKS))
@@ -158,6 +156,30 @@ def test_they_compile(kind: str) -> None:
         del exact["trajectory_sha256"]
         assert agree(result, exact)
     assert compiling()[0] > before
+
+
+def test_what_it_is_told_follows_its_members_when_others_are_dropped() -> None:
+    hearing = ElementTable(name="hearing", acts="always", parameters={"gain": 0.001})
+    made = [replace(one, dissipation=(*one.dissipation, hearing)) for one in diverging()]
+    expected = [alone(each, KNOWN) for each in made]
+    assert {"diverged", "done"} == {result["ended"] for result in expected}
+    assert together(made, KNOWN) == expected
+
+
+@pytest.mark.parametrize("after_steps", [0, 4, 35])
+def test_the_force_that_acted_is_told_by_the_delay_that_was_set(after_steps: int) -> None:
+    """From where every command that acts was given after the change on."""
+    (scene,) = scenes("keeping", {})
+    controller = Controller(scene, Timebase.from_scene(scene), KNOWN | {"keeping": Keeping})
+    controller.schedule(50, {"set": {"clock.round_trip_delay": after_steps * T / 10}})
+    controller.answer([(place,) for place in (-0.003 + 0.002 * np.cos(0.07 * np.arange(TICKS))).tolist()])
+    total = np.concatenate([np.frombuffer(each["columns"]["total"]) for each in controller.recorder.take()])
+    element: Any = controller.params.elements[1].element
+    acted = np.array(element.told)[:, ASKABLE.index("acted")]
+    whole, late = divmod(after_steps, 10)
+    ticks = np.arange(60, TICKS)
+    expected = (10 - late) / 10 * total[ticks - 1 - whole] + late / 10 * total[ticks - 2 - whole]
+    assert acted[ticks] == pytest.approx(expected, rel=1e-12)
 
 
 def test_what_an_element_does_not_ask_for_it_is_not_told_and_the_error_says_how_to_ask() -> None:

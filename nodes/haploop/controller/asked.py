@@ -96,7 +96,7 @@ def answer_of(
     }  # fmt: skip
     if commands:
         known["acted"] = _acted((total_before, *commands), declared)
-        commands = (total_before, *commands[:-1])
+        commands = (total_before, *commands)[: declared.whole_ticks + 1]
     motion = now.telling(known, active.element.asks)
     if own is None:
         answer = active.element.force(motion)
@@ -107,8 +107,11 @@ def answer_of(
 
 
 def _acted(commands: tuple[Any, ...], declared: Declared) -> Any:
-    """The mean force held over the last period: c[k-1-L] from its step ``late`` on, c[k-2-L] before."""
-    most = len(commands) - 1
-    newer, older = (commands[min(declared.whole_ticks + more, most)] for more in (0, 1))
+    """The mean force held over the last period: of c[k-1-L] from its step ``late`` on, of c[k-2-L] before.
+
+    Where a longer delay has just been set, the oldest command known stands for those before it.
+    """
+    oldest = len(commands) - 1
+    newer, older = (commands[min(declared.whole_ticks + ago, oldest)] for ago in (0, 1))
     late, steps = declared.late_steps, declared.steps
     return ((steps - late) * newer + late * older) / steps

@@ -34,7 +34,7 @@ def answered(x: np.ndarray, element: dict[str, Any], **others: Any) -> dict[str,
     return {name: np.frombuffer(column) for name, column in block["columns"].items()}
 
 
-def wandering(seed: int, ticks: int = 3000) -> np.ndarray:
+def wandering(seed: int, ticks: int = 1500) -> np.ndarray:
     """Positions about a place 20 mm inside, where they begin: slowly to and fro by 10 mm, and shaken."""
     shaken = np.random.default_rng(seed).uniform(-3e-5, 3e-5, ticks)
     return -1.02 + 0.01 * np.sin(0.01 * np.arange(ticks)) + np.cumsum(shaken) * (np.arange(ticks) > 0)

@@ -140,6 +140,7 @@ class Element(ABC):
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)
+        cls.asks = tuple(cls.asks)  # a list would count as something that the class keeps
         dataclasses.dataclass(kw_only=True, eq=False)(cls)
 
     @abstractmethod

@@ -18,7 +18,7 @@ def taken_by_damper(energy: Any, damping: Any, motion: Motion) -> Any:
 
 
 class PassivityController(Element):
-    """f = -alpha v, alpha = -W / (T v^2) where W < 0 and v != 0, at most ``damping``; else 0 (Hannaford & Ryu 2002).
+    """f = -alpha v, alpha = -W / (T v^2), at most its damping, where W < 0 and v != 0; else 0 (Hannaford & Ryu 2002).
 
     W[k] = W[k-1] - f_out[k-1] (x_m[k] - x_m[k-1]), of f_out: the force of the wall, of all before it in the list and
     its own; v = (x_m[k] - x_m[k-1]) / T. The source books f[k] v[k]; this is what a held force does. The next sample
@@ -35,7 +35,7 @@ class PassivityController(Element):
 
 
 class PassivityControllerReset(Element):
-    """``PassivityController`` that books every contact by itself: W = 0 at the last tick before it.
+    """A passivity controller that books every contact by itself: W = 0 at the last tick before it.
 
     So what earlier contacts took is no credit for this one; what they still owe is let off.
     """
@@ -51,7 +51,7 @@ class PassivityControllerReset(Element):
 
 
 class PassivityControllerReference(Element):
-    """``PassivityController`` that keeps W above K p^2 / 2, what an ideal spring holds at the penetration p.
+    """A passivity controller that keeps W above K p^2 / 2, what an ideal spring holds at the penetration p.
 
     After Ryu, Preusche, Hannaford & Hirzinger 2005 (reference energy following): it acts as soon as the sampled wall
     takes less than a spring would, also on the way in.
