@@ -119,11 +119,14 @@ class Seat:
         return heard
 
     def _await_grant(self):
-        if self._tick >= self._until and not self._last:
-            self._say(PROGRESS, self._tick, {})
-        while self._tick >= self._until and not self._last:
-            if self._owns_time and self._tick and not self._listen():
+        if self._tick < self._until or self._last:
+            return
+        self._say(PROGRESS, self._tick, {})
+        if self._owns_time and self._tick:
+            self._listen()
+            if self._tick >= self._until and not self._last:
                 raise SeatError(f"Tick {self._tick} was not granted in time; set run.window_blocks to more.")
+        while self._tick >= self._until and not self._last:
             if not self._listen(SAY_MS if self._tick == self._telemetry.first else int(BLOCK_S * 1000)):
                 self._flush()
                 self._idle("clock")
