@@ -30,6 +30,7 @@ HELLO, SAMPLES, COMMANDS, LAST = 20, 21, 22, 23
 STATE, CONTROLLER_BLOCK, END = 30, 32, 34
 COLUMNS = ("x", "v", "a", "wall", "dissipation.0", "total", "in_contact")
 BLOCK = 100
+_pack = msgpack.Packer(autoreset=True).pack
 
 
 class Law:
@@ -70,7 +71,7 @@ class Controller:
         self.law = Law(self.scene, 1.0 / timebase["control_rate"])
         self.plant = self.socket(zmq.DEALER)
         self.plant.connect(endpoints["plant"]["loop"])
-        self.plant.send(msgpack.packb([VERSION, HELLO, told["secret"]]))
+        self.plant.send(_pack([VERSION, HELLO, told["secret"]]))
 
     def socket(self, kind):
         socket = self.context.socket(kind)
@@ -78,7 +79,7 @@ class Controller:
         return socket
 
     def say(self, code, *fields):
-        self.clock.send(msgpack.packb([VERSION, code, *fields]))
+        self.clock.send(_pack([VERSION, code, *fields]))
 
     def welcome(self):
         _, code, *fields = msgpack.unpackb(self.clock.recv(), strict_map_key=False)
@@ -108,7 +109,7 @@ class Controller:
         return asked
 
     def publish(self, *message):
-        self.telemetry.send_multipart([b"controller", msgpack.packb([VERSION, *message])])
+        self.telemetry.send_multipart([b"controller", _pack([VERSION, *message])])
 
     def begin(self):
         while not self.plant.poll(200):
@@ -193,8 +194,8 @@ class Controller:
             while True:
                 self.say(WAITING, tick, "plant")
                 self.listen(200)
-        forces = {"nan": [math.nan] * len(forces), "text": ["1.0"] * len(forces)}.get(how, forces)
-        frame = msgpack.packb([VERSION, COMMANDS, tick, forces])
+        forces = {"nan": [math.nan] * len(forces), "text": ["1.0"] * len(forces)}.get(how or "", forces)
+        frame = _pack([VERSION, COMMANDS, tick, forces])
         self.plant.send(b"\xc1\xff\x00garbage" if how == "garbage" else frame)
 
     def change(self, tick, event):
