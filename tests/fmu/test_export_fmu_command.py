@@ -138,9 +138,15 @@ def test_an_element_of_a_plugin_is_refused_though_it_has_the_name_of_one_that_is
         controller_of(one)
 
 
-def test_every_element_and_estimator_that_comes_with_haploop_has_its_words_in_c() -> None:
-    assert set(KINDS.values()) <= ELEMENTS.keys()
+def test_every_estimator_and_element_that_comes_with_haploop_and_asks_for_nothing_has_its_words_in_c() -> None:
+    assert {kind for kind in KINDS.values() if not kind.asks} <= ELEMENTS.keys()
     named = {estimator_class(name) for name in NAMES_OF_ESTIMATORS}
     assert named | {Unchanged} | {made for kind in named for made in kind.__subclasses__()} == ESTIMATORS.keys()
     written = Path(package.__file__).with_name("controller.h").read_text(encoding="utf-8")
     assert [word for word in (*ELEMENTS.values(), *ESTIMATORS.values()) if f"case {word}:" not in written] == []
+
+
+def test_a_stabilizer_is_refused_by_its_name() -> None:
+    one = scene(wall={"position": -0.06, "stiffness": 150}, dissipation=[{"kind": "force-bounding"}])
+    with pytest.raises(NotExportable, match=r"dissipation\.0 is force-bounding, which is Python; an FMU holds"):
+        controller_of(one)
