@@ -133,7 +133,8 @@ class Supervisor:
             if role in spec.programs and spec.programs[role].is_external:  # perhaps on another host
                 own = {"address": self._server.address, "transport": transport.of(role, elsewhere=True).as_dict()}
                 return start | own
-            return {**start, "transport": transport.of(role).as_dict()}
+            # One of this machine ends with its launcher, and may wait for one that is stopped.
+            return {**start, "transport": replace(transport.of(role), patience_s=0.0).as_dict()}
 
         self._told_to = told_to
         self._start_nodes = partial(start_nodes, sockets, told_to, scene.run.pin, run_number, spec.programs)
@@ -198,7 +199,7 @@ class Supervisor:
             if logger := self._server.roster.own("logger"):
                 self._spec.on_progress(logger.status)
         for child in self._children.values():
-            child.wait(2.0)
+            child.wait(self._spec.transport.linger_s + 1.0)
 
     def _look_at(self, child: Child) -> None:
         """Takes note that a process has ended: in order after DONE, otherwise the run fails."""

@@ -18,7 +18,7 @@ import zmq
 from haploop.protocol.transport.clock_client import Aborted, ClockClient, Refused
 from haploop.protocol.transport.loop import LoopError
 from haploop.protocol.transport.prints import keep_prints
-from haploop.protocol.transport.sockets import BindError, SecureContext, Transport
+from haploop.protocol.transport.sockets import BindError, SecureContext, Transport, transport_of
 from haploop.protocol.transport.wire import Message
 
 # work(client, context, directory of sockets) -> (tick reached, result for the clock)
@@ -88,7 +88,7 @@ def take_part(
         traceback.print_exc()
         client.leave("FAILED", -1, f"{type(error).__name__}: {error}")
         status = 1
-    context.destroy(linger=1000)
+    context.destroy(linger=int(1000 * transport_of(context).linger_s))
     return status
 
 

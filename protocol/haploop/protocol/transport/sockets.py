@@ -45,7 +45,7 @@ class Transport:
         port: that of the clock, the other sockets of a run take those that follow; 0 for any that are free.
         keys: those of the program whose sockets these are; None for sockets that anyone may connect to.
         directory: of the keys of a whole run, for its launcher alone.
-        patience_s: after so long without a sign of life a connection to another host is given up.
+        patience_s: after so long without a sign of life a connection to another host is given up; 0 for never.
     """
 
     host: str | None = None
@@ -53,6 +53,11 @@ class Transport:
     keys: Keys | None = None
     directory: Path | None = None
     patience_s: float = 5.0
+
+    @property
+    def linger_s(self) -> float:
+        """Returns how long what was said last is given to go out, s: a network may lose some of it at first."""
+        return 5.0 if self.host else 1.0
 
     @classmethod
     def from_options(cls, tcp: str | None, keys: Path | None) -> Transport:
@@ -174,10 +179,11 @@ def transport_of(context: zmq.Context[zmq.Socket[bytes]]) -> Transport:
 
 def _watch_peers(socket: zmq.Socket[bytes], patience_s: float) -> None:
     """Has the library give up a connection of which nothing is heard, and one that never says who it is."""
-    milliseconds = max(2, int(patience_s * 1000))
-    asks_ms = min(1000, milliseconds // 2)
-    socket.setsockopt(zmq.HEARTBEAT_IVL, asks_ms)
-    socket.setsockopt(zmq.HEARTBEAT_TIMEOUT, milliseconds - asks_ms)
+    if patience_s:
+        milliseconds = max(2, int(patience_s * 1000))
+        asks_ms = min(1000, milliseconds // 2)
+        socket.setsockopt(zmq.HEARTBEAT_IVL, asks_ms)
+        socket.setsockopt(zmq.HEARTBEAT_TIMEOUT, milliseconds - asks_ms)
     socket.setsockopt(zmq.HANDSHAKE_IVL, _HANDSHAKE_MS)
     socket.setsockopt(zmq.RECONNECT_IVL_MAX, 1000)
 
