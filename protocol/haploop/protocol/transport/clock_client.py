@@ -85,6 +85,8 @@ class ClockClient:
             if not self.socket.poll(_LOOK_MS):
                 if self._connection and (why := self._connection.trouble()):
                     raise Refused(why)
+                if self._connection and self._connection.lost_s() > self._grace_s:
+                    raise Refused(self._lost)
                 continue
             frame = self._receive()
             if frame and frame.name == "WELCOME":
@@ -156,7 +158,10 @@ class ClockClient:
     def leave(self, name: str, *fields: Any) -> None:
         """Sends DONE, FAILED or LEAVE, allows it 1 s to go out, and closes."""
         self.socket.send(encode(name, *fields))
-        self.socket.close(linger=1000)
+        self.close(linger_ms=1000)
 
-    def close(self) -> None:
-        self.socket.close(linger=0)
+    def close(self, linger_ms: int = 0) -> None:
+        """Closes the connection; what was sent last has some time to go out."""
+        if self._connection:  # while it closes it must tell nobody of its connection: it could wait for ever
+            self.socket.disable_monitor()
+        self.socket.close(linger=linger_ms)
