@@ -57,9 +57,10 @@ function share({ residual_J: residual, moved_J: moved }) {
 }
 
 function factor({ real_time_factor: now, pace, summary, lateness: late }) {
+  if (late?.clock === "plant" && late.ticks) return `${fixed((100 * late.late_ticks) / late.ticks, 2)} % late`;
   const real = summary?.real_time_factor ?? now;
   if (!isNumber(real)) return NONE;
-  return `${fixed(real)}×${isNumber(pace) && pace !== 1 ? ` of ${fixed(pace, 2)}×` : ""}${late?.ticks ? `, ${late.late_ticks} late` : ""}`;
+  return `${fixed(real)}×${isNumber(pace) && pace !== 1 ? ` of ${fixed(pace, 2)}×` : ""}`;
 }
 
 function lateness({ lateness: late }) {
