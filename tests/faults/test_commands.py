@@ -98,6 +98,8 @@ REFUSED = [
     ("set", {"set": {"dissipation.1.mass": 0.01}}, "dissipation.1.mass"),
     ("step", {"ticks": 0}, "from 1 to 600000"),
     ("step", {"ticks": "many"}, "from 1 to 600000"),
+    ("step", {"ticks": 10**26}, "a whole number is beyond 64 bits"),
+    ("set", {"set": {"wall.stiffness": 10**26}}, "a whole number is beyond 64 bits"),
     ("explode", {}, "is no command"),
 ]
 

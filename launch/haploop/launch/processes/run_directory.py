@@ -168,6 +168,9 @@ def ask(run: LiveRun, verb: str, **arguments: Any) -> tuple[str, Message]:
         frame = decode(socket.recv())
     except WireError as error:
         raise RunNotFound(f"Run {run.id} answered with something else: {error}") from error
+    except (OverflowError, ValueError) as error:  # what msgpack refuses to carry
+        why = "a whole number is beyond 64 bits" if isinstance(error, OverflowError) else str(error)
+        raise CommandRefused(f"A message cannot carry this command: {why}.") from error
     except zmq.ZMQError as error:
         raise RunNotFound(f"Run {run.id} cannot be reached at {run.clock}: {error.strerror}.") from error
     finally:
