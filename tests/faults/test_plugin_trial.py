@@ -48,6 +48,7 @@ BREAKS = {
     "raise BaseException('odd')": "BaseException: odd",
     "os.closerange(3, 50)": "ended the process it was tried in",
     "for fd in range(3, 20): exec('try: os.write(fd, b\"nonsense\\\\n\")\\nexcept OSError: pass')": "answered for",
+    "for fd in range(3, 20): exec('try: os.write(fd, b\"[3]\\\\n\")\\nexcept OSError: pass')": "answered for",
     "hoard = bytearray(1 << 36)": "MemoryError",
 }
 HANGS = {
@@ -75,6 +76,21 @@ def tried(text: str, limit_s: float = 30.0) -> dict[str, Any]:
 def test_whatever_a_file_does_to_the_process_it_is_tried_in_is_a_sentence(statement, words, place):
     with pytest.raises((PluginError, ElementError), match=words):
         tried(source(**{place: statement}))
+
+
+@pytest.mark.parametrize("forged", ["{}", '{"kinds": 3}', '{"kinds": {"brake": []}}', "[" * 60_000])
+def test_an_answer_that_the_file_itself_has_given_is_told_as_such(forged):
+    write = f"os.write(fd, {forged.encode()!r} + bytes([10]))"
+    with pytest.raises(PluginError, match=r"brake\.py answered for the process it was tried in as it loaded"):
+        tried(
+            source(f"""
+for fd in range(3, 20):
+    try:
+        {write}
+    except OSError:
+        pass
+""")
+        )
 
 
 @pytest.mark.parametrize("place", first_and_slowly("at_import", "at_making", "at_force"))

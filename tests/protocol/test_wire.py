@@ -157,6 +157,11 @@ def test_the_largest_whole_numbers_of_the_wire_come_through_and_larger_ones_cann
         encode("READY", 2**64)
 
 
+def test_a_text_that_is_no_unicode_is_carried_with_the_code_in_its_place() -> None:
+    """What a user's file raises may hold half a surrogate pair; the message that tells of it must not fail."""
+    assert decode(encode("REPLY", False, "no \ud800", {"\udfff": 1})).fields == [False, "no \\ud800", {"\\udfff": 1}]
+
+
 def test_keys_that_cannot_be_keys_are_refused() -> None:
     for key in ([], {}, [1, [2]]):
         items = b"\x94\x02\x06\x00\x81" + pack(key) + b"\x00"

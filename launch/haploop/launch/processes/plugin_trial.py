@@ -79,8 +79,12 @@ class PluginTrial:
 
         Raises PluginError where it does not load, ends its process, or does not come to an end within the limit.
         """
-        reply = yield from self._ask({"source": self._source, "origin": self._origin}, "as it loaded", PluginError)
-        return {kind: _stand_in(kind, declared) for kind, declared in reply["kinds"].items()}
+        when = "as it loaded"
+        reply = yield from self._ask({"source": self._source, "origin": self._origin}, when, PluginError)
+        try:
+            return {kind: _stand_in(kind, declared) for kind, declared in reply["kinds"].items()}
+        except (LookupError, TypeError, ValueError, AttributeError):
+            raise PluginError(self._forged(when)) from None
 
     def make(self, elements: Iterable[ElementTable]) -> Steps:
         """Makes elements of resolved tables and has each give a force at rest; raises ElementError as ``load`` does."""
@@ -105,11 +109,16 @@ class PluginTrial:
             yield
         try:
             reply = json.loads(answer)
-        except ValueError:
-            raise kind(f"The plugin {self._origin} answered for the process it was tried in {when}.") from None
+        except (ValueError, RecursionError):
+            raise kind(self._forged(when)) from None
+        if not isinstance(reply, dict):
+            raise kind(self._forged(when))
         if "error" in reply:
-            raise kind(reply["error"])
+            raise kind(str(reply["error"]))
         return reply
+
+    def _forged(self, when: str) -> str:
+        return f"The plugin {self._origin} answered for the process it was tried in {when}."
 
     def _end(self) -> str:
         try:

@@ -83,7 +83,7 @@ def load_source(source: str, origin: str) -> dict[str, type[Element]]:
         with redirect_stdout(sys.stderr):
             exec(compile(source, origin, "exec"), module.__dict__)
     except (Exception, SystemExit) as error:
-        line = f", line {error.lineno}" if isinstance(error, SyntaxError) else ""
+        line = f", line {error.lineno}" if isinstance(error, SyntaxError) and error.lineno else ""
         raise PluginError(f"The plugin {origin}{line} does not load: {type(error).__name__}: {error}") from error
     found = [c for c in vars(module).values() if inspect.isclass(c) and c.__module__ == module.__name__]
     elements = [checked(c, origin) for c in found if issubclass(c, Element)]

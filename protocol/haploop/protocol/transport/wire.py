@@ -30,7 +30,8 @@ class Frame(NamedTuple):
         return {name: value for (name, _), value in zip(MESSAGES[self.name].fields, self.fields, strict=True)}
 
 
-_packer = msgpack.Packer(autoreset=True)
+# Half a surrogate pair, as in what a plugin raises, is no UTF-8; such a text is carried with its code in place of it.
+_packer = msgpack.Packer(autoreset=True, unicode_errors="backslashreplace")
 
 
 def encode(name: str, *fields: Any) -> bytes:
