@@ -78,6 +78,12 @@ def test_whatever_a_file_does_to_the_process_it_is_tried_in_is_a_sentence(statem
         tried(source(**{place: statement}))
 
 
+@pytest.mark.parametrize("force", ["nan", "inf", "-inf"])
+def test_an_element_whose_force_at_rest_is_not_finite_is_refused_before_a_run_takes_it_up(force):
+    with pytest.raises(ElementError, match=f"brake gave {force}, no finite force"):
+        tried(source(at_force=f"return float('{force}')"))
+
+
 @pytest.mark.parametrize("forged", ["{}", '{"kinds": 3}', '{"kinds": {"brake": []}}', "[" * 60_000])
 def test_an_answer_that_the_file_itself_has_given_is_told_as_such(forged):
     write = f"os.write(fd, {forged.encode()!r} + bytes([10]))"

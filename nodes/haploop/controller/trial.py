@@ -10,6 +10,7 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import json
+import math
 import os
 import queue
 import sys
@@ -95,10 +96,12 @@ def _make(elements: list[tuple[str, dict[str, float]]], kinds: dict[str, type[El
             motion.contact = contact
             try:
                 force = element.force(motion) if memory is None else element.force(motion, memory)[0]
-                float(force)
+                finite = math.isfinite(force)
             except Exception as error:
                 what = f"{type(error).__name__}: {error}"
                 raise ElementError(f"The element {kind} gave no force when it was tried at rest: {what}.") from error
+            if not finite:
+                raise ElementError(f"The element {kind} gave {force}, no finite force, when it was tried at rest.")
     return {"made": len(elements)}
 
 
