@@ -108,11 +108,9 @@ class ClockClient:
 
     def hears(self, most_ms: int) -> bool:
         """Waits for a message of the clock, and takes all there are; returns False when none came in time."""
-        if not self.socket.poll(most_ms):
-            return False
-        self._receive()
+        heard = bool(self.socket.poll(most_ms))
         self.poll()
-        return True
+        return heard
 
     def wait(self, tick: int) -> None:
         """Waits for a message of the clock; after 0.2 s without one, reports WAITING."""
