@@ -106,6 +106,7 @@ def test_a_client_may_connect_to_what_a_node_binds_and_a_stranger_may_not(keys, 
     known = SecureContext.from_transport(Transport(keys=read_keys(keys, CLIENT)))
     stranger = SecureContext.from_transport(Transport(keys=read_keys(tmp_path / "other", CLIENT)))
     try:
+        assert launcher.keys
         publisher = open_socket(node, zmq.XPUB)
         address = f"tcp://127.0.0.1:{publisher.bind_to_random_port('tcp://127.0.0.1')}"
         subscribers = [open_socket(context, zmq.SUB) for context in (known, stranger)]

@@ -47,7 +47,7 @@ def test_fmpy_finds_nothing_wrong_with_it(tables: dict[str, Any], tmp_path: Path
 
     path = made(scene(**tables), tmp_path, "2 a-b")
     assert validate_fmu(str(path)) == []
-    schema = XMLSchema(file=str(Path(fmpy.__file__).parent / "schema" / "fmi3" / "fmi3BuildDescription.xsd"))
+    schema = XMLSchema(file=str(Path(str(fmpy.__file__)).parent / "schema" / "fmi3" / "fmi3BuildDescription.xsd"))
     schema.assertValid(fromstring(zipfile.ZipFile(path).read("sources/buildDescription.xml")))
 
 
@@ -88,7 +88,7 @@ def test_the_same_scene_gives_the_same_bytes_and_another_one_another_token(tmp_p
 def test_its_c_agrees_with_the_headers_of_the_standard_and_defines_every_function(tmp_path: Path) -> None:
     import fmpy
 
-    headers = Path(fmpy.__file__).parent / "c-code"
+    headers = Path(str(fmpy.__file__)).parent / "c-code"
     with zipfile.ZipFile(made(scene(**LOOP), tmp_path)) as archive:
         archive.extractall(tmp_path)
     strict = ["-std=c99", "-Wall", "-Wextra", "-Wno-unused-parameter", "-Wno-strict-prototypes", "-Werror"]

@@ -71,7 +71,7 @@ def fmu(tmp_path_factory: pytest.TempPathFactory) -> Path:
     needs_fmus()
     import fmpy
 
-    folder, headers = tmp_path_factory.mktemp("mass"), Path(fmpy.__file__).parent / "c-code"
+    folder, headers = tmp_path_factory.mktemp("mass"), Path(str(fmpy.__file__)).parent / "c-code"
     source = (HOUSE / "tests/helpers/outside/mass.c").read_text(encoding="utf-8")
     declared = re.findall(r"fmi3\w+TYPE\s+(fmi3\w+);", (headers / "fmi3Functions.h").read_text(encoding="utf-8"))
     lacking = [name for name in declared if f" {name}(" not in source]

@@ -46,7 +46,7 @@ def test_what_is_no_message_and_what_is_out_of_place_is_refused_and_changes_noth
 ) -> None:
     with going(tmp_path, "duration=0.6", pauses=(200,)) as run:
         run.stands_at(200)
-        with attacks.Stranger(context, run.live.sockets / "clock.sock") as clock:
+        with attacks.Stranger(context, run.run_json.with_name("clock.sock")) as clock:
             for frame in attacks.junk():
                 code, reason = clock.ask(frame)
                 assert code == REFUSED
@@ -65,7 +65,7 @@ def test_commands_that_cannot_be_carried_out_are_refused_and_change_nothing(
 ) -> None:
     with going(tmp_path, "duration=0.6", pauses=(200,)) as run:
         run.stands_at(200)
-        with attacks.Stranger(context, run.live.sockets / "clock.sock") as clock:
+        with attacks.Stranger(context, run.run_json.with_name("clock.sock")) as clock:
             for verb, arguments in attacks.impossible_commands():
                 code, ok, text, _data = clock.ask(attacks.pack(2, 13, verb, arguments))
                 assert (code, ok) == (REPLY, False), (verb, arguments)
@@ -81,7 +81,7 @@ def test_an_observer_that_talks_nonsense_harms_only_itself(
 ) -> None:
     with going(tmp_path, "duration=0.6", pauses=(200,)) as run:
         run.stands_at(200)
-        with attacks.Stranger(context, run.live.sockets / "clock.sock") as observer:
+        with attacks.Stranger(context, run.run_json.with_name("clock.sock")) as observer:
             join = attacks.pack(2, 1, "observer", "", -(2**63), {}, True, {})
             code, _run, _scene, _timebase, _endpoints, granted, about = observer.ask(join)
             assert (code, granted) == (WELCOME, 200)
@@ -129,7 +129,7 @@ def test_junk_on_every_socket_before_a_run_begins_and_while_it_runs_changes_noth
             thread.join()
         run.stands_at(200)
         for name in attacks.SOCKETS:
-            attack(run.live.sockets / f"{name}.sock")
+            attack(run.run_json.with_name(f"{name}.sock"))
         run.ask("resume")
         assert_unharmed(run, run.result())
     for sender in opened:

@@ -11,6 +11,7 @@ import time
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import zmq
 
@@ -111,10 +112,15 @@ def _interrupt(played: Played, dice: random.Random, live: run_directory.LiveRun)
         time.sleep(dice.choice((0.0, 0.1)))
 
 
+def _sockets(live: run_directory.LiveRun) -> Path:
+    assert live.sockets
+    return live.sockets
+
+
 def _junk(played: Played, dice: random.Random, live: run_directory.LiveRun) -> None:
     context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
     for name in dice.sample(attacks.SOCKETS, 2):
-        attacks.send_unasked(context, live.sockets / f"{name}.sock")
+        attacks.send_unasked(context, _sockets(live) / f"{name}.sock")
     time.sleep(0.3)
     context.destroy(linger=0)
 
@@ -131,7 +137,7 @@ def _false_join(played: Played, dice: random.Random, live: run_directory.LiveRun
     """A wrong secret, no endpoints, or an observer or second logger that is welcomed and then says no more."""
     half = [attacks.pack(2, 1, role, "", _NOBODY, {}, lossless, {}) for role, lossless in (("a", False), ("b", True))]
     context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
-    with attacks.Stranger(context, live.sockets / "clock.sock") as stranger:
+    with attacks.Stranger(context, _sockets(live) / "clock.sock") as stranger:
         for frame in dice.sample([*attacks.false_joins(), *half], 4):
             stranger.socket.send(frame)
         time.sleep(dice.uniform(0.1, 1.0))
