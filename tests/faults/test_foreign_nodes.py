@@ -8,6 +8,7 @@ import signal
 import stat
 import subprocess
 import sys
+import tempfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -31,8 +32,6 @@ Started = Callable[..., Run]
 @pytest.fixture
 def started(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Started]:
     """Starts runs of figure 6(c) with the plain controller, and leaves none behind."""
-    monkeypatch.setenv("XDG_RUNTIME_DIR", str(base := Path(f"/tmp/hf{tmp_path.name[-8:]}")))
-    base.mkdir(mode=0o700, exist_ok=True)
     runs: list[Run] = []
 
     def start(*options: str, node: str | None = PLAIN, sets: tuple[str, ...] = SOON, **more: Any) -> Run:
@@ -41,12 +40,11 @@ def started(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Started
         runs.append(Run(tmp_path / f"out{len(runs)}", *nodes, *options, sets=sets, **{"pace": (), **more}))
         return runs[-1]
 
-    yield start
-    for run in runs:
-        run.clear_away()
-    for path in sorted(base.rglob("*"), reverse=True):
-        path.rmdir() if path.is_dir() else path.unlink()
-    base.rmdir()
+    with tempfile.TemporaryDirectory(prefix="hl") as base:  # short, for the sockets' names
+        monkeypatch.setenv("XDG_RUNTIME_DIR", base)
+        yield start
+        for run in runs:
+            run.clear_away()
 
 
 def test_a_foreign_controller_gives_the_bits_of_our_own_and_is_told_as_foreign(started: Started) -> None:
