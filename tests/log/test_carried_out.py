@@ -55,6 +55,7 @@ def test_a_change_is_taken_as_made_only_where_a_block_begins_with_it_and_shows_i
 def test_a_set_of_what_is_there_and_one_of_the_delay_are_no_business_of_the_blocks() -> None:
     for event in ({"set": {"wall.stiffness": 150.0}}, {"set": {"clock.round_trip_delay": 0.003}}):
         assert refused(event, block(0, 100, 150.0, INERTIA), block(100, 200, 150.0, INERTIA)) == []
+        assert refused(event, block(0, 200, 150.0, INERTIA)) == []
 
 
 def test_blocks_wait_until_all_events_in_them_are_known_and_a_refusal_of_its_own_is_enough() -> None:

@@ -54,7 +54,9 @@ class CarriedOut:
 
     def _judge_tick(self, tick: int, changes: list[Change], block: Message) -> list[Change]:
         after = at_work(self._scene, changes)
-        is_begun = block["from_tick"] == tick or after == self._scene
+        # The delay is the plant's: no block of the controller shows it.
+        changes_nothing = (after.wall, after.dissipation) == (self._scene.wall, self._scene.dissipation)
+        is_begun = block["from_tick"] == tick or changes_nothing
         made = [change for change in changes if is_begun and _shows(block, change, after)]
         self._scene = at_work(self._scene, made)
         return [replace(change, refused=_why(change)) for change in changes if change not in made]
