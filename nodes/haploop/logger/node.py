@@ -127,7 +127,16 @@ class LoggerNode:
             if self._publisher:
                 self._publisher.serve()
             self.session.flush_when_due()
+        if any(self._foreign.values()):
+            self._demand_all_blocks()
         return self.finish("")
+
+    def _demand_all_blocks(self) -> None:
+        """Fails the run where a program of somebody else's has ended without having sent all of its blocks."""
+        end = min(tick for tick, *_ in self._ended.values())
+        if self._tick < end:
+            why = f"The {self._streams.slowest} has ended at tick {end}, but its blocks reach tick {self._tick} only."
+            raise NodeError(why)
 
     @property
     def _reached(self) -> int:
