@@ -32,8 +32,8 @@ def new(
 ) -> None:
     """Write a commented scene to start from: a hand moves a device into a wall and holds it there."""
     from haploop.launch.scene.file import load
+    from haploop.launch.scene.first_scene import FirstSceneError, first_scene
     from haploop.launch.scene.mistakes import SceneError
-    from haploop.tools.cli.first_scene import FirstSceneError, first_scene
 
     with plain_errors():
         try:
