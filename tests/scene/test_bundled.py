@@ -1,4 +1,4 @@
-"""What comes with haploop is found by its name wherever one is, one's own files first."""
+"""Files that come with haploop are found by their names wherever one is, one's own first."""
 
 import tomllib
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""What an element that asks is told at a tick, and what has to be remembered for it."""
+"""Answers to an element that asks, at a tick, and the memory that they need."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What takes longest of a batch with books as loops of machine code (numba): formulas of motion and books, compiled.
+"""Loops of machine code (numba) for what takes longest of a batch with books: formulas of motion and books, compiled.
 
 NumPy goes over all members once for every operation, a loop once for all of them. The same operations in the same order
 give the same bits.

@@ -1,4 +1,4 @@
-"""What a running loop lets itself be changed to: keys that can be set, kinds that can be swapped in."""
+"""Choices that a running loop offers: keys that can be set, kinds that can be swapped in."""
 
 from __future__ import annotations
 

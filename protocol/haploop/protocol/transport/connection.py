@@ -1,4 +1,4 @@
-"""What becomes of a TCP connection to a clock, from the library's events: why it fails, and when it is lost."""
+"""Fate of a TCP connection to a clock, from the library's events: why it fails, and when it is lost."""
 
 from __future__ import annotations
 
