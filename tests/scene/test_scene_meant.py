@@ -11,7 +11,7 @@ from haploop.launch.plan.effects import notes
 from haploop.launch.scene.file import load
 from haploop.launch.scene.mistakes import SceneError
 from haploop.protocol.quantity import MEANT, Quantity
-from helpers.scenes.least import KINDS, scene
+from helpers.scenes.least import KINDS, LEAST, WALL, scene
 
 SCENES = Path(__file__).parents[2] / "launch" / "scenes"
 FIG6C = SCENES / "fig6c.toml"
@@ -138,8 +138,8 @@ def test_of_thousands_of_mistakes_fifty_are_told(tmp_path):
 
 def test_what_stands_after_an_element_that_limits_is_noted_and_nothing_else_is() -> None:
     bounding, damping = {"kind": "force-bounding"}, {"kind": "damping", "damping": 1.0}
-    wall = {"position": -0.06, "stiffness": 150.0}
-    assert not notes(scene(wall=wall, dissipation=[damping, bounding]), KINDS)
-    [note] = notes(scene(wall=wall, dissipation=[bounding, damping]), KINDS)
+    thrown = {"wall": WALL, "device": LEAST["device"] | {"velocity": -1.0}}
+    assert not notes(scene(**thrown, dissipation=[damping, bounding]), KINDS)
+    [note] = notes(scene(**thrown, dissipation=[bounding, damping]), KINDS)
     assert note.startswith("dissipation.0 (force-bounding) changes the force of the wall")
     assert "dissipation.1 (damping) stands after it" in note

@@ -17,12 +17,6 @@ from haploop.protocol.ticks import whole_count
 if TYPE_CHECKING:
     from haploop.controller.dissipation import Element
 
-# Beyond these a number is in order, but more often a slip of the unit: key, least, most, unit.
-_USUAL = (
-    ("clock.round_trip_delay", 0.0, 1.0, "s"),
-    ("wall.stiffness", 1.0, 1e6, "N/m"),
-    ("device.mass", 1e-4, 100.0, "kg"),
-)
 # What rounding adds to the factor 1 of a body that drifts.
 _ROUNDING = 1e-7
 
@@ -139,19 +133,6 @@ def note_growth(scene: Scene) -> list[str]:
         f'clock.integrator = "{clock.integrator}" is unstable by itself at {clock.plant_rate} Hz: it multiplies '
         f"the fastest growing swing of the bodies by {factor:.7g} in every plant step, whatever the controller does."
     ]
-
-
-def note_unusual(scene: Scene) -> list[str]:
-    """Asks after numbers that hardly any haptic loop has, and after a delay that outlasts the run."""
-    found = [(key, value_at(scene, key), least, most, unit) for key, least, most, unit in _USUAL]
-    asked = [
-        f"{key} is {value:g} {unit}; is that the unit that was meant? Haptic loops have {least:g} to {most:g} {unit}."
-        for key, value, least, most, unit in found
-        if value and not least <= value <= most
-    ]
-    if scene.clock.round_trip_delay >= scene.duration:
-        asked.append("No force takes effect within the run, since clock.round_trip_delay is no shorter than duration.")
-    return asked
 
 
 def note_order(scene: Scene, kinds: Mapping[str, type[Element]]) -> list[str]:

@@ -86,7 +86,7 @@ def run(
             leave(str(error), WRONG_USE)
         prepared = start.prepare(scene, set or [], plugin or [], out, any_hand="plant" in programs)
         try:
-            print_notes(prepared.scene, prepared.kinds)
+            noted = print_notes(prepared.scene, prepared.kinds)
             # What an element prints is no part of the answer.
             with ProgressLine(prepared.scene.title, prepared.scene.duration) as line, redirect_stdout(sys.stderr):
 
@@ -118,7 +118,7 @@ def run(
                 FAILED,
             )
         if json:
-            print_json({**summary, "directory": str(prepared.out)})
+            print_json({**summary, "directory": str(prepared.out), "notes": noted})
         else:
             print_summary(summary)
             print(f"{prepared.out}", file=sys.stderr)

@@ -37,7 +37,7 @@ def check(
     schema: Annotated[bool, typer.Option("--schema", help="print the JSON Schema of scenes instead")] = False,
     json: Json = False,
 ) -> None:
-    """Say everything that is wrong with a scene, or that nothing is; start nothing."""
+    """Say what is wrong with a scene and what in it can hardly be meant."""
     from haploop.launch.scene.file import load
     from haploop.launch.scene.schema import json_schema
     from haploop.launch.scene.toml_writer import to_toml
@@ -51,9 +51,9 @@ def check(
         if scene is None:
             raise typer.BadParameter("A scene file was expected, or --schema.")
         resolved = load(scene, set or [], kinds, any_hand=True)
-    print_notes(resolved, kinds)
+    noted = print_notes(resolved, kinds)
     if json:
-        print_json(resolved.as_dict())
+        print_json({**resolved.as_dict(), "notes": noted})
     else:
         print(to_toml(resolved.as_dict()), end="")
         with_a = " with a plant of yours (--node plant=COMMAND)" if hand_is_unmodelled(resolved) else ""
@@ -179,9 +179,11 @@ def print_note(note: str) -> None:
         print(f"Note: {note}", file=sys.stderr)
 
 
-def print_notes(scene: Scene, kinds: Mapping[str, type[Element]]) -> None:
-    """Prints on stderr what in a resolved scene may not be what was meant."""
+def print_notes(scene: Scene, kinds: Mapping[str, type[Element]]) -> list[str]:
+    """Prints on stderr what in a resolved scene may not be what was meant, one line each; returns it."""
     from haploop.launch.plan.effects import notes
 
-    for note in notes(scene, kinds):
+    found = notes(scene, kinds)
+    for note in found:
         print_note(note)
+    return found

@@ -10,6 +10,7 @@ import numpy as np
 
 from haploop.launch.scene.toml_writer import inline
 from haploop.logger.log.recording import Recording
+from haploop.protocol.scene.scene import accelerometer_is_used
 from haploop.protocol.scene.table import Table
 from haploop.tools.figure.style import (
     GREY,
@@ -122,6 +123,7 @@ def scene_text(work: Work, interpretation: Point, panel: str) -> str:
         lines += ["", f"[{name}]", *_lines(table)] if table else []
     for element in scene.dissipation:
         lines += ["", "[[dissipation]]", *_lines(element)]
+    lines += ["", "[accelerometer]  # ideal: it has no key"] * accelerometer_is_used(scene)
     return "\n".join(lines) + "\n"
 
 

@@ -1,0 +1,167 @@
+"""What is in order in a scene but cannot be meant: one rule each, with its condition and the sentence it says."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from typing import NamedTuple
+
+from haploop.protocol.scene.hand_force import Sine, Trace
+from haploop.protocol.scene.paths import value_at
+from haploop.protocol.scene.scene import Scene, Wall, accelerometer_is_used, hand_is_unmodelled
+
+# Beyond these a number is in order, but more often a slip of the unit: key, least, most, unit.
+_USUAL = (
+    ("clock.round_trip_delay", 0.0, 1.0, "s"),
+    ("wall.stiffness", 1.0, 1e6, "N/m"),
+    ("device.mass", 1e-4, 100.0, "kg"),
+    ("encoder.resolution", 1e-10, 1e-3, "m"),
+)
+_MANY_TICKS, _DEEP_M = 1000, 1e-3
+Found = Mapping[str, float]
+
+
+class Rule(NamedTuple):
+    """A rule: the numbers of its sentence where a resolved scene breaks it, None where it holds."""
+
+    broken: Callable[[Scene], Found | None]
+    sentence: str
+
+
+def _late(scene: Scene) -> Found | None:
+    delay_s = scene.clock.round_trip_delay
+    ticks = delay_s * scene.clock.control_rate
+    return {"ticks": ticks, "delay_s": delay_s} if ticks >= _MANY_TICKS and delay_s <= 1.0 else None
+
+
+def _never_answers(scene: Scene) -> Found | None:
+    return {} if scene.clock.round_trip_delay >= scene.duration else None
+
+
+def _pushed_by_nothing(scene: Scene) -> Found | None:
+    """Tells whether a device is at rest at t = 0 in balance, without a force to come; noise alone may move it."""
+    hand, device = scene.hand, scene.device
+    if hand_is_unmodelled(scene) or scene.others or scene.noise or _wall_moves(scene):
+        return None
+    spring = bool(hand and hand.stiffness and hand.rest != device.position)
+    pushed = device.velocity or _most_force_N(scene) or spring or _start_depth_m(scene) > -_count_m(scene)
+    return None if pushed else {}
+
+
+def _out_of_reach(scene: Scene) -> Found | None:
+    """Compares the way to the wall with the longest that hand and speed can move the one mass there is.
+
+    With m x'' + b x' + k x = F, |F| <= F_max, w = sqrt(k / m) and x from the spring's rest: |x| is at most
+    sqrt(x0^2 + (v0 / w)^2) + F_max G, G the integral of the impulse response's size: 1 / k where it never swings, else
+    coth(pi z / (2 sqrt(1 - z^2))) / k with z = b / (2 sqrt(k m)). Without a spring |v| is at most |v0| + F_max t / m.
+    """
+    hand, device, wall = scene.hand, scene.device, scene.wall
+    chained = scene.transmission or (hand and hand.grip)
+    always = any(element.acts == "always" for element in scene.dissipation)
+    if wall is None or hand_is_unmodelled(scene) or scene.others or scene.noise or chained or always:
+        return None
+    if _wall_moves(scene) or _start_depth_m(scene) > 0.0 or _pushed_by_nothing(scene) is not None:
+        return None
+    mass, damping = device.mass + (hand.mass if hand else 0.0), device.damping + (hand.damping if hand else 0.0)
+    force_N, spring = _most_force_N(scene), hand.stiffness if hand else 0.0
+    if scene.friction:
+        force_N += max(scene.friction.kinetic, scene.friction.breakaway or 0.0)
+    seconds, speed = scene.duration, abs(device.velocity)
+    begin, reach_m = device.position, speed * seconds + force_N * seconds**2 / (2.0 * mass)
+    if hand and spring:
+        ratio = damping / (2.0 * math.sqrt(spring * mass))
+        held = 1.0 / math.tanh(0.5 * math.pi * ratio / math.sqrt(1.0 - ratio**2)) if 0.0 < ratio < 1.0 else 1.0
+        swing = math.hypot(begin - hand.rest, speed * math.sqrt(mass / spring)) + force_N * held / spring
+        if ratio and abs(begin - hand.rest) + swing < reach_m:
+            begin, reach_m = hand.rest, swing
+    way_m = abs(wall.position - begin) - _count_m(scene)
+    return {"way_mm": way_m * 1e3, "reach_mm": reach_m * 1e3} if way_m > reach_m else None
+
+
+def _beyond_the_end(scene: Scene) -> Found | None:
+    wall, most = scene.wall, scene.diverged_beyond
+    if wall is None or _start_depth_m(scene) > 0.0 or abs(wall.position) < most or _wall_moves(scene):
+        return None
+    return {"position_m": wall.position, "most_m": most}
+
+
+def _ideal_accelerometer(scene: Scene) -> Found | None:
+    return {} if accelerometer_is_used(scene) and scene.accelerometer is None else None
+
+
+def _begins_deep(scene: Scene) -> Found | None:
+    depth_m = _start_depth_m(scene)
+    if scene.wall is None or depth_m <= _DEEP_M or not scene.wall.stiffness:
+        return None
+    return {"depth_mm": depth_m * 1e3, "force_N": scene.wall.stiffness * depth_m}
+
+
+RULES = (
+    Rule(_late, "The delay, {delay_s:g} s, is {ticks:.0f} ticks; is that the unit that was meant?"),
+    Rule(
+        _never_answers,
+        "No force takes effect within the run, since clock.round_trip_delay is no shorter than duration.",
+    ),
+    Rule(
+        _pushed_by_nothing,
+        "Nothing moves the device: the hand has no force and no stretched spring, the device no velocity at the start, "
+        "and it begins outside the wall. [hand.force] would push it, device.velocity throw it.",
+    ),
+    Rule(
+        _beyond_the_end,
+        "The wall is at {position_m:g} m; a run ends as diverged beyond {most_m:g} m (diverged_beyond), before the "
+        "device is there. Is that the unit that was meant?",
+    ),
+    Rule(
+        _out_of_reach,
+        "The wall is never reached: it is {way_mm:.3g} mm away, and the hand's force and the speed at the start "
+        "move the device by less than {reach_mm:.3g} mm.",
+    ),
+    Rule(
+        _ideal_accelerometer,
+        "An estimate reads an accelerometer that no table describes, so it is ideal: no noise, no counts, no delay. "
+        "[accelerometer] gives it those of a real one.",
+    ),
+    Rule(
+        _begins_deep,
+        "The device begins {depth_mm:.3g} mm deep in the wall, which throws it out with {force_N:.3g} N at once; "
+        "device.position, wall.position or wall.occupies may be the other way round.",
+    ),
+)
+
+
+def note_unmeant(scene: Scene) -> list[str]:
+    """Returns a sentence for every rule that a resolved scene breaks, and for numbers that hardly any loop has."""
+    unusual = [
+        f"{key} is {value:g} {unit}; is that the unit that was meant? Haptic loops have {least:g} to {most:g} {unit}."
+        for key, least, most, unit in _USUAL
+        if (value := value_at(scene, key)) and not least <= value <= most
+    ]
+    broken = [(rule.sentence, rule.broken(scene)) for rule in RULES]
+    return unusual + [sentence.format(**found) for sentence, found in broken if found is not None]
+
+
+def _most_force_N(scene: Scene) -> float:
+    """Returns the largest force of the hand, to either side."""
+    force = scene.hand.force if scene.hand else None
+    if force is None:
+        return 0.0
+    if isinstance(force, Trace):
+        return max(map(abs, force.force))
+    return abs(force.amplitude) + abs(force.offset) if isinstance(force, Sine) else abs(force.value)
+
+
+def _start_depth_m(scene: Scene) -> float:
+    """Returns how deep in the wall the device begins; negative outside, minus infinity without a wall."""
+    wall: Wall | None = scene.wall
+    if wall is None:
+        return -math.inf
+    return (wall.position - scene.device.position) * (1.0 if wall.occupies == "below" else -1.0)
+
+
+def _count_m(scene: Scene) -> float:
+    return scene.encoder.resolution if scene.encoder else 0.0
+
+
+def _wall_moves(scene: Scene) -> bool:
+    return any("wall.position" in (event.set or {}) for event in scene.event)

@@ -1,0 +1,98 @@
+"""What is in order in a scene but cannot be meant: asked after in one line, and silent where it can be."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import haploop.logger
+from haploop.launch.plan.meant import RULES, note_unmeant
+from haploop.launch.runs.in_process import run_in_process
+from haploop.launch.scene.file import load
+from haploop.tools.cli.app import app
+from helpers.scenes.least import KINDS, WALL, scene
+
+SCENES = Path(__file__).parents[2] / "launch/scenes"
+PUSHED = {"mass": 0.1, "damping": 2.0, "stiffness": 100.0, "force": {"kind": "ramp", "value": -10, "rise_time": 0.1}}
+# Tables that break each rule, and a neighbour of them that keeps it; what the sentence must hold.
+CASES: list[tuple[dict[str, Any], dict[str, Any], str]] = [
+    ({"duration": 3, "clock": {"control_rate": 10_000, "round_trip_delay": 0.2}},
+     {"duration": 3, "clock": {"control_rate": 2_000, "round_trip_delay": 0.2}}, "is 2000 ticks"),
+    ({"clock": {"round_trip_delay": 1.0}}, {"clock": {"round_trip_delay": 0.9}}, "No force takes effect"),
+    ({"hand": {"mass": 0.1, "stiffness": 50.0}}, {"hand": {"mass": 0.1, "stiffness": 50.0, "rest": 0.01}},
+     "Nothing moves the device"),
+    ({"hand": PUSHED, "wall": {"position": -60, "stiffness": 150}},
+     {"hand": PUSHED, "wall": {"position": -0.06, "stiffness": 150}}, "The wall is at -60 m"),
+    ({"hand": PUSHED | {"stiffness": 2000.0, "damping": 9.0}, "wall": WALL}, {"hand": PUSHED, "wall": WALL},
+     "The wall is never reached"),
+    ({"hand": PUSHED, "acceleration": {"source": "accelerometer"}},
+     {"hand": PUSHED, "acceleration": {"source": "accelerometer"}, "accelerometer": {}}, "so it is ideal"),
+    ({"hand": PUSHED, "wall": {"position": 0.01, "stiffness": 150}},
+     {"hand": PUSHED, "wall": {"position": 0.0005, "stiffness": 150}}, "10 mm deep in the wall"),
+    ({"hand": PUSHED, "encoder": {"resolution": 1.0}}, {"hand": PUSHED, "encoder": {"resolution": 1e-5}},
+     "encoder.resolution is 1 m; is that the unit"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("broken", "kept", "words"), CASES, ids=[case[2] for case in CASES])
+def test_a_rule_speaks_in_one_line_where_it_is_broken_and_is_silent_beside_it(broken, kept, words):
+    still = {"device": {"mass": 0.01, "damping": 0.1, "velocity": 0.1}} if "hand" not in broken else {}
+    said = [note for note in note_unmeant(scene(**still | broken)) if words in note]
+    assert len(said) == 1
+    assert "\n" not in said[0]
+    assert not [note for note in note_unmeant(scene(**still | kept)) if words.split(" is ")[-1] in note]
+
+
+def test_every_rule_has_its_case():
+    said = [note for broken, _, _ in CASES for note in note_unmeant(scene(**broken))]
+    begins = [rule.sentence.partition("{")[0] for rule in RULES]
+    assert all(any(note.startswith(begin) for note in said) for begin in begins)
+
+
+@pytest.mark.parametrize("path", sorted(SCENES.rglob("*.toml")), ids=lambda path: path.stem)
+def test_of_a_shipped_scene_nothing_is_asked(path):
+    assert not note_unmeant(load(path))
+
+
+def farthest_m(tmp_path: Path, **tables: Any) -> float:
+    """How far a device comes when no wall is there, to the wall's side."""
+    run_in_process(scene(**tables), KINDS, out=tmp_path)
+    return -float(haploop.logger.read(tmp_path)["/plant"]["x"].min())
+
+
+@pytest.mark.parametrize("damping", [0.05, 1.0, 20.0])
+def test_a_wall_called_out_of_reach_is_not_met_even_by_a_force_at_the_natural_frequency(tmp_path, damping):
+    hand = {"mass": 0.09, "stiffness": 100.0, "damping": damping}
+    frequency = np.sqrt(100.0 / 0.1) / (2.0 * np.pi)
+    hand["force"] = {"kind": "sine", "amplitude": 0.5, "frequency": frequency}
+    device = {"mass": 0.01, "damping": 0.0, "velocity": -0.1}
+    reached = farthest_m(tmp_path, hand=hand, device=device)
+
+    def notes_of(place_m: float) -> list[str]:
+        return note_unmeant(scene(hand=hand, device=device, wall={"position": -place_m, "stiffness": 10}))
+
+    assert not notes_of(0.999 * reached)
+    assert notes_of(6.0 * reached + 0.02)
+
+
+def test_what_may_yet_push_or_reach_silences_the_rule():
+    still = {"wall": WALL}
+    assert note_unmeant(scene(**still))
+    for more in (
+        {"noise": {"deviation": 1e-6, "cutoff": 100}},
+        {"event": [{"at": 0.5, "set": {"wall.position": 0.01}}]},
+        {"device": {"mass": 0.01, "damping": 0.1, "velocity": -1.0}},
+    ):
+        assert not note_unmeant(scene(**still | more)), more
+
+
+def test_check_notes_what_cannot_be_meant_and_does_not_refuse_it():
+    fig = str(SCENES / "fig6c.toml")
+    far = CliRunner().invoke(app, ["check", fig, "--set", "wall.position=-60", "--json"])
+    assert far.exit_code == 0
+    assert far.stderr.count("Note: The wall is at -60 m") == 1
+    assert [note for note in json.loads(far.stdout)["notes"] if note.startswith("The wall is at -60 m")]
+    assert json.loads(CliRunner().invoke(app, ["check", fig, "--json"]).stdout)["notes"] == []
