@@ -10,6 +10,7 @@ from typing import Any
 import msgpack
 
 from haploop.launch import spec
+from haploop.launch.clock import commands
 from haploop.launch.clock.clock import Clock
 from haploop.launch.clock.roster import Roster
 from haploop.launch.clock.server import ClockServer
@@ -167,6 +168,18 @@ def _not_exclusively(kept: Method) -> Method:
     return claimed
 
 
+def _any_burden(kept: Method) -> Method:
+    return lambda arguments: None
+
+
+def _keeps_objects(kept: Method) -> Method:
+    def append_chunk(self: Any, piece: bytes, index: Any) -> None:
+        kept(self, piece, index)
+        vars(self).setdefault("chunks", []).append(index)
+
+    return append_chunk
+
+
 # What the defect is -> the class or module, its method, and what makes the defective one of it.
 DEFECTS: dict[str, tuple[Any, str, Callable[[Method], Method]]] = {
     "a grant goes back when a slower node joins": (Clock, "grant", _goes_back),
@@ -185,6 +198,8 @@ DEFECTS: dict[str, tuple[Any, str, Callable[[Method], Method]]] = {
     "a second lossless node is not waited for": (Roster, "slowest", _not_waited_for),
     "two runs that start at one instant take one directory": (spec, "_claimed", _not_exclusively),
     "blocks from before a STATE are taken": (Subscriber, "_follows", _before_its_state),
+    "one command may carry any number of keys": (commands, "_check_burden", _any_burden),
+    "the log keeps objects of every chunk": (McapFile, "append_chunk", _keeps_objects),
 }
 
 

@@ -37,6 +37,11 @@ Part = TypeVar("Part")
 
 _TICKS = 70
 _STAYS = ("stays", 0.0)
+# A pace at which a run lasts so long, in virtual time, that its log is flushed forty times.
+_LONG = 0.004
+_ASKED = ("ask", "pause", "step", "pace", "stop", "set", "set", "swap", "swap", "impossible", "limit")
+# Commands at the limits of what one may carry, and beyond: unknown keys, letters of a text, waiting changes.
+_KEYS, _LETTERS, _WAITING = (31, 32, 3000, 10_000), (200, 201, 30_000), 101
 # Those that ``ask`` can send.
 _IMPOSSIBLE = [
     (verb, arguments)
@@ -76,7 +81,7 @@ def draw(seed: int) -> Plan:
         dice.choice(NAMES),
         dice.choice((0.0, 0.01, 0.05, 0.2)),
         dice.choice((20e-6, 100e-6, 400e-6)),
-        dice.choice((math.inf, math.inf, math.inf, 1.0, 0.1, 0.03)),
+        dice.choice((math.inf, math.inf, math.inf, 1.0, 0.1, 0.03)) if dice.random() < 0.98 else _LONG,
         {role: dice.uniform(0.01, 0.6) for role in OWN},
         faults,
     )
@@ -102,7 +107,9 @@ def _fault(dice: Random) -> Fault:
 def _commands(dice: Random) -> Commands:
     commands: list[tuple[str, dict[str, Any], float]] = []
     for _ in range(dice.randint(1, 3)):
-        match dice.choice(("ask", "pause", "step", "pace", "stop", "set", "set", "swap", "swap", "impossible")):
+        match dice.choice(
+            ("ask", "pause", "step", "pace", "stop", "set", "set", "swap", "swap", "impossible", "limit")
+        ):
             case "ask":
                 commands.append((dice.choice(("status", "options")), {}, dice.expovariate(100.0)))
             case "pause":
@@ -131,9 +138,28 @@ def _commands(dice: Random) -> Commands:
                 commands.append(("swap", arguments, dice.expovariate(100.0)))
                 if arguments["element"]:
                     commands.append(("undo", {}, 0.003))
+            case "limit":
+                commands += _at_a_limit(dice)
             case _:
                 commands.append((*dice.choice(_IMPOSSIBLE), 0.0))
     return Commands(_when(dice), _STAYS, tuple(commands))
+
+
+def _at_a_limit(dice: Random) -> list[tuple[str, dict[str, Any], float]]:
+    """Commands that are just possible, or just no more."""
+    match dice.choice(("keys", "letters", "step", "pace", "at", "waiting")):
+        case "keys":
+            return [("set", {"set": {f"wall.stiffnes{i}": 1.0 for i in range(dice.choice(_KEYS))}}, 0.0)]
+        case "letters":
+            return [("swap", {"swap": {"kind": dice.choice("x1[") * dice.choice(_LETTERS)}}, 0.0)]
+        case "step":
+            return [("step", {"ticks": ticks}, 0.0) for ticks in (_TICKS + 1, _TICKS)] + [("resume", {}, 0.0)]
+        case "pace":
+            return [("pace", {"pace": pace}, dice.random()) for pace in (1e6, 1.1e6, 1e-6, 0.9e-6, "free")]
+        case "at":
+            return [("set", {"set": {"wall.stiffness": 1.0}, "at": at}, 0.0) for at in (1e9, 0.07, 0.0699)]
+    change = {"set": {"wall.stiffness": 10.0}, "at": 0.068}
+    return [("pause", {}, 0.0), *[("set", change, 0.0)] * _WAITING, ("resume", {}, 0.0)]
 
 
 # Maker of a fault -> how often it is drawn.

@@ -133,7 +133,8 @@ class Sim:
 
     def judge(self, reads_log: bool) -> str:
         """Returns the first promise that was broken, "" for none."""
-        for check in (self._how_it_ended, self._when_it_ended, self._what_is_left, self._visitors_went_well):
+        growing = self.watch.holdings.growing
+        for check in (self._how_it_ended, self._when_it_ended, self._what_is_left, self._visitors_went_well, growing):
             if not self.watch.broken and (broken := check()):
                 self.watch.fail(broken)
         if not self.watch.broken and (broken := self._files(reads_log)):

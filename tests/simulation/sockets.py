@@ -168,12 +168,15 @@ class SimSocket:
         return frames
 
     def poll(self, timeout: int | None = None) -> int:
+        if not self.readable():
+            self.context.watch.at_rest(self.process)
         ready = self.process.wait(self.readable, None if timeout is None else timeout / 1000.0)
         return zmq.POLLIN if ready else 0
 
     # Sending
 
     def send(self, data: bytes, flags: int = 0) -> None:
+        self.context.watch.step_over()
         if self.is_closed:
             raise zmq.ZMQError(zmq.ENOTSOCK)
         if self.kind == zmq.ROUTER and not self._begun and data not in self.pipes:

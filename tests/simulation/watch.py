@@ -12,6 +12,7 @@ import zmq
 from haploop.protocol.changes import Event
 from haploop.protocol.transport.messages import BY_CODE, VERSION
 from haploop.protocol.transport.wire import decode
+from simulation.burden import MOST_CALLS, Holdings, Work
 from simulation.world import Process
 
 if TYPE_CHECKING:
@@ -49,6 +50,7 @@ class Watch:
         reported: tick of each of them as the clock has read it, while it takes part.
         reports: (time, tick) of every report of the logger.
         events: (tick, event) as granted.
+        holdings: what the run's processes and others that may miss nothing hold, look by look.
     """
 
     def __init__(self, window: int) -> None:
@@ -64,6 +66,8 @@ class Watch:
         self._run: SimRun | None = None
         self.reports: list[tuple[float, int]] = []
         self.events: list[tuple[int, Event]] = []
+        self.holdings = Holdings()
+        self._work = Work()
 
     def begin(self, run: SimRun) -> None:
         """Learns who the clock and the run's own processes are."""
@@ -77,6 +81,11 @@ class Watch:
 
     def fail(self, promise: str) -> None:
         self.broken = self.broken or promise
+
+    def step_over(self) -> None:
+        """Checks what a process has done since it last spoke to others, where that was asked for."""
+        if self._work.end():
+            self.fail(f"a command held the clock up for {self._work.calls} calls, more than {MOST_CALLS}")
 
     def sent(self, socket: SimSocket, pipe: Pipe | None, frames: Frames) -> None:
         run, process = self._run, socket.process
@@ -145,6 +154,7 @@ class Watch:
             self.fail(f"the {process.name} sent {name} up to tick {reached}, but only {process.granted} were granted")
 
     def received(self, socket: SimSocket, pipe: Pipe, frames: Frames) -> None:
+        self.step_over()
         run, process, data = self._run, socket.process, frames[-1]
         if run is None:
             return
@@ -152,6 +162,8 @@ class Watch:
         if process is run.launcher:
             if socket.kind == zmq.ROUTER:
                 self._clock_hears(pipe, name, data)
+                if name == "COMMAND":
+                    self._work.begin()
         elif name == "GRANT":
             process.granted = max(process.granted, ints(data, 1)[0])
         elif socket.kind == zmq.SUB and process in self.lossless:
@@ -179,8 +191,12 @@ class Watch:
             self._next[socket] = max(self._next[socket], first + ticks)
 
     def at_rest(self, process: Process) -> None:
-        """Checks what holds whenever the clock has nothing left to read: everyone has his answer."""
-        if self._run is None or process is not self._run.launcher:
+        """Checks what holds whenever a process has nothing left to read: of the clock, that everyone has his answer."""
+        self.step_over()
+        run = self._run
+        if run and self.granted and (process is run.launcher or process in self.lossless or self._is_own(process)):
+            self.holdings.look(process, len(self.events))
+        if run is None or process is not run.launcher:
             return
         for pipe, owed in self._owed.items():
             if owed > 0 and not pipe.near.is_closed:
