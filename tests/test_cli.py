@@ -150,3 +150,9 @@ def test_help_imports_none_of_the_heavy_packages():
 def test_version_and_both_forms_of_help_are_answered():
     assert haploop("--version").stdout == f"haploop {version('haploop')}\n"
     assert haploop("run", "-h").stdout == haploop("run", "--help").stdout
+
+
+def test_the_list_of_commands_says_of_each_a_whole_sentence():
+    told = haploop("--help").stdout.partition("Commands:")[2]
+    assert "..." not in told
+    assert all(len(line) <= 80 for line in told.splitlines())

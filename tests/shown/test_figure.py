@@ -221,6 +221,11 @@ def test_the_header_tells_verdict_and_numbers(runs: dict[str, Path]) -> None:
     assert [text.get_text() for text in artists(figure, "title")] == [data.scene.title]
     assert any("residual" in words for words in key_numbers(data))
     assert any(words.startswith("displayed stiffness") for words in key_numbers(data))
+    swing = {"rate_1_s": 0.0, "width_m": 5.2e-3, "spread_m": 1e-4, "frequency_Hz": 7.5, "felt": True, "chaotic": False}
+    data.summary["stability"] = swing
+    assert "pushed, it swings 5.20 mm +- 100 µm peak to peak, at 7.50 Hz, felt" in key_numbers(data)
+    data.summary["stability"] = swing | {"width_m": 0.0}
+    assert "pushed, it swings less than 1 nm peak to peak, felt" in key_numbers(data)
 
 
 @pytest.mark.parametrize("share", [0.4, 0.8])

@@ -10,10 +10,10 @@ import aiohttp
 import pytest
 
 from haploop.view.receive.runs import CommandFailed
-from haploop.view.serve import assets, connections
+from haploop.view.serve import assets, connections, server
 from haploop.view.serve.guard import Guard
 from haploop.view.serve.server import PortTaken, listen
-from helpers.live.browsing import site, to_its_end
+from helpers.live.browsing import site, stream, to_its_end
 
 
 class NoRuns:
@@ -271,3 +271,24 @@ async def test_connections_that_ask_for_nothing_are_closed_and_never_more_than_a
         assert await status(here, "/") == 200
         assert tab.closed is None
         assert not (await tab.send("pause", {}, here.guard.token))[0]
+
+
+@scenario
+async def test_where_asked_the_server_ends_once_its_last_page_is_closed_and_not_when_one_is_loaded_anew(monkeypatch):
+    monkeypatch.setattr(server, "_ANEW_S", 0.05)
+    for until_closed in (True, False):
+        end, ready = asyncio.Event(), asyncio.get_running_loop().create_future()
+        options = {"on_serving": ready.set_result, "end": end, "until_closed": until_closed}
+        serving = asyncio.create_task(server.serve(NoRuns(), listen(0), **options))
+        guard = await ready
+        async with aiohttp.ClientSession() as session:
+            first = await stream(session, guard.address.rstrip("/"))
+            second = await stream(session, guard.address.rstrip("/"))
+            await first.close()
+            await asyncio.sleep(0.2)
+            assert not serving.done()
+            await second.close()
+            await asyncio.wait([serving], timeout=10 if until_closed else 0.3)
+            assert serving.done() == until_closed
+            end.set()
+            await asyncio.wait_for(serving, 20)

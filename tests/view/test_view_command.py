@@ -117,6 +117,19 @@ def test_run_with_view_serves_the_run_and_stays_until_ctrl_c(launched, tmp_path,
 
 
 @pytest.mark.slow
+def test_run_with_view_ends_with_its_page_where_asked(launched, tmp_path, monkeypatch):
+    monkeypatch.delenv("DISPLAY", raising=False)
+    words = ["--set", "duration=0.5", "--view", "--until-closed", "--name", "mine", "--json"]
+    run = launched("run", str(SCENE), *words, out=tmp_path / "out")
+
+    async def play(tab: Tab) -> dict[str, Any]:
+        return await tab.phase("ended")
+
+    assert browse(run, play)["summary"]["title"] == "mine"
+    assert '"title": "mine"' in run.end(0)
+
+
+@pytest.mark.slow
 def test_a_run_waits_for_its_viewer_and_is_shown_however_short_it_is(launched, tmp_path):
     """Twenty ticks at free pace end long before a viewer that started with them."""
     run = launched("run", str(SCENE), "--set", "duration=0.02", "--view", "--pace", "free", out=tmp_path / "out")

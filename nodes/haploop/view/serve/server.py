@@ -25,12 +25,16 @@ _LARGEST_MESSAGE = 64 * 1024
 _HEARTBEAT_S = 20.0
 # How long pages that have been told to close, and requests under way, are waited for at the end.
 _GOODBYE_S = 1.0
+# A page that comes back within so long was loaded anew, not closed.
+_ANEW_S = 2.0
 # So much may wait in the system for a page that is slow; then it gets fewer pictures, but none that are old.
 _WAITING_BYTES = 256 * 1024
 
 
-def make_app(viewer: Viewer, guard: Guard, heard: Heard) -> web.Application:
+def make_app(viewer: Viewer, guard: Guard, heard: Heard, on_closed: Callable[[], None]) -> web.Application:
     """Makes the web application, which notes in ``heard`` the connections from which a request has come.
+
+    Once every page that was open has been closed it calls ``on_closed``.
 
     GET / is the page, /static/NAME its files, /stream a WebSocket (see :mod:`haploop.view.serve.page`), /enter/KEY
     the way in for a browser that is started with a link.
@@ -64,6 +68,11 @@ def make_app(viewer: Viewer, guard: Guard, heard: Heard) -> web.Application:
             connection.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _WAITING_BYTES)
         pages.add(page)
         await Page(page, viewer, guard).run()
+        pages.discard(page)
+        if not pages:
+            await asyncio.sleep(_ANEW_S)
+            if not pages:
+                on_closed()
         return page
 
     @web.middleware
@@ -118,8 +127,12 @@ async def serve(
     end: asyncio.Event,
     first: str | None = None,
     from_start: bool = True,
+    until_closed: bool = False,
 ) -> None:
-    """Serves the page until SIGINT, SIGTERM or ``end``; runs, first and from_start are those of :class:`Viewer`."""
+    """Serves the page until SIGINT, SIGTERM or ``end``, or until every page that was open has been closed.
+
+    Runs, first and from_start are those of :class:`Viewer`.
+    """
     guard = Guard(listening.getsockname()[1])
     viewer = Viewer(runs, first, from_start)
     loop = asyncio.get_running_loop()
@@ -127,7 +140,7 @@ async def serve(
         with contextlib.suppress(NotImplementedError, RuntimeError, ValueError):  # not in the main thread
             loop.add_signal_handler(number, end.set)
     heard = Heard()
-    app = make_app(viewer, guard, heard)
+    app = make_app(viewer, guard, heard, end.set if until_closed else lambda: None)
     quiet = {"access_log": None, "logger": quiet_logger()}
     runner = web.AppRunner(app, **quiet, keepalive_timeout=SILENT_S, shutdown_timeout=_GOODBYE_S)
     await runner.setup()

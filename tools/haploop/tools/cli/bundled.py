@@ -11,7 +11,7 @@ from haploop.tools.cli.options import FAILED, WRONG_USE, Json, leave, plain_erro
 
 
 def scenes(json: Json = False) -> None:
-    """List the scenes, devices, hands and sweeps that come with haploop; each is found by its name."""
+    """List the scenes, devices, hands and sweeps there are. Each is found by its name."""
     from haploop.launch.scene.bundled import FOLDERS, about, bundled
 
     listed = {folder: {name: about(path) for name, path in bundled(folder).items()} for folder in FOLDERS}
@@ -30,7 +30,7 @@ def new(
     hand: Annotated[str, typer.Option(metavar="NAME", help="a hand that haploop scenes lists")] = "fu_cavusoglu_y",
     wall: Annotated[str, typer.Option(metavar="STIFFNESS", help="stiffness of the wall")] = "0.5 N/mm",
 ) -> None:
-    """Write a commented scene to start from: a hand moves a device into a wall and holds it there."""
+    """Write a commented scene to start from. A hand moves a device into a wall and holds it there."""
     from haploop.launch.scene.file import load
     from haploop.launch.scene.first_scene import FirstSceneError, first_scene
     from haploop.launch.scene.mistakes import SceneError

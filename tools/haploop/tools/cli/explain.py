@@ -24,7 +24,7 @@ _READING = (
 
 
 def explain(scene: SceneFile, set: Set = None, plugin: Plugin = None, json: Json = False) -> None:
-    """Show what a scene comes to: bodies, states, what happens in which order, and what each effect costs."""
+    """Show what a scene comes to, and what each effect costs."""
     from haploop.launch.plan.plan import plan
     from haploop.launch.scene.events import elements_of, try_out
     from haploop.launch.scene.file import load

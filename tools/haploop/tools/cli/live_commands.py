@@ -21,7 +21,7 @@ from haploop.tools.cli.which_run import for_a_run
 
 @for_a_run
 def status(run: Run = None, json: Json = False) -> None:
-    """Show the live runs: every node, its tick, its lag, whom it waits for, what it skipped."""
+    """Show the live runs and their nodes. Of each its tick, its lag, whom it waits for, what it skipped."""
     from haploop.launch.processes import run_directory
     from haploop.launch.processes.run_directory import ask
 
@@ -114,13 +114,13 @@ def set_(
     run: Run = None,
     json: Json = False,
 ) -> None:
-    """Change numbers of a running loop: wall.stiffness, wall.position, dissipation.0.mass ..."""
+    """Change numbers of a running loop. They are wall.stiffness, wall.position, dissipation.0.mass and so on."""
     _ask(run, json, "set", set=parse_assignments(parameters), at=at)
 
 
 @for_a_run
 def undo(run: Run = None, json: Json = False) -> None:
-    """Take back the last swap or set of a running loop that a command made."""
+    """Take back the last swap or set of a running loop."""
     _ask(run, json, "undo")
 
 
@@ -133,7 +133,7 @@ def attach(
     ] = None,
     run: Run = None,
 ) -> None:
-    """Join a running loop: with a second logger, to show it as a live table, or to pass it on to PlotJuggler.
+    """Join a running loop with a logger, a table or PlotJuggler.
 
     The logger holds the loop up rather than miss anything; the others never do, and say what they skipped.
     """
@@ -145,7 +145,7 @@ def attach(
 def keys(
     directory: Annotated[Path, typer.Argument(help="new, or one that lacks some", show_default=False)],
 ) -> None:
-    """Make the keys of runs that other hosts can reach: a certificate for each process, and one for clients."""
+    """Make the keys of runs that other hosts can reach. A certificate for each process, and one for clients."""
     from haploop.protocol.transport.keys import make_keys
 
     with plain_errors():

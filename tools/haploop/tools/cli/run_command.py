@@ -25,6 +25,7 @@ from haploop.tools.cli.options import (
     print_json,
 )
 from haploop.tools.cli.scenes import print_notes
+from haploop.tools.cli.view import UntilClosed
 
 
 def run(
@@ -39,6 +40,10 @@ def run(
         str, typer.Option(metavar="run|plant", help="who owns the time; plant: a device that goes on by itself")
     ] = "run",
     view: Annotated[bool, typer.Option("--view", help="show it in the browser, which may steer it")] = False,
+    until_closed: UntilClosed = False,
+    name: Annotated[
+        str | None, typer.Option(metavar="NAME", help="of the run, in status, summary and figures [the scene's title]")
+    ] = None,
     plugin: Plugin = None,
     tcp: Annotated[
         str | None, typer.Option(metavar="ADDRESS[:PORT]", help="TCP sockets, such as 127.0.0.1; others need keys")
@@ -54,10 +59,11 @@ def run(
     wait: Annotated[str | None, typer.Option("--wait", metavar="TIME", help="how long for [60 s]")] = None,
     json: Json = False,
 ) -> None:
-    """Run a scene to its end; other terminals can steer and watch it meanwhile."""
+    """Run a scene to its end. Other terminals can steer and watch it meanwhile."""
     with LeavingAtOnce():
         from haploop.launch.processes.foreign import ProgramError, check_wait, read_programs
         from haploop.launch.runs import start
+        from haploop.launch.scene.toml_writer import inline
         from haploop.launch.spec import SCENE, RunFailed, discard
         from haploop.protocol.transport.addresses import TransportError
         from haploop.protocol.transport.keys import KeysError
@@ -66,7 +72,7 @@ def run(
         from haploop.tools.render.progress import ProgressLine
         from haploop.tools.render.report import print_summary
 
-    with viewing(view, in_process) as viewer, plain_errors():
+    with viewing(view, in_process, until_closed) as viewer, plain_errors():
         rate = parse_pace(pace or ("1" if view and clock == "run" else "free"))
         if rate != "free" and in_process:
             leave("--pace needs the clock of a run as processes; leave out --in-process.", WRONG_USE)
@@ -84,7 +90,8 @@ def run(
             wait_s = check_wait(parse_seconds(wait, "--wait"))
         except (TransportError, KeysError, ProgramError) as error:
             leave(str(error), WRONG_USE)
-        prepared = start.prepare(scene, set or [], plugin or [], out, any_hand="plant" in programs)
+        named = [f"title={inline(name)}"] if name else []
+        prepared = start.prepare(scene, [*(set or []), *named], plugin or [], out, any_hand="plant" in programs)
         try:
             noted = print_notes(prepared.scene, prepared.kinds)
             # What an element prints is no part of the answer.

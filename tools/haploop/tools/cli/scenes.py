@@ -37,7 +37,7 @@ def check(
     schema: Annotated[bool, typer.Option("--schema", help="print the JSON Schema of scenes instead")] = False,
     json: Json = False,
 ) -> None:
-    """Say what is wrong with a scene and what in it can hardly be meant."""
+    """Say what is wrong with a scene, or can hardly be meant."""
     from haploop.launch.scene.file import load
     from haploop.launch.scene.schema import json_schema
     from haploop.launch.scene.toml_writer import to_toml
@@ -81,7 +81,7 @@ def _parameters(element: type[Element]) -> dict[str, dict[str, str | float | Non
 
 
 def plot(directory: Directory) -> None:
-    """Draw a run, or the map of a sweep as far as it goes; the last line names the figure's file."""
+    """Draw a run, or the map of a sweep as far as it goes. The last line names the figure's file."""
     from haploop.tools.figure.data import FigureError
     from haploop.tools.sweep.table import is_sweep
 
@@ -99,7 +99,7 @@ def plot(directory: Directory) -> None:
 
 
 def replay(directory: Directory, json: Json = False) -> None:
-    """Repeat a run from its own log and say whether every bit agreed."""
+    """Repeat a run from its log and say whether all bits agree."""
     from haploop.launch.runs import replay as runs
 
     with plain_errors(), redirect_stdout(sys.stderr):
@@ -122,10 +122,11 @@ def replay(directory: Directory, json: Json = False) -> None:
 
 
 def judge(directory: Directory, json: Json = False) -> None:
-    """Say whether the loop of a run is stable: held still and pushed at the run's end, does it come to rest?
+    """Say whether the loop of a run is stable.
 
     The run is repeated from its log, the hand then held still without noise, pushed hard and softly, and watched for
-    up to 64 s of simulated time. The word is steady, limit-cycle, growing, diverged, no-contact or undecided.
+    up to 64 s of simulated time: does it come to rest? The word is steady, limit-cycle,
+    growing, diverged, no-contact or undecided.
     """
     from haploop.launch.runs.replay import ReplayError, demand_own, logged_run, repeatable
     from haploop.launch.stability.judge import judge_scene
@@ -156,7 +157,7 @@ def export(
     topics: Annotated[str | None, typer.Option(help="only these channels, comma-separated [all]")] = None,
     force: Annotated[bool, typer.Option("--force", help="write over files that exist")] = False,
 ) -> None:
-    """Write a run's log in the format of other programs, names and units kept; stdout names the files.
+    """Write a run's log in the format of other programs. Names and units are kept; stdout names the files.
 
     Any length of log takes the same memory. A number that is not there, an element's before it was swapped in, is NaN
     in npz and parquet, an empty cell in csv, and left out in json-mcap, as are numbers that are not finite.

@@ -22,7 +22,7 @@ def sweep(
     plugin: Plugin = None,
     json: Json = False,
 ) -> None:
-    """Run a scene over one to three axes into a table (Parquet); with [bisect], find where its verdict changes.
+    """Run a scene over one to three axes into a table. With [bisect], find where its verdict changes.
 
     Can be stopped or killed; the same command with the same --out goes on. `haploop plot DIR` draws the map.
     """
@@ -66,7 +66,7 @@ def dissipate(
     out: Annotated[Path | None, typer.Option(help="the figure's file [beside the recording]")] = None,
     json: Json = False,
 ) -> None:
-    """Tell what elements would have dissipated on a motion that was recorded, which they do not change.
+    """Tell what elements would have dissipated on a recording. They do not change its motion.
 
     Of a force that was recorded too: its true work, held from sample to sample, and whether it is passive. One pass in
     flat memory. The last line names the figure's file.
@@ -87,7 +87,7 @@ def paper(
     small: Annotated[bool, typer.Option("--small", help="few runs, in seconds, to see that it works")] = False,
     workers: Annotated[int | None, typer.Option(min=1, help="processes [one a core]")] = None,
 ) -> None:
-    """Make the figures of the paper and the table of its claims, with what holds here.
+    """Make the figures of the paper and the table of its claims.
 
     Each figure is a PNG with its data and scenes beside it. The last line names the page. Stopped, the same command
     goes on where it was.
@@ -114,7 +114,9 @@ def advise(
     ] = None,
     json: Json = False,
 ) -> None:
-    """Say how stiff a wall a device can render safely, with which element, what breaks it, and what would gain most.
+    """Say how stiff a wall a device can render safely.
+
+    With which element, what breaks it, and what would gain most.
 
     Can be stopped; the same command with --out DIR, the directory of the first, goes on.
     """

@@ -24,7 +24,9 @@ if TYPE_CHECKING:
     from haploop.view.serve.guard import Guard
 
 SINCE = ("start", "now")
-_AT = "The page is at {} (Ctrl-C ends it)"
+UntilClosed = Annotated[bool, typer.Option("--until-closed", help="end once the page is closed, not with Ctrl-C")]
+_AT = "The page is at {} ({} ends it)"
+_ENDS = ("Ctrl-C", "closing it")
 # A run waits so long for its viewer.
 _HELD_S = 10.0
 
@@ -66,9 +68,10 @@ def view(
     port: Annotated[int, typer.Option(min=0, max=65535, metavar="PORT", help="of this machine; 0: any free one")] = 0,
     since: Annotated[str, typer.Option(metavar="start|now", help="with what was logged before, or without")] = "start",
     browser: Annotated[bool, typer.Option("--browser/--no-browser", help="open the page")] = True,
+    until_closed: UntilClosed = False,
     led: Annotated[bool, typer.Option("--led", hidden=True)] = False,
 ) -> None:
-    """Look at runs of this machine, or one elsewhere, in the browser as they go, and steer them; until Ctrl-C."""
+    """Show runs in the browser as they go, and steer them. Those of this machine or one elsewhere, until Ctrl-C."""
     # One led by another process gives it the link on stdout and ends with stdin.
     if since not in SINCE:
         leave(f"--since must be {' or '.join(SINCE)}, but {since!r} was given.", WRONG_USE)
@@ -90,7 +93,7 @@ def view(
         if led:
             print(guard.link, flush=True)
         else:
-            print(_AT.format(guard.link), file=sys.stderr, flush=True)
+            print(_AT.format(guard.link, _ENDS[until_closed]), file=sys.stderr, flush=True)
         if browser:
             threading.Thread(target=_open, args=(guard.one_time_link,), daemon=True).start()
 
@@ -105,6 +108,7 @@ def view(
             from_start=since == "start",
             on_serving=serving,
             end=end,
+            until_closed=until_closed,
         )
 
     with contextlib.suppress(KeyboardInterrupt):
@@ -142,16 +146,18 @@ def _at_eof(loop: asyncio.AbstractEventLoop, act: Callable[[], None]) -> None:
 
 
 @contextlib.contextmanager
-def viewing(wanted: bool, in_process: bool) -> Iterator[Viewer]:
-    """Shows what is run meanwhile from its first tick on; when it is over, keeps the page until Ctrl-C.
+def viewing(wanted: bool, in_process: bool, until_closed: bool) -> Iterator[Viewer]:
+    """Shows what is run meanwhile from its first tick on; when it is over, keeps the page until Ctrl-C or its end.
 
     The viewer is a process of its own; what becomes of it is no matter to the run.
     """
     if wanted and in_process:
         leave("--view needs the sockets of a run as processes; leave out --in-process.", WRONG_USE)
+    if until_closed and not wanted:
+        leave("--until-closed is for the page of --view, which was not given.", WRONG_USE)
     if wanted:
         check_extra()
-    shown = Viewer(wanted)
+    shown = Viewer(wanted, until_closed)
     try:
         yield shown
     finally:
@@ -161,15 +167,15 @@ def viewing(wanted: bool, in_process: bool) -> Iterator[Viewer]:
 class Viewer:
     """The viewer of a run as a process of its own; does nothing where nobody looks."""
 
-    def __init__(self, wanted: bool) -> None:
-        self._wanted, self._link = wanted, ""
+    def __init__(self, wanted: bool, until_closed: bool) -> None:
+        self._wanted, self._until_closed, self._link = wanted, until_closed, ""
         self._process: subprocess.Popen[str] | None = None
 
     def on_started(self, run_id: str) -> None:
         """Takes the id by which the run can be found from now on."""
         if not self._wanted:
             return
-        words = ["view", "--run", run_id.partition(" ")[0], "--led"]
+        words = ["view", "--run", run_id.partition(" ")[0], "--led", *["--until-closed"] * self._until_closed]
         self._since = time.monotonic()
         self._process = subprocess.Popen(
             [sys.executable, "-m", "haploop.tools.cli", *words],
@@ -199,7 +205,7 @@ class Viewer:
             return
         with contextlib.suppress(KeyboardInterrupt):
             if self._link and process.poll() is None:
-                print(_AT.format(self._link), file=sys.stderr, flush=True)
+                print(_AT.format(self._link, _ENDS[self._until_closed]), file=sys.stderr, flush=True)
             process.wait()
         assert process.stdin
         with contextlib.suppress(OSError):

@@ -27,7 +27,7 @@ def cost(
     processes: Annotated[bool, typer.Option("--processes/--no-processes", help="time what processes cost too")] = True,
     json: Json = False,
 ) -> None:
-    """Measure what accuracy costs in time: error and time of every method at every plant rate, and advice.
+    """Measure what accuracy costs in time. Error and time of every method at every plant rate, and advice.
 
     Can be stopped; the same command goes on.
     """

@@ -11,7 +11,7 @@ from haploop.tools.figure import style
 from haploop.tools.figure.data import TOGETHER, Book, RunData
 from haploop.tools.figure.loops import draw_force_position, draw_momentum
 from haploop.tools.figure.time import energy_panel, force_panel, mark_events, position_panel
-from haploop.tools.render.report import LEAK_CAUSES, count_losses, plant_books
+from haploop.tools.render.report import LEAK_CAUSES, count_losses, plant_books, swing_words
 from haploop.tools.render.terminal import told
 from haploop.tools.render.units import amount, parameters, spring
 
@@ -82,7 +82,8 @@ def _draw_header(figure: Figure | SubFigure, run: RunData) -> None:
     look: dict[str, Any] = {"color": style.INK, "va": "center"}
     title = figure.text(right + 0.018, 0.66, run.scene.title, fontsize=style.LARGE, gid="title", **look)
     style.fit_text(title, figure.bbox.width * (0.97 - right), smallest=1.0)
-    figure.text(0.006, 0.16, "   ·   ".join(key_numbers(run)), fontsize=style.TEXT + 1, gid="numbers", **look)
+    numbers = figure.text(0.006, 0.16, "   ·   ".join(key_numbers(run)), fontsize=style.TEXT + 1, gid="numbers", **look)
+    style.fit_text(numbers, figure.bbox.width * 0.985)
 
 
 def key_numbers(run: RunData) -> list[str]:
@@ -92,6 +93,8 @@ def key_numbers(run: RunData) -> list[str]:
         return [f"{'log cut off' if run.cut else 'no summary'}: {last - first:g} s of {run.scene.duration:g} s"]
     window, energy = run.summary["window"], run.summary["energy"]
     words = [f"in the last {last - window['from_s']:.3g} s: oscillation {amount(window['oscillation_m'], 'm')}"]
+    if (found := run.summary.get("stability", {})).get("rate_1_s") is not None:
+        words.append(f"pushed, it swings {swing_words(found)}")
     if run.history.walls and run.summary["verdict"] != "no-contact":
         words.append(f"outside the wall {100 * window['outside_fraction']:.0f} %")
         displayed, wanted = window["displayed_stiffness_N_m"], run.history.walls[-1].wall.stiffness

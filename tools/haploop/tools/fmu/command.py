@@ -17,7 +17,7 @@ def export_fmu(
     out: Annotated[Path | None, typer.Option(metavar="FILE.fmu", help="file, or directory [SCENE.fmu here]")] = None,
     force: Annotated[bool, typer.Option("--force", help="write over a file that exists")] = False,
 ) -> None:
-    """Write the controller of a scene as an FMU (FMI 3.0, co-simulation), in C: position in, force out.
+    """Write the controller of a scene as an FMU, position to force. FMI 3.0, co-simulation, in C.
 
     Wall, elements, estimators and delay, without Python, to the bits of a run. It takes a C compiler.
     """

@@ -153,13 +153,8 @@ def _stability(found: Summary) -> list[tuple[str, str]]:
     """Returns what a loop does, held still and pushed at its end; nothing where it was not watched to an answer."""
     if found.get("rate_1_s") is None:
         return []
-    felt = "felt" if found["felt"] else "not felt"
-    rests = found["width_m"] < 1e-9  # what is left is rounding
-    frequency = "" if rests or not found["frequency_Hz"] else f"at {amount(found['frequency_Hz'], 'Hz')}, "
-    chaotic = ", chaotic" if found["chaotic"] else ""
-    size = "less than 1 nm" if rests else f"{amount(found['width_m'], 'm')} +- {amount(found['spread_m'], 'm', 2)}"
     rows = [
-        ("pushed, it swings", f"{size} peak to peak, {frequency}{felt}{chaotic}"),
+        ("pushed, it swings", swing_words(found)),
         ("force ripple > 30 Hz", f"{amount(found['force_ripple_N'], 'N')} peak to peak"),
         ("growth", f"{found['rate_1_s']:.3g} +- {found['error_1_s']:.2g} 1/s, watched for {found['watched_s']:g} s"),
     ]
@@ -169,6 +164,15 @@ def _stability(found: Summary) -> list[tuple[str, str]]:
     if blown := found.get("blown"):
         rows.append(("after a blow", f"of {amount(found['blow_N'], 'N')}: {blown}"))
     return rows
+
+
+def swing_words(found: Summary) -> str:
+    """Returns size, frequency and feel of the swing that a pushed loop comes to, given a summary's ``stability``."""
+    rests = found["width_m"] < 1e-9  # what is left is rounding
+    frequency = "" if rests or not found["frequency_Hz"] else f"at {amount(found['frequency_Hz'], 'Hz')}, "
+    size = "less than 1 nm" if rests else f"{amount(found['width_m'], 'm')} +- {amount(found['spread_m'], 'm', 2)}"
+    felt, chaotic = "felt" if found["felt"] else "not felt", ", chaotic" if found["chaotic"] else ""
+    return f"{size} peak to peak, {frequency}{felt}{chaotic}"
 
 
 def status_table(data: Message) -> RenderableType:
