@@ -18,10 +18,8 @@ QUICK := tests/scene tests/log tests/estimators tests/clock $(patsubst %,tests/p
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-8s %s\n", $$1, $$2 }' Makefile
 
-demo: $(READY) ## run the scene of figure 6c into runs/demo and draw it; the last line names the figure's file
-	@rm -rf runs/demo
-	@$(BIN)/haploop run launch/scenes/fig6c.toml --out runs/demo
-	@$(BIN)/haploop plot runs/demo
+demo: $(READY) ## tell how a wall buzzes, why, and what steadies it; the last line names the figure's file
+	@$(BIN)/haploop demo
 
 quick: $(READY) ## run the tests of scene, log, estimators, clock and physics in closed form (below 30 s)
 	@$(BIN)/pytest -q -n auto --dist worksteal --hypothesis-profile quick -m "not slow" \

@@ -120,6 +120,7 @@ GOLDEN = {
     "fig6c": (["device"], 2, ["encoder"]),
     "swap": (["device"], 2, ["encoder"]),
     "tap": (["device"], 2, ["encoder"]),
+    "demo": (["device", "hand"], 4, ["hand.grip", "friction", "encoder", "actuator.saturation"]),
     "premium_tap": (["device", "hand"], 4, ["hand.grip", "friction", "encoder", "actuator.saturation"]),
     "premium_press": (
         ["motor", "tip", "hand"],

@@ -80,8 +80,8 @@ class RunSpec:
     is_new: bool = False
 
 
-def make_output(out: Path | None, scene_path: Path, first: str = SCENE) -> Path:
-    """Makes the run's directory: ``out``, or a new one below ``runs/`` named by scene and time.
+def make_output(out: Path | None, scene_path: Path, first: str = SCENE, parent: Path = Path("runs")) -> Path:
+    """Makes the run's directory: ``out``, or a new one below ``parent`` named by scene and time.
 
     It is claimed by making the file ``first``, empty, which its owner writes: of many who start at one instant only one
     can.
@@ -92,11 +92,11 @@ def make_output(out: Path | None, scene_path: Path, first: str = SCENE) -> Path:
         if out is None:
             stem = f"{scene_path.stem}-{time.strftime('%Y%m%d-%H%M%S')}"
             names = (stem + suffix for suffix in chain([""], map("-{}".format, count(2))))
-            return next(path for name in names if _claimed(path := Path("runs") / name, first))
+            return next(path for name in names if _claimed(path := parent / name, first))
         if not _claimed(out, first):
             raise OutputError(f"{out} must be new or empty, so that no earlier run is lost; name another with --out.")
     except OSError as error:
-        place = "runs" if out is None else out
+        place = parent if out is None else out
         raise OutputError(f"The run's directory {place} cannot be made: {error.strerror}.") from error
     return out
 

@@ -15,6 +15,7 @@ from haploop.tools.cli.scenes import check, export, judge, plot, plugins, replay
 from haploop.tools.cli.study_commands import advise, dissipate, paper, sweep
 from haploop.tools.cli.view import view
 from haploop.tools.cost.command import cost
+from haploop.tools.demo.command import demo
 from haploop.tools.fmu.command import export_fmu
 
 app = typer.Typer(
@@ -44,7 +45,7 @@ def haploop(
 
 # In the order in which the help lists them.
 for command in (
-    run, scenes, new, check, explain, plugins, status, pause, resume, step, pace, stop, swap, set_, undo, attach, view,
-    keys, join, plot, replay, judge, export, export_fmu, cost, sweep, dissipate, paper, advise,
+    demo, run, scenes, new, check, explain, plugins, status, pause, resume, step, pace, stop, swap, set_, undo, attach,
+    view, keys, join, plot, replay, judge, export, export_fmu, cost, sweep, dissipate, paper, advise,
 ):  # fmt: skip
     app.command(command.__name__.rstrip("_").replace("_", "-"))(command)

@@ -1,0 +1,79 @@
+"""The demo: its words follow from its run, and its last line names the figure."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+from rich.console import Console
+from typer.testing import CliRunner
+
+from haploop.launch.runs.loaded_scene import load
+from haploop.launch.scene.bundled import bundled
+from haploop.tools.cli.app import app
+from haploop.tools.demo.report import report
+from haploop.tools.demo.story import Part, Story
+
+SCENE = load(bundled("scenes")["demo"]).scene
+
+
+def part(verdict: str, swing_m: float = 2e-3, **leak: float) -> Part:
+    causes = dict.fromkeys(("delay_J", "sampling_and_hold_J", "quantisation_J"), 0.0) | leak
+    energy = {"wall": {"leak": {"total_J": sum(causes.values()), **causes}}}
+    summary: dict[str, Any] = {"verdict": verdict, "verdict_rule": f"It is {verdict}.", "energy": energy}
+    summary["stability"] = {"width_m": swing_m, "frequency_Hz": 31.0}
+    return Part(summary, swing_m, 3.5)
+
+
+def story(before: Part, after: Part) -> Story:
+    data: Any = SimpleNamespace(scene=SCENE)
+    return Story(data, 1.0, "damping of 5 N s/m", before, after)
+
+
+def words(told: Story, columns: int = 80) -> str:
+    console = Console(width=columns)
+    with console.capture() as captured:
+        console.print(report(told))
+    return captured.get()
+
+
+def test_the_demo_says_steady_of_the_element_only_where_the_verdict_does() -> None:
+    for before in ("steady", "limit-cycle", "growing", "undecided"):
+        for after in ("steady", "limit-cycle", "diverged", "undecided"):
+            said = story(part(before), part(after)).outcome()
+            assert ("not steady" in said or "it is not with it" in said) == (after != "steady"), said
+            assert ("was steady before" in said) == (before == "steady"), said
+
+
+def test_the_demo_names_the_cause_with_the_largest_share_and_none_of_a_wall_that_gave_nothing() -> None:
+    def why(**leak: float) -> str:
+        return story(part("limit-cycle", **leak), part("steady")).why()
+
+    assert "3 mJ more than it took, 67 % of it because each force comes 2 ms after" in why(
+        delay_J=-2e-3, sampling_and_hold_J=-1e-3
+    ).replace("3.00", "3")
+    assert "held for a tick" in why(delay_J=1e-3, sampling_and_hold_J=-2e-3)
+    assert "100 % of it because the encoder rounds" in why(quantisation_J=-1e-6)
+    assert "no more energy than it took" in why(delay_J=-1e-3, sampling_and_hold_J=2e-3)
+    assert "no more energy than it took" in why()
+
+
+def test_the_demo_fits_into_80_columns_and_shows_hertz_and_newtons_of_either_side() -> None:
+    told = words(story(part("limit-cycle", delay_J=-2e-3), part("steady", 0.0)))
+    assert max(map(len, told.splitlines())) <= 80
+    assert [line.split()[1:] for line in told.splitlines() if line.startswith(" at ")] == [["31.0", "Hz", "–"]]
+    assert "3.50 N" in told
+
+
+@pytest.mark.slow
+def test_the_demo_buzzes_until_its_element_comes_and_draws_what_it_says_twice_in_a_row(tmp_path: Path) -> None:
+    results = [CliRunner().invoke(app, ["demo", "--out", str(tmp_path)]) for _ in range(2)]
+    for result in results:
+        assert result.exit_code == 0, result.output
+        assert "limit-cycle" in result.stderr
+        assert "With damping of 5 N s/m the same wall is steady." in " ".join(result.stderr.split())
+    figures = [Path(result.stdout.strip()) for result in results]
+    assert all(figure.is_file() for figure in figures)
+    assert len(set(figures)) == 2

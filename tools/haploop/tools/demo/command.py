@@ -1,0 +1,52 @@
+"""The command ``haploop demo``; what it works with is imported when it is called."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from haploop.tools.cli.interrupt import LeavingAtOnce
+from haploop.tools.cli.options import FAILED, leave, plain_errors
+
+SCENE, FIGURE = "demo", "figure.png"
+
+
+def demo(
+    out: Annotated[Path, typer.Option(help="directory in which a new one is made for the run and its figure")] = Path(
+        "runs"
+    ),
+) -> None:
+    """Tell in a few seconds how a wall buzzes, why, and which element steadies it, swapped in in mid-contact.
+
+    Plant, controller and logger run as three processes. The last line names the figure's file.
+    """
+    with LeavingAtOnce():
+        from haploop.launch import load
+        from haploop.launch.runs.start import lay_out
+        from haploop.launch.scene.bundled import bundled
+        from haploop.launch.spec import RunFailed, make_output
+        from haploop.tools.demo.figure import draw
+        from haploop.tools.demo.report import report
+        from haploop.tools.demo.story import tell
+        from haploop.tools.figure.data import FigureError
+        from haploop.tools.render.terminal import console
+
+    with plain_errors():
+        scene = load(bundled("scenes")[SCENE])
+        directory = make_output(None, Path(SCENE), parent=out)
+        try:
+            story = tell(lay_out(scene.scene, dict(scene.kinds), directory, is_new=True))
+        except RunFailed as error:
+            leave(f"{error}\nWhat was logged is in {directory}.", FAILED)
+        except KeyboardInterrupt:
+            leave(f"Interrupted; what was logged is in {directory}.", FAILED)
+        console(stderr=True).print(report(story))
+        try:
+            figure = draw(story, directory / FIGURE)
+        except FigureError as error:
+            leave(f"No figure: {error}\nThe run is in {directory}.", FAILED)
+    print(f"Next: haploop new my.toml, haploop replay {directory}, haploop run {SCENE} --view.", file=sys.stderr)
+    print(figure)

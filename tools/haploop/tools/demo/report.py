@@ -1,0 +1,31 @@
+"""The demo's story in the terminal: the wall, why it swings, what the element did, both sides beside each other."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from haploop.tools.demo.story import Story
+from haploop.tools.render.terminal import make_table, verdict_style
+
+if TYPE_CHECKING:
+    from rich.console import RenderableType
+
+
+def report(story: Story) -> RenderableType:
+    """Returns the story as lines and one table, at most 80 letters wide."""
+    from rich.console import Group
+    from rich.text import Text
+
+    table = make_table("", "before", f"with {story.element}")
+    for (name, before), (_, after) in zip(story.before.rows(), story.after.rows(), strict=True):
+        table.add_row(
+            name, *(Text(value, verdict_style(value) if name == "verdict" else "") for value in (before, after))
+        )
+    return Group(
+        Text(story.data.scene.title, style="bold"),
+        Text(f"\nWhy: {story.why()}"),
+        Text(f"\nAt {story.at_s:g} s, in mid-contact, {story.element} is swapped in. {story.outcome()}"),
+        table,
+        *(Text(f"{name}: {part.summary['verdict_rule']}", style="dim") for name, part in story.parts()),
+        Text(),
+    )
