@@ -35,7 +35,7 @@ def test_without_a_run_it_says_how_to_start_one_and_offers_nothing_that_steers(s
     expect(page.locator("#phase")).to_have_text("waiting")
     expect(page.locator("#pause")).to_be_disabled()
     expect(page.locator("#swap")).to_be_hidden()
-    expect(page.locator("#verdict")).to_have_text("no verdict")
+    expect(page.locator("#verdict span")).to_have_text("no verdict")
     assert "NaN" not in page.inner_text("body")
     assert "null" not in page.inner_text("body")
 
@@ -46,7 +46,7 @@ def test_a_verdict_is_a_word_a_shape_of_its_own_and_a_colour(stand_in, open_page
     words = ("steady", "limit-cycle", "growing", "diverged", "no-contact", "undecided")
     for word in words:
         stand_in.state(**ENDED | {"verdict": word})
-        expect(page.locator("#verdict")).to_have_text(word)
+        expect(page.locator("#verdict span")).to_have_text(word)
         assert page.get_attribute("#verdict use", "href") == f"#verdict-{word}"
         page.wait_for_timeout(200)
         grounds.add(style(page, "backgroundColor"))
@@ -63,22 +63,27 @@ def style(page, name):
 @pytest.mark.slow
 def test_what_the_window_sees_is_an_outline_and_says_that_nothing_is_known_of_stability(stand_in, open_page):
     page = open_page(stand_in.url)
-    shown = {"steady": "no swing seen", "limit-cycle": "swinging", "diverged": "diverged", "no-contact": "no-contact"}
-    for word, told in shown.items():
-        stand_in.state(verdict=word)
-        expect(page.locator("#verdict")).to_have_text(told)
+    sight = RUNNING["sight"]
+    for word in ("no swing seen", "swinging", "moving", "no contact", "force ripples"):
+        stand_in.state(verdict="steady", sight=sight | {"word": word})
+        expect(page.locator("#verdict span")).to_have_text(word)
+        expect(page.locator("#seen")).to_have_text("in 1.00–1.50 s")
         assert style(page, "borderTopStyle") == "dashed"
         page.wait_for_timeout(200)
         assert style(page, "backgroundColor") == "rgba(0, 0, 0, 0)"
+    stand_in.state(sight=sight | {"word": "settling", "from_s": 1.2, "so_far": True})
+    expect(page.locator("#verdict span")).to_have_text("settling")
+    expect(page.locator("#seen")).to_have_text("so far: 0.30 of 0.5 s")
     by_window = {key: value for key, value in SUMMARY.items() if key != "stability"}
     unseen = dict.fromkeys(("abandoned", "foreign", "seen"), "no swing seen")
     for verdict_is, told in {"awaited": "being judged", **unseen}.items():
-        stand_in.state(**ENDED | {"summary": by_window, "verdict": "steady", "verdict_is": verdict_is})
-        expect(page.locator("#verdict")).to_have_text(told)
+        ended = {"summary": by_window, "verdict": "steady", "verdict_is": verdict_is}
+        stand_in.state(**ENDED | ended | {"sight": sight | {"word": "no swing seen"}})
+        expect(page.locator("#verdict span")).to_have_text(told)
         expect(page.locator("#summary-title")).to_have_text(f"Ended: {told}")
         assert style(page, "borderTopStyle") != "none"
     stand_in.state(**ENDED | {"summary": None, "verdict_is": "unknown", "why": "Its summary cannot be read."})
-    expect(page.locator("#verdict")).to_have_text("not known")
+    expect(page.locator("#verdict span")).to_have_text("not known")
     expect(page.locator("#notice")).to_contain_text("Its summary cannot be read.")
 
 
@@ -87,12 +92,14 @@ def test_the_header_has_the_numbers_with_their_units(stand_in, open_page):
     stand_in.state()
     page = open_page(stand_in.url)
     expect(page.locator("#oscillation")).to_have_text("5.35 mm")
+    expect(page.locator("#frequency")).to_have_text("8.25 Hz")
+    expect(page.locator("#ripple")).to_have_text("410 mN")
     expect(page.locator("#stiffness")).to_have_text("137 of 150 N/m")
     expect(page.locator("#residual")).to_have_text("3.4e−16")
     expect(page.locator("#factor")).to_have_text("0.980×")
     expect(page.locator("#skipped")).to_have_text("12 ticks")
     expect(page.locator("#time")).to_have_text("1.500 of 3 s")
-    stand_in.state(displayed_stiffness_N_m=None, oscillation_m=None, real_time_factor=None, pace="free")
+    stand_in.state(displayed_stiffness_N_m=None, sight=None, real_time_factor=None, pace="free")
     expect(page.locator("#stiffness")).to_have_text("–")
     expect(page.locator("#oscillation")).to_have_text("–")
 

@@ -5,6 +5,7 @@ from playwright.sync_api import expect
 
 from helpers.live.browser import DESK, PHONE
 from helpers.live.launched import first_and_slowly
+from helpers.live.stand_in import RUNNING
 from oracles.snapshots import contact
 
 TABLET, LARGE = {"width": 820, "height": 1180}, {"width": 1920, "height": 1080}
@@ -135,8 +136,13 @@ def test_the_page_stays_where_it_is_while_numbers_change(stand_in, open_page):
     those = ".figures div, .chart, nav > *, #verdict"
     places = f"[...document.querySelectorAll('{those}')].map(e => e.getBoundingClientRect().x)"
     before = page.evaluate(places)
-    stand_in.state(oscillation_m=-1.2345e-9, verdict="steady", residual_J=None, real_time_factor=12.3, skipped_ticks=0)
-    expect(page.locator("#verdict")).to_have_text("no swing seen")
+    stand_in.state(
+        sight={**RUNNING["sight"], "word": "no swing seen", "oscillation_m": 1.2345e-9},
+        residual_J=None,
+        real_time_factor=12.3,
+        skipped_ticks=0,
+    )
+    expect(page.locator("#verdict span")).to_have_text("no swing seen")
     assert page.evaluate(places) == before
 
 

@@ -28,7 +28,7 @@ def test_every_sample_of_the_snapshot_is_the_logs(tmp_path):
         log = await has_logged(run, 600)
         snapshot = await whole(tab, run, 600)
         tables = snapshot["tables"]
-        assert {name: table["envelope"] for name, table in tables.items()} == dict.fromkeys(tables, False)
+        assert [name for name, table in tables.items() if table["envelope"]] == ["overview"]
         position, force, energy = (tables[name]["values"] for name in ("position", "force", "energy"))
         assert (tables["position"]["t0_s"], tables["position"]["rows"]) == (0.0, 6000)
         same(position["x"], log["/plant"]["x"])

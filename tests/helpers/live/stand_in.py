@@ -45,6 +45,11 @@ RUNNING = {
     "title": "Fig. 6(c): a 0.15 N/mm wall with unidirectional inertia",
     "tick": 1500, "end_tick": 3000, "control_rate": 1000, "plant_rate": 10000, "pace": 1.0, "real_time_factor": 0.98,
     "verdict": "limit-cycle", "verdict_is": "seen",
+    "sight": {
+        "word": "swinging", "why": "In the last 0.5 s the position crossed its trend line 24 times.", "from_s": 1.0,
+        "to_s": 1.5, "so_far": False, "oscillation_m": 0.00535, "ripple_N": 0.41, "frequency_Hz": 8.25,
+        "stiffness_N_m": 137.2,
+    },
     "verdict_rule": "In the last 0.5 s x crossed its trend line 24 times.",
     "oscillation_m": 0.00535, "displayed_stiffness_N_m": 137.2, "residual_J": 2.1e-18, "moved_J": 6.2e-3,
     "nodes": [

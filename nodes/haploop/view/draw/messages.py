@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
-from typing import NamedTuple, TypedDict
+from typing import Any, NamedTuple, TypedDict
 
 import numpy as np
 
@@ -41,7 +41,7 @@ class Column(NamedTuple):
     label: str
 
 
-@dataclass(frozen=True)
+@dataclasses.dataclass(frozen=True)
 class Table:
     """One table of a snapshot: columns of equal length at equal steps of time.
 
@@ -58,15 +58,15 @@ class Table:
     columns: Sequence[Column]
     values: np.ndarray
     envelope: bool = False
-    more: dict[str, float | None] = field(default_factory=dict)
+    more: dict[str, Any] = dataclasses.field(default_factory=dict)
 
 
-def encode(from_s: float, to_s: float, tables: Sequence[Table]) -> bytes:
+def encode(from_s: float, to_s: float, tables: Sequence[Table], **more: Any) -> bytes:
     """Returns the snapshot of an interval of time as bytes.
 
     uint32 length of the header | header in JSON, padded with spaces | of each table its columns one by one as 32-bit
     floats, padded with zeros; all little-endian. Header and tables each begin at a multiple of 8 bytes, so that a
-    browser reads the columns in place.
+    browser reads the columns in place. ``more`` are further entries of the header.
     """
     entries = [
         {
@@ -76,11 +76,11 @@ def encode(from_s: float, to_s: float, tables: Sequence[Table]) -> bytes:
             "rows": table.values.shape[1],
             "columns": [column._asdict() for column in table.columns],
             "envelope": table.envelope,
-            **table.more,
+            **finite(table.more),
         }
         for table in tables
     ]
-    header = {"from_s": from_s, "to_s": to_s, "tables": entries}
+    header = {"from_s": from_s, "to_s": to_s, "tables": entries, **finite(more)}
     head = json.dumps(header, separators=(",", ":"), allow_nan=False).encode()
     head += b" " * (-(4 + len(head)) % 8)
     parts = [len(head).to_bytes(4, "little"), head]
@@ -94,6 +94,8 @@ def encode(from_s: float, to_s: float, tables: Sequence[Table]) -> bytes:
 def state(session: RunSession) -> Message:
     history, time, summary, status = session.history, session.time, session.summary, session.clock.status
     elements, wall = history.at_work
+    session.changes.note(history, session.events)
+    sight = session.changes.sight(history)
     message: Message = {
         "type": "state",
         "phase": session.outcome or ("paused" if status.get("paused") else "running"),
@@ -118,6 +120,7 @@ def state(session: RunSession) -> Message:
         and {"position": wall.position, "stiffness": wall.stiffness, "into_wall": history.at_work.into_wall},
         "delay_s": session.delay_s,
         "summary": summary,
+        "sight": sight and dataclasses.asdict(sight),
     }
     # Verdict and figures are those of the summary once there is one, else of the newest status of the logger.
     judged = (summary, summary["window"], summary["energy"]) if summary else (session.status,) * 3

@@ -5,11 +5,15 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from typing import Any
 
 import numpy as np
 
 from haploop.view.draw.messages import Column, Table, encode
+from haploop.view.look.budget import budget
+from haploop.view.look.compare import Changes, Half
+from haploop.view.look.spectrum import amplitudes, main_line
 from haploop.view.store.history import TRUE, WALL_BOOK, History
 from haploop.view.store.lod_series import LodSeries
 
@@ -17,6 +21,9 @@ from haploop.view.store.lod_series import LodSeries
 _ROWS_A_POINT, _BUCKETS_A_POINT = 3.0, 0.75
 # Simulated time that the phase plots show, and their number of rows at most.
 _PHASE_S, _MOST_ROWS = 0.4, 8000
+PANELS = ("loops", "energy", "spectrum", "compare", "motion")
+# Ticks of which a spectrum is made at most, the newest; parts of an overview of the run.
+_SPECTRUM_TICKS, _OVERVIEW_PARTS = 2048, 256
 _BODIES = {"x": "position", "tip_x": "position of the tip", "hand_x": "position of the hand"}
 _MEASURED = {"wall_position": Column("wall", "m", "wall"), "x_measured": Column("x_measured", "m", "measured position")}
 _MAKING = re.compile(r"-\d+$")
@@ -30,11 +37,13 @@ class Viewport:
         span_s: length of the interval in simulated time, s; None for the whole run.
         points: about how many points fit side by side.
         end_s: end of the interval, s; None for the newest tick.
+        panel: what is shown beside the charts over time, of ``PANELS``.
     """
 
     span_s: float | None = 2.0
     points: int = 1000
     end_s: float | None = None
+    panel: str = PANELS[0]
 
 
 # Columns of one series by name, each with its header entry.
@@ -43,23 +52,35 @@ Part = tuple[LodSeries, Mapping[str, Column]]
 IsShown = Callable[[Column, np.ndarray], bool]
 
 
-def snapshot(history: History, viewport: Viewport) -> bytes:
+def snapshot(history: History, viewport: Viewport, changes: Changes | None = None) -> bytes:
     """Returns everything a page shows as bytes, packed by :func:`haploop.view.draw.messages.encode`.
 
     Tables over time are position, force and energy; each row by row where the page has room for it, else as an envelope
-    whose rows are the two extremes of consecutive buckets in the order in which they came. Then come the two phase
-    plots of Choi et al. 2022, row by row, from the last 0.4 s; a table without data is left out.
+    whose rows are the two extremes of consecutive buckets in the order in which they came. Then comes an overview of
+    the whole run, and what the page's panel asks for: the two phase plots of Choi et al. 2022, row by row, from the
+    last 0.4 s; the energy budget; spectra; the two sides of the last of ``changes``. A table without data is left out.
     """
     rate = history.time.control_rate
     from_tick, to_tick = _window(history, viewport)
     known_from = to_tick if history.first_tick is None else history.first_tick
     first, end = max(from_tick, known_from), min(to_tick, history.end_tick)
     tables: list[Table | None] = []
+    more: dict[str, Any] = {}
     if first < end:
         interval = _Interval(first, end, rate, viewport.points)
         tables = [interval.table(*made(history)) for made in (_position, _force, _energy)]
-        tables += _force_position(history, first, end), _momentum(history, first, end)
-    return encode(from_tick / rate, to_tick / rate, [table for table in tables if table])
+        tables.append(_overview(history, known_from))
+        if viewport.panel == "loops":
+            tables += _force_position(history, first, end), _momentum(history, first, end)
+        elif viewport.panel == "energy":
+            more["budget"] = budget(history, first, end)
+        elif viewport.panel == "spectrum":
+            table, more["lines"] = _spectrum(history, first, end)
+            tables.append(table)
+        elif viewport.panel == "compare" and changes and (pair := changes.pair(history)):
+            tables += [_trace(name, half, rate) for name, half in zip(("before", "after"), pair[1:], strict=True)]
+            more["change"] = {"tick": pair[0], "t_s": pair[0] / rate}
+    return encode(from_tick / rate, to_tick / rate, [table for table in tables if table], **more)
 
 
 def _window(history: History, viewport: Viewport) -> tuple[int, int]:
@@ -203,3 +224,43 @@ def _momentum(history: History, first: int, end: int) -> Table | None:
             columns.append(Column(f"p.{place}", "kg m/s", f"element {place}: {kind}"))
             values.append(mass[:-1] * v[1:])
     return Table("momentum", (first + 1) / rate, 1.0 / rate, columns, np.stack(values)) if len(values) > 1 else None
+
+
+def _overview(history: History, first: int) -> Table | None:
+    """Returns the position over the whole run, the two extremes of each of its parts."""
+    end = history.end_tick
+    bucket = 1 << max(0, math.ceil(math.log2(max(1, end - first) / _OVERVIEW_PARTS)))
+    bucket = history.steps.bucket_from(first, bucket)
+    begins, ends = history.steps.aligned(first, bucket), end + (history.steps.aligned(first, bucket) - end) % bucket
+    values = history.steps.envelope(["x"], begins, ends, bucket)
+    rate = history.time.control_rate
+    columns = [Column("x", "m", "position")]
+    return Table("overview", (begins + bucket / 4.0) / rate, bucket / 2.0 / rate, columns, values, envelope=True)
+
+
+def _spectrum(history: History, first: int, end: int) -> tuple[Table | None, dict[str, Any]]:
+    """Returns amplitudes of position and applied force over frequency, ``t`` in Hz, and the line that stands out."""
+    rate = history.time.control_rate
+    end = min(end, history.steps.end_tick, history.stop_tick or end)
+    first = max(first, end - _SPECTRUM_TICKS, history.steps.full_from_tick)
+    if end - first < 32:
+        return None, {}
+    samples = history.steps.rows(("x", "force"), first, end)[:, :: history.time.steps_per_tick]
+    if not np.isfinite(samples).all():
+        return None, {}
+    at, height = amplitudes(samples, rate)
+    columns = [Column("x", "m", "position"), Column("force", "N", "force")]
+    lines = {name: main_line(row, rate) for name, row in zip(("x", "force"), samples, strict=True)}
+    found = {name: line and line._asdict() for name, line in lines.items()}
+    seen = {"from_s": first / rate, "to_s": end / rate}
+    return Table("spectrum", float(at[0]), float(at[1] - at[0]), columns, height), {**found, **seen}
+
+
+def _trace(name: str, half: Half | None, rate: int) -> Table | None:
+    """Returns position and force on one side of a change, with what was seen and its energy budget."""
+    if half is None:
+        return None
+    columns = [Column("x", "m", "position"), Column("force", "N", "force")]
+    more = {"sight": asdict(half.sight), "budget": half.budget}
+    from_s = half.sight.to_s - half.traces.shape[1] / rate
+    return Table(name, from_s, 1.0 / rate, columns, half.traces, more=more)

@@ -14,13 +14,15 @@ from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
 from haploop.protocol.transport.telemetry import Block
 from haploop.protocol.transport.wire import Frame, Message
-from haploop.view.store.history import TRUE, AtWork, History
+from haploop.view.store.history import AtWork, History
 
 # Columns from which positions and forces of the plant are made, and those of the controller that are shown.
 _OF_PLANT = ("x", "v", "force", "actuator", "cable.stretch", "cable.rate", "grip.stretch", "grip.rate")
 _OF_CONTROLLER = ("x", "v", "wall", "total")
 _LOGGED_POSITIONS = ("x", "tip_x", "hand_x")
 _STATE_BYTES = 8
+# Columns of the energy that no page shows.
+_NOT_SHOWN, _SAMPLED = ("timestamp", "moved"), ".sampled"
 
 
 def ingest(history: History, frames: Sequence[tuple[str, Frame]]) -> Message:
@@ -91,7 +93,7 @@ def _energy(history: History, run: list[Block]) -> None:
 
 
 def _is_shown(book: str) -> bool:
-    return book == "residual" or book.endswith(TRUE)
+    return book not in _NOT_SHOWN and not book.endswith(_SAMPLED)
 
 
 class Backfill:

@@ -17,6 +17,7 @@ from haploop.protocol.ticks import DELAY, Timebase
 from haploop.protocol.transport.clock_client import Aborted, Refused
 from haploop.protocol.transport.observer import Observer
 from haploop.protocol.transport.wire import Message
+from haploop.view.look.compare import Changes
 from haploop.view.receive.ingest import ingest
 from haploop.view.receive.runs import ClockAnswers, Run, Runs
 from haploop.view.store.history import AtWork, History
@@ -34,6 +35,7 @@ class RunSession:
         scene, time, out: the resolved scene, its integers, the run's directory.
         history: telemetry received, and what was logged before once ``prepend`` has been called.
         status: newest status of the logger.
+        changes: swaps and sets, with what was before them.
         outcome: "" while the run goes on, then "ended" or "failed"; ``why`` is a sentence, if there is one.
         given_up: whether nobody is there any more who could judge the run.
 
@@ -57,6 +59,7 @@ class RunSession:
         self.history = History(self.time, max(0, welcome["granted"] - window))
         self.status: Message = {}
         self.events: list[tuple[int, Event]] = []
+        self.changes = Changes(self.scene.encoder.resolution if self.scene.encoder else 0.0)
         self.clock = ClockAnswers(runs, run, self.events)
         self.delay_s = self.scene.clock.round_trip_delay
         self.outcome = self.why = ""

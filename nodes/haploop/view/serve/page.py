@@ -13,7 +13,7 @@ from aiohttp import WSCloseCode, WSMsgType, web
 
 from haploop.protocol.transport.wire import Message
 from haploop.view.draw.messages import WAITING, event_lines, state
-from haploop.view.draw.snapshot import Viewport, snapshot
+from haploop.view.draw.snapshot import PANELS, Viewport, snapshot
 from haploop.view.receive.runs import CommandFailed
 from haploop.view.serve.guard import Guard
 from haploop.view.viewer import Viewer
@@ -110,7 +110,7 @@ class Page:
         showing = (session.history, session.history.version, self._viewport)
         if showing != self._sent_snapshot:
             self._sent_snapshot = showing
-            await self._socket.send_bytes(snapshot(session.history, self._viewport))
+            await self._socket.send_bytes(snapshot(session.history, self._viewport, session.changes))
 
     async def _send(self, message: Message) -> None:
         await self._socket.send_str(json.dumps(message, allow_nan=False))
@@ -155,7 +155,10 @@ def _watch(message: Message) -> Viewport:
         raise BadMessage("watch.span_s must be above 0, or null.")
     if isinstance(points, bool) or not isinstance(points, int | float) or not math.isfinite(points):
         raise BadMessage("watch.points must be a number.")
-    return Viewport(span_s, int(min(max(points, _FEWEST_POINTS), _MOST_POINTS)), end_s)
+    panel = message.get("panel", PANELS[0])
+    if panel not in PANELS:
+        raise BadMessage(f"watch.panel must be one of {', '.join(PANELS)}.")
+    return Viewport(span_s, int(min(max(points, _FEWEST_POINTS), _MOST_POINTS)), end_s, panel)
 
 
 def _seconds(value: object, key: str) -> float | None:

@@ -18,7 +18,7 @@ Columns = Mapping[str, np.ndarray]
 _RECENT_TICKS, _RECENT_STEPS, _LEAST_TICKS = 16_384, 131_072, 512
 # Books of elements that are kept, the newest: every change of a parameter opens one.
 _MOST_BOOKS = 16
-TRUE, WALL_BOOK = ".true", "wall.true"
+TRUE, WALL_BOOK, EARLIER = ".true", "wall.true", "earlier.true"
 
 
 class AtWork(NamedTuple):
@@ -54,7 +54,8 @@ class History:
         ticks: at control ticks: x_measured, v, forces of the wall and of each element (``element.<place>.<kind>``),
             their total, the wall's position and stiffness (NaN without one), and the mass of each virtual inertia while
             it is at work, else 0 (``mass.<place>.<kind>``).
-        energy: at ticks: the true book of the wall and of each element (``<name>.true``), and the residual.
+        energy: at ticks: the true book of the wall and of each element (``<name>.true``; ``earlier.true`` is the sum of
+            those that are not kept apart), the plant's books, those that part the wall's by cause, and the residual.
         at_work: at the newest ticks of the controller.
         stop_tick: tick at which the plant has ended; None before.
         version: changes with every row that is appended.
@@ -128,8 +129,11 @@ class History:
     def append_energy(self, tick: int, columns: Columns) -> None:
         """Appends running books, by name."""
         elements = [name for name in columns if name.endswith(TRUE) and name != WALL_BOOK]
-        kept = ["residual", WALL_BOOK, *elements[-_MOST_BOOKS:]]
-        self._append(self.energy, tick, {name: columns[name] for name in kept if name in columns})
+        earlier = elements[:-_MOST_BOOKS]
+        kept = {name: column for name, column in columns.items() if name not in earlier}
+        if earlier:
+            kept[EARLIER] = np.nansum([columns[name] for name in earlier], axis=0)
+        self._append(self.energy, tick, kept)
 
     def extend_from(self, other: History) -> None:
         """Appends from another history of the same run what this one has not reached."""

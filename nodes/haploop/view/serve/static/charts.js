@@ -2,7 +2,7 @@
 
 import { amount, isNumber } from "./amounts.js";
 import { byId } from "./dom.js";
-import { PhasePlots } from "./phase_plots.js";
+import { Panels } from "./panels.js";
 import { linesFor } from "./palette.js";
 import { scaled, times } from "./snapshot.js";
 import { TimeChart } from "./time_chart.js";
@@ -21,7 +21,7 @@ export class Charts {
     this.charts = Object.fromEntries(
       Object.entries(CHARTS).map(([name, options]) => [name, new TimeChart(byId(name), options, viewport)]),
     );
-    this.loops = new PhasePlots(byId("loop"), byId("momentum"));
+    this.panels = new Panels(viewport);
     new ResizeObserver(([{ contentRect }]) => viewport.fit(contentRect.width)).observe(byId("position"));
   }
 
@@ -32,7 +32,8 @@ export class Charts {
    * @param {object} state the run's state.
    * @param {object[]} marks what changed the run.
    */
-  show({ from_s, to_s, tables }, state, marks) {
+  show(snapshot, state, marks) {
+    const { from_s, to_s, tables } = snapshot;
     this.viewport.shown = [from_s, to_s];
     for (const [name, chart] of Object.entries(this.charts)) {
       const lines = tables[name] ? linesOf(tables[name], CHARTS[name].factor) : [];
@@ -42,13 +43,13 @@ export class Charts {
         note: name === "energy" ? residual(state) : "",
       });
     }
-    this.loops.show(tables);
+    this.panels.show(snapshot, state);
   }
 
   /** Fit all axes closely the next time: another stretch of time is looked at. */
   refit() {
     for (const { range } of Object.values(this.charts)) range.forget();
-    for (const { ranges } of this.loops.charts) ranges.forEach((range) => range.forget());
+    this.panels.refit();
   }
 }
 

@@ -5,13 +5,19 @@ import { byId, put, sign } from "./dom.js";
 
 const WORDS = { lost: "not connected" };
 const VERDICTS = new Set(["steady", "limit-cycle", "growing", "diverged", "no-contact", "undecided"]);
-// What is seen in the last half second says nothing of stability: that is judged when the run has ended.
-const SEEN = { steady: "no swing seen", "limit-cycle": "swinging" };
+// What is seen in the last half second says nothing of stability: that is judged when the run has ended. Its signs:
+const SIGNS = {
+  swinging: "limit-cycle", "swing grows": "growing", "force ripples": "limit-cycle", "no contact": "no-contact",
+  "not finite": "diverged",
+};
 const NOT_YET = { awaited: "being judged", unknown: "not known" };
 
 /** What there is of a verdict, in a word. */
-export const told = ({ verdict, verdict_is: is }) =>
-  NOT_YET[is] ?? (is === "judged" ? verdict : SEEN[verdict] ?? verdict);
+export const told = ({ verdict, verdict_is: is, sight }) =>
+  NOT_YET[is] ?? (isJudged({ verdict, verdict_is: is }) ? verdict : sight?.word);
+
+/** Whether there is a word that more than what was seen stands behind. */
+export const isJudged = ({ verdict, verdict_is: is }) => is === "judged" || verdict === "diverged";
 
 /** Show a state; `phase` is its phase, or "lost" without a connection. */
 export function showHeader(state, phase) {
@@ -23,7 +29,10 @@ export function showHeader(state, phase) {
   byId("title").title = state.title || "";
   put(document.querySelector("title"), state.title ? `${told(state) || phase}: ${state.title}` : "haploop");
   showVerdict(state);
-  put(byId("oscillation"), amount(state.oscillation_m, "m"));
+  const { sight } = state;
+  put(byId("oscillation"), amount(sight?.oscillation_m, "m"));
+  put(byId("frequency"), amount(sight?.frequency_Hz, "Hz"));
+  put(byId("ripple"), amount(sight?.ripple_N, "N"));
   put(byId("stiffness"), stiffness(state));
   put(byId("residual"), share(state));
   byId("residual").title = state.balance ?? "";
@@ -34,14 +43,22 @@ export function showHeader(state, phase) {
 }
 
 function showVerdict(state) {
-  // The sign of a steady loop is for one that was judged.
-  const isTold = state.verdict_is === "judged" || (state.verdict !== "steady" && !(state.verdict_is in NOT_YET));
-  const known = isTold && VERDICTS.has(state.verdict) ? state.verdict : "none";
+  const { sight, verdict_is: is } = state;
+  const word = isJudged(state) ? state.verdict : is in NOT_YET ? "" : SIGNS[sight?.word];
+  const known = VERDICTS.has(word) ? word : "none";
   const sought = byId("verdict");
   sought.dataset.verdict = known;
   sought.dataset.is = state.verdict_is ?? "seen";
-  sought.title = state.verdict_rule || "";
+  sought.title = (isJudged(state) ? state.verdict_rule : sight?.why) ?? "";
+  put(byId("seen"), isJudged(state) || is in NOT_YET ? "" : seen(sight));
   sign(sought, `verdict-${known}`, told(state) || "no verdict");
+}
+
+/** Of when a word is: of how much of the half second that it takes, or of which. */
+function seen(sight) {
+  if (!sight) return "";
+  const { from_s: from, to_s: to, so_far: soFar } = sight;
+  return soFar ? `so far: ${steady(to - from, 2)} of 0.5 s` : `in ${steady(from, 2)}–${steady(to, 2)} s`;
 }
 
 /** A number of at most six digits, in powers of ten beyond. */

@@ -23,15 +23,20 @@ const inPixels = (size) => (u, xs, ys) => dots(u, xs, ys, size * devicePixelRati
 
 export class PhasePlots {
   constructor(loop, momentum) {
-    this.loop = new PhaseChart(loop, { x: "penetration (mm)", y: "force out of the wall (N)", least: [0.01, 0.001] });
+    this.loop = new PhaseChart(loop, { x: "penetration (mm)", y: "force (N)", least: [0.01, 0.001] });
     this.momentum = new PhaseChart(momentum, { x: "velocity (m/s)", y: "momentum (g m/s)", least: [1e-4, 1e-4] });
     this.charts = [this.loop, this.momentum];
   }
 
   /** Show the loops among the tables of a snapshot, or say why there is none. */
-  show({ loop, momentum }) {
+  show({ tables: { loop, momentum } }) {
     this.loop.show(loop ? forceLoop(loop) : [], loop ? "" : NO_WALL);
     this.momentum.show(momentum ? momentumLoops(momentum) : [], momentum ? "" : NO_INERTIA);
+  }
+
+  /** Fit all axes closely the next time. */
+  refit() {
+    for (const { ranges } of this.charts) ranges.forEach((range) => range.forget());
   }
 }
 

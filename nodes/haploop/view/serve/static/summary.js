@@ -2,7 +2,7 @@
 
 import { amount, fixed, isNumber, NONE } from "./amounts.js";
 import { byId, make } from "./dom.js";
-import { told } from "./header.js";
+import { isJudged, told } from "./header.js";
 
 const CAUSES = { sampling_and_hold_J: "sampling and hold", quantisation_J: "quantisation", delay_J: "delay" };
 const HOW = { done: "to its end", stopped: "stopped early", diverged: "ended by divergence", failed: "failed" };
@@ -17,7 +17,7 @@ export function showSummary(state) {
   panel.dataset.known = known;
   panel.replaceChildren(
     make("h2", { id: "summary-title" }, `Ended: ${told(state)}`),
-    make("p", { class: "about" }, summary.verdict_rule ?? ""),
+    make("p", { class: "about" }, (isJudged(state) ? summary.verdict_rule : state.sight?.why) ?? ""),
     make("p", { class: "balance" }, summary.energy?.balance ?? ""),
     rows({ ...pushed(summary.stability ?? {}), ...figures(summary), ...foreign(summary.programs) }),
     books(summary.energy ?? {}),

@@ -12,6 +12,7 @@ export class Viewport {
     this.span_s = 2;
     this.end_s = null;
     this.points = 1000;
+    this.panel = "loops";
     // What there is to look at, and what is on the page now.
     this.first_s = 0;
     this.last_s = 0;
@@ -24,7 +25,7 @@ export class Viewport {
 
   /** As the server wants to be asked. */
   request() {
-    return { span_s: this.span_s, points: this.points, end_s: this.end_s };
+    return { span_s: this.span_s, points: this.points, end_s: this.end_s, panel: this.panel };
   }
 
   /** So many seconds, or null for everything since the start. */
@@ -74,6 +75,13 @@ export class Viewport {
 
   within(end_s) {
     return Math.max(Math.min(end_s, this.last_s), Math.min(this.first_s + this.span_s, this.last_s));
+  }
+
+  /** What is shown beside the charts over time. */
+  choose(panel) {
+    if (panel === this.panel) return;
+    this.panel = panel;
+    this.changed();
   }
 
   /** As many points as the charts are wide. */

@@ -1,0 +1,72 @@
+"""Energy budget of a loop by cause: what fed the device and what took energy out, since the start and in a window."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+
+from haploop.view.store.history import EARLIER, TRUE, WALL_BOOK, History
+
+# Books of the plant in the order in which they are told; all but these are named after themselves.
+_STORED = ("kinetic", "spring", "actuator")
+_LABELS = {"unmodelled_work": "hand, by what is left over", EARLIER: "earlier elements"}
+# The wall's share by cause: label, the book it goes up to and the book it starts from; "" is nothing.
+_OF_WALL = (
+    ("sampling and hold", "sampled_and_held", "ideal"),
+    ("quantisation", "quantised", "sampled_and_held"),
+    ("delay", WALL_BOOK, "quantised"),
+)
+
+
+def budget(history: History, from_tick: int, end: int) -> dict[str, Any] | None:
+    """Returns every cause with its joules, below 0 where it feeds the device and above where it takes energy out.
+
+    ``rows`` are {name, total_J, window_J}: since the start of the run, and in the ticks from ``from_tick`` to before
+    ``end``. They sum to nothing but rounding, as the books close: what is put into store counts as taken out.
+    ``from_s`` is where the window begins, later than asked where no energy is known before; it lies within ``about_s``
+    where the past is held coarsely. None without any energy.
+    """
+    series, rate = history.energy, history.time.control_rate
+    end = min(end, series.end_tick)
+    first = max(from_tick, series.first_tick or 0)
+    if series.first_tick is None or first >= end:
+        return None
+    names = series.names
+    now, (before, about) = _at(series, names, end - 1)[0], _at(series, names, first)
+    total, window = (dict(zip(names, values.tolist(), strict=True)) for values in (now, now - before))
+    rows = [
+        {"name": label, "total_J": sum(sign * total[name] for sign, name in parts),
+         "window_J": sum(sign * window[name] for sign, name in parts)}
+        for label, parts in _causes(names)
+    ]  # fmt: skip
+    shown = [row for row in rows if np.isfinite(row["total_J"]) and np.isfinite(row["window_J"])]
+    return {"from_s": first / rate, "to_s": (end - 1) / rate, "about_s": about / rate, "rows": shown}
+
+
+def _at(series: Any, names: Sequence[str], tick: int) -> tuple[np.ndarray, int]:
+    """Returns the books at a tick, and within how many ticks of it they are; a book not yet open stands at 0."""
+    if tick >= series.full_from_tick:
+        return np.nan_to_num(series.rows(names, tick, tick + 1)[:, 0], nan=0.0), 0
+    bucket = series.bucket_from(tick, 1)
+    begin = series.aligned(tick, bucket)
+    return np.nan_to_num(series.envelope(names, begin, begin + bucket, bucket)[:, 0], nan=0.0), bucket
+
+
+def _causes(names: Sequence[str]) -> Iterator[tuple[str, list[tuple[float, str]]]]:
+    """Yields each cause with the books that make it, and their signs."""
+    for name in names:
+        if name.endswith("_work"):
+            yield _LABELS.get(name, name.removesuffix("_work")), [(-1.0, name)]
+    has_wall = "ideal" in names
+    for label, up_to, start in _OF_WALL if has_wall else ():
+        yield label, [(1.0, up_to), (-1.0, start)]
+    for name in names:
+        if name.endswith(TRUE) and name != WALL_BOOK:
+            yield _LABELS.get(name, name.removesuffix(TRUE)), [(1.0, name)]
+    for name in names:
+        if name.endswith("_heat"):
+            yield f"heat in {name.removesuffix('_heat')}", [(1.0, name)]
+    stored = [*(name for name in _STORED if name in names), *(["ideal"] if has_wall else [])]
+    yield "put into store", [(1.0, name) for name in stored]

@@ -1,0 +1,77 @@
+"""Comparison of a loop before and after its last change: the half second on either side, in figures and numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from haploop.protocol.changes import Event
+from haploop.view.look.budget import budget
+from haploop.view.look.sight import Sight, see, window_ticks
+from haploop.view.store.history import History
+
+# Changes of which the half second before is kept, the newest.
+_MOST = 64
+
+
+@dataclass(frozen=True)
+class Half:
+    """One side of a change: what was seen, its energy budget, and its position and force at ticks, shape (2, ticks)."""
+
+    sight: Sight
+    budget: dict[str, Any] | None
+    traces: np.ndarray
+
+
+class Changes:
+    """Keeps the half second before every swap and set of a run, which a history of full rows forgets."""
+
+    def __init__(self, resolution_m: float) -> None:
+        self._resolution_m = resolution_m
+        self._before: dict[int, Half | None] = {}
+        self._ticks: list[int] = []
+
+    def since(self, end: int) -> int:
+        """Returns the tick of the last change before tick ``end``; 0 without one."""
+        return max((tick for tick in self._ticks if tick < end), default=0)
+
+    def note(self, history: History, events: Iterable[tuple[int, Event]]) -> None:
+        """Notes the changes among these events, and keeps what was before those that the history has reached."""
+        self._ticks = sorted({tick for tick, event in events if "swap" in event or "set" in event})
+        for tick in self._ticks[-_MOST:]:
+            if tick and tick not in self._before and history.end_tick >= tick:
+                self._before[tick] = self._half(history, self.since(tick), tick)
+        for tick in list(self._before)[:-_MOST]:
+            del self._before[tick]
+
+    def _half(self, history: History, since: int, end: int) -> Half | None:
+        first = max(since, end - window_ticks(history.time.control_rate))
+        seen = see(history, since, end, self._resolution_m)
+        if seen is None or first < history.steps.full_from_tick:
+            return None
+        n = history.time.steps_per_tick
+        return Half(seen, budget(history, first, end), history.steps.rows(("x", "force"), first, end)[:, ::n])
+
+    def sight(self, history: History) -> Sight | None:
+        """Returns what the newest ticks show since the last change; None before there are any."""
+        end = last_tick(history)
+        return see(history, self.since(end), end, self._resolution_m)
+
+    def pair(self, history: History) -> tuple[int, Half | None, Half | None] | None:
+        """Returns the tick of the last change, and its two sides, each None where it is not held; None for no change.
+
+        The side after is the newest half second, of less where less has passed.
+        """
+        end = last_tick(history)
+        if not (tick := self.since(end)):
+            return None
+        return tick, self._before.get(tick), self._half(history, tick, end)
+
+
+def last_tick(history: History) -> int:
+    """Returns the tick before which plant and controller are known."""
+    ends = [history.steps.end_tick, history.ticks.end_tick]
+    return min([*ends, history.stop_tick] if history.stop_tick is not None else ends)

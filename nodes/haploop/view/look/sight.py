@@ -1,0 +1,143 @@
+"""Sight of a loop: what its newest half second shows, in a word that is told only of a whole window in one regime."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from haploop.logger.verdict.measures import CROSSINGS, ROUNDING, SMALLEST_SWING_M, WINDOW_S, swings
+from haploop.view.look.spectrum import main_line
+from haploop.view.store.history import History
+
+# A slow swing is looked for in so many windows; growth and decay are told beyond these ratios of the two halves.
+_LONG = 4
+_DIES, _GROWS = 0.5, 2.0
+# At rest, position stays within so many times what counts as a swing, and force within this share of the largest.
+_REST, _RIPPLE, _LEAST_RIPPLE_N = 4.0, 0.02, 1e-3
+_WHY = {
+    "settling": "Its numbers are those so far: no word before {window:g} s in one regime, since {begin}.",
+    "no contact": "No tick of the last {window:g} s was in contact.",
+    "swinging": "In the last {seen:.3g} s the position crossed its trend line {crossings} times by more than "
+    "{swing_um:.3g} µm.",
+    "swing grows": "In the last {seen:.3g} s the position crossed its trend line {crossings} times, the second half "
+    "{growth:.2f} times as wide as the first.",
+    "swing dies away": "In the last {seen:.3g} s the position crossed its trend line {crossings} times, the second "
+    "half {growth:.2f} times as wide as the first.",
+    "moving": "In the last {seen:.3g} s the position moved by {width_um:.3g} µm and crossed its trend line "
+    "{crossings} times: a push of the hand, or a swing slower than can be told.",
+    "force ripples": "The position rests, but in the last {window:g} s the force rippled by {ripple_N:.3g} N.",
+    "no swing seen": "In the last {seen:.3g} s the position stayed within {width_um:.3g} µm, the force within "
+    "{ripple_N:.3g} N. This says nothing of stability.",
+    "not finite": "A position or force is no finite number.",
+}
+
+
+@dataclass(frozen=True)
+class Sight:
+    """What is seen of a loop in an interval.
+
+    Attributes:
+        word: a key of the rules; ``why`` is a sentence.
+        from_s, to_s: the interval that was looked at.
+        so_far: whether the interval is shorter than a window, so that no word is told yet.
+        oscillation_m, ripple_N: widths of position and of applied force about their straight trends, peak to peak.
+        frequency_Hz: of the line of the position where one stands out, else of that of the force; None for none.
+        stiffness_N_m: mean of force over penetration at the ticks in contact; None of none.
+    """
+
+    word: str
+    why: str
+    from_s: float
+    to_s: float
+    so_far: bool = False
+    oscillation_m: float | None = None
+    ripple_N: float | None = None
+    frequency_Hz: float | None = None
+    stiffness_N_m: float | None = None
+
+
+def window_ticks(rate: int) -> int:
+    return max(2, round(WINDOW_S * rate))
+
+
+def see(history: History, since: int, end: int, resolution_m: float) -> Sight | None:
+    """Returns what the ticks before ``end`` show; None where none of them is held in full.
+
+    Args:
+        since: tick of the last change of the loop, or of its start: what was before is another regime. So is what was
+            before a contact that came after more than a window without one.
+        resolution_m: of the encoder; swings within it do not count. 0 without one.
+    """
+    rate, window = history.time.control_rate, window_ticks(history.time.control_rate)
+    known = max(history.steps.full_from_tick, history.ticks.full_from_tick, history.first_tick or 0)
+    begin, by = max(since, known), "the start" if since <= known else f"{since / rate:g} s"
+    if end - begin < 4:
+        return None
+    inside, stiffness = _contact(history, max(known, end - 2 * window), end)
+    came = end - len(inside) + int(np.argmax(inside)) if inside.any() else None
+    if came is not None and came > max(begin, end - window) and came > end - len(inside):
+        begin, by = came, f"contact at {came / rate:g} s"
+    so_far = end - begin < window
+    first = max(begin, end - window)
+    if end - first < 4:
+        return Sight("settling", _WHY["settling"].format(window=WINDOW_S, begin=by), first / rate, end / rate, True)
+    long_first = max(begin, end - _LONG * window)
+    n = history.time.steps_per_tick
+    x, force = history.steps.rows(("x", "force"), first, end)
+    slow = history.steps.rows(("x",), long_first, end)[0][::n]
+    if not (np.isfinite(x).all() and np.isfinite(force).all() and np.isfinite(slow).all()):
+        return Sight("not finite", _WHY["not finite"], first / rate, end / rate)
+    swing_m = max(resolution_m, SMALLEST_SWING_M)
+    (fast, fast_growth), (crossings, growth) = _swings(x, swing_m), _swings(slow, swing_m)
+    seen_s = (end - long_first) / rate
+    if fast >= CROSSINGS:
+        crossings, growth, seen_s = fast, fast_growth, (end - first) / rate
+    width, ripple = float(np.ptp(slow)), float(np.ptp(_flat(force)))
+    if so_far:
+        word = "settling"
+    elif not inside[-window:].any():
+        word = "no contact"
+    elif crossings >= CROSSINGS:
+        word = "swing dies away" if growth < _DIES else "swing grows" if growth > _GROWS else "swinging"
+    elif width > _REST * swing_m:
+        word = "moving"
+    else:
+        most = max(_LEAST_RIPPLE_N, _RIPPLE * float(np.abs(force).max()))
+        word = "force ripples" if ripple > most else "no swing seen"
+    line = main_line(slow, rate) if width > 2.0 * swing_m else None
+    line = line or (main_line(history.steps.rows(("force",), long_first, end)[0][::n], rate) if ripple else None)
+    why = _WHY[word].format(
+        window=WINDOW_S, begin=by, seen=seen_s, crossings=crossings, growth=growth, swing_um=swing_m * 1e6,
+        width_um=width * 1e6, ripple_N=ripple,
+    )  # fmt: skip
+    return Sight(
+        word, why, first / rate, end / rate, so_far, float(np.ptp(_flat(x))), ripple,
+        line.frequency_Hz if line else None, stiffness if inside[first - end :].any() else None,
+    )  # fmt: skip
+
+
+def _contact(history: History, first: int, end: int) -> tuple[np.ndarray, float | None]:
+    """Returns whether each tick was in contact, and the mean of total force over penetration in the newest window."""
+    position, x, total = history.ticks.rows(("wall_position", "x_measured", "total"), first, end)
+    depth = (x - position) * history.at_work.into_wall
+    with np.errstate(invalid="ignore"):
+        inside = depth > ROUNDING * np.abs(position)
+    newest = np.flatnonzero(inside[-window_ticks(history.time.control_rate) :])
+    if not len(newest):
+        return inside, None
+    newest += max(0, len(inside) - window_ticks(history.time.control_rate))
+    ratio = -total[newest] * history.at_work.into_wall / depth[newest]
+    return inside, float(ratio.mean()) if np.isfinite(ratio).all() else None
+
+
+def _flat(samples: np.ndarray) -> np.ndarray:
+    """Returns samples less their straight trend."""
+    t = np.arange(len(samples)) - (len(samples) - 1) / 2.0
+    flat = samples - samples.mean()
+    return flat - t * ((flat @ t) / (t @ t))
+
+
+def _swings(x: np.ndarray, swing_m: float) -> tuple[int, float]:
+    crossings, growth = swings(x[None], np.array([swing_m]))
+    return crossings[0], growth[0]

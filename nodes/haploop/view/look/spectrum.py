@@ -1,0 +1,66 @@
+"""Amplitude spectra of force and position, and the line that stands out of one."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+# The line is told where it holds this share of all that swings; below, there are many lines or noise.
+_STANDS_OUT = 0.25
+# Lines this many resolved frequencies beside the highest are part of it: a Hann window is as wide.
+_HALF_WIDTH = 2
+_FEWEST = 16
+
+
+class Line(NamedTuple):
+    """The line of a spectrum: its frequency, its swing peak to peak in the unit of the samples, and its share.
+
+    ``share`` is that of the variance, 0 to 1.
+    """
+
+    frequency_Hz: float
+    width: float
+    share: float
+
+
+def amplitudes(samples: np.ndarray, rate: float) -> tuple[np.ndarray, np.ndarray]:
+    """Returns frequencies in Hz and amplitudes, 0 to peak, of samples of shape (..., count) less their straight trend.
+
+    A Hann window is used, so that a sine of amplitude A shows as A at its frequency; frequencies are spaced by
+    ``rate / count``, and the first is above 0.
+    """
+    count = samples.shape[-1]
+    t = np.arange(count) - (count - 1) / 2.0
+    flat = samples - samples.mean(axis=-1, keepdims=True)
+    flat = flat - t * (flat @ t / (t @ t))[..., None]
+    window = np.hanning(count + 1)[:-1]
+    found = np.abs(np.fft.rfft(flat * window)) * (2.0 / window.sum())
+    return np.fft.rfftfreq(count, 1.0 / rate)[1:], found[..., 1:]
+
+
+def main_line(samples: np.ndarray, rate: float) -> Line | None:
+    """Returns the line that stands out of the spectrum of samples, shape (count,); None where none does.
+
+    Its frequency and height are those of the parabola through the logarithms of the three highest neighbours. None too
+    where fewer than three periods were seen, for which a frequency is a guess.
+    """
+    if len(samples) < _FEWEST or not np.isfinite(samples).all():
+        return None
+    at, height = amplitudes(samples, rate)
+    power = height**2
+    peak = int(np.argmax(height))
+    first, end = max(0, peak - _HALF_WIDTH), peak + _HALF_WIDTH + 1
+    if peak < 2 or not height[peak] > 1e-12 * np.abs(samples).max():
+        return None
+    share = float(power[first:end].sum() / power.sum())
+    if share < _STANDS_OUT:
+        return None
+    offset, top = 0.0, height[peak]
+    if peak + 1 < len(height):
+        low, mid, high = np.log(np.maximum(height[peak - 1 : peak + 2], 1e-300))
+        bend = low - 2.0 * mid + high
+        if bend < 0.0:
+            offset = 0.5 * (low - high) / bend
+            top = np.exp(mid - 0.25 * (low - high) * offset)
+    return Line(float(at[peak] + offset * (at[1] - at[0])), float(2.0 * top), share)

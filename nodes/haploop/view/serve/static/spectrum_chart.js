@@ -1,0 +1,78 @@
+// The spectrum of force and position: amplitudes over frequency on two axes, the line that stands out named.
+
+import { amount, axisNumbers } from "./amounts.js";
+import { bottomAxis, leftAxis } from "./axes.js";
+import { make, put } from "./dom.js";
+import { colour } from "./palette.js";
+import { line as linePath } from "./paths.js";
+import { Range, extent } from "./range.js";
+import { scaled, times } from "./snapshot.js";
+
+const SIDES = {
+  x: { label: "position", unit: "m", axis: "position (µm)", factor: 1e6, colour: "accent", least: 0.1 },
+  force: { label: "applied force", unit: "N", axis: "force (mN)", factor: 1e3, colour: "ink", least: 0.1 },
+};
+
+export class SpectrumChart {
+  /** @param {HTMLElement} host takes two charts, one below the other, and the names of their lines. */
+  constructor(host) {
+    this.note = make("p", { class: "about" });
+    this.charts = Object.entries(SIDES).map(([name, side]) => {
+      const said = make("p", { class: "line-name" });
+      const plot = make("div", { class: "plot" });
+      host.append(make("section", { class: "chart", "aria-label": `spectrum of the ${side.label}` }, said, plot));
+      return this.chart(name, side, plot, said);
+    });
+    host.append(this.note);
+  }
+
+  chart(name, side, plot, said) {
+    const range = new Range(side.least);
+    const size = () => ({ width: Math.max(120, plot.clientWidth), height: Math.max(80, plot.clientHeight) });
+    const u = new uPlot(
+      {
+        ...size(),
+        padding: [8, 12, 2, 0],
+        legend: { show: false },
+        cursor: { y: false, points: { show: false }, drag: { x: false, y: false } },
+        scales: {
+          x: { time: false, auto: false, distr: 3, log: 10, range: (_, min, max) => [min, max] },
+          y: { auto: false, range: () => range.now },
+        },
+        series: [{}, { stroke: () => colour(side.colour), width: 1.4, auto: false, points: { show: false } }],
+        axes: [
+          { ...bottomAxis("frequency (Hz)"), values: (_, splits) => splits.map((hz) => (hz == null ? null : axisNumbers([hz], hz < 1 ? 0.1 : 1)[0])) },
+          leftAxis(side.axis),
+        ],
+      },
+      [[1, 2], [0, 0]],
+      plot,
+    );
+    new ResizeObserver(() => plot.clientWidth && u.setSize(size())).observe(plot);
+    return { name, side, u, range, said };
+  }
+
+  show({ tables: { spectrum }, lines }) {
+    for (const { name, side, u, range, said } of this.charts) {
+      const column = spectrum?.columns.find((one) => one.name === name);
+      const at = spectrum ? times(spectrum) : new Float64Array(0);
+      const heights = column ? scaled(column.values, side.factor) : new Float64Array(0);
+      range.follow(...extent([heights], [0]));
+      u.setData([at, heights], false);
+      u.setScale("y", { min: range.now[0], max: range.now[1] });
+      if (at.length) u.setScale("x", { min: at[0], max: at.at(-1) });
+      put(said, `${side.label}: ${named(lines?.[name], side.unit)}`);
+    }
+    put(this.note, lines?.to_s ? `Amplitudes, ${lines.from_s.toFixed(2)} to ${lines.to_s.toFixed(2)} s.` : "Too few samples for a spectrum.");
+  }
+
+  refit() {
+    for (const { range } of this.charts) range.forget();
+  }
+}
+
+/** The main line in words. */
+function named(line, unit) {
+  if (!line) return `no line stands out`;
+  return `${amount(line.frequency_Hz, "Hz")}, ${amount(line.width, unit)} peak to peak`;
+}

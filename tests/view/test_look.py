@@ -1,0 +1,163 @@
+"""What the page says of a loop as it goes: no word before it can be told, none that the picture contradicts."""
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from haploop.launch import load, run
+from haploop.protocol.scene.scene import Wall
+from haploop.protocol.ticks import Timebase
+from haploop.view.look.budget import budget
+from haploop.view.look.compare import Changes
+from haploop.view.look.sight import see
+from haploop.view.look.spectrum import amplitudes, main_line
+from haploop.view.receive.ingest import Backfill
+from haploop.view.store.history import AtWork, History
+
+TIME = Timebase(10_000, 1_000, 0, 100_000)
+COUNT_M = 1e-5
+
+
+def history_of(x, force, wall_m: float | None = 0.0):
+    """A history of positions and forces over time, functions of s, sampled at plant steps, of 3 s."""
+    history, ticks = History(TIME, 0), 3000
+    t = np.arange(ticks * 10) / 1e4
+    history.append_steps(0, {"x": x(t) + 0.0 * t, "force": force(t) + 0.0 * t})
+    now = np.arange(ticks) / 1e3
+    columns = {"x": x(now) + 0.0 * now, "v": 0.0 * now, "wall": 0.0 * now, "total": force(now) + 0.0 * now}
+    history.append_ticks(0, columns, AtWork((), None if wall_m is None else Wall(position=wall_m, stiffness=100.0)))
+    return history
+
+
+def seen(x, force=lambda t: 0.1, since=0, end=3000, wall_m: float | None = 0.0):
+    found = see(history_of(x, force, wall_m), since, end, COUNT_M)
+    assert found
+    return found
+
+
+def deep(t):
+    return -1e-3 + 0.0 * t
+
+
+def sine(f, size):
+    return lambda t: -5e-3 + size * np.sin(2 * np.pi * f * t)
+
+
+@pytest.mark.parametrize("f", [3.3, 37.3, 200.1])
+def test_a_sine_is_one_line_of_its_frequency_and_width(f):
+    t = np.arange(2000) / 1000
+    line = main_line(0.2 * np.sin(2 * np.pi * f * t + 0.3) + 3 * t, 1000.0)
+    assert line
+    assert line.frequency_Hz == pytest.approx(f, abs=0.05)
+    assert line.width == pytest.approx(0.4, rel=0.03)
+    at, height = amplitudes(0.2 * np.sin(2 * np.pi * 50.0 * t), 1000.0)
+    assert height[np.argmin(abs(at - 50.0))] == pytest.approx(0.2, rel=1e-3)
+
+
+def test_noise_a_constant_and_less_than_two_periods_have_no_line():
+    noise = np.random.default_rng(1).normal(size=2000)
+    assert main_line(noise, 1000.0) is None
+    assert main_line(np.ones(2000), 1000.0) is None
+    assert main_line(np.sin(2 * np.pi * 0.4 * np.arange(2000) / 1000), 1000.0) is None
+
+
+def test_before_half_a_second_in_one_regime_there_is_no_word():
+    """After the start, after a change, and after contact where there was none."""
+    swing = sine(40.0, 1e-3)
+    assert seen(swing, end=499).word == "settling"
+    assert seen(swing, end=500).word == "swinging"
+    assert seen(swing, since=2600).word == "settling"
+    assert seen(swing, since=2500).word == "swinging"
+
+    def arrives(t):
+        return np.where(t < 2.7, 1e-3, -1e-3)
+
+    early = seen(arrives)
+    assert (early.word, early.from_s, early.so_far) == ("settling", 2.7, True)
+    assert seen(arrives, end=2600).word == "no contact"
+
+
+def test_what_bounces_on_and_off_the_wall_is_one_regime():
+    assert seen(lambda t: 2e-3 * np.sin(2 * np.pi * 8.0 * t)).word == "swinging"
+
+
+def test_no_swing_is_said_to_be_unseen_that_a_picture_of_two_seconds_shows():
+    """Of 1 to 3 Hz half a second has fewer than four crossings, which is no swing to the window's rule."""
+    words = {f: seen(sine(f, 1e-3)).word for f in (0.3, 0.7, 1.0, 1.5, 3.0, 8.0, 100.0)}
+    assert "no swing seen" not in words.values()
+    assert words[1.5] == words[3.0] == words[100.0] == "swinging"
+    assert words[0.3] == "moving"
+
+
+def test_a_force_that_buzzes_while_the_position_rests_is_told():
+    quiet, loud = (seen(deep, lambda t, size=size: 0.5 + size * np.sign(np.sin(700.0 * t))) for size in (1e-4, 0.1))
+    assert quiet.word == "no swing seen"
+    assert loud.word == "force ripples"
+    assert loud.ripple_N == pytest.approx(0.2, rel=0.02)
+    assert loud.frequency_Hz == pytest.approx(700.0 / (2 * np.pi), rel=0.01)
+
+
+def test_growth_and_decay_have_words_of_their_own():
+    def grows(rate):
+        return lambda t: -5e-3 + 1e-4 * np.exp(rate * (t - 3.0)) * np.sin(2 * np.pi * 30 * t)
+
+    assert [seen(grows(rate)).word for rate in (4.0, 0.0, -4.0)] == ["swing grows", "swinging", "swing dies away"]
+    assert seen(lambda t: np.where(t > 2.9, np.nan, -1e-3)).word == "not finite"
+
+
+def recorded(tmp_path):
+    """The history of a run of 3 s, and its summary."""
+    loaded = load("fig6c").set({"duration": 3.0})
+    result = run(loaded, out=tmp_path / "run")
+    time = Timebase.from_scene(loaded.scene)
+    backfill = Backfill(tmp_path / "run", loaded.scene, time, [])
+    backfill.read()
+    return backfill.history, result.summary
+
+
+def test_the_budget_closes_and_its_causes_are_those_of_the_summary(tmp_path):
+    history, summary = recorded(tmp_path)
+    found = budget(history, 0, history.end_tick)
+    assert found
+    total = {row["name"]: row["total_J"] for row in found["rows"]}
+    energy = summary["energy"]
+    leak = energy["wall"]["leak"]
+    assert abs(sum(total.values())) < 1e-15 * energy["moved_J"] + 1e-17
+    for name, value in {
+        "hand": -energy["hand_work_J"], "sampling and hold": leak["sampling_and_hold_J"], "delay": leak["delay_J"],
+        "heat in device": energy["device_heat_J"], "unidirectional-inertia": energy["elements"][0]["true_J"],
+    }.items():  # fmt: skip
+        # The books on the page are those of the last tick, the summary's of the end: one tick apart.
+        assert total[name] == pytest.approx(value, rel=0.02), name
+    last = budget(history, 1500, history.end_tick)
+    early = budget(history, 0, 1501)
+    assert last
+    assert early
+    for late, soon, whole in zip(last["rows"], early["rows"], found["rows"], strict=True):
+        assert late["window_J"] + soon["total_J"] == pytest.approx(whole["total_J"], abs=1e-15)
+    assert abs(sum(row["window_J"] for row in last["rows"])) < 1e-17
+
+
+def test_the_two_sides_of_a_change_are_kept_also_when_the_history_has_forgotten_the_first():
+    def calms(t):
+        return np.where(t < 2.0, sine(40.0, 1e-3)(t), -5e-3)
+
+    history, changes = history_of(calms, lambda t: 0.1), Changes(COUNT_M)
+    events: list[Any] = [(1, {"pause": True}), (2000, {"swap": {"kind": "damping"}})]
+    assert changes.pair(history) is None
+    changes.note(history, events)
+    pair = changes.pair(history)
+    assert pair
+    tick, before, after = pair
+    assert before
+    assert after
+    assert (tick, before.sight.word, after.sight.word) == (2000, "swinging", "no swing seen")
+    assert before.traces.shape == (2, 500)
+    assert np.array_equal(before.traces[0], calms(np.arange(1500, 2000) / 1e3))
+    forgot: Any = SimpleNamespace(**{name: getattr(history, name) for name in ("end_tick", "steps", "ticks", "time")})
+    changes.note(forgot, events)
+    pair = changes.pair(history)
+    assert pair
+    assert pair[1] is before
