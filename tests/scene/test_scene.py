@@ -24,7 +24,7 @@ def test_defaults_are_filled_in_and_absent_tables_stay_absent():
         "clock": {"plant_rate": 10_000, "control_rate": 1_000, "round_trip_delay": 0.0, "integrator": "exact"},
         "device": {"mass": 0.01, "damping": 0.1, "position": 0.0, "velocity": 0.0},
         "run": {"log": "steps", "pin": True, "block_ticks": 1000, "window_blocks": 2, "deadline": 5.0}
-        | {"verdict": "pushed"},
+        | {"verdict": "pushed", "faulty_swap": "restore"},
     }
     assert scene(wall=WALL).wall == Wall(position=-0.06, stiffness=150.0, occupies="below")
     assert scene(encoder={"resolution": 1e-5}).encoder == Encoder(resolution=1e-5, rounding="nearest")

@@ -4,19 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, TypedDict
+from typing import Any, NotRequired, TypedDict
 
 from haploop.controller.dissipation import Element, ElementError
 from haploop.protocol.scene.scene import ElementTable
 
 
 class Description(TypedDict):
-    """An element and its book, as they stand in telemetry and summary; ``parameters`` has ``acts`` beside its own."""
+    """An element and its book, as they stand in telemetry and summary; ``parameters`` has ``acts`` beside its own.
+
+    ``columns`` has the units of what it shows in the log beside its force, and is left out where that is nothing.
+    """
 
     book: int
     kind: str
-    parameters: dict[str, float | str]
+    parameters: dict[str, Any]
     from_tick: int
+    columns: NotRequired[dict[str, str]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,16 +32,23 @@ class ActiveElement:
     Attributes:
         acts: "always", or "in-contact": the force is 0 out of contact.
         book: number of the book, in order of opening within the run.
+        swapped: tick of the swap that brought it and what was in its place, None for nothing; None for the scene's own.
     """
 
     element: Element
     acts: str
     book: int
     from_tick: int
+    swapped: tuple[int, ActiveElement | None] | None = None
 
     def describe(self) -> Description:
         parameters = {**self.element.values(), "acts": self.acts}
-        return {"book": self.book, "kind": self.element.kind, "parameters": parameters, "from_tick": self.from_tick}
+        told: Description = {
+            "book": self.book, "kind": self.element.kind, "parameters": parameters, "from_tick": self.from_tick,
+        }  # fmt: skip
+        if self.element.columns:
+            told["columns"] = dict(self.element.columns)
+        return told
 
 
 def make_element(table: ElementTable, kinds: Mapping[str, type[Element]]) -> tuple[Element, str]:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 from haploop.controller.active_elements import ActiveElement
-from haploop.controller.dissipation.element import Element, Motion
+from haploop.controller.dissipation.element import Element, ElementError, Motion
 from haploop.protocol.arrays import where
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
@@ -60,6 +61,19 @@ def first_memory(element: Element, declared: Declared) -> Any:
         return element.memory
     commands = (0.0,) * (declared.whole_ticks + 1) if "acted" in element.asks else ()
     return Told(element.memory, commands=commands)
+
+
+def shown(memory: Any, names: Sequence[str]) -> list[float]:
+    """Returns what an element shows in the log beside its force: fields of its memory.
+
+    Raises ElementError where they are no numbers.
+    """
+    own = memory.own if memory.__class__ is Told else memory
+    try:
+        return [float(getattr(own, name)) for name in names]
+    except (AttributeError, TypeError, ValueError) as error:
+        what = f"{type(error).__name__}: {error}"
+        raise ElementError(f"The log is to show {' and '.join(names)} of its memory, numbers; {what}.") from error
 
 
 def answer_of(

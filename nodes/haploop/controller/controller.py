@@ -5,75 +5,23 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from copy import copy, deepcopy
-from dataclasses import replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from haploop.controller.active_elements import ActiveElement, make_element
-from haploop.controller.asked import Declared, first_memory
-from haploop.controller.dissipation import Element, ElementError, Motion, load_plugin
+from haploop.controller.asked import Declared, shown
+from haploop.controller.changes import Kinds, apply_change, take_back, try_element
+from haploop.controller.dissipation import ElementError, Motion
 from haploop.controller.estimators.base import Sample
 from haploop.controller.estimators.choose import make_estimators
 from haploop.controller.recorder import Recorder
 from haploop.controller.tick import ControllerParams, ControllerState, NoForce, StateTuple, Wall, initial_state, tick
-from haploop.protocol.changes import Change, Event
-from haploop.protocol.scene.scene import NO_ELEMENT, ElementTable, Scene
+from haploop.protocol.changes import Change, Event, restoration
+from haploop.protocol.scene.scene import NO_ELEMENT, Scene
 from haploop.protocol.ticks import DELAY, Timebase
 from haploop.protocol.trees import tree_select
 
 if TYPE_CHECKING:
     import numpy as np
-
-Kinds = dict[str, type[Element]]
-
-
-def apply_change(
-    change: Change, params: ControllerParams, state: ControllerState, kinds: Kinds
-) -> tuple[ControllerParams, ControllerState]:
-    """Returns parameters and state after a change that was checked before; whatever raises leaves both as they were.
-
-    A plugin is loaded first; it lies in the run's own directory, put there by the launcher.
-    """
-    if change.plugin is not None:
-        kinds.update(load_plugin(Path(change.plugin)))
-    if change.swap is not None:
-        params, state = _swapped(params, state, change, change.swap, kinds)
-    for key, value in change.set.items():
-        params = _set(params, change.tick, key.split("."), value)
-    return params, state
-
-
-def _swapped(
-    params: ControllerParams, state: ControllerState, change: Change, table: ElementTable, kinds: Kinds
-) -> tuple[ControllerParams, ControllerState]:
-    """Returns both with a new element in its place, one more past the end, or one less; a new one's memory is fresh."""
-    place, elements, memories, books = change.element, list(params.elements), list(state.elements), params.books
-    if table.name == NO_ELEMENT:
-        del elements[place]
-        del memories[place]
-    else:
-        active = ActiveElement(*make_element(table, kinds), books, change.tick)
-        elements[place : place + 1] = [active]
-        memories[place : place + 1] = [first_memory(active.element, params.declared)]
-        books += 1
-    return replace(params, elements=tuple(elements), books=books), state._replace(elements=tuple(memories))
-
-
-def _set(params: ControllerParams, tick: int, path: list[str], value: float) -> ControllerParams:
-    match path:
-        case ["wall", "stiffness" | "position" as name]:
-            return replace(params, wall=replace(params.wall, **{name: value}))
-        case ["clock", "round_trip_delay"]:  # the plant's to do; elements that ask are told
-            steps = round(value * params.declared.steps / params.motion.period_s)
-            return replace(params, declared=params.declared.delayed(steps))
-        case ["dissipation", place, name]:
-            elements = list(params.elements)
-            active = elements[int(place)]
-            setattr(active.element, name, value)  # in place: what an element keeps of its own stays
-            elements[int(place)] = replace(active, book=params.books, from_tick=tick)
-            return replace(params, elements=tuple(elements), books=params.books + 1)
-    raise KeyError(f"{'.'.join(path)} cannot be set while a loop runs")
-
 
 # Later than any tick; compared as an int, which is quicker than infinity.
 _NEVER = 2**62
@@ -99,6 +47,7 @@ class Controller:
 
     def __init__(self, scene: Scene, time: Timebase, kinds: Kinds, recorder: Recorder | None = None) -> None:
         self._kinds, self._control_rate = dict(kinds), time.control_rate
+        self._restores = scene.run.faulty_swap == "restore"
         self.params = make_params(scene, time.period_s, self._kinds)
         self.state: StateTuple | None = None
         self.tick = 0
@@ -153,26 +102,61 @@ class Controller:
             state = self.state = initial_state(self.params, samples[0])
         for sample in samples:
             if self.tick >= self._next_change:
-                state = self._change(ControllerState(*state))
+                state = self._change(ControllerState(*state), sample)
             try:
                 state, row = tick(self.params, state, sample)
             except NoForce as error:
-                raise ElementError(error.sentence(self.params, self.tick)) from error.__cause__
+                state, row = self._without(error, ControllerState(*state), sample)
             self.state = state
             self.tick += 1
-            self.recorder.add(row)
             forces.append(row[-2])
+            for index, names in self.recorder.own:
+                row += self._shown(index, state[3][index], names)
+            self.recorder.add(row)
         return forces
 
-    def _change(self, state: ControllerState) -> ControllerState:
+    def _shown(self, index: int, memory: Any, names: Sequence[str]) -> list[float]:
+        try:
+            return shown(memory, names)
+        except ElementError as error:
+            kind = self.params.elements[index].element.kind
+            raise ElementError(f"Element {index} ({kind}) failed at tick {self.tick - 1}: {error}") from error
+
+    def _change(self, state: ControllerState, sample: Sample) -> ControllerState:
         """Carries out what is due; later ticks are written to a new block, since its columns may differ."""
         self.recorder.cut()
         while self._changes and self._changes[0].tick <= self.tick:
             change = self._changes.pop(0)
             try:
-                self.params, state = apply_change(change, self.params, state, self._kinds)
+                params, after = apply_change(change, self.params, state, self._kinds)
+                if change.swap is not None and change.swap.name != NO_ELEMENT:
+                    try_element(change.element, params, after, sample)
+            except NoForce as error:
+                self.recorder.refused.append(change.refuse(error.__cause__ or error))
             except (Exception, SystemExit) as error:
                 self.recorder.refused.append(change.refuse(error))
+            else:
+                self.params, state = params, after
         self._next_change = self._changes[0].tick if self._changes else _NEVER
         self.recorder.open(self.params)
         return state
+
+    def _without(self, error: NoForce, state: ControllerState, sample: Sample) -> tuple[StateTuple, list[Any]]:
+        """Returns state and row of this tick after swaps of the last second, whose elements raise, are taken back.
+
+        Raises:
+            ElementError: an element raises that no such swap has brought, or the scene asks for the end.
+        """
+        while True:
+            why, place = error.sentence(self.params, self.tick), error.index
+            swapped = self.params.elements[place].swapped
+            if not self._restores or swapped is None or self.tick - swapped[0] >= self._control_rate:
+                raise ElementError(why) from error.__cause__
+            self.recorder.cut()
+            change, self.params, state = take_back(place, swapped[1], self.params, state, self.tick)
+            self.recorder.open(self.params)
+            self.recorder.restored.append(restoration(change, f"{why} It is taken back: {change.describe()}."))
+            try:
+                return tick(self.params, state, sample)
+            except NoForce as other:
+                error = other

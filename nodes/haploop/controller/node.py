@@ -99,8 +99,7 @@ class ControllerNode:
             self._publisher.publish("CONTROLLER_BLOCK", *fields)
         self._publisher.serve()
         self._reported = self._controller.tick
-        refused, recorder.refused = recorder.refused, []
-        self._client.progress(self._reported, refusals_as_status(refused))
+        self._client.progress(self._reported, refusals_as_status(*recorder.take_told()))
         self._block.next()
 
     def _wait(self, on: str) -> None:

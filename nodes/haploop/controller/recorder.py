@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from haploop.controller.active_elements import Description
 from haploop.controller.tick import ControllerParams
-from haploop.protocol.changes import Change
+from haploop.protocol.changes import Change, Event
 from haploop.protocol.transport.telemetry import Block
 
 if TYPE_CHECKING:
@@ -24,6 +24,8 @@ class Recorder:
     description per dissipation column) and ``wall`` (position, stiffness, into_wall) as they stood in its ticks.
 
     Attributes:
+        refused, restored: changes that were not made; events that tell of swaps taken back.
+        own: index and names of what elements show beside their forces; those end a row.
         history: the newest blocks taken, covering every command that may still be in flight.
         trouble: the element that first gave a force which is no finite number, as a sentence, or None.
     """
@@ -32,9 +34,11 @@ class Recorder:
         self._history_ticks = history_ticks
         self._cut: list[Block] = []
         self.refused: list[Change] = []
+        self.restored: list[Event] = []
         self.history: list[Block] = []
         self.trouble: str | None = None
         self._next_tick = 0
+        self.own: tuple[tuple[int, tuple[str, ...]], ...] = ()
 
     def open(self, params: ControllerParams) -> None:
         """Starts a block with the columns of these elements, in which wall and elements are as they are now."""
@@ -42,8 +46,11 @@ class Recorder:
         self._begin()
         self.elements = [active.describe() for active in params.elements]
         self._wall = {"position": wall.position, "stiffness": wall.stiffness, "into_wall": wall.inward}
-        names = [f"dissipation.{index}" for index in range(len(self.elements))]
-        self._names = [*MOTION_COLUMNS, *names, "total", "in_contact"]
+        forces = [f"dissipation.{index}" for index in range(len(self.elements))]
+        shows = [(*active.element.columns,) for active in params.elements]
+        self.own = tuple((index, names) for index, names in enumerate(shows) if names)
+        own = [f"dissipation.{index}.{name}" for index, names in self.own for name in names]
+        self._names = [*MOTION_COLUMNS, *forces, "total", "in_contact", *own]
 
     def _begin(self) -> None:
         self._rows: list[float] = []
@@ -75,6 +82,12 @@ class Recorder:
             del self.history[0]
         self._begin()
         return blocks
+
+    def take_told(self) -> tuple[list[Change], list[Event]]:
+        """Returns the changes refused, and the events of swaps taken back, since the last call."""
+        told = self.refused, self.restored
+        self.refused, self.restored = [], []
+        return told
 
     def _find_trouble(self, columns: dict[str, array[float]]) -> None:
         found = [
@@ -111,6 +124,7 @@ class BatchRecorder(Recorder):
     def open(self, params: ControllerParams) -> None:
         """Gives the rows to come the columns of these elements and this wall."""
         super().open(params)
+        self.own = ()
         self._shared = {"wall_position": params.wall.position, "wall_stiffness": params.wall.stiffness}
         self._books = [active.book for active in params.elements]
         self.add = self._add

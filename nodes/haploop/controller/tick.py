@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, NamedTuple
 
 from haploop.controller.active_elements import ActiveElement
@@ -91,7 +92,23 @@ class NoForce(Exception):
         kind, cause = params.elements[self.index].element.kind, self.__cause__
         name = getattr(cause, "name", None)
         hint = f' It is told what it names in its class: asks = ("{name}",).' if name in ASKABLE else ""
-        return f"Element {self.index} ({kind}) gave no force at tick {tick}: {type(cause).__name__}: {cause}.{hint}"
+        what = f"{type(cause).__name__}: {cause}{_line(cause)}"
+        return f"Element {self.index} ({kind}) gave no force at tick {tick}: {what}.{hint}"
+
+
+def _line(error: BaseException | None) -> str:
+    """Returns the file and the line of an element's code at which it raised; nothing where that is not its code."""
+    trace = error.__traceback__ if error else None
+    while trace and trace.tb_next:
+        trace = trace.tb_next
+    file = trace.tb_frame.f_code.co_filename if trace else __file__
+    return "" if trace is None or file == __file__ else f" ({Path(file).name}, line {trace.tb_lineno})"
+
+
+def _number(force: Any) -> float:
+    if isinstance(force, str | bytes):
+        raise TypeError(f"it returned {force!r}, which is text and no number")
+    return float(force)
 
 
 def initial_state(params: ControllerParams, sample: Sample) -> ControllerState:
@@ -139,7 +156,7 @@ def tick(params: ControllerParams, state: StateTuple, sample: Sample) -> tuple[S
                     force, memory = active.element.force(motion, memory)
                 memories = (*memories[:index], memory, *memories[index + 1 :])
             if one_loop:
-                force = float(force) if contact or active.acts == "always" else 0.0
+                force = _number(force) if contact or active.acts == "always" else 0.0
             else:
                 force = 1.0 * (force if active.acts == "always" else where(contact, force, 0.0))
             row.append(force)

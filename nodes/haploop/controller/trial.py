@@ -77,11 +77,15 @@ def _declaration(element: type[Element], origin: str) -> Reply:
     parameters, defaults = {}, {}
     for name, (quantity, default) in element.parameters().items():
         parameters[name] = dataclasses.asdict(quantity)
-        if default is not dataclasses.MISSING:
-            try:
-                defaults[name] = float(default)
-            except (TypeError, ValueError):
-                raise PluginError(f"{origin}: the default of {name} must be a number, but is {default!r}.") from None
+        if default is dataclasses.MISSING:
+            continue
+        if quantity.choices:
+            defaults[name] = default
+            continue
+        try:
+            defaults[name] = int(default) if quantity.whole else float(default)
+        except (TypeError, ValueError):
+            raise PluginError(f"{origin}: the default of {name} must be a number, but is {default!r}.") from None
     says = {"linear": bool(element.linear) and not element.asks, "limits": bool(element.limits)}
     return {"name": element.__name__, "about": element.__doc__, **says, "parameters": parameters, "defaults": defaults}
 

@@ -47,6 +47,7 @@ class Logger:
         self._into_wall = 0.0
         self._accounts: dict[int, Account] = {}
         self._events: list[tuple[int, Event]] = []
+        self._not_made: list[str] = []
         self._counted: Counter[str] = Counter()
         self._digest = hashlib.sha256()
         self.booked: Callable[[int, dict[str, np.ndarray]], object] = lambda first, books: None
@@ -85,6 +86,7 @@ class Logger:
 
     def event(self, tick: int, event: Event) -> None:
         """Takes note of something that changes the run at ``tick``; it is logged once the books get there."""
+        self._not_made += [event[kind] for kind in ("refused", "restored") if kind in event]
         insort(self._events, (tick, event), key=lambda item: item[0])
         self._log_events()
 
@@ -206,7 +208,8 @@ class Logger:
         ]
         has_wall = self._scene.wall is not None
         energies = energy(books, accounts, has_wall) | self._balance()
-        return outcome(self._scene, ran, self._measured(), diverged) | {"energy": energies}
+        told = {"not_made": self._not_made} if self._not_made else {}
+        return outcome(self._scene, ran, self._measured(), diverged) | {"energy": energies} | told
 
     def _balance(self) -> dict[str, str]:
         """Returns what the books leave unexplained as the sentence ``balance``, where it is worth one."""

@@ -2,13 +2,14 @@
 
 An event is a map, as ``[[event]]`` of a scene, GRANT and the log's ``/events`` hold it. Some events change what is
 simulated: ``swap`` (an element comes, goes or takes another's place) and ``set`` (values of wall, delay or elements).
-The others (pause, resume, step, pace, stop, refused) change no bit of it.
+The others (pause, resume, step, pace, stop, refused, restored) change no bit of it: a controller that takes a swap
+back, since the new element raised, has done so by itself before the event tells of it.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import reduce
 from typing import Any
@@ -18,9 +19,9 @@ from haploop.protocol.scene.scene import NO_ELEMENT, ElementTable, Scene
 
 Event = dict[str, Any]
 
-KINDS = ("swap", "set", "pause", "resume", "step", "stop", "pace", "refused")
-# What the status of a PROGRESS tells of changes that were not made.
-REFUSALS = ("refused", "refused_changes")
+KINDS = ("swap", "set", "pause", "resume", "step", "stop", "pace", "refused", "restored")
+# What the status of a PROGRESS tells of changes that were not made, or were taken back.
+REFUSALS = ("refused", "refused_changes", "restored")
 _NO_UNITS: Mapping[str, str] = {}
 
 
@@ -35,6 +36,7 @@ class Change:
         set: dotted key -> value in SI units.
         plugin: path of a file that defines the element, loaded first; None for none.
         refused: why it could not be carried out, a full sentence; None where it was.
+        on_record: tick of the event that tells of it, where that is a later one: of a swap taken back.
     """
 
     tick: int
@@ -43,6 +45,7 @@ class Change:
     set: Mapping[str, Any] = field(default_factory=dict)
     plugin: str | None = None
     refused: str | None = None
+    on_record: int | None = field(default=None, compare=False)
 
     @classmethod
     def from_dict(cls, tick: int, event: Event) -> Change:
@@ -134,15 +137,21 @@ def refusal(change: Change) -> Event:
     return {"refused": change.refused, "change": {k: v for k, v in change.as_dict().items() if k != "refused"}}
 
 
-def refusals_as_status(refused: Iterable[Change]) -> Event | None:
-    """Returns what the controller's PROGRESS reports of refused changes; None where there are none."""
+def refusals_as_status(refused: Iterable[Change], restored: Sequence[Event] = ()) -> Event | None:
+    """Returns what the controller's PROGRESS reports of changes refused and taken back; None where there are none."""
     events = [refusal(change) for change in refused]
     named = {"refused": "refused", "refused_changes": "change"}
-    return {key: [event[name] for event in events] for key, name in named.items()} if events else None
+    status = {key: [event[name] for event in events] for key, name in named.items()} if events else {}
+    return status | ({"restored": list(restored)} if restored else {}) or None
+
+
+def restoration(change: Change, why: str) -> Event:
+    """Returns the event that tells of a swap that was taken back: what took its place, from which tick on, and why."""
+    return {"restored": why, "change": change.as_dict()}
 
 
 def refused_change(event: Event) -> Change | None:
-    """Returns the change that a refusal names, None where it names none."""
+    """Returns the change that a refusal, or the taking back of a swap, names; None where it names none."""
     try:
         return Change.from_dict(
             int(event["change"]["tick"]), {**event["change"], "set": dict(event["change"].get("set", {}))}
@@ -169,6 +178,10 @@ def refusals_of(status: Event, events: Iterable[tuple[int, Event]] = ()) -> list
             elif any(change.is_as(other) for other in known):
                 continue
         found.append(event)
+    taken_back = status.get("restored")
+    for told in taken_back if isinstance(taken_back, list) else ():
+        if change := refused_change(told):
+            found.append(restoration(change, str(told.get("restored"))))
     return found
 
 
@@ -176,7 +189,13 @@ def changes_of(events: Iterable[tuple[int, Event]]) -> list[Change]:
     """Returns the changes among (tick, event) in order, with ``refused`` where a later event refuses one."""
     events = list(events)
     refusals = [event for _, event in events if "refused" in event]
-    changes = [Change.from_dict(tick, event) for tick, event in events if is_change(event)]
+    changes: list[Change] = []
+    for tick, event in events:
+        if is_change(event):
+            changes.append(Change.from_dict(tick, event))
+        elif "restored" in event and (change := refused_change(event)):
+            changes.append(replace(change, on_record=tick))
+    changes.sort(key=lambda change: change.tick)
     sentences = [
         next((event["refused"] for event in refusals if change.is_as(refused_change(event))), None)
         for change in changes
@@ -207,12 +226,13 @@ def describe(event: Event, units: Mapping[str, str] = _NO_UNITS) -> str:
             return f"{event['step']} tick{'s' * (event['step'] != 1)} on"
         case "pace":
             return "as fast as it goes" if event["pace"] == "free" else f"pace {_amount(event['pace'], None)}"
-        case "refused":
-            return str(event["refused"])
+        case "refused" | "restored" as kind:
+            return str(event[kind])
         case kind:
             return {"pause": "paused", "resume": "resumed", "stop": "stopped"}.get(kind or "", "changed")
 
 
 def _amount(value: Any, unit: str | None) -> str:
-    is_number = isinstance(value, int | float) and not isinstance(value, bool)
-    return f"{value:g} {unit or ''}".rstrip() if is_number else str(value)
+    if isinstance(value, bool):
+        return str(value).lower()
+    return f"{value:g} {unit or ''}".rstrip() if isinstance(value, int | float) else str(value)

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 # Bounds of what can be meant, by unit: the largest size to either side, what that is like, and the least of what must
 # be above 0. Beyond them products overflow; what declares bounds of its own has those.
@@ -35,6 +37,7 @@ class Quantity:
         at_least, above, at_most, below: bounds, each optional; those of ``MEANT`` stand in for the ones left out.
         about: the meaning of the number in a few words, for editors.
         whole: only whole numbers, held as int.
+        choices: all the values there are, texts or False and True, of what is no number; empty of one that is.
     """
 
     unit: str
@@ -44,11 +47,16 @@ class Quantity:
     below: float | None = None
     about: str = ""
     whole: bool = False
+    choices: tuple[str | bool, ...] = ()
 
-    def as_dict(self) -> dict[str, str | float | None]:
-        """Returns unit and bounds by name, as they travel on the wire."""
+    def as_dict(self) -> dict[str, Any]:
+        """Returns unit and bounds by name, as they travel on the wire; ``choices`` where there are some."""
         names = ("unit", "at_least", "above", "at_most", "below")
-        return {name: getattr(self, name) for name in names}
+        return {name: getattr(self, name) for name in names} | ({"choices": [*self.choices]} if self.choices else {})
+
+    def text(self, value: Any) -> str:
+        """Returns a value with its unit, a choice as a scene file has it."""
+        return json.dumps(value) if self.choices else f"{value:g} {self.unit}".rstrip()
 
     def complaint(self, value: float) -> str | None:
         """Returns what is wrong with ``value`` ("must be above 0 kg"), or None when it may be used."""
@@ -80,6 +88,6 @@ class Quantity:
         return None
 
 
-def si(unit: str, about: str = "", *, whole: bool = False, **bounds: float) -> Quantity:
+def si(unit: str, about: str = "", *, whole: bool = False, **bounds: Any) -> Quantity:
     """Makes a ``Quantity`` in one line: ``mass: Annotated[float, si("kg", "mass of the device", above=0)]``."""
     return Quantity(unit, about=about, whole=whole, **bounds)

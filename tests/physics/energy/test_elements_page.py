@@ -1,4 +1,4 @@
-"""docs/elements.md: its three files run as they stand, and its table is what the elements do."""
+"""docs/elements.md and plugins.md: their files run as they stand, and the table is what the elements do."""
 
 from __future__ import annotations
 
@@ -13,13 +13,14 @@ from helpers.runs.batches import alone, pressed, together, with_element
 from helpers.scenes.least import KINDS, scene
 
 PAGE = (Path(__file__).parents[3] / "docs/elements.md").read_text(encoding="utf-8")
-FILES = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
-VALUES = [{"coefficient": 5.0}, {"damping": 0.3}, {"most": 4.0}]
+PLUGINS = (Path(__file__).parents[3] / "docs/plugins.md").read_text(encoding="utf-8")
+FILES = re.findall(r"```python\n(.*?)```", PAGE + PLUGINS, re.DOTALL)
+VALUES = [{"coefficient": 5.0}, {"damping": 0.3}, {"most": 4.0}, {"most": 4.0, "side": "inward", "on": True}]
 ROWS = re.findall(r"^\| (none|`[^|]*) \| ([\d.]+) \| ([\d.]+) \| ([\d.]+) \|$", PAGE, re.MULTILINE)
 NAMES = {"N s/m": ("damping", 1.0), "N/m": ("stiffness", 1.0), "g": ("mass", 1e-3), "ms": ("time", 1e-3)}
 
 
-@pytest.mark.parametrize("place", range(3))
+@pytest.mark.parametrize("place", range(len(VALUES)))
 def test_a_file_of_the_page_runs_alone_and_has_the_same_bits_in_a_batch(place: int) -> None:
     found = load_source(FILES[place], "page.py")
     kinds, (kind,) = KINDS | found, found

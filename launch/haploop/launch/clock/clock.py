@@ -249,7 +249,10 @@ class Clock:
         while end < len(self.events) and self.events[end][0] < tick:
             end += 1
         if end > self._settled:
-            made = [change for change in changes_of(self.events[self._settled :]) if change.tick < tick]
+            changes = changes_of(self.events[self._settled :])
+            made = [
+                change for change in changes if (change.tick if change.on_record is None else change.on_record) < tick
+            ]
             waiting = tuple(event for event in self._scene.event if self._time.first_tick_at(event.at) >= tick)
             self._scene, self._settled = replace(at_work(self._scene, made), event=waiting), end
 

@@ -107,9 +107,9 @@ class Loop:
             logger.plant_block({"from_tick": first, "ticks": ticks, "columns": columns})
         for block in self._controller.recorder.take():
             logger.controller_block(block)
-        for change in self._controller.recorder.refused:
-            logger.event(self._controller.tick, refusal(change))
-        self._controller.recorder.refused = []
+        refused, restored = self._controller.recorder.take_told()
+        for event in (*map(refusal, refused), *restored):
+            logger.event(self._controller.tick, event)
 
     def end_here(self) -> None:
         self.schedule([(self._plant.tick, {"stop": True})])

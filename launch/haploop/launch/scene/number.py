@@ -25,13 +25,17 @@ class Number:
 
     quantity: Quantity
 
-    def read(self, value: Any) -> float:
-        """Returns the number in SI units.
+    def read(self, value: Any) -> Any:
+        """Returns the number in SI units, or the choice.
 
         Raises:
             PydanticCustomError: not a number, not finite, out of bounds, or of another dimension; its message is
                 a full sentence.
         """
+        if self.quantity.choices:
+            if any(choice.__class__ is value.__class__ and choice == value for choice in self.quantity.choices):
+                return value
+            _refuse(f"It must be {self.form}.")
         if isinstance(value, bool) or not isinstance(value, (int, float, str)):
             _refuse(f"It must be {self.form}.")
         try:
@@ -53,6 +57,8 @@ class Number:
     def form(self) -> str:
         """The form to write: 'a number in kg, above 0, or text with its unit'."""
         q = self.quantity
+        if q.choices:
+            return " or ".join(map(q.text, q.choices))
         bounds = {"at least": q.at_least, "above": q.above, "at most": q.at_most, "below": q.below}
         words = " and ".join(f"{word} {bound:g}" for word, bound in bounds.items() if bound is not None)
         unit = f" in {q.unit}" if q.unit else ""
@@ -64,6 +70,8 @@ class Number:
 
     def __get_pydantic_json_schema__(self, _schema: CoreSchema, _handler: GetJsonSchemaHandler) -> JsonSchemaValue:
         q = self.quantity
+        if q.choices:
+            return {"enum": [*q.choices], "description": ": ".join(filter(None, [q.about, self.form]))}
         bounds = {"minimum": q.at_least, "exclusiveMinimum": q.above, "maximum": q.at_most, "exclusiveMaximum": q.below}
         return {
             "type": ["integer" if self.quantity.whole else "number", "string"],

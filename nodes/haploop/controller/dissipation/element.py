@@ -5,7 +5,8 @@ from __future__ import annotations
 import dataclasses
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping
-from typing import Annotated, Any, ClassVar, dataclass_transform, get_args, get_origin, get_type_hints
+from types import MappingProxyType
+from typing import Annotated, Any, ClassVar, Literal, dataclass_transform, get_args, get_origin, get_type_hints
 
 from haploop.protocol.quantity import Quantity
 
@@ -110,9 +111,10 @@ class Motion:
 class Element(ABC):
     """Base of every dissipation element.
 
-    A subclass names its ``kind``, declares each parameter as ``name: Annotated[float, Quantity(unit, bounds)]`` and
-    writes ``force``, with arithmetic and ``where`` so that it serves floats and arrays alike. It becomes a dataclass by
-    itself. ``force`` is called at every tick, in contact or not.
+    A subclass names its ``kind``, declares its parameters and writes ``force``, with arithmetic and ``where`` so that
+    it serves floats and arrays alike. It becomes a dataclass by itself. ``force`` is called at every tick, in contact
+    or not. A parameter is declared as ``name: Annotated[float, Quantity(unit, bounds)]``, a whole number with ``int``
+    in its place, a switch as ``bool`` and a choice as ``Literal["one", "other"]``.
 
     An element that remembers declares its memory at the first tick as ``memory``, a number or a NamedTuple of numbers;
     ``force(self, motion, memory)`` then returns the force and the memory of the next tick. One that keeps attributes of
@@ -130,6 +132,8 @@ class Element(ABC):
         asks: names of what it is told beside the motion.
         limits: whether its force is a change of what the wall and all before it give; what comes after it in the list
             is not limited.
+        columns: unit by name of what the log shows of it beside its force, ``{"alpha": "N s/m"}``: fields of its
+            memory, a NamedTuple, as they are after each tick.
     """
 
     kind: ClassVar[str]
@@ -137,17 +141,19 @@ class Element(ABC):
     linear: ClassVar[bool] = False
     asks: ClassVar[tuple[str, ...]] = ()
     limits: ClassVar[bool] = False
+    columns: ClassVar[Mapping[str, str]] = MappingProxyType({})
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)
-        cls.asks = tuple(cls.asks)  # a list would count as something that the class keeps
+        # A list or a dict would count as something that the class keeps.
+        cls.asks, cls.columns = tuple(cls.asks), MappingProxyType(dict(cls.columns))
         dataclasses.dataclass(kw_only=True, eq=False)(cls)
 
     @abstractmethod
     def force(self, *args: Any, **kwargs: Any) -> Any:
         """Force of the element on the device at this tick, N, positive along +x, and the memory where it has one."""
 
-    def values(self) -> dict[str, float]:
+    def values(self) -> dict[str, Any]:
         return {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
 
     @classmethod
@@ -155,17 +161,23 @@ class Element(ABC):
         """Returns name -> (quantity, default or ``dataclasses.MISSING``) of every declared parameter.
 
         Raises:
-            TypeError: a parameter is not declared as ``Annotated[float, Quantity(...)]``.
+            TypeError: a parameter is declared as none of the forms there are.
         """
         hints = get_type_hints(cls, include_extras=True)
         return {f.name: (_quantity(cls, f.name, hints[f.name]), f.default) for f in dataclasses.fields(cls)}
 
 
 def _quantity(cls: type, name: str, hint: Any) -> Quantity:
-    if get_origin(hint) is Annotated and get_args(hint)[0] is float:
-        for mark in get_args(hint)[1:]:
-            if isinstance(mark, Quantity):
-                return mark
+    of, *marks = get_args(hint) if get_origin(hint) is Annotated else (hint,)
+    mark = next((mark for mark in marks if isinstance(mark, Quantity)), None)
+    if of is float and mark:
+        return mark
+    if of is int and mark:
+        return dataclasses.replace(mark, whole=True)
+    choices = (False, True) if of is bool else get_args(of) if get_origin(of) is Literal else ()
+    if of is bool or (choices and all(isinstance(choice, str) for choice in choices)):
+        return Quantity("", about=mark.about if mark else "", choices=choices)
     raise TypeError(
-        f"Parameter {name!r} of {cls.__name__} must be declared as Annotated[float, Quantity(unit, ...)], not {hint!r}."
+        f"Parameter {name!r} of {cls.__name__} must be declared as Annotated[float, Quantity(unit, ...)], as "
+        f'Annotated[int, Quantity("")], as bool or as Literal["one", "other"], not {hint!r}.'
     )

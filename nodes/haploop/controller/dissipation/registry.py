@@ -113,6 +113,11 @@ def checked(element: object, origin: str) -> type[Element]:
             f"{element.__name__} in {origin} asks for {unknown[0]!r}, which is not known; it may ask for "
             f"{', '.join(ASKABLE)}."
         )
+    if missing := [name for name in element.columns if name not in getattr(element.memory, "_fields", ())]:
+        raise PluginError(
+            f"{element.__name__} in {origin} shows {missing[0]!r} in the log, which must be a field of its memory, "
+            "a NamedTuple."
+        )
     try:
         element.parameters()
     except TypeError as error:

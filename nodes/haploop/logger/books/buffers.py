@@ -94,8 +94,9 @@ class ControllerBuffer:
     def add(self, block: Block) -> None:
         """Appends a block; TelemetryGap where it does not start at the end of the last one."""
         _check(block, "controller", self.end)
-        new = {name: as_float64(data) for name, data in block["columns"].items()}
-        books = {e["book"]: new.pop(f"dissipation.{i}") for i, e in enumerate(block["elements"])}
+        columns = {name: as_float64(data) for name, data in block["columns"].items()}
+        books = {e["book"]: columns[f"dissipation.{i}"] for i, e in enumerate(block["elements"])}
+        new = {name: column for name, column in columns.items() if not name.startswith("dissipation.")}
         ticks, kept = block["ticks"], self.end - self.first
         for name in ("position", "stiffness"):
             new[f"wall_{name}"] = np.full(ticks, block["wall"][name])

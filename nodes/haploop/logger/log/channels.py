@@ -69,7 +69,9 @@ class Channels:
         first = max(since, block["from_tick"])
         columns = {name: as_float64(data)[first - block["from_tick"] :] for name, data in block["columns"].items()}
         kinds = ", ".join(f"dissipation.{i} is {e['kind']}" for i, e in enumerate(block["elements"])) or "no element"
-        units = {name: CONTROLLER_UNITS.get(name, "N") for name in columns}
+        own = [(i, each.get("columns", {})) for i, each in enumerate(block["elements"])]
+        known = CONTROLLER_UNITS | {f"dissipation.{i}.{name}": shown[name] for i, shown in own for name in shown}
+        units = {name: known.get(name, "N") for name in columns}
         self._ticks("/controller", f"the controller at every tick; {kinds}", units, first, columns)
 
     def energy(self, first: int, columns: dict[str, np.ndarray]) -> None:

@@ -14,7 +14,7 @@ from haploop.protocol.transport.wire import Message
 # How often the clock is asked for its status.
 _ASK_S = 0.5
 # Kinds of events after which the options may be others.
-_CHANGES = ("swap", "set", "refused")
+_CHANGES = ("swap", "set", "refused", "restored")
 
 
 class CommandFailed(Exception):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import field, replace
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from haploop.protocol.quantity import si
 from haploop.protocol.scene.effects import Accelerometer, Actuator, Friction, Grip, Jitter, Loss, Noise, Transmission
@@ -86,6 +86,7 @@ class Run(Table):
     window_blocks: Annotated[int, si("", "blocks the clock grants ahead", whole=True, at_least=1, at_most=100)] = 2
     deadline: Annotated[float, si("s", "wall time a node may stay silent", above=0)] = 5.0
     verdict: Literal["pushed", "window"] = "pushed"
+    faulty_swap: Literal["restore", "end"] = "restore"
 
 
 # The kind of a swap that takes an element out.
@@ -100,7 +101,7 @@ class ElementTable(Table):
 
     name: str
     acts: Literal["in-contact", "always"] = "in-contact"
-    parameters: dict[str, float] = field(default_factory=dict)
+    parameters: dict[str, Any] = field(default_factory=dict)
 
     @classmethod
     def from_dict(cls, data: Tables) -> ElementTable:

@@ -191,7 +191,7 @@ def _label(table: ElementTable, declared: Mapping[str, tuple[Quantity, object]])
     words = []
     for name, (quantity, _) in declared.items():
         value = table.parameters[name]
-        number = amount(1e3 * value, "g") if quantity.unit == "kg" else f"{value:g} {quantity.unit}".rstrip()
+        number = amount(1e3 * value, "g") if quantity.unit == "kg" else quantity.text(value)
         words.append(number if len(declared) == 1 else f"{name} {number}")
     kind = table.name.replace("-", " ")
     return " ".join([kind, *words]) if len(words) < 2 else f"{kind} ({', '.join(words)})"

@@ -63,8 +63,8 @@ def summary_table(summary: Summary) -> RenderableType:
     parts: list[RenderableType] = [head, Text(f"{rule[:1].upper()}{rule[1:]}.", style="dim")]
     if summary["ended"] not in ("done", "diverged"):
         parts.append(Text(f"ended early: {summary['ended']}", style="bold red"))
-    if balance := summary["energy"].get("balance"):
-        parts.append(Text(balance, style="bold yellow"))
+    told_too = [*summary.get("not_made", ()), *filter(None, [summary["energy"].get("balance")])]
+    parts += [Text(sentence, style="bold yellow") for sentence in told_too]
     control_rate = summary["ticks"] / summary["duration_s"] if summary["duration_s"] else 1.0
     return Group(*parts, make_facts(_key_figures(summary)), _books(summary["energy"], control_rate))
 
@@ -246,9 +246,10 @@ def plugins_table(kinds: Mapping[str, type[Element]]) -> Table:
 
 def _parameter(name: str, quantity: Quantity, default: Any) -> str:
     words = [f"{name} ({quantity.unit})" if quantity.unit else name]
+    words += [" or ".join(map(quantity.text, quantity.choices))] if quantity.choices else []
     for bound in ("at_least", "above", "at_most", "below"):
         value = getattr(quantity, bound)
         words += [f"{bound.replace('_', ' ')} {value:g}"] if value is not None else []
     if default is not dataclasses.MISSING:
-        words.append(f"default {default:g}")
+        words.append(f"default {quantity.text(default) if quantity.choices else format(default, 'g')}")
     return ", ".join(words)

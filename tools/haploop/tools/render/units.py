@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from typing import Any
 
 PREFIXES = {1e3: "k", 1.0: "", 1e-3: "m", 1e-6: "µ", 1e-9: "n"}
 
@@ -49,7 +50,10 @@ def spring(stiffness_N_m: float | None) -> str:
     return f"{fixed(stiffness_N_m)} N/m"
 
 
-def parameters(table: dict[str, object]) -> str:
+def parameters(table: dict[str, Any]) -> str:
     """Returns an element's parameters in short, ``"mass 0.01, always"``; acting in contact goes without saying."""
-    words = [f"{name} {value:g}" for name, value in table.items() if isinstance(value, int | float)]
+    own = {name: value for name, value in table.items() if name not in ("kind", "acts")}
+    words = [
+        f"{name} {str(value).lower() if isinstance(value, str | bool) else f'{value:g}'}" for name, value in own.items()
+    ]
     return ", ".join(words + (["always"] if table.get("acts") == "always" else []))

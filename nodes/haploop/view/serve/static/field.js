@@ -1,4 +1,4 @@
-// One number of a form: its name, unit and bounds, and whether what was typed can be used.
+// One number or choice of a form: its name, unit and bounds, and whether what was typed can be used.
 
 import { plain } from "./amounts.js";
 import { make, put } from "./dom.js";
@@ -29,7 +29,10 @@ export class Field {
     this.name = name;
     this.quantity = quantity;
     [this.unit, this.factor] = SHOWN_AS[quantity.unit] ?? [quantity.unit, 1];
-    this.input = make("input", { id, type: "text", inputmode: "decimal", autocomplete: "off", spellcheck: "false" });
+    this.choices = quantity.choices?.map((choice) => JSON.stringify(choice));
+    this.input = this.choices
+      ? make("select", { id }, ...this.choices.map((choice) => make("option", { value: choice }, choice)))
+      : make("input", { id, type: "text", inputmode: "decimal", autocomplete: "off", spellcheck: "false" });
     this.input.setAttribute("aria-describedby", `${id}-unit ${id}-problem`);
     this.problem = make("span", { class: "problem", id: `${id}-problem`, role: "alert" });
     const unit = make("span", { class: "unit", id: `${id}-unit` }, [this.unit, this.bounds()].filter(Boolean).join(", "));
@@ -52,7 +55,8 @@ export class Field {
     if (performance.now() < this.heldUntil && value === this.before) return;
     const wasTouched = this.touched;
     this.before = value;
-    this.present = value == null ? "" : plain(value * this.factor);
+    if (this.choices) this.present = JSON.stringify(value ?? this.quantity.choices[0]);
+    else this.present = value == null ? "" : plain(value * this.factor);
     if (!wasTouched && this.input.value !== this.present) this.input.value = this.present;
   }
 
@@ -81,6 +85,7 @@ export class Field {
   /** Why what stands in the field cannot be used; "" when it can, as far as the page knows. */
   complaint() {
     const { text, unit } = this;
+    if (this.choices) return "";
     if (!text) return "A number is needed.";
     if (/^[+-]?\d+,\d+/.test(text)) return `Write a point, not a comma: ${text.replace(",", ".")}`;
     if (!NUMBER.test(text)) {
@@ -104,6 +109,7 @@ export class Field {
 
   /** As the run takes it: a number in SI, or text with its unit, which the run converts exactly. */
   value() {
+    if (this.choices) return JSON.parse(this.text);
     if (!NUMBER.test(this.text)) return this.text;
     return this.factor === 1 ? Number(this.text) : `${this.text} ${this.unit}`;
   }

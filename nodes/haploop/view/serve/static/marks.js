@@ -3,7 +3,7 @@
 import { FONT } from "./axes.js";
 import { colour } from "./palette.js";
 
-const CHANGES = new Set(["swap", "set", "stop"]);
+const CHANGES = new Set(["swap", "set", "stop", "restored"]);
 const LANES = 2;
 const TEXT_PX = 12;
 const GAP_PX = 4;
