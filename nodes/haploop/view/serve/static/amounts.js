@@ -1,6 +1,6 @@
 // Numbers as people read them: with a prefix that suits their size, and their unit.
 
-const PREFIXES = [[1e3, "k"], [1, ""], [1e-3, "m"], [1e-6, "µ"], [1e-9, "n"]];
+const PREFIXES = [[1e9, "G"], [1e6, "M"], [1e3, "k"], [1, ""], [1e-3, "m"], [1e-6, "µ"], [1e-9, "n"]];
 const MOST_DECIMALS = 4;
 const MOST_WHOLE = 999_999;
 export const NONE = "–";

@@ -26,8 +26,8 @@ const numbers = (u, splits, axis, space, step) => axisNumbers(splits, step);
 /** The axis to the left. */
 export const leftAxis = (label) => ({ ...common(), scale: "y", label, size: LEFT_PX, space: 24, values: numbers });
 
-/** The axis below. */
-export const bottomAxis = (label) => ({ ...common(), scale: "x", label, size: BOTTOM_PX, space: 56, values: numbers });
+/** The axis below; `space` px at least lie between its numbers. */
+export const bottomAxis = (label, space = 56) => ({ ...common(), scale: "x", label, size: BOTTOM_PX, space, values: numbers });
 
 /** The axis below a chart whose times stand below another one. */
 export const bareAxis = () => ({

@@ -4,13 +4,13 @@ import { amount, isNumber } from "./amounts.js";
 import { byId } from "./dom.js";
 import { Panels } from "./panels.js";
 import { linesFor } from "./palette.js";
-import { scaled, times } from "./snapshot.js";
+import { times } from "./snapshot.js";
 import { TimeChart } from "./time_chart.js";
 
 const CHARTS = {
-  position: { label: "position", unit: "mm", factor: 1e3, decimals: 3, least: 0.01, zero: false, times: false },
-  force: { label: "force", unit: "N", factor: 1, decimals: 3, least: 0.001, zero: true, times: false },
-  energy: { label: "energy taken", unit: "mJ", factor: 1e3, decimals: 3, least: 1e-6, zero: true, times: true },
+  position: { label: "position", unit: "m", prefix: "m", least: 1e-5, zero: false, times: false },
+  force: { label: "force", unit: "N", prefix: "", least: 1e-3, zero: true, times: false },
+  energy: { label: "energy taken", unit: "J", prefix: "m", least: 1e-9, zero: true, times: true },
 };
 const NO_TIMES = new Float64Array(0);
 
@@ -36,7 +36,7 @@ export class Charts {
     const { from_s, to_s, tables } = snapshot;
     this.viewport.shown = [from_s, to_s];
     for (const [name, chart] of Object.entries(this.charts)) {
-      const lines = tables[name] ? linesOf(tables[name], CHARTS[name].factor) : [];
+      const lines = tables[name] ? linesOf(tables[name]) : [];
       chart.show([from_s, to_s], tables[name] ? times(tables[name]) : NO_TIMES, lines, {
         wall: name === "position" ? wallOf(lines, state) : null,
         marks,
@@ -53,11 +53,11 @@ export class Charts {
   }
 }
 
-/** Every column as a line in the unit of its chart; the residual is a number beside the chart, too small for a line. */
-function linesOf({ columns }, factor) {
+/** Every column as a line; the residual is a number beside the chart, too small for a line. */
+function linesOf({ columns }) {
   const drawn = columns.filter(({ name }) => name !== "residual");
   const looks = linesFor(drawn);
-  return drawn.map(({ name, label, values }, i) => ({ key: name, label, line: looks[i], values: scaled(values, factor) }));
+  return drawn.map(({ name, label, values }, i) => ({ key: name, label, line: looks[i], values }));
 }
 
 /** The wall's face and the side its material is on. */

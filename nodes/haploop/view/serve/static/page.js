@@ -39,6 +39,11 @@ const time = new TimeControls(steering);
 const view = new ViewControls(viewport);
 const swapForm = new SwapForm(steering);
 const setForm = new SetForm(steering);
+// The address keeps the token: the jump is made here.
+byId("to-forms").addEventListener("click", (event) => {
+  event.preventDefault();
+  byId("swap").scrollIntoView({ block: "center" });
+});
 byId("undo-do").addEventListener("click", () => steering.order("undo"));
 
 function onConnection(isThere) {
@@ -58,6 +63,7 @@ function onState(now) {
 function newRun() {
   viewport.live();
   charts.refit();
+  swapForm.forget();
 }
 
 function showState() {
@@ -66,7 +72,8 @@ function showState() {
   showSummary(state);
   time.update(state);
   const goesOn = Boolean(state.options) && !state.summary;
-  byId("swap").hidden = byId("set").hidden = byId("undo").hidden = !goesOn;
+  byId("swap").hidden = byId("set").hidden = !goesOn;
+  byId("undo").hidden = !goesOn || !marks.some(({ changes }) => changes);
   byId("nothing-yet").hidden = goesOn || Boolean(state.summary);
   if (state.options) {
     swapForm.update(state.options);

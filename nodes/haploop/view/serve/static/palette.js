@@ -12,8 +12,14 @@ const LINES = {
   total: { colour: "ink", width: 1.2 },
 };
 
+// Kinds have their colours by their place here, in every window; others by their letters.
+const KINDS = [
+  "damping", "unidirectional-inertia", "bidirectional-inertia", "unidirectional-damping", "passivity-controller",
+  "force-bounding", "virtual-coupling", "adaptive-inertia", "force-rate", "passivity-controller-reset",
+  "passivity-controller-reference",
+];
+
 const dark = matchMedia("(prefers-color-scheme: dark)");
-const kinds = [];
 let known = new Map();
 
 /** The colour with this name in page.css, as it is now. */
@@ -34,11 +40,15 @@ export function linesFor(columns) {
 const kindOf = (label) => label.replace(/^element \d+: /, "").replace(/-\d+$/, "");
 
 function elementLine(kind, seen) {
-  if (!kinds.includes(kind)) kinds.push(kind);
-  const number = kinds.indexOf(kind);
+  const number = placeOf(kind);
   const before = seen.get(kind) ?? 0;
   seen.set(kind, before + 1);
-  return { colour: `element-${number % ELEMENTS}`, width: 1.5, dash: DASHES[(number + before) % DASHES.length] };
+  return { colour: `element-${number % ELEMENTS}`, width: 1.5, dash: DASHES[(number + Math.floor(number / ELEMENTS) + before) % DASHES.length] };
+}
+
+function placeOf(kind) {
+  const place = KINDS.indexOf(kind);
+  return place >= 0 ? place : [...kind].reduce((sum, letter) => (31 * sum + letter.codePointAt(0)) % 997, 7);
 }
 
 /** Calls `again` whenever light and dark change places. */

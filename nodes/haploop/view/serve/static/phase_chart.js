@@ -50,7 +50,7 @@ export class PhaseChart {
       cursor: { show: false },
       scales: { x: { time: false, ...axis(0) }, y: axis(1) },
       series: [null, ...(series.length ? series : [{ ...SHAPE, paths: () => null, points: { show: false } }])],
-      axes: [bottomAxis(this.labels[0]), leftAxis(this.labels[1])],
+      axes: [bottomAxis(this.labels[0], 34), leftAxis(this.labels[1])],
     };
     this.u = new uPlot(options, this.data(), this.plot);
   }

@@ -30,7 +30,10 @@ export class SwapForm {
     const names = this.elements.map(({ kind }, i) => [String(i), `${i}: ${kind}`]);
     choices("swap-element", [...names, [String(this.elements.length), `${this.elements.length}: add one`]]);
     this.offerKinds();
-    if (isFirst) this.takeElement();
+    if (isFirst) {
+      byId("swap-element").value = "0";
+      this.takeElement();
+    }
     else if (!byId("swap-kind").value) this.takeKind();
   }
 
@@ -67,13 +70,22 @@ export class SwapForm {
     put(byId("swap-problem"), "");
   }
 
+  /** Another run: nothing that was chosen for the last one stays. */
+  forget() {
+    this.known = "";
+  }
+
+  /** One order at a time: three clicks are one swap. */
   async swap() {
+    if (byId("swap-do").disabled) return;
     put(byId("swap-problem"), "");
     const kind = byId("swap-kind").value;
     if (!kind || firstWrong(this.fields)) return;
     const values = Object.fromEntries(this.fields.map((field) => [field.name, field.value()]));
     const table = kind === REMOVE ? { kind } : { kind, acts: byId("swap-acts").value, ...values };
+    byId("swap-do").disabled = true;
     const answer = await this.steering.order("swap", { swap: table, element: this.index }, { quiet: true });
+    byId("swap-do").disabled = false;
     if (!answer.ok) refuse(answer.text, this.fields, byId("swap-problem"));
   }
 }

@@ -5,23 +5,26 @@ import { bareAxis, bottomAxis, leftAxis } from "./axes.js";
 import { make } from "./dom.js";
 import { Legend, stroke } from "./legend.js";
 import { drawMarks } from "./marks.js";
+import { ClimbingUnit } from "./climbing.js";
 import { colour } from "./palette.js";
 import { halfPlane, line as linePath } from "./paths.js";
-import { last } from "./snapshot.js";
+import { last, scaled } from "./snapshot.js";
 import { extent, Range } from "./range.js";
 
 const CURSORS = "haploop";
+const DECIMALS = 3;
 
 export class TimeChart {
   /**
    * @param {HTMLElement} host takes the chart.
-   * @param {object} options label and unit of the left axis; decimals of the numbers in the legend; least: the axis
-   *   never covers less; zero: the axis always shows 0; times: whether the times stand below it.
+   * @param {object} options label, SI unit and first prefix of the left axis; least: it never covers less, in SI; zero:
+   *   it always shows 0; times: whether the times stand below it.
    * @param {import("./viewport.js").Viewport} viewport what dragging in the chart changes.
    */
   constructor(host, options, viewport) {
     Object.assign(this, { host, options, viewport });
-    this.range = new Range(options.least);
+    this.unit = new ClimbingUnit(options.unit, options.prefix);
+    this.range = new Range(options.least * this.unit.factor);
     this.legend = new Legend(host, () => this.retoggle());
     this.plot = host.appendChild(make("div", { class: "plot" }));
     this.lines = [];
@@ -37,7 +40,7 @@ export class TimeChart {
 
   build() {
     this.u?.destroy();
-    const { label, unit, times } = this.options;
+    const { label, times } = this.options;
     const series = this.lines.map(({ line, label: name, key }) => ({
       label: name,
       stroke: stroke(line),
@@ -57,7 +60,7 @@ export class TimeChart {
         y: { auto: false, range: () => this.range.now },
       },
       series: [{}, ...series],
-      axes: [times ? bottomAxis("simulated time (s)") : bareAxis(), leftAxis(`${label} (${unit})`)],
+      axes: [times ? bottomAxis("simulated time (s)") : bareAxis(), leftAxis(`${label} (${this.unit.name})`)],
       cursor: {
         y: false,
         points: { show: false },
@@ -86,8 +89,9 @@ export class TimeChart {
    */
   show(span, t, lines, { wall = null, marks = [], note = "" } = {}) {
     const signature = (list) => JSON.stringify(list.map(({ key, label }) => [key, label]));
-    const isNew = signature(lines) !== signature(this.lines);
-    Object.assign(this, { span, t, lines, wall, marks, note, columns: lines.map(({ values }) => values) });
+    const isNew = signature(lines) !== signature(this.lines) | this.climb(lines);
+    const columns = lines.map(({ values }) => scaled(values, this.unit.factor));
+    Object.assign(this, { span, t, lines, wall, marks, note, columns });
     this.rerange();
     if (isNew) {
       this.legend.name(lines);
@@ -96,8 +100,16 @@ export class TimeChart {
     this.draw();
   }
 
+  /** Whether other numbers want another unit. */
+  climb(lines) {
+    const [low, high] = extent(lines.map(({ values }) => values));
+    const climbs = this.unit.serve(Math.max(Math.abs(low), Math.abs(high), this.options.least));
+    if (climbs) Object.assign(this, { range: new Range(this.options.least * this.unit.factor) });
+    return climbs;
+  }
+
   rerange() {
-    const shown = this.lines.filter(({ key }) => this.legend.isShown(key)).map(({ values }) => values);
+    const shown = this.columns.filter((_, i) => this.legend.isShown(this.lines[i].key));
     this.range.follow(...extent(shown, this.options.zero && shown.length ? [0] : []));
   }
 
@@ -121,7 +133,7 @@ export class TimeChart {
     u.ctx.rect(u.bbox.left, u.bbox.top, u.bbox.width, u.bbox.height);
     u.ctx.clip();
     u.ctx.fillStyle = colour("wall-fill");
-    u.ctx.fill(halfPlane(u, this.t, this.wall.values, this.wall.side));
+    u.ctx.fill(halfPlane(u, this.t, scaled(this.wall.values, this.unit.factor), this.wall.side));
     u.ctx.restore();
   }
 
@@ -129,8 +141,7 @@ export class TimeChart {
   tell() {
     if (!this.u) return;
     const at = this.u.cursor.idx;
-    const { decimals } = this.options;
-    const texts = this.columns.map((values) => steady(at == null ? last(values) : values[at], decimals));
+    const texts = this.columns.map((values) => steady(at == null ? last(values) : values[at], DECIMALS));
     const time = at == null ? "" : `at ${steady(this.t[at], 4)} s`;
     this.legend.tell(texts, time || this.note);
   }

@@ -1,0 +1,34 @@
+// The unit of an axis, which climbs with its numbers: µJ, mJ, J, kJ. It does not tremble: it stays while it serves.
+
+const STEPS = [[1e-9, "n"], [1e-6, "µ"], [1e-3, "m"], [1, ""], [1e3, "k"], [1e6, "M"], [1e9, "G"]];
+// Numbers of an axis lie between these; the unit is kept a little beyond.
+const [LEAST, MOST, SLACK] = [0.1, 1000, 2];
+
+export class ClimbingUnit {
+  /**
+   * @param {string} unit in SI.
+   * @param {string} letter of the prefix to begin with.
+   */
+  constructor(unit, letter) {
+    this.unit = unit;
+    this.step = STEPS.find(([, one]) => one === letter);
+  }
+
+  /** From SI to this unit. */
+  get factor() {
+    return 1 / this.step[0];
+  }
+
+  get name() {
+    return this.step[1] + this.unit;
+  }
+
+  /** Serve numbers up to this size in SI; whether that took another unit. */
+  serve(largest) {
+    const size = largest / this.step[0];
+    if (!(largest > 0 && Number.isFinite(largest)) || (size >= LEAST / SLACK && size < MOST * SLACK)) return false;
+    const before = this.step;
+    this.step = STEPS.findLast(([factor]) => largest >= LEAST * factor) ?? STEPS[0];
+    return this.step !== before;
+  }
+}
