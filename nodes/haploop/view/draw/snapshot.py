@@ -58,7 +58,8 @@ def snapshot(history: History, viewport: Viewport, changes: Changes | None = Non
     Tables over time are position, force and energy; each row by row where the page has room for it, else as an envelope
     whose rows are the two extremes of consecutive buckets in the order in which they came. Then comes an overview of
     the whole run, and what the page's panel asks for: the two phase plots of Choi et al. 2022, row by row, of two
-    periods where a swing has a line, else of the last 0.4 s; the energy budget; spectra; the two sides of the last of ``changes``. A table without data is left out.
+    periods where a swing has a line, else of the last 0.4 s; the energy budget; spectra; the two sides of the last of
+    ``changes``. A table without data is left out.
     """
     rate = history.time.control_rate
     from_tick, to_tick = _window(history, viewport)
@@ -186,7 +187,7 @@ def _last(history: History, series: LodSeries, first: int, end: int) -> tuple[in
 
 
 def _newest_periods(history: History, first: int, end: int) -> int:
-    """Returns the tick from which on two periods of the main swing of the last 0.4 s are seen, ``first`` without one."""
+    """Returns the tick from which on two periods of the main swing of the last 0.4 s lie, ``first`` without one."""
     found, end = _last(history, history.steps, first, end)
     rate, n = history.time.control_rate, history.time.steps_per_tick
     line = main_line(history.steps.rows(("x",), found, end)[0][::n], rate) if found < end else None
