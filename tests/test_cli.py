@@ -156,3 +156,11 @@ def test_the_list_of_commands_says_of_each_a_whole_sentence():
     told = haploop("--help").stdout.partition("Commands:")[2]
     assert "..." not in told
     assert all(len(line) <= 80 for line in told.splitlines())
+
+
+@pytest.mark.parametrize("words", [("step", "1.5"), ("step", "1e18"), ("step", "-x"), ("pace", "-1"), ("pace", "-x")])
+def test_a_number_that_cannot_be_one_is_refused_in_the_words_of_the_program(words):
+    result = haploop(*words)
+    assert result.exit_code == 2
+    assert f"{words[1].replace('-1', '-1.0')}" in result.stderr
+    assert result.stderr.startswith(f"A {words[0]} ")

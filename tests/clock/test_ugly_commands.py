@@ -48,6 +48,8 @@ def deep(levels: int) -> dict[str, Any]:
         ("set", {"set": {"wall.stiffness": b"\xff" * 300}}, "at most 200 letters"),
         ("set", {"set": {"wall.stiffness": "3 furlong"}}, "unit that a running loop does not know; it knows Hz, J"),
         ("set", {"set": {"wall.stiffness": "3 ms"}}, "ms has the dimension [time], but N/m has [mass] / [time] ** 2"),
+        ("set", {"set": {"wall.stiffness": "3 kg"}}, 'wall.stiffness is "3 kg". kg has the dimension [mass], but N/m'),
+        ("swap", {"swap": {"kind": "damping", "dampin": 1}}, "dampin is not a key of [swap]; did you mean damping?"),
         ("swap", {"swap": {"kind": "damping", "damping": "1 lbf s/inch"}}, "unit that a running loop does not know"),
         ("swap", {"swap": "damping"}, "must be a table"),
         ("swap", {"swap": None}, "exactly one of swap, set"),
@@ -71,6 +73,7 @@ def test_what_carries_too_much_or_means_nothing_is_refused_with_a_sentence(
     ok, text, data = at_once(subject, verb, arguments)
     assert (ok, data) == (False, {})
     assert says in text
+    assert "event." not in text
     assert len(text) < 1000
     assert at_once(subject, "status", {})[1].startswith("running at tick 0 (0 s) of 1000")
 

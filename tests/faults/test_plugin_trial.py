@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import threading
 from pathlib import Path
 from typing import Any
@@ -10,6 +11,7 @@ from typing import Any
 import pytest
 
 from haploop.controller.dissipation import ElementError, PluginError
+from haploop.controller.dissipation.registry import load_source
 from haploop.launch.processes import run_directory
 from haploop.launch.processes.plugin_trial import PluginTrial
 from haploop.launch.runs.replay import replay
@@ -120,6 +122,26 @@ def test_the_declaration_of_an_element_is_known_without_its_code():
         kinds["brake"]().force()
 
 
+@pytest.mark.parametrize(
+    ("default", "says"),
+    [
+        ("float('nan')", "damping of Brake is nan. It must be a finite number of N s/m."),
+        ("-0.05", "damping of Brake is -0.05. It must be at least 0 N s/m."),
+        ("'much'", "damping of Brake is 'much'. It must be a number."),
+    ],
+)
+def test_a_default_that_its_own_declaration_does_not_allow_is_refused(default, says):
+    with pytest.raises(PluginError, match=re.escape(f"brake.py: the default of {says}")):
+        load_source(source().replace("= 0.05", f"= {default}"), "brake.py")
+
+
+@pytest.mark.slow
+def test_a_unit_that_nobody_knows_is_refused_and_one_that_is_not_usual_is_not():
+    with pytest.raises(PluginError, match="damping of Brake is declared in 'N s/furlongz', which is no unit"):
+        tried(source().replace("N s/m", "N s/furlongz"))
+    assert "brake" in tried(source().replace("N s/m", "V s/inch"))
+
+
 @pytest.fixture
 def scene(tmp_path: Path) -> Path:
     path = tmp_path / "scene.toml"
@@ -174,6 +196,9 @@ def test_a_reload_that_breaks_in_any_way_changes_nothing_and_time_goes_on(runnin
             run.ask("swap", **SWAP, reload=True)
     plugin.write_text(source().replace("Quantity(", "Quanity("))
     with pytest.raises(run_directory.CommandRefused, match="NameError: name 'Quanity'"):
+        run.ask("swap", **SWAP, reload=True)
+    plugin.write_text(source() + source().replace('"brake"', '"damping"').replace("class Brake", "class Damping"))
+    with pytest.raises(run_directory.CommandRefused, match="defines damping now, a kind that the run has from els"):
         run.ask("swap", **SWAP, reload=True)
     assert sorted((run.out / "plugins").iterdir()) == kept
     assert run.ask("options")["kinds"] == options["kinds"]

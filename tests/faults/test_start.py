@@ -1,6 +1,7 @@
 """Faults between the start of the processes and the first tick: each is waited for, or named."""
 
 import os
+import resource
 import signal
 import threading
 from pathlib import Path
@@ -8,8 +9,8 @@ from typing import Any
 
 import pytest
 
-from haploop.launch.processes import children, supervisor
-from haploop.launch.spec import RunFailed
+from haploop.launch.processes import children, open_files, supervisor
+from haploop.launch.spec import OutputError, RunFailed
 from helpers.live.live_run import Going, going
 
 
@@ -61,3 +62,21 @@ def test_a_node_that_comes_with_a_wrong_secret_is_named_at_once(
     monkeypatch.setattr(children, "Child", start)
     with going(tmp_path) as run, pytest.raises(RunFailed, match=r"JOIN as controller, .* came with a wrong secret"):
         run.result()
+
+
+@pytest.mark.parametrize(("soft", "hard", "set_to"), [(1024, 4096, [(4096, 4096)]), (1024, -1, [(65_536, -1)])])
+def test_a_run_may_open_as_many_files_as_the_system_lets_it_since_all_who_connect_take_one(
+    soft: int, hard: int, set_to: list[tuple[int, int]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert resource.RLIM_INFINITY == -1
+    asked: list[tuple[int, int]] = []
+    monkeypatch.setattr(resource, "getrlimit", lambda _: (soft, hard))
+    monkeypatch.setattr(resource, "setrlimit", lambda _, limits: asked.append(limits))
+    open_files.allow_many()
+    assert asked == set_to
+
+
+def test_where_a_run_may_open_too_few_files_that_is_a_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(resource, "getrlimit", lambda _: (40, 40))
+    with pytest.raises(OutputError, match=r"opens up to 64 files, but here .* 40; allow more with ulimit -n 64"):
+        open_files.allow_many()

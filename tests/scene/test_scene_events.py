@@ -87,7 +87,7 @@ def test_a_live_event_is_checked_after_what_has_happened_and_before_what_is_to_c
     running = scene(**with_events({"at": 0.2, "swap": INERTIA}, {"at": 0.8, "set": {"dissipation.0.mass": 0.02}}))
     change = {"at": 0.5, "set": {"dissipation.0.mass": "20 g"}}
     assert resolve_event(change, running, KINDS) == EventTable(at=0.5, set={"dissipation.0.mass": 0.02})
-    with pytest.raises(SceneError, match=r"live event: event.2.swap.kind is \"dampin\"; did you mean damping\?"):
+    with pytest.raises(SceneError, match=r"^kind is \"dampin\"; did you mean damping\?"):
         resolve_event({"at": 0.5, "swap": {"kind": "dampin"}}, running, KINDS)
-    with pytest.raises(SceneError, match=r"event.1.set.dissipation.0.mass cannot be set"):
+    with pytest.raises(SceneError, match=r"^the run with this change: event.1.set.dissipation.0.mass cannot"):
         resolve_event({"at": 0.5, "swap": DAMPING}, running, KINDS)

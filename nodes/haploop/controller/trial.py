@@ -21,6 +21,7 @@ from typing import Any, TextIO
 from haploop.controller.active_elements import make_element
 from haploop.controller.dissipation.element import ASKABLE, Element, ElementError, Motion
 from haploop.controller.dissipation.registry import PluginError, load_source
+from haploop.protocol.quantity import MEANT
 from haploop.protocol.scene.scene import ElementTable
 from haploop.protocol.transport.prints import keep_prints
 
@@ -76,18 +77,24 @@ def _load(request: Reply, kinds: dict[str, type[Element]]) -> Reply:
 def _declaration(element: type[Element], origin: str) -> Reply:
     parameters, defaults = {}, {}
     for name, (quantity, default) in element.parameters().items():
+        _check_unit(quantity.unit, f"{origin}: {name} of {element.__name__}")
         parameters[name] = dataclasses.asdict(quantity)
-        if default is dataclasses.MISSING:
-            continue
-        if quantity.choices:
-            defaults[name] = default
-            continue
-        try:
-            defaults[name] = int(default) if quantity.whole else float(default)
-        except (TypeError, ValueError):
-            raise PluginError(f"{origin}: the default of {name} must be a number, but is {default!r}.") from None
+        if default is not dataclasses.MISSING:
+            defaults[name] = default if quantity.choices else int(default) if quantity.whole else float(default)
     says = {"linear": bool(element.linear) and not element.asks, "limits": bool(element.limits)}
     return {"name": element.__name__, "about": element.__doc__, **says, "parameters": parameters, "defaults": defaults}
+
+
+def _check_unit(unit: str, where: str) -> None:
+    """Raises PluginError where a unit is none; one that is not usual here takes a second, since pint is loaded."""
+    if unit in ("", *MEANT):
+        return
+    import pint
+
+    try:
+        pint.UnitRegistry().parse_units(unit)
+    except Exception as error:  # what a parser of arbitrary text raises is not documented
+        raise PluginError(f'{where} is declared in {unit!r}, which is no unit; write one such as "N s/m".') from error
 
 
 def _make(elements: list[tuple[str, dict[str, float]]], kinds: dict[str, type[Element]]) -> Reply:

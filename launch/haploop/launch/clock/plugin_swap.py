@@ -42,6 +42,9 @@ def swap_plugin(
         found = yield from trial.load()
         if kind not in found:
             raise ClockError(f"{source} no longer defines {kind}, but {', '.join(found)}; the old element stays.")
+        if taken := [each for each in found if each in spec.kinds and spec.plugin_sources.get(each) != source]:
+            why = f"{source} defines {taken[0]} now, a kind that the run has from elsewhere; give it a name of its own"
+            raise ClockError(f"{why}. The old element stays.")
         _, event = clock.resolved(change, at_s, {**spec.kinds, **found} if reload else spec.kinds)
         assert event.swap
         yield from trial.make([event.swap])

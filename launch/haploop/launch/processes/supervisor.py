@@ -20,7 +20,7 @@ from haploop.launch.clock.commands import Commands
 from haploop.launch.clock.device_time import PLANT, lateness_told
 from haploop.launch.clock.roster import Node
 from haploop.launch.clock.server import ClockServer
-from haploop.launch.processes import private_directory, run_directory
+from haploop.launch.processes import open_files, private_directory, run_directory
 from haploop.launch.processes.awaited import Awaited
 from haploop.launch.processes.children import Child, interrupts, start_children
 from haploop.launch.processes.foreign import Program
@@ -65,9 +65,10 @@ def run_processes(
     Raises:
         NeverBegan: no program joined that somebody else was to start.
         RunFailed: a process was killed, hung or could not go on; nothing of the run is left but its files.
-        OutputError: sockets or processes cannot be made.
+        OutputError: sockets or processes cannot be made, or too few files opened.
         KeyboardInterrupt: the second signal came.
     """
+    open_files.allow_many()
     with interrupts(usual_from=3) as received, private_directory.made() as sockets:
         context = make_context(replace(spec.transport, patience_s=spec.scene.run.deadline))
         try:

@@ -16,7 +16,7 @@ from haploop.launch.plan.effects import all_effects
 from haploop.launch.scene.estimator_keys import check_estimators, check_filter
 from haploop.launch.scene.events import check_events
 from haploop.launch.scene.layers import KeyPath, Layers
-from haploop.launch.scene.mistakes import SceneError, nearest
+from haploop.launch.scene.mistakes import Mistake, SceneError, nearest
 from haploop.launch.scene.models import Model, number_of, read_table, scene_model
 from haploop.launch.scene.schema import Schema, alternatives, schema_at, whole_schema
 from haploop.launch.scene.toml_writer import inline
@@ -100,11 +100,26 @@ def resolve_event(event: Tables, scene: Scene, kinds: Mapping[str, type[Element]
     """Returns an event that comes in during a run, resolved, after the events of the resolved ``scene``.
 
     Raises:
-        SceneError: it does not fit the scene, or an event that is still to come no longer would.
+        SceneError: it does not fit the scene, or an event that is still to come no longer would. Keys of its own are
+            told as they were given, without their place in the scene.
     """
     events = [*(known.as_dict() for known in scene.event), event]
-    layers = Layers(Path("live event"), {**scene.as_dict(), "event": events})
-    return resolve(layers, kinds).event[-1]
+    layers = Layers(Path("the run with this change"), {**scene.as_dict(), "event": events})
+    try:
+        return resolve(layers, kinds).event[-1]
+    except SceneError as error:
+        raise SceneError(_as_asked(mistake, f"event.{len(events) - 1}") for mistake in error.mistakes) from None
+
+
+def _as_asked(mistake: Mistake, event: str) -> Mistake:
+    """Returns a mistake of one event without its place in the scene; one of anything else as it is."""
+    if mistake.key == event:
+        return replace(mistake, file="", key="what was asked for")
+    if not mistake.key.startswith(f"{event}."):
+        return mistake
+    key = mistake.key.removeprefix(f"{event}.")
+    key = next((key.removeprefix(verb) for verb in ("set.", "swap.") if key.startswith(verb)), key)
+    return replace(mistake, file="", key=key, given=mistake.given.replace(f"[{event}.", "["))
 
 
 def _timebase(layers: Layers, scene: Scene | None) -> Timebase | None:

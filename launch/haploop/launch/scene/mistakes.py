@@ -18,7 +18,7 @@ class Mistake:
     """One mistake.
 
     Attributes:
-        file: the scene file that made it, or ``"--set"``.
+        file: the scene file that made it, or ``"--set"``; "" where nobody need be told.
         key: dotted key, such as ``dissipation.0.mass``; empty when the file as a whole is wrong.
         given: what was found there ("is -3.0", "is missing", "is not a key of [wall]").
         expected: what is allowed, a full sentence.
@@ -32,10 +32,11 @@ class Mistake:
     nearest: str | None = None
 
     def __str__(self) -> str:
+        where = f"{self.file}: " if self.file else ""
         if not self.key:
-            return f"{self.file}: {self.expected}"
+            return f"{where}{self.expected}"
         hint = f"; did you mean {self.nearest}?" if self.nearest else "."
-        return f"{self.file}: {self.key} {self.given}{hint} {self.expected}"
+        return f"{where}{self.key} {self.given}{hint} {self.expected}"
 
 
 class SceneError(ValueError):

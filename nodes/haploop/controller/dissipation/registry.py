@@ -6,6 +6,7 @@ import inspect
 import sys
 from collections.abc import Mapping
 from contextlib import redirect_stdout
+from dataclasses import MISSING
 from pathlib import Path
 from pkgutil import resolve_name
 from types import ModuleType
@@ -14,6 +15,7 @@ from typing import Any
 from haploop.controller.dissipation.element import ASKABLE, Element
 from haploop.protocol.files import read_text
 from haploop.protocol.installed import entry_points_of
+from haploop.protocol.quantity import Quantity
 
 ENTRY_POINT_GROUP = "haploop.dissipation"
 
@@ -119,7 +121,23 @@ def checked(element: object, origin: str) -> type[Element]:
             "a NamedTuple."
         )
     try:
-        element.parameters()
+        declared = element.parameters()
     except TypeError as error:
         raise PluginError(f"{origin}: {error}") from error
+    for name, (quantity, default) in declared.items():
+        if default is not MISSING and (why := _complaint(quantity, default)):
+            raise PluginError(f"{origin}: the default of {name} of {element.__name__} is {default!r}. It {why}.")
     return element
+
+
+def _complaint(quantity: Quantity, default: object) -> str | None:
+    """Returns why a default cannot be the parameter's value, None where it can."""
+    if quantity.choices:
+        is_one = any(choice.__class__ is default.__class__ and choice == default for choice in quantity.choices)
+        return None if is_one else f"must be {' or '.join(map(quantity.text, quantity.choices))}"
+    try:
+        if quantity.whole and float(default) % 1:  # pyright: ignore[reportArgumentType]
+            return "must be a whole number"
+        return quantity.complaint(float(default))  # pyright: ignore[reportArgumentType]
+    except (TypeError, ValueError, OverflowError):
+        return "must be a number"

@@ -48,4 +48,5 @@ for command in (
     demo, run, scenes, new, check, explain, plugins, status, pause, resume, step, pace, stop, swap, set_, undo, attach,
     view, keys, join, plot, replay, judge, export, export_fmu, cost, sweep, dissipate, paper, advise,
 ):  # fmt: skip
-    app.command(command.__name__.rstrip("_").replace("_", "-"))(command)
+    settings = {"ignore_unknown_options": True} if command in (step, pace) else None  # -1 is a number there
+    app.command(command.__name__.rstrip("_").replace("_", "-"), context_settings=settings)(command)

@@ -13,6 +13,7 @@ from haploop.tools.cli.options import (
     Run,
     parse_assignments,
     parse_pace,
+    parse_ticks,
     plain_errors,
     print_json,
 )
@@ -71,9 +72,11 @@ def resume(run: Run = None, json: Json = False) -> None:
 
 
 @for_a_run
-def step(ticks: Annotated[int, typer.Argument(help="control ticks")] = 1, run: Run = None, json: Json = False) -> None:
+def step(
+    ticks: Annotated[str, typer.Argument(help="control ticks")] = "1", run: Run = None, json: Json = False
+) -> None:
     """Go on for some ticks, then stand still."""
-    _ask(run, json, "step", ticks=ticks)
+    _ask(run, json, "step", ticks=parse_ticks(ticks))
 
 
 @for_a_run

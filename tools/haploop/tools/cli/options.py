@@ -45,6 +45,14 @@ def parse_pace(text: str) -> float | Literal["free"]:
         leave(f"{error} 1 is real time.", WRONG_USE)
 
 
+def parse_ticks(text: str) -> int:
+    """Returns a whole number of ticks; how many there may be, the run knows."""
+    try:
+        return int(text)
+    except ValueError:
+        leave(f"A step goes on for a whole number of ticks, such as 100, but {text[:40]!r} was given.", WRONG_USE)
+
+
 def parse_seconds(text: str | None, option: str = "--at") -> float | None:
     """Returns a time in s, given in seconds or with its unit; None for none."""
     if text is None:

@@ -10,8 +10,6 @@ const REASONS = {
   ended: "The run has ended; the next one will come up here by itself.",
   failed: "The run has failed.",
 };
-// What a key inside a scene is called by the clock: of no use to who typed a number into a form.
-const WHERE = /^live event: (event\.\d+\.)?(swap\.|set\.)?/gm;
 
 /** Why nothing can be steered now; "" when it can. */
 export const obstacle = (phase) => REASONS[phase] ?? (maySteer() ? "" : WATCHING);
@@ -31,9 +29,8 @@ export class Steering {
 
   /** Give an order; the answer {ok, text}, also told on the page unless `quiet` and refused. */
   async order(verb, args = {}, { quiet = false } = {}) {
-    const { ok, text } = await this.stream.command(verb, args);
-    const answer = { ok, text: text.replace(WHERE, "") };
-    if (ok || !quiet) say(answer);
+    const answer = await this.stream.command(verb, args);
+    if (answer.ok || !quiet) say(answer);
     else say({ ok: true, text: "" });
     return answer;
   }
