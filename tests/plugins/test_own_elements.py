@@ -19,9 +19,12 @@ from haploop.launch.scene.check import resolve
 from haploop.launch.scene.layers import Layers
 from haploop.launch.scene.mistakes import SceneError
 from haploop.launch.scene.schema import json_schema
+from haploop.launch.scene.toml_writer import to_toml
 from haploop.logger import read
 from haploop.protocol.changes import at_work, changes_of
 from haploop.protocol.ticks import Timebase
+from haploop.tools.figure.data import RunData
+from haploop.tools.figure.run_figure import make_figure
 from helpers.scenes.least import LEAST
 
 FIG6C = Path(__file__).parents[2] / "launch" / "scenes" / "fig6c.toml"
@@ -30,7 +33,7 @@ DAMPING = {"kind": "damping", "damping": 0.3}
 
 class Kept(NamedTuple):
     speed: float = 0.0
-    count: float = 0.0
+    ticks: float = 0.0
 
 
 class Brake(Element):
@@ -38,7 +41,7 @@ class Brake(Element):
 
     kind = "brake"
     memory = Kept()
-    columns = {"speed": "m/s", "count": ""}  # noqa: RUF012
+    columns = {"speed": "m/s", "ticks": ""}  # noqa: RUF012
     damping: Annotated[float, Quantity("N s/m", at_least=0)]
     mode: Literal["soft", "hard"] = "soft"
     on: bool = True
@@ -46,7 +49,7 @@ class Brake(Element):
 
     def force(self, motion: Motion, memory):
         share = self.on * self.times * (2.0 if self.mode == "hard" else 1.0)
-        return -share * self.damping * motion.v, Kept(motion.v, memory.count + 1.0)
+        return -share * self.damping * motion.v, Kept(motion.v, memory.ticks + 1.0)
 
 
 class Raises(Element):
@@ -153,9 +156,19 @@ def test_what_an_element_shows_is_in_the_log_with_its_unit_and_replays(tmp_path)
     log = read(tmp_path)["/controller"]
     assert log.units["dissipation.1.speed"] == "m/s"
     assert np.array_equal(log["dissipation.1.speed"], log["v"])
-    assert np.array_equal(log["dissipation.1.count"], np.arange(1.0, 401.0))
+    assert np.array_equal(log["dissipation.1.ticks"], np.arange(1.0, 401.0))
     summary = json.loads((tmp_path / "summary.json").read_text())
     assert [each["kind"] for each in summary["energy"]["elements"]] == ["damping", "brake"]
+
+
+def test_the_figure_has_a_panel_for_each_unit_of_what_elements_show(tmp_path):
+    of = own([{"kind": "brake", "damping": 0.5, "mode": "hard", "on": False}])
+    run_in_process(of, KINDS, out=tmp_path)
+    (tmp_path / "scene.toml").write_text(to_toml(of.as_dict()))
+    panels = [ax for part in make_figure(RunData.from_directory(tmp_path)).subfigs for ax in part.axes]
+    own_panels = [ax for ax in panels if "Shown" in ax.get_title("left")]
+    shown = {ax.get_ylabel(): ax.get_legend_handles_labels()[1] for ax in own_panels}
+    assert shown == {"(mm/s)": ["speed of element 0"], "": ["ticks of element 0"]}
 
 
 def test_what_it_shows_must_be_a_field_of_its_memory():

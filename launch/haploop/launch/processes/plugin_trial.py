@@ -16,9 +16,9 @@ import sys
 import time
 from collections.abc import Generator, Iterable, Mapping
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Any, Self
 
-from haploop.controller.dissipation.element import Element, ElementError
+from haploop.controller.dissipation.element import Element, ElementError, hint_of
 from haploop.controller.dissipation.registry import PluginError
 from haploop.launch.processes.one_thread import ask_for_one_thread
 from haploop.protocol.quantity import Quantity
@@ -155,12 +155,7 @@ def _stand_in(kind: str, declared: Mapping[str, Any]) -> type[Element]:
     parameters = declared["parameters"]
     quantities = {name: Quantity(**of | {"choices": tuple(of["choices"])}) for name, of in parameters.items()}
     defaults = declared["defaults"]
-    annotations = {name: _hint(quantity) for name, quantity in quantities.items()}
+    annotations = {name: hint_of(quantity) for name, quantity in quantities.items()}
     about = {"__doc__": declared["about"], "__module__": __name__, "__annotations__": annotations}
     says = {"kind": kind, "linear": declared["linear"], "limits": declared["limits"]}
     return type(declared["name"], (StandIn,), about | defaults | says)
-
-
-def _hint(quantity: Quantity) -> Any:
-    texts = quantity.choices != (False, True)
-    return Annotated[(Literal[quantity.choices] if texts else bool) if quantity.choices else float, quantity]

@@ -5,10 +5,11 @@ from __future__ import annotations
 import tomllib
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import haploop.logger
 from haploop.controller.dissipation import Element, registry
+from haploop.controller.dissipation.element import hint_of
 from haploop.launch.scene.check import resolve
 from haploop.launch.scene.layers import Layers, parse
 from haploop.launch.scene.mistakes import Mistake, SceneError
@@ -52,14 +53,31 @@ def recorded_scene(
 
 
 def _stand_ins(tables: Tables) -> dict[str, type[Element]]:
-    """Makes an element for each kind that a scene names, with the numbers that it gives, whatever they mean."""
-    made = {}
+    """Makes an element for each kind that a scene names, with the values that it gives, whatever they mean."""
+    given: dict[str, dict[str, list[Any]]] = {}
     for table in _elements(tables):
-        names = [name for name in table if name.isidentifier() and name not in ("kind", "acts")]
-        hints = {name: Annotated[float, Quantity("")] for name in names}
-        body = {"kind": table["kind"], "force": lambda self, motion: 0.0, "__annotations__": hints}
-        made[table["kind"]] = type("StandIn", (Element,), body)
+        values = given.setdefault(table["kind"], {})
+        for name in table:
+            if name.isidentifier() and name not in ("kind", "acts"):
+                values.setdefault(name, []).append(table[name])
+    events = tables.get("event")
+    sets = [event.get("set") for event in events if isinstance(event, dict)] if isinstance(events, list) else []
+    later = [value for each in sets if isinstance(each, dict) for value in each.values()]
+    made = {}
+    for kind, values in given.items():
+        hints = {name: hint_of(Quantity("", choices=_choices(of, later))) for name, of in values.items()}
+        body = {"kind": kind, "force": lambda self, motion: 0.0, "__annotations__": hints}
+        made[kind] = type("StandIn", (Element,), body)
     return made
+
+
+def _choices(values: list[Any], later: list[Any]) -> tuple[str | bool, ...]:
+    """Returns what a parameter with these values may be: no choices of a number, all texts there are of a text."""
+    if any(isinstance(value, bool) for value in values):
+        return False, True
+    if not any(isinstance(value, str) for value in values):
+        return ()
+    return tuple(dict.fromkeys(value for value in (*values, *later) if isinstance(value, str)))
 
 
 def _elements(tables: Tables) -> Iterator[Tables]:

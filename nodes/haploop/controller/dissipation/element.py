@@ -167,6 +167,13 @@ class Element(ABC):
         return {f.name: (_quantity(cls, f.name, hints[f.name]), f.default) for f in dataclasses.fields(cls)}
 
 
+def hint_of(quantity: Quantity) -> Any:
+    """Returns the type by which an element declares a parameter of this quantity."""
+    if not quantity.choices:
+        return Annotated[float, quantity]
+    return Annotated[bool if False in quantity.choices else Literal[quantity.choices], quantity]
+
+
 def _quantity(cls: type, name: str, hint: Any) -> Quantity:
     of, *marks = get_args(hint) if get_origin(hint) is Annotated else (hint,)
     mark = next((mark for mark in marks if isinstance(mark, Quantity)), None)

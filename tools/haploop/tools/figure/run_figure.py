@@ -10,6 +10,7 @@ from haploop.protocol.changes import describe
 from haploop.tools.figure import style
 from haploop.tools.figure.data import TOGETHER, Book, RunData
 from haploop.tools.figure.loops import draw_force_position, draw_momentum
+from haploop.tools.figure.own_columns import draw_own_columns, own_columns
 from haploop.tools.figure.time import energy_panel, force_panel, mark_events, position_panel
 from haploop.tools.render.report import LEAK_CAUSES, count_losses, plant_books, swing_words
 from haploop.tools.render.terminal import told
@@ -42,11 +43,12 @@ def draw(directory: Path, target: Path | None = None) -> Path:
 
 def make_figure(run: RunData) -> Figure:
     """Makes the figure of a run, with all panels; FigureError where matplotlib is missing."""
-    figure = style.empty_figure(15.0, 9.2)
+    rows = 3 + bool(own_columns(run))
+    figure = style.empty_figure(15.0, 9.2 + 2.9 * (rows - 3))
     events = event_lines(run)
     heights = 0.085, 1.0, 0.001 + 0.025 * len(events)
     header, body, footer = figure.subfigures(3, 1, squeeze=False, height_ratios=heights)[:, 0]
-    grid = body.add_gridspec(3, 3, width_ratios=(1.9, 1.25, 1.15))
+    grid = body.add_gridspec(rows, 3, width_ratios=(1.9, 1.25, 1.15))
     close_s = run.close_s()
     position, force, energy = (body.add_subplot(grid[row, 0]) for row in range(3))
     position_panel(position, run, run.span_s, "Position")
@@ -66,6 +68,7 @@ def make_figure(run: RunData) -> Figure:
     draw_force_position(body.add_subplot(grid[0, 2]), run, close_s)
     draw_momentum(body.add_subplot(grid[1, 2]), run, close_s)
     _draw_books(body.add_subplot(grid[2, 1:]), run, books, colours)
+    draw_own_columns(body, grid, 3, run)
     _draw_header(header, run)
     footer.text(0.012, 0.5, "\n".join(events), fontsize=style.SMALL + 0.5, color=style.GREY, va="center", gid="events")
     body.align_ylabels()
