@@ -18,6 +18,8 @@ Columns = dict[str, np.ndarray]
 BatchColumns = dict[str, Any]
 # A part of a step is counted in 2^-62 of it: whole numbers, whose sums over many steps may overflow unharmed.
 _FINEST = 62
+# So many segments of a kind are integrated by themselves; fewer together with others, each by coefficients of its own.
+_MANY = 256
 
 
 @dataclass(frozen=True)
@@ -79,17 +81,23 @@ class Segments:
             stop_loss=table("snap_J")[begins],
         )
 
-    def groups(self) -> list[tuple[int, bool, np.ndarray | slice]]:
-        """Returns (level, is_stuck, which segments) of all that last equally long with body 0 free, or held.
+    def groups(self) -> list[tuple[np.ndarray, np.ndarray, np.ndarray | slice]]:
+        """Returns (kinds, which kind each one is, which segments): those of a kind that has many, and all others.
 
-        ``which`` selects from arrays of shape (segments,), or (segments, batch): all, or those where a mask is true.
+        A kind, level * 2 + is_stuck, lasts equally long with body 0 free, or held. ``which`` selects from arrays of
+        shape (segments,), or (segments, batch): all, or those where a mask is true.
         """
         kinds = self.level * 2 + self.is_stuck
-        found = np.unique(kinds).tolist()
+        found, counts = np.unique(kinds, return_counts=True)
         if len(found) == 1:
-            return [(found[0] // 2, bool(found[0] % 2), slice(None))]
+            return [(found, np.zeros(1, np.intp), slice(None))]
         kinds = np.broadcast_to(kinds, self.states.shape[1:])
-        return [(kind // 2, bool(kind % 2), kinds == kind) for kind in found]
+        groups = [(found[i : i + 1], np.zeros(1, np.intp), kinds == found[i]) for i in np.flatnonzero(counts >= _MANY)]
+        others = found[counts < _MANY]
+        if len(others):
+            which = np.isin(kinds, others)
+            groups.append((others, np.searchsorted(others, kinds[which]), which))
+        return groups
 
 
 def end_to_end(first_step: int, columns: Columns, pieces: list[tuple[int, Columns]]) -> Columns:
@@ -183,10 +191,12 @@ class ChainForms:
         groups, result = segments.groups(), np.empty((len(self.names), *force.shape))
         if len(groups) > 1:
             acting, rise = [np.broadcast_to(of, force.shape) for of in acting], np.broadcast_to(rise, force.shape)
-        for level, stuck, which in groups:
-            rates = [_sum_of(row, acting, which) for row in self._rates[stuck]]
-            w = [*rates, rise[which]]
-            products, lag_integral = self.forms(level, stuck)
+        for kinds, of, which in groups:
+            made = [(self._rates[kind % 2 == 1], *self.forms(kind // 2, kind % 2 == 1)) for kind in kinds.tolist()]
+            rates, products, lag_integral = made[0]
+            if len(made) > 1:
+                rates, products, lag_integral = (np.stack(part, axis=-1)[..., of] for part in zip(*made, strict=True))
+            w = [*(_sum_of(row, acting, which) for row in rates), rise[which]]
             result[:-1, which] = _forms_of(products, w)
             result[-1, which] = _sum_of(lag_integral, w, slice(None))
         return result
@@ -195,8 +205,9 @@ class ChainForms:
         """Returns (forms of all products, shape (products, rates, rates); form of the lag integral, shape (rates,))."""
         if (level, stuck) not in self._made:
             flow = self._flows[stuck]
-            forms = [factor * flow.product(left, right, level) for factor, left, right in self._products]
-            made = np.stack(forms), flow.lag(self._last, level)
+            factors, *pairs = zip(*self._products, strict=True)
+            forms = np.array(factors)[:, None, None] * flow.products([*zip(*pairs, strict=True)], level)
+            made = forms, flow.lag(self._last, level)
             self._made[level, stuck] = made[0].astype(self._real), made[1].astype(self._real)
         return self._made[level, stuck]
 

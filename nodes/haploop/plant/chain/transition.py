@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import lru_cache
 
@@ -126,12 +126,17 @@ class ChainIntegrals:
         self._rates[: self._size, -1] = full[: self._size, self._size + 2] / self._step_s
         self._scales = scales
 
-    def product(self, left: np.ndarray, right: np.ndarray, level: int = 0) -> Matrix:
-        """Returns symmetric Q with integral (left.w)(right.w) dt = w' Q w over h/2^level; all unscaled."""
-        a, b = (np.append(row, 0.0) / self._scales for row in (left, right))
-        weight = (np.outer(a, b) + np.outer(b, a)) / 2.0
-        form = gramian(self._rates, weight, self._step_s / _wide(2) ** level)
-        return form * np.outer(self._scales, self._scales)
+    def products(self, pairs: Sequence[tuple[np.ndarray, np.ndarray]], level: int = 0) -> Matrix:
+        """Returns symmetric Q, unscaled, with integral (left.w)(right.w) dt = w' Q w over h/2^level, one of each pair.
+
+        Shape (pairs, states + 1, states + 1).
+        """
+        weights = []
+        for left, right in pairs:
+            a, b = (np.append(row, 0.0) / self._scales for row in (left, right))
+            weights.append((np.outer(a, b) + np.outer(b, a)) / 2.0)
+        forms = gramian(self._rates, np.stack(weights), self._step_s / _wide(2) ** level)
+        return forms * np.outer(self._scales, self._scales)
 
     def lag(self, velocity: np.ndarray, level: int = 0) -> np.ndarray:
         """Returns l with integral (t - t_end/2)/t_end velocity.w dt = l . w over h/2^level."""

@@ -48,21 +48,22 @@ def gramian(rates: Matrix, weight: Matrix, duration: Real) -> Matrix:
 
     Args:
         rates: A, shape (n, n), 1/s.
-        weight: Q, symmetric, shape (n, n); so is W.
+        weight: Q, symmetric to the bit, shape (n, n), or several, shape (..., n, n); so is W.
         duration: t, s.
     """
     scaled, doublings = _short_step(rates, duration)
     step = duration / _wide(2) ** doublings
     derivative, total = weight, weight * step
     for order in range(2, 34):
-        derivative = (scaled.T @ derivative + derivative @ scaled) / order
+        moved = scaled.T @ derivative  # whose transpose is D A
+        derivative = (moved + moved.swapaxes(-1, -2)) / order
         total = total + derivative * step
     increment = transition_minus_identity(rates, step)
     for _ in range(doublings):
         moved = total @ increment
-        total = 2.0 * total + moved + moved.T + increment.T @ moved
+        total = 2.0 * total + moved + moved.swapaxes(-1, -2) + increment.T @ moved
         increment = 2.0 * increment + increment @ increment
-    return (total + total.T) / 2.0
+    return (total + total.swapaxes(-1, -2)) / 2.0
 
 
 def _short_step(rates: Matrix, duration: Real) -> tuple[Matrix, int]:
