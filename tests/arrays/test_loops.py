@@ -17,7 +17,9 @@ import pytest
 from haploop.controller.dissipation import registry
 from haploop.launch.batch import batch
 from haploop.launch.batch.run import run_batch
+from haploop.logger.books import work
 from haploop.logger.books.work import BatchSums
+from haploop.protocol.machine_code import MachineCode, WhereItPays
 from haploop.protocol.scene.scene import Scene
 from haploop.tools.sweep.sweep_file import load
 from helpers.runs.batches import alone, diverging, pressed, together
@@ -25,15 +27,15 @@ from helpers.scenes.varied_scenes import drawn_base, varied
 
 SWEEPS = sorted((Path(__file__).parents[2] / "launch/sweeps").glob("*.toml"))
 # What comes of a scene and its variations as numba compiles for the processor that is named to it.
-BARE = "import test_loops as t; t.batch.PAYS = 0; print(t.batch._loops_for(0) is not None, t.digest_of(7))"
+BARE = "import test_loops as t; t.batch.LOOPS.pays = 0; print(t.batch.LOOPS.module() is not None, t.digest_of(7))"
 
 
 @pytest.fixture
 def by_loops(monkeypatch: pytest.MonkeyPatch) -> None:
     """Loops from the first batch on; where numba is there they must work, and nothing else does in their place."""
     pytest.importorskip("numba")
-    monkeypatch.setattr(batch, "PAYS", 0)
-    loops = batch._loops_for(0)
+    monkeypatch.setattr(batch.LOOPS, "pays", 0)
+    loops = batch.LOOPS.module()
     assert loops is not None
     monkeypatch.setattr(loops, "SUMS", BatchSums(loops.displacement, loops.energies, loops.add_ticks))
     monkeypatch.setattr(loops, "fill", loops.filled)
@@ -90,7 +92,7 @@ def test_a_shipped_sweep_has_the_same_results_with_loops_and_without(
 ) -> None:
     scenes, kinds = cells(path), registry()
     found = run_batch(scenes, kinds, trajectories=True, fewest=2)
-    monkeypatch.setattr(batch, "PAYS", float("inf"))
+    monkeypatch.setattr(batch.LOOPS, "pays", float("inf"))
     assert run_batch(scenes, kinds, trajectories=True, fewest=2) == found
 
 
@@ -107,7 +109,7 @@ def test_compiled_for_any_processor_the_loops_have_the_same_bits(by_loops: None)
 @pytest.mark.slow
 def test_a_loop_that_cannot_be_loaded_in_mid_run_is_done_by_numpy(monkeypatch: pytest.MonkeyPatch) -> None:
     loops = pytest.importorskip("haploop.launch.batch.loops")
-    monkeypatch.setattr(batch, "PAYS", 0)
+    monkeypatch.setattr(batch.LOOPS, "pays", 0)
     for name in ("_ways", "_energies", "_add", "_fill"):
         monkeypatch.setattr(loops, name, damaged)
     scenes = drawn(7)
@@ -121,39 +123,42 @@ def test_machine_code_that_is_damaged_is_made_anew_by_the_next_process(
     from haploop.launch.batch import loops
 
     (tmp_path / "kept").mkdir()
-    monkeypatch.setattr(loops, "_CACHE", str(tmp_path / "kept"))
+    monkeypatch.setattr(loops._code, "kept", str(tmp_path / "kept"))
     monkeypatch.setattr(loops, "_ways", damaged)
     with pytest.raises(EOFError):
         loops.try_out()
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.slow
-def test_machine_code_of_other_formulas_is_not_taken_for_that_of_these(
-    by_loops: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    from haploop.launch.batch import loops
-
-    now, source = loops._cache(), Path(str(loops.work.__file__)).read_text(encoding="utf-8")
-    (tmp_path / "work.py").write_text(source.replace("dx = end - start", "dx = start - end"), encoding="utf-8")
-    monkeypatch.setattr(loops.work, "__file__", str(tmp_path / "work.py"))
-    assert loops._cache() != now
+def test_machine_code_of_other_formulas_is_not_taken_for_that_of_these(tmp_path: Path) -> None:
+    there, source = tmp_path / "work.py", Path(str(work.__file__)).read_text(encoding="utf-8")
+    found = []
+    for formula in ("dx = end - start", "dx = start - end", "dx = end - start"):
+        there.write_text(source.replace("dx = end - start", formula), encoding="utf-8")
+        found.append(MachineCode(str(there), (work,)).kept)
+    assert found[0] == found[2] != found[1]
 
 
 def test_without_numba_a_batch_is_booked_by_numpy(monkeypatch: pytest.MonkeyPatch) -> None:
     scenes = [pressed(wall={"position": -0.002, "stiffness": 300.0 + i}) for i in range(3)]
-    monkeypatch.setattr(batch, "PAYS", 0)
+    monkeypatch.setattr(batch.LOOPS, "pays", 0)
     monkeypatch.setitem(sys.modules, "numba", None)
     monkeypatch.delitem(sys.modules, "haploop.launch.batch.loops", raising=False)
-    batch._loops.cache_clear()
+    batch.LOOPS.forget()
     try:
-        assert batch._loops_for(0) is None
+        assert batch.LOOPS.module_for(0) is None
         assert together(scenes) == [alone(each) for each in scenes]
     finally:
-        batch._loops.cache_clear()
+        batch.LOOPS.forget()
 
 
-def test_a_batch_too_small_to_pay_for_it_asks_for_no_loops(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(batch, "_asked", batch.Counter())
-    monkeypatch.setattr(batch, "_loops", lambda: "loops")
-    assert [batch._loops_for(batch.PAYS // 2) for _ in range(3)] == [None, "loops", "loops"]
+def test_loops_are_loaded_once_enough_was_asked_of_a_process_and_no_sooner(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "loops_that_count.py").write_text("tried = []\ndef try_out(): tried.append(1)\n", encoding="utf-8")
+    monkeypatch.syspath_prepend(tmp_path)
+    loops = WhereItPays("loops_that_count", 10)
+    found = [loops.module_for(4) for _ in range(4)]
+    assert found[:2] == [None, None]
+    assert found[2] is found[3]
+    assert found[2].tried == [1]

@@ -49,11 +49,11 @@ def measured_us(run: Callable[[], Any], ticks: int) -> float:
 
 def by_numpy(scenes: list[Scene], kinds: dict[str, type[Element]]) -> None:
     """The arrays as they are where numba is not installed."""
-    pays, batch.PAYS = batch.PAYS, sys.maxsize
+    pays, batch.LOOPS.pays = batch.LOOPS.pays, sys.maxsize
     try:
         run_batch(scenes, kinds)
     finally:
-        batch.PAYS = pays
+        batch.LOOPS.pays = pays
 
 
 def check_kernel(scenes: list[Scene], kinds: dict[str, type[Element]]) -> None:

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import gc
-from collections import Counter, deque
+from collections import deque
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from functools import lru_cache
-from importlib import import_module
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -22,6 +20,7 @@ from haploop.logger.batch import BatchLogger, MemberEnd
 from haploop.logger.summary import Summary
 from haploop.plant.motion.one_mass import OneMassMotion
 from haploop.plant.plant import beyond
+from haploop.protocol.machine_code import WhereItPays
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
 from haploop.protocol.trees import tree_select, tree_take
@@ -40,25 +39,8 @@ _BUFFER = 512
 _UNHEEDED = 0.25
 
 
-# numba is loaded once so many ticks of members were to be booked in this process: sooner it takes longer than it saves.
-PAYS = 6_000_000
-_asked = Counter[str]()
-
-
-def _loops_for(ticks: int) -> Any:
-    """Returns the module of compiled loops where it pays for a batch of so many ticks in all, and works; else None."""
-    _asked["ticks"] += ticks
-    return _loops() if _asked["ticks"] >= PAYS else None
-
-
-@lru_cache(maxsize=1)
-def _loops() -> Any:
-    try:
-        loops = import_module("haploop.launch.batch.loops")
-        loops.try_out()
-    except Exception:  # not installed, or not for this version of NumPy, or broken: NumPy does the same
-        return None
-    return loops
+# For batches of so many ticks in all.
+LOOPS = WhereItPays("haploop.launch.batch.loops", 6_000_000)
 
 
 class BatchEnd(NamedTuple):
@@ -115,7 +97,7 @@ class Batch(BatchLoop):
         rows = BatchRecorder()
         super().__init__(scene, time, Controller(scene, time, kinds, rows), rows, len(scenes))
         self._logger = BatchLogger(scene, time, len(scenes), energy=energy, trajectories=trajectories)
-        if self._logger.books and (loops := _loops_for(len(scenes) * time.ticks)):
+        if self._logger.books and (loops := LOOPS.module_for(len(scenes) * time.ticks)):
             self._logger.books.sum_by(loops.SUMS)
             if isinstance(self._motion, OneMassMotion):
                 self._motion.fill = loops.fill

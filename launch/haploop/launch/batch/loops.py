@@ -6,14 +6,9 @@ give the same bits.
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Sequence
-from hashlib import sha256
-from pathlib import Path
-from shutil import rmtree
 from typing import Any
 
-import numba.core.config  # pyright: ignore[reportMissingImports]
 import numpy as np
 
 from haploop.logger.books import one_mass, work
@@ -21,33 +16,10 @@ from haploop.logger.books.one_mass import OneMassParams, Steps
 from haploop.logger.books.work import BatchSums, Displacement, Sums, SumSteps
 from haploop.plant.motion import record
 from haploop.plant.motion.one_mass import Mechanics
+from haploop.protocol.machine_code import MachineCode
 
-_SETTINGS: Any = numba.core.config
-_FORMULAS = work, one_mass, record
-
-
-def _cache() -> str:
-    """Returns a directory for machine code of these very formulas; "" where there is none to write into.
-
-    numba by itself looks at the file of the loop alone, and would go on with the machine code of changed formulas.
-    """
-    here = Path(__file__).parent / "__pycache__"
-    if not os.access(here if here.exists() else here.parent, os.W_OK):
-        return ""
-    sources = [Path(__file__).read_bytes(), *(Path(str(module.__file__)).read_bytes() for module in _FORMULAS)]
-    return str(here / f"loops-{sha256(b''.join(sources)).hexdigest()[:16]}")
-
-
-def _compiled(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Returns a function of numbers and arrays as machine code, with IEEE arithmetic as it is written."""
-    before, _SETTINGS.CACHE_DIR = _SETTINGS.CACHE_DIR, _CACHE
-    try:
-        return numba.njit(function, cache=bool(_CACHE), fastmath=False, error_model="numpy")
-    finally:
-        _SETTINGS.CACHE_DIR = before
-
-
-_CACHE = _cache()
+_code = MachineCode(__file__, (work, one_mass, record))
+_compiled = _code.compiled
 _way, _lost, _change_over = _compiled(work.way), _compiled(work.lost), _compiled(record.change_over)
 _net_force, _hand_work = _compiled(one_mass.net_force), _compiled(one_mass.hand_work)
 _sum_squares = _compiled(one_mass.sum_squares)
@@ -202,15 +174,8 @@ def _or_numpy(loop: Callable[..., Any], plain: Callable[..., Any]) -> Callable[.
 
 
 def try_out() -> None:
-    """Compiles the loops, or loads them, for numbers that all members share.
-
-    Raises whatever numba does; the next process then finds no machine code kept, which may be damaged.
-    """
-    try:
-        _try_out()
-    except Exception:
-        rmtree(_CACHE, ignore_errors=True)
-        raise
+    """Compiles the loops, or loads them, for numbers that all members share; raises whatever numba does."""
+    _code.try_out(_try_out)
 
 
 def _try_out() -> None:

@@ -75,15 +75,10 @@ class ChainBooks:
     def _with_cut_steps(
         self, first_step: int, columns: BatchColumns, tau: np.ndarray, dx: np.ndarray, commanded: list[np.ndarray]
     ) -> Iterator[np.ndarray]:
-        pieces = dict[int, list[Columns]]()
-        for place, cut in columns["pieces"]:
-            pieces.setdefault(place, []).append(cut)
-        places, rows, shape = sorted(pieces), len(dx) + 1, columns["x"].shape
+        pieces, rows, shape = columns["pieces"], len(dx) + 1, columns["x"].shape
+        places = [place for place, _ in pieces]
         whole = {name: column for name, column in columns.items() if np.shape(column) == shape}
-        in_order = [
-            (at, {name: np.concatenate([cut[name] for cut in pieces[place]]) for name in pieces[place][0]})
-            for at, place in enumerate(places)
-        ]
+        in_order = [(at, cut) for at, (_, cut) in enumerate(pieces)]
 
         def joined(values: np.ndarray) -> np.ndarray:
             """Returns a column of all steps of those members, one member after the other; 0 between them."""

@@ -57,7 +57,7 @@ def follow(
     y, comp = states[begin], comps[begin]
     if begin:
         y = states[begin] - forced[begin]
-        comp = comp + _lost_in(states[begin], -forced[begin], y)
+        comp = comp + lost_in(states[begin], -forced[begin], y)
     first = 0
     for count, force, _ in holds:
         at, first = max(first, begin), first + count
@@ -71,7 +71,7 @@ def follow(
             comp = moved[-1] - (y - before)
 
 
-def _lost_in(a: np.ndarray, b: np.ndarray, total: np.ndarray) -> np.ndarray:
+def lost_in(a: np.ndarray, b: np.ndarray, total: np.ndarray) -> np.ndarray:
     """Returns what rounding has taken from ``total`` = a + b (Knuth's two-sum)."""
     of_b = total - a
     return (a - (total - of_b)) + (b - of_b)

@@ -2,19 +2,37 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from haploop.plant.chain.history import ChainState, Interval, StickSlipState
 from haploop.plant.chain.motion import ChainMotion, follow
 from haploop.plant.chain.transition import ChainTransition
-from haploop.plant.friction.stick_slip import RubbingHistory, StickSlip
-from haploop.plant.friction.substeps import SubstepSolver, pieces_record
+from haploop.plant.friction.stick_slip import (
+    RubbingHistory,
+    StickSlip,
+    decide_at_rest,
+    holds_against,
+    holds_through,
+    may_switch_within,
+    row_on,
+    slipping,
+    slipping_at,
+)
+from haploop.plant.friction.substeps import goes_by_whole_steps, halving_of, pieces_record, solve_step
 from haploop.plant.line import Hold
+from haploop.protocol.machine_code import WhereItPays
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
 from haploop.protocol.trees import tree_member, tree_take
+
+if TYPE_CHECKING:
+    from haploop.plant.friction.loops import Loops
+
+
+# For so many intervals in all.
+LOOPS = WhereItPays("haploop.plant.friction.loops", 20_000)
 
 
 class FrictionMotion(RubbingHistory, ChainMotion):
@@ -30,9 +48,20 @@ class FrictionMotion(RubbingHistory, ChainMotion):
     def __init__(self, scene: Scene, time: Timebase) -> None:
         super().__init__(scene, time)
         self._clamped = self._response(stuck=True)
-        self._pieces: list[list[float]] = []
-        free, clamped = (ChainTransition(self.chain, self._step_s, self._n, stuck) for stuck in (False, True))
-        self._solver = SubstepSolver(self.chain, self._stick_slip, free, clamped, self._step_s)
+        self._pieces: list[Any] = []
+        self._halving, self._whole_steps = halving_of(self.chain, self._step_s), goes_by_whole_steps(scene)
+        levels = self._halving.finest + 1
+        self._tables = [
+            ChainTransition(self.chain, self._step_s, self._n, stuck).halves(levels) for stuck in (False, True)
+        ]
+        self._loops = self.loops_for(time.ticks)
+
+    def loops_for(self, intervals: int) -> Loops | None:
+        """Returns loops of machine code where they pay for so many intervals; they serve a batch of this chain, too."""
+        if not (module := LOOPS.module_for(intervals)):
+            return None
+        held = np.stack([of.held for of in (self._free, self._clamped)])
+        return module.Loops(self._stick_slip, self._halving, self._whole_steps, np.stack(self._tables), held)
 
     def advance(self, tick: int, holds: list[Hold]) -> Any:
         loads = self.loads(tick * self._n, (tick + 1) * self._n + 1)
@@ -47,38 +76,58 @@ class FrictionMotion(RubbingHistory, ChainMotion):
     ) -> Any:
         """Moves through an interval as ``advance`` does, under given loads, shape (n + 1,), and their responses."""
         interval, mode = self._begin(holds), self.state.mode
+        if self._loops and mode and (found := self._by_loops(self._loops, interval, mode, loads, forced, tick, holds)):
+            return self._accept(tick, interval, found)
         step = 0
         assert mode
         while step < self._n:
-            if self._solver.whole_steps:
-                mode = self._stick_slip.decide_at_rest(mode, interval.states[step], interval.held[step, 0], loads[step])
+            if self._whole_steps:
+                mode = decide_at_rest(
+                    self._stick_slip, mode, interval.states[step], interval.held[step, 0], loads[step]
+                )
                 step = self._follow(mode, interval, step, holds, loads, forced[mode.is_stuck])
             if step < self._n:
                 mode = self._solve(mode, interval, step, tick, loads)
                 step += 1
         return self._accept(tick, interval, mode)
 
+    def _by_loops(
+        self, loops: Loops, interval: Interval, mode: StickSlipState, loads: np.ndarray,
+        forced: tuple[np.ndarray, np.ndarray], tick: int, holds: list[Hold],
+    ) -> StickSlipState | None:  # fmt: skip
+        """Fills in the interval by loops of machine code; returns the mode at its end, None where they cannot."""
+        is_stuck, direction = np.array([mode.is_stuck]), np.array([mode.direction])
+        one = Interval(*(part[..., None] for part in interval))
+        free, clamped = forced
+        pieces = loops.advance(
+            one, (free[..., None], clamped[..., None]), loads[:, None], holds, tick * self._n, is_stuck, direction
+        )
+        if pieces is None:
+            return None
+        self._pieces += [rows for _, rows in pieces]
+        return StickSlipState(bool(is_stuck[0]), float(direction[0]))
+
     def _follow(
         self, mode: StickSlipState, interval: Interval, begin: int, holds: list[Hold], loads: np.ndarray,
         forced: np.ndarray,
     ) -> int:  # fmt: skip
         """Follows a mode from step ``begin`` on; returns the first step in which it does not hold."""
-        friction = self._stick_slip.slipping(mode)
+        friction = slipping(self._stick_slip, mode)
         follow((self._clamped if mode.is_stuck else self._free).held, forced, interval, begin, holds, friction)
         interval.held[begin:, 2:] = interval.at_ends[begin:] = friction, mode.is_stuck
-        holds_through = self.holds_through(mode, interval, begin, friction, loads)
-        return self._n if holds_through.all() else begin + int(holds_through.argmin())
+        lasts = self.holds_in_steps(mode, interval, begin, friction, loads)
+        return self._n if lasts.all() else begin + int(lasts.argmin())
 
-    def holds_through(
+    def holds_in_steps(
         self, mode: StickSlipState, interval: Interval, begin: int, friction: Any, loads: np.ndarray
     ) -> np.ndarray:
         """Tells whether a mode holds throughout each step from ``begin`` on; in a batch on the last axis."""
         of, states, command = self._stick_slip, interval.states.swapaxes(0, 1), interval.held[begin:, 0]
         starts, ends, load, end_load = states[:, begin:-1], states[:, begin + 1 :], loads[begin:-1], loads[begin + 1 :]
-        holds = of.holds_through(mode, ends, command, end_load)
+        holds = holds_through(of, mode, ends, command, end_load)
         if mode.is_stuck:
-            holds &= of.holds_through(mode, starts, command, load)
-        return holds & ~of.may_switch_within(mode, starts, ends, command, load, end_load, friction, 1.0)
+            holds &= holds_through(of, mode, starts, command, load)
+        return holds & ~may_switch_within(of, mode, starts, ends, command, load, end_load, friction, 1.0)
 
     def _solve(
         self, mode: StickSlipState, interval: Interval, step: int, tick: int, loads: np.ndarray
@@ -87,21 +136,22 @@ class FrictionMotion(RubbingHistory, ChainMotion):
         states, comps, held, at_ends = interval
         load, rise = float(loads[step]), float(loads[step + 1] - loads[step])
         number, command = tick * self._n + step, float(held[step, 0])
-        mode, states[step + 1], comps[step + 1], held[step, 2], held[step, 3], pieces = self._solver.through(
-            mode, number, states[step], comps[step], command, load, rise
-        )
-        self._pieces += pieces
-        at_ends[step] = self._stick_slip.friction_at(mode, states[step + 1, self._v]), mode.is_stuck
+        mode, states[step + 1], comps[step + 1], held[step, 2], held[step, 3] = solve_step(
+            self._stick_slip, self._halving, self._tables, mode, number, states[step], comps[step], command, load, rise,
+            self._pieces,
+        )  # fmt: skip
+        at_ends[step] = slipping_at(self._stick_slip, mode, states[step + 1, self._v]), mode.is_stuck
         return mode
 
     def take_record(self, tick: int, *, positions_only: bool = False) -> dict[str, np.ndarray]:
-        """Returns the record as without friction, and beside it ``take_pieces``."""
-        return super().take_record(tick, positions_only=positions_only) | self.take_pieces()
+        """Returns the record as without friction, and beside it the pieces of steps that were cut."""
+        pieces = pieces_record(self.chain, self.take_pieces())
+        return super().take_record(tick, positions_only=positions_only) | pieces
 
-    def take_pieces(self) -> dict[str, np.ndarray]:
+    def take_pieces(self) -> list[Any]:
         """Returns the pieces of the steps within which friction switched; see ``pieces_record``."""
         pieces, self._pieces = self._pieces, []
-        return pieces_record(self.chain, pieces)
+        return pieces
 
     def take_interval(self) -> Interval:
         """Returns the last interval, which is then in no record."""
@@ -117,10 +167,11 @@ class BatchFrictionMotion(RubbingHistory, ChainMotion):
 
     def __init__(self, scene: Scene, time: Timebase, members: int) -> None:
         self._one = FrictionMotion(tree_member(scene, 0), time)
-        self._pieces: list[tuple[int, dict[str, np.ndarray]]] = []
+        self._pieces: list[tuple[int, Any]] = []
         super().__init__(scene, time, members)
-        self._stick_slip = StickSlip(self.chain, self.friction, self._step_s)
+        self._stick_slip = StickSlip.of(self.chain, self.friction, self._step_s)
         self._clamped = self._response(stuck=True)
+        self._loops = self._one.loops_for(time.ticks * members)
 
     def _begun(self, z: np.ndarray) -> tuple[np.ndarray, StickSlipState | None]:
         loads = np.broadcast_to(self.loads(0, 1)[0], z.shape[1:]).tolist()
@@ -130,15 +181,21 @@ class BatchFrictionMotion(RubbingHistory, ChainMotion):
     def advance(self, tick: int, holds: list[Hold]) -> Any:
         interval, loads = self._begin(holds), self.loads(tick * self._n, (tick + 1) * self._n + 1)
         forced = self._free.of_interval(tick), self._clamped.of_interval(tick)
+        if self._loops and (mode := self.state.mode):
+            modes = mode.is_stuck.copy(), mode.direction.copy()
+            found = self._loops.advance(interval, forced, loads, holds, tick * self._n, *modes)
+            if found is not None:
+                self._pieces += found
+                return self._accept(tick, interval, StickSlipState(*modes))
         is_stuck, direction = self._decided(interval, loads)
-        holds_through = np.empty(is_stuck.shape, bool)
+        lasts = np.empty(is_stuck.shape, bool)
         for kind in (False, True):
             places = np.flatnonzero(is_stuck == kind)
             if len(places):
                 mode = StickSlipState(kind, direction[places])
                 of_these = tree_take((loads, forced[kind]), places)
-                holds_through[places] = self._follow(mode, interval, places, tree_take(holds, places), *of_these)
-        for place in np.flatnonzero(~holds_through).tolist():
+                lasts[places] = self._follow(mode, interval, places, tree_take(holds, places), *of_these)
+        for place in np.flatnonzero(~lasts).tolist():
             of_this = tree_member((loads, forced), place)
             is_stuck[place], direction[place] = self._solve(interval, place, tick, tree_member(holds, place), *of_this)
         return self._accept(tick, interval, StickSlipState(is_stuck, direction))
@@ -147,12 +204,12 @@ class BatchFrictionMotion(RubbingHistory, ChainMotion):
         return super()._begin(holds)._replace(at_ends=np.zeros((self._n, 2, *self.state.z.shape[1:])))
 
     def _decided(self, interval: Interval, loads: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Returns the modes at the beginning; see ``StickSlip.decide_at_rest``."""
+        """Returns the modes at the beginning; see ``decide_at_rest``."""
         z, mode = interval.states[0], self.state.mode
         assert mode
-        at_rest, is_at_rest = self._stick_slip.at_rest(z, interval.held[0, 0], loads[0]), z[self._v] == 0.0
-        is_stuck = np.where(is_at_rest, at_rest.is_stuck, mode.is_stuck)
-        return is_stuck, np.where(is_at_rest, at_rest.direction, mode.direction)
+        force, is_at_rest = row_on(self._stick_slip.force, z, interval.held[0, 0], loads[0]), z[self._v] == 0.0
+        is_stuck = np.where(is_at_rest, holds_against(self.friction, force), mode.is_stuck)
+        return is_stuck, np.where(is_at_rest, np.copysign(1.0, force), mode.direction)
 
     def _follow(
         self, mode: StickSlipState, interval: Interval, places: np.ndarray, holds: list[Hold], loads: np.ndarray,
@@ -160,13 +217,13 @@ class BatchFrictionMotion(RubbingHistory, ChainMotion):
     ) -> np.ndarray:  # fmt: skip
         """Lets some members, of which all stick or all slip, follow their mode; returns which of them it holds for."""
         some = Interval(*(np.ascontiguousarray(part[..., places]) for part in interval))
-        friction = self._stick_slip.slipping(mode)
+        friction = slipping(self._stick_slip, mode)
         follow((self._clamped if mode.is_stuck else self._free).held, forced, some, 0, holds, friction)
         some.held[:, 2], some.held[:, 3] = friction, mode.is_stuck
         some.at_ends[:, 0], some.at_ends[:, 1] = friction, mode.is_stuck
         for part, of_these in zip(interval, some, strict=True):
             part[..., places] = of_these
-        return np.all(self._one.holds_through(mode, some, 0, friction, loads), axis=0)
+        return np.all(self._one.holds_in_steps(mode, some, 0, friction, loads), axis=0)
 
     def _solve(
         self, interval: Interval, place: int, tick: int, holds: list[Hold], loads: np.ndarray,
@@ -179,17 +236,21 @@ class BatchFrictionMotion(RubbingHistory, ChainMotion):
         one.advance_under(loads, forced, tick, holds)
         for part, of_this in zip(interval, one.take_interval(), strict=True):
             part[..., place] = of_this
-        pieces = one.take_pieces()
-        if len(pieces["pieces.step"]):
+        if pieces := one.take_pieces():
             self._pieces.append((place, pieces))
         assert one.state.mode
         return one.state.mode
 
     def take_record(self, tick: int, *, positions_only: bool = False) -> dict[str, Any]:
-        """Returns the record as without friction, and beside it ``pieces``: (member, its pieces) of intervals."""
+        """Returns the record as without friction, and beside it ``pieces``: (member, its pieces) where it has any."""
         pieces, self._pieces = self._pieces, []
         record = super().take_record(tick, positions_only=positions_only)
-        return record if positions_only else record | {"pieces": pieces}
+        if positions_only:
+            return record
+        of_place = dict[int, list[Any]]()
+        for place, rows in pieces:
+            of_place.setdefault(place, []).append(rows)
+        return record | {"pieces": [(place, pieces_record(self.chain, of_place[place])) for place in sorted(of_place)]}
 
     def forget_record(self) -> None:
         super().forget_record()

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from haploop.plant.chain.history import Interval, StickSlipState
-from haploop.plant.friction.stick_slip import RubbingHistory
+from haploop.plant.friction.stick_slip import RubbingHistory, decide_at_rest, friction_at, slipping_at
 from haploop.plant.integrators.dop853 import Dop853Motion, Event, Rates, System
 from haploop.plant.line import Hold
 from haploop.protocol.scene.scene import Scene
@@ -57,7 +57,7 @@ class Dop853FrictionMotion(RubbingHistory, Dop853Motion):
         forces = _Forces(float(interval.held[first, 0]), load, slope, first * self._step_s)
         z, t = interval.states[first].copy(), forces.start
         interval.held[first:last, 2:] = 0.0, 1.0
-        self._mode = self._stick_slip.decide_at_rest(self._mode, z, forces.command, load)
+        self._mode = decide_at_rest(self._stick_slip, self._mode, z, forces.command, load)
         for _ in range(_MOST_SWITCHES):
             begun = t
             z, t, has_ceased = self._piece(interval, z, t, last, forces)
@@ -68,7 +68,7 @@ class Dop853FrictionMotion(RubbingHistory, Dop853Motion):
                 break
         else:
             raise ArithmeticError(f"Friction switched {_MOST_SWITCHES} times in a plant step; raise clock.plant_rate.")
-        friction = self._stick_slip.friction_at(self._mode, z[v])
+        friction = slipping_at(self._stick_slip, self._mode, z[v])
         interval.states[last], interval.at_ends[last - 1] = z, (friction, self._mode.is_stuck)
 
     def _after_switch(self, z: np.ndarray, t: float, forces: _Forces, moved: bool) -> StickSlipState:
@@ -77,7 +77,7 @@ class Dop853FrictionMotion(RubbingHistory, Dop853Motion):
         if mode.is_stuck:
             return StickSlipState(False, math.copysign(1.0, self._other_forces(t, z, forces)))
         if moved:
-            return self._stick_slip.decide_at_rest(mode, z, forces.command, forces.load_at(t))
+            return decide_at_rest(self._stick_slip, mode, z, forces.command, forces.load_at(t))
         return StickSlipState(True, mode.direction)
 
     def _piece(
@@ -93,7 +93,7 @@ class Dop853FrictionMotion(RubbingHistory, Dop853Motion):
         reached = steps[: states.shape[1]]
         interval.states[reached] = states.T
         for step, v in zip(reached.tolist(), states[self._v].tolist(), strict=True):
-            interval.at_ends[step - 1] = self._stick_slip.friction_at(mode, v), mode.is_stuck
+            interval.at_ends[step - 1] = slipping_at(self._stick_slip, mode, v), mode.is_stuck
         has_ceased = found.status == 1
         end = float(found.t_events[0][0]) if has_ceased else last * h
         if not mode.is_stuck:
@@ -104,13 +104,13 @@ class Dop853FrictionMotion(RubbingHistory, Dop853Motion):
         """Notes friction in the steps in which the body slips, as at their beginning; ``v`` at that of the first."""
         speeds = [v, *interval.states[first + 1 : last, self._v].tolist()]
         for step, speed in zip(range(first, last), speeds, strict=False):
-            interval.held[step, 2:] = -self._mode.direction * self.friction.at(speed), 0.0
+            interval.held[step, 2:] = -self._mode.direction * friction_at(self.friction, speed), 0.0
 
     def _slipping(self, forces: _Forces) -> tuple[Rates, Event]:
         """Returns z' while body 0 slips, and what falls below 0 when it no longer does: the speed in its direction."""
         law, v, direction = self.friction, self._v, self._mode.direction
         smooth, unit = self._free.under(*forces), -direction * self._free.of_friction
-        return (lambda t, z: smooth(t, z) + law.at(z[v]) * unit), _Event(lambda _t, z: direction * z[v])
+        return (lambda t, z: smooth(t, z) + friction_at(law, z[v]) * unit), _Event(lambda _t, z: direction * z[v])
 
     def _sticking(self, forces: _Forces) -> tuple[Rates, Event]:
         """Returns z' while body 0 is held, and what falls below 0 when it no longer is: what more could be held."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from haploop.plant.chain.history import Interval
-from haploop.plant.friction.stick_slip import Friction, RubbingHistory
+from haploop.plant.friction.stick_slip import Friction, RubbingHistory, friction_at, holds_against
 from haploop.plant.integrators.linear_rates import LinearRates, OneStep, Rows, moved, response_to
 from haploop.plant.integrators.stepwise import StepwiseMotion
 from haploop.protocol.scene.scene import Scene
@@ -32,9 +32,9 @@ class FrictionProjection:
         v, law = self._v, self._friction
         after = self._free.step(z, begin, middle, end)
         stopping = after[v] / self._response[v]
-        most = law.at(z[v])
+        most = friction_at(law, z[v])
         if z[v] == 0.0:
-            if law.holds(stopping):
+            if holds_against(law, stopping):
                 self._rows.append((0.0, 1.0, 0.0, 1.0))
                 return self._clamped.step(z, self._held(begin), self._held(middle), self._held(end))
             most = law.holds_N

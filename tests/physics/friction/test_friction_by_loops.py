@@ -1,0 +1,73 @@
+"""Friction moved by loops of machine code has the bits of Python and NumPy, alone and in a batch."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from haploop.plant.friction import motion
+from haploop.protocol.scene.paths import with_value
+from haploop.protocol.scene.scene import Scene
+from helpers.runs.batches import alone, together, with_stiffness
+from helpers.scenes.effect_tables import tap
+
+pytestmark = pytest.mark.slow
+STRIBECK = {"kinetic": 0.03, "breakaway": 0.05, "stribeck_velocity": 0.01}
+SCENES: dict[str, dict[str, Any]] = {
+    "one mass": {},
+    "a cable and a grip": {"also": ("transmission", "grip")},
+    "breakaway": {"friction": {"kinetic": 0.03, "breakaway": 0.06}},
+    "Stribeck": {"friction": STRIBECK, "also": ("transmission", "bandwidth")},
+    "steps cut into parts": {"also": ("transmission",), "stiffness_N_m": 2e6},
+    "jitter": {"also": ("transmission", "grip", "jitter", "loss")},
+}
+
+
+@pytest.fixture
+def loops(monkeypatch: pytest.MonkeyPatch) -> Any:
+    """The loops, which must work where numba is there."""
+    pytest.importorskip("numba")
+    found = motion.LOOPS.module()
+    assert found is not None
+    return found
+
+
+def scene_of(name: str) -> Scene:
+    of = SCENES[name]
+    tables = {"friction": of["friction"]} if "friction" in of else {}
+    scene = tap(("friction", *of.get("also", ())), duration=0.12, **tables)
+    return with_value(scene, "transmission.stiffness", of["stiffness_N_m"]) if "stiffness_N_m" in of else scene
+
+
+def by(pays: float, monkeypatch: pytest.MonkeyPatch, scenes: list[Scene], *, batch: bool = False) -> list[Any]:
+    monkeypatch.setattr(motion.LOOPS, "pays", pays)
+    return together(scenes) if batch else [alone(scene) for scene in scenes]
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_a_run_by_loops_has_every_bit_of_the_run_without(name: str, loops: Any, monkeypatch: pytest.MonkeyPatch):
+    scene = [scene_of(name)]
+    assert by(0, monkeypatch, scene) == by(np.inf, monkeypatch, scene)
+
+
+@pytest.mark.parametrize("room", [None, 40, 1])
+def test_so_has_a_batch_whatever_room_there_is_for_the_pieces(
+    room: int | None, loops: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    base = scene_of("a cable and a grip")
+    scenes = [replace(with_stiffness(base, k), seed=i) for i, k in enumerate((60.0, 700.0, 2900.0))]
+    expected = by(np.inf, monkeypatch, scenes)
+    assert all(result["energy"]["friction_heat_J"] > 1e-5 for result in expected)
+    if room:
+        monkeypatch.setattr(loops, "_PIECES", room)
+    assert by(0, monkeypatch, scenes, batch=True) == expected
+
+
+def test_a_transition_that_is_off_by_its_last_bit_is_seen(loops: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    scene, made = [scene_of("one mass")], loops.Loops
+    expected = by(np.inf, monkeypatch, scene)
+    monkeypatch.setattr(loops, "Loops", lambda *of: made(*of[:3], np.nextafter(of[3], 1.0), of[4]))
+    assert by(0, monkeypatch, scene) != expected
