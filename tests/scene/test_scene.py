@@ -67,7 +67,7 @@ def test_every_mistake_is_reported_at_once():
         "wall.position is true. It must be a number in m",
         "wall.stiffness is missing. It must be a number in N/m, at least 0",
         'wall.occupies is "belo"; did you mean below? Allowed: below, above.',
-        "wall.stifness is not a key of [wall]; did you mean stiffness? Allowed: position, stiffness, occupies.",
+        "wall.stifness is not a key of [wall]; did you mean stiffness? Allowed: kind, position, stiffness,",
         'dissipation.0.kind is "dampin"; did you mean damping? Allowed: adaptive-inertia, bidirectional-inertia,',
         "dissipation.1.damping is -1.0. It must be at least 0 N s/m.",
         'event.0.swap.kind is "nne"; did you mean none? Allowed:',

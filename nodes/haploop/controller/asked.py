@@ -10,6 +10,7 @@ from haploop.controller.dissipation.element import Element, ElementError, Motion
 from haploop.protocol.arrays import where
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
+from haploop.protocol.walls.wall import Wall
 
 
 class Declared(NamedTuple):
@@ -82,7 +83,7 @@ def answer_of(
     now: Motion,
     row: list[Any],
     force: Any,
-    wall: tuple[Any, Any],
+    wall: Wall,
     declared: Declared,
 ) -> tuple[Any, Told]:
     """Returns the force of an element that asks, and its memory of the next tick.
@@ -91,7 +92,6 @@ def answer_of(
         now: what every element is told.
         row: of this tick, complete up to this element; the memory keeps it, and finds it whole at the next tick.
         force: of the wall and of all elements before this one, N.
-        wall: its position in m and its stiffness in N/m.
     """
     own, before, force_before, output_before, (wall_J, own_J, output_J, total_J), commands = told
     x, wall_force, total_before, way = now.x, row[3], 0.0, 0.0 * now.x
@@ -103,11 +103,14 @@ def answer_of(
         total_J = total_J - total_before * way
     known = {
         "force": force, "wall_force": wall_force, "way": way,
-        "wall_stored": 0.5 * wall_force * (wall[0] - x), "wall_position": wall[0], "wall_stiffness": wall[1],
+        "wall_position": wall.position, "wall_stiffness": wall.stiffness,
         "force_before": force_before, "output_before": output_before, "total_before": total_before,
         "wall_energy": wall_J, "own_energy": own_J, "output_energy": output_J, "total_energy": total_J,
         "device_mass": declared.mass, "device_damping": declared.damping,
     }  # fmt: skip
+    if "wall_stored" in active.element.asks:
+        depth = where(now.contact, (x - wall.position) * wall.inward, 0.0 * x)
+        known["wall_stored"] = wall.stored(depth)
     if commands:
         known["acted"] = _acted((total_before, *commands), declared)
         commands = (total_before, *commands)[: declared.whole_ticks + 1]

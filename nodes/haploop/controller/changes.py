@@ -90,7 +90,7 @@ def take_back(
 
 def _set(params: ControllerParams, tick: int, path: list[str], value: float) -> ControllerParams:
     match path:
-        case ["wall", "stiffness" | "position" as name]:
+        case ["wall", name] if name in params.wall.values():
             return replace(params, wall=replace(params.wall, **{name: value}))
         case ["clock", "round_trip_delay"]:  # the plant's to do; elements that ask are told
             steps = round(value * params.declared.steps / params.motion.period_s)

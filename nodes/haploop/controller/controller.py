@@ -14,11 +14,12 @@ from haploop.controller.dissipation import ElementError, Motion
 from haploop.controller.estimators.base import Sample
 from haploop.controller.estimators.choose import make_estimators
 from haploop.controller.recorder import Recorder
-from haploop.controller.tick import ControllerParams, ControllerState, NoForce, StateTuple, Wall, initial_state, tick
+from haploop.controller.tick import ControllerParams, ControllerState, NoForce, StateTuple, initial_state, tick
 from haploop.protocol.changes import Change, Event, restoration
 from haploop.protocol.scene.scene import NO_ELEMENT, Scene
 from haploop.protocol.ticks import DELAY, Timebase
 from haploop.protocol.trees import tree_select
+from haploop.protocol.walls.registry import make_wall
 
 if TYPE_CHECKING:
     import numpy as np
@@ -31,7 +32,7 @@ def make_params(scene: Scene, period_s: float, kinds: Kinds) -> ControllerParams
     """Makes the parameters of the controller of a resolved scene, or of a batch in a stacked one."""
     made = [make_element(table, kinds) for table in scene.dissipation]
     elements = tuple(ActiveElement(element, acts, book, 0) for book, (element, acts) in enumerate(made))
-    wall = Wall.from_scene(scene)
+    wall = make_wall(scene.wall)
     motion = Motion(period_s, wall.inward)
     return ControllerParams(
         *make_estimators(scene, period_s), wall, elements, len(elements), motion, Declared.from_scene(scene)

@@ -21,7 +21,8 @@ class Recorder:
     """Rows of a controller, tick by tick.
 
     A block has ``from_tick``, ``ticks``, ``columns`` (name -> little-endian float64 bytes), ``elements`` (one
-    description per dissipation column) and ``wall`` (position, stiffness, into_wall) as they stood in its ticks.
+    description per dissipation column) and ``wall`` (its numbers, into_wall, and its kind unless it is a spring) as
+    they stood in its ticks.
 
     Attributes:
         refused, restored: changes that were not made; events that tell of swaps taken back.
@@ -45,7 +46,8 @@ class Recorder:
         wall = params.wall
         self._begin()
         self.elements = [active.describe() for active in params.elements]
-        self._wall = {"position": wall.position, "stiffness": wall.stiffness, "into_wall": wall.inward}
+        named = {} if wall.kind == "spring" else {"kind": wall.kind}
+        self._wall = {**wall.values(), "into_wall": wall.inward, **named}
         forces = [f"dissipation.{index}" for index in range(len(self.elements))]
         shows = [(*active.element.columns,) for active in params.elements]
         self.own = tuple((index, names) for index, names in enumerate(shows) if names)

@@ -11,33 +11,7 @@ from haploop.controller.asked import Declared, Told, answer_of, first_memory
 from haploop.controller.dissipation.element import ASKABLE, Motion
 from haploop.controller.estimators.base import Estimator, Sample
 from haploop.protocol.arrays import where
-from haploop.protocol.scene.scene import Scene
-
-
-@dataclass(frozen=True, slots=True)
-class Wall:
-    """f_wall = k_w (x_w - x_m) while x_m is strictly inside, else 0 (Choi et al. 2022, eq. 12).
-
-    Attributes:
-        position, stiffness: x_w of its surface, m; k_w, N/m.
-        inward: direction that leads into it, +1.0 or -1.0; 0.0 where there is no wall, so that nothing is inside.
-    """
-
-    position: Any
-    stiffness: Any
-    inward: float
-
-    @classmethod
-    def from_scene(cls, scene: Scene) -> Wall:
-        if (table := scene.wall) is None:
-            return cls(0.0, 0.0, 0.0)
-        return cls(table.position, table.stiffness, -1.0 if table.occupies == "below" else 1.0)
-
-    def contact(self, x: Any) -> tuple[Any, Any]:
-        """Returns whether measured position x (m) is strictly inside, and the force on the device in N along +x."""
-        out = self.position - x
-        contact = out * self.inward < 0.0
-        return contact, where(contact, self.stiffness * out, 0.0)
+from haploop.protocol.walls.wall import Wall
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,7 +112,7 @@ def tick(params: ControllerParams, state: StateTuple, sample: Sample) -> tuple[S
     if params.input != "encoder":
         u = sample[1] if params.input == "accelerometer" else params.velocity.acceleration(of_velocity)
     of_acceleration, a = params.acceleration.step(of_acceleration, u, sample)
-    contact, total = params.wall.contact(x)
+    contact, total = params.wall.contact(x, v)
     row = [x, v, a, total]
     motion, index = params.motion, 0
     motion.x, motion.v, motion.a, motion.a_before, motion.contact = x, v, a, a_before, contact
@@ -150,8 +124,7 @@ def tick(params: ControllerParams, state: StateTuple, sample: Sample) -> tuple[S
                 force = active.element.force(motion)
             else:
                 if memory.__class__ is Told:
-                    wall = params.wall.position, params.wall.stiffness
-                    force, memory = answer_of(active, memory, motion, row, total, wall, params.declared)
+                    force, memory = answer_of(active, memory, motion, row, total, params.wall, params.declared)
                 else:
                     force, memory = active.element.force(motion, memory)
                 memories = (*memories[:index], memory, *memories[index + 1 :])

@@ -17,6 +17,7 @@ from haploop.protocol.arrays import rows_of
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
 from haploop.protocol.trees import tree_by_member, tree_select, tree_take
+from haploop.protocol.walls.wall import Wall
 
 # Steps of a trajectory that are hashed together.
 _HASHED_STEPS = 320
@@ -71,8 +72,11 @@ class BatchLogger:
         self._trajectories = Trajectories(members) if trajectories else None
         self.tick = 0
 
-    def book(self, plant: dict[str, np.ndarray], rows: Sequence[Row], into_wall: float) -> None:
-        """Books the intervals from ``tick`` on: plant columns of shape (ticks * n + 1, members), and a row a tick."""
+    def book(self, plant: dict[str, np.ndarray], rows: Sequence[Row], wall: Wall) -> None:
+        """Books the intervals from ``tick`` on: plant columns of shape (ticks * n + 1, members), and a row a tick.
+
+        ``wall`` is as it stands in all of them.
+        """
         first, ticks, x = self.tick, len(rows), plant["x"]
         members = x.shape[1]
         columns = {name: _column([row.columns[name] for row in rows], members) for name in CONTROLLER_COLUMNS}
@@ -80,8 +84,6 @@ class BatchLogger:
             self.rows += rows
             if first == 0:
                 self.books.start(plant)
-            now = rows[0].columns
-            wall = now["wall_position"], now["wall_stiffness"], into_wall
             self.books.book_batch(first, plant, self._commanded(first + ticks, wall, members))
             # Commands that are still in effect, and the last row, are needed once more.
             needed = first + ticks - min(first + ticks - 1, int(plant["command"][-1]))
@@ -92,7 +94,7 @@ class BatchLogger:
         self.tick += ticks
         self.note_accounts(rows[-1].elements)
 
-    def _commanded(self, end: int, wall: tuple[Any, Any, float], members: int) -> Commanded:
+    def _commanded(self, end: int, wall: Wall, members: int) -> Commanded:
         """Returns the part of the rows kept that books need; the latest row is of tick ``end - 1``."""
         rows = self.rows
         forces = {"wall": rows_of([row.columns["wall"] for row in rows], members)}

@@ -7,6 +7,7 @@ from itertools import groupby
 from typing import Any
 
 from haploop.protocol.changes import Change, Event, at_work, is_change, refused_change
+from haploop.protocol.scene.paths import value_at
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.transport.wire import Message
 
@@ -77,7 +78,7 @@ def _shows(block: Message, change: Change, after: Scene) -> bool:
     touched: set[int] = set()
     for key in change.set:
         table, _, name = key.partition(".")
-        if table == "wall" and (after.wall is None or wall.get(name) != getattr(after.wall, name)):
+        if table == "wall" and (after.wall is None or wall.get(name) != value_at(after.wall, name)):
             return False
         if table == "dissipation":
             touched.add(int(name.partition(".")[0]))

@@ -13,13 +13,13 @@ from haploop.protocol.ticks import Timebase
 from haploop.protocol.transport.messages import MESSAGES
 from haploop.protocol.transport.messages import complaint as message_complaint
 from haploop.protocol.transport.wire import Frame, Message
+from haploop.protocol.walls.registry import class_of, parameters_of
 
 _PLANT = ("x", "v", "x_low", "force", "command")
 _CONTROLLER = ("x", "v", "a", "wall", "total", "in_contact")
 # Where the device is, as told by the plant, or measured: without it nothing is known.
 _MOTION = ("x", "v")
 _STATE = ("tick", "x", "v", "force", "command")
-_WALL = ("position", "stiffness", "into_wall")
 _ELEMENT = {"book": int, "kind": str, "parameters": dict, "from_tick": int}
 
 
@@ -29,11 +29,11 @@ def complaint(frame: Frame, role: str, scene: Scene, time: Timebase) -> str:
     if frame.name not in ("STATE", "END", f"{role.upper()}_BLOCK"):
         return f"{frame.name} is no telemetry of a {role}, but came from it."
     if frame.name == "STATE":
-        wrong = _state(message["state"], role)
+        wrong = _state(message["state"], role, scene)
     elif frame.name == "PLANT_BLOCK":
         wrong = _columns(message, plant_columns(scene), message["ticks"] * time.steps_per_tick + 1)
     elif frame.name == "CONTROLLER_BLOCK":
-        wrong = _controller_block(message)
+        wrong = _controller_block(message, scene)
     else:
         return ""
     return wrong and f"A {frame.name} of the {role} from tick {frame.fields[0]} cannot be booked: {wrong}."
@@ -46,7 +46,7 @@ def plant_columns(scene: Scene) -> tuple[str, ...]:
     return tuple(dict.fromkeys((*_PLANT, *chain.states, *lows, *friction)))
 
 
-def _state(state: Message, role: str) -> str:
+def _state(state: Message, role: str, scene: Scene) -> str:
     if role == "plant":
         missing = [name for name in _STATE if not _is_number(state.get(name))]
         return f"its state has no number for {' and '.join(missing)}" if missing else ""
@@ -56,14 +56,14 @@ def _state(state: Message, role: str) -> str:
     names = [name for name, _ in MESSAGES["CONTROLLER_BLOCK"].fields]
     for block in history:
         fields: list[object] = [block.get(name) for name in names] if isinstance(block, dict) else []
-        if wrong := message_complaint("CONTROLLER_BLOCK", fields) or _controller_block(block):
+        if wrong := message_complaint("CONTROLLER_BLOCK", fields) or _controller_block(block, scene):
             return f"in its history {wrong}"
     return ""
 
 
-def _controller_block(block: Message) -> str:
+def _controller_block(block: Message, scene: Scene) -> str:
     names = (*_CONTROLLER, *(f"dissipation.{index}" for index in range(len(block["elements"]))))
-    return _parts(block) or _columns(block, names, block["ticks"])
+    return _parts(block, scene) or _columns(block, names, block["ticks"])
 
 
 def _columns(block: Message, names: tuple[str, ...], rows: int) -> str:
@@ -82,9 +82,10 @@ def _columns(block: Message, names: tuple[str, ...], rows: int) -> str:
     return ""
 
 
-def _parts(block: Message) -> str:
+def _parts(block: Message, scene: Scene) -> str:
     wall, elements = block["wall"], block["elements"]
-    if missing := [name for name in _WALL if not _is_number(wall.get(name))]:
+    needed = *parameters_of(class_of(scene.wall)), "into_wall"
+    if missing := [name for name in needed if not _is_number(wall.get(name))]:
         return f"its wall has no number for {' and '.join(missing)}"
     if wall["into_wall"] not in (-1, 0, 1):
         return f"into_wall of its wall is {wall['into_wall']:g}, not -1, 0 or 1"

@@ -23,6 +23,7 @@ from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
 from haploop.protocol.transport.telemetry import Block
 from haploop.protocol.transport.wire import Message
+from haploop.protocol.walls.registry import class_of
 
 
 class Logger:
@@ -44,7 +45,6 @@ class Logger:
         self.books = Books(scene, time)
         self.window = Window(time, scene.encoder.resolution if scene.encoder else 0.0)
         self._measures: RunMeasures | None = None
-        self._into_wall = 0.0
         self._accounts: dict[int, Account] = {}
         self._events: list[tuple[int, Event]] = []
         self._not_made: list[str] = []
@@ -63,7 +63,9 @@ class Logger:
         known = history[-1]["from_tick"] + history[-1]["ticks"] if history else 0
         self.tick = self._first_tick = max(int(plant["tick"]), known)
         self._plant = PlantBuffer(self.time.steps_per_tick, int(plant["tick"]))
-        self._controller = ControllerBuffer(history[0]["from_tick"] if history else self.tick)
+        self._controller = ControllerBuffer(
+            history[0]["from_tick"] if history else self.tick, class_of(self._scene.wall)
+        )
         for block in history:
             self._buffer(block)
         self._end_state = {name: np.array([plant[name]]) for name in ("x", "v", "force")}
@@ -81,7 +83,6 @@ class Logger:
 
     def _buffer(self, block: Block) -> None:
         self._controller.add(block)
-        self._into_wall = block["wall"]["into_wall"]
         note_accounts(self._accounts, block["elements"], block["from_tick"] + block["ticks"])
 
     def event(self, tick: int, event: Event) -> None:
@@ -130,7 +131,7 @@ class Logger:
             self.books.start(plant)
             self._digest.update(states[:1].tobytes())
             self._started = True
-        rows = self.books.book(self.tick, plant, controller.commanded(self.tick, end, self._into_wall))
+        rows = self.books.book(self.tick, plant, controller.commanded(self.tick, end))
         columns = {name: controller.rows(name, self.tick, end)[:, None] for name in CONTROLLER_COLUMNS}
         self.window.add(plant["x"][:, None], plant["force"][:-1, None], columns)
         self._measures = None

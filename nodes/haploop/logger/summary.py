@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from haploop.logger.books.balance import BooksState, moved_J, residual_J, stored_J, total_J
+from haploop.logger.books.ideal_wall import DISSIPATED
 from haploop.logger.log import LogError
 from haploop.logger.verdict.measures import RunMeasures
 from haploop.protocol.files import read_text
@@ -59,8 +60,8 @@ def versions() -> dict[str, str]:
 def energy(books: BooksState, accounts: Sequence[Account], has_wall: bool) -> Summary:
     """Returns the ``energy`` entry: every book as it stands; arrays over the members where the books are of a batch.
 
-    The wall's leak is its true book less what an ideal spring would hold now (``ideal_J``, against the start), but for
-    what changes of the wall in contact put into that spring (``changes_J``).
+    The wall's leak is its true book less what an ideal wall would hold now (``ideal_J``, against the start), but for
+    what changes of the wall in contact put into it (``changes_J``), and less what its law takes (``dissipated_J``).
     """
 
     def pair(account: str | int) -> Summary:
@@ -72,6 +73,10 @@ def energy(books: BooksState, accounts: Sequence[Account], has_wall: bool) -> Su
         causes = ("sampling_and_hold_J", "quantisation_J", "delay_J")
         parts = {cause: after - before for cause, before, after in zip(causes, steps[:-1], steps[1:], strict=True)}
         wall |= {"ideal_J": steps[0] + books.wall_changes_J, "changes_J": books.wall_changes_J}
+        if DISSIPATED in books.names:
+            wall |= {f"{DISSIPATED}_J": (lost := total_J(books, DISSIPATED))}
+            steps[0] = steps[0] + lost
+            parts["sampling_and_hold_J"] = steps[1] - steps[0]
         wall |= {"leak": {"total_J": steps[-1] - steps[0], **parts}}
     beside = [name for name in books.names if name.endswith(("_heat", "_work")) or name == "actuator"]
     return {

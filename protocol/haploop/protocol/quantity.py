@@ -38,6 +38,7 @@ class Quantity:
         about: the meaning of the number in a few words, for editors.
         whole: only whole numbers, held as int.
         choices: all the values there are, texts or False and True, of what is no number; empty of one that is.
+        step: only multiples of it.
     """
 
     unit: str
@@ -48,6 +49,7 @@ class Quantity:
     about: str = ""
     whole: bool = False
     choices: tuple[str | bool, ...] = ()
+    step: float | None = None
 
     def as_dict(self) -> dict[str, Any]:
         """Returns unit and bounds by name, as they travel on the wire; ``choices`` where there are some."""
@@ -62,6 +64,8 @@ class Quantity:
         """Returns what is wrong with ``value`` ("must be above 0 kg"), or None when it may be used."""
         if not math.isfinite(value):
             return "must be a finite number" + (f" of {self.unit}" if self.unit else "")
+        if self.step and value % self.step:
+            return f"must be a multiple of {self.step:g} {self.unit}".rstrip()
         return self._out_of_bounds(value) or self._not_meant(value)
 
     def _out_of_bounds(self, value: float) -> str | None:

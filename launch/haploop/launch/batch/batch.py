@@ -158,7 +158,7 @@ class Batch(BatchLoop):
         self._elements.check()
         if rows:
             plant = self._motion.take_record(self._logger.tick, positions_only=self._positions_only)
-            self._logger.book(plant, rows, self._controller.params.wall.inward)
+            self._logger.book(plant, rows, self._controller.params.wall)
 
     def _look_for_ends(self, tick: int) -> None:
         inside = np.abs(self._motion.x) <= self._limit_m

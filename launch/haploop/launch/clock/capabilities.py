@@ -11,6 +11,7 @@ from haploop.protocol.quantity import Quantity
 from haploop.protocol.scene.paths import value_at
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.transport.wire import Message
+from haploop.protocol.walls.registry import class_of
 
 if TYPE_CHECKING:
     from haploop.controller.dissipation import Element
@@ -23,7 +24,7 @@ def capabilities(scene: Scene, kinds: Mapping[str, type[Element]]) -> Message:
         ``settable``: key -> unit, bounds and present value; ``kinds``: kind -> what it does and its parameters with
         unit, bounds and default; ``elements``: those at work. A bound or default that is not there is None.
     """
-    keys = settable_keys([element.name for element in scene.dissipation], scene.wall is not None, kinds)
+    keys = settable_keys([element.name for element in scene.dissipation], scene.wall and class_of(scene.wall), kinds)
     return {
         "settable": {key: {**number.quantity.as_dict(), "value": value_at(scene, key)} for key, number in keys.items()},
         "kinds": {

@@ -124,7 +124,8 @@ def _estimates(scene: Scene, named: tuple[Effect, ...]) -> Iterable[Step]:
 def _forces(scene: Scene) -> Iterable[Step]:
     if wall := scene.wall:
         sign = "<" if wall.occupies == "below" else ">"
-        yield Step("controller", f"wall: {wall.stiffness:g} N/m where x {sign} {wall.position:g} m")
+        named = f"{wall.kind}{_values(wall.others)}, " if wall.kind else ""
+        yield Step("controller", f"wall: {named}{wall.stiffness:g} N/m where x {sign} {wall.position:g} m")
     for table in scene.dissipation:
         yield Step("controller", f"{table.name}{_values(table)}, {table.acts}")
 
@@ -141,7 +142,7 @@ def _stage(stage: Stage, named: Iterable[Effect], scene: Scene) -> tuple[Step, .
 def _values(found: Any, key: str = "") -> str:
     """Returns the numbers of an effect, or of an element, in parentheses."""
     name = key.rpartition(".")[2]
-    table = found.as_dict() if isinstance(found, Table) else {name: found}
+    table = found.as_dict() if isinstance(found, Table) else found if isinstance(found, dict) else {name: found}
     words = [f"{k} = {v:g}" for k, v in table.items() if isinstance(v, (int, float)) and not isinstance(v, bool)]
     return f" ({', '.join(words)})" if words else ""
 

@@ -21,6 +21,7 @@ from haploop.launch.scene.models import Model, number_of, read_table, scene_mode
 from haploop.launch.scene.schema import Schema, alternatives, schema_at, whole_schema
 from haploop.launch.scene.toml_writer import inline
 from haploop.launch.scene.unmodelled import check_hand
+from haploop.launch.scene.wall_keys import check_spring, check_wall, with_defaults
 from haploop.protocol.scene.scene import Clock, EventTable, Scene
 from haploop.protocol.scene.table import Tables
 from haploop.protocol.ticks import Timebase, TimebaseError
@@ -82,11 +83,14 @@ def with_rules(layers: Layers, scene: Scene | None, kinds: Mapping[str, type[Ele
         effect.check(draft)
     check_hand(draft)
     check_estimators(layers)
+    check_wall(layers)
     if scene:
+        check_spring(layers, scene, kinds)
         check_filter(layers, scene)
     settings = check_events(layers, _timebase(layers, scene), kinds)
     if layers.mistakes or scene is None:
         raise SceneError(layers.mistakes)
+    scene = with_defaults(scene)
     if not scene.event:
         return scene
     events = [

@@ -16,6 +16,9 @@ from haploop.protocol.changes import Event
 from haploop.protocol.scene.scene import NO_ELEMENT, Clock, ElementTable, EventTable, Scene, Wall
 from haploop.protocol.scene.table import Tables
 from haploop.protocol.ticks import DELAY, Timebase, too_long, whole_count
+from haploop.protocol.walls.registry import all_walls
+from haploop.protocol.walls.wall import Spring
+from haploop.protocol.walls.wall import Wall as WallLaw
 
 if TYPE_CHECKING:
     from haploop.controller.dissipation import Element
@@ -36,15 +39,15 @@ def check_events(
     """
     events = [(i, e) for i, e in enumerate(_tables(layers.data.get("event"))) if isinstance(e, dict)]
     slots = [e.get("kind") if isinstance(e, dict) else None for e in _tables(layers.data.get("dissipation"))]
-    has_wall = isinstance(layers.data.get("wall"), dict)
+    wall = _wall_of(layers)
     settings: dict[int, dict[str, float]] = {}
-    settable = settable_keys(slots, has_wall, kinds)
+    settable = settable_keys(slots, wall, kinds)
     for index, event in sorted(events, key=lambda item: _read(item[1], "at")):
         key = ("event", index)
         _check_shape(layers, key, event, time)
         if isinstance(event.get("swap"), dict):
             _swap(layers, key, event, slots)
-            settable = settable_keys(slots, has_wall, kinds)
+            settable = settable_keys(slots, wall, kinds)
         if isinstance(event.get("set"), dict):
             settings[index] = {
                 name: value
@@ -77,16 +80,24 @@ def _swap(layers: Layers, key: KeyPath, event: Tables, slots: list[Any]) -> None
         layers.complain((*key, "element"), expected, f"is {element}")
 
 
-def settable_keys(slots: list[Any], has_wall: bool, kinds: Mapping[str, type[Element]]) -> dict[str, Number]:
+def settable_keys(
+    slots: list[Any], wall: type[WallLaw] | None, kinds: Mapping[str, type[Element]]
+) -> dict[str, Number]:
     """Returns every key that can be set while these kinds are at work, and the number that reads its value."""
-    wall = {f"wall.{name}": number_of(Wall, name) for name in SETTABLE_OF_WALL if has_wall}
+    of_wall = {f"wall.{name}": number_of(Wall, name) for name in (*SETTABLE_OF_WALL, *wall.keys)} if wall else {}
     elements = {
         f"dissipation.{slot}.{name}": Number(quantity)
         for slot, kind in enumerate(slots)
         if isinstance(kind, str) and kind in kinds
         for name, (quantity, _) in kinds[kind].parameters().items()
     }
-    return wall | {DELAY: number_of(Clock, "round_trip_delay")} | elements
+    return of_wall | {DELAY: number_of(Clock, "round_trip_delay")} | elements
+
+
+def _wall_of(layers: Layers) -> type[WallLaw] | None:
+    """Returns the kind of the scene's wall; a spring for a kind that there is not, a mistake reported elsewhere."""
+    table = layers.data.get("wall")
+    return all_walls().get(str(table.get("kind")), Spring) if isinstance(table, dict) else None
 
 
 def _setting(

@@ -19,8 +19,9 @@ from haploop.plant.integrators.registry import integrator_names
 from haploop.protocol.quantity import Quantity
 from haploop.protocol.scene.estimators import Acceleration, Velocity
 from haploop.protocol.scene.hand_force import Trace
-from haploop.protocol.scene.scene import NO_ELEMENT, Clock, EventTable, Scene
+from haploop.protocol.scene.scene import NO_ELEMENT, Clock, EventTable, Scene, Wall
 from haploop.protocol.scene.table import Table
+from haploop.protocol.walls.registry import all_walls
 
 if TYPE_CHECKING:
     from haploop.controller.dissipation import Element
@@ -71,15 +72,15 @@ def _keys_of(table: type[Table], others: Keys, named: frozenset[str] | None = No
 
 
 def _registered(table: type[Table]) -> Keys:
-    """Returns the keys that registries give: names, keys of estimators of other packages, tables of their effects."""
+    """Returns the keys that registries give: names, keys of walls and estimators, tables of effects."""
     if table is Scene:
         return {effect.key: (model_of(effect.table) | None, None) for effect in all_effects() if effect.table}
     if table is Clock:
         return {"integrator": (_one_name(integrator_names()), "exact")}
-    if table not in (Velocity, Acceleration):
+    if table not in (Velocity, Acceleration, Wall):
         return {}
-    kinds = estimators_for(table.__name__.lower())
-    keys: Keys = {"estimator": (_one_name(kinds) | None, None)}
+    kinds, name = (all_walls(), "kind") if table is Wall else (estimators_for(table.__name__.lower()), "estimator")
+    keys: Keys = {name: (_one_name(kinds) | None, None)}
     for kind in kinds.values():
         keys |= {key: (Annotated[float | None, Number(quantity)], None) for key, quantity in kind.keys.items()}
     return keys

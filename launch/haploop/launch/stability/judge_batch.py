@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from haploop.controller.tick import Wall
 from haploop.launch.batch.batch import BatchEnd
 from haploop.launch.stability.decide import Finding
 from haploop.launch.stability.looks import (
@@ -26,6 +25,7 @@ from haploop.launch.stability.looks import (
 from haploop.launch.stability.still_batch import StillBatch
 from haploop.launch.stability.still_hand import hold_of
 from haploop.protocol.trees import tree_take
+from haploop.protocol.walls.wall import Wall
 
 # Members of a batch that are judged together.
 MOST = 1024

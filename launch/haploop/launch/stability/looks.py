@@ -6,11 +6,11 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from haploop.controller.tick import Wall
 from haploop.launch.stability.decide import Finding, decide
 from haploop.launch.stability.swing import Pushed, measure
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
+from haploop.protocol.walls.wall import Wall
 
 # The larger push, as a share of what the hand holds the wall with, and the smaller one, as a share of it.
 PUSH, SMALLER = 0.3, 0.1

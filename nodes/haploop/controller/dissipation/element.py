@@ -53,7 +53,7 @@ class Motion:
 
     Attributes:
         force: of the wall and of all elements before this one in the list, at this tick, N.
-        wall_force, wall_stored: of the wall alone, N; what its ideal spring holds at this penetration, J.
+        wall_force, wall_stored: of the wall alone, N; what its potential holds at this penetration, J.
         wall_position, wall_stiffness: as they are at this tick, m and N/m.
         way: x_m[k] - x_m[k-1], m; 0 at the first tick.
         force_before, output_before, total_before: what was commanded at tick k - 1, N: of this element; with the wall

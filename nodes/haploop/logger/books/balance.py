@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from haploop.logger.books.work import CLOSING, Sums
+from haploop.protocol.walls.wall import Wall
 
 # A residual is told in words beyond this share of the energy that moved.
 _TOLD = 1e-3
@@ -31,14 +32,14 @@ class BooksState(NamedTuple):
             is a wall, ``moved``, then ``<b>.sampled`` and ``<b>.true`` for the wall and for every element's book b.
         sums: how they stand, J.
         stored_at_start_J: kinetic and spring energy at the start.
-        wall: position in m and stiffness in N/m where the last intervals were booked; None before the first.
-        wall_changes_J: what changes of the wall in contact would have put into an ideal spring.
+        wall: as it stood where the last intervals were booked; None before the first.
+        wall_changes_J: what changes of the wall in contact would have put into an ideal one.
     """
 
     names: tuple[str, ...]
     sums: Sums
     stored_at_start_J: Any
-    wall: tuple[Any, Any] | None
+    wall: Wall | None
     wall_changes_J: Any
 
 

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from haploop.logger.books.balance import BooksState, balance, balance_sign
+from haploop.logger.books.ideal_wall import CAUSES, DISSIPATED, dissipated, ideal_walls, inside, leak_books
 from haploop.logger.books.one_mass import OneMassBooks
 from haploop.logger.books.work import (
-    CAUSES,
     CLOSING,
     BatchSums,
     Displacement,
@@ -18,8 +18,6 @@ from haploop.logger.books.work import (
     add_ticks_of_batch,
     by_interval,
     displacement,
-    held_J,
-    ideal_springs,
     in_effect,
     no_sums,
     sampled_work,
@@ -30,12 +28,14 @@ from haploop.logger.books.work import (
 from haploop.protocol.arrays import first_row
 from haploop.protocol.scene.scene import Scene, hand_is_unmodelled
 from haploop.protocol.ticks import Timebase
-from haploop.protocol.trees import tree_select
+from haploop.protocol.trees import tree_leaves, tree_select
+from haploop.protocol.walls.registry import class_of
 
 if TYPE_CHECKING:
     from haploop.logger.books.buffers import Commanded
     from haploop.logger.books.chain import ChainBooks
     from haploop.logger.books.closing import ClosingBooks
+    from haploop.protocol.walls.wall import Wall
 
     PlantBooks = OneMassBooks | ChainBooks | ClosingBooks
 
@@ -57,8 +57,8 @@ class Books:
         self._time = time
         self.plant = plant_books(scene, time, members)
         self._displacement, self._add_ticks = displacement, add_ticks_of_batch
-        self._has_wall = scene.wall is not None
-        names = [*self.plant.names, *(CAUSES if self._has_wall else ()), "moved"]
+        self._leak = leak_books(class_of(scene.wall)) if scene.wall else ()
+        names = [*self.plant.names, *self._leak, "moved"]
         self.state = BooksState((), no_sums(0, members), 0.0, None, 0.0)
         self._open([*names, *_of_account("wall")])
 
@@ -116,12 +116,15 @@ class Books:
         if CLOSING in flows:
             flows[CLOSING] = sum_rows(-sign * flow for name, flow in flows.items() if (sign := balance_sign(name)))
         flows["moved"] = _half_of_magnitudes(flows.values())
-        if self._has_wall:
-            at_ticks, (position, stiffness, into_wall) = plant["x"][::n], commanded.wall
-            self._note_wall(first_row(at_ticks), (position, stiffness), into_wall)
+        if self._leak:
+            at_ticks, wall = plant["x"][::n], commanded.wall
+            self._note_wall(first_row(at_ticks), wall)
             computed = forces["wall"][before : before + ticks]
-            springs = ideal_springs(at_ticks, way.by_tick, computed, (position, stiffness), into_wall)
-            flows |= zip(CAUSES, springs, strict=True)
+            ideal = ideal_walls(wall, at_ticks, plant["v"][::n], way.by_tick, computed)
+            flows |= zip(CAUSES, ideal, strict=True)
+            if DISSIPATED in self._leak:
+                by_step = dissipated(wall, plant["x"], plant["v"], self._time.step_s)
+                flows[DISSIPATED] = sum_steps(by_interval(by_step, n))
         known = slice(max(before - 1, 0), before + ticks)
         none: np.ndarray = np.zeros_like(way.by_tick)
         for account, force in forces.items():
@@ -158,10 +161,10 @@ class Books:
                 flow[uneven] = sum_steps(by_step)[uneven]
             yield f"{account}.true", flow
 
-    def _note_wall(self, x: Any, wall: tuple[Any, Any], into_wall: float) -> None:
+    def _note_wall(self, x: Any, wall: Wall) -> None:
         before = self.state.wall
-        if before and not all(map(np.array_equal, wall, before)):
-            change_J = held_J(x, wall, into_wall) - held_J(x, before, into_wall)
+        if before and not all(map(np.array_equal, tree_leaves(wall), tree_leaves(before))):
+            change_J = wall.stored(inside(wall, x)) - before.stored(inside(before, x))
             self.state = self.state._replace(wall_changes_J=self.state.wall_changes_J + change_J)
         self.state = self.state._replace(wall=wall)
 

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from haploop.protocol.transport.telemetry import Block
+from haploop.protocol.walls.registry import parameters_of
+from haploop.protocol.walls.wall import Spring, Wall
 
 # Columns of pieces of steps have a row for each piece, in order; ``pieces.step`` says of which step it is.
 PIECES = "pieces."
@@ -67,24 +69,28 @@ class Commanded(NamedTuple):
     Attributes:
         x_m: positions as measured, shape (rows,), m.
         forces: of the wall, by the name "wall", and of every element's book, shape (rows,) each, N.
-        wall: position in m, stiffness in N/m and direction into it, +1 or -1, as they stand in all intervals booked.
+        wall: as it stands in all intervals booked.
     """
 
     first: int
     x_m: np.ndarray
     forces: dict[str, np.ndarray]
-    wall: tuple[Any, Any, float]
+    wall: Wall
 
 
 class ControllerBuffer:
     """Controller rows of one run by tick, with every book's force and the wall as it stood.
 
+    Args:
+        wall: class of the scene's.
+
     Attributes:
-        columns: x, v, a, wall, total, in_contact, wall_position, wall_stiffness; shape (end - first,) each.
+        columns: x, v, a, wall, total, in_contact, the wall's numbers (wall_position, ...); shape (end - first,) each.
         forces: force of every book that has acted within these ticks, 0 where it was not at work.
     """
 
-    def __init__(self, tick: int) -> None:
+    def __init__(self, tick: int, wall: type[Wall] = Spring) -> None:
+        self._wall, self._of_wall, self._inward = wall, parameters_of(wall), 0.0
         self.first = self.end = tick
         self.columns: dict[str, np.ndarray] = {}
         self.forces: dict[int, np.ndarray] = {}
@@ -98,8 +104,8 @@ class ControllerBuffer:
         books = {e["book"]: columns[f"dissipation.{i}"] for i, e in enumerate(block["elements"])}
         new = {name: column for name, column in columns.items() if not name.startswith("dissipation.")}
         ticks, kept = block["ticks"], self.end - self.first
-        for name in ("position", "stiffness"):
-            new[f"wall_{name}"] = np.full(ticks, block["wall"][name])
+        new |= {f"wall_{name}": np.full(ticks, block["wall"][name]) for name in self._of_wall}
+        self._inward = block["wall"]["into_wall"]
         self.columns = {name: np.concatenate([self.columns.get(name, new[name][:0]), new[name]]) for name in new}
         self.forces = {
             book: np.concatenate([self.forces.get(book, np.zeros(kept)), books.get(book, np.zeros(ticks))])
@@ -118,11 +124,11 @@ class ControllerBuffer:
         """Returns a column at the ticks first ... end - 1."""
         return self.columns[name][first - self.first : end - self.first]
 
-    def commanded(self, tick: int, end: int, into_wall: float) -> Commanded:
+    def commanded(self, tick: int, end: int) -> Commanded:
         """Returns what books need of the intervals ``tick`` ... ``end - 1``, without elements that come later."""
         forces = {str(book): force for book, force in self.forces.items() if self._opened[book] < end}
-        position, stiffness = (float(self.rows(f"wall_{of}", tick, end)[0]) for of in ("position", "stiffness"))
-        wall = position, stiffness, into_wall
+        stood = {name: float(self.rows(f"wall_{name}", tick, end)[0]) for name in self._of_wall}
+        wall = self._wall(inward=self._inward, **stood)
         return Commanded(self.first, self.columns["x"], {"wall": self.columns["wall"]} | forces, wall)
 
     def forget_before(self, tick: int, command: int) -> None:

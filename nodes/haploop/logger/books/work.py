@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from haploop.protocol.arrays import each
-
 # Sums a flow over the plant steps of each interval, from a first step on before an end.
 SumSteps = Callable[..., Any]
-# The springs whose books part the leak of a wall into its causes, as ``ideal_springs`` yields them.
-CAUSES = ("ideal", "sampled_and_held", "quantised")
 # The book of an unmodelled hand: what all others leave over, so that they have no residual.
 CLOSING = "unmodelled_work"
 
@@ -91,41 +87,6 @@ def in_effect(force: np.ndarray, command: np.ndarray, first: int) -> np.ndarray:
     found = force.take(np.maximum(command - first, 0), axis=0)
     found[command < 0] = 0.0
     return found
-
-
-def held_J(x: Any, wall: tuple[Any, Any], into_wall: float) -> Any:
-    """Returns the energy in an ideal spring of position and stiffness ``wall`` with the device at x: k p^2 / 2, J."""
-    return each(_held_J, x, *wall, into_wall)
-
-
-def _held_J(x: float, position: float, stiffness: float, into_wall: float) -> float:
-    return stiffness * max(0.0, (x - position) * into_wall) ** 2 / 2.0
-
-
-def ideal_springs(x: Any, way: Any, force: Any, wall: tuple[Any, Any], into_wall: float) -> Iterator[Any]:
-    """Yields the energy taken out of the device on the same trajectory by springs better than the true one, J.
-
-    ideal             that of a real spring, always there: change of k p^2 / 2, p the true penetration
-    sampled_and_held  its force taken from the true position at the tick and held: what sampling and hold add
-    quantised         the force the controller computed, without delay: what quantisation and noise add
-    The true book adds the delay. Leak = true - ideal; its parts are the differences from line to line.
-
-    Args:
-        x: true position at the ticks and at the end, shape (ticks + 1,), m.
-        way: displacement over each interval, shape (ticks,), m.
-        force: what the controller computed for the wall at these ticks, shape (ticks,), N.
-        wall: position in m and stiffness in N/m.
-        into_wall: +1 or -1.
-
-    Yields:
-        Shape (ticks,) each, ordered as ``CAUSES``; all arrays may have a last axis for a batch.
-    """
-    position, stiffness = wall
-    depth = x.__array_namespace__().maximum(0.0, (x - position) * into_wall)
-    before, after = depth[:-1], depth[1:]
-    yield 0.5 * stiffness * (after - before) * (after + before)
-    yield into_wall * stiffness * before * way
-    yield -force * way
 
 
 def sum_rows(rows: Iterable[Any]) -> Any:

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from haploop.protocol.walls.registry import make_wall, wall_names
 from haploop.view.draw.messages import Column, Table, encode
 from haploop.view.look.budget import budget
 from haploop.view.look.compare import Changes, Half
@@ -24,6 +25,8 @@ _PERIODS, _PHASE_S, _MOST_ROWS = 2.0, 0.4, 8000
 PANELS = ("loops", "energy", "spectrum", "compare", "motion")
 # Ticks of which a spectrum is made at most, the newest; parts of an overview of the run.
 _SPECTRUM_TICKS, _OVERVIEW_PARTS = 2048, 256
+# Points of the curve of a wall that is no spring.
+_CURVE = 60
 _BODIES = {"x": "position", "tip_x": "position of the tip", "hand_x": "position of the hand"}
 _MEASURED = {"wall_position": Column("wall", "m", "wall"), "x_measured": Column("x_measured", "m", "measured position")}
 _MAKING = re.compile(r"-\d+$")
@@ -198,7 +201,8 @@ def _force_position(history: History, first: int, end: int) -> Table | None:
     """Returns penetration (m, positive inside) and force out of the wall (N) at every plant step (Fig. 3).
 
     The force is the one applied, total of wall and elements, held while the position moves on. Where it runs
-    counter-clockwise, the area within is energy given to the device. ``stiffness`` (N/m) is that of the ideal spring.
+    counter-clockwise, the area within is energy given to the device. ``stiffness`` (N/m) is that of the ideal spring;
+    of a wall that is none, ``curve`` has depths (m) and the forces (N) that it stores there.
     """
     first, end = _last(history, history.steps, first, end)
     inward = history.at_work.into_wall
@@ -212,7 +216,10 @@ def _force_position(history: History, first: int, end: int) -> Table | None:
     values = np.stack([depth, -force * inward])[:, ::each]
     columns = [Column("penetration", "m", "penetration"), Column("force", "N", "force out of the wall")]
     known = stiffness[np.isfinite(stiffness)]
-    more = {"stiffness": float(known[-1]) if len(known) else None}
+    more: dict[str, Any] = {"stiffness": float(known[-1]) if len(known) else None}
+    if (wall := history.at_work.wall) and wall.kind in wall_names()[1:]:
+        curve = np.linspace(0.0, max(float(depth.max()), 0.0), _CURVE)
+        more["curve"] = [curve.tolist(), make_wall(wall).held(curve).tolist()]
     return Table("loop", first / time.control_rate, each / time.plant_rate, columns, values, more=more)
 
 

@@ -32,10 +32,10 @@ class AtWork(NamedTuple):
         elements = [
             ElementTable.from_dict({"kind": element["kind"], **element["parameters"]}) for element in block["elements"]
         ]
-        now = block["wall"]
-        occupies = "above" if now["into_wall"] > 0.0 else "below"
-        wall = Wall(position=now["position"], stiffness=now["stiffness"], occupies=occupies)
-        return cls(tuple(elements), wall if now["into_wall"] else None)
+        now = dict(block["wall"])
+        inward = now.pop("into_wall")
+        wall = Wall.from_dict({**now, "occupies": "above" if inward > 0.0 else "below"})
+        return cls(tuple(elements), wall if inward else None)
 
     @property
     def into_wall(self) -> float:

@@ -63,9 +63,10 @@ class Encoder(Table):
     rounding: Literal["nearest", "floor"] = "nearest"
 
 
-class Wall(Table):
-    """The virtual wall: a spring, felt inside."""
+class Wall(OpenTable):
+    """The virtual wall, felt inside: a spring, or of the kind that is named, with the parameters of that kind."""
 
+    kind: str | None = None  # pyright: ignore[reportIncompatibleVariableOverride]
     position: Annotated[float, si("m", "where the surface is")]
     stiffness: Annotated[float, si("N/m", "stiffness", at_least=0)]
     occupies: Literal["below", "above"] = "below"

@@ -17,6 +17,7 @@ from haploop.launch.scene.layers import Layers, read_layers
 from haploop.launch.scene.mistakes import nearest
 from haploop.protocol.changes import Change, at_work
 from haploop.protocol.scene.scene import Scene
+from haploop.protocol.walls.registry import class_of
 from haploop.tools.advise.walls.cases import MOST_DELAY_S
 
 # The only measured hand there is, along the axis of Choi et al. 2022.
@@ -32,6 +33,11 @@ ESTIMATORS: dict[str, dict[str, dict[str, Any]]] = {
 _TOO_LATE = (
     "The round-trip delay is {0:g} s; advice is given up to {1:g} s. A number without a unit is in seconds: write "
     '"{0:g} ms" for milliseconds.'
+)
+
+_NO_SPRING = (
+    "The scene's wall is of the kind {0}; advice is on springs, which are what it tries. "
+    "Take wall.kind out to be advised on a spring."
 )
 
 # How a device file says which of its numbers are assumed.
@@ -106,6 +112,8 @@ def make_subject(
     if scene.event:
         scene = apply_events(scene)
         notes.append("What the scene's events change is taken as changed from the start.")
+    if (kind := class_of(scene.wall).kind) != "spring":
+        raise InvalidRequest(_NO_SPRING.format(kind))
     return Subject(path.stem, scene, has_task, tuple(notes), assumptions(path))
 
 

@@ -200,6 +200,11 @@ class RunData:
         first = float(contact[0]) if len(contact) else self.span_s[0]
         return first, first + _EARLY_S
 
+    def wall_table_at(self, t_s: float) -> Wall | None:
+        """Returns the table of the wall as it stood at a time, None without a wall."""
+        walls = [span.wall for span in self.history.walls if span.from_tick / self.control_rate <= t_s]
+        return walls[-1] if walls else None
+
     def wall_at(self, t_s: Floats) -> tuple[Floats, Floats]:
         """Returns position (m) and stiffness (N/m) of the wall at some times."""
         walls = self.history.walls

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from haploop.protocol.walls.registry import make_wall
 from haploop.tools.figure import style
 from haploop.tools.figure.data import ElementSpan, Floats, RunData
 from haploop.tools.figure.time import MM
@@ -14,6 +15,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 GRAMS = 1e3
+# Points of the curve of a wall that is no spring.
+_CURVE = 200
 
 
 def force_position_loop(run: RunData, span_s: tuple[float, float]) -> tuple[Floats, Floats]:
@@ -41,7 +44,7 @@ def momentum_loop(run: RunData, span: ElementSpan) -> tuple[Floats, Floats, Floa
 
 
 def draw_force_position(ax: Axes, run: RunData, span_s: tuple[float, float]) -> None:
-    """Draws force against penetration, pressing and releasing told apart, beside the spring it should be."""
+    """Draws force against penetration, pressing and releasing told apart, beside the wall it should be."""
     title = "Force against penetration"
     if not run.history.walls:
         style.dress(ax, title, "", "")
@@ -61,13 +64,14 @@ def draw_force_position(ax: Axes, run: RunData, span_s: tuple[float, float]) -> 
         drawn = part | np.concatenate([[False], part[:-1]]) if len(part) else part
         x, y = np.where(drawn, depth * MM, np.nan), np.where(drawn, force, np.nan)
         ax.plot(x, y, color=colour, linewidth=1.1, label=label, gid=label)
-    _, stiffness = run.wall_at(np.array([span_s[1]]))
     in_contact = np.concatenate([d[(f != 0.0) | (d > 0.0)] for d, f in ((early_depth, early_force), (depth, force))])
     in_contact = in_contact[np.isfinite(in_contact)]
     deepest = in_contact.max(initial=0.0)
-    line = np.array([0.0, deepest])
-    ideal = {"color": style.INK, "linewidth": 1.0, "dashes": (4, 2), "label": "ideal spring", "gid": "spring"}
-    ax.plot(line * MM, stiffness[0] * line, **ideal)
+    wall = make_wall(run.wall_table_at(span_s[1]))
+    label, points = ("ideal spring", 2) if wall.kind == "spring" else ("ideal wall, at rest", _CURVE)
+    line = np.linspace(0.0, deepest, points)
+    ideal = {"color": style.INK, "linewidth": 1.0, "dashes": (4, 2), "label": label, "gid": "spring"}
+    ax.plot(line * MM, wall.held(line), **ideal)
     low, high = in_contact.min(initial=0.0) * MM, deepest * MM
     margin = 0.06 * (high - low) or 0.01
     ax.set_xlim(low - margin, high + margin)

@@ -12,7 +12,7 @@ from haploop.tools.figure.data import TOGETHER, Book, RunData
 from haploop.tools.figure.loops import draw_force_position, draw_momentum
 from haploop.tools.figure.own_columns import draw_own_columns, own_columns
 from haploop.tools.figure.time import energy_panel, force_panel, mark_events, position_panel
-from haploop.tools.render.report import LEAK_CAUSES, count_losses, plant_books, swing_words
+from haploop.tools.render.report import HELD, LAW_TAKES, LEAK_CAUSES, count_losses, plant_books, swing_words
 from haploop.tools.render.terminal import told
 from haploop.tools.render.units import amount, parameters, spring
 
@@ -163,7 +163,9 @@ def _leak_rows(wall: Summary) -> list[Row]:
     rows = [Row(f"    leak by {words}", amount(wall["leak"][key], "J")) for key, words in LEAK_CAUSES.items()]
     ideal = wall["ideal_J"] or 0.0
     held = abs(ideal) > 1e-9 * abs(wall["true_J"] or 0.0)
-    return rows + ([Row("    held by an ideal spring", amount(ideal, "J"))] if held else [])
+    if "dissipated_J" in wall:
+        rows.append(Row(f"    {LAW_TAKES}", amount(wall["dissipated_J"], "J")))
+    return rows + ([Row(f"    {HELD}", amount(ideal, "J"))] if held else [])
 
 
 def event_lines(run: RunData) -> list[str]:

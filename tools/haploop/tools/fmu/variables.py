@@ -85,6 +85,8 @@ def _obstacles(scene: Scene, params: ControllerParams) -> Iterator[str]:
         if type(active.element) not in ELEMENTS:
             kinds = ", ".join(kind.kind for kind in ELEMENTS)
             yield f"dissipation.{index} is {active.element.kind}, which is Python; an FMU holds {kinds}."
+    if params.wall.kind != "spring":
+        yield f"wall.kind is {params.wall.kind}; an FMU holds springs."
     for table, estimator in (("velocity", params.velocity), ("acceleration", params.acceleration)):
         if type(_unfiltered(estimator)[0]) not in ESTIMATORS:
             yield f"{table}.estimator is {_unfiltered(estimator)[0].name}, which is Python of another package."

@@ -13,7 +13,7 @@ from haploop.plant.chain.chain import Chain
 from haploop.plant.motion.one_mass import Mechanics
 from haploop.protocol.scene.paths import value_at
 from haploop.protocol.scene.scene import Scene, accelerometer_is_used
-from haploop.tools.linear.linearity import Kinds, LinearController, installed_kinds, why_not_linear
+from haploop.tools.linear.linearity import Kinds, LinearController, installed_kinds, why_not_linear, with_spring
 
 # Gil et al. leave out what grows with the square of this: the angle in rad by which the wall's swing turns in T/2 + td.
 _SMALL_ANGLE = 0.3
@@ -53,7 +53,7 @@ class _DoesNotApply(Exception):
 
 def bounds_of(scene: Scene, kinds: Kinds | None = None) -> list[Bound]:
     """Returns all known bounds of a resolved scene's wall, those that do not apply among them."""
-    kinds = installed_kinds() if kinds is None else kinds
+    kinds, scene = installed_kinds() if kinds is None else kinds, with_spring(scene)
     return [_bound(about, stiffness, scene, kinds) for stiffness, about in _KNOWN.items()]
 
 
@@ -177,7 +177,7 @@ _OUTSIDE: dict[str, tuple[Callable[[Scene], object], str]] = {
         lambda scene: scene.transmission or value_at(scene, "hand.grip"),
         "Device and hand are no single rigid mass.",
     ),
-    "elements": (lambda scene: scene.dissipation, "It is of a wall alone; the scene has dissipation elements."),
+    "elements": (lambda scene: scene.dissipation, "It is of a spring alone; the scene has damping or other dissipation elements."),
     "delay": (lambda scene: scene.clock.round_trip_delay, "It is of a loop without delay."),
     "spring": (lambda scene: value_at(scene, "hand.stiffness"), "The hand has a spring."),
     "transmission": (lambda scene: scene.transmission, "The device is not rigid: it has a [transmission]."),

@@ -19,8 +19,9 @@ from haploop.controller.tick import ControllerParams, StateTuple, initial_state,
 from haploop.launch.plan.effect import as_written
 from haploop.launch.plan.effects import all_effects
 from haploop.protocol.scene.paths import value_at
-from haploop.protocol.scene.scene import Scene, Wall, accelerometer_is_used
+from haploop.protocol.scene.scene import ElementTable, Scene, Wall, accelerometer_is_used
 from haploop.protocol.trees import tree_leaves, tree_unflatten
+from haploop.protocol.walls.registry import make_wall
 
 Kinds = Mapping[str, "type[Element]"]
 # A wall without stiffness that is never left: the elements act, and its own force is added where it is known.
@@ -44,8 +45,24 @@ def why_not_linear(scene: Scene, kinds: Kinds | None = None) -> list[str]:
     """
     kinds = installed_kinds() if kinds is None else kinds
     curved = [effect.written for effect in all_effects() if not effect.linear and effect.is_named(scene)]
+    wall = make_wall(scene.wall)
+    curved += [f"a wall of the kind {wall.kind}"] * (wall.stiffness_and_damping() is None)
     elements = {table.name: make_element(table, kinds)[0] for table in scene.dissipation}
     return curved + [f"the element {kind}" for kind, one in elements.items() if not _is_linear(one)]
+
+
+def with_spring(scene: Scene) -> Scene:
+    """Returns a scene whose wall is a spring, with an element of its damping: in lasting contact the same loop.
+
+    That a damped spring never pulls is left out; where small swings around a depth do not come to it, nothing is.
+    A wall that is no spring and damper stays.
+    """
+    known = make_wall(scene.wall).stiffness_and_damping()
+    if scene.wall is None or known is None or not scene.wall.kind:
+        return scene
+    damper = ElementTable(name="damping", parameters={"damping": known[1]})
+    wall = replace(scene.wall, kind=None, others={})
+    return replace(scene, wall=wall, dissipation=(*[damper] * bool(known[1]), *scene.dissipation))
 
 
 def _is_linear(element: Element) -> bool:

@@ -14,7 +14,7 @@ from haploop.plant.chain.transition import ChainTransition
 from haploop.protocol.scene.effects import Accelerometer
 from haploop.protocol.scene.scene import Scene, accelerometer_is_used
 from haploop.protocol.ticks import Timebase
-from haploop.tools.linear.linearity import Kinds, LinearController, installed_kinds, why_not_linear
+from haploop.tools.linear.linearity import Kinds, LinearController, installed_kinds, why_not_linear, with_spring
 from haploop.tools.search.bisect import bisect
 
 # No wall is softer than this, and none stiffer is looked at.
@@ -66,6 +66,7 @@ class OneTickMap:
                 "The stiffness limit is that of a linear loop: held forces on masses, springs and dampers. "
                 f"{scene.title!r} also has {', '.join(curved)}; take it out to ask for the limit."
             )
+        scene = with_spring(scene)
         after = _after_a_tick(scene, LinearController.from_scene(scene, kinds))
         return cls(after[:, :-1], after[:, -1])
 

@@ -21,6 +21,7 @@ BELOW, ABOVE = 0.97, 1.03
 _DEPTH_M, _START_M, _CHANGE = 2e-3, 3e-6, 100.0
 # Links that are stretched and an actuator that lags start with swings of up to the depth: it is then less.
 _DEPTH_OF_MORE_STATES_M = 6e-5
+_SPRING = Wall(position=0.0, stiffness=0.0)
 
 
 @dataclass(frozen=True)
@@ -58,7 +59,7 @@ def pressed_deep(scene: Scene, stiffness: float, kinds: dict[str, type[Element]]
         pressed,
         hand=replace(pressed.hand or Hand(), rest=0.0, force=push),
         device=replace(pressed.device, position=_START_M, velocity=0.0),
-        wall=Wall(position=depth_m, stiffness=stiffness),
+        wall=replace(scene.wall or _SPRING, position=depth_m, stiffness=stiffness, occupies="below"),
         run=replace(pressed.run, log="none"),
     )
     growth = OneTickMap.from_scene(pressed, kinds).growth(stiffness)

@@ -29,6 +29,7 @@ _COUNTS = (
     ("accelerometer", "clipped_ticks", "readings clipped"),
 )
 # The causes of a wall's leak by their keys in the summary.
+HELD, LAW_TAKES = "held by the wall if ideal", "taken by its law"
 LEAK_CAUSES = {"sampling_and_hold_J": "sampling and hold", "quantisation_J": "quantisation", "delay_J": "delay"}
 
 
@@ -120,7 +121,9 @@ def _books(energy: Summary, control_rate: float) -> Table:
         # The rounding error of a much larger number is zero.
         ideal_J, true_J = wall["ideal_J"], wall["true_J"]
         is_zero = None not in (ideal_J, true_J) and abs(ideal_J) < 1e-9 * abs(true_J)
-        table.add_row("  held by an ideal spring", "", amount(0.0 if is_zero else ideal_J, "J"), "")
+        if "dissipated_J" in wall:
+            table.add_row(f"  {LAW_TAKES}", "", amount(wall["dissipated_J"], "J"), "")
+        table.add_row(f"  {HELD}", "", amount(0.0 if is_zero else ideal_J, "J"), "")
     for element in energy["elements"]:
         values = parameters(element["parameters"])
         ticks = f"{element['from_tick'] / control_rate:g}–{element['to_tick'] / control_rate:g} s"

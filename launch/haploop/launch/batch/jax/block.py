@@ -161,10 +161,13 @@ class Block:
             return {}, command
         apart, now = partial(_apart, go), told.forces
         wall = params.controller.wall if self._has_wall else None
+        step_s = params.controller.motion.period_s / (len(told.x) - 1)
         acting = [before[0], before[1] if params.lookahead else now]
 
         def added() -> Forces:
-            return added_in_tick(params.books, self._book_names, told, acting, before[2], x_m_before, wall, apart)
+            return added_in_tick(
+                params.books, self._book_names, told, acting, before[2], x_m_before, wall, step_s, apart
+            )
 
         return apart(added), now | command
 

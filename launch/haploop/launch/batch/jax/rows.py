@@ -59,6 +59,30 @@ class Rows:
     def __truediv__(self, other: Any) -> Rows:
         return self._with(other, operator.truediv)
 
+    def __eq__(self, other: Any) -> Rows:  # pyright: ignore[reportIncompatibleMethodOverride]
+        return self._with(other, operator.eq)
+
+    def __ne__(self, other: Any) -> Rows:  # pyright: ignore[reportIncompatibleMethodOverride]
+        return self._with(other, operator.ne)
+
+    def __lt__(self, other: Any) -> Rows:
+        return self._with(other, operator.lt)
+
+    def __le__(self, other: Any) -> Rows:
+        return self._with(other, operator.le)
+
+    def __gt__(self, other: Any) -> Rows:
+        return self._with(other, operator.gt)
+
+    def __ge__(self, other: Any) -> Rows:
+        return self._with(other, operator.ge)
+
+    def __and__(self, other: Any) -> Rows:
+        return self._with(other, operator.and_)
+
+    def __or__(self, other: Any) -> Rows:
+        return self._with(other, operator.or_)
+
     def __neg__(self) -> Rows:
         return Rows([-row for row in self.rows])
 
@@ -89,4 +113,15 @@ def _repeat(rows: Rows, times: int, axis: int) -> Rows:
     return Rows([row for row in rows.rows for _ in range(times)])
 
 
-_NAMESPACE = SimpleNamespace(maximum=_maximum, repeat=_repeat)
+def _where(condition: Rows, yes: Any, no: Any) -> Rows:
+    of_each = [part.rows if isinstance(part, Rows) else [part] * len(condition) for part in (yes, no)]
+    return Rows([jnp.where(*row) for row in zip(condition.rows, *of_each, strict=True)])
+
+
+def _of_each(function: Callable[[Any], Any]) -> Callable[[Rows], Rows]:
+    return lambda rows: Rows([function(row) for row in rows.rows])
+
+
+_NAMESPACE = SimpleNamespace(
+    maximum=_maximum, repeat=_repeat, where=_where, sqrt=_of_each(jnp.sqrt), floor=_of_each(jnp.floor)
+)

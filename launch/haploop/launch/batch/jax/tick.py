@@ -10,14 +10,16 @@ from typing import Any, NamedTuple
 
 import jax
 
-from haploop.controller.tick import ControllerParams, StateTuple, Wall, tick
+from haploop.controller.tick import ControllerParams, StateTuple, tick
 from haploop.launch.batch.jax.rows import Rows
+from haploop.logger.books.ideal_wall import CAUSES, DISSIPATED, dissipated, ideal_walls
 from haploop.logger.books.one_mass import OneMassParams, Steps, Ticks, increments
-from haploop.logger.books.work import CAUSES, displacement, ideal_springs, sampled_work, sum_rows
+from haploop.logger.books.work import displacement, sampled_work, sum_rows
 from haploop.plant.motion.forced_response import forced_response
 from haploop.plant.motion.one_mass import OneMassState, advance, sensed_acceleration
 from haploop.plant.motion.record import NOTED, change_over
 from haploop.plant.sensing.encoder import make_encoder
+from haploop.protocol.walls.wall import Wall
 
 # Force of the wall and of every element at one tick.
 Forces = dict[str, jax.Array]
@@ -181,7 +183,7 @@ def rounded(value: Any, zero: Any) -> Any:
 
 def added_in_tick(
     params: OneMassParams, names: Sequence[str], told: TickOutputs, acting: Sequence[Forces], before: Forces,
-    x_m_before: Any, wall: Wall | None, apart: Apart,
+    x_m_before: Any, wall: Wall | None, step_s: float, apart: Apart,
 ) -> dict[str, jax.Array]:  # fmt: skip
     """Returns what a tick adds to each book, J, by the names of ``Books``; shape (members,).
 
@@ -208,9 +210,9 @@ def added_in_tick(
         flows[f"{account}.true"] = sum_rows(-force * way for force, way in zip(forces, ways, strict=True))
     flows["moved"] = 0.5 * sum_rows(abs(flow) for flow in flows.values())
     if wall:
-        place = wall.position, wall.stiffness
-        springs = ideal_springs(x[::n], moved.by_tick, Rows([now["wall"]]), place, wall.inward)
-        flows |= zip(CAUSES, springs, strict=True)
+        flows |= zip(CAUSES, ideal_walls(wall, x[::n], v[::n], moved.by_tick, Rows([now["wall"]])), strict=True)
+        if wall.dissipates:
+            flows[DISSIPATED] = summed(dissipated(wall, x, v, step_s))
     x_m: Any = Rows([x_m_before, told.row["x"]])
     for account in now:
         flows[f"{account}.sampled"] = sampled_work(x_m, before[account])

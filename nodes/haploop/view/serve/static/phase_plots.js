@@ -40,8 +40,8 @@ export class PhasePlots {
   }
 }
 
-/** Pressing and releasing told apart, beside the spring it should be; what lies outside the wall is left out. */
-function forceLoop({ columns, stiffness }) {
+/** Pressing and releasing told apart, beside the wall it should be; what lies outside the wall is left out. */
+function forceLoop({ columns, stiffness, curve }) {
   const [depth, force] = columns.map(({ values }) => values);
   const x = new Float64Array(depth.length);
   let deepest = 0;
@@ -54,7 +54,10 @@ function forceLoop({ columns, stiffness }) {
     { key: "pressing", label: "pressing", path: (u, xs, ys) => line(u, xs, ys, presses) },
     { key: "releasing", label: "releasing", path: (u, xs, ys) => line(u, xs, ys, (i) => !presses(i)) },
   ].map((part) => ({ ...part, line: LINES[part.key], x, y: force }));
-  if (Number.isFinite(stiffness)) {
+  if (curve) {
+    const ideal = { x: scaled(curve[0], MM), y: curve[1] };
+    parts.push({ key: "spring", label: "ideal wall, at rest", line: LINES.spring, path: whole, ...ideal });
+  } else if (Number.isFinite(stiffness)) {
     const spring = { x: [0, deepest * MM], y: [0, stiffness * deepest] };
     parts.push({ key: "spring", label: "ideal spring", line: LINES.spring, path: whole, ...spring });
   }

@@ -74,6 +74,7 @@ function books({ wall = {}, elements = [], moved_J: moved, residual_J: residual,
   for (const [key, words] of Object.entries(CAUSES)) {
     if (wall.leak) rows.push([`leak by ${words}`, undefined, wall.leak[key]]);
   }
+  if (isNumber(wall.dissipated_J)) rows.push(["taken by the law of the wall", undefined, wall.dissipated_J]);
   for (const { kind, from_tick: from, to_tick: to, sampled_J, true_J } of elements) {
     rows.push([`${kind}, ticks ${from} to ${to}`, sampled_J, true_J]);
   }
