@@ -1,4 +1,4 @@
-"""Another package adds an effect, an estimator and an integrator: they are checked, planned, run, booked, taken out.
+"""Another package adds an effect, an estimator, an integrator and a wall: they are checked, planned, run, booked, taken out.
 
 The package is that of ``tests/helpers/outside``; haploop finds it by its entry points alone.
 """
@@ -16,7 +16,7 @@ import pytest
 import haploop.logger
 
 OUTSIDE = Path(__file__).parent / "helpers/outside"
-# Free fall from rest for a second, then a scene with all three in a wall, then bodies in a row.
+# Free fall from rest for a second, then a scene with all of them, then bodies in a row.
 FALL = "duration = 1.0\ndiverged_beyond = 10.0\n[device]\nmass = 0.2\ndamping = 0.0\n[gravity]\n"
 ALL = """
 duration = 0.5
@@ -31,8 +31,10 @@ damping = 1.0
 stiffness = 50.0
 force = { kind = "ramp", value = -0.5, rise_time = 0.1 }
 [wall]
+kind = "bumper"
 position = -0.005
 stiffness = 500.0
+hardens_at = "4 mm"
 [velocity]
 estimator = "alpha-beta"
 alpha = 0.4
@@ -69,7 +71,7 @@ def found(code: str, scene: Path) -> Any:
 
 @pytest.fixture
 def scene(tmp_path: Path) -> Path:
-    """A scene with all three."""
+    """A scene with all of them."""
     (tmp_path / "all.toml").write_text(ALL, encoding="utf-8")
     return tmp_path / "all.toml"
 
@@ -88,6 +90,7 @@ def test_a_scene_that_names_them_is_checked_with_units_bounds_and_rules_of_their
     assert done.returncode == 0, done.stderr
     resolved = json.loads(done.stdout)
     assert resolved["gravity"] == {"acceleration": 3.7}
+    assert resolved["wall"]["hardens_at"] == 0.004
     assert resolved["velocity"] == {"estimator": "alpha-beta", "alpha": 0.4, "beta": 0.1}
     wrong = outside("check", scene, "--set", "gravity.acceleration=-1", "--set", "velocity.beta=3")
     assert wrong.returncode == 2
@@ -106,6 +109,7 @@ def test_without_the_package_its_table_is_no_key_of_a_scene(scene: Path) -> None
     assert "gravity is not a key of a scene" in done.stderr
     assert 'velocity.estimator is "alpha-beta"' in done.stderr
     assert 'clock.integrator is "kutta-3-8"' in done.stderr
+    assert 'wall.kind is "bumper"' in done.stderr
 
 
 def test_the_schema_for_editors_has_their_keys() -> None:
@@ -147,7 +151,7 @@ from haploop.tools.linear.linearity import why_not_linear
 exact = without(scene, "clock.integrator")
 print(json.dumps([why_not_linear(scene), is_batchable(exact), is_batchable(without(exact, "gravity"))]))
 """
-    assert found(code, scene) == [['clock.integrator = "kutta-3-8"'], False, True]
+    assert found(code, scene) == [['clock.integrator = "kutta-3-8"', "a wall of the kind bumper"], False, True]
 
 
 def test_a_device_falls_as_it_should_and_gravity_is_in_the_books(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""Another package, as somebody else would write it: an effect, an estimator and an integrator, by entry points."""
+"""Another package, as somebody else would write it: an effect, an estimator, an integrator and a wall, by entry points."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from haploop.plant.integrators.registry import Integrator
 from haploop.protocol.quantity import Quantity, si
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.scene.table import Table
+from haploop.protocol.walls.wall import Wall
 
 
 class Gravity(Table):
@@ -93,3 +94,20 @@ class Kutta38:
 
 
 KUTTA_3_8 = Integrator("kutta-3-8", "one of Kutta's 3/8 rule, order 4", 4, Kutta38, evaluations=4)
+
+
+@dataclass(frozen=True, slots=True)
+class Bumper(Wall):
+    """f = K p (1 + (p / h)^2): a spring that hardens; V = K p^2 / 2 + K p^4 / (4 h^2)."""
+
+    kind: ClassVar[str] = "bumper"
+    keys: ClassVar[Mapping[str, Quantity]] = {"hardens_at": si("m", "h, where it is twice as stiff a spring", above=0)}
+    hardens_at: Any
+
+    def push(self, depth: Any, speed: Any) -> Any:
+        share = depth / self.hardens_at
+        return self.stiffness * depth * (1.0 + share * share)
+
+    def stored(self, depth: Any) -> Any:
+        share = depth / self.hardens_at
+        return 0.5 * self.stiffness * depth * depth * (1.0 + 0.5 * share * share)

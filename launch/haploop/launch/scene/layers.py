@@ -22,6 +22,7 @@ KeyPath = tuple[str | int, ...]
 _DEEPEST, _MOST_FILES, _MOST_KEYS = 32, 100, 2000
 # Keys that say what else is in their table, each with the keys that are there whatever it says.
 _SORTS = {"kind": (), "estimator": ("source", "cutoff")}
+_OF_EVERY_KIND = {("wall",): ("position", "stiffness", "occupies")}
 # Tables of which one that names no kind is of a kind, too.
 _KINDLESS = [("hand",)]
 
@@ -68,6 +69,7 @@ class Layers:
         """
         under = self.value(key)
         for sort, common in _SORTS.items():
+            common = _OF_EVERY_KIND.get(key, common)
             if sort in over and under.get(sort, "" if key in _KINDLESS else over[sort]) != over[sort]:
                 for name in [n for n in under if n not in common and self.origins.get((*key, n)) != origin]:
                     self._forget((*key, name))
