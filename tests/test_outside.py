@@ -1,4 +1,4 @@
-"""Another package adds an effect, an estimator, an integrator and a wall: they are checked, planned, run, booked, taken out.
+"""Another package adds an effect, an estimator, an integrator and a wall: they are checked, planned, run, booked.
 
 The package is that of ``tests/helpers/outside``; haploop finds it by its entry points alone.
 """

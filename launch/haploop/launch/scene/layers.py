@@ -22,7 +22,7 @@ KeyPath = tuple[str | int, ...]
 _DEEPEST, _MOST_FILES, _MOST_KEYS = 32, 100, 2000
 # Keys that say what else is in their table, each with the keys that are there whatever it says.
 _SORTS = {"kind": (), "estimator": ("source", "cutoff")}
-_OF_EVERY_KIND = {("wall",): ("position", "stiffness", "occupies")}
+_OF_EVERY_KIND: dict[KeyPath, tuple[str, ...]] = {("wall",): ("position", "stiffness", "occupies")}
 # Tables of which one that names no kind is of a kind, too.
 _KINDLESS = [("hand",)]
 

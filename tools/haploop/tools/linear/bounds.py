@@ -177,7 +177,10 @@ _OUTSIDE: dict[str, tuple[Callable[[Scene], object], str]] = {
         lambda scene: scene.transmission or value_at(scene, "hand.grip"),
         "Device and hand are no single rigid mass.",
     ),
-    "elements": (lambda scene: scene.dissipation, "It is of a spring alone; the scene has damping or other dissipation elements."),
+    "elements": (
+        lambda scene: scene.dissipation,
+        "It is of a spring alone; the scene has damping or dissipation elements.",
+    ),
     "delay": (lambda scene: scene.clock.round_trip_delay, "It is of a loop without delay."),
     "spring": (lambda scene: value_at(scene, "hand.stiffness"), "The hand has a spring."),
     "transmission": (lambda scene: scene.transmission, "The device is not rigid: it has a [transmission]."),
