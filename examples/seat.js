@@ -6,7 +6,7 @@ const path = require("node:path");
 const { encode, decode } = require("@msgpack/msgpack");
 const zmq = require("zeromq");
 
-const VERSION = 2;
+const VERSION = 1;
 const CODE = {
   JOIN: 1,
   WELCOME: 2,

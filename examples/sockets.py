@@ -4,7 +4,7 @@ import msgpack
 import zmq
 from zmq.auth.thread import ThreadAuthenticator
 
-VERSION = 2
+VERSION = 1
 # With a port in the transport each socket has its own, in this order from that one on.
 PORTS = ("clock", "loop", "plant", "controller", "logger")
 BINDS = (zmq.ROUTER, zmq.XPUB)

@@ -61,15 +61,28 @@ def test_a_process_that_does_not_bring_the_sockets_its_role_must_bind_is_refused
     role: str, served: Served
 ) -> None:
     for brought in ({}, {"loop ": "ipc://x"}, {"Telemetry": "ipc://x"}):
-        code, reason = served.answer(pack(2, JOIN, role, SECRET, 1, brought, True, {}))
+        code, reason = served.answer(pack(1, JOIN, role, SECRET, 1, brought, True, {}))
         assert code == REFUSED
         assert all(name in reason for name in PROCESSES[role].binds)
     assert served.server.roster.nodes == {}
     assert served.server.roster.refused == {role: reason}
 
 
+@pytest.mark.parametrize("role", PROCESSES)
+@pytest.mark.parametrize("program", [(), (None,), ({},)])
+def test_a_process_that_does_not_say_what_it_is_may_take_part(role: str, program: tuple[Any, ...], served: Served):
+    brought = dict.fromkeys(PROCESSES[role].binds, "ipc://x")
+    with Stranger(served.context, served.sockets / "clock.sock") as stranger:
+        stranger.socket.send(pack(1, JOIN, role, SECRET, 1, brought, True, *program))
+        served.server.socket.poll(10_000)
+        served.server.serve()
+        node = served.server.roster.own(role)
+    assert node
+    assert node.program == {}
+
+
 def test_a_wrong_secret_is_called_so_and_kept_by_the_role_it_came_with(served: Served) -> None:
-    code, reason = served.answer(pack(2, JOIN, "plant", "0" * 32, 1, {"loop": "x", "telemetry": "y"}, True, {}))
+    code, reason = served.answer(pack(1, JOIN, "plant", "0" * 32, 1, {"loop": "x", "telemetry": "y"}, True, {}))
     assert code == REFUSED
     assert reason == "JOIN as plant, a role of the run's own process, came with a wrong secret; join as an observer."
     assert served.server.roster.refused == {"plant": reason}
@@ -78,7 +91,7 @@ def test_a_wrong_secret_is_called_so_and_kept_by_the_role_it_came_with(served: S
 def test_one_command_is_carried_out_between_two_grants_however_many_wait(served: Served) -> None:
     with Stranger(served.context, served.sockets / "clock.sock") as stranger:
         for number in range(5):
-            stranger.socket.send(pack(2, COMMAND, str(number), {}))
+            stranger.socket.send(pack(1, COMMAND, str(number), {}))
         done = []
         while len(served.asked) < 5:
             assert served.server.socket.poll(10_000)
@@ -90,16 +103,16 @@ def test_one_command_is_carried_out_between_two_grants_however_many_wait(served:
 
 
 def test_a_frame_that_takes_long_to_read_is_refused_unread(served: Served) -> None:
-    code, reason = served.answer(pack(2, COMMAND, "set", {"set": {f"wall.k{i}": 1.0 for i in range(10_000)}}))
+    code, reason = served.answer(pack(1, COMMAND, "set", {"set": {f"wall.k{i}": 1.0 for i in range(10_000)}}))
     assert code == REFUSED
     assert reason.startswith("A frame must be at most 32768 bytes, but one of ")
     assert served.asked == []
-    assert served.answer(pack(2, COMMAND, "x" * 30_000, {}))[0] == REPLY
+    assert served.answer(pack(1, COMMAND, "x" * 30_000, {}))[0] == REPLY
 
 
 def test_a_message_of_very_many_frames_is_taken_over_several_turns_with_grants_between(served: Served) -> None:
     with Stranger(served.context, served.sockets / "clock.sock") as stranger:
-        stranger.socket.send_multipart([b""] * 999 + [pack(2, COMMAND, "pause", {})])
+        stranger.socket.send_multipart([b""] * 999 + [pack(1, COMMAND, "pause", {})])
         assert served.server.socket.poll(10_000)
         turns = 0
         while not served.asked:

@@ -81,7 +81,13 @@ def test_the_word_of_a_run_with_a_half_of_somebody_elses_is_that_of_its_window_a
     assert of.summary["verdict_rule"].startswith(f"By its window alone, since the {role} was not haploop's own")
     assert read(of.out / "summary.json")["verdict_rule"] == of.summary["verdict_rule"]
     assert not awaits_verdict(of.scene, of.summary)
-    assert "steady" not in shown(summary_table(of.summary), 100).splitlines()[0]
+    text = " ".join(shown(summary_table(of.summary), 100).split())
+    assert not text.startswith("steady")
+    assert f"That the {role} does what the scene says is its own word; haploop replay holds it against" in text
+    of.summary["programs"][role] |= {"name": "", "version": "", "command": ""}
+    assert f"{role} not haploop's own a program without a name" in " ".join(
+        shown(summary_table(of.summary), 80).split()
+    )
 
 
 def test_the_same_run_of_our_own_plant_is_pushed_and_awaited(inventing: Ran, tmp_path: Path) -> None:

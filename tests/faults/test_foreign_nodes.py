@@ -181,8 +181,9 @@ def test_a_run_waits_for_an_external_controller_and_gives_the_same_bits(started:
     seat = seat_of(run)
     assert stat.S_IMODE(seat.stat().st_mode) == 0o600
     assert "Waiting 60 s for a controller to join" in run.stderr
-    controller = joined(seat)
+    controller = joined(seat, "--nameless")
     assert run.summary()["trajectory_sha256"] == own.summary()["trajectory_sha256"]
+    assert run.summary()["programs"]["controller"] == {"name": "", "version": "", "command": "", "own": False}
     assert controller.wait(30) == 0
     assert not seat.exists()
     assert read(run.out_directory).attachments.keys() == {"scene.toml", "programs.json"}

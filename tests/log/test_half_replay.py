@@ -9,8 +9,9 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner
 
+from haploop.launch.runs.half_replay import beside_own
 from haploop.launch.runs.in_process import run_in_process
-from haploop.launch.runs.replay import Replay, ReplayError, replay
+from haploop.launch.runs.replay import Replay, ReplayError, logged_run, repeatable, replay
 from haploop.launch.scene.toml_writer import to_toml
 from haploop.launch.spec import PROGRAMS, SCENE
 from haploop.logger.log import LogError
@@ -48,7 +49,7 @@ def left(out: Path, ran: Scene, *foreign: str, told: Scene | None = None, progra
 
 def test_where_the_plant_was_somebody_elses_the_controller_is_repeated_from_its_samples_to_the_bit(tmp_path: Path):
     found = replay(left(tmp_path / "run", scene(**TAP), "plant"))
-    assert found == Replay({"ticks": 200}, [], "", found.half)
+    assert found == Replay({"ticks": 200}, [], "", found.half, found.other)
     assert found.half == ("The controller was repeated from its samples; the plant was Bench 2.1 (./bench --fast).")
 
 
@@ -75,6 +76,32 @@ def test_only_the_half_that_is_ours_is_held_against_what_it_did(tmp_path, key, v
     ran = scene(**TAP)
     found = replay(left(tmp_path / "run", ran, foreign, told=with_value(ran, key, value)))
     assert any(sentence.startswith(differs) for sentence in found.differences) if differs else not found.differences
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "foreign", "says"),
+    [
+        ("wall.stiffness", 101.0, "controller", "Haploop's own controller would have answered the same samples with f"),
+        ("device.mass", 0.011, "plant", "Haploop's own plant would have been up to "),
+        ("device.mass", 0.011, "controller", "Either the log was changed, or the controller sent other forces than"),
+    ],
+)
+def test_the_half_of_somebody_elses_is_held_against_what_our_own_would_have_done(tmp_path, key, value, foreign, says):
+    ran = scene(**TAP)
+    same = replay(left(tmp_path / "same", ran, foreign)).other
+    assert same == f"Haploop's own {foreign} would have done the same there, to the bit."
+    assert replay(left(tmp_path / "other", ran, foreign, told=with_value(ran, key, value))).other.startswith(says)
+
+
+def test_a_change_that_a_controller_refused_is_not_asked_of_our_own_either(tmp_path: Path):
+    out = left(tmp_path / "run", scene(**{**TAP, "event": []}), "controller", told=scene(**{**TAP, "event": []}))
+    recorded = logged_run(out)
+    made, kinds, events = repeatable(out, recorded)
+    change = {"set": {"wall.stiffness": 150.0}}
+    refused = (130, {"refused": "No.", "change": {"tick": 120, **change}})
+    same = "Haploop's own controller would have done the same there, to the bit."
+    assert beside_own("controller", made, kinds, [(120, change), refused, *events], recorded) == same
+    assert beside_own("controller", made, kinds, [(120, change), *events], recorded).endswith("first at 0.12 s.")
 
 
 def test_a_run_that_was_logged_at_its_ticks_alone_is_held_against_its_trajectory(tmp_path: Path):
@@ -119,7 +146,7 @@ def test_the_command_says_which_half_was_repeated_and_whose_the_other_was(tmp_pa
     assert answer.exit_code == 0
     assert answer.stdout == (
         "Every bit of 200 ticks agreed. The controller was repeated from its samples; "
-        "the plant was Bench 2.1 (./bench --fast).\n"
+        "the plant was Bench 2.1 (./bench --fast). Haploop's own plant would have done the same there, to the bit.\n"
     )
     wrong = left(tmp_path / "wrong", scene(**TAP), "plant", told=with_value(scene(**TAP), "wall.stiffness", 101.0))
     answer = CliRunner().invoke(app, ["replay", str(wrong), "--json"])

@@ -1,10 +1,11 @@
 """A controller written from protocol/README.md alone: it imports nothing of haploop.
 
-usage: plain_controller.py [--seat FILE] [--changes make|refuse] [--misbehave HOW --at TICK] [DIRECTORY]
+usage: plain_controller.py [--seat FILE] [--nameless] [--changes make|refuse] [--misbehave HOW --at TICK] [DIRECTORY]
 
 Takes the controller's place in a run: a wall and one element of unidirectional inertia in contact (Choi et al. 2022,
 eq. 9 and 12), both derivatives as backward differences. Started by haploop, stdin brings a line of JSON; --seat names
 the file of a run that waits for it instead.
+--nameless: JOIN ends before the map that says what joins, as the first page of the protocol had it.
 --changes: what becomes of a set of the wall's stiffness; without, every change is passed over in silence.
 --misbehave: from that tick on: die, exit, hang, silent (answers no more, but reports), nan, text (a force
   that is none), garbage (bytes in place of forces), mute (no telemetry), cut (a telemetry column
@@ -24,7 +25,7 @@ from pathlib import Path
 import msgpack
 import zmq
 
-VERSION = 2
+VERSION = 1
 JOIN, WELCOME, REFUSED, READY, GRANT, PROGRESS, WAITING, DONE, FAILED, ABORT = 1, 2, 3, 4, 5, 6, 7, 9, 10, 11
 HELLO, SAMPLES, COMMANDS, LAST = 20, 21, 22, 23
 STATE, CONTROLLER_BLOCK, END = 30, 32, 34
@@ -64,7 +65,8 @@ class Controller:
         address = f"ipc://{start['directory']}/controller.sock"
         self.telemetry.bind(address)
         program = {"name": "plain controller", "version": "1.5", "command": " ".join(sys.argv)}
-        self.say(JOIN, "controller", start["secret"], os.getpid(), {"telemetry": address}, True, program)
+        told = [] if options.nameless else [program]
+        self.say(JOIN, "controller", start["secret"], os.getpid(), {"telemetry": address}, True, *told)
         self.until, self.last, self.events, self.rows, self.first = 0, False, [], [], 0
         self.history, self.refused = [], []
         _, self.scene, timebase, endpoints, _, told = self.welcome()
@@ -215,6 +217,7 @@ def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("directory", nargs="?")
     parser.add_argument("--seat", type=Path)
+    parser.add_argument("--nameless", action="store_true")
     parser.add_argument("--changes", choices=["make", "refuse"])
     parser.add_argument("--misbehave")
     parser.add_argument("--at", type=int, default=500)

@@ -21,7 +21,7 @@ from pathlib import Path
 import msgpack
 import zmq
 
-VERSION = 2
+VERSION = 1
 JOIN, WELCOME, REFUSED, READY, GRANT, PROGRESS, WAITING, ABORT, LEAVE = 1, 2, 3, 4, 5, 6, 7, 11, 12
 STATE, PLANT_BLOCK, CONTROLLER_BLOCK, END = 30, 31, 32, 34
 ROLES = ("plant", "controller")
@@ -88,7 +88,7 @@ class Clock:
 
     def join(self):
         while True:
-            self.say(JOIN, "plain observer", "", os.getpid(), {}, True, {"name": "plain observer"})
+            self.say(JOIN, "plain observer", "", os.getpid(), {}, True)  # who it is, it may leave out
             code, *fields = self.hear()
             if code == WELCOME:
                 return dict(zip(("run", "scene", "timebase", "endpoints", "granted", "context"), fields, strict=True))

@@ -67,7 +67,7 @@ def test_commands_that_cannot_be_carried_out_are_refused_and_change_nothing(
         run.stands_at(200)
         with attacks.Stranger(context, run.run_json.with_name("clock.sock")) as clock:
             for verb, arguments in attacks.impossible_commands():
-                code, ok, text, _data = clock.ask(attacks.pack(2, 13, verb, arguments))
+                code, ok, text, _data = clock.ask(attacks.pack(1, 13, verb, arguments))
                 assert (code, ok) == (REPLY, False), (verb, arguments)
                 assert text
         run.ask("resume")
@@ -82,23 +82,23 @@ def test_an_observer_that_talks_nonsense_harms_only_itself(
     with going(tmp_path, "duration=0.6", pauses=(200,)) as run:
         run.stands_at(200)
         with attacks.Stranger(context, run.run_json.with_name("clock.sock")) as observer:
-            join = attacks.pack(2, 1, "observer", "", -(2**63), {}, True, {})
+            join = attacks.pack(1, 1, "observer", "", -(2**63), {}, True, {})
             code, _run, _scene, _timebase, _endpoints, granted, about = observer.ask(join)
             assert (code, granted) == (WELCOME, 200)
             assert "secret" not in about
             assert observer.ask(join) == [REFUSED, "You have joined already."]
             for tick in (-1, 201, attacks.MAX_WHOLE, attacks.MIN_WHOLE):
-                assert observer.ask(attacks.pack(2, 4, tick))[0] == REFUSED
-                assert observer.ask(attacks.pack(2, 6, tick, {}))[0] == REFUSED
+                assert observer.ask(attacks.pack(1, 4, tick))[0] == REFUSED
+                assert observer.ask(attacks.pack(1, 6, tick, {}))[0] == REFUSED
             for code in (2, 5, 11, 14, 20, 22, 30):
-                (frame,) = [f for f in [*attacks.out_of_place(), attacks.pack(2, 14, True, "", {})] if f[2] == code]
+                (frame,) = [f for f in [*attacks.out_of_place(), attacks.pack(1, 14, True, "", {})] if f[2] == code]
                 assert observer.ask(frame)[0] == REFUSED
             for status in ({"refused": 5}, {"refused": ["I refuse"]}, {1: {2: [None]}}, {"t_s": "x", "verdict": []}):
-                observer.socket.send(attacks.pack(2, 6, 200, status))
-            observer.socket.send(attacks.pack(2, 8, 0, "the plant has ended"))
+                observer.socket.send(attacks.pack(1, 6, 200, status))
+            observer.socket.send(attacks.pack(1, 8, 0, "the plant has ended"))
             data = run.ask("status")[1]
             assert data["nodes"][-1]["role"] == "observer"
-            observer.socket.send(attacks.pack(2, 10, 0, "I cannot go on"))
+            observer.socket.send(attacks.pack(1, 10, 0, "I cannot go on"))
         run.ask("resume")
         assert_unharmed(run, run.result())
     events = haploop.logger.read(run.prepared.out)["/events"]
@@ -164,7 +164,7 @@ def test_the_clock_grants_after_a_turns_worth_of_messages_however_many_wait(
         with attacks.Stranger(context, Path(sockets) / "clock.sock") as stranger:
             for _ in range(900):
                 stranger.socket.send(b"junk")
-            stranger.socket.send(attacks.pack(2, 13, "status", {}))
+            stranger.socket.send(attacks.pack(1, 13, "status", {}))
             turns = []
             while sum(turns) < 900:
                 server.socket.poll()

@@ -15,21 +15,24 @@ SECRET = "s" * 32
 HELLO, SAMPLES, COMMANDS, LAST = 20, 21, 22, 23
 NO_ANSWERS = [
     *junk(),
-    pack(2, COMMANDS, 5, ["1.0"]),
-    pack(2, COMMANDS, 5, [None]),
-    pack(2, COMMANDS, 5, [[1.0]]),
-    pack(2, COMMANDS, 5, ["x" * 10_000]),
-    pack(2, COMMANDS, 5, "1"),
-    pack(2, COMMANDS, 5, {1.0: 2.0}),
-    pack(2, COMMANDS, 5, 1.0),
-    pack(2, COMMANDS, 5, [1.0, 2.0]),
-    pack(2, COMMANDS, 5, []),
-    pack(2, COMMANDS, 4, [1.0]),
-    pack(2, COMMANDS, 5),
-    pack(1, COMMANDS, 5, [1.0]),
-    pack(2, HELLO, SECRET),
-    pack(2, LAST, 5),
-    b"\x94\x02\x16\x05" + b"\x91" * 1000 + b"\x01",
+    pack(1, COMMANDS, 5, ["1.0"]),
+    pack(1, COMMANDS, 5, [None]),
+    pack(1, COMMANDS, 5, [[1.0]]),
+    pack(1, COMMANDS, 5, ["x" * 10_000]),
+    pack(1, COMMANDS, 5, "1"),
+    pack(1, COMMANDS, 5, {1.0: 2.0}),
+    pack(1, COMMANDS, 5, 1.0),
+    pack(1, COMMANDS, 5, [1.0, 2.0]),
+    pack(1, COMMANDS, 5, []),
+    pack(1, COMMANDS, 4, [1.0]),
+    pack(1, COMMANDS, 5),
+    pack(1, COMMANDS, 5.0, [1.0]),
+    pack(True, COMMANDS, 5, [1.0]),
+    pack(1, COMMANDS, 5, [True]),
+    pack(2, COMMANDS, 5, [1.0]),
+    pack(1, HELLO, SECRET),
+    pack(1, LAST, 5),
+    b"\x94\x01\x16\x05" + b"\x91" * 1000 + b"\x01",
 ]
 
 
@@ -42,7 +45,7 @@ class Plant:
         self.end = PlantEnd(self.context, lambda: None)
         self.address = bind(self.end.socket, Path(self._folder.name), "loop")
         self.partner = self.dealer()
-        self.partner.send(pack(2, HELLO, SECRET))
+        self.partner.send(pack(1, HELLO, SECRET))
         self.end.greet(SECRET)
         self.partner.recv()
 
@@ -72,7 +75,7 @@ def test_whatever_the_partner_sends_in_place_of_forces_is_a_named_error(plant: P
                 LoopError, match=r"In the loop commands from tick 5, 1 of them, were expected, but .* came\."
             ):
                 plant.end.exchange(5, [(0.0,)])
-    plant.partner.send(pack(2, COMMANDS, 5, [1.5]))
+    plant.partner.send(pack(1, COMMANDS, 5, [1.5]))
     assert plant.end.exchange(5, [(0.0,)]) == [1.5]
 
 
@@ -83,14 +86,20 @@ def test_what_a_stranger_sends_is_counted_and_dropped_and_the_answer_is_the_part
     stranger.send_multipart(NO_ANSWERS)
     exchanged = 0
     while plant.end.unknown_peers <= len(NO_ANSWERS):
-        plant.partner.send(pack(2, COMMANDS, 5, [1.5]))
+        plant.partner.send(pack(1, COMMANDS, 5, [1.5]))
         assert plant.end.exchange(5, [(0.0,)]) == [1.5]
         exchanged += 1
         assert exchanged < 10_000
     stranger.close()
 
 
-NO_SAMPLES = [*junk(), *(pack(2, SAMPLES, 5, wrong) for wrong in ("x", None, {1: 2})), pack(2, LAST, "x")]
+NO_SAMPLES = [
+    *junk(),
+    *(pack(1, SAMPLES, 5, wrong) for wrong in ("x", None, {1: 2})),
+    pack(1, LAST, "x"),
+    pack(1, SAMPLES, 5.0, [[0.0]]),
+    pack(1, LAST, 5.0),
+]
 
 
 def test_whatever_comes_in_place_of_samples_is_a_named_error() -> None:
@@ -104,8 +113,8 @@ def test_whatever_comes_in_place_of_samples_is_a_named_error() -> None:
             plant.send(data)
             with pytest.raises(LoopError, match=r"In the loop samples from tick 5 were expected, but .* came\."):
                 controller.samples(5)
-        plant.send(pack(2, SAMPLES, 5, [[0.25]]))
+        plant.send(pack(1, SAMPLES, 5, [[0.25]]))
         assert controller.samples(5) == [[0.25]]
-        plant.send(pack(2, LAST, 5))
+        plant.send(pack(1, LAST, 5))
         assert controller.samples(6) is None
         controller.socket.close()

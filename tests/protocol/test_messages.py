@@ -9,7 +9,7 @@ from haploop.protocol import changes, document
 from haploop.protocol.transport.messages import BY_CODE, CHANNELS, MESSAGES, PROCESSES, VERSION, complaint
 
 README = Path(__file__).parents[2] / "protocol" / "README.md"
-KINDS = {"int", "number", "text", "bool", "bytes", "map", "list", "text?"}
+KINDS = {"int", "number", "text", "bool", "bytes", "map", "list", "text?", "map?"}
 
 
 def test_every_message_has_a_code_of_its_own() -> None:

@@ -10,7 +10,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from haploop.protocol.transport import wire
-from haploop.protocol.transport.messages import MESSAGES, VERSION
+from haploop.protocol.transport.messages import MESSAGES, VERSION, required
 from haploop.protocol.transport.wire import Frame, WireError, decode, encode
 
 WHOLE = st.integers(-(2**63), 2**64 - 1)
@@ -29,6 +29,7 @@ FIELD = {
     "map": st.dictionaries(TEXT, NESTED, max_size=4),
     "list": st.lists(NESTED, max_size=4),
     "text?": TEXT | st.none(),
+    "map?": st.dictionaries(TEXT, NESTED, max_size=4) | st.none(),
 }
 
 
@@ -67,6 +68,13 @@ def test_a_float_comes_back_bit_for_bit(bits: int) -> None:
 def test_bytes_that_are_no_message_are_refused(data: bytes) -> None:
     with pytest.raises(WireError, match=r"^.{1,200}$"):
         decode(data)
+
+
+@given(message=messages())
+def test_what_may_be_nil_may_be_left_out_at_the_end(message: tuple[str, list[Any]]) -> None:
+    name, fields = message
+    left_out = [None] * (len(fields) - required(name))
+    assert decode(encode(name, *fields[: required(name)])) == Frame(name, fields[: required(name)] + left_out)
 
 
 @given(message=messages(), cut=st.floats(0, 1, exclude_max=True))
@@ -112,7 +120,7 @@ def test_a_field_of_another_type_is_refused_by_name(message: tuple[str, list[Any
     field, kind = MESSAGES[name].fields[where]
     fields[where] = wrong
     allowed = {"int": int, "number": (int, float), "text": str, "bool": bool, "bytes": bytes, "map": dict, "list": list}
-    if kind == "text?" and wrong is None:
+    if kind.endswith("?") and wrong is None:
         return
     if isinstance(wrong, allowed[kind.rstrip("?")]) and (kind == "bool" or not isinstance(wrong, bool)):
         return
@@ -124,7 +132,7 @@ def test_a_field_of_another_type_is_refused_by_name(message: tuple[str, list[Any
 def test_missing_and_surplus_fields_are_refused(message: tuple[str, list[Any]], more: list[Any]) -> None:
     name, fields = message
     with pytest.raises(WireError, match=f"{name} has {len(fields)} fields"):
-        decode(encode(name, *fields[:-1]))
+        decode(encode(name, *fields[: required(name) - 1]))
     with pytest.raises(WireError, match=f"{name} has {len(fields)} fields"):
         decode(encode(name, *fields, *more))
 
@@ -142,8 +150,8 @@ def test_nesting_of_any_depth_ends_in_nothing_but_a_refusal(depth: int, head: by
     deep = head * depth + b"\x01" * (depth + 1 if head == b"\x81" else 1)
     data = {
         "version": b"\x92" + deep + b"\x04",
-        "code": b"\x92\x02" + deep,
-        "field": b"\x93\x02\x04" + deep,
+        "code": b"\x92\x01" + deep,
+        "field": b"\x93\x01\x04" + deep,
         "whole": deep,
     }[place]
     with pytest.raises(WireError):
@@ -164,7 +172,7 @@ def test_a_text_that_is_no_unicode_is_carried_with_the_code_in_its_place() -> No
 
 def test_keys_that_cannot_be_keys_are_refused() -> None:
     for key in ([], {}, [1, [2]]):
-        items = b"\x94\x02\x06\x00\x81" + pack(key) + b"\x00"
+        items = b"\x94\x01\x06\x00\x81" + pack(key) + b"\x00"
         with pytest.raises(WireError):
             decode(items)
 

@@ -135,7 +135,7 @@ def _flood(played: Played, dice: random.Random, live: run_directory.LiveRun) -> 
 
 def _false_join(played: Played, dice: random.Random, live: run_directory.LiveRun) -> None:
     """A wrong secret, no endpoints, or an observer or second logger that is welcomed and then says no more."""
-    half = [attacks.pack(2, 1, role, "", _NOBODY, {}, lossless, {}) for role, lossless in (("a", False), ("b", True))]
+    half = [attacks.pack(1, 1, role, "", _NOBODY, {}, lossless, {}) for role, lossless in (("a", False), ("b", True))]
     context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
     with attacks.Stranger(context, _sockets(live) / "clock.sock") as stranger:
         for frame in dice.sample([*attacks.false_joins(), *half], 4):

@@ -38,53 +38,53 @@ def junk(seed: int = 1) -> list[bytes]:
     """Frames that are no messages: garbage, other versions, unknown codes, wrong, missing and surplus fields."""
     dice = random.Random(seed)
     good = [
-        pack(2, 6, 5, {}),
-        pack(2, 1, "observer", "", 1, {}, True, {}),
-        pack(2, 13, "stop", {}),
-        pack(2, 22, 0, [1.0]),
+        pack(1, 6, 5, {}),
+        pack(1, 1, "observer", "", 1, {}, True, {}),
+        pack(1, 13, "stop", {}),
+        pack(1, 22, 0, [1.0]),
     ]
     frames = [b"", b"\0", b"\xc1", b"HELLO", b"GET / HTTP/1.1\r\n\r\n", b"\x80\x04N.", b"\xff" * 1000]
     frames += [dice.randbytes(dice.randint(1, 300)) for _ in range(50)]
     frames += [data[:cut] for data in good for cut in range(1, len(data))]
-    versions = (0, 1, -1, 1.0, True, "1", None, [1], {}, math.nan, MAX_WHOLE)
+    versions = (0, 2, -1, 1.0, True, "1", None, [1], {}, math.nan, MAX_WHOLE)
     codes = (0, 99, -1, MAX_WHOLE, 6.0, True, "6", None, [], b"6")
     progress = ((), (1,), ("1", {}), (1.0, {}), (True, {}), (None, {}), (1, []), (1, {}, 2))
     frames += [pack(version, 13, "stop", {}) for version in versions]
-    frames += [pack(2, code, 0) for code in codes]
-    frames += [pack(2, 6, *fields) for fields in progress]
+    frames += [pack(1, code, 0) for code in codes]
+    frames += [pack(1, 6, *fields) for fields in progress]
     frames += [head * depth + b"\x01" for head in (b"\x91", b"\x81\x01") for depth in (1000, 1020, 5000)]
-    frames += [b"\x92" + b"\x91" * 1010 + b"\x02\x04", b"\x92\x02" + b"\x91" * 1010 + b"\x01"]
-    frames += [b"\xdd\xff\xff\xff\xff", b"\xdf\xff\xff\xff\xff", b"\xc6\xff\xff\xff\xff", b"\x93\x02\x06\xc7\xff\x05"]
+    frames += [b"\x92" + b"\x91" * 1010 + b"\x02\x04", b"\x92\x01" + b"\x91" * 1010 + b"\x01"]
+    frames += [b"\xdd\xff\xff\xff\xff", b"\xdf\xff\xff\xff\xff", b"\xc6\xff\xff\xff\xff", b"\x93\x01\x06\xc7\xff\x05"]
     return frames
 
 
 def out_of_place() -> list[bytes]:
     """Good messages from somebody who may not send them."""
     return [
-        pack(2, 2, "run", {}, {}, {}, 0, {}),
-        pack(2, 4, 0),
-        pack(2, 5, 10_000, True, []),
-        pack(2, 6, 1000, {"refused": 5}),
-        pack(2, 7, 0, "you"),
-        pack(2, 8, 0, "I say so"),
-        pack(2, 9, 0, {}),
-        pack(2, 10, 0, "I say so"),
-        pack(2, 11, "I say so"),
-        pack(2, 12, 0),
-        pack(2, 20, ""),
-        pack(2, 21, 0, [[0.0]]),
-        pack(2, 22, 0, [1e6]),
-        pack(2, 23, 0),
-        pack(2, 30, 0, {}),
-        pack(2, 34, 0, "", None),
+        pack(1, 2, "run", {}, {}, {}, 0, {}),
+        pack(1, 4, 0),
+        pack(1, 5, 10_000, True, []),
+        pack(1, 6, 1000, {"refused": 5}),
+        pack(1, 7, 0, "you"),
+        pack(1, 8, 0, "I say so"),
+        pack(1, 9, 0, {}),
+        pack(1, 10, 0, "I say so"),
+        pack(1, 11, "I say so"),
+        pack(1, 12, 0),
+        pack(1, 20, ""),
+        pack(1, 21, 0, [[0.0]]),
+        pack(1, 22, 0, [1e6]),
+        pack(1, 23, 0),
+        pack(1, 30, 0, {}),
+        pack(1, 34, 0, "", None),
     ]
 
 
 def false_joins() -> list[bytes]:
     """Requests to take part that must not be granted."""
-    own = [pack(2, 1, role, "0" * 32, 1, {}, True, {}) for role in PUBLISHERS]
-    odd = [pack(2, 1, role, "", 1, {}, True, {}) for role in ("", "x" * 41, "\x1b[2J", "a\nb")]
-    return own + odd + [pack(2, 1, "observer", "", 1, binds, True, {}) for binds in ({1: "x"}, {"x": 1}, {"x": [{}]})]
+    own = [pack(1, 1, role, "0" * 32, 1, {}, True, {}) for role in PUBLISHERS]
+    odd = [pack(1, 1, role, "", 1, {}, True, {}) for role in ("", "x" * 41, "\x1b[2J", "a\nb")]
+    return own + odd + [pack(1, 1, "observer", "", 1, binds, True, {}) for binds in ({1: "x"}, {"x": 1}, {"x": [{}]})]
 
 
 def impossible_commands() -> Iterator[tuple[Any, Any]]:
@@ -142,7 +142,7 @@ def send_unasked(context: zmq.Context[zmq.Socket[bytes]], path: Path) -> list[zm
     Returns the sockets, still open, so that the sending goes on while the run does.
     """
     topics = (path.stem.encode(), b"", b"junk", b"\xff")
-    frames = [pack(2, 20, "0" * 32), *false_joins(), *out_of_place(), *junk(), pack(2, 22, 0, [MAX_WHOLE] * 10_000)]
+    frames = [pack(1, 20, "0" * 32), *false_joins(), *out_of_place(), *junk(), pack(1, 22, 0, [MAX_WHOLE] * 10_000)]
     frames += [mark + topic for mark in (b"\0", b"\1") for topic in topics]
     opened = []
     for kind in (zmq.XSUB,) if path.stem in PUBLISHERS else (zmq.DEALER, zmq.PUB):

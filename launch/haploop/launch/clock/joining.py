@@ -14,7 +14,8 @@ _PROGRAM_KEYS, _LONGEST_TEXT = ("name", "version", "command"), 200
 
 def what_joins(request: Message) -> dict[str, Any]:
     """Returns name, version and command of what asks to join, as far as it tells them."""
-    return {key: request["program"][key] for key in _PROGRAM_KEYS if key in request["program"]}
+    told = request["program"] or {}
+    return {key: told[key] for key in _PROGRAM_KEYS if key in told}
 
 
 def why_refused(request: Message, program: Message, secret: str, roster: Roster, has_begun: bool) -> str:

@@ -47,6 +47,12 @@ def seat_file(role: str) -> str:
     return f"external-{role}.json"
 
 
+def described(told: Mapping[str, str]) -> str:
+    """Returns name, version and command of a program as far as it told them, for people."""
+    name = " ".join(filter(None, (told["name"], told["version"]))) or "a program without a name"
+    return f"{name} ({told['command']})" if told["command"] else name
+
+
 NO_PROGRAMS: Mapping[str, Program] = {}
 
 

@@ -11,6 +11,8 @@ import numpy as np
 
 from haploop.controller.controller import Controller
 from haploop.controller.dissipation import Element, ElementError
+from haploop.launch.processes.foreign import described
+from haploop.launch.runs.run_files import holds_readings
 from haploop.launch.spec import PROGRAMS
 from haploop.logger.books.buffers import as_float64
 from haploop.logger.log import LogError
@@ -19,11 +21,17 @@ from haploop.logger.log.recording import MemoryLog, Recording
 from haploop.logger.log.table import Floats
 from haploop.logger.summary import misfit
 from haploop.plant.plant import Plant
-from haploop.protocol.changes import Event, is_change
+from haploop.protocol.changes import Event, changes_of, is_change
 from haploop.protocol.scene.scene import Scene, accelerometer_is_used, hand_is_unmodelled
 from haploop.protocol.ticks import Timebase
 from haploop.protocol.transport.wire import Message
 
+_SAME = "Haploop's own {} would have done the same there, to the bit."
+_OTHER_FORCES = (
+    "Haploop's own controller would have answered the same samples with forces that differ by up to {:.3g} N, "
+    "first at {:g} s."
+)
+_OTHER_WAY = "Haploop's own plant would have been up to {:.3g} m elsewhere under the same commands."
 _NO_PROGRAMS = f"What the log holds as {PROGRAMS} is none of a run: it should name its programs by role."
 _UNKNOWN: Message = {"name": "", "version": "", "command": ""}
 _PROGRAM = {"name": str, "version": str, "command": str, "own": bool}
@@ -48,11 +56,7 @@ def foreign_programs(recorded: Recording, scene: Scene) -> dict[str, Message]:
 
 def named(foreign: Mapping[str, Message]) -> str:
     """Returns whose programs had these roles, for people: "the plant was Bench 2.1 (./bench --fast)"."""
-    words = []
-    for role, program in foreign.items():
-        name = " ".join(filter(None, (program["name"], program["version"]))) or "a program without a name"
-        words.append(f"the {role} was {name}" + (f" ({program['command']})" if program["command"] else ""))
-    return " and ".join(words)
+    return " and ".join(f"the {role} was {described(program)}" for role, program in foreign.items())
 
 
 def repeat_controller(
@@ -75,6 +79,36 @@ def repeat_controller(
             _log(channels, controller)
     _log(channels, controller)
     return memory.recording()
+
+
+def beside_own(
+    role: str, scene: Scene, kinds: Mapping[str, type[Element]], events: list[tuple[int, Event]], recorded: Recording
+) -> str:
+    """Returns how far what took a role went from what haploop's own would have done in its place, a sentence.
+
+    Changes that were refused are left out; "" where the log does not hold what haploop's own would have to be told.
+    """
+    refused = iter(change.refused is not None for change in changes_of(events))
+    made = [(tick, event) for tick, event in events if not (is_change(event) and next(refused))]
+    if role == "plant":
+        if hand_is_unmodelled(scene):
+            return ""
+        topic, name, own = (
+            ("/plant" if "/plant" in recorded else "/controller"),
+            "x",
+            repeat_plant(scene, made, recorded)[0],
+        )
+    else:
+        if accelerometer_is_used(scene) and not holds_readings(scene):
+            return ""
+        topic, name, own = "/controller", "total", repeat_controller(scene, kinds, made, recorded)
+    theirs, ours = recorded[topic][name], own[topic][name]
+    count = min(len(theirs), len(ours))
+    apart = np.abs(theirs[:count] - ours[:count])
+    if not apart.any():
+        return _SAME.format(role)
+    most, first = float(np.fmax.reduce(apart)), float(recorded[topic]["timestamp"][np.argmax(apart != 0.0)])
+    return _OTHER_WAY.format(most) if role == "plant" else _OTHER_FORCES.format(most, first)
 
 
 def _log(channels: Channels, controller: Controller) -> None:

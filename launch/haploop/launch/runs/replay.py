@@ -12,7 +12,7 @@ import numpy as np
 
 import haploop.logger
 from haploop.controller.dissipation import Element, load_plugin, registry
-from haploop.launch.runs.half_replay import foreign_programs, named, repeat_controller, repeat_plant
+from haploop.launch.runs.half_replay import beside_own, foreign_programs, named, repeat_controller, repeat_plant
 from haploop.launch.runs.in_process import run_in_process
 from haploop.launch.runs.run_files import holds_readings, recorded_log, recorded_scene, recorded_summary
 from haploop.launch.spec import PLUGINS, SCENE, RunFailed, kept_name
@@ -29,6 +29,8 @@ _NO_READINGS = (
     'holds the readings only with acceleration.source = "accelerometer" and no cutoff'
 )
 
+_TOLD_OTHERWISE = "Either the log was changed, or the controller sent other forces than it told."
+
 
 class ReplayError(Exception):
     """The run cannot be repeated; the message says what is missing."""
@@ -43,12 +45,14 @@ class Replay:
         differences: where recorded and repeated run disagree, as sentences; empty when every bit agreed.
         cut: where the log ends if it was cut off, else "".
         half: of a run of which but one half was haploop's own, which one was repeated and whose the other was; else "".
+        other: of such a run, how far the other half was from what haploop's own would have done in its place.
     """
 
     summary: Summary
     differences: list[str]
     cut: str
     half: str = ""
+    other: str = ""
 
 
 def replay(directory: Path) -> Replay:
@@ -92,17 +96,19 @@ def _replay_half(
     before: Summary | None,
     foreign: dict[str, Message],
 ) -> Replay:
-    others = named(foreign)
+    others, role = named(foreign), next(iter(foreign))
     if len(foreign) > 1:
         raise ReplayError(f"Neither half of this run was haploop's own, so there is nothing to repeat: {others}.")
     failed, rows = before is not None and before["ended"] == "failed", recorded["/controller"]
     summary: Summary = {"ticks": len(rows["x"])}
+    other = beside_own(role, scene, kinds, events, recorded)
     if "plant" in foreign:
         if accelerometer_is_used(scene) and not holds_readings(scene):
             raise ReplayError(f"{_NO_READINGS} ({others}).")
         half = repeat_controller(scene, kinds, events, recorded)
         differences = _compare({"/controller": rows}, half, failed)
-        return Replay(summary, differences, recorded.cut, f"The controller was repeated from its samples; {others}.")
+        how = f"The controller was repeated from its samples; {others}."
+        return Replay(summary, differences, recorded.cut, how, other)
     half, digest = repeat_plant(scene, events, recorded)
     samples = {"/controller": {name: rows[name] for name in ("timestamp", "x")}}
     plant = {topic: recorded[topic] for topic in ("/plant",) if topic in recorded}
@@ -110,7 +116,8 @@ def _replay_half(
     if before and not failed:
         summary["trajectory_sha256"] = digest
         differences += ["trajectory_sha256 of the summary differs."] * (before["trajectory_sha256"] != digest)
-    return Replay(summary, differences, recorded.cut, f"The plant was repeated from its commands; {others}.")
+    other = _TOLD_OTHERWISE if differences else other
+    return Replay(summary, differences, recorded.cut, f"The plant was repeated from its commands; {others}.", other)
 
 
 def logged_run(directory: Path) -> Recording:

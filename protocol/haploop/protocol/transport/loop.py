@@ -18,6 +18,9 @@ _COMMANDS = MESSAGES["COMMANDS"].code
 _SAMPLES = MESSAGES["SAMPLES"].code
 _LAST = MESSAGES["LAST"].code
 
+# True equals 1, and so does 1.0; the types of what came are looked at, too.
+_NUMBERS = frozenset({int, float})
+
 # So often a controller that gets no samples sees to what else it has to do.
 IDLE_MS = 20
 
@@ -70,8 +73,9 @@ class PlantEnd:
             sender, data = self._receive()
         try:
             *head, forces = msgpack.unpackb(data)
-            if head == [VERSION, _COMMANDS, tick] and type(forces) is list and len(forces) == len(samples):
-                sum(forces)  # raises where one is no number
+            are_whole = head == [VERSION, _COMMANDS, tick] and type(head[0]) is type(head[1]) is type(head[2]) is int
+            is_answer = are_whole and type(forces) is list and len(forces) == len(samples)
+            if is_answer and _NUMBERS.issuperset(map(type, forces)):
                 return forces
         except Exception as error:  # whatever came is no answer
             raise LoopError(_mismatch("commands", tick, len(samples), data)) from error
@@ -131,9 +135,10 @@ class ControllerEnd:
         data = self._receive()
         try:
             *head, samples = msgpack.unpackb(data)
-            if head == [VERSION, _SAMPLES, tick] and type(samples) is list:
+            are_whole = type(head[0]) is type(head[1]) is type(head[-1]) is int
+            if are_whole and head == [VERSION, _SAMPLES, tick] and type(samples) is list:
                 return samples
-            if head == [VERSION, _LAST] and samples <= tick:
+            if are_whole and head == [VERSION, _LAST] and type(samples) is int and samples <= tick:
                 return None
         except Exception as error:  # whatever came is no sample
             raise LoopError(_mismatch("samples", tick, None, data)) from error

@@ -8,9 +8,10 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-VERSION = 2
+VERSION = 1
 
-# Field types: what msgpack must have unpacked. "number" is an int or a float.
+# Field types: what msgpack must have unpacked. "number" is an int or a float; what ends in "?" may be nil, and at the end
+# of a frame be left out, so that a field can be added without another version.
 _TYPES: dict[str, tuple[type, ...]] = {
     "int": (int,),
     "number": (int, float),
@@ -20,6 +21,7 @@ _TYPES: dict[str, tuple[type, ...]] = {
     "map": (dict,),
     "list": (list,),
     "text?": (str, type(None)),
+    "map?": (dict, type(None)),
 }
 
 
@@ -81,9 +83,9 @@ def _message(code: int, channel: str, sender: str, receiver: str, fields: str, m
 
 MESSAGES: dict[str, Message] = {
     # Joining
-    "JOIN": _message(1, "clock", "node", "clock", "role:text secret:text pid:int endpoints:map lossless:bool program:map",
+    "JOIN": _message(1, "clock", "node", "clock", "role:text secret:text pid:int endpoints:map lossless:bool program:map?",
                      "A node asks to take part. endpoints: channel -> address of each socket it has bound. "
-                     "program: name, version and command of what joins, texts that may be left out."),
+                     "program: name, version and command of what joins, as far as it says them."),
     "WELCOME": _message(2, "clock", "clock", "node", "run:text scene:map timebase:map endpoints:map granted:int context:map",
                         "The node is part of the run: the resolved scene, its integers, every address, the tick granted."),
     "REFUSED": _message(3, "clock", "clock", "any", "reason:text", "The frame before could not be used, and why."),
@@ -125,12 +127,18 @@ MESSAGES: dict[str, Message] = {
 BY_CODE: dict[int, str] = {message.code: name for name, message in MESSAGES.items()}
 
 
+def required(name: str) -> int:
+    """Returns the number of fields that a message has at least: those before the last that may be nil."""
+    fields = MESSAGES[name].fields
+    return max((place for place, (_, kind) in enumerate(fields, 1) if not kind.endswith("?")), default=0)
+
+
 def complaint(name: str, fields: list[object]) -> str | None:
     """Returns what is wrong with the fields of a message, or None."""
     expected = MESSAGES[name].fields
-    if len(fields) != len(expected):
+    if not required(name) <= len(fields) <= len(expected):
         return f"{name} has {len(expected)} fields ({', '.join(n for n, _ in expected)}), but {len(fields)} came"
-    for value, (field, kind) in zip(fields, expected, strict=True):
+    for value, (field, kind) in zip(fields, expected, strict=False):
         wrong_bool = isinstance(value, bool) and kind in ("int", "number")
         if wrong_bool or not isinstance(value, _TYPES[kind]):
             return f"{name}.{field} must be of type {kind}, but {type(value).__name__} came"

@@ -21,7 +21,7 @@ class WireError(ValueError):
 
 
 class Frame(NamedTuple):
-    """A decoded message: its name and its fields in the order of the table."""
+    """A decoded message: its name and its fields in the order of the table, None for those left out."""
 
     name: str
     fields: list[Any]
@@ -59,7 +59,7 @@ def decode(data: bytes) -> Frame:
     wrong = complaint(name, fields)
     if wrong:
         raise WireError(wrong + ".")
-    return Frame(name, fields)
+    return Frame(name, fields + [None] * (len(MESSAGES[name].fields) - len(fields)))
 
 
 def _describe(value: Any) -> str:

@@ -109,12 +109,12 @@ def replay(directory: Directory, json: Json = False) -> None:
             leave(str(error), WRONG_USE)
     print_note(result.cut)
     if json:
-        half = {"half": result.half} if result.half else {}
+        half = {"half": result.half, "other": result.other} if result.half else {}
         print_json({"agrees": not result.differences, "differences": result.differences, **half, **result.summary})
     elif result.differences:
-        print("\n".join([*result.differences, *filter(None, [result.half])]))
+        print("\n".join([*result.differences, *filter(None, [result.half, result.other])]))
     elif result.half:
-        print(f"Every bit of {result.summary['ticks']} ticks agreed. {result.half}")
+        print(f"Every bit of {result.summary['ticks']} ticks agreed. {result.half} {result.other}".rstrip())
     else:
         print(f"Every bit of {result.summary['steps']} steps agreed: {result.summary['trajectory_sha256']}")
     if result.differences:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from typing import TYPE_CHECKING, Any
 
+from haploop.launch.processes.foreign import described
 from haploop.tools.render.terminal import console, make_facts, make_table, seen, told, verdict_style
 from haploop.tools.render.units import amount, fixed, parameters, spring
 
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from haploop.protocol.quantity import Quantity
     from haploop.protocol.transport.wire import Message
 
+_ITS_WORD = "That the {} does what the scene says is its own word; haploop replay holds it against the scene."
 # Entry of the summary, the count in it, and its words.
 _COUNTS = (
     ("lost", "commands_dropped", "commands dropped"),
@@ -66,6 +68,7 @@ def summary_table(summary: Summary) -> RenderableType:
         parts.append(Text(f"ended early: {summary['ended']}", style="bold red"))
     told_too = [*summary.get("not_made", ()), *filter(None, [summary["energy"].get("balance")])]
     parts += [Text(sentence, style="bold yellow") for sentence in told_too]
+    parts += [Text(_ITS_WORD.format(words.split()[0])) for words, _ in _programs(summary)]
     control_rate = summary["ticks"] / summary["duration_s"] if summary["duration_s"] else 1.0
     return Group(*parts, make_facts(_key_figures(summary)), _books(summary["energy"], control_rate))
 
@@ -202,11 +205,7 @@ def status_table(data: Message) -> RenderableType:
 
 def _programs(data: Message) -> list[tuple[str, str]]:
     """Returns role and program of what is not haploop's own, of a status or a summary."""
-    return [
-        (f"{role} not haploop's own", f"{' '.join(filter(None, (p['name'], p['version'])))} ({p['command']})")
-        for role, p in data.get("programs", {}).items()
-        if not p["own"]
-    ]
+    return [(f"{role} not haploop's own", described(p)) for role, p in data.get("programs", {}).items() if not p["own"]]
 
 
 def _nodes(nodes: list[Message], control_rate: float) -> Table:

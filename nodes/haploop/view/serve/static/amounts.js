@@ -49,3 +49,9 @@ export function axisNumbers(splits, step) {
   const digits = Math.max(2, 1 + magnitude(largest) - magnitude(step));
   return splits.map((value) => (value === 0 ? "0" : power(value, digits).replace("e+", "e")));
 }
+
+/** Name, version and command of a program that is not haploop's own, as far as it told them. */
+export function programName({ name, version, command }) {
+  const named = [name, version].filter(Boolean).join(" ") || "a program without a name";
+  return command ? `${named} (${command})` : named;
+}

@@ -1,6 +1,6 @@
 // What came of a run that has ended: the figures and books of its summary.json.
 
-import { amount, fixed, isNumber, NONE } from "./amounts.js";
+import { amount, fixed, isNumber, NONE, programName } from "./amounts.js";
 import { byId, make } from "./dom.js";
 import { isJudged, told } from "./header.js";
 
@@ -57,9 +57,8 @@ function figures({ duration_s, ended, extremes = {}, real_time_factor: factor, l
 
 /** Plant and controller where they are not haploop's own. */
 function foreign(programs = {}) {
-  const told = ({ name, version, command }) => `${[name, version].filter(Boolean).join(" ")} (${command})`;
   const strangers = Object.entries(programs).filter(([, program]) => !program.own);
-  return Object.fromEntries(strangers.map(([role, program]) => [`${role} not haploop's own`, told(program)]));
+  return Object.fromEntries(strangers.map(([role, program]) => [`${role} not haploop's own`, programName(program)]));
 }
 
 function rows(texts) {
